@@ -1,0 +1,73 @@
+"""The interface of a world: the only thing that knows the simulator.
+
+`SapienWorld` (`robospa.harness.sapien_world`) is the first implementation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robospa.protocol.policy import CameraSpec, PolicySpec
+from robospa.tasks.scene import Scene
+from robospa.tasks.snapshot import Snapshot
+
+Poll = Callable[[Snapshot], bool]
+"""Called at 50 Hz of simulated time; returning True ends the action at once."""
+
+
+class SceneUnstable(Exception):
+    """The scene did not come to rest: this seed is not valid."""
+
+
+class ActionError(Exception):
+    """The policy's action cannot be executed; the message says which part and why."""
+
+
+@dataclass(frozen=True)
+class StepResult:
+    """One executed action: how many physics steps it took, and whether the poll ended it."""
+
+    physics_steps: int
+    stopped: bool
+
+
+class World(Protocol):
+    """One simulated table with robot. Not thread-safe; one trial at a time."""
+
+    def load(self, scene: Scene, contacts: bool = False) -> None:
+        """Build `scene` afresh and settle it; nothing of an earlier trial survives.
+
+        `contacts`: fill `Snapshot.contacts` when polling (costs time). Raises SceneUnstable.
+        """
+
+    def step(self, action: NDArray[np.float32], space: str, poll: Poll) -> StepResult:
+        """Execute one policy action of `space` "joint", "ee" or "delta_ee"; raises ActionError."""
+        ...
+
+    def observe(self, spec: PolicySpec) -> dict[str, Any]:
+        """What `spec` asks for at this instant: see `robospa.protocol.policy`."""
+        ...
+
+    def render(self, camera: CameraSpec) -> NDArray[np.uint8]:
+        """One RGB image, uint8 of shape (height, width, 3)."""
+        ...
+
+    def snapshot(self) -> Snapshot:
+        """The state at this instant (contacts included if `load` was asked for them)."""
+        ...
+
+    def digest(self) -> str:
+        """Hash of the exact state (poses, velocities, joints): equal only if equal to the bit."""
+        ...
+
+    def info(self) -> Mapping[str, Any]:
+        """Simulator, version, device and renderer, for the run's manifest."""
+        ...
+
+    def close(self) -> None:
+        """Free the simulator's resources."""

@@ -1,0 +1,73 @@
+"""The trial record: the unit of everything that is counted. Imports nothing of ours."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+END_REASONS = (
+    "success",
+    "step_limit",
+    "policy_error",  # the policy answered something that cannot be executed: counts as a failure
+    "goal_lost",  # the goal can no longer be met (memory tasks)
+    "infrastructure",  # the trial could not be run: missing, never scored as a failure
+)
+
+
+@dataclass(frozen=True, order=True)
+class TrialKey:
+    """What a trial is. The same key and the same actions give the same record."""
+
+    task: str
+    level: int
+    seed: int
+    embodiment: str = "aloha-agilex"
+    mode: str = "clean"
+    split: str = "heldout"
+
+    @property
+    def variant(self) -> tuple[str, int]:
+        """(task, level)."""
+        return (self.task, self.level)
+
+    @property
+    def slug(self) -> str:
+        """A file name for what belongs to this trial."""
+        return f"{self.task}-L{self.level}-{self.seed}-{self.embodiment}-{self.mode}-{self.split}"
+
+
+@dataclass(frozen=True)
+class TrialRecord:
+    """One finished trial. Times in seconds, latencies in milliseconds.
+
+    `end` is one of END_REASONS and `message` says why where that needs words. `done` of `total`
+    subtasks hold at the end, `best` is the most that ever held at once. `events` are plain dicts
+    (see `robospa.tasks.events`). `digest` is the world's final state, `scene_digest` the start's,
+    `actions_digest` the hash of all executed actions. `latency` has p50, p95, p99 and max.
+    """
+
+    key: TrialKey
+    category: str
+    instruction: str
+    scene_digest: str
+    end: str
+    success: bool
+    done: int
+    best: int
+    total: int
+    candidates: int
+    steps: int
+    physics_steps: int
+    policy_calls: int
+    digest: str
+    actions_digest: str
+    wall_time: float
+    policy_seed: int = 0
+    message: str = ""
+    attempts: int = 1
+    events: tuple[Mapping[str, Any], ...] = ()
+    latency: Mapping[str, float] = field(default_factory=dict)
+    timing: Mapping[str, float] = field(default_factory=dict)
+    diagnostics: Mapping[str, Any] = field(default_factory=dict)
+    video: str = ""

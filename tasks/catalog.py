@@ -1,0 +1,82 @@
+"""The list of tasks, and the one way to build a scene."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib
+from functools import cache
+
+import numpy as np
+
+from robospa.tasks.scene import SUITE, Scene
+from robospa.tasks.task import Task
+
+MODULES = (
+    "pick_blocks_size",
+    "pick_mixed_objects_distance_b",
+    "pick_mixed_objects_canonical_a",
+    "pick_soaps_relational",
+    "pick_mixed_objects_multi_view_a",
+    "press_stapler_repeat",
+    "put_bottles_dustbin",
+    "stack_blocks_color_order",
+    "click_can_place_items",
+    "remember_color_cover",
+)
+"""One module of `robospa.tasks.variants` a task, in the paper's order; each defines TASK."""
+
+LEVELS = (1, 2, 3, 4, 5)
+
+
+@cache
+def tasks() -> dict[str, Task]:
+    """All tasks by official name, in the paper's order."""
+    found = [importlib.import_module(f"robospa.tasks.variants.{m}").TASK for m in MODULES]
+    return {task.name: task for task in found}
+
+
+def task(name: str) -> Task:
+    """The task called `name` (case and underscores do not matter); KeyError with near matches."""
+    import difflib
+
+    def plain(text: str) -> str:
+        return text.lower().replace("_", "").replace(" ", "").replace("-", "")
+
+    known = {plain(n): t for n, t in tasks().items()}
+    if plain(name) in known:
+        return known[plain(name)]
+    near = difflib.get_close_matches(plain(name), list(known), n=3, cutoff=0.5)
+    hint = ", ".join(known[n].name for n in near) or "see `robospa tasks`"
+    raise KeyError(f"no task {name!r}; did you mean {hint}?")
+
+
+def build_scene(
+    name: str,
+    level: int,
+    seed: int,
+    embodiment: str = "aloha-agilex",
+    mode: str = "clean",
+) -> Scene:
+    """The scene of one trial: a pure function of its arguments.
+
+    All randomness comes from one generator seeded by (suite, task, level, seed); the embodiment
+    does not enter, so that every robot meets the same scenes.
+    """
+    found = task(name)
+    if level not in found.levels:
+        raise ValueError(f"{found.name} has levels {sorted(found.levels)}, not {level}")
+    if mode != "clean":
+        raise ValueError(f"scene mode {mode!r} is not built yet; use 'clean'")
+    text = f"{SUITE}/{found.name}/{level}/{seed}".encode()
+    entropy = int.from_bytes(hashlib.sha256(text).digest()[:16], "big")
+    draft = found.draw(level, np.random.Generator(np.random.PCG64(entropy)))
+    return Scene(
+        task=found.name,
+        level=level,
+        seed=seed,
+        embodiment=embodiment,
+        mode=mode,
+        objects=draft.objects,
+        facts=draft.facts,
+        table_shift=draft.table_shift,
+    )

@@ -1,0 +1,118 @@
+"""Poses and the little rotation algebra that scenes, goals and skills share.
+
+Positions are metres in the world frame (x right, y away from the robot, z up); rotations are unit
+quaternions in the order w, x, y, z. Everything here is plain numpy: no simulator, no global state.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Vec3 = tuple[float, float, float]
+Quat = tuple[float, float, float, float]
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Pose:
+    """A rigid transform: `position` [m] and `rotation` (unit quaternion, wxyz)."""
+
+    position: Vec3 = (0.0, 0.0, 0.0)
+    rotation: Quat = (1.0, 0.0, 0.0, 0.0)
+
+    def __mul__(self, other: Pose) -> Pose:
+        """The pose of `other`'s frame when `other` is given in this pose's frame."""
+        return Pose(self.apply(other.position), multiply(self.rotation, other.rotation))
+
+    def apply(self, point: ArrayLike) -> Vec3:
+        """`point` [m] of this pose's frame, expressed in the parent frame."""
+        x, y, z = rotate(self.rotation, point)
+        px, py, pz = self.position
+        return (px + x, py + y, pz + z)
+
+    def inverse(self) -> Pose:
+        """The transform that undoes this one."""
+        w, x, y, z = self.rotation
+        back: Quat = (w, -x, -y, -z)
+        px, py, pz = rotate(back, self.position)
+        return Pose((-px, -py, -pz), back)
+
+
+def multiply(a: Quat, b: Quat) -> Quat:
+    """Hamilton product a*b of two wxyz quaternions."""
+    aw, ax, ay, az = a
+    bw, bx, by, bz = b
+    return (
+        aw * bw - ax * bx - ay * by - az * bz,
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
+    )
+
+
+def rotate(q: Quat, v: ArrayLike) -> Vec3:
+    """Vector `v` turned by the unit quaternion `q`."""
+    w, x, y, z = q
+    vx, vy, vz = (float(c) for c in np.asarray(v, dtype=float))
+    tx, ty, tz = 2 * (y * vz - z * vy), 2 * (z * vx - x * vz), 2 * (x * vy - y * vx)
+    return (
+        vx + w * tx + y * tz - z * ty,
+        vy + w * ty + z * tx - x * tz,
+        vz + w * tz + x * ty - y * tx,
+    )
+
+
+def yaw_rotation(yaw: float) -> Quat:
+    """Rotation by `yaw` [rad] about the world's z axis."""
+    return (math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2))
+
+
+def axis_rotation(axis: ArrayLike, angle: float) -> Quat:
+    """Rotation by `angle` [rad] about `axis` (need not be unit length)."""
+    x, y, z = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
+    s = math.sin(angle / 2)
+    return (math.cos(angle / 2), float(x) * s, float(y) * s, float(z) * s)
+
+
+def to_matrix(q: Quat) -> Array:
+    """3x3 rotation matrix of a unit quaternion."""
+    w, x, y, z = q
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def from_matrix(m: Array) -> Quat:
+    """Unit quaternion (wxyz, w >= 0) of a 3x3 rotation matrix."""
+    trace = float(m[0, 0] + m[1, 1] + m[2, 2])
+    if trace > 0:
+        s = 2 * math.sqrt(1 + trace)
+        q = [s / 4, (m[2, 1] - m[1, 2]) / s, (m[0, 2] - m[2, 0]) / s, (m[1, 0] - m[0, 1]) / s]
+    else:
+        i = int(np.argmax(np.diag(m)))
+        j, k = (i + 1) % 3, (i + 2) % 3
+        s = 2 * math.sqrt(max(1e-12, 1 + m[i, i] - m[j, j] - m[k, k]))
+        q = [(m[k, j] - m[j, k]) / s, 0.0, 0.0, 0.0]
+        q[1 + i], q[1 + j], q[1 + k] = s / 4, (m[j, i] + m[i, j]) / s, (m[k, i] + m[i, k]) / s
+    quat = np.array(q) / np.linalg.norm(q)
+    if quat[0] < 0:
+        quat = -quat
+    return (float(quat[0]), float(quat[1]), float(quat[2]), float(quat[3]))
+
+
+def look_rotation(x_axis: ArrayLike, y_axis: ArrayLike) -> Quat:
+    """Rotation whose x axis is `x_axis` and whose y axis is as near to `y_axis` as possible."""
+    x = np.asarray(x_axis, dtype=float)
+    x = x / np.linalg.norm(x)
+    y = np.asarray(y_axis, dtype=float)
+    y = y - x * float(x @ y)
+    y = y / np.linalg.norm(y)
+    return from_matrix(np.stack([x, y, np.cross(x, y)], axis=1))

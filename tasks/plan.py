@@ -1,0 +1,83 @@
+"""Plans are data: a task's expert is a tuple of skill calls computed from its scene.
+
+`robospa.harness.skills` turns each call into joint targets. Objects are named as in the scene;
+`arm` None lets the skill choose. Lengths are metres, positions are in the world frame.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from robospa.tasks.geometry import Vec3
+
+
+@dataclass(frozen=True)
+class Pick:
+    """Grasp `object` and raise it by `lift`."""
+
+    object: str
+    lift: float = 0.12
+    arm: str | None = None
+
+
+@dataclass(frozen=True)
+class Place:
+    """Put the held `object` down with its origin at `position` (upright), release and retreat.
+
+    `on` names an object to place onto instead: then `position` is an offset in its "support" frame
+    as it lies at that moment. `drop` lets go that far above. `yaw` [rad] turns the object about z
+    in the world; None leaves it as it comes.
+    """
+
+    object: str
+    position: Vec3 = (0.0, 0.0, 0.0)
+    on: str | None = None
+    drop: float = 0.003
+    yaw: float | None = None
+    retreat: float = 0.08
+    arm: str | None = None
+
+
+@dataclass(frozen=True)
+class Press:
+    """Touch the "press" frame of `object` with the closed gripper from above, then come back up."""
+
+    object: str
+    frame: str = "press"
+    hover: float = 0.06
+    arm: str | None = None
+
+
+@dataclass(frozen=True)
+class Handover:
+    """Pass the held `object` from one arm to the other near the table's middle."""
+
+    object: str
+    to: str
+
+
+@dataclass(frozen=True)
+class Drop:
+    """Carry the held `object` over the container `into` and open the gripper above its mouth."""
+
+    object: str
+    into: str
+    height: float = 0.12
+    arm: str | None = None
+
+
+@dataclass(frozen=True)
+class Wait:
+    """Hold still for `seconds` of simulated time."""
+
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Home:
+    """Bring `arm` (None: both) back to its home joints."""
+
+    arm: str | None = None
+
+
+Skill = Pick | Place | Press | Handover | Drop | Wait | Home

@@ -1,0 +1,90 @@
+"""A scene is a value: what lies where when a trial starts, and nothing else.
+
+Scenes are frozen, compare by value, survive JSON both ways and carry a digest of their canonical
+form. They know asset names, not meshes: `robospa.tasks.objects.object_model` turns an asset name
+and its parameters into shapes.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from robospa.tasks.geometry import Pose
+
+SUITE = "robospa-1"
+"""Version of the scenes: a change to any of them needs a new one."""
+
+TABLE_TOP = 0.74
+"""Height of the table's surface [m] (official infrastructure)."""
+
+
+@dataclass(frozen=True)
+class SceneObject:
+    """One object of a scene.
+
+    `name` identifies it inside the scene and gives no hint of its role. `pose` is the pose of its
+    body frame at the start. A `fixed` object cannot move. An object with `appears_at` [s of
+    simulated time after the start] does not exist before that.
+    """
+
+    name: str
+    asset: str
+    pose: Pose
+    params: Mapping[str, Any] = field(default_factory=dict)
+    fixed: bool = False
+    appears_at: float | None = None
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Everything that a world needs to load a trial and that a goal or a plan needs to judge it.
+
+    `facts` holds what the task drew (target, order, reference, directions...): JSON values, read
+    by the task's own goal, plan and instruction slots. `table_shift` moves the table in x, y [m].
+    """
+
+    task: str
+    level: int
+    seed: int
+    embodiment: str
+    mode: str
+    objects: tuple[SceneObject, ...]
+    facts: Mapping[str, Any]
+    table_shift: tuple[float, float] = (0.0, 0.0)
+    suite: str = SUITE
+
+    def object(self, name: str) -> SceneObject:
+        """The object called `name`; KeyError, naming what exists, if there is none."""
+        for item in self.objects:
+            if item.name == name:
+                return item
+        raise KeyError(f"no object {name!r} in this scene; it has {[o.name for o in self.objects]}")
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain JSON values; `from_json` is the inverse."""
+        return json.loads(json.dumps(asdict(self)))
+
+    @staticmethod
+    def from_json(data: Mapping[str, Any]) -> Scene:
+        """The scene that `to_json` wrote."""
+        objects = tuple(
+            SceneObject(
+                **{
+                    **item,
+                    "pose": Pose(tuple(item["pose"]["position"]), tuple(item["pose"]["rotation"])),
+                }
+            )
+            for item in data["objects"]
+        )
+        shift = data["table_shift"]
+        return Scene(**{**data, "objects": objects, "table_shift": (shift[0], shift[1])})
+
+    @property
+    def digest(self) -> str:
+        """Hash of the canonical JSON form: equal digests mean equal scenes."""
+        text = json.dumps(self.to_json(), sort_keys=True, separators=(",", ":"))
+        return hashlib.sha256(text.encode()).hexdigest()[:16]

@@ -1,0 +1,108 @@
+"""What an object is made of: shapes to draw and to collide with, and the frames that skills use.
+
+All values are in the object's body frame: z up when the object stands on the table as placed.
+The origin is the centre of the underside for modelled objects and the centre for box primitives
+(asset `block`), as in the official assets, because official height thresholds are on origins.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from robospa.tasks.geometry import Pose, Vec3
+
+Color = tuple[float, float, float]
+"""Linear RGB, each 0..1."""
+
+
+@dataclass(frozen=True)
+class Box:
+    """`half` sizes [m] along x, y, z."""
+
+    half: Vec3
+
+
+@dataclass(frozen=True)
+class Sphere:
+    """`radius` [m]."""
+
+    radius: float
+
+
+@dataclass(frozen=True)
+class Cylinder:
+    """Along z: `radius` and `half_length` [m]."""
+
+    radius: float
+    half_length: float
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """Triangles: `vertices` [m], `faces` as index triples, counter-clockwise seen from outside.
+
+    As a collision shape its convex hull is used.
+    """
+
+    vertices: tuple[Vec3, ...]
+    faces: tuple[tuple[int, int, int], ...]
+
+
+Geometry = Box | Sphere | Cylinder | Mesh
+
+
+@dataclass(frozen=True)
+class Shape:
+    """One piece of a body: drawn if `visual`, felt if `collision`."""
+
+    geometry: Geometry
+    pose: Pose = Pose()
+    color: Color = (0.8, 0.8, 0.8)
+    visual: bool = True
+    collision: bool = True
+    roughness: float = 0.5
+    metallic: float = 0.0
+
+
+@dataclass(frozen=True)
+class Grasp:
+    """A way to take an object between two parallel fingers.
+
+    `point` [m] lies between the fingertips; `approach` is the unit direction in which the gripper
+    advances; `closing` the unit direction in which the fingers close (either sign is the same
+    grasp); `width` [m] is the object's size along it. `tilt` [rad] is how far the approach may be
+    turned about `closing`, either way, without spoiling the grasp.
+    """
+
+    point: Vec3
+    approach: Vec3
+    closing: Vec3
+    width: float
+    tilt: float = 0.7
+
+
+@dataclass(frozen=True)
+class ObjectModel:
+    """A body: shapes, mass, and the frames that scenes, goals and skills need.
+
+    `radius` [m] bounds the footprint around the origin, `size` [m] is the bounding box (x, y, z),
+    `bottom` [m] is the lowest z of the body frame (0 for modelled objects, -half for boxes), so
+    an object at rest on the table has origin height TABLE_TOP - bottom.
+    `frames` holds named frames: "press" (z axis out of the surface to be pressed), "support" (where
+    something is put on it, z up), "click"...
+    `noun` is the plain English noun; `phrases` are noun phrases without article that describe
+    this very look ("red stapler"), at least four, the last third kept for held-out instructions.
+    """
+
+    asset: str
+    shapes: tuple[Shape, ...]
+    size: Vec3
+    radius: float
+    noun: str
+    phrases: tuple[str, ...] = ()
+    bottom: float = 0.0
+    mass: float = 0.05
+    friction: float = 0.5
+    grasps: tuple[Grasp, ...] = ()
+    frames: Mapping[str, Pose] = field(default_factory=dict)

@@ -1,0 +1,57 @@
+"""The state of the world at one instant, as goals and experts see it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from robospa.tasks.geometry import Pose, Vec3
+
+ARMS = ("left", "right")
+
+GRIPPER_OPEN = 0.8
+"""A commanded gripper above this is open (official predicate)."""
+GRIPPER_CLOSED = 0.2
+"""A commanded gripper below this is closed (official predicate)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """Two touching bodies and one point of contact [m, world frame].
+
+    Bodies are object names, "table", "left_gripper", "right_gripper", "left_arm", "right_arm".
+    """
+
+    first: str
+    second: str
+    point: Vec3
+
+
+@dataclass(frozen=True, slots=True)
+class Snapshot:
+    """One instant. `time` [s] counts simulated time since the trial's start.
+
+    `poses` has every object that exists at this instant. `gripper` is the *commanded* opening
+    (0 closed .. 1 open) of left and right; `end_effector` the pose of each arm's end-effector
+    frame (x axis = approach, 0.12 m behind the grasp centre); `joints` the commanded arm joints
+    [rad] of left and right, `measured` the measured ones. `contacts` is filled only for goals that
+    ask for it (`Tracker.needs_contacts`).
+    """
+
+    time: float
+    poses: Mapping[str, Pose]
+    gripper: tuple[float, float]
+    end_effector: tuple[Pose, Pose]
+    joints: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())
+    measured: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())
+    contacts: tuple[Contact, ...] = field(default=())
+
+    def gripper_contacts(self, name: str) -> list[Contact]:
+        """Contacts between any gripper and the object called `name`."""
+        grippers = ("left_gripper", "right_gripper")
+        return [
+            c
+            for c in self.contacts
+            if (c.first in grippers and c.second == name)
+            or (c.second in grippers and c.first == name)
+        ]

@@ -1,0 +1,71 @@
+"""What a task is: facts per level and three pure functions of its scene."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from robospa.tasks.events import Event
+from robospa.tasks.plan import Skill
+from robospa.tasks.scene import Scene, SceneObject
+from robospa.tasks.snapshot import Snapshot
+
+
+class Tracker(Protocol):
+    """A goal as a state machine over snapshots; see `robospa.tasks.goals`.
+
+    `start` is called once with the settled scene, `update` at 50 Hz of simulated time from the
+    first action on. `update` returns the events of this instant (usually none).
+    """
+
+    total: int
+    needs_contacts: bool
+
+    def start(self, snapshot: Snapshot) -> tuple[Event, ...]: ...
+
+    def update(self, snapshot: Snapshot) -> tuple[Event, ...]: ...
+
+
+@dataclass(frozen=True)
+class Draft:
+    """What a task draws for a seed: its objects, its facts and, rarely, a shifted table."""
+
+    objects: tuple[SceneObject, ...]
+    facts: Mapping[str, Any]
+    table_shift: tuple[float, float] = (0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Level:
+    """`candidates` is the paper's n, `subtasks` its T, `steps` the limit in policy actions."""
+
+    candidates: int
+    subtasks: int
+    steps: int
+
+
+@dataclass(frozen=True)
+class Task:
+    """A base task. `draw`, `goal`, `plan` and `slots` are pure functions.
+
+    `slots(scene)` gives, for every placeholder of the task's templates, the phrasings that may
+    fill it: `{slot: (train phrasings, held-out phrasings)}`, each a non-empty tuple.
+    """
+
+    name: str
+    category: str
+    levels: Mapping[int, Level]
+    draw: Callable[[int, np.random.Generator], Draft]
+    goal: Callable[[Scene], Tracker]
+    plan: Callable[[Scene], tuple[Skill, ...]]
+    slots: Callable[[Scene], Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]]]
+    summary: str
+    success: str
+
+    @property
+    def dimension(self) -> str:
+        """ "spatial" or "procedural"."""
+        return "spatial" if self.category in ("GAC", "SDE", "CPI", "RRR", "CVR") else "procedural"
