@@ -1,0 +1,97 @@
+"""Aloha-AgileX: two ARX arms side by side, the benchmark's default embodiment.
+
+Joint origins, axes and sizes are the fact sheet's (public description of the robot); joint limits
+are those of the same arm's own description, since the two-arm one leaves them open. Link shapes
+are ours: boxes and cylinders fitted to the listed sizes.
+"""
+
+from __future__ import annotations
+
+import math
+
+from robospa.harness.robots.aloha_agilex_shapes import FINGER_SHAPES, LINK_SHAPES, STAND_SHAPES
+from robospa.harness.robots.embodiment import Arm, Embodiment, Joint, StaticCamera
+from robospa.tasks.geometry import Pose, Vec3, axis_rotation, look_rotation, yaw_rotation
+
+PI = math.pi
+FLIP = axis_rotation((1, 0, 0), -PI)
+LEVEL = (1.0, 0.0, 0.0, 0.0)
+
+# (origin xyz, origin rotation, axis, lower, upper) of joints 1 to 6
+CHAIN: tuple[tuple[Vec3, tuple[float, float, float, float], Vec3, float, float], ...] = (
+    ((0.0, 0.0, 0.0603), LEVEL, (0, 0, 1), -PI, PI),
+    ((0.02, 0.0, 0.0402), LEVEL, (0, 1, 0), -0.05, 3.4),
+    ((-0.264, 0.0, 0.0), FLIP, (0, 1, 0), -0.05, 3.4),
+    ((0.245, 0.0, -0.056), LEVEL, (0, 1, 0), -PI / 2, PI / 2),
+    ((0.06575, -0.001, -0.0825), LEVEL, (0, 0, 1), -1.67, 1.67),
+    ((0.02845, 0.0, 0.0825), FLIP, (1, 0, 0), -PI / 2 - 0.1, PI / 2 + 0.1),
+)
+FINGER_TRAVEL = 0.04765
+GRASP_CENTRE = 0.145  # along the last link's x axis
+REACH = 0.12  # from the end-effector frame to the grasp centre (gripper_bias)
+
+READY = (0.0, 1.6, 1.5, 0.0, 0.0, 0.0)
+SEEDS = (
+    READY,
+    (0.0, 2.2, 1.6, -0.9, 0.0, 0.0),
+    (0.0, 1.2, 1.2, 1.2, 0.0, 0.0),
+    (0.0, 2.2, 1.2, 0.3, 0.0, 0.0),
+)
+
+
+def _arm(name: str, prefix: str, base: Vec3) -> Arm:
+    links = [f"{prefix}_base_link", *(f"{prefix}_link{i}" for i in range(1, 9))]
+    joints = tuple(
+        Joint(f"{prefix}_joint{i + 1}", links[i], links[i + 1], Pose(xyz, rot), axis, low, high)
+        for i, (xyz, rot, axis, low, high) in enumerate(CHAIN)
+    )
+    fingers = tuple(
+        Joint(
+            f"{prefix}_joint{7 + i}",
+            links[6],
+            links[7 + i],
+            Pose((0.073574, side * 0.024629, 0.0)),
+            (0.0, side, 0.0),
+            0.0,
+            FINGER_TRAVEL,
+            "prismatic",
+        )
+        for i, side in enumerate((1.0, -1.0))
+    )
+    shapes = dict(zip(links, (*LINK_SHAPES, *FINGER_SHAPES), strict=True))
+    return Arm(
+        name=name,
+        base=Pose(base, yaw_rotation(PI / 2)),
+        base_link=links[0],
+        joints=joints,
+        fingers=fingers,
+        gripper=(-0.01, 0.045),
+        tool=Pose((GRASP_CENTRE - REACH, 0.0, 0.0)),
+        reach=REACH,
+        home=(0.0,) * 6,
+        seeds=SEEDS,
+        shapes=shapes,
+        # above the gripper, looking along the fingers so that both tips and what is between them
+        # are in the lower half of the picture
+        camera=Pose((-0.03, 0.0, 0.075), axis_rotation((0, 1, 0), math.radians(22))),
+    )
+
+
+def _looking(position: Vec3, forward: Vec3, left: Vec3, fov_degrees: float) -> StaticCamera:
+    return StaticCamera(Pose(position, look_rotation(forward, left)), math.radians(fov_degrees))
+
+
+# The robot stands at (0, -0.65, 0) turned by 90 degrees; the bases below are in the world frame.
+ALOHA_AGILEX = Embodiment(
+    name="aloha-agilex",
+    arms=(
+        _arm("left", "fl", (-0.3, -0.417, 0.7775)),
+        _arm("right", "fr", (0.307, -0.417, 0.7775)),
+    ),
+    cameras={
+        "head": _looking((-0.032, -0.45, 1.35), (0, 0.6, -0.8), (-1, 0, 0), 37),
+        "front": _looking((0.0, -0.45, 0.85), (0, 1, -0.1), (-1, 0, 0), 37),
+        "third": _looking((0.0, 0.23, 1.33), (0, -1, -1.02), (1, 0, 0), 93),
+    },
+    body=STAND_SHAPES,
+)

@@ -1,0 +1,94 @@
+"""A two-armed robot as data: joint chains, link shapes, grippers and camera mounts.
+
+Adding a robot means writing one module like `aloha_agilex.py`; nothing else changes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from robospa.tasks.geometry import Pose, Vec3
+from robospa.tasks.shapes import Shape
+
+
+@dataclass(frozen=True)
+class Joint:
+    """`origin` places the joint's frame in its parent link; `axis` is in the joint's frame.
+
+    Limits are radians for "revolute" and metres for "prismatic" joints.
+    """
+
+    name: str
+    parent: str
+    child: str
+    origin: Pose
+    axis: Vec3
+    lower: float
+    upper: float
+    kind: str = "revolute"
+
+
+@dataclass(frozen=True)
+class Arm:
+    """One arm with a parallel gripper.
+
+    `base` is the world pose of the first link. `joints` are the arm's own joints in order,
+    `fingers` the prismatic ones, both driven to the same travel. `gripper` gives that travel [m]
+    commanded for 0 (closed) and 1 (open). `tool` is the end-effector frame in the last arm link:
+    x is the approach direction, y the closing direction, the grasp centre lies `reach` [m] ahead.
+    `home` are joint angles [rad]; `seeds` are postures from which inverse kinematics starts.
+    `shapes` maps every link to what it is made of, in its frame.
+    """
+
+    name: str
+    base: Pose
+    base_link: str
+    joints: tuple[Joint, ...]
+    fingers: tuple[Joint, ...]
+    gripper: tuple[float, float]
+    tool: Pose
+    reach: float
+    home: tuple[float, ...]
+    seeds: tuple[tuple[float, ...], ...]
+    shapes: Mapping[str, tuple[Shape, ...]]
+    camera: Pose
+    """Wrist camera in the last arm link: x looks forward, z is up in the image."""
+
+    @property
+    def links(self) -> tuple[str, ...]:
+        """All link names, base first, in creation order."""
+        return (self.base_link, *(j.child for j in (*self.joints, *self.fingers)))
+
+    @property
+    def last_link(self) -> str:
+        """The link that carries the gripper and the wrist camera."""
+        return self.joints[-1].child
+
+
+@dataclass(frozen=True)
+class StaticCamera:
+    """A camera fixed in the world: x of `pose` looks forward, z is up; `fov` is vertical [rad]."""
+
+    pose: Pose
+    fov: float
+
+
+@dataclass(frozen=True)
+class Embodiment:
+    """A robot: two arms and its fixed cameras. `stiffness` and `damping` are the drives'."""
+
+    name: str
+    arms: tuple[Arm, Arm]
+    cameras: Mapping[str, StaticCamera]
+    stiffness: float = 1000.0
+    damping: float = 200.0
+    link_mass: float = 1.0
+    wrist_fov: float = 0.6457718
+    body: tuple[Shape, ...] = field(default=())
+    """What stands still beside the arms (stand, columns), in the world frame: only drawn."""
+
+    @property
+    def action_dim(self) -> int:
+        """Length of a joint action: both arms' joints and one gripper value each."""
+        return sum(len(arm.joints) + 1 for arm in self.arms)

@@ -1,0 +1,171 @@
+"""Forward and inverse kinematics of one arm in plain numpy, many poses at a time.
+
+Damped least squares on the end-effector pose, started from a few postures aimed at the target, for
+N targets at once: that costs little more than one. No simulator, no global state: the same
+arguments give the same bits on one machine.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robospa.harness.robots.embodiment import Arm
+from robospa.tasks.geometry import Pose, from_matrix, to_matrix
+
+Array = NDArray[np.float64]
+
+POSITION_TOLERANCE = 5e-4  # [m]
+ROTATION_TOLERANCE = 3e-3  # [rad]
+ITERATIONS = 60
+DAMPING = 1e-3
+STEP_LIMIT = 0.35  # [rad] per iteration and joint, keeps far starts from jumping
+
+
+@dataclass(frozen=True)
+class Chain:
+    """An arm's joints as arrays, in the world frame. Build once with `chain_of`."""
+
+    base: Array  # (4, 4)
+    origins: Array  # (J, 4, 4)
+    axes: Array  # (J, 3)
+    tool: Array  # (4, 4)
+    lower: Array  # (J,)
+    upper: Array  # (J,)
+    seeds: Array  # (S, J)
+
+
+def matrix(pose: Pose) -> Array:
+    """4x4 homogeneous transform of a pose."""
+    out = np.eye(4)
+    out[:3, :3] = to_matrix(pose.rotation)
+    out[:3, 3] = pose.position
+    return out
+
+
+def pose_of(transform: Array) -> Pose:
+    """Pose of a 4x4 homogeneous transform."""
+    x, y, z = (float(v) for v in transform[:3, 3])
+    return Pose((x, y, z), from_matrix(transform[:3, :3]))
+
+
+def chain_of(arm: Arm) -> Chain:
+    """The arm's joints as arrays, ending in its end-effector frame."""
+    return Chain(
+        base=matrix(arm.base),
+        origins=np.stack([matrix(j.origin) for j in arm.joints]),
+        axes=np.array([j.axis for j in arm.joints], dtype=float),
+        tool=matrix(arm.tool),
+        lower=np.array([j.lower for j in arm.joints]),
+        upper=np.array([j.upper for j in arm.joints]),
+        seeds=np.array(arm.seeds, dtype=float),
+    )
+
+
+def _rotations(axis: Array, angles: Array) -> Array:
+    """(N, 4, 4) rotations about one unit axis (Rodrigues)."""
+    x, y, z = axis
+    k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    out = np.zeros((len(angles), 4, 4))
+    s, c = np.sin(angles)[:, None, None], (1 - np.cos(angles))[:, None, None]
+    out[:, :3, :3] = np.eye(3) + s * k + c * (k @ k)
+    out[:, 3, 3] = 1
+    return out
+
+
+def forward(chain: Chain, joints: Array) -> tuple[Array, Array]:
+    """End-effector transforms (N, 4, 4) and geometric Jacobians (N, 6, J) of joints (N, J)."""
+    count, width = joints.shape
+    frame = np.broadcast_to(chain.base, (count, 4, 4))
+    points, axes = [], []
+    for i in range(width):
+        frame = frame @ chain.origins[i]
+        points.append(frame[:, :3, 3])
+        axes.append(frame[:, :3, :3] @ chain.axes[i])
+        frame = frame @ _rotations(chain.axes[i], joints[:, i])
+    frame = frame @ chain.tool
+    axis = np.stack(axes, axis=2)  # (N, 3, J)
+    arm = frame[:, :3, 3:4] - np.stack(points, axis=2)
+    linear = np.cross(axis, arm, axis=1)
+    return frame, np.concatenate([linear, axis], axis=1)
+
+
+def end_effector(chain: Chain, joints: Sequence[float]) -> Pose:
+    """Pose of the end-effector frame in the world at `joints` [rad]."""
+    return pose_of(forward(chain, np.asarray(joints, dtype=float)[None])[0][0])
+
+
+def _errors(frame: Array, target: Array) -> Array:
+    """(N, 6) position and rotation-vector errors from frames to targets."""
+    turn = target[:, :3, :3] @ frame[:, :3, :3].transpose(0, 2, 1)
+    vector = np.stack(
+        [
+            turn[:, 2, 1] - turn[:, 1, 2],
+            turn[:, 0, 2] - turn[:, 2, 0],
+            turn[:, 1, 0] - turn[:, 0, 1],
+        ],
+        axis=1,
+    )
+    sine = np.linalg.norm(vector, axis=1) / 2
+    cosine = (np.trace(turn, axis1=1, axis2=2) - 1) / 2
+    angle = np.arctan2(sine, cosine)
+    scale = np.where(sine > 1e-6, angle / np.maximum(2 * sine, 1e-12), 0.5)
+    return np.concatenate([target[:, :3, 3] - frame[:, :3, 3], vector * scale[:, None]], axis=1)
+
+
+def _descend(chain: Chain, targets: Array, joints: Array) -> tuple[Array, Array]:
+    """Damped least squares from `joints` (N, J); returns joints and which of them arrived (N,)."""
+    lower, upper = chain.lower, chain.upper
+    width = joints.shape[1]
+    joints = joints.copy()
+    arrived = np.zeros(len(joints), dtype=bool)
+    active = np.arange(len(joints))
+    damping = DAMPING * np.eye(width)
+    for _ in range(ITERATIONS):
+        frame, jacobian = forward(chain, joints[active])
+        error = _errors(frame, targets[active])
+        near = (np.abs(error[:, :3]).max(axis=1) < POSITION_TOLERANCE) & (
+            np.abs(error[:, 3:]).max(axis=1) < ROTATION_TOLERANCE
+        )
+        arrived[active[near]] = True
+        active, error, jacobian = active[~near], error[~near], jacobian[~near]
+        if not len(active):
+            break
+        transposed = jacobian.transpose(0, 2, 1)
+        step = np.linalg.solve(transposed @ jacobian + damping, transposed @ error[:, :, None])
+        change = np.clip(step[:, :, 0], -STEP_LIMIT, STEP_LIMIT)
+        joints[active] = np.clip(joints[active] + change, lower, upper)
+    return joints, arrived
+
+
+def inverse(
+    chain: Chain, targets: Sequence[Pose], near: Sequence[float] | None = None
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Joints (N, J) [rad] that bring the end-effector frame to each target, and success (N,).
+
+    With `near` only the solution reached from those joints counts, so that it stays on the same
+    branch; otherwise every posture of the arm's `seeds`, aimed at the target, is tried and
+    the one that arrives nearest to its start is taken. A target that is out of reach or beyond the
+    joint limits has success False and the best joints found.
+    """
+    wanted = np.stack([matrix(t) for t in targets])
+    count = len(targets)
+    if near is not None:
+        start = np.broadcast_to(np.asarray(near, dtype=float), (count, len(chain.axes)))
+        return _descend(chain, wanted, start)
+    local = np.linalg.inv(chain.base) @ wanted
+    aim = np.arctan2(local[:, 1, 3], local[:, 0, 3])
+    seeds = np.repeat(chain.seeds[None], count, axis=0)  # (N, S, J)
+    seeds[:, :, 0] += aim[:, None]
+    many = seeds.shape[1]
+    joints, arrived = _descend(
+        chain, np.repeat(wanted, many, axis=0), seeds.reshape(count * many, -1)
+    )
+    joints, arrived = joints.reshape(count, many, -1), arrived.reshape(count, many)
+    cost = np.abs(joints - seeds).sum(axis=2) + np.where(arrived, 0.0, 1e6)
+    best = np.argmin(cost, axis=1)
+    rows = np.arange(count)
+    return joints[rows, best], arrived[rows, best]
