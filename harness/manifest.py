@@ -1,0 +1,167 @@
+"""`run.json`: what a run is made of, written once at its start and compared on resume.
+
+`settings` decide the result and may not change; `about` describes the machine and is only kept.
+The list of trials is fixed here, before the first one runs.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import platform
+import subprocess
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from robospa.harness.store import replace_file
+from robospa.results.reading import MANIFEST, RunError, manifest_keys, read_manifest
+from robospa.results.records import TrialKey
+
+FORMAT = 1
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """A run's `settings`, its fixed `keys` and what is known `about` where it ran."""
+
+    settings: Mapping[str, Any]
+    keys: tuple[TrialKey, ...]
+    about: Mapping[str, Any]
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain JSON values."""
+        return {
+            "format": FORMAT,
+            "settings": json.loads(json.dumps(self.settings)),
+            "seed_hash": seed_hash(self.keys),
+            "trials": group_keys(self.keys),
+            "about": json.loads(json.dumps(self.about, default=str)),
+        }
+
+
+def group_keys(keys: Iterable[TrialKey]) -> list[dict[str, Any]]:
+    """The trial list, one row a variant: `{"task", "level", ..., "seeds": [...]}`."""
+    rows: dict[tuple[Any, ...], list[int]] = {}
+    for key in keys:
+        row = (key.task, key.level, key.embodiment, key.mode, key.split)
+        rows.setdefault(row, []).append(key.seed)
+    names = ("task", "level", "embodiment", "mode", "split")
+    return [{**dict(zip(names, row, strict=True)), "seeds": s} for row, s in rows.items()]
+
+
+def seed_hash(keys: Iterable[TrialKey]) -> str:
+    """Hash of the set of trials: equal only if two runs list exactly the same ones."""
+    text = "\n".join(sorted(key.slug for key in keys))
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def _version(package: str) -> str:
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return "not installed"
+
+
+def git_state(folder: Path) -> dict[str, Any]:
+    """Commit and dirty flag of the checkout that holds `folder`; empty if there is none."""
+
+    def git(*words: str) -> str:
+        done = subprocess.run(
+            ["git", "-C", str(folder), *words], capture_output=True, text=True, timeout=10
+        )
+        return done.stdout.strip() if done.returncode == 0 else ""
+
+    try:
+        commit = git("rev-parse", "HEAD")
+        if not commit:
+            return {}
+        return {"commit": commit, "dirty": bool(git("status", "--porcelain"))}
+    except (OSError, subprocess.TimeoutExpired):
+        return {}
+
+
+def about_machine(world: Mapping[str, Any]) -> dict[str, Any]:
+    """Versions, checkout and machine, with what the `world` says about itself."""
+    return {
+        "versions": {
+            "robospa": _version("robospa"),
+            "python": sys.version.split()[0],
+            "numpy": _version("numpy"),
+            "sapien": _version("sapien"),
+        },
+        "git": git_state(Path(__file__).resolve().parent),
+        "machine": {
+            "system": platform.platform(),
+            "processor": platform.machine(),
+            "cores": os.cpu_count(),
+        },
+        "world": dict(world),
+    }
+
+
+def _flatten(value: object, path: str = "") -> dict[str, object]:
+    if isinstance(value, Mapping) and value:
+        parts: dict[str, object] = {}
+        for name, inner in value.items():
+            parts.update(_flatten(inner, f"{path}.{name}" if path else str(name)))
+        return parts
+    return {path: value}
+
+
+def changed_settings(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
+    """One phrase per setting that differs: `name: old -> new`."""
+    first, second = _flatten(old), _flatten(new)
+    names = sorted(set(first) | set(second))
+    return [
+        f"{name}: {first.get(name, 'unset')!r} -> {second.get(name, 'unset')!r}"
+        for name in names
+        if first.get(name) != second.get(name)
+    ]
+
+
+def _list_changes(old: Sequence[TrialKey], new: Sequence[TrialKey]) -> list[str]:
+    before, after = set(old), set(new)
+    if before == after:
+        return []
+    return [f"trials: {len(after - before)} new and {len(before - after)} gone"]
+
+
+def write_manifest(folder: Path, manifest: Manifest) -> None:
+    """Write `run.json` at once or not at all."""
+    text = json.dumps(manifest.to_json(), indent=1)
+    replace_file(folder / MANIFEST, text.encode())
+
+
+def open_run(folder: Path, manifest: Manifest, resume: bool) -> None:
+    """Start the run in `folder` or take it up again.
+
+    Raises RunError if it exists and `resume` is off, or if it was started with other settings or
+    trials (naming them).
+    """
+    if not (folder / MANIFEST).exists():
+        if resume and not folder.exists():
+            raise RunError(f"there is no run in {folder} to resume; leave --resume out to start one")
+        write_manifest(folder, manifest)
+        return
+    if not resume:
+        raise RunError(
+            f"{folder} already holds a run; add --resume to go on with it or choose another --out"
+        )
+    old = read_manifest(folder)
+    new = manifest.to_json()
+    changes = changed_settings(old["settings"], new["settings"])
+    changes += _list_changes(manifest_keys(old), manifest.keys)
+    for part in ("versions", "git"):
+        before, now = dict(old["about"].get(part, {})), dict(new["about"].get(part, {}))
+        before.pop("dirty", None), now.pop("dirty", None)
+        changes += [f"{part}.{c}" for c in changed_settings(before, now)]
+    if changes:
+        raise RunError(
+            f"the run in {folder} was started with other settings ({'; '.join(changes)}); "
+            "use the same ones to resume it or choose another --out"
+        )

@@ -1,0 +1,295 @@
+"""One trial: a world, a policy and a key in; a record out.
+
+Pure of processes, files and networks, so that the same key and the same actions give the same
+record wherever it runs. The policy is asked only when a new chunk is needed, and the world renders
+only then (plus at the past steps that the policy's history offsets will need).
+
+What goes wrong is sorted once, here:
+
+    an action or an answer that breaks the spec    -> the record ends in "policy_error": a failure
+    anything else that the policy or world raises  -> passed on: not run, the caller may retry
+"""
+
+from __future__ import annotations
+
+import hashlib
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robospa.harness.world import ActionError, World
+from robospa.protocol.policy import Policy, PolicySpec, TrialInfo
+from robospa.results.records import TrialKey, TrialRecord
+from robospa.tasks.catalog import build_scene
+from robospa.tasks.catalog import task as find_task
+from robospa.tasks.events import Event, outcome
+from robospa.tasks.scene import Scene
+from robospa.tasks.snapshot import Snapshot
+from robospa.tasks.task import Task, Tracker
+
+SIZES = {"joint": (14, 16), "ee": (16,), "delta_ee": (16, 14)}
+"""Action sizes that any embodiment of ours takes; the world checks the exact one."""
+
+
+class BadAnswer(Exception):
+    """The policy answered something that is not an action chunk of its own spec."""
+
+
+class Recorder(Protocol):
+    """Looks on while a trial runs."""
+
+    def started(self, world: World) -> None:
+        """The scene has settled; no action has been executed."""
+
+    def executed(self, world: World, action: NDArray[np.float32]) -> None:
+        """`action` has just been executed."""
+
+
+@dataclass(frozen=True)
+class TrialParts:
+    """What a trial needs of its task; tests replace it to run without the task catalog."""
+
+    scene: Scene
+    task: Task
+    tracker: Tracker
+    instruction: str
+
+
+def task_parts(key: TrialKey) -> TrialParts:
+    """Scene, goal and instruction of `key` from the catalog; KeyError or ValueError if unknown."""
+    from robospa.tasks.instructions import instruction
+
+    task = find_task(key.task)
+    scene = build_scene(key.task, key.level, key.seed, key.embodiment, key.mode)
+    return TrialParts(scene, task, task.goal(scene), instruction(scene, key.split))
+
+
+def policy_seed(key: TrialKey, run_seed: int = 0) -> int:
+    """The seed that a stochastic policy gets for `key`: the same in every worker and order."""
+    digest = hashlib.sha256(f"{run_seed}/{key.slug}".encode()).digest()
+    return int.from_bytes(digest[:4], "big") >> 1
+
+
+def check_chunk(answer: object, spec: PolicySpec) -> NDArray[np.float32]:
+    """`answer` as float32 (T, D); raises BadAnswer, saying which rule of the spec it breaks."""
+    try:
+        chunk = np.asarray(answer, dtype=np.float32)
+    except (TypeError, ValueError) as error:
+        raise BadAnswer(f"the policy answered no array of numbers: {error}") from error
+    sizes = SIZES.get(spec.action, ())
+    if chunk.ndim != 2 or chunk.shape[0] < 1 or (sizes and chunk.shape[1] not in sizes):
+        wanted = " or ".join(map(str, sizes))
+        raise BadAnswer(
+            f"the policy answered an array of shape {chunk.shape}; "
+            f"a chunk of {spec.action!r} actions has shape (T, {wanted}) with T >= 1"
+        )
+    if chunk.shape[0] > spec.horizon:
+        raise BadAnswer(
+            f"the policy answered {chunk.shape[0]} actions; its spec allows {spec.horizon} a chunk"
+        )
+    if not np.isfinite(chunk).all():
+        row, column = np.argwhere(~np.isfinite(chunk))[0]
+        raise BadAnswer(
+            f"the policy answered {chunk[row, column]} in action {row}, dimension {column}"
+        )
+    return np.ascontiguousarray(chunk)
+
+
+class _Stopwatch:
+    """Seconds by purpose."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+
+    def call(self, purpose: str, work: Callable[..., Any], *args: Any) -> Any:
+        begun = time.perf_counter()
+        try:
+            return work(*args)
+        finally:
+            spent = time.perf_counter() - begun
+            self.seconds[purpose] = self.seconds.get(purpose, 0.0) + spent
+
+
+@dataclass
+class _Run:
+    """The state of one trial in progress."""
+
+    world: World
+    policy: Policy
+    parts: TrialParts
+    recorder: Recorder | None
+    watch: _Stopwatch = field(default_factory=_Stopwatch)
+    events: list[Event] = field(default_factory=list)
+    actions: list[NDArray[np.float32]] = field(default_factory=list)
+    latencies: list[float] = field(default_factory=list)
+    past: dict[int, dict[str, Any]] = field(default_factory=dict)
+    physics_steps: int = 0
+
+    def poll(self, snapshot: Snapshot) -> bool:
+        new = self.watch.call("goal", self.parts.tracker.update, snapshot)
+        self.events.extend(new)
+        return any(event.kind in ("success", "failed") for event in new)
+
+    def observation(self, spec: PolicySpec) -> dict[str, Any]:
+        """What the policy asked for, at this instant."""
+        step = len(self.actions)
+        seen = self.watch.call("rendering", self.world.observe, spec)
+        observation = dict(seen)
+        observation["instruction"] = self.parts.instruction
+        observation["step"] = step
+        if spec.history:
+            self.past[step] = _present(seen)
+            observation["history"] = {
+                offset: self.past[max(step + offset, 0)] for offset in spec.history
+            }
+            oldest = step + min(spec.history)
+            self.past = {s: o for s, o in self.past.items() if s >= oldest or s == 0}
+        return observation
+
+    def remember(self, spec: PolicySpec, next_query: int) -> None:
+        """Keep this step's view if a later query may ask for it.
+
+        Offsets that reach `next_query` exactly are needed; those that reach beyond it may be,
+        because the length of later chunks is not known.
+        """
+        step = len(self.actions)
+        if step not in self.past and any(step - offset >= next_query for offset in spec.history):
+            plain = replace(spec, privileged=False)
+            self.past[step] = _present(self.watch.call("rendering", self.world.observe, plain))
+
+    def ask(self, spec: PolicySpec) -> NDArray[np.float32]:
+        observation = self.observation(spec)
+        begun = time.perf_counter()
+        answer = self.watch.call("waiting", self.policy.infer, observation)
+        self.latencies.append(1000.0 * (time.perf_counter() - begun))
+        return check_chunk(answer, spec)
+
+    def execute(self, action: NDArray[np.float32], space: str) -> bool:
+        """Whether the goal was met or lost during `action`."""
+        self.actions.append(action)
+        done = self.watch.call("physics", self.world.step, action, space, self.poll)
+        self.physics_steps += done.physics_steps
+        if self.recorder is not None:
+            self.watch.call("recording", self.recorder.executed, self.world, action)
+        return bool(done.stopped)
+
+
+def _present(observation: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: observation[name] for name in ("images", "state") if name in observation}
+
+
+def _loop(run: _Run, limit: int) -> str:
+    """Act until the goal is met or lost or `limit` actions are spent; returns the end reason."""
+    spec = run.policy.spec
+    while len(run.actions) < limit:
+        chunk = run.ask(spec)
+        wanted = chunk[: spec.execute] if spec.execute else chunk
+        wanted = wanted[: limit - len(run.actions)]
+        next_query = len(run.actions) + len(wanted)
+        for action in wanted:
+            if spec.history and run.actions:
+                run.remember(spec, next_query)
+            if run.execute(action, spec.action):
+                return _end_of(run)
+    return "step_limit"
+
+
+def _end_of(run: _Run) -> str:
+    reached = outcome(run.events, run.parts.tracker.total)
+    if reached.success:
+        return "success"
+    return "goal_lost" if reached.failed else "step_limit"
+
+
+def _percentiles(latencies: list[float]) -> dict[str, float]:
+    if not latencies:
+        return {}
+    p50, p95, p99 = (float(v) for v in np.percentile(latencies, [50, 95, 99]))
+    return {"p50": p50, "p95": p95, "p99": p99, "max": max(latencies)}
+
+
+def actions_digest(actions: list[NDArray[np.float32]]) -> str:
+    """sha256 over the executed actions as little-endian float32."""
+    digest = hashlib.sha256()
+    for action in actions:
+        digest.update(np.ascontiguousarray(action, dtype="<f4").tobytes())
+    return digest.hexdigest()
+
+
+def _play(run: _Run, info: TrialInfo, limit: int) -> tuple[str, str]:
+    """(end reason, message) of the trial whose scene is loaded."""
+    try:
+        run.watch.call("waiting", run.policy.reset, info)
+        if run.recorder is not None:
+            run.watch.call("recording", run.recorder.started, run.world)
+        run.events.extend(run.parts.tracker.start(run.world.snapshot()))
+        if any(event.kind in ("success", "failed") for event in run.events):
+            return _end_of(run), "the goal was decided before the first action"
+        return _loop(run, limit), ""
+    except (ActionError, BadAnswer) as error:
+        return "policy_error", str(error)
+
+
+def run_trial(
+    world: World,
+    policy: Policy,
+    key: TrialKey,
+    *,
+    policy_seed: int,
+    recorder: Recorder | None = None,
+    parts: Callable[[TrialKey], TrialParts] = task_parts,
+) -> TrialRecord:
+    """Run the trial `key` to its end and return its record.
+
+    Whatever `policy` or `world` raise apart from bad actions and answers is passed on: the caller
+    decides whether to try again. `world` may be used for any other trial before and after.
+    """
+    begun = time.perf_counter()
+    wanted = parts(key)
+    run = _Run(world, policy, wanted, recorder)
+    level = wanted.task.levels[key.level]
+    tracker = wanted.tracker
+    run.watch.call("loading", world.load, wanted.scene, tracker.needs_contacts)
+    info = TrialInfo(
+        task=key.task,
+        level=key.level,
+        seed=key.seed,
+        embodiment=key.embodiment,
+        mode=key.mode,
+        split=key.split,
+        instruction=wanted.instruction,
+        policy_seed=policy_seed,
+    )
+    end, message = _play(run, info, level.steps)
+    reached = outcome(run.events, tracker.total)
+    diagnostics = getattr(tracker, "diagnostics", None)
+    timing = dict(run.watch.seconds)
+    timing["physics"] = timing.get("physics", 0.0) - timing.get("goal", 0.0)
+    return TrialRecord(
+        key=key,
+        category=wanted.task.category,
+        instruction=wanted.instruction,
+        scene_digest=wanted.scene.digest,
+        end=end,
+        success=reached.success,
+        done=reached.done,
+        best=reached.best,
+        total=tracker.total,
+        candidates=level.candidates,
+        steps=len(run.actions),
+        physics_steps=run.physics_steps,
+        policy_calls=len(run.latencies),
+        digest=world.digest(),
+        actions_digest=actions_digest(run.actions),
+        wall_time=time.perf_counter() - begun,
+        policy_seed=policy_seed,
+        message=message,
+        events=tuple(asdict(event) for event in run.events),
+        latency=_percentiles(run.latencies),
+        timing=timing,
+        diagnostics=dict(diagnostics()) if diagnostics is not None else {},
+    )

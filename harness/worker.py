@@ -1,0 +1,171 @@
+"""One worker process: one world, one policy connection, one trial at a time, one record file.
+
+The driver sends ("run", key, attempt) or ("stop",); the worker answers ("ready", file), then per
+trial ("done", record) once the record is on disk, or ("lost", key, message, retry) if it could not
+be run. After a loss the world is rebuilt and the policy reconnected before the next trial, never
+within one. A worker whose driver has died ends at once.
+"""
+
+from __future__ import annotations
+
+import faulthandler
+import multiprocessing
+import os
+import signal
+import sys
+import threading
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from multiprocessing.connection import Connection, wait
+from pathlib import Path
+from typing import Any
+
+from robospa.harness.factory import load, open_policy
+from robospa.harness.store import RecordWriter, write_actions
+from robospa.results.records import TrialKey, TrialRecord
+
+LOGS = "logs"
+VIDEO = ("none", "failures", "all")
+
+
+@dataclass(frozen=True)
+class WorkerConfig:
+    """What a worker needs to know; picklable.
+
+    `policy` is a server's URL or a policy's name, `options` go to the client. `world` and `parts`
+    are `module:function` paths of a world factory and of what finds a trial's scene and goal.
+    """
+
+    folder: Path
+    policy: str
+    options: Mapping[str, Any] = field(default_factory=dict)
+    world: str = "robospa.harness.sapien_world:SapienWorld"
+    parts: str = "robospa.harness.trial:task_parts"
+    run_seed: int = 0
+    video: str = "none"
+
+
+class Worker:
+    """Runs trials; builds its world and policy when first needed and again after a loss."""
+
+    def __init__(self, config: WorkerConfig, writer: RecordWriter) -> None:
+        self.config = config
+        self.writer = writer
+        self.parts: Callable[[TrialKey], Any] = load(config.parts)
+        self._world: Any = None
+        self._policy: Any = None
+        self._stale = False
+
+    def run(self, key: TrialKey, attempt: int) -> TrialRecord:
+        """Run one trial and put its record, action trace and video on disk."""
+        from robospa.harness.trial import policy_seed, run_trial
+        from robospa.harness.video import TrialRecorder
+
+        self._prepare()
+        recorder = TrialRecorder(frames=self.config.video != "none")
+        seed = policy_seed(key, self.config.run_seed)
+        record = run_trial(
+            self._world, self._policy, key, policy_seed=seed, recorder=recorder, parts=self.parts
+        )
+        finish = getattr(self._policy, "finish", None)
+        if finish is not None:
+            finish({"end": record.end, "success": record.success})
+        record = replace(record, attempts=attempt)
+        write_actions(self.config.folder, key, recorder.actions, self._policy.spec.action)
+        if self.config.video == "all" or (self.config.video == "failures" and not record.success):
+            record = replace(record, video=recorder.write_video(self.config.folder, key))
+        self.writer.write(record)
+        return record
+
+    def _prepare(self) -> None:
+        if self._world is None:
+            self._world = load(self.config.world)()
+        if self._policy is None:
+            self._policy = open_policy(self.config.policy, dict(self.config.options))
+        elif self._stale:
+            reconnect = getattr(self._policy, "reconnect", None)
+            if reconnect is not None:
+                reconnect()
+        self._stale = False
+
+    def recover(self) -> None:
+        """After a loss: nothing of the world survives, and the connection is not trusted."""
+        world, self._world = self._world, None
+        self._stale = True
+        if world is not None:
+            world.close()
+
+    def close(self) -> None:
+        """Say goodbye to the policy's server and free the world."""
+        for part in (self._policy, self._world):
+            shut = getattr(part, "close", None)
+            if shut is not None:
+                shut()
+
+
+def _die_with_driver() -> None:
+    """End this process as soon as its parent is gone, however it went."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+
+        def watch() -> None:
+            wait([parent.sentinel])
+            os._exit(1)
+
+        threading.Thread(target=watch, daemon=True).start()
+
+
+def _log_to(path: Path) -> None:
+    """Send whatever libraries print, and the stack of a crash, to a file instead of the screen."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
+    os.dup2(file, sys.stdout.fileno())
+    os.dup2(file, sys.stderr.fileno())
+    faulthandler.enable()
+
+
+def describe(error: BaseException) -> str:
+    """One line about `error`, naming its class where the text alone would not be understood."""
+    text = " ".join(str(error).split())
+    module = type(error).__module__
+    return text if text and module.startswith("robospa.") else f"{type(error).__name__}: {text}"
+
+
+def _serve(pipe: Connection, worker: Worker) -> None:
+    from robospa.harness.world import SceneUnstable
+
+    while True:
+        message = pipe.recv()
+        if message[0] == "stop":
+            return
+        _, key, attempt = message
+        try:
+            record = worker.run(key, attempt)
+        except SceneUnstable as error:
+            pipe.send(("lost", key, describe(error), False))
+        except Exception as error:  # the driver decides: retry, then report as missing
+            import traceback
+
+            traceback.print_exc()
+            worker.recover()
+            pipe.send(("lost", key, describe(error), True))
+        else:
+            pipe.send(("done", record))
+
+
+def main(pipe: Connection, config: WorkerConfig, name: str) -> None:
+    """Entry point of a worker process."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    _die_with_driver()
+    _log_to(config.folder / LOGS / f"{name}.log")
+    writer = RecordWriter(config.folder)
+    worker = Worker(config, writer)
+    pipe.send(("ready", writer.path))
+    try:
+        _serve(pipe, worker)
+    except (EOFError, BrokenPipeError):
+        return
+    finally:
+        writer.close()
+        worker.close()
