@@ -28,12 +28,21 @@ class ActionError(Exception):
     """The policy's action cannot be executed; the message says which part and why."""
 
 
+class RenderUnavailable(Exception):
+    """No image can be drawn on this machine; the message says why and what to do."""
+
+
 @dataclass(frozen=True)
 class StepResult:
-    """One executed action: how many physics steps it took, and whether the poll ended it."""
+    """One executed action: how many physics steps it took, and whether the poll ended it.
+
+    `problems` says what could not be done as asked although the action was executed: an arm whose
+    pose is out of reach holds. To be recorded as policy errors.
+    """
 
     physics_steps: int
     stopped: bool
+    problems: tuple[str, ...] = ()
 
 
 class World(Protocol):
@@ -42,11 +51,15 @@ class World(Protocol):
     def load(self, scene: Scene, contacts: bool = False) -> None:
         """Build `scene` afresh and settle it; nothing of an earlier trial survives.
 
-        `contacts`: fill `Snapshot.contacts` when polling (costs time). Raises SceneUnstable.
+        Simulated time is 0 afterwards. `contacts`: fill `Snapshot.contacts` when polling (costs time). Raises SceneUnstable.
         """
 
     def step(self, action: NDArray[np.float32], space: str, poll: Poll) -> StepResult:
-        """Execute one policy action of `space` "joint", "ee" or "delta_ee"; raises ActionError."""
+        """Execute one policy action of `space` "joint", "ee" or "delta_ee"; raises ActionError.
+
+        `poll` is called whenever simulated time passes a multiple of 1/50 s. After a refused
+        action (ActionError) nothing has moved.
+        """
         ...
 
     def observe(self, spec: PolicySpec) -> dict[str, Any]:
@@ -54,7 +67,7 @@ class World(Protocol):
         ...
 
     def render(self, camera: CameraSpec) -> NDArray[np.uint8]:
-        """One RGB image, uint8 of shape (height, width, 3)."""
+        """One RGB image, uint8 of shape (height, width, 3); raises RenderUnavailable."""
         ...
 
     def snapshot(self) -> Snapshot:
