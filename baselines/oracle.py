@@ -1,0 +1,60 @@
+"""The oracle: solves every task from exact state, and says so in its spec.
+
+It proves that a trial can be solved and shows what the harness looks like when it is. Its
+numbers are an upper bound of the setup, never a policy's result.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robospa.harness.skills import Expert
+from robospa.protocol.policy import Observation, PolicySpec, TrialInfo
+from robospa.tasks.catalog import build_scene
+from robospa.tasks.scene import Scene
+from robospa.tasks.snapshot import snapshot_from_json
+
+HORIZON = 200
+
+
+class Oracle:
+    """A privileged policy: builds the trial's scene itself and plans on the exact state."""
+
+    spec = PolicySpec(
+        name="oracle",
+        cameras=(),
+        state="commanded",
+        action="joint",
+        horizon=HORIZON,
+        seeded=True,
+        privileged=True,
+        embodiments=("aloha-agilex",),
+    )
+
+    def __init__(self) -> None:
+        self._scene: Scene | None = None
+        self._expert: Expert | None = None
+
+    def reset(self, trial: TrialInfo) -> None:
+        """Build the scene that `trial` names."""
+        self._scene = build_scene(trial.task, trial.level, trial.seed, trial.embodiment, trial.mode)
+        self._expert = None
+
+    def infer(self, observation: Observation) -> NDArray[np.float32]:
+        """The next skill's actions, float32 (T, 14)."""
+        if self._scene is None:
+            raise RuntimeError("the oracle was asked for actions before a reset")
+        state: Mapping[str, Any] = observation["privileged"]
+        snapshot = snapshot_from_json(state)
+        if self._expert is None:
+            self._expert = Expert(self._scene, snapshot)
+        return self._expert.next(snapshot)[:HORIZON]
+
+
+def create() -> Oracle:
+    """A new oracle, one per connection."""
+    return Oracle()

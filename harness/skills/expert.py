@@ -1,0 +1,125 @@
+"""The expert: a task's plan, executed one skill after the other, looking after each.
+
+`Expert.next(snapshot)` gives the next actions. A skill that fails is not the end: the plan goes on
+with the next object, and what can be done again is done again.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robospa.harness.robots import embodiment
+from robospa.harness.skills.moving import retreat_home
+from robospa.harness.skills.pick import pick
+from robospa.harness.skills.place import can_follow, drop, place, place_position
+from robospa.harness.skills.press import press
+from robospa.harness.skills.workspace import SkillFailed, Steps, Workspace
+from robospa.tasks.catalog import task
+from robospa.tasks.plan import Drop, Home, Pick, Place, Press, Skill, Wait
+from robospa.tasks.scene import Scene
+from robospa.tasks.snapshot import ARMS, Snapshot
+
+HOLD_SECONDS = 0.2
+"""An action in which nothing moves takes 50 physics steps of 1/250 s."""
+MOVE_ATTEMPTS = 3
+PLACED_WITHIN = 0.02
+"""A placed object this near to its goal [m] is placed."""
+
+
+class Expert:
+    """Solves one trial from exact state. Not for comparison with learned policies."""
+
+    def __init__(self, scene: Scene, snapshot: Snapshot) -> None:
+        self.workspace = Workspace(scene, embodiment(scene.embodiment), snapshot)
+        self.trouble: list[str] = []
+        self._steps = self._run(task(scene.task).plan(scene))
+        self._started = False
+
+    def next(self, snapshot: Snapshot) -> NDArray[np.float32]:
+        """The next actions, float32 (T, D); holds still when the plan is over."""
+        try:
+            if self._started:
+                rows = self._steps.send(snapshot)
+            else:
+                self._started = True
+                self.workspace.see(snapshot)
+                rows = next(self._steps)
+        except StopIteration:
+            self.workspace.see(snapshot)
+            rows = self.workspace.row()[None]
+        return np.asarray(rows, dtype=np.float32)
+
+    def _run(self, plan: tuple[Skill, ...]) -> Steps:
+        calls = list(plan)
+        while calls:
+            call = calls.pop(0)
+            follow = calls[0] if calls else None
+            try:
+                if (
+                    isinstance(call, Pick)
+                    and isinstance(follow, Place | Drop)
+                    and follow.object == call.object
+                ):
+                    calls.pop(0)
+                    yield from self._move(call, follow)
+                else:
+                    yield from self._single(call)
+            except SkillFailed as trouble:
+                self.trouble.append(str(trouble))
+        ws = self.workspace
+        for arm in range(len(ARMS)):
+            if ws.held[arm] is None:
+                retreat_home(ws, arm)
+        yield from ws.flush()
+
+    def _single(self, call: Skill) -> Steps:
+        ws = self.workspace
+        if isinstance(call, Pick):
+            yield from pick(ws, call)
+        elif isinstance(call, Place):
+            yield from place(ws, call)
+        elif isinstance(call, Drop):
+            yield from drop(ws, call)
+        elif isinstance(call, Press):
+            yield from press(ws, call)
+        elif isinstance(call, Wait):
+            for _ in range(round(call.seconds / HOLD_SECONDS)):
+                ws.add(0)
+            yield from ws.flush()
+        elif isinstance(call, Home):
+            for arm in range(len(ARMS)):
+                if call.arm in (None, ARMS[arm]):
+                    retreat_home(ws, arm)
+            yield from ws.flush()
+        else:
+            raise SkillFailed(f"no skill performs {type(call).__name__}")
+
+    def _move(self, first: Pick, then: Place | Drop) -> Steps:
+        """Pick and place as one: done again while the object is not where it should be."""
+        ws = self.workspace
+        for _ in range(MOVE_ATTEMPTS):
+            yield from pick(ws, first, partial(can_follow, ws, then))
+            arm = ws.held.index(first.object)
+            try:
+                yield from place(ws, then) if isinstance(then, Place) else drop(ws, then)
+            except SkillFailed:
+                ws.held[arm] = None
+                ws.add(arm, gripper=1.0)
+                retreat_home(ws, arm)
+                yield from ws.flush()
+                raise
+            if self._arrived(then):
+                return
+
+    def _arrived(self, call: Place | Drop) -> bool:
+        ws = self.workspace
+        here = np.array(ws.pose(call.object).position)
+        if isinstance(call, Place):
+            goal = np.array(place_position(ws, call))
+            return bool(np.abs(here[:2] - goal[:2]).max() < PLACED_WITHIN)
+        bin_pose, model = ws.pose(call.into), ws.models[call.into]
+        inside = np.abs(here[:2] - np.array(bin_pose.position[:2])) < np.array(model.size[:2]) / 2
+        return bool(inside.all() and here[2] < bin_pose.position[2] + model.size[2])

@@ -1,0 +1,157 @@
+"""Where to take an object: grasp frames of its model, tilted, tried against reach and neighbours.
+
+Every candidate is an end-effector pose for one arm. Inverse kinematics runs on all of them at once;
+what is left is ranked by tilt, by room for the fingers and by how far the arm has to go.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robospa.harness.robots.kinematics import inverse
+from robospa.harness.skills.workspace import (
+    FINGER_HALF_WIDTH,
+    FINGER_THICKNESS,
+    FINGERTIP,
+    Workspace,
+)
+from robospa.tasks.geometry import Pose, Vec3, axis_rotation, look_rotation, rotate, to_matrix
+from robospa.tasks.scene import TABLE_TOP
+from robospa.tasks.shapes import Grasp, ObjectModel
+
+Array = NDArray[np.float64]
+
+TILTS = (0.0, 0.2, -0.2, 0.4, -0.4, 0.6, -0.6, 0.8, -0.8, 1.0, -1.0, 1.2, -1.2)
+OPENING_MARGIN = 0.022
+"""How much wider than the object the fingers open [m]."""
+MAX_OPENING = 0.088
+TABLE_CLEARANCE = 0.003
+WRONG_SIDE = 0.6
+"""Cost of using the arm on the other side of the table."""
+
+
+@dataclass(frozen=True)
+class Reach:
+    """A grasp that the arm can take: end-effector pose, its joints, and how wide to open (0..1)."""
+
+    arm: int
+    pose: Pose
+    approach: Vec3
+    joints: Array
+    opening: float
+    cost: float
+    tilt: float
+
+
+def upright(pose: Pose) -> bool:
+    """Whether the body's z axis points up within 25 degrees."""
+    return rotate(pose.rotation, (0, 0, 1))[2] > 0.9
+
+
+def grasps_now(model: ObjectModel, pose: Pose) -> tuple[Grasp, ...]:
+    """The model's grasps in the world; for a body that has tipped over, one across its axis."""
+    if upright(pose):
+        return tuple(
+            Grasp(
+                pose.apply(g.point),
+                rotate(pose.rotation, g.approach),
+                rotate(pose.rotation, g.closing),
+                g.width,
+                g.tilt,
+            )
+            for g in model.grasps
+        )
+    centre = pose.apply((0.0, 0.0, model.bottom + model.size[2] / 2))
+    sizes = np.array(model.size)
+    axes = to_matrix(pose.rotation)
+    flat = np.abs(axes[2]) < 0.5  # body axes that lie in the table's plane
+    choices = [i for i in range(3) if flat[i] and sizes[i] < MAX_OPENING - 0.01]
+    return tuple(
+        Grasp(centre, (0.0, 0.0, -1.0), tuple(axes[:, i]), float(sizes[i]), 0.6) for i in choices
+    )
+
+
+def candidate_poses(grasp: Grasp, reach: float) -> list[tuple[Pose, Vec3, float]]:
+    """End-effector poses for one grasp: both finger orders, all tilts that it allows."""
+    found = []
+    for tilt in TILTS:
+        if abs(tilt) > grasp.tilt + 1e-9:
+            continue
+        approach = rotate(axis_rotation(grasp.closing, tilt), grasp.approach)
+        if approach[2] > -0.05:
+            continue
+        lean = math.sqrt(max(0.0, 1 - approach[2] ** 2))
+        lowest = FINGERTIP * -approach[2] + FINGER_HALF_WIDTH * lean
+        x, y, z = grasp.point
+        z = max(z, TABLE_TOP + TABLE_CLEARANCE + lowest)
+        position = (x - approach[0] * reach, y - approach[1] * reach, z - approach[2] * reach)
+        for sign in (1.0, -1.0):
+            closing = tuple(sign * c for c in grasp.closing)
+            found.append((Pose(position, look_rotation(approach, closing)), approach, tilt))
+    return found
+
+
+def _boxes_near(ws: Workspace, target: str) -> list[tuple[Pose, ObjectModel]]:
+    here = ws.pose(target).position
+    near = []
+    for name, pose in ws.snapshot.poses.items():
+        model = ws.models[name]
+        distance = math.dist(here[:2], pose.position[:2])
+        if name != target and distance < 0.16 + model.radius:
+            near.append((pose, model))
+    return near
+
+
+def crowding(ws: Workspace, target: str, pose: Pose, approach: Vec3, opening: float) -> float:
+    """How deep [m] the opened fingers would be inside neighbours at `pose` (0 = free)."""
+    frame = to_matrix(pose.rotation)
+    tip = np.array(pose.position) + frame[:, 0] * (ws.robot.arms[0].reach + FINGERTIP)
+    side, across = frame[:, 1], frame[:, 2]
+    points = [
+        tip - frame[:, 0] * back + side * s * (opening / 2 + t) + across * w
+        for back in (0.0, 0.03, 0.06)
+        for s in (1, -1)
+        for t in (0.0, FINGER_THICKNESS)
+        for w in (-FINGER_HALF_WIDTH, FINGER_HALF_WIDTH)
+    ]
+    cloud = np.array(points)
+    worst = 0.0
+    for body, model in _boxes_near(ws, target):
+        local = (cloud - np.array(body.position)) @ to_matrix(body.rotation)
+        local[:, 2] -= model.bottom + model.size[2] / 2
+        inside = np.array(model.size) / 2 + 0.004 - np.abs(local)
+        depth = inside.min(axis=1).max()
+        worst = max(worst, float(depth))
+    return worst
+
+
+def reachable_grasps(ws: Workspace, name: str, arms: tuple[int, ...]) -> list[Reach]:
+    """All grasps of `name` that one of `arms` can take now, best first."""
+    model = ws.models[name]
+    body = ws.pose(name)
+    grasps = grasps_now(model, body)
+    found: list[Reach] = []
+    for arm in arms:
+        reach = ws.robot.arms[arm].reach
+        poses: list[tuple[Pose, Vec3, float, float]] = []
+        for grasp in grasps:
+            opening = min(MAX_OPENING, grasp.width + OPENING_MARGIN)
+            poses += [(*c, opening) for c in candidate_poses(grasp, reach)]
+        if not poses:
+            continue
+        joints, ok = inverse(ws.chains[arm], [p[0] for p in poses])
+        wrong = WRONG_SIDE if (body.position[0] > 0) != (arm == 1) else 0.0
+        if abs(body.position[0]) < 0.04:
+            wrong *= abs(body.position[0]) / 0.04
+        for i in np.flatnonzero(ok):
+            pose, approach, tilt, opening = poses[i]
+            depth = crowding(ws, name, pose, approach, opening)
+            roll = abs(float(joints[i][-1])) + 0.5 * abs(float(joints[i][-2]))
+            cost = wrong + 0.5 * abs(tilt) + 0.25 * roll + 60.0 * depth
+            share = opening / MAX_OPENING
+            found.append(Reach(arm, pose, approach, joints[i], share, cost, tilt))
+    return sorted(found, key=lambda r: r.cost)

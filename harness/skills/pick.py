@@ -1,0 +1,92 @@
+"""Pick: grasp an object and lift it; look whether it came along, and try again if it did not."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robospa.harness.skills.grasping import Reach, reachable_grasps
+from robospa.harness.skills.moving import clear_other, line, retreat_home, rise, travel
+from robospa.harness.skills.workspace import SkillFailed, Steps, Workspace, backed, raised
+from robospa.tasks.plan import Pick
+from robospa.tasks.snapshot import ARMS
+
+Array = NDArray[np.float64]
+Fits = Callable[[Reach], bool]
+"""Whether what comes after the grasp can be done with it."""
+
+STANDOFF = 0.08
+ATTEMPTS = 5
+LOOKAHEAD = 12
+"""How many of the best grasps are tested against what comes after."""
+
+
+def arms_for(call_arm: str | None) -> tuple[int, ...]:
+    """Indices of the arms that may do it."""
+    return (0, 1) if call_arm is None else (ARMS.index(call_arm),)
+
+
+def pick(ws: Workspace, call: Pick, fits: Fits | None = None) -> Steps:
+    """Grasp and lift; raises SkillFailed after a few attempts."""
+    tried: list[Reach] = []
+    for _ in range(ATTEMPTS):
+        choice, way_in, way_up = _choose(ws, call, tried, fits)
+        tried.append(choice)
+        before = ws.pose(call.object).position[2]
+        arm = choice.arm
+        clear_other(ws, arm)
+        ws.add(arm, gripper=choice.opening)
+        travel(ws, arm, way_in[0])
+        for joints in way_in[1:]:
+            ws.add(arm, joints)
+        ws.add(arm, gripper=0.0)
+        ws.add(arm)
+        for joints in way_up:
+            ws.add(arm, joints)
+        yield from ws.flush()
+        if ws.pose(call.object).position[2] - before > 0.4 * call.lift:
+            ws.held[arm] = call.object
+            return
+        ws.add(arm, gripper=1.0)
+        rise(ws, arm)
+        retreat_home(ws, arm)
+        yield from ws.flush()
+    raise SkillFailed(f"{call.object} could not be lifted in {ATTEMPTS} attempts")
+
+
+def _choose(
+    ws: Workspace, call: Pick, tried: list[Reach], fits: Fits | None
+) -> tuple[Reach, list[Array], list[Array]]:
+    """The best grasp not yet tried, with the joints of the way in (to the grasp) and of the lift."""
+    arms = tuple(a for a in arms_for(call.arm) if ws.held[a] is None)
+    options = reachable_grasps(ws, call.object, arms)
+    fresh = [o for o in options if not any(_alike(o, t) for t in tried)]
+    spare: tuple[Reach, list[Array], list[Array]] | None = None
+    for rank, option in enumerate(fresh or options):
+        out = backed(option.pose, option.approach, STANDOFF)
+        back = ws.straight(option.arm, option.joints, line(option.pose, out, 2))
+        up = ws.straight(
+            option.arm, option.joints, line(option.pose, raised(option.pose, call.lift), 2)
+        )
+        if back is None or up is None:
+            continue
+        found = (option, [*reversed(back), option.joints], up)
+        if fits is None or fits(option):
+            return found
+        spare = spare or found
+        if rank >= LOOKAHEAD:
+            break
+    if spare is not None:
+        return spare
+    raise SkillFailed(f"no arm can reach {call.object} at {ws.pose(call.object).position}")
+
+
+def _alike(a: Reach, b: Reach) -> bool:
+    turned = min(
+        math.dist(a.pose.rotation, b.pose.rotation),
+        math.dist(a.pose.rotation, tuple(-c for c in b.pose.rotation)),
+    )
+    return a.arm == b.arm and turned < 0.1 and math.dist(a.pose.position, b.pose.position) < 0.01

@@ -1,0 +1,134 @@
+"""Place and Drop: bring the held object somewhere and let go of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robospa.harness.robots.kinematics import inverse
+from robospa.harness.skills.grasping import Reach
+from robospa.harness.skills.moving import line, retreat_home, rise, travel
+from robospa.harness.skills.workspace import SkillFailed, Steps, Workspace, backed, raised
+from robospa.tasks.geometry import Pose, rotate, yaw_rotation
+from robospa.tasks.plan import Drop, Place
+
+Array = NDArray[np.float64]
+
+ABOVE = 0.07
+"""Height above the final pose from which the object comes straight down [m]."""
+YAWS = tuple(2 * math.pi * i / 16 for i in range(16))
+MOUTH = ((0.0, 0.0), (0.06, -0.08), (0.06, 0.0), (0.1, -0.12), (0.0, -0.12), (0.12, 0.0))
+"""Where over a container the object may be let go, relative to its centre [m]."""
+
+
+@dataclass(frozen=True)
+class Spot:
+    """An end-effector pose that puts the object where it should be, and its joints."""
+
+    pose: Pose
+    joints: Array
+    above: Array
+
+
+def holder(ws: Workspace, name: str) -> int:
+    """The arm that holds `name`; SkillFailed if none does."""
+    if name not in ws.held:
+        raise SkillFailed(f"{name} is not held by any arm")
+    return ws.held.index(name)
+
+
+def grip_offset(ws: Workspace, arm: int, name: str) -> Pose:
+    """Pose of the object in the end-effector frame of the arm that holds it."""
+    return ws.snapshot.end_effector[arm].inverse() * ws.pose(name)
+
+
+def place_position(ws: Workspace, call: Place) -> tuple[float, float, float]:
+    """Where the object's origin goes in the world [m]."""
+    if call.on is None:
+        return call.position
+    support = ws.pose(call.on) * ws.models[call.on].frames["support"]
+    x, y, z = support.apply(call.position)
+    return (x, y, z - ws.models[call.object].bottom)
+
+
+def spots(
+    ws: Workspace, arm: int, offset: Pose, targets: Iterable[Pose], above: float, near: Array
+) -> list[Spot]:
+    """All reachable ways to bring an object held with `offset` to one of `targets`, best first."""
+    poses = [target * offset.inverse() for target in targets]
+    joints, ok = inverse(ws.chains[arm], poses)
+    order = sorted(np.flatnonzero(ok), key=lambda i: float(np.abs(joints[i] - near).max()))
+    found = []
+    for i in order:
+        up = ws.solve(arm, raised(poses[i], above), joints[i])
+        if up is not None:
+            found.append(Spot(poses[i], joints[i], up))
+            if len(found) == 3:
+                break
+    return found
+
+
+def place_targets(ws: Workspace, call: Place) -> list[Pose]:
+    """Object poses that satisfy the call: upright, at the position, any allowed yaw."""
+    x, y, z = place_position(ws, call)
+    yaws = YAWS if call.yaw is None else (call.yaw,)
+    return [Pose((x, y, z + call.drop), yaw_rotation(yaw)) for yaw in yaws]
+
+
+def drop_targets(ws: Workspace, call: Drop) -> list[Pose]:
+    """Object poses over the container's mouth."""
+    bin_pose, model = ws.pose(call.into), ws.models[call.into]
+    x, y, z = bin_pose.position
+    z += model.bottom + model.size[2] + call.height
+    return [Pose((x + dx, y + dy, z), yaw_rotation(yaw)) for dx, dy in MOUTH for yaw in YAWS[::2]]
+
+
+def can_follow(ws: Workspace, call: Place | Drop, grasp: Reach) -> bool:
+    """Whether `grasp` would let the same arm do `call` afterwards."""
+    offset = grasp.pose.inverse() * ws.pose(call.object)
+    targets = place_targets(ws, call) if isinstance(call, Place) else drop_targets(ws, call)
+    above = ABOVE if isinstance(call, Place) else 0.0
+    return bool(spots(ws, grasp.arm, offset, targets, above, grasp.joints))
+
+
+def place(ws: Workspace, call: Place) -> Steps:
+    """Carry, set down, let go, back off."""
+    arm = holder(ws, call.object)
+    offset = grip_offset(ws, arm, call.object)
+    found = spots(ws, arm, offset, place_targets(ws, call), ABOVE, ws.joints[arm])
+    if not found:
+        raise SkillFailed(f"{call.object} cannot be brought to {place_position(ws, call)}")
+    spot = found[0]
+    travel(ws, arm, spot.above)
+    yield from ws.flush()
+    ws.add(arm, spot.joints)
+    ws.add(arm)
+    ws.add(arm, gripper=1.0)
+    approach = rotate(spot.pose.rotation, (1, 0, 0))
+    away = backed(spot.pose, approach, call.retreat)
+    out = ws.straight(arm, spot.joints, line(spot.pose, away, 2)) or [spot.above]
+    for joints in out:
+        ws.add(arm, joints)
+    ws.held[arm] = None
+    rise(ws, arm)
+    yield from ws.flush()
+
+
+def drop(ws: Workspace, call: Drop) -> Steps:
+    """Carry over the container and open the gripper."""
+    arm = holder(ws, call.object)
+    offset = grip_offset(ws, arm, call.object)
+    found = spots(ws, arm, offset, drop_targets(ws, call), 0.0, ws.joints[arm])
+    if not found:
+        raise SkillFailed(f"{call.object} cannot be brought over {call.into}")
+    travel(ws, arm, found[0].joints)
+    ws.add(arm)
+    ws.add(arm, gripper=1.0)
+    ws.add(arm)
+    ws.held[arm] = None
+    retreat_home(ws, arm)
+    yield from ws.flush()

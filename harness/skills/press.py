@@ -1,0 +1,68 @@
+"""Press: touch a frame from above with the closed gripper, then come back up."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from robospa.harness.robots.kinematics import inverse
+from robospa.harness.skills.moving import clear_other, line, travel
+from robospa.harness.skills.pick import arms_for
+from robospa.harness.skills.workspace import FINGERTIP, SkillFailed, Steps, Workspace, raised
+from robospa.tasks.geometry import Pose, axis_rotation, look_rotation, rotate
+from robospa.tasks.plan import Press
+
+TILTS = (0.0, 0.2, 0.4, 0.6, 0.8)
+TURNS = tuple(math.pi * i / 8 for i in range(8))
+DEPTH = 0.006
+"""How far the commanded fingertip goes below the surface, so that it is sure to touch [m]."""
+PAUSE = 1
+
+
+def press(ws: Workspace, call: Press) -> Steps:
+    """One press; the arm stays above the object."""
+    arm, down, up = _plan(ws, call)
+    clear_other(ws, arm)
+    if ws.gripper[arm] > 0.05:
+        ws.add(arm, gripper=0.0)
+    if float(np.abs(ws.joints[arm] - up).max()) > 1e-6:
+        travel(ws, arm, up)
+    ws.add(arm, down)
+    ws.add(arm, up)
+    yield from ws.flush()
+
+
+def _plan(ws: Workspace, call: Press) -> tuple[int, np.ndarray, np.ndarray]:
+    """Arm, joints that touch and joints that hover."""
+    frame = ws.pose(call.object) * ws.models[call.object].frames[call.frame]
+    x, y, z = frame.position
+    arms = arms_for(call.arm)
+    if len(arms) == 2:
+        arms = (0, 1) if x < 0 else (1, 0)
+    for arm in arms:
+        reach = ws.robot.arms[arm].reach + FINGERTIP
+        poses = []
+        for tilt in TILTS:
+            for turn in TURNS:
+                closing = (math.cos(turn), math.sin(turn), 0.0)
+                for sign in (1, -1):
+                    approach = rotate(axis_rotation(closing, sign * tilt), (0, 0, -1))
+                    # the lowest corner of the tilted tip should meet the point
+                    tip = (x, y, z - DEPTH)
+                    position = tuple(t - a * reach for t, a in zip(tip, approach, strict=True))
+                    for side in (1, -1):
+                        facing = tuple(side * c for c in closing)
+                        poses.append(Pose(position, look_rotation(approach, facing)))
+        joints, ok = inverse(ws.chains[arm], poses)
+        per_tilt = len(TURNS) * 4
+        near = ws.joints[arm]
+        ranked = sorted(
+            np.flatnonzero(ok),
+            key=lambda i: (i // per_tilt, float(np.abs(joints[i] - near).max())),
+        )
+        for i in ranked[:20]:
+            above = ws.straight(arm, joints[i], line(poses[i], raised(poses[i], call.hover), 1))
+            if above is not None:
+                return arm, joints[i], above[0]
+    raise SkillFailed(f"no arm can press {call.object} at {frame.position}")

@@ -1,0 +1,116 @@
+"""What a skill knows: the scene, the robot, where everything is now, and what the arms were told.
+
+Skills are generators: they yield rows of joint actions, float64 (T, D), and get back the snapshot
+that these led to. Nothing here touches the simulator.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robospa.harness.robots.embodiment import Embodiment
+from robospa.harness.robots.kinematics import Chain, chain_of, inverse
+from robospa.tasks.geometry import Pose, Vec3
+from robospa.tasks.objects import object_model
+from robospa.tasks.scene import TABLE_TOP, Scene
+from robospa.tasks.shapes import ObjectModel
+from robospa.tasks.snapshot import ARMS, Snapshot
+
+Array = NDArray[np.float64]
+Steps = Generator[Array, Snapshot, None]
+
+FINGERTIP = 0.012
+"""How far the fingertips reach beyond the grasp centre along the approach [m]."""
+FINGER_HALF_WIDTH = 0.010
+FINGER_THICKNESS = 0.008
+TRAVEL_HEIGHT = TABLE_TOP + 0.17
+"""Grasp centres move sideways at this height [m] or above."""
+
+
+class SkillFailed(Exception):
+    """The skill cannot go on; the message says which object and why."""
+
+
+@dataclass
+class Workspace:
+    """One trial as the expert sees it. `left`/`right` have index 0/1 everywhere."""
+
+    scene: Scene
+    robot: Embodiment
+    snapshot: Snapshot
+    models: dict[str, ObjectModel] = field(init=False)
+    chains: tuple[Chain, Chain] = field(init=False)
+    joints: list[Array] = field(init=False)
+    gripper: list[float] = field(init=False)
+    held: list[str | None] = field(default_factory=lambda: [None, None])
+    rows: list[Array] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.models = {o.name: object_model(o.asset, o.params) for o in self.scene.objects}
+        left, right = self.robot.arms
+        self.chains = (chain_of(left), chain_of(right))
+        self.joints = [np.asarray(j, dtype=float) for j in self.snapshot.joints]
+        self.gripper = list(self.snapshot.gripper)
+
+    def see(self, snapshot: Snapshot) -> None:
+        """Take over what the world says now."""
+        self.snapshot = snapshot
+        self.joints = [np.asarray(j, dtype=float) for j in snapshot.joints]
+        self.gripper = list(snapshot.gripper)
+
+    def add(self, arm: int, joints: Array | None = None, gripper: float | None = None) -> None:
+        """Append one action: `arm` goes to `joints` and `gripper`, all else holds."""
+        if joints is not None:
+            self.joints[arm] = np.asarray(joints, dtype=float)
+        if gripper is not None:
+            self.gripper[arm] = gripper
+        self.rows.append(self.row())
+
+    def row(self) -> Array:
+        """The action that holds what was commanded last."""
+        parts = [np.append(self.joints[i], self.gripper[i]) for i in range(len(ARMS))]
+        return np.concatenate(parts)
+
+    def flush(self) -> Steps:
+        """Send the appended actions and look at the outcome."""
+        if self.rows:
+            rows, self.rows = np.stack(self.rows), []
+            self.see((yield rows))
+
+    def pose(self, name: str) -> Pose:
+        """Where `name` is now."""
+        return self.snapshot.poses[name]
+
+    def solve(self, arm: int, target: Pose, near: Array | None = None) -> Array | None:
+        """Joints for an end-effector pose, staying near `near` if given; None out of reach."""
+        joints, found = inverse(self.chains[arm], [target], near)
+        return joints[0] if found[0] else None
+
+    def straight(self, arm: int, start: Array, poses: list[Pose]) -> list[Array] | None:
+        """Joints along a list of nearby poses, each from the one before; None if one fails."""
+        out: list[Array] = []
+        for pose in poses:
+            step = self.solve(arm, pose, out[-1] if out else start)
+            if step is None:
+                return None
+            out.append(step)
+        return out
+
+
+def raised(pose: Pose, height: float) -> Pose:
+    """`pose` moved up by `height` [m]."""
+    x, y, z = pose.position
+    return Pose((x, y, z + height), pose.rotation)
+
+
+def backed(pose: Pose, approach: Vec3, distance: float) -> Pose:
+    """`pose` moved back by `distance` [m] against its approach direction."""
+    x, y, z = pose.position
+    return Pose(
+        (x - approach[0] * distance, y - approach[1] * distance, z - approach[2] * distance),
+        pose.rotation,
+    )
