@@ -1,0 +1,142 @@
+"""Where things may lie: the head camera's view, the arms' reach, free scatter and grids.
+
+Everything is closed form or bounded in work: a draw looks at a fixed number of candidate
+positions and raises `LayoutError` when none will do, so building a scene always takes
+milliseconds. Positions are metres in the world frame. Nothing here knows a simulator or a task.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from robospa.tasks.geometry import Array
+from robospa.tasks.scene import TABLE_TOP
+
+EYE = (-0.032, -0.45, 1.35)
+"""Position of the head camera [m]; it looks along (0, 0.6, -0.8), its left is -x."""
+FOCAL = 120 / math.tan(math.radians(37) / 2)
+"""Focal length of the head camera [px] at 320x240 with a vertical field of view of 37 deg."""
+WIDTH, HEIGHT = 320, 240
+
+BASES = ((-0.3, -0.417), (0.3, -0.417))
+"""Where the left and right arm stand on the plan [m]."""
+MAX_REACH = 0.69
+"""Farthest planar distance [m] from an arm's base at which a tilted grasp still gets there."""
+
+
+class LayoutError(RuntimeError):
+    """No layout was found within the allowed work: this seed is not valid."""
+
+
+def head_pixel(x: Array, y: Array, z: Array | float) -> tuple[Array, Array]:
+    """Pixel (u to the right, v down) of points [m] in the head camera's 320x240 image."""
+    dx, dy, dz = x - EYE[0], y - EYE[1], z - EYE[2]
+    depth = 0.6 * dy - 0.8 * dz
+    return WIDTH / 2 + FOCAL * dx / depth, HEIGHT / 2 - FOCAL * (0.8 * dy + 0.6 * dz) / depth
+
+
+def in_head_view(
+    x: Array,
+    y: Array,
+    radius: Array | float = 0.0,
+    height: Array | float = 0.0,
+    margin: tuple[float, float] = (0.02, 0.02),
+) -> Array:
+    """Whether upright cylinders on the table lie inside the head image, as a boolean array.
+
+    `radius` and `height` [m] bound each object; `margin` is the part of the image's width and
+    height that stays free on each side.
+    """
+    low, high = TABLE_TOP, TABLE_TOP + height
+    left = head_pixel(x - radius, y, high)[0]
+    right = head_pixel(x + radius, y, high)[0]
+    top = head_pixel(x, y + radius, high)[1]
+    bottom = head_pixel(x, y - radius, low)[1]
+    free_x, free_y = margin[0] * WIDTH, margin[1] * HEIGHT
+    inside: Array = (
+        (left >= free_x) & (right <= WIDTH - free_x) & (top >= free_y) & (bottom <= HEIGHT - free_y)
+    )
+    return inside
+
+
+def in_reach(x: Array, y: Array) -> Array:
+    """Whether the nearer arm can grasp at these places, as a boolean array."""
+    near = [np.hypot(x - bx, y - by) for bx, by in BASES]
+    reached: Array = np.minimum(near[0], near[1]) <= MAX_REACH
+    return reached
+
+
+@dataclass(frozen=True)
+class Area:
+    """A rectangle on the table: `x` and `y` ranges [m].
+
+    `clear_middle` keeps y <= 0 where |x| < 0.15, as the official scenes do.
+    """
+
+    x: tuple[float, float]
+    y: tuple[float, float]
+    clear_middle: bool = False
+
+    def draw(self, rng: np.random.Generator, shape: tuple[int, ...]) -> tuple[Array, Array]:
+        """Uniform positions of this shape; y is uniform on what is allowed at its x."""
+        x = rng.uniform(self.x[0], self.x[1], shape)
+        top: Array | float = self.y[1]
+        if self.clear_middle:
+            top = np.where(np.abs(x) < 0.15, min(0.0, self.y[1]), self.y[1])
+        y = self.y[0] + (top - self.y[0]) * rng.random(shape)
+        return x, y
+
+
+Points = list[tuple[float, float]]
+Propose = Callable[[np.random.Generator], tuple[Array, Array, Array]]
+"""Draws candidate positions: x, y and whether each may be used, all of shape (objects, tries)."""
+
+
+def scatter(
+    rng: np.random.Generator,
+    propose: Propose,
+    apart: Sequence[Sequence[float]],
+    accept: Callable[[Points], bool] = lambda points: True,
+    restarts: int = 80,
+) -> Points:
+    """Free positions, object by object: each takes its first candidate that keeps its distance.
+
+    `apart[i][j]` is the least centre distance [m] of objects i and j. A layout that `accept`
+    refuses is drawn afresh, at most `restarts` times; then LayoutError.
+    """
+    for _ in range(restarts):
+        x, y, usable = propose(rng)
+        points = _place(x.tolist(), y.tolist(), usable.tolist(), apart)
+        if points is not None and accept(points):
+            return points
+    raise LayoutError(f"no free layout of {len(apart)} objects in {restarts} draws; skip this seed")
+
+
+def _place(
+    x: list[list[float]],
+    y: list[list[float]],
+    usable: list[list[bool]],
+    apart: Sequence[Sequence[float]],
+) -> Points | None:
+    points: Points = []
+    for i, limits in enumerate(apart):
+        squares = [limits[j] ** 2 for j in range(i)]
+        for px, py, ok in zip(x[i], y[i], usable[i], strict=True):
+            if ok and all(
+                (px - qx) ** 2 + (py - qy) ** 2 >= limit
+                for (qx, qy), limit in zip(points, squares, strict=True)
+            ):
+                points.append((px, py))
+                break
+        else:
+            return None
+    return points
+
+
+def spread(values: Sequence[float]) -> float:
+    """Largest minus smallest value."""
+    return max(values) - min(values)
