@@ -1,0 +1,255 @@
+"""Phrasings of the spatial tasks' slots, from what a scene drew.
+
+Directions are the robot's: left and right as it sees them, near is close to it. In the relational
+and multi-view tasks the official words are kept (front = far from the viewer, back = near), which
+is not how everybody speaks, so a slot `convention` says it; "in front of" and "behind", which
+many readers take the other way round, are never used.
+"""
+
+from __future__ import annotations
+
+from robospa.tasks.instructions.words import Slots, ordinal, with_common
+
+_REFERENCES: Slots = {
+    "tea box": (("tea box", "box of tea"), ("tea carton", "tea packet", "tea package")),
+    "sauce can": (("sauce can", "can of sauce"), ("sauce tin", "tin of sauce", "canned sauce")),
+    "bowl": (("bowl", "round bowl"), ("open bowl", "serving bowl", "table bowl")),
+    "toycar": (("toy car", "toycar"), ("model car", "miniature car", "little car")),
+    "fan": (("fan", "electric fan"), ("desk fan", "table fan", "little fan")),
+    "tissue box": (
+        ("tissue box", "box of tissues"),
+        ("tissue carton", "tissue package", "carton of tissues"),
+    ),
+    "french fries": (
+        ("french fries", "box of french fries"),
+        ("carton of fries", "fries", "packet of fries"),
+    ),
+}
+
+_COLUMNS: Slots = {
+    f"from {a} to {b}": (
+        (f"from {a} to {b}", f"from the {a} to the {b}"),
+        (
+            f"going from {a} to {b}",
+            f"from the {a} end to the {b} end",
+            f"from the {a} side to the {b} side",
+        ),
+    )
+    for a, b in (("left", "right"), ("right", "left"))
+}
+
+_ROWS: Slots = {
+    f"from {a} to {b}": (
+        (f"from {a} to {b}", f"from the {a} side to the {b} side"),
+        (
+            f"going from {a} to {b}",
+            f"from the {long_a} one to the {long_b} one",
+            f"from the {a} edge to the {b} edge",
+        ),
+    )
+    for (a, long_a), (b, long_b) in (
+        (("near", "nearest"), ("far", "farthest")),
+        (("far", "farthest"), ("near", "nearest")),
+    )
+}
+
+_ROBOT_VIEW = (
+    ("as seen from the robot", "from the robot's viewpoint"),
+    ("from the robot's perspective", "as the robot looks at them", "from where the robot stands"),
+)
+
+_VIEWS: Slots = {
+    "back": (
+        ("from the robot's own viewpoint", "from the robot's side of the table"),
+        (
+            "from where the robot stands",
+            "from the robot's own perspective",
+            "from the place of the robot",
+        ),
+    ),
+    "front": (
+        ("from the viewpoint opposite the robot", "from the side of the table facing the robot"),
+        (
+            "from across the table, opposite the robot",
+            "from the place that faces the robot",
+            "from the far side of the table, looking at the robot",
+        ),
+    ),
+    "left": (
+        ("from the viewpoint on the robot's left", "from the table side to the robot's left"),
+        (
+            "from the robot's left, looking across the table",
+            "from a place at the robot's left-hand side",
+            "from the table end to the left of the robot",
+        ),
+    ),
+    "right": (
+        ("from the viewpoint on the robot's right", "from the table side to the robot's right"),
+        (
+            "from the robot's right, looking across the table",
+            "from a place at the robot's right-hand side",
+            "from the table end to the right of the robot",
+        ),
+    ),
+}
+
+
+def size(rank: int, count: int) -> Slots:
+    """{block}: the block of size `rank` (1 = largest) among `count`."""
+    if not 1 <= rank <= count:
+        raise ValueError(f"size rank {rank} does not exist among {count} blocks")
+    number, word = ordinal(rank)
+    if count == 2:
+        more, other = ("larger", "bigger") if rank == 1 else ("smaller", "less large")
+        train = (f"the {more} block", f"the {other} block")
+        held = (
+            f"the {more} of the two blocks",
+            f"the block that is {more} than the other",
+            f"the {more} one of the two blocks",
+            f"the {other} of the two blocks",
+        )
+    elif rank == 1:
+        train = ("the largest block", "the biggest block")
+        held = (
+            "the largest of the blocks",
+            "the block that is larger than all others",
+            "the biggest of all the blocks",
+            "the block of greatest size",
+        )
+    else:
+        train = (
+            f"the {number} largest block",
+            f"the {word} largest block",
+            f"the {number} biggest block",
+        )
+        held = (
+            f"the {word} largest of the blocks",
+            f"the block that is {number} in size, counted from the largest,",
+            f"the block ranked {word} from the largest",
+            f"the {number} biggest of the blocks",
+        )
+    return with_common({"block": (train, held)})
+
+
+def distance(rank: int, reference: str) -> Slots:
+    """{rank}, {reference}: the object `rank` farthest (1 = farthest) from `reference`.
+
+    `reference` is a category ("tea box") or an asset ("112_tea-box"); KeyError if unknown.
+    """
+    number, word = ordinal(rank)
+    if rank == 1:
+        train: tuple[str, ...] = ("farthest", "farthest away")
+        held: tuple[str, ...] = ("furthest", "furthest away", "most distant", "most remote")
+    else:
+        train = (f"{number} farthest", f"{word} farthest")
+        held = (
+            f"{number} furthest",
+            f"{word} furthest",
+            f"{number} most distant",
+            f"{word} most distant",
+        )
+    return with_common({"rank": (train, held), "reference": _REFERENCES[category(reference)]})
+
+
+def category(name: str) -> str:
+    """The category word of an asset name: "112_tea-box" -> "tea box"."""
+    plain = name.split("_", 1)[1] if name[:3].isdigit() else name
+    plain = plain.replace("-", " ").replace("_", " ")
+    return {"toy car": "toycar", "fries": "french fries"}.get(plain, plain)
+
+
+def canonical(
+    column: int, column_direction: str, row: int | None = None, row_direction: str | None = None
+) -> Slots:
+    """{column}, {column_direction}, {viewer} and, if there are rows, {row}, {row_direction}.
+
+    Positions count from 1 along "from left to right" or "from right to left", and along "from near
+    to far" or "from far to near".
+    """
+    spelled = ordinal(column)
+    slots: Slots = {
+        "column": (spelled, spelled),
+        "column_direction": _COLUMNS[column_direction],
+        "viewer": _ROBOT_VIEW,
+    }
+    if row is not None and row_direction is not None:
+        spelled = ordinal(row)
+        slots["row"] = (spelled, spelled)
+        slots["row_direction"] = _ROWS[row_direction]
+    return with_common(slots)
+
+
+def relational(direction: str, reference: str, level: int) -> Slots:
+    """{relation}, {reference}, {convention}: the neighbour in `direction` of the `reference` bar.
+
+    `direction` is left, right, front, back or a compound such as front_left; `reference` is the
+    position label of the reference bar ("left", "front-left", "front-middle", "center"...). From
+    level 2 on an axis neighbour is "directly" there (official wording); from level 4 on a diagonal
+    neighbour is "immediately" there, because another bar may lie further out on the same side.
+    """
+    side = direction.replace("_", "-")
+    how = ""
+    if "-" in side:
+        how = "immediately " if level >= 4 else ""
+    elif level >= 2:
+        how = "directly "
+    relation = (
+        (f"{how}to the {side} of", f"{how}on the {side} side of"),
+        (
+            f"lying {how}to the {side} of",
+            f"placed {how}on the {side} side of",
+            f"located {how}to the {side} of",
+            f"found {how}on the {side} side of",
+        ),
+    )
+    label = reference.replace("_", "-")
+    where = label.replace("-", " ")
+    at = {"left": "on the left", "right": "on the right", "center": "in the center"}.get(
+        where, f"at the {where}"
+    )
+    names = (
+        (f"the {label} soap bar", f"the soap bar {at}"),
+        (f"the {label} bar of soap", f"the bar of soap {at}", f"the soap {at}"),
+    )
+    convention = (
+        (
+            "front means far from the robot and back means near it",
+            "the front is the far side and the back is the side nearest the robot",
+        ),
+        (
+            "front points away from the robot and back points towards it",
+            "the front side lies far from the robot, the back side close to it",
+        ),
+    )
+    return with_common({"relation": relation, "reference": names, "convention": convention})
+
+
+def multi_view(position: str, view: str) -> Slots:
+    """{target}, {view}, {convention}: the extreme object, named from a viewpoint.
+
+    `position` is leftmost, rightmost, frontmost or backmost *in that view*; `view` is back (the
+    robot's own), front, left or right, as the fact sheets name them.
+    """
+    side = position.removesuffix("most")
+    if side not in ("left", "right", "front", "back"):
+        raise ValueError(f"no position {position!r}; use leftmost, rightmost, frontmost, backmost")
+    target = (
+        (f"the {position} object", f"the object farthest to the {side}"),
+        (
+            f"the object lying furthest to the {side}",
+            f"the object placed most to the {side}",
+            f"the {position} of all the objects",
+            f"the {position} one of the objects",
+        ),
+    )
+    convention = (
+        (
+            "front means far from that viewer and back means near",
+            "the front is the viewer's far side and the back the viewer's near side",
+        ),
+        (
+            "front points away from that viewer and back points towards the viewer",
+            "the front side lies far from the viewer, the back side close by",
+        ),
+    )
+    return with_common({"target": target, "view": _VIEWS[view], "convention": convention})
