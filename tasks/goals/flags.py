@@ -1,0 +1,76 @@
+"""Subtask flags and the small predicates that the trackers share."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from robospa.tasks.events import Event
+from robospa.tasks.geometry import Pose, Vec3
+from robospa.tasks.snapshot import GRIPPER_OPEN, Snapshot
+
+GRASP_OFFSET = 0.12
+"""The grasp centre lies this far [m] along the end effector's x axis."""
+
+
+class Flags:
+    """The state of `total` subtasks; every change becomes an event."""
+
+    def __init__(self, total: int) -> None:
+        self.held = [False] * total
+        self.order: list[int] = []
+        """Indices in the order in which they were first done."""
+
+    def set(self, index: int, value: bool, time: float, name: str = "") -> tuple[Event, ...]:
+        """Give subtask `index` a value; an event if that is news."""
+        if self.held[index] == value:
+            return ()
+        self.held[index] = value
+        if value and index not in self.order:
+            self.order.append(index)
+        return (Event(time, "subtask_done" if value else "subtask_undone", name, index),)
+
+    @property
+    def all(self) -> bool:
+        """Whether every subtask holds."""
+        return all(self.held)
+
+
+def both_open(snapshot: Snapshot) -> bool:
+    """Whether both grippers are commanded open."""
+    return snapshot.gripper[0] > GRIPPER_OPEN and snapshot.gripper[1] > GRIPPER_OPEN
+
+
+def grasp_centre(end_effector: Pose) -> Vec3:
+    """The point [m, world] between the fingertips."""
+    w, x, y, z = end_effector.rotation
+    px, py, pz = end_effector.position
+    return (
+        px + GRASP_OFFSET * (1 - 2 * (y * y + z * z)),
+        py + GRASP_OFFSET * 2 * (x * y + w * z),
+        pz + GRASP_OFFSET * 2 * (x * z - w * y),
+    )
+
+
+def closed_near(snapshot: Snapshot, point: Vec3, radius: float) -> bool:
+    """Whether a gripper that is not open has its grasp centre within `radius` [m] of `point`."""
+    for opening, pose in zip(snapshot.gripper, snapshot.end_effector, strict=True):
+        if opening <= GRIPPER_OPEN:
+            x, y, z = grasp_centre(pose)
+            dx, dy, dz = x - point[0], y - point[1], z - point[2]
+            if dx * dx + dy * dy + dz * dz < radius * radius:
+                return True
+    return False
+
+
+def inside_box(point: Vec3, centre: Vec3, half: Vec3) -> bool:
+    """Whether `point` lies strictly inside the axis-aligned box around `centre`."""
+    return (
+        abs(point[0] - centre[0]) < half[0]
+        and abs(point[1] - centre[1]) < half[1]
+        and abs(point[2] - centre[2]) < half[2]
+    )
+
+
+def succeeded(events: Iterable[Event]) -> bool:
+    """Whether one of `events` is the success."""
+    return any(event.kind == "success" for event in events)

@@ -1,0 +1,93 @@
+"""Counting presses: how often a gripper touched an object's press frame.
+
+A press counts when the touch begins. The next one needs 0.1 s without a touch first, so that the
+chatter of one physical contact is one press; without that rule a single press can count for five.
+"""
+
+from __future__ import annotations
+
+from robospa.tasks.events import Event
+from robospa.tasks.geometry import Pose, Vec3
+from robospa.tasks.goals.flags import Flags, inside_box
+from robospa.tasks.snapshot import Snapshot
+
+PRESS_BOX: Vec3 = (0.03, 0.03, 0.03)
+"""Half sizes [m] of the box around the press frame in which a touch counts."""
+
+REARM = 0.1
+"""Seconds without a touch before the next press can count."""
+
+
+class PressCounter:
+    """Counts presses of object `name` at `frame` (given in the object's frame)."""
+
+    def __init__(self, name: str, frame: Pose, box: Vec3 = PRESS_BOX) -> None:
+        self.name = name
+        self.frame = frame
+        self.box = box
+        self.count = 0
+        self.raw_count = 0
+        """Touches that began, chatter included: what a counter without re-arming would say."""
+        self._touching = False
+        self._last_touch = float("-inf")
+
+    def touched(self, snapshot: Snapshot) -> bool:
+        """Whether a gripper touches the object inside the box at this instant."""
+        if not snapshot.contacts:
+            return False
+        contacts = snapshot.gripper_contacts(self.name)
+        if not contacts:
+            return False
+        centre = snapshot.poses[self.name].apply(self.frame.position)
+        return any(inside_box(c.point, centre, self.box) for c in contacts)
+
+    def start(self, snapshot: Snapshot) -> None:
+        """Begin with what is touched now not counting as a press."""
+        self._touching = self.touched(snapshot)
+        if self._touching:
+            self._last_touch = snapshot.time
+
+    def update(self, snapshot: Snapshot) -> bool:
+        """Whether a press begins at this instant."""
+        touching = self.touched(snapshot)
+        began, self._touching = touching and not self._touching, touching
+        new = began and snapshot.time - self._last_touch >= REARM - 1e-9
+        if touching:
+            self._last_touch = snapshot.time
+        self.raw_count += began
+        self.count += new
+        return new
+
+
+class Repeat:
+    """Press one object a given number of times; subtask i is press i + 1, latched.
+
+    Grippers need not be closed and the last press needs no retreat (both official). One press too
+    many cannot happen before the trial ends: success latches at the last one asked for.
+    """
+
+    needs_contacts = True
+
+    def __init__(self, counter: PressCounter, times: int) -> None:
+        self.total = times
+        self.counter = counter
+        self._flags = Flags(times)
+
+    def start(self, snapshot: Snapshot) -> tuple[Event, ...]:
+        """Nothing is done yet."""
+        self.counter.start(snapshot)
+        return ()
+
+    def update(self, snapshot: Snapshot) -> tuple[Event, ...]:
+        """A subtask per press; success with the last one; `repeated` for each one beyond."""
+        if not self.counter.update(snapshot):
+            return ()
+        time, name, count = snapshot.time, self.counter.name, self.counter.count
+        if count > self.total:
+            return (Event(time, "repeated", name, self.total - 1),)
+        events = self._flags.set(count - 1, True, time, name)
+        return (*events, Event(time, "success")) if count == self.total else events
+
+    def diagnostics(self) -> dict[str, float]:
+        """`presses` counted, and `raw_presses` as a counter without re-arming would see them."""
+        return {"presses": self.counter.count, "raw_presses": self.counter.raw_count}

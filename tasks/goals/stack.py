@@ -1,0 +1,128 @@
+"""Building a tower in a given order of its parts.
+
+One rule for every height of tower: part i rests i block heights above the bottom part and straight
+above part i - 1. Subtask 0, the bottom part, holds from the start (official); a part counts from
+the moment nothing holds it. Flags do not latch: a collapse takes them away.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from robospa.tasks.events import Event
+from robospa.tasks.goals.flags import Flags, both_open, closed_near
+from robospa.tasks.goals.handling import Handling
+from robospa.tasks.snapshot import Snapshot
+
+HEIGHT_TOLERANCE = 0.02
+"""Allowed error [m] of a part's height above the bottom part."""
+
+SIDE_TOLERANCE = 0.025
+"""Allowed offset [m] in x and in y from the part below."""
+
+HELD_RADIUS = 0.03
+"""A gripper that is not open and whose grasp centre is nearer [m] than this holds the part."""
+
+
+class Stack:
+    """`order` names the parts from bottom to top; all have the same `height` [m].
+
+    The order in time is not checked (official); `diagnostics` counts parts that came to rest
+    before the one below them.
+    """
+
+    needs_contacts = False
+
+    def __init__(self, order: Sequence[str], height: float) -> None:
+        self.total = len(order)
+        self._order = tuple(order)
+        self._height = height
+        self._flags = Flags(self.total)
+        self._handling = Handling(order, radius=0.06)
+        self._idle = 0
+        self._out_of_order = 0
+
+    def start(self, snapshot: Snapshot) -> tuple[Event, ...]:
+        """The bottom part counts as done."""
+        events = self._flags.set(0, True, snapshot.time, self._order[0])
+        self._idle = 1
+        return events
+
+    def update(self, snapshot: Snapshot) -> tuple[Event, ...]:
+        """Changes of the flags; success once all hold and both grippers are open."""
+        events = self._handling.update(snapshot)
+        time, poses, held = snapshot.time, snapshot.poses, self._flags.held
+        bottom = poses[self._order[0]].position[2]
+        for i in range(1, self.total):
+            name = self._order[i]
+            now = self._in_place(snapshot, i, bottom)
+            if now and not held[i] and closed_near(snapshot, poses[name].position, HELD_RADIUS):
+                now = False
+            if now and not held[i] and not held[i - 1] and i not in self._flags.order:
+                self._out_of_order += 1
+                events += (Event(time, "wrong_order", name, i),)
+            events += self._flags.set(i, now, time, name)
+        if self._flags.all and both_open(snapshot):
+            events += (Event(time, "success"),)
+        return events
+
+    def _in_place(self, snapshot: Snapshot, i: int, bottom: float) -> bool:
+        x, y, z = snapshot.poses[self._order[i]].position
+        below = snapshot.poses[self._order[i - 1]].position
+        return (
+            abs(z - bottom - i * self._height) <= HEIGHT_TOLERANCE
+            and abs(x - below[0]) < SIDE_TOLERANCE
+            and abs(y - below[1]) < SIDE_TOLERANCE
+        )
+
+    def diagnostics(self) -> dict[str, float]:
+        """`idle_progress` of a policy that does nothing, parts placed too early, drops."""
+        return {
+            "idle_progress": self._idle / self.total,
+            "out_of_order": self._out_of_order,
+            "drops": self._handling.drops,
+        }
+
+
+class Bring:
+    """Bring one object to a region of the table and let go of it there; latched.
+
+    The official rule has no height or release test; here the object must be at most
+    HEIGHT_TOLERANCE above its first height and both grippers open, as for a tower.
+    """
+
+    total = 1
+    needs_contacts = False
+
+    def __init__(
+        self, name: str, x: tuple[float, float] = (-1.0, 1.0), y: tuple[float, float] = (-1.0, 1.0)
+    ) -> None:
+        self._name = name
+        self._x = x
+        self._y = y
+        self._height = 0.0
+        self._flags = Flags(1)
+        self._handling = Handling((name,), radius=0.06)
+
+    def start(self, snapshot: Snapshot) -> tuple[Event, ...]:
+        """Remember the height at which the object rests."""
+        self._height = snapshot.poses[self._name].position[2]
+        return ()
+
+    def update(self, snapshot: Snapshot) -> tuple[Event, ...]:
+        """Done and success at once when the object lies in the region, released."""
+        events = self._handling.update(snapshot)
+        x, y, z = snapshot.poses[self._name].position
+        there = (
+            self._x[0] < x < self._x[1]
+            and self._y[0] < y < self._y[1]
+            and abs(z - self._height) <= HEIGHT_TOLERANCE
+        )
+        if there and not self._flags.all and both_open(snapshot):
+            events += self._flags.set(0, True, snapshot.time, self._name)
+            events += (Event(snapshot.time, "success"),)
+        return events
+
+    def diagnostics(self) -> dict[str, float]:
+        """Idle progress (none) and drops."""
+        return {"idle_progress": 0.0, "drops": self._handling.drops}

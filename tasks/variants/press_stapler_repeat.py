@@ -1,0 +1,111 @@
+"""Press_Stapler_Repeat: press a stapler a given number of times.
+
+Draw: one fixed stapler, any yaw, in the middle of the table; the level is the count.
+Success: that many presses, each a gripper touching the stapler within 3 cm of its press point,
+counted when the touch begins and re-armed by 0.1 s without one.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from robospa.tasks import objects
+from robospa.tasks.goals.repeat import PressCounter, Repeat
+from robospa.tasks.plan import Press, Skill
+from robospa.tasks.scene import Scene
+from robospa.tasks.task import Draft, Level, Task
+from robospa.tasks.variants.tabletop import (
+    NUMBERS,
+    Item,
+    Phrasings,
+    draw_look,
+    look_phrasings,
+    named,
+    side,
+    standing,
+)
+
+X, Y = (-0.2, 0.2), (-0.1, 0.05)
+
+LEVELS = {n: Level(candidates=1, subtasks=n, steps=200 * n) for n in range(1, 6)}
+
+
+def draw(level: int, rng: np.random.Generator) -> Draft:
+    """One stapler anywhere in the region, turned any way."""
+    point = (float(rng.uniform(*X)), float(rng.uniform(*Y)))
+    pose = standing(point, float(rng.uniform(-math.pi, math.pi)))
+    items = [Item("stapler", "stapler", pose, draw_look(rng, "stapler"), fixed=True)]
+    scene_objects, names = named(rng, items)
+    return Draft(scene_objects, {**names, "count": level})
+
+
+def goal(scene: Scene) -> Repeat:
+    """The press counter of the scene's stapler."""
+    stapler = scene.object(scene.facts["stapler"])
+    model = objects.object_model(stapler.asset, stapler.params)
+    return Repeat(PressCounter(stapler.name, model.frames["press"]), scene.facts["count"])
+
+
+def plan(scene: Scene) -> tuple[Skill, ...]:
+    """As many presses as asked for, by the arm on the press point's side."""
+    stapler = scene.object(scene.facts["stapler"])
+    press = objects.object_model(stapler.asset, stapler.params).frames["press"]
+    arm = side(stapler.pose.apply(press.position)[0])
+    return (Press(stapler.name, arm=arm),) * int(scene.facts["count"])
+
+
+def _count(n: int) -> Phrasings:
+    if n == 1:
+        return (
+            ("once", "one time", "one single time"),
+            ("just once", "exactly once", "a single time", "only once"),
+        )
+    word = NUMBERS[n]
+    return (
+        (f"{word} times", f"{n} times", f"{word} times in a row"),
+        (f"a total of {word} times", f"exactly {word} times", f"{n} times in total", f"{n}x"),
+    )
+
+
+def _presses(n: int) -> Phrasings:
+    if n == 1:
+        return (
+            ("one press", "a single press", "1 press"),
+            ("exactly one press", "just one press", "one push", "a lone press"),
+        )
+    word = NUMBERS[n]
+    return (
+        (f"{word} presses", f"{n} presses", f"{word} separate presses"),
+        (f"exactly {word} presses", f"a total of {word} presses", f"{word} pushes", f"{n} pushes"),
+    )
+
+
+def slots(scene: Scene) -> dict[str, Phrasings]:
+    """`object` (no article), `count` ("three times") and `presses` ("three presses")."""
+    stapler = scene.object(scene.facts["stapler"])
+    model = objects.object_model(stapler.asset, stapler.params)
+    n = int(scene.facts["count"])
+    extra = (("stapler", "stapler on the table"), ("desk stapler", "stapling device"))
+    return {
+        "object": look_phrasings(model, *extra),
+        "count": _count(n),
+        "presses": _presses(n),
+    }
+
+
+TASK = Task(
+    name="Press_Stapler_Repeat",
+    category="RPF",
+    levels=LEVELS,
+    draw=draw,
+    goal=goal,
+    plan=plan,
+    slots=slots,
+    summary="Press the stapler the given number of times.",
+    success=(
+        "The stapler was touched by a gripper near its press point as often as asked, "
+        "with at least 0.1 s without a touch between presses."
+    ),
+)

@@ -1,0 +1,137 @@
+"""What the long-horizon tasks share: scattering things on the table, neutral names, phrasings.
+
+Sampling is bounded everywhere: a layout that cannot be completed is drawn anew, a given number of
+times, and then refused with a sentence. Names give no hint of an object's role.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from robospa.tasks import objects
+from robospa.tasks.geometry import Pose, yaw_rotation
+from robospa.tasks.plan import Home, Skill
+from robospa.tasks.scene import TABLE_TOP, SceneObject
+from robospa.tasks.shapes import ObjectModel
+
+Point = tuple[float, float]
+Phrasings = tuple[tuple[str, ...], tuple[str, ...]]
+"""Train phrasings and held-out phrasings of one instruction slot."""
+
+TRIES_PER_POINT = 100
+LAYOUTS = 200
+NUMBERS = ("zero", "one", "two", "three", "four", "five")
+
+
+@dataclass(frozen=True)
+class Item:
+    """An object before it has a name; `role` is how the task's facts call it."""
+
+    role: str
+    asset: str
+    pose: Pose
+    params: Mapping[str, Any] = field(default_factory=dict)
+    fixed: bool = False
+    appears_at: float | None = None
+
+
+def named(
+    rng: np.random.Generator, items: Sequence[Item]
+) -> tuple[tuple[SceneObject, ...], dict[str, str]]:
+    """`items` as scene objects "object_0".. in shuffled order, and the name of every role."""
+    order = [int(i) for i in rng.permutation(len(items))]
+    scene_objects, names = [], {}
+    for number, index in enumerate(order):
+        item, name = items[index], f"object_{number}"
+        names[item.role] = name
+        scene_objects.append(
+            SceneObject(name, item.asset, item.pose, item.params, item.fixed, item.appears_at)
+        )
+    return tuple(scene_objects), names
+
+
+def draw_look(rng: np.random.Generator, asset: str) -> dict[str, int]:
+    """Parameters of one of the asset's looks, each equally likely."""
+    return {"look": int(rng.integers(objects.looks(asset)))}
+
+
+def standing(point: Point, yaw: float = 0.0, height: float = 0.0) -> Pose:
+    """Pose at rest on the table: origin `height` [m] above it, turned by `yaw` [rad] about z."""
+    return Pose((point[0], point[1], TABLE_TOP + height), yaw_rotation(yaw))
+
+
+def apart(point: Point, others: Iterable[Point], distance: float) -> bool:
+    """Whether `point` is at least `distance` [m] from all `others`."""
+    x, y = point
+    return all(math.hypot(x - ox, y - oy) >= distance for ox, oy in others)
+
+
+def scatter(
+    rng: np.random.Generator,
+    count: int,
+    x: tuple[float, float],
+    y: tuple[float, float],
+    distance: float,
+    allowed: Callable[[Point], bool] = lambda point: True,
+    near_middle: bool = False,
+) -> tuple[Point, ...]:
+    """`count` uniform points of the rectangle, pairwise at least `distance` [m] apart.
+
+    With `near_middle` a point with |x| < 0.15 and y > 0 gets a new y between the region's near
+    edge and 0 (an official rule: the middle of the table's far half is hard to reach for both
+    arms). A layout that is not complete after 100 draws per point is started again, 200 times at
+    most. Raises RuntimeError if that does not do.
+    """
+    for _ in range(LAYOUTS):
+        points: list[Point] = []
+        for _ in range(TRIES_PER_POINT * count):
+            px, py = float(rng.uniform(*x)), float(rng.uniform(*y))
+            if near_middle and abs(px) < 0.15 and py > 0:
+                py = float(rng.uniform(y[0], 0.0))
+            if allowed((px, py)) and apart((px, py), points, distance):
+                points.append((px, py))
+                if len(points) == count:
+                    return tuple(points)
+    raise RuntimeError(
+        f"no layout of {count} points {distance} m apart in x {x}, y {y} after {LAYOUTS} attempts; "
+        "widen the region or lower the distance"
+    )
+
+
+def side(x: float) -> str:
+    """The arm that works at `x` [m]: left of the middle the left one, else the right one."""
+    return "left" if x < 0 else "right"
+
+
+def resting_home(skills: Iterable[Skill]) -> tuple[Skill, ...]:
+    """`skills` with the arm that has finished sent home whenever the other one takes over."""
+    result: list[Skill] = []
+    busy: str | None = None
+    for skill in skills:
+        arm = getattr(skill, "arm", None)
+        if arm is not None and not isinstance(skill, Home):
+            if busy is not None and arm != busy:
+                result.append(Home(busy))
+            busy = arm
+        result.append(skill)
+    return tuple(result)
+
+
+def look_phrasings(
+    model: ObjectModel, train: Sequence[str] = (), held_out: Sequence[str] = ()
+) -> Phrasings:
+    """A model's own phrases, the last third held out, with the given ones added to either side."""
+    cut = max(1, len(model.phrases) - max(1, len(model.phrases) // 3))
+    seen = tuple(dict.fromkeys((*model.phrases[:cut], *train)))
+    unseen = (*model.phrases[cut:], *held_out)
+    return seen, tuple(p for p in dict.fromkeys(unseen) if p not in seen)
+
+
+def listed(words: Sequence[str], last: str = " and ", between: str = ", ") -> str:
+    """`words` as an English list: "red", "red and green", "red, green and blue"."""
+    return between.join(words[:-1]) + last + words[-1] if len(words) > 1 else words[0]
