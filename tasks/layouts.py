@@ -12,9 +12,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from robospa.tasks.geometry import Array
 from robospa.tasks.scene import TABLE_TOP
+
+Mask = NDArray[np.bool_]
 
 EYE = (-0.032, -0.45, 1.35)
 """Position of the head camera [m]; it looks along (0, 0.6, -0.8), its left is -x."""
@@ -45,7 +48,7 @@ def in_head_view(
     radius: Array | float = 0.0,
     height: Array | float = 0.0,
     margin: tuple[float, float] = (0.02, 0.02),
-) -> Array:
+) -> Mask:
     """Whether upright cylinders on the table lie inside the head image, as a boolean array.
 
     `radius` and `height` [m] bound each object; `margin` is the part of the image's width and
@@ -57,16 +60,16 @@ def in_head_view(
     top = head_pixel(x, y + radius, high)[1]
     bottom = head_pixel(x, y - radius, low)[1]
     free_x, free_y = margin[0] * WIDTH, margin[1] * HEIGHT
-    inside: Array = (
+    inside: Mask = (
         (left >= free_x) & (right <= WIDTH - free_x) & (top >= free_y) & (bottom <= HEIGHT - free_y)
     )
     return inside
 
 
-def in_reach(x: Array, y: Array) -> Array:
+def in_reach(x: Array, y: Array) -> Mask:
     """Whether the nearer arm can grasp at these places, as a boolean array."""
     near = [np.hypot(x - bx, y - by) for bx, by in BASES]
-    reached: Array = np.minimum(near[0], near[1]) <= MAX_REACH
+    reached: Mask = np.minimum(near[0], near[1]) <= MAX_REACH
     return reached
 
 
@@ -92,7 +95,7 @@ class Area:
 
 
 Points = list[tuple[float, float]]
-Propose = Callable[[np.random.Generator], tuple[Array, Array, Array]]
+Propose = Callable[[np.random.Generator], tuple[Array, Array, Mask]]
 """Draws candidate positions: x, y and whether each may be used, all of shape (objects, tries)."""
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from robospa.tasks.geometry import Array, Pose, yaw_rotation
 from robospa.tasks.goals.pick import Lift, PickTracker
-from robospa.tasks.layouts import Area, Points, in_head_view, scatter, spread
+from robospa.tasks.layouts import Area, Mask, Points, in_head_view, scatter, spread
 from robospa.tasks.plan import Pick, Skill
 from robospa.tasks.scene import TABLE_TOP, Scene, SceneObject
 from robospa.tasks.task import Draft, Level, Task, Tracker
@@ -87,7 +87,7 @@ def draw(level: int, rng: np.random.Generator) -> Draft:
     color = [round(float(c), 4) for c in rng.random(3)]
     edge = np.array(halves)[:, None]
 
-    def propose(rng: np.random.Generator) -> tuple[Array, Array, Array]:
+    def propose(rng: np.random.Generator) -> tuple[Array, Array, Mask]:
         x, y = layout.redraw.draw(rng, (count, TRIES))
         x[:, :1], y[:, :1] = layout.first.draw(rng, (count, 1))
         (dx, dy), square = DISC
