@@ -1,7 +1,8 @@
-"""Keeps a trial's actions and, if asked, one head-camera frame per executed action.
+"""Keeps a trial's actions and, if asked, a video: one head-camera frame per executed action.
 
-Frames wait in memory as JPEG (a few kilobytes each) because only the end tells whether a video is
-wanted; they are then written as H.264 in yuv420p, which every browser plays.
+Only the end tells whether a video is wanted, so it is encoded into memory while the trial runs
+(tens of kilobytes) and reaches the disk, or not, at the end. H.264 in yuv420p: every browser plays
+it.
 """
 
 from __future__ import annotations
@@ -23,12 +24,43 @@ FPS = 10
 CAMERA = CameraSpec("head")
 
 
-class TrialRecorder:
-    """A `Recorder` of actions, and of frames if `frames`."""
+class VideoBuffer:
+    """An H.264 file that grows in memory; all frames have the size of the first, an even one."""
 
-    def __init__(self, frames: bool = False) -> None:
-        self._wanted = frames
-        self._frames: list[bytes] = []
+    def __init__(self, fps: int = FPS) -> None:
+        import av
+
+        self._av = av
+        self._bytes = io.BytesIO()
+        self._fps = fps
+        self._file: Any = av.open(self._bytes, "w", format="mp4")
+        self._stream: Any = None
+
+    def add(self, image: NDArray[np.uint8]) -> None:
+        """Append one RGB frame, uint8 (height, width, 3)."""
+        if self._stream is None:
+            stream = self._file.add_stream("libx264", rate=self._fps)
+            stream.height, stream.width = image.shape[:2]
+            stream.pix_fmt = "yuv420p"
+            stream.options = {"crf": "23", "preset": "veryfast"}
+            stream.codec_context.thread_count = 1
+            self._stream = stream
+        frame = self._av.VideoFrame.from_ndarray(np.ascontiguousarray(image), format="rgb24")
+        self._file.mux(self._stream.encode(frame))
+
+    def finish(self) -> bytes:
+        """The whole file; nothing can be added any more."""
+        if self._stream is not None:
+            self._file.mux(self._stream.encode())
+        self._file.close()
+        return self._bytes.getvalue()
+
+
+class TrialRecorder:
+    """A `Recorder` of actions, and of a video if `video`."""
+
+    def __init__(self, video: bool = False) -> None:
+        self._video = VideoBuffer() if video else None
         self._actions: list[NDArray[np.float32]] = []
 
     @property
@@ -38,55 +70,19 @@ class TrialRecorder:
 
     def started(self, world: World) -> None:
         """Keep the first view."""
-        self._keep(world)
+        if self._video is not None:
+            self._video.add(world.render(CAMERA))
 
     def executed(self, world: World, action: NDArray[np.float32]) -> None:
         """Keep `action` and the view after it."""
         self._actions.append(action)
-        self._keep(world)
-
-    def _keep(self, world: World) -> None:
-        if self._wanted:
-            self._frames.append(encode_jpeg(world.render(CAMERA)))
+        if self._video is not None:
+            self._video.add(world.render(CAMERA))
 
     def write_video(self, folder: Path, key: TrialKey) -> str:
-        """Write the frames and return the video's path inside `folder` ("" if there are none)."""
-        if not self._frames:
+        """Write the video and return its path inside `folder` ("" if none was kept)."""
+        if self._video is None:
             return ""
         path = Path(VIDEOS) / f"{key.slug}.mp4"
-        replace_file(folder / path, encode_mp4([decode_jpeg(f) for f in self._frames]))
+        replace_file(folder / path, self._video.finish())
         return str(path)
-
-
-def encode_jpeg(image: NDArray[np.uint8], quality: int = 92) -> bytes:
-    """`image` uint8 (height, width, 3) as JPEG."""
-    from PIL import Image
-
-    buffer = io.BytesIO()
-    Image.fromarray(image).save(buffer, "JPEG", quality=quality)
-    return buffer.getvalue()
-
-
-def decode_jpeg(data: bytes) -> NDArray[np.uint8]:
-    """The image that `encode_jpeg` wrote."""
-    from PIL import Image
-
-    return np.asarray(Image.open(io.BytesIO(data)).convert("RGB"), dtype=np.uint8)
-
-
-def encode_mp4(frames: list[NDArray[np.uint8]], fps: int = FPS) -> bytes:
-    """`frames`, uint8 (height, width, 3) of one even size, as an H.264 file."""
-    import av
-
-    buffer = io.BytesIO()
-    options = {"movflags": "faststart"}
-    with av.open(buffer, "w", format="mp4", options=options) as container:
-        stream: Any = container.add_stream("libx264", rate=fps)
-        stream.height, stream.width = frames[0].shape[:2]
-        stream.pix_fmt = "yuv420p"
-        stream.options = {"crf": "23", "preset": "veryfast"}
-        stream.codec_context.thread_count = 1
-        for frame in frames:
-            container.mux(stream.encode(av.VideoFrame.from_ndarray(frame, format="rgb24")))
-        container.mux(stream.encode())
-    return buffer.getvalue()

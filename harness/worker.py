@@ -62,7 +62,7 @@ class Worker:
         from robospa.harness.video import TrialRecorder
 
         self._prepare()
-        recorder = TrialRecorder(frames=self.config.video != "none")
+        recorder = TrialRecorder(video=self.config.video != "none")
         seed = policy_seed(key, self.config.run_seed)
         record = run_trial(
             self._world, self._policy, key, policy_seed=seed, recorder=recorder, parts=self.parts
