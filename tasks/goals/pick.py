@@ -1,8 +1,9 @@
 """The goal of every pick task: the named object is lifted, by a gripper.
 
 One state machine serves all of them; a task chooses its height test and what else must hold at
-that instant. Whatever the height test, the object has to be carried: close to a gripper, not
-thrown up or raised on top of something else. Lifting another object is an event, not a failure.
+that instant. Whatever the height test, the object has to be carried: close to a gripper that is
+not open, not thrown up or pushed up by something else. Lifting another object is an event, not a
+failure.
 """
 
 from __future__ import annotations
@@ -10,15 +11,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from robospa.tasks.events import Event
-from robospa.tasks.geometry import Pose
+from robospa.tasks.geometry import Vec3
+from robospa.tasks.goals.flags import grasp_centre
+from robospa.tasks.goals.handling import Handling
 from robospa.tasks.snapshot import GRIPPER_CLOSED, GRIPPER_OPEN, Snapshot
 
-GRASP_CENTRE = 0.12
-"""The grasp centre lies this far [m] ahead of the end-effector frame, along its x axis."""
 CARRY_DISTANCE = 0.15
-"""An object whose origin is this near [m] to a grasp centre counts as carried by that arm."""
-LIFTED, WRONG, RESTING = 0.02, 0.03, 0.01
-"""Rise [m] above the start that makes an object lifted, wrongly lifted, and back at rest."""
+"""An object whose origin is this near [m] to a grasp centre may be carried by that arm."""
+WRONG = 0.03
+"""Rise [m] above the start that makes another object wrongly lifted."""
+BACK = 0.01
+"""Rise [m] below which that object may be lifted anew."""
 
 
 @dataclass(frozen=True)
@@ -27,7 +30,7 @@ class Lift:
 
     `above`: the origin is higher than this [m, world]. `rise`: it is higher than at the start by
     more than this [m]. `steady`: every other object is within this [m] of its start height.
-    `closed`: an arm that carries the object has its commanded gripper below 0.2.
+    `closed`: an arm that carries the object has its commanded gripper below 0.2 (else: below 0.8).
     `touching`: a gripper is in contact with the object.
     """
 
@@ -46,92 +49,69 @@ class PickTracker:
     def __init__(self, target: str, names: tuple[str, ...], lift: Lift) -> None:
         if target not in names:
             raise ValueError(f"target {target!r} is not among the objects {list(names)}")
+        if lift.above is None and lift.rise is None:
+            raise ValueError("a lift without a height test is never wrong; give `above` or `rise`")
         self.target = target
-        self.names = names
+        self.others = tuple(name for name in names if name != target)
         self.lift = lift
         self.needs_contacts = lift.touching
+        self._names = names
+        self._begin()
+
+    def _begin(self) -> None:
+        self._handling = Handling(self._names, CARRY_DISTANCE)
         self._heights: list[float] = []
         self._goal_height = float("inf")
-        self._raised: dict[str, bool] = {}  # lifted now; True once a gripper was seen to hold it
-        self._reported: set[str] = set()
+        self._wrong: set[str] = set()
         self._done = False
 
     def start(self, snapshot: Snapshot) -> tuple[Event, ...]:
         """Remember the heights of the settled scene."""
-        poses = snapshot.poses
-        self._heights = [poses[name].position[2] for name in self.names]
-        tests = [self.lift.above] if self.lift.above is not None else []
+        self._begin()
+        self._heights = [snapshot.poses[name].position[2] for name in self.others]
+        heights = [] if self.lift.above is None else [self.lift.above]
         if self.lift.rise is not None:
-            tests.append(poses[self.target].position[2] + self.lift.rise)
-        if not tests:
-            raise ValueError("a lift needs a height test: give `above` or `rise`")
-        self._goal_height = max(tests)
-        self._raised, self._reported, self._done = {}, set(), False
-        return ()
+            heights.append(snapshot.poses[self.target].position[2] + self.lift.rise)
+        self._goal_height = max(heights)
+        return self._handling.update(snapshot)
 
     def update(self, snapshot: Snapshot) -> tuple[Event, ...]:
-        """Events of this instant; nothing after success."""
+        """Events of this instant; none after success."""
         if self._done:
             return ()
-        poses = snapshot.poses
-        events: list[Event] = []
-        for name, start in zip(self.names, self._heights, strict=True):
+        events = self._handling.update(snapshot)
+        poses, steady = snapshot.poses, True
+        for name, start in zip(self.others, self._heights, strict=True):
             rise = poses[name].position[2] - start
-            if rise > LIFTED or name in self._raised:
-                self._lifted(snapshot, name, rise, events)
-        if poses[self.target].position[2] > self._goal_height and self._holds(snapshot):
+            if self.lift.steady is not None and abs(rise) > self.lift.steady:
+                steady = False
+            if rise > WRONG and name not in self._wrong:
+                self._wrong.add(name)
+                events += (Event(snapshot.time, "wrong_object", name),)
+            elif rise < BACK:
+                self._wrong.discard(name)
+        if steady and poses[self.target].position[2] > self._goal_height and self._held(snapshot):
             self._done = True
-            events.append(Event(snapshot.time, "subtask_done", self.target, 0))
-            events.append(Event(snapshot.time, "success", self.target))
-        return tuple(events)
+            events += (
+                Event(snapshot.time, "subtask_done", self.target, 0),
+                Event(snapshot.time, "success", self.target),
+            )
+        return events
 
-    def _lifted(self, snapshot: Snapshot, name: str, rise: float, events: list[Event]) -> None:
-        """Events of one object that is off the table, or was."""
-        if rise < RESTING:
-            if self._raised.pop(name):
-                events.append(Event(snapshot.time, "dropped", name))
-            self._reported.discard(name)
-            return
-        if rise > LIFTED and not self._raised.get(name) and carriers(snapshot, name, GRIPPER_OPEN):
-            self._raised[name] = True
-            events.append(Event(snapshot.time, "grasped", name))
-        self._raised.setdefault(name, False)
-        if name != self.target and rise > WRONG and name not in self._reported:
-            self._reported.add(name)
-            events.append(Event(snapshot.time, "wrong_object", name))
-
-    def _holds(self, snapshot: Snapshot) -> bool:
-        """The conditions beside the target's own height."""
-        opening = GRIPPER_CLOSED if self.lift.closed else float("inf")
-        if not carriers(snapshot, self.target, opening):
+    def _held(self, snapshot: Snapshot) -> bool:
+        """Whether a gripper carries the target, as far as this task looks."""
+        opening = GRIPPER_CLOSED if self.lift.closed else GRIPPER_OPEN
+        if not carried(snapshot, snapshot.poses[self.target].position, opening):
             return False
-        if self.lift.touching and not snapshot.gripper_contacts(self.target):
-            return False
-        steady = self.lift.steady
-        return steady is None or all(
-            name == self.target or abs(snapshot.poses[name].position[2] - start) <= steady
-            for name, start in zip(self.names, self._heights, strict=True)
-        )
+        return not self.lift.touching or bool(snapshot.gripper_contacts(self.target))
 
 
-def carriers(snapshot: Snapshot, name: str, opening: float) -> list[int]:
-    """Arms (0 left, 1 right) near the object whose commanded gripper is below `opening`."""
-    x, y, z = snapshot.poses[name].position
-    found = []
-    for arm in (0, 1):
-        if snapshot.gripper[arm] < opening:
-            gx, gy, gz = grasp_centre(snapshot.end_effector[arm])
-            if (gx - x) ** 2 + (gy - y) ** 2 + (gz - z) ** 2 < CARRY_DISTANCE**2:
-                found.append(arm)
-    return found
-
-
-def grasp_centre(end_effector: Pose) -> tuple[float, float, float]:
-    """The point between the fingertips [m, world] of an arm with this end-effector pose."""
-    px, py, pz = end_effector.position
-    w, x, y, z = end_effector.rotation
-    return (
-        px + GRASP_CENTRE * (1 - 2 * (y * y + z * z)),
-        py + GRASP_CENTRE * 2 * (x * y + w * z),
-        pz + GRASP_CENTRE * 2 * (x * z - w * y),
-    )
+def carried(snapshot: Snapshot, point: Vec3, opening: float) -> bool:
+    """Whether an arm commanded to less than `opening` has its grasp centre near `point`."""
+    for commanded, pose in zip(snapshot.gripper, snapshot.end_effector, strict=True):
+        if commanded < opening:
+            x, y, z = grasp_centre(pose)
+            dx, dy, dz = x - point[0], y - point[1], z - point[2]
+            if dx * dx + dy * dy + dz * dz < CARRY_DISTANCE**2:
+                return True
+    return False
