@@ -1,0 +1,49 @@
+# Two commands for newcomers: `make demo` and `make test`. Each installs what it needs first.
+
+SHELL := /bin/bash
+BIN := .venv/bin
+UV_COMPILE := $(BIN)/uv pip compile pyproject.toml --universal --fork-strategy fewest \
+	--python-version 3.11 --default-index https://pypi.org/simple --no-config --no-header -q
+
+.PHONY: help demo test install install-dev lint types fast sim format lock clean
+
+help: ## What can be made
+	@grep -E '^[a-z-]+:.*##' Makefile | sed -E 's/:.*## /\t/' | expand -t 14
+
+demo: install ## Install what is missing, then evaluate a policy server end to end
+	$(BIN)/robospa demo
+
+test: install-dev ## Install what is missing, then lint, types, fast tests, simulator tests
+	$(MAKE) --no-print-directory lint types fast sim
+
+install: ## .venv, packages, robospa itself, a Vulkan driver: only what is missing
+	@bash scripts/setup.sh
+
+install-dev: ## The same with the test tools
+	@bash scripts/setup.sh --dev
+
+lint: ## ruff: rules and format
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+types: ## mypy --strict over the installed packages
+	$(BIN)/mypy -p robospa
+
+fast: ## Tests without simulator
+	$(BIN)/pytest
+
+sim: ## Tests that run the simulator
+	$(BIN)/pytest -m sim
+
+format: ## Let ruff format and sort
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+lock: ## Renew both lock files from pyproject.toml (LOCK=--upgrade for newer versions)
+	$(BIN)/pip install -q uv
+	$(UV_COMPILE) $(LOCK) --extra sim --extra report -o requirements.lock
+	$(UV_COMPILE) $(LOCK) --extra sim --extra report --extra dev -c requirements.lock \
+		-o requirements-dev.lock
+
+clean: ## Forget the environment, caches and build output; runs/ stays
+	rm -rf .venv build .mypy_cache .ruff_cache .pytest_cache .hypothesis
