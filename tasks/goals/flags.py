@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 from robospa.tasks.events import Event
 from robospa.tasks.geometry import Pose, Vec3
 from robospa.tasks.snapshot import GRIPPER_OPEN, Snapshot
 
-GRASP_OFFSET = 0.12
-"""The grasp centre lies this far [m] along the end effector's x axis."""
+GRASP_CENTRE = 0.12
+"""The grasp centre lies this far [m] ahead of the end-effector frame, along its x axis."""
 
 
 class Flags:
@@ -41,13 +39,13 @@ def both_open(snapshot: Snapshot) -> bool:
 
 
 def grasp_centre(end_effector: Pose) -> Vec3:
-    """The point [m, world] between the fingertips."""
+    """The point [m, world] between the fingertips of an arm with this end-effector pose."""
     w, x, y, z = end_effector.rotation
     px, py, pz = end_effector.position
     return (
-        px + GRASP_OFFSET * (1 - 2 * (y * y + z * z)),
-        py + GRASP_OFFSET * 2 * (x * y + w * z),
-        pz + GRASP_OFFSET * 2 * (x * z - w * y),
+        px + GRASP_CENTRE * (1 - 2 * (y * y + z * z)),
+        py + GRASP_CENTRE * 2 * (x * y + w * z),
+        pz + GRASP_CENTRE * 2 * (x * z - w * y),
     )
 
 
@@ -69,8 +67,3 @@ def inside_box(point: Vec3, centre: Vec3, half: Vec3) -> bool:
         and abs(point[1] - centre[1]) < half[1]
         and abs(point[2] - centre[2]) < half[2]
     )
-
-
-def succeeded(events: Iterable[Event]) -> bool:
-    """Whether one of `events` is the success."""
-    return any(event.kind == "success" for event in events)

@@ -13,19 +13,12 @@ import numpy as np
 
 from robospa.tasks import objects
 from robospa.tasks.goals.repeat import PressCounter, Repeat
+from robospa.tasks.instructions import words_procedural
+from robospa.tasks.instructions.words import Slots
 from robospa.tasks.plan import Press, Skill
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
-from robospa.tasks.variants.tabletop import (
-    NUMBERS,
-    Item,
-    Phrasings,
-    draw_look,
-    look_phrasings,
-    named,
-    side,
-    standing,
-)
+from robospa.tasks.variants.tabletop import Item, draw_look, named, side, standing
 
 X, Y = (-0.2, 0.2), (-0.1, 0.05)
 
@@ -56,43 +49,9 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
     return (Press(stapler.name, arm=arm),) * int(scene.facts["count"])
 
 
-def _count(n: int) -> Phrasings:
-    if n == 1:
-        return (
-            ("once", "one time", "one single time"),
-            ("just once", "exactly once", "a single time", "only once"),
-        )
-    word = NUMBERS[n]
-    return (
-        (f"{word} times", f"{n} times", f"{word} times in a row"),
-        (f"a total of {word} times", f"exactly {word} times", f"{n} times in total", f"{n}x"),
-    )
-
-
-def _presses(n: int) -> Phrasings:
-    if n == 1:
-        return (
-            ("one press", "a single press", "1 press"),
-            ("exactly one press", "just one press", "one push", "a lone press"),
-        )
-    word = NUMBERS[n]
-    return (
-        (f"{word} presses", f"{n} presses", f"{word} separate presses"),
-        (f"exactly {word} presses", f"a total of {word} presses", f"{word} pushes", f"{n} pushes"),
-    )
-
-
-def slots(scene: Scene) -> dict[str, Phrasings]:
-    """`object` (no article), `count` ("three times") and `presses` ("three presses")."""
-    stapler = scene.object(scene.facts["stapler"])
-    model = objects.object_model(stapler.asset, stapler.params)
-    n = int(scene.facts["count"])
-    extra = (("stapler", "stapler on the table"), ("desk stapler", "stapling device"))
-    return {
-        "object": look_phrasings(model, *extra),
-        "count": _count(n),
-        "presses": _presses(n),
-    }
+def slots(scene: Scene) -> Slots:
+    """How the stapler and the count are said."""
+    return words_procedural.press(int(scene.facts["count"]))
 
 
 TASK = Task(

@@ -10,16 +10,15 @@ from __future__ import annotations
 import numpy as np
 
 from robospa.tasks.goals.stack import Bring, Stack
+from robospa.tasks.instructions import words_procedural
+from robospa.tasks.instructions.words import Slots
 from robospa.tasks.plan import Pick, Place, Skill
 from robospa.tasks.scene import TABLE_TOP, Scene
 from robospa.tasks.task import Draft, Level, Task
 from robospa.tasks.variants.tabletop import (
-    NUMBERS,
     Item,
-    Phrasings,
     Point,
     apart,
-    listed,
     named,
     resting_home,
     scatter,
@@ -101,55 +100,13 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
         if i == 0:
             skills.append(Place(name, (x, y, TABLE_TOP + HALF), arm=arm))
         else:
-            skills.append(Place(name, (0.0, 0.0, HALF), on=order[i - 1], arm=arm))
+            skills.append(Place(name, on=order[i - 1], arm=arm))
     return resting_home(skills)
 
 
-def _single(color: str) -> dict[str, Phrasings]:
-    return {
-        "object": (
-            (f"{color} block", f"{color} cube", f"small {color} block"),
-            (f"{color} wooden cube", f"{color} building block", f"block that is {color}"),
-        ),
-        "place": (
-            ("to the middle of the near edge", "to the centre of the side close to you"),
-            (
-                "to the central spot nearest to you",
-                "to the middle, right in front of the robot",
-                "to the near centre of the table",
-                "to the middle of the table's near side",
-            ),
-        ),
-    }
-
-
-def slots(scene: Scene) -> dict[str, Phrasings]:
-    """Level 1: `object`, `place`. Others: the colours both ways, `bottom`, `top`, `number`..."""
-    colors = list(scene.facts["colors"])
-    if len(colors) == 1:
-        return _single(colors[0])
-    down = colors[::-1]
-    word = NUMBERS[len(colors)]
-    return {
-        "bottom_to_top": (
-            (listed(colors), listed(colors, ", then ", ", then ")),
-            (listed(colors, ", and on top of that ", ", on it "), listed(colors, ", finally ")),
-        ),
-        "top_to_bottom": (
-            (listed(down), listed(down, ", then ", ", then ")),
-            (listed(down, ", and below that ", ", under it "), listed(down, ", lastly ")),
-        ),
-        "bottom": (
-            (f"{colors[0]} block", f"{colors[0]} cube"),
-            (f"{colors[0]} one", f"{colors[0]} piece"),
-        ),
-        "top": (
-            (f"{down[0]} block", f"{down[0]} cube"),
-            (f"{down[0]} one", f"{down[0]} piece"),
-        ),
-        "number": ((word, str(len(colors))), (f"all {word}", f"these {word}")),
-        "stack": (("tower", "stack", "pile"), ("column", "single tower", "vertical stack")),
-    }
+def slots(scene: Scene) -> Slots:
+    """How the order of the colours is said."""
+    return words_procedural.stack(list(scene.facts["colors"]))
 
 
 TASK = Task(

@@ -1,4 +1,4 @@
-"""What the long-horizon tasks share: scattering things on the table, neutral names, phrasings.
+"""What the long-horizon tasks share: scattering things on the table, and neutral names.
 
 Sampling is bounded everywhere: a layout that cannot be completed is drawn anew, a given number of
 times, and then refused with a sentence. Names give no hint of an object's role.
@@ -17,15 +17,10 @@ from robospa.tasks import objects
 from robospa.tasks.geometry import Pose, yaw_rotation
 from robospa.tasks.plan import Home, Skill
 from robospa.tasks.scene import TABLE_TOP, SceneObject
-from robospa.tasks.shapes import ObjectModel
 
 Point = tuple[float, float]
-Phrasings = tuple[tuple[str, ...], tuple[str, ...]]
-"""Train phrasings and held-out phrasings of one instruction slot."""
-
 TRIES_PER_POINT = 100
 LAYOUTS = 200
-NUMBERS = ("zero", "one", "two", "three", "four", "five")
 
 
 @dataclass(frozen=True)
@@ -120,18 +115,3 @@ def resting_home(skills: Iterable[Skill]) -> tuple[Skill, ...]:
             busy = arm
         result.append(skill)
     return tuple(result)
-
-
-def look_phrasings(
-    model: ObjectModel, train: Sequence[str] = (), held_out: Sequence[str] = ()
-) -> Phrasings:
-    """A model's own phrases, the last third held out, with the given ones added to either side."""
-    cut = max(1, len(model.phrases) - max(1, len(model.phrases) // 3))
-    seen = tuple(dict.fromkeys((*model.phrases[:cut], *train)))
-    unseen = (*model.phrases[cut:], *held_out)
-    return seen, tuple(p for p in dict.fromkeys(unseen) if p not in seen)
-
-
-def listed(words: Sequence[str], last: str = " and ", between: str = ", ") -> str:
-    """`words` as an English list: "red", "red and green", "red, green and blue"."""
-    return between.join(words[:-1]) + last + words[-1] if len(words) > 1 else words[0]
