@@ -102,7 +102,7 @@ def draw(level: int, rng: np.random.Generator) -> Draft:
             f"object_{i}",
             "block",
             Pose((points[i][0], points[i][1], TABLE_TOP + halves[i]), yaw_rotation(float(yaws[i]))),
-            {"half": halves[i], "color": color},
+            {"half": [halves[i]] * 3, "color": color},
         )
         for i in range(count)
     )
