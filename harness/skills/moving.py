@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.harness.robots.kinematics import forward
+from robospa.harness.robots.kinematics import forward, pose_of
 from robospa.harness.skills.workspace import TRAVEL_HEIGHT, Workspace, raised
 from robospa.tasks.geometry import Pose
 from robospa.tasks.scene import TABLE_TOP
@@ -29,8 +29,6 @@ def rise(ws: Workspace, arm: int, to: float = TRAVEL_HEIGHT) -> None:
     if height >= to - 0.01:
         return
     frames, _ = forward(ws.chains[arm], ws.joints[arm][None])
-    from robospa.harness.robots.kinematics import pose_of
-
     here = pose_of(frames[0])
     for share in (1.0, 0.75, 0.5, 0.25):
         joints = ws.solve(arm, raised(here, (to - height) * share), ws.joints[arm])
@@ -51,8 +49,6 @@ def travel(ws: Workspace, arm: int, goal: Array, floor: float = TABLE_TOP + 0.07
     if float(tip_heights(ws, arm, line).min()) < ends - 0.01:
         middle = (start + goal) / 2
         frames, _ = forward(ws.chains[arm], middle[None])
-        from robospa.harness.robots.kinematics import pose_of
-
         here = pose_of(frames[0])
         height = float(tip_heights(ws, arm, middle[None])[0])
         detour = ws.solve(arm, raised(here, max(0.0, TRAVEL_HEIGHT - height)), middle)

@@ -60,7 +60,7 @@ def pick(ws: Workspace, call: Pick, fits: Fits | None = None) -> Steps:
 def _choose(
     ws: Workspace, call: Pick, tried: list[Reach], fits: Fits | None
 ) -> tuple[Reach, list[Array], list[Array]]:
-    """The best grasp not yet tried, with the joints of the way in (to the grasp) and of the lift."""
+    """The best grasp not yet tried, with the joints of the way in and of the lift."""
     arms = tuple(a for a in arms_for(call.arm) if ws.held[a] is None)
     options = reachable_grasps(ws, call.object, arms)
     fresh = [o for o in options if not any(_alike(o, t) for t in tried)]

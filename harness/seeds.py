@@ -1,0 +1,148 @@
+"""Which seeds count: scenes that settle and that the expert solves.
+
+The expert runs in this process, without a wire and without rendering, through the same `run_trial`
+as every policy. Used to make the shipped seed lists and to measure the expert on other seeds.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from multiprocessing import get_context
+from pathlib import Path
+
+from robospa.harness.world import SceneUnstable, World
+from robospa.protocol.policy import Policy
+from robospa.results.records import TrialKey
+
+BATCH = 10
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """What became of one seed. `why` is empty for an accepted one."""
+
+    seed: int
+    accepted: bool
+    why: str
+    digest: str = ""
+    physics_steps: int = 0
+    steps: int = 0
+    seconds: float = 0.0
+
+
+_WORKER: list[tuple[World, Policy]] = []
+
+
+def _start() -> None:
+    from robospa.harness.factory import policy_factory
+    from robospa.harness.sapien_world import SapienWorld
+
+    _WORKER.append((SapienWorld(render=False), policy_factory("oracle")()))
+
+
+def attempt(world: World, policy: Policy, name: str, level: int, seed: int) -> Attempt:
+    """Run the expert on one seed."""
+    from robospa.harness.trial import run_trial
+
+    try:
+        record = run_trial(world, policy, TrialKey(name, level, seed), policy_seed=0)
+    except SceneUnstable as trouble:
+        return Attempt(seed, False, f"does not settle: {trouble}")
+    trouble_now = "; ".join(getattr(policy, "trouble", ()))
+    why = "" if record.success else f"{record.end} {record.message} {trouble_now}".strip()
+    return Attempt(
+        seed,
+        record.success,
+        why,
+        record.digest,
+        record.physics_steps,
+        record.steps,
+        record.wall_time,
+    )
+
+
+def _batch(name: str, level: int, seeds: list[int]) -> list[Attempt]:
+    if not _WORKER:
+        _start()
+    world, policy = _WORKER[0]
+    return [attempt(world, policy, name, level, seed) for seed in seeds]
+
+
+class Sweep:
+    """Worker processes that try seeds; use as a context manager."""
+
+    def __init__(self, workers: int) -> None:
+        self._workers = max(1, workers)
+        self._pool = ProcessPoolExecutor(self._workers, mp_context=get_context("spawn"))
+
+    def __enter__(self) -> Sweep:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._pool.shutdown(cancel_futures=True)
+
+    def try_seeds(
+        self, name: str, level: int, seeds: list[int], done: Callable[[int], None] = lambda n: None
+    ) -> list[Attempt]:
+        """Attempts for `seeds`, in their order; `done(n)` is called as n more are finished."""
+        parts = [seeds[i : i + BATCH] for i in range(0, len(seeds), BATCH)]
+        futures = [self._pool.submit(_batch, name, level, part) for part in parts]
+        for future in as_completed(futures):
+            done(len(future.result()))
+        return [item for future in futures for item in future.result()]
+
+    def first_accepted(
+        self,
+        name: str,
+        level: int,
+        start: int,
+        count: int,
+        done: Callable[[int], None] = lambda n: None,
+    ) -> tuple[list[int], list[Attempt]]:
+        """The first `count` accepted seeds from `start` up, and every refused attempt before them.
+
+        Raises RuntimeError if fewer than half of the seeds are accepted.
+        """
+        accepted: list[int] = []
+        refused: list[Attempt] = []
+        for block in _blocks(start, count):
+            for item in self.try_seeds(name, level, block, done):
+                if len(accepted) == count:
+                    break
+                if item.accepted:
+                    accepted.append(item.seed)
+                else:
+                    refused.append(item)
+            if len(accepted) == count:
+                return accepted, refused
+        raise RuntimeError(
+            f"{name} level {level}: only {len(accepted)} of {len(accepted) + len(refused)} seeds "
+            "were accepted; the expert does not solve this variant"
+        )
+
+
+def _blocks(start: int, count: int) -> Iterator[list[int]]:
+    yield list(range(start, start + count))
+    step = 10
+    for first in range(start + count, start + 2 * count, step):
+        yield list(range(first, first + step))
+
+
+def save(folder: Path, name: str, level: int, seeds: list[int]) -> None:
+    """Add a variant's seeds to the task's JSON file, whole or not at all."""
+    path = folder / f"{name}.json"
+    data = json.loads(path.read_text()) if path.exists() else {}
+    data[str(level)] = seeds
+    rows = ",\n".join(f'"{k}": {json.dumps(data[k])}' for k in sorted(data))
+    temporary = path.with_suffix(".tmp")
+    temporary.write_text("{\n" + rows + "\n}\n")
+    temporary.replace(path)
+
+
+def stored_levels(folder: Path, name: str) -> set[int]:
+    """Levels whose seeds are already in the folder."""
+    path = folder / f"{name}.json"
+    return {int(k) for k in json.loads(path.read_text())} if path.exists() else set()
