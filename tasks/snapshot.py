@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 from robospa.tasks.geometry import Pose, Vec3
 
@@ -55,3 +56,47 @@ class Snapshot:
             if (c.first in grippers and c.second == name)
             or (c.second in grippers and c.first == name)
         ]
+
+
+def snapshot_to_json(snapshot: Snapshot) -> dict[str, Any]:
+    """Plain JSON values: poses as [x, y, z, qw, qx, qy, qz]; `snapshot_from_json` is the inverse.
+
+    Contacts are not included: they belong to goals, not to experts.
+    """
+    return {
+        "time": snapshot.time,
+        "poses": {name: _flat(pose) for name, pose in snapshot.poses.items()},
+        "gripper": list(snapshot.gripper),
+        "end_effector": [_flat(pose) for pose in snapshot.end_effector],
+        "joints": [list(arm) for arm in snapshot.joints],
+        "measured": [list(arm) for arm in snapshot.measured],
+    }
+
+
+def snapshot_from_json(data: Mapping[str, Any]) -> Snapshot:
+    """The snapshot that `snapshot_to_json` wrote; KeyError or ValueError if it is not one."""
+    left, right = data["end_effector"]
+    grip_left, grip_right = data["gripper"]
+    joints_left, joints_right = data["joints"]
+    measured_left, measured_right = data["measured"]
+    return Snapshot(
+        time=float(data["time"]),
+        poses={name: _pose(row) for name, row in data["poses"].items()},
+        gripper=(float(grip_left), float(grip_right)),
+        end_effector=(_pose(left), _pose(right)),
+        joints=(_floats(joints_left), _floats(joints_right)),
+        measured=(_floats(measured_left), _floats(measured_right)),
+    )
+
+
+def _flat(pose: Pose) -> list[float]:
+    return [*pose.position, *pose.rotation]
+
+
+def _floats(row: Any) -> tuple[float, ...]:
+    return tuple(float(v) for v in row)
+
+
+def _pose(row: Any) -> Pose:
+    x, y, z, qw, qx, qy, qz = _floats(row)
+    return Pose((x, y, z), (qw, qx, qy, qz))

@@ -1,0 +1,160 @@
+"""How one action becomes drive targets: a closed form, computed once per action.
+
+The official harness time-parameterises the straight joint line with a planner; for a line with one
+velocity and one acceleration limit the answer is a triangle or a trapezium of speed, so it is
+written down here instead. Everything is plain numpy and knows nothing of the simulator. It refuses
+nothing: actions are checked before they come here (`robospa.harness.actions`).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+RATE = 250
+"""Physics steps per simulated second."""
+MAX_VELOCITY = 1.0
+"""[rad/s] of any joint."""
+MAX_ACCELERATION = 1.0
+"""[rad/s^2] of any joint."""
+HOLD_STEPS = 50
+"""Physics steps of an action that moves no joint (0.2 s)."""
+OPENING_LEAD = 0.1
+"""The most by which a gripper's drive target may open in one physics step."""
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Drive targets of both arms, one row per physics step.
+
+    `joints` [rad] and `velocities` [rad/s] are (2, n, J), `gripper` (0 closed .. 1 open) is (2, n):
+    the drive targets. `commanded` (2, n) is the gripper as commanded, which an opening gripper's
+    drive target may lag. Before the first row the targets are those of the previous action.
+    """
+
+    joints: Array
+    velocities: Array
+    gripper: Array
+    commanded: Array
+
+    def __len__(self) -> int:
+        """Number of physics steps."""
+        return int(self.gripper.shape[1])
+
+
+def duration(change: float) -> float:
+    """Time [s] of a rest-to-rest motion whose fastest joint turns by `change` >= 0 [rad]."""
+    reach = MAX_VELOCITY**2 / MAX_ACCELERATION
+    if change <= reach:
+        return 2.0 * math.sqrt(change / MAX_ACCELERATION)
+    return change / MAX_VELOCITY + MAX_VELOCITY / MAX_ACCELERATION
+
+
+def step_count(change: float) -> int:
+    """Physics steps of that motion; 0 if it is too small to take one."""
+    return math.floor(RATE * duration(change) + 1e-9)
+
+
+def profile(change: float) -> tuple[Array, Array]:
+    """Travelled fraction (n,) from 0 to 1 and its rate (n,) [1/s] of a rest-to-rest motion.
+
+    The n = `step_count(change)` samples are spread evenly over the motion, both ends included; a
+    motion of a single step has only its end.
+    """
+    count = step_count(change)
+    if count == 0:
+        return np.empty(0), np.empty(0)
+    total = duration(change)
+    time = np.linspace(0.0, total, count) if count > 1 else np.array([total])
+    peak = min(MAX_VELOCITY, math.sqrt(change * MAX_ACCELERATION))
+    ramp = peak / MAX_ACCELERATION
+    left = total - time
+    cruise = change - peak * ramp  # travelled at peak speed
+    travelled = np.where(
+        time < ramp,
+        0.5 * MAX_ACCELERATION * time**2,
+        np.where(
+            left < ramp,
+            change - 0.5 * MAX_ACCELERATION * left**2,
+            0.5 * peak * ramp + np.clip(peak * (time - ramp), 0.0, cruise),
+        ),
+    )
+    speed = np.minimum(peak, MAX_ACCELERATION * np.minimum(time, left))
+    return travelled / change, speed / change
+
+
+def limit_opening(commanded: Array, drive: float) -> Array:
+    """Gripper drive targets (n,) that follow `commanded` (n,) from `drive`, opening no faster
+    than OPENING_LEAD per step. Closing is not limited."""
+    if len(commanded) == 0 or np.diff(commanded, prepend=drive).max() <= OPENING_LEAD + 1e-12:
+        return commanded
+    out = np.empty_like(commanded)
+    for i, value in enumerate(commanded):
+        drive = min(float(value), drive + OPENING_LEAD)
+        out[i] = drive
+    return out
+
+
+def _padded(values: Array, count: int) -> Array:
+    """`values` (n, ...) with the last row repeated up to `count` rows."""
+    missing = count - len(values)
+    return values if missing <= 0 else np.concatenate([values, np.repeat(values[-1:], missing, 0)])
+
+
+def _arm_steps(change: float, gripper_change: float) -> int:
+    """Steps that one arm asks for: its motion's, or HOLD_STEPS if only its gripper moves."""
+    return step_count(change) or (HOLD_STEPS if gripper_change else 0)
+
+
+def rest_to_rest(
+    start: Array, goal: Array, gripper: Array, gripper_goal: Array, drive: Array
+) -> Trajectory:
+    """The official rule: each arm goes straight from `start` to `goal` (2, J), at rest at both ends.
+
+    The gripper goes linearly from `gripper` to `gripper_goal` (2,) over its arm's steps; `drive` (2,)
+    is where its drive target stands. The arm that is done first holds. An arm that does not move waits
+    for the other (its gripper, if it moves, takes HOLD_STEPS); if nothing moves, both hold for
+    HOLD_STEPS.
+    """
+    change = np.abs(goal - start).max(axis=1)
+    steps = [_arm_steps(change[a], gripper_goal[a] - gripper[a]) for a in range(2)]
+    count = max(steps) or HOLD_STEPS
+    joints, velocities, commanded, drives = [], [], [], []
+    for a in range(2):
+        fraction, rate = profile(float(change[a]))
+        if len(fraction) == 0:  # at rest, or closer than one step: the target is taken at once
+            fraction, rate = np.ones(1), np.zeros(1)
+        line = start[a] + fraction[:, None] * (goal[a] - start[a])
+        line[-1] = goal[a]
+        n = steps[a] or count
+        grip = gripper[a] + np.arange(1, n + 1) / n * (gripper_goal[a] - gripper[a])
+        grip[-1] = gripper_goal[a]
+        grip = _padded(grip, count)
+        joints.append(_padded(line, count))
+        velocities.append(_padded(rate[:, None] * (goal[a] - start[a]), count))
+        commanded.append(grip)
+        drives.append(limit_opening(grip, float(drive[a])))
+    return Trajectory(np.stack(joints), np.stack(velocities), np.stack(drives), np.stack(commanded))
+
+
+def fixed_rate(
+    start: Array, goal: Array, gripper: Array, gripper_goal: Array, drive: Array, count: int
+) -> Trajectory:
+    """Every action lasts `count` steps; joints and grippers move linearly, whatever their speed.
+
+    The last velocity target is zero, so that a policy that stops sending leaves the arms at rest.
+    """
+    fraction = np.arange(1, count + 1) / count
+    joints = start[:, None] + fraction[None, :, None] * (goal - start)[:, None]
+    joints[:, -1] = goal
+    velocities = np.repeat((goal - start)[:, None] * (RATE / count), count, axis=1)
+    velocities[:, -1] = 0.0
+    grip = gripper[:, None] + fraction[None, :] * (gripper_goal - gripper)[:, None]
+    grip[:, -1] = gripper_goal
+    drives = np.stack([limit_opening(grip[a], float(drive[a])) for a in range(2)])
+    return Trajectory(joints, velocities, drives, grip)
