@@ -27,7 +27,8 @@ lint: ## ruff: rules and format
 	$(BIN)/ruff format --check .
 
 types: ## mypy --strict over the installed packages
-	$(BIN)/mypy -p robospa
+	@set -o pipefail; MYPYPATH=$$(echo build/__editable__.robospa-*) $(BIN)/mypy -p robospa \
+		| sed -E 's|^build/__editable__[^/]*/robospa/||'
 
 fast: ## Tests without simulator
 	$(BIN)/pytest

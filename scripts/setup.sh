@@ -174,12 +174,17 @@ vulkan_source() { # where this system's Mesa >= 24.3 comes from: backports, arch
 add_backports() { # as a file of its own, unless some source has it already
     local prefix mirror file=$apt_sources/robospa-bookworm-backports.sources
     ! grep -qsr "bookworm-backports" "$apt_sources" "$(dirname "$apt_sources")/sources.list" || return 0
-    prefix=$(root_prefix) || return 0 # apt_install will say what to do
     mirror=$(apt-get indextargets --format '$(REPO_URI)' 'Codename: bookworm' 2>/dev/null |
         grep -m1 -v security || true)
+    mirror=${mirror:-http://deb.debian.org/debian}
+    prefix=$(root_prefix) || {
+        say "neither root nor sudo: please run first: echo 'deb $mirror bookworm-backports main' |" \
+            "sudo tee ${file%.sources}.list"
+        return 0
+    }
     say "adding the package source bookworm-backports in $file"
     [ "$dry_run" = 0 ] || return 0
-    printf '%s\n' "Types: deb" "URIs: ${mirror:-http://deb.debian.org/debian}" \
+    printf '%s\n' "Types: deb" "URIs: $mirror" \
         "Suites: bookworm-backports" "Components: main" \
         "Signed-By: /usr/share/keyrings/debian-archive-keyring.gpg" |
         $prefix tee "$file" >/dev/null

@@ -1,0 +1,137 @@
+"""Imports point one way, packaging lists what exists, and starting up stays light."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+
+ALLOWED = {
+    "protocol": (),
+    "tasks": (),
+    "results": (),
+    "clients": ("protocol",),
+    # A world answers what the policy's spec asks for, so the harness knows the protocol's types.
+    "harness": ("protocol", "clients", "tasks", "results"),
+    "baselines": ("protocol", "tasks", "harness.skills", "harness.robots"),
+    "leaderboard": ("results", "harness"),
+}
+"""What each folder may import besides itself. The CLI reaches `baselines` through entry points."""
+
+HEAVY = ("sapien", "matplotlib", "scipy", "av", "jinja2", "torch", "cv2", "PIL")
+"""Modules that cost a good part of a second, or are not part of the base install."""
+
+
+def imported_modules(source: str) -> Iterator[str]:
+    """Every `robospa...` name that `source` imports, `from` imports with the imported name."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"relative import in line {node.lineno}: write robospa.<folder>"
+            names = [f"{node.module}.{alias.name}" for alias in node.names]
+        else:
+            continue
+        yield from (name for name in names if name.split(".")[0] == "robospa")
+
+
+def violations(folder: str, source: str) -> list[str]:
+    """The imports of `source`, a module of `folder`, that ALLOWED does not list."""
+    allowed = [f"robospa.{name}." for name in (folder, *ALLOWED[folder])]
+    return [m for m in imported_modules(source) if not (m + ".").startswith(tuple(allowed))]
+
+
+def loaded_after(statement: str) -> set[str]:
+    """Top-level modules that a fresh interpreter has loaded after running `statement`."""
+    code = f"import sys\n{statement}\nprint('\\nloaded', *{{m.split('.')[0] for m in sys.modules}})"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr
+    return set(done.stdout.splitlines()[-1].split()[1:])
+
+
+def python_files(folder: str) -> list[Path]:
+    return sorted((ROOT / folder).rglob("*.py"))
+
+
+@pytest.mark.parametrize("folder", ALLOWED)
+def test_imports_point_one_way(folder: str) -> None:
+    wrong = [
+        f"{path.relative_to(ROOT)} imports {name}"
+        for path in python_files(folder)
+        for name in violations(folder, path.read_text())
+    ]
+    assert wrong == []
+
+
+@pytest.mark.parametrize(
+    ("folder", "line", "wrong"),
+    [
+        ("tasks", "import robospa.harness.world", ["robospa.harness.world"]),
+        ("baselines", "from robospa.harness import cli", ["robospa.harness.cli"]),
+        ("baselines", "from robospa.harness.skills import run", []),
+        (
+            "harness",
+            "def f():\n    from robospa.baselines import oracle",
+            ["robospa.baselines.oracle"],
+        ),
+        ("protocol", "import numpy", []),
+    ],
+)
+def test_the_rule_sees_a_violation(folder: str, line: str, wrong: list[str]) -> None:
+    assert violations(folder, line) == wrong
+
+
+def test_every_folder_with_code_has_a_rule() -> None:
+    folders = {path.parent.name for path in ROOT.glob("*/__init__.py")}
+    assert folders == set(ALLOWED)
+
+
+def test_packaging_lists_every_package() -> None:
+    listed = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]["packages"]
+    found = {
+        ".".join(("robospa", *path.parent.relative_to(ROOT).parts))
+        for folder in ALLOWED
+        for path in (ROOT / folder).rglob("__init__.py")
+    }
+    assert set(listed) == found
+
+
+def test_protocol_loads_only_its_three_dependencies() -> None:
+    statement = (
+        "import importlib, pkgutil, robospa.protocol as p\n"
+        "for m in pkgutil.iter_modules(p.__path__): importlib.import_module(p.__name__+'.'+m.name)"
+    )
+    loaded = loaded_after(statement)
+    assert loaded.isdisjoint((*HEAVY, "typer", "rich"))
+
+
+@pytest.mark.parametrize("module", ["robospa.tasks.catalog", "robospa.results"])
+def test_tasks_and_results_load_no_simulator(module: str) -> None:
+    assert loaded_after(f"import {module}").isdisjoint(HEAVY)
+
+
+def test_help_loads_nothing_heavy() -> None:
+    statement = (
+        "from robospa.harness.cli.main import main\n"
+        "sys.argv = ['robospa', '--help']\n"
+        "try: main()\n"
+        "except SystemExit as stop: assert not stop.code, stop.code"
+    )
+    assert loaded_after(statement).isdisjoint(HEAVY)
+
+
+def test_no_private_package_index_in_the_lock_files() -> None:
+    lines = [
+        line
+        for name in ("requirements.lock", "requirements-dev.lock")
+        for line in (ROOT / name).read_text().splitlines()
+        if not line.lstrip().startswith("#")
+    ]
+    assert [line for line in lines if "://" in line or line.startswith(("-", "torch"))] == []
