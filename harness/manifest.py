@@ -105,7 +105,7 @@ def about_machine(world: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _flatten(value: object, path: str = "") -> dict[str, object]:
-    if isinstance(value, Mapping) and value:
+    if isinstance(value, Mapping) and (value or not path):
         parts: dict[str, object] = {}
         for name, inner in value.items():
             parts.update(_flatten(inner, f"{path}.{name}" if path else str(name)))

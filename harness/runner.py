@@ -155,6 +155,8 @@ class Runner:
         elif message[0] == "done":
             hand.work = None
             self._settle(message[1])
+        elif message[0] == "fatal":
+            raise RunAborted(message[1])
         else:
             _, _, text, retry = message
             work, hand.work = hand.work, None

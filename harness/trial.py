@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.harness.world import ActionError, World
+from robospa.protocol.errors import PolicyAnswerError
 from robospa.protocol.policy import Policy, PolicySpec, TrialInfo
 from robospa.results.records import TrialKey, TrialRecord
 from robospa.tasks.catalog import build_scene
@@ -33,10 +34,6 @@ from robospa.tasks.task import Task, Tracker
 
 SIZES = {"joint": (14, 16), "ee": (16,), "delta_ee": (16, 14)}
 """Action sizes that any embodiment of ours takes; the world checks the exact one."""
-
-
-class BadAnswer(Exception):
-    """The policy answered something that is not an action chunk of its own spec."""
 
 
 class Recorder(Protocol):
@@ -75,25 +72,25 @@ def policy_seed(key: TrialKey, run_seed: int = 0) -> int:
 
 
 def check_chunk(answer: object, spec: PolicySpec) -> NDArray[np.float32]:
-    """`answer` as float32 (T, D); raises BadAnswer, saying which rule of the spec it breaks."""
+    """`answer` as float32 (T, D); raises PolicyAnswerError, saying which rule of the spec it breaks."""
     try:
         chunk = np.asarray(answer, dtype=np.float32)
     except (TypeError, ValueError) as error:
-        raise BadAnswer(f"the policy answered no array of numbers: {error}") from error
+        raise PolicyAnswerError(f"the policy answered no array of numbers: {error}") from error
     sizes = SIZES.get(spec.action, ())
     if chunk.ndim != 2 or chunk.shape[0] < 1 or (sizes and chunk.shape[1] not in sizes):
         wanted = " or ".join(map(str, sizes))
-        raise BadAnswer(
+        raise PolicyAnswerError(
             f"the policy answered an array of shape {chunk.shape}; "
             f"a chunk of {spec.action!r} actions has shape (T, {wanted}) with T >= 1"
         )
     if chunk.shape[0] > spec.horizon:
-        raise BadAnswer(
+        raise PolicyAnswerError(
             f"the policy answered {chunk.shape[0]} actions; its spec allows {spec.horizon} a chunk"
         )
     if not np.isfinite(chunk).all():
         row, column = np.argwhere(~np.isfinite(chunk))[0]
-        raise BadAnswer(
+        raise PolicyAnswerError(
             f"the policy answered {chunk[row, column]} in action {row}, dimension {column}"
         )
     return np.ascontiguousarray(chunk)
@@ -230,7 +227,7 @@ def _play(run: _Run, info: TrialInfo, limit: int) -> tuple[str, str]:
         if any(event.kind in ("success", "failed") for event in run.events):
             return _end_of(run), "the goal was decided before the first action"
         return _loop(run, limit), ""
-    except (ActionError, BadAnswer) as error:
+    except (ActionError, PolicyAnswerError) as error:
         return "policy_error", str(error)
 
 

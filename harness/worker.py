@@ -1,9 +1,10 @@
 """One worker process: one world, one policy connection, one trial at a time, one record file.
 
 The driver sends ("run", key, attempt) or ("stop",); the worker answers ("ready", file), then per
-trial ("done", record) once the record is on disk, or ("lost", key, message, retry) if it could not
-be run. After a loss the world is rebuilt and the policy reconnected before the next trial, never
-within one. A worker whose driver has died ends at once.
+trial ("done", record) once the record is on disk, ("lost", key, message, retry) if it could not be
+run, or ("fatal", message) if no trial could ever be run. After a loss the world is rebuilt and the
+policy reconnected before the next trial, never within one. A worker whose driver has died ends at
+once.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import os
 import signal
 import sys
 import threading
+import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from multiprocessing.connection import Connection, wait
@@ -131,26 +133,30 @@ def describe(error: BaseException) -> str:
     return text if text and module.startswith("robospa.") else f"{type(error).__name__}: {text}"
 
 
-def _serve(pipe: Connection, worker: Worker) -> None:
+def _attempt(worker: Worker, key: TrialKey, attempt: int) -> tuple[Any, ...]:
+    """The message that tells how this attempt went. Errors are sorted here, once."""
+    from robospa.harness.factory import UnknownName
     from robospa.harness.world import SceneUnstable
+    from robospa.protocol.errors import HandshakeError, ServerError
 
+    try:
+        return ("done", worker.run(key, attempt))
+    except SceneUnstable as error:
+        return ("lost", key, describe(error), False)
+    except (HandshakeError, UnknownName) as error:
+        return ("fatal", describe(error))
+    except Exception as error:  # the driver decides: retry, then report as missing
+        traceback.print_exc()
+        worker.recover()
+        return ("lost", key, describe(error), not isinstance(error, ServerError) or error.retriable)
+
+
+def _serve(pipe: Connection, worker: Worker) -> None:
     while True:
         message = pipe.recv()
         if message[0] == "stop":
             return
-        _, key, attempt = message
-        try:
-            record = worker.run(key, attempt)
-        except SceneUnstable as error:
-            pipe.send(("lost", key, describe(error), False))
-        except Exception as error:  # the driver decides: retry, then report as missing
-            import traceback
-
-            traceback.print_exc()
-            worker.recover()
-            pipe.send(("lost", key, describe(error), True))
-        else:
-            pipe.send(("done", record))
+        pipe.send(_attempt(worker, *message[1:]))
 
 
 def main(pipe: Connection, config: WorkerConfig, name: str) -> None:

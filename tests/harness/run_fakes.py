@@ -1,0 +1,175 @@
+"""A world, a task and policies that need no simulator and take microseconds.
+
+The goal of every fake trial: the sum of all executed actions' first entry reaches the seed's last
+digit plus one. A policy that sends ones needs (digit + 1) actions.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import signal
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robospa.harness.trial import TrialParts
+from robospa.harness.world import ActionError, Poll, SceneUnstable, StepResult
+from robospa.protocol.policy import CameraSpec, PolicySpec, TrialInfo
+from robospa.results.records import TrialKey
+from robospa.tasks.events import Event
+from robospa.tasks.geometry import Pose
+from robospa.tasks.scene import Scene
+from robospa.tasks.snapshot import Snapshot
+from robospa.tasks.task import Level, Task
+
+HERE = Pose((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
+LIMIT = 20
+SPEC = PolicySpec(name="fake", cameras=(), state="commanded", horizon=4)
+
+
+class FakeWorld:
+    def __init__(self) -> None:
+        self.total = 0.0
+        self.steps = 0
+        self.views = 0
+        self.seed = -1
+
+    def load(self, scene: Scene, contacts: bool = False) -> None:
+        if scene.seed == 666:
+            raise SceneUnstable("the scene of seed 666 does not come to rest")
+        self.total, self.steps, self.seed, self.views = 0.0, 0, scene.seed, 0
+
+    def step(self, action: NDArray[np.float32], space: str, poll: Poll) -> StepResult:
+        if abs(float(action[1])) > 10:
+            raise ActionError(f"left arm joint 2 is asked to go to {action[1]:g} rad")
+        self.total += float(action[0])
+        self.steps += 1
+        return StepResult(5, poll(self.snapshot()))
+
+    def observe(self, spec: PolicySpec) -> dict[str, Any]:
+        self.views += 1
+        state = np.full(14, self.steps, np.float32)
+        return {"images": {c.name: self.render(c) for c in spec.cameras}, "state": state}
+
+    def render(self, camera: CameraSpec) -> NDArray[np.uint8]:
+        return np.full((camera.height, camera.width, 3), self.steps % 256, np.uint8)
+
+    def snapshot(self) -> Snapshot:
+        return Snapshot(0.02 * self.steps, {"sum": HERE}, (self.total, 1.0), (HERE, HERE))
+
+    def digest(self) -> str:
+        return hashlib.sha256(f"{self.seed}/{self.total}/{self.steps}".encode()).hexdigest()[:16]
+
+    def info(self) -> Mapping[str, Any]:
+        return {"simulator": "fake"}
+
+    def close(self) -> None: ...
+
+
+class SumTracker:
+    needs_contacts = False
+
+    def __init__(self, wanted: float, total: int) -> None:
+        self.wanted, self.total, self.done = wanted, total, 0
+
+    def start(self, snapshot: Snapshot) -> tuple[Event, ...]:
+        return ()
+
+    def update(self, snapshot: Snapshot) -> tuple[Event, ...]:
+        if snapshot.gripper[0] >= self.wanted:
+            return (Event(snapshot.time, "success"),)
+        if self.done == 0 and snapshot.gripper[0] >= self.wanted / 2:
+            self.done = 1
+            return (Event(snapshot.time, "subtask_done", index=0),)
+        return ()
+
+    def diagnostics(self) -> dict[str, Any]:
+        return {"idle": 0}
+
+
+def _unused(*_: Any) -> Any:
+    raise AssertionError("the fake task is never drawn")
+
+
+def fake_task(name: str) -> Task:
+    levels = {n: Level(candidates=n + 1, subtasks=2, steps=LIMIT) for n in range(1, 6)}
+    category = "GAC" if "Pick" in name else "RPF"
+    return Task(name, category, levels, _unused, _unused, _unused, _unused, "fake", "fake")
+
+
+def parts(key: TrialKey) -> TrialParts:
+    scene = Scene(key.task, key.level, key.seed, key.embodiment, key.mode, (), {})
+    tracker = SumTracker(key.seed % 10 + 1, 2)
+    return TrialParts(scene, fake_task(key.task), tracker, f"sum to {key.seed % 10 + 1}")
+
+
+class FakePolicy:
+    """Sends chunks of ones; subclasses misbehave."""
+
+    def __init__(self, spec: PolicySpec = SPEC, length: int = 2) -> None:
+        self.spec = spec
+        self.length = length
+        self.seen: list[dict[str, Any]] = []
+        self.trial: TrialInfo | None = None
+
+    def reset(self, trial: TrialInfo) -> None:
+        self.trial = trial
+        self.seen = []
+
+    def infer(self, observation: Mapping[str, Any]) -> NDArray[np.float32]:
+        self.seen.append(dict(observation))
+        return np.ones((self.length, 14), np.float32)
+
+
+class SlowPolicy(FakePolicy):
+    def infer(self, observation: Mapping[str, Any]) -> NDArray[np.float32]:
+        time.sleep(0.03)
+        return super().infer(observation)
+
+
+class NanPolicy(FakePolicy):
+    def infer(self, observation: Mapping[str, Any]) -> NDArray[np.float32]:
+        answer = super().infer(observation)
+        answer[1, 3] = np.nan
+        return answer
+
+
+class FlakyPolicy(FakePolicy):
+    """Loses its line in the first attempt at every odd seed."""
+
+    tried: set[int]
+
+    def reset(self, trial: TrialInfo) -> None:
+        super().reset(trial)
+        mark = Path(os.environ["FAKE_MARKS"]) / str(trial.seed)
+        if trial.seed % 2 and not mark.exists():
+            mark.touch()
+            raise ConnectionError("the line went dead")
+
+
+class GonePolicy(FakePolicy):
+    def infer(self, observation: Mapping[str, Any]) -> NDArray[np.float32]:
+        raise ConnectionError("nobody answers")
+
+
+class SuicidalPolicy(FakePolicy):
+    """Kills its own process in the first attempt at seed 100003, hangs in that at 100005."""
+
+    def infer(self, observation: Mapping[str, Any]) -> NDArray[np.float32]:
+        assert self.trial is not None
+        mark = Path(os.environ["FAKE_MARKS"]) / str(self.trial.seed)
+        if self.trial.seed in (100003, 100005) and not mark.exists():
+            mark.touch()
+            if self.trial.seed == 100003:
+                os.kill(os.getpid(), signal.SIGKILL)
+            time.sleep(60)
+        return super().infer(observation)
+
+
+def slow() -> FakePolicy:
+    return SlowPolicy()

@@ -1,0 +1,154 @@
+"""One trial: when the policy is asked, when it ends, and what the record says."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from run_fakes import LIMIT, SPEC, FakePolicy, FakeWorld, NanPolicy, parts
+
+from robospa.harness.trial import policy_seed, run_trial
+from robospa.harness.video import TrialRecorder
+from robospa.harness.world import SceneUnstable
+from robospa.results.records import TrialKey, TrialRecord
+
+KEY = TrialKey("Pick_Fake", 2, 100004)
+
+
+def play(policy: FakePolicy, key: TrialKey = KEY, world: FakeWorld | None = None) -> TrialRecord:
+    return run_trial(world or FakeWorld(), policy, key, policy_seed=7, parts=parts)
+
+
+def test_success_ends_the_trial_inside_a_chunk() -> None:
+    record = play(FakePolicy(length=4))
+    assert (record.end, record.success, record.steps, record.policy_calls) == ("success", True, 5, 2)
+    assert (record.done, record.best, record.total) == (2, 2, 2)
+    assert record.physics_steps == 25
+
+
+def test_the_actions_digest_covers_exactly_the_executed_actions() -> None:
+    expected = hashlib.sha256(np.ones((5, 14), "<f4").tobytes()).hexdigest()
+    assert play(FakePolicy()).actions_digest == expected
+
+
+def test_the_step_limit_cuts_the_last_chunk() -> None:
+    class Idle(FakePolicy):
+        def infer(self, observation: object) -> np.ndarray:
+            return np.zeros((3, 14), np.float32)
+
+    record = play(Idle())
+    assert (record.end, record.success, record.steps, record.policy_calls) == (
+        "step_limit",
+        False,
+        LIMIT,
+        7,
+    )
+
+
+def test_execute_leaves_the_rest_of_the_chunk_unused() -> None:
+    policy = FakePolicy(replace(SPEC, execute=1), length=4)
+    assert play(policy).policy_calls == 5
+
+
+def test_the_policy_learns_the_trial_at_reset() -> None:
+    policy = FakePolicy()
+    play(policy)
+    assert policy.trial is not None
+    assert (policy.trial.seed, policy.trial.policy_seed) == (100004, 7)
+    assert policy.trial.instruction == "sum to 5"
+
+
+def test_the_world_is_observed_only_when_a_chunk_is_needed() -> None:
+    world = FakeWorld()
+    play(FakePolicy(length=2), world=world)
+    assert world.views == 3
+
+
+def test_history_holds_the_views_at_the_offsets_and_renders_no_others() -> None:
+    world = FakeWorld()
+    policy = FakePolicy(replace(SPEC, history=(-1,)), length=4)
+    play(policy, TrialKey("Pick_Fake", 1, 100009), world)
+    states = [float(seen["history"][-1]["state"][0]) for seen in policy.seen]
+    assert states == [0.0, 3.0, 7.0]
+    assert world.views == 5  # three queries, and steps 3 and 7
+
+
+def test_long_history_offsets_reach_back_over_chunks() -> None:
+    policy = FakePolicy(replace(SPEC, history=(-1, -5)), length=2)
+    play(policy, TrialKey("Pick_Fake", 1, 100009))
+    states = [float(seen["history"][-5]["state"][0]) for seen in policy.seen]
+    assert states == [0.0, 0.0, 0.0, 1.0, 3.0]
+
+
+@pytest.mark.parametrize(
+    ("answer", "words"),
+    [
+        (np.full((2, 14), np.inf), "inf in action 0"),
+        (np.zeros((2, 13)), "shape (2, 13)"),
+        (np.zeros((0, 14)), "shape (0, 14)"),
+        (np.zeros((5, 14)), "5 actions"),
+        (np.zeros(14), "shape (14,)"),
+        ("up", "no array"),
+        ({"actions": 1}, "no array"),
+    ],
+)
+def test_a_bad_answer_is_a_failure_with_the_reason(answer: object, words: str) -> None:
+    class Bad(FakePolicy):
+        def infer(self, observation: object) -> object:  # type: ignore[override]
+            return answer
+
+    record = play(Bad())
+    assert (record.end, record.success, record.steps) == ("policy_error", False, 0)
+    assert words in record.message
+
+
+def test_nan_names_the_place() -> None:
+    assert "nan in action 1, dimension 3" in play(NanPolicy()).message
+
+
+def test_an_action_that_cannot_be_executed_is_a_failure_with_the_reason() -> None:
+    class Wild(FakePolicy):
+        def infer(self, observation: object) -> np.ndarray:
+            return np.full((1, 14), 99, np.float32)
+
+    record = play(Wild())
+    assert record.end == "policy_error"
+    assert "left arm joint 2" in record.message
+
+
+def test_transport_trouble_is_passed_on() -> None:
+    class Gone(FakePolicy):
+        def infer(self, observation: object) -> np.ndarray:
+            raise ConnectionError("gone")
+
+    with pytest.raises(ConnectionError):
+        play(Gone())
+
+
+def test_an_unstable_scene_is_passed_on() -> None:
+    with pytest.raises(SceneUnstable):
+        play(FakePolicy(), replace(KEY, seed=666))
+
+
+def test_the_same_trial_gives_the_same_record_after_any_other() -> None:
+    world = FakeWorld()
+    first = play(FakePolicy(), world=world)
+    play(FakePolicy(), replace(KEY, seed=100001), world)
+    again = play(FakePolicy(), world=world)
+    assert (first.digest, first.actions_digest) == (again.digest, again.actions_digest)
+
+
+def test_policy_seeds_depend_on_the_key_and_the_run_seed_only() -> None:
+    assert policy_seed(KEY) == policy_seed(replace(KEY))
+    assert policy_seed(KEY) != policy_seed(replace(KEY, seed=100005))
+    assert policy_seed(KEY) != policy_seed(KEY, run_seed=1)
+
+
+def test_the_recorder_keeps_every_executed_action() -> None:
+    recorder = TrialRecorder()
+    run_trial(FakeWorld(), FakePolicy(), KEY, policy_seed=0, recorder=recorder, parts=parts)
+    assert recorder.actions.shape == (5, 14)
+
+
