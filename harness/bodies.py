@@ -51,7 +51,7 @@ def _collision_shape(geometry: Geometry, material: Any) -> Any:
     )
 
 
-def _local(shape: Shape) -> Any:
+def local_pose(shape: Shape) -> Any:
     """A shape's pose in SAPIEN's convention for its geometry."""
     pose = shape.pose
     if isinstance(shape.geometry, Cylinder):
@@ -70,7 +70,7 @@ def attach_collisions(
     for shape in shapes:
         if shape.collision:
             collision = _collision_shape(shape.geometry, material)
-            collision.local_pose = _local(shape)
+            collision.local_pose = local_pose(shape)
             collision.density = density
             if groups is not None:
                 collision.set_collision_groups(list(groups))
@@ -176,7 +176,7 @@ def build_arm(scene: Any, embodiment: Embodiment, arm: Arm, prefix: str) -> Any:
     builder.set_scene(scene)
     builder.set_initial_pose(to_sapien(arm.base))
     gripper = {arm.last_link, *(finger.child for finger in arm.fingers)}
-    made = {}
+    made: dict[str, Any] = {}
     incoming = {joint.child: joint for joint in (*arm.joints, *arm.fingers)}
     for link in arm.links:
         joint = incoming.get(link)

@@ -114,12 +114,12 @@ def _arm_steps(change: float, gripper_change: float) -> int:
 def rest_to_rest(
     start: Array, goal: Array, gripper: Array, gripper_goal: Array, drive: Array
 ) -> Trajectory:
-    """The official rule: each arm goes straight from `start` to `goal` (2, J), at rest at both ends.
+    """The official rule: each arm goes straight from `start` to `goal` (2, J), rest to rest.
 
-    The gripper goes linearly from `gripper` to `gripper_goal` (2,) over its arm's steps; `drive` (2,)
-    is where its drive target stands. The arm that is done first holds. An arm that does not move waits
-    for the other (its gripper, if it moves, takes HOLD_STEPS); if nothing moves, both hold for
-    HOLD_STEPS.
+    The gripper goes linearly from `gripper` to `gripper_goal` (2,) over its arm's steps; `drive`
+    (2,) is where its drive target stands. The arm that is done first holds. An arm that does not
+    move waits for the other (its gripper, if it moves, takes HOLD_STEPS); if nothing moves, both
+    hold for HOLD_STEPS.
     """
     change = np.abs(goal - start).max(axis=1)
     steps = [_arm_steps(change[a], gripper_goal[a] - gripper[a]) for a in range(2)]

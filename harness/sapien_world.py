@@ -8,7 +8,7 @@ first physics step, and between two polls there is nothing but SAPIEN's own call
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -19,13 +19,11 @@ from robospa.harness.actions import ActionReader
 from robospa.harness.motion import RATE, Trajectory, fixed_rate, rest_to_rest
 from robospa.harness.physics import FLOATS, Physics, unpack
 from robospa.harness.robots import embodiment as embodiment_named
-from robospa.harness.robots.embodiment import Embodiment
 from robospa.harness.world import Poll, RenderUnavailable, SceneUnstable, StepResult
 from robospa.protocol.policy import CameraSpec, PolicySpec
-from robospa.tasks.geometry import Pose
 from robospa.tasks.scene import Scene
 from robospa.tasks.shapes import ObjectModel
-from robospa.tasks.snapshot import ARMS, Snapshot, snapshot_to_json
+from robospa.tasks.snapshot import Snapshot, snapshot_to_json
 
 if TYPE_CHECKING:
     from robospa.harness.cameras import Studio
@@ -61,9 +59,9 @@ class SapienWorld:
     """A `robospa.harness.world.World`.
 
     `render`: False never draws, True opens the renderer at once (and fails at once where there is
-    none), None opens it when the first image is asked for. `control`: "rest_to_rest" is the official
-    timing; "fixed_rate" lets every action last `action_steps` physics steps. `models` makes an
-    object's shapes from asset name and parameters.
+    none), None opens it when the first image is asked for. `control`: "rest_to_rest" is the
+    official timing; "fixed_rate" lets every action last `action_steps` physics steps. `models`
+    makes an object's shapes from asset name and parameters.
     """
 
     def __init__(
@@ -121,7 +119,7 @@ class SapienWorld:
         self._gripper = np.ones(2)
         self._drive = np.ones(2)
         self._last_links = [physics.links[a][arms[a].last_link] for a in range(2)]
-        self._writers = []
+        self._writers: list[_Writers] = []
         for a, arm in enumerate(arms):
             articulation = physics.arms[a]
             travel = self._travel(a, 1.0)
@@ -300,7 +298,10 @@ class SapienWorld:
         instruction, step and history.
         """
         snapshot = self.snapshot()
-        out: dict[str, Any] = {"images": {c.name: self.render(c) for c in spec.cameras}}
+        images = self._pictures(spec.cameras)
+        out: dict[str, Any] = {
+            "images": {c.name: image for c, image in zip(spec.cameras, images, strict=True)}
+        }
         if spec.state != "none":
             out["state"] = self._state(spec.state == "measured")
         out["ee"] = np.array(
@@ -331,6 +332,11 @@ class SapienWorld:
 
     def render(self, camera: CameraSpec) -> NDArray[np.uint8]:
         """One RGB image (height, width, 3); RenderUnavailable where nothing can be drawn."""
+        return self._pictures((camera,))[0]
+
+    def _pictures(self, cameras: Sequence[CameraSpec]) -> list[NDArray[np.uint8]]:
+        if not cameras:
+            return []
         physics = self._loaded()
         studio = self._studio or self._open_studio()
         studio.arrange(self._scene, self._embodiment, self._model)
@@ -338,7 +344,7 @@ class SapienWorld:
         links = [
             {link: unpack(values, row) for link, row in rows.items()} for rows in physics.links
         ]
-        return studio.picture(camera, links, physics.poses(values))
+        return studio.pictures(cameras, links, physics.poses(values))
 
     def _open_studio(self) -> Studio:
         if self._render is False:
@@ -354,8 +360,11 @@ class SapienWorld:
 
     def info(self) -> Mapping[str, Any]:
         """Simulator, versions, control, and the render device if it is open."""
-        from robospa.harness.cameras import device_summary
+        renderer = None
+        if self._studio:
+            from robospa.harness.cameras import device_summary
 
+            renderer = device_summary()
         return {
             "simulator": "sapien",
             **versions(),
@@ -363,7 +372,7 @@ class SapienWorld:
             "physics_hz": RATE,
             "control": self._control,
             **({"action_steps": self._action_steps} if self._control == "fixed_rate" else {}),
-            "renderer": device_summary() if self._studio else None,
+            "renderer": renderer,
         }
 
     def close(self) -> None:
@@ -374,7 +383,6 @@ class SapienWorld:
             self._studio = None
 
     def _drop_physics(self) -> None:
-        self._writers: list[_Writers] = []
         if self._physics:
             self._physics.close()
             self._physics = None

@@ -1,0 +1,225 @@
+"""What cameras see: a scene that is only drawn, posed like the physics at the moment of the picture.
+
+Drawing has its own scene, without physics: a world that never looks pays nothing, and looking
+cannot change a trial. Robot, table, lights and cameras stay from trial to trial (they hold no
+state); objects are those of the trial. Rasterised with SAPIEN's default shader, on any Vulkan
+device, Mesa's software one included.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robospa.harness import furniture
+from robospa.harness.robots.embodiment import Embodiment
+from robospa.harness.world import RenderUnavailable
+from robospa.protocol.policy import CameraSpec
+from robospa.tasks.geometry import Pose
+from robospa.tasks.scene import Scene
+from robospa.tasks.shapes import ObjectModel
+from robospa.tasks.snapshot import ARMS
+
+Links = Sequence[Mapping[str, Pose]]
+"""World pose of every link of the left and of the right arm."""
+
+AMBIENT = (0.5, 0.5, 0.5)
+SUN_DIRECTION, SUN_COLOR = (0.0, 0.5, -1.0), (0.5, 0.5, 0.5)
+LAMPS, LAMP_COLOR = ((1.0, 0.0, 1.8), (-1.0, 0.0, 1.8)), (1.0, 1.0, 1.0)
+NEAR, FAR = 0.1, 100.0
+WRIST_NEAR = 0.01
+"""[m]: the fingers are nearer to the wrist cameras than the official near plane."""
+WRISTS = {f"{arm}_wrist": i for i, arm in enumerate(ARMS)}
+LARGEST = 4096
+"""[px] of an image's width or height."""
+ADVICE = "run `robospa doctor` to see what is missing"
+
+
+def device_summary() -> str:
+    """SAPIEN's description of the device that draws."""
+    import sapien
+
+    return str(sapien.render.get_device_summary()).strip()
+
+
+def open_render_system() -> Any:
+    """A SAPIEN render system; RenderUnavailable, with the reason, where there is no device."""
+    try:
+        import sapien
+
+        return sapien.render.RenderSystem()
+    except (ImportError, RuntimeError) as error:
+        raise RenderUnavailable(f"cannot draw on this machine ({error}); {ADVICE}") from error
+
+
+class Studio:
+    """The drawn scene of one world. Raises RenderUnavailable if nothing can be drawn here."""
+
+    def __init__(self) -> None:
+        self._system = open_render_system()
+        import sapien
+
+        self._scene: Any = sapien.Scene([self._system])
+        self._cameras: dict[tuple[str, int, int], Any] = {}
+        self._robot: list[dict[str, Any]] = []
+        self._objects: dict[str, Any] = {}
+        self._loaded: Scene | None = None
+        self._embodiment: Embodiment | None = None
+        self._stand: Any = None
+        self._light()
+        self._table = self._draw(furniture.table(), "table")
+        self._draw(furniture.wall(), "wall")
+        self._draw(furniture.floor(), "floor")
+
+    def _light(self) -> None:
+        """The official lights, with shadows from the directional one."""
+        self._scene.set_ambient_light(AMBIENT)
+        self._scene.add_directional_light(
+            SUN_DIRECTION,
+            SUN_COLOR,
+            shadow=True,
+            position=[0.0, 0.0, 1.5],
+            shadow_scale=1.0,
+            shadow_near=-2.0,
+            shadow_far=4.0,
+            shadow_map_size=2048,
+        )
+        for position in LAMPS:
+            self._scene.add_point_light(position, LAMP_COLOR)
+
+    def _draw(self, shapes: Sequence[Any], name: str) -> Any:
+        """An entity in the drawn scene; None if none of the shapes is visual."""
+        from robospa.harness.looks import render_body
+
+        entity = render_body(shapes, name)
+        if entity is not None:
+            self._scene.add_entity(entity)
+        return entity
+
+    def arrange(
+        self,
+        scene: Scene,
+        embodiment: Embodiment,
+        model: Callable[[str, Mapping[str, Any]], ObjectModel],
+    ) -> None:
+        """Take the objects of `scene` and the robot `embodiment`; cheap if they are here already."""
+        if self._embodiment is not embodiment:
+            self._set_robot(embodiment)
+        if self._loaded is not scene:
+            for entity in self._objects.values():
+                if entity is not None:
+                    self._scene.remove_entity(entity)
+            self._objects = {}
+            self._loaded = scene
+            self._model = model
+            self._place(self._table, Pose((*scene.table_shift, 0.0)))
+
+    def _set_robot(self, embodiment: Embodiment) -> None:
+        old = [e for links in self._robot for e in links.values()]
+        for entity in [*old, *([self._stand] if self._stand else [])]:
+            self._scene.remove_entity(entity)
+        drawn = (
+            {link: self._draw(arm.shapes[link], f"{name} {link}") for link in arm.links}
+            for name, arm in zip(ARMS, embodiment.arms, strict=True)
+        )
+        self._robot = [{k: v for k, v in links.items() if v is not None} for links in drawn]
+        self._stand = self._draw(embodiment.body, "stand")
+        self._cameras = {}
+        self._embodiment = embodiment
+
+    def pictures(
+        self, cameras: Sequence[CameraSpec], links: Links, poses: Mapping[str, Pose]
+    ) -> list[NDArray[np.uint8]]:
+        """One RGB image (height, width, 3) per camera, of the links and objects as posed.
+
+        Objects that are not in `poses` do not exist yet and are not drawn. ValueError for a camera
+        that this robot does not have, or a size that no image can have.
+        """
+        for entities, here in zip(self._robot, links, strict=True):
+            for link, entity in entities.items():
+                self._place(entity, here[link])
+        for name, pose in poses.items():
+            if name not in self._objects:
+                self._objects[name] = self._new_object(name)
+            if self._objects[name] is not None:
+                self._place(self._objects[name], pose)
+        found = [self._camera(spec, links) for spec in cameras]
+        self._scene.update_render()
+        images = []
+        for camera in found:
+            camera.take_picture()
+            images.append(_rgb(camera.get_picture("Color")))
+        return images
+
+    def _new_object(self, name: str) -> Any:
+        assert self._loaded is not None
+        item = self._loaded.object(name)
+        return self._draw(self._model(item.asset, item.params).shapes, name)
+
+    @staticmethod
+    def _place(entity: Any, pose: Pose) -> None:
+        from robospa.harness.bodies import to_sapien
+
+        entity.pose = to_sapien(pose)
+
+    def _camera(self, spec: CameraSpec, links: Links) -> Any:
+        """The camera of `spec`, made on first use and put where it is now."""
+        import sapien
+
+        assert self._embodiment is not None
+        pose, fov, near = camera_view(self._embodiment, spec.name, links)
+        key = (spec.name, spec.width, spec.height)
+        if key not in self._cameras:
+            if not (0 < spec.width <= LARGEST and 0 < spec.height <= LARGEST):
+                raise ValueError(
+                    f"camera {spec.name!r} cannot be {spec.width}x{spec.height}; "
+                    f"sizes are 1 to {LARGEST}"
+                )
+            camera = sapien.render.RenderCameraComponent(spec.width, spec.height)
+            camera.set_fovy(fov, compute_x=True)
+            camera.near, camera.far = near, FAR
+            entity = sapien.Entity()
+            entity.add_component(camera)
+            self._scene.add_entity(entity)
+            self._cameras[key] = camera
+        camera = self._cameras[key]
+        self._place(camera.entity, pose)
+        return camera
+
+    def close(self) -> None:
+        """Free what was drawn."""
+        self._cameras, self._objects, self._robot = {}, {}, []
+        self._table = self._stand = None
+        self._scene.clear()
+
+
+def camera_view(embodiment: Embodiment, name: str, links: Links) -> tuple[Pose, float, float]:
+    """World pose (x forward, z up), vertical field of view [rad] and near plane [m] of a camera.
+
+    ValueError, listing the cameras there are, for a name that this robot does not have.
+    """
+    if name in WRISTS:
+        arm = embodiment.arms[WRISTS[name]]
+        return links[WRISTS[name]][arm.last_link] * arm.camera, embodiment.wrist_fov, WRIST_NEAR
+    if name in embodiment.cameras:
+        fixed = embodiment.cameras[name]
+        return fixed.pose, fixed.fov, NEAR
+    known = ", ".join([*embodiment.cameras, *WRISTS])
+    raise ValueError(f"{embodiment.name} has no camera {name!r}; it has {known}")
+
+
+def focal_length(height: int, fov: float) -> float:
+    """Focal length [px] of square pixels for an image `height` px high."""
+    return height / 2 / math.tan(fov / 2)
+
+
+def _rgb(picture: Any) -> NDArray[np.uint8]:
+    """uint8 (height, width, 3) of SAPIEN's float colours 0..1."""
+    colors = np.asarray(picture)[..., :3]
+    if colors.dtype == np.uint8:
+        return np.ascontiguousarray(colors)
+    return (np.clip(colors, 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
