@@ -22,9 +22,13 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from robospa.protocol.errors import DecodeError
+from robospa.protocol.validate import Fields
+
 CAMERAS = ("head", "left_wrist", "right_wrist", "front", "third")
 STATES = ("commanded", "measured", "none")
 SPACES = ("joint", "ee", "delta_ee")
+CODECS = ("raw", "jpeg")
 
 Observation = Mapping[str, Any]
 
@@ -50,7 +54,8 @@ class PolicySpec:
     of them are executed before it is asked again, None for all. `history`: offsets in executed
     actions, all negative, whose observations it wants beside the present one. `batch`: how many
     observations one call of `infer_batch` may hold. `seeded`: whether it honours the policy seed.
-    `privileged`: whether it needs the exact state (no honest learned policy does).
+    `privileged`: whether it needs the exact state (no honest learned policy does). `action_dim`:
+    columns of a chunk, None for 14 or 16, whichever the embodiment and the space have.
     """
 
     name: str
@@ -65,11 +70,63 @@ class PolicySpec:
     seeded: bool = False
     privileged: bool = False
     embodiments: tuple[str, ...] = ()
+    action_dim: int | None = None
 
     def to_json(self) -> dict[str, Any]:
-        """Plain JSON values; `from_json` (in `robospa.protocol.messages`) is the inverse."""
+        """Plain JSON values; `from_json` is the inverse."""
         data = asdict(self)
         return {k: list(v) if isinstance(v, tuple) else v for k, v in data.items()}
+
+    @classmethod
+    def from_json(cls, value: Any) -> PolicySpec:
+        """The spec in a decoded map; unknown fields are ignored. Raises DecodeError."""
+        fields = Fields("spec", value)
+        cameras = tuple(_camera(item) for item in fields.items("cameras", DEFAULT_CAMERAS))
+        if len({camera.name for camera in cameras}) != len(cameras):
+            raise DecodeError("spec: 'cameras' names a camera twice")
+        horizon = fields.whole("horizon", 50, 1, 10_000)
+        execute = fields.raw("execute", None)
+        action_dim = fields.raw("action_dim", None)
+        history = fields.items("history", ())
+        if not all(type(offset) is int and offset < 0 for offset in history):
+            raise DecodeError("spec: 'history' must be a list of negative whole numbers")
+        embodiments = fields.items("embodiments", ())
+        if not all(type(name) is str for name in embodiments):
+            raise DecodeError("spec: 'embodiments' must be a list of text")
+        return cls(
+            name=fields.text("name"),
+            cameras=cameras,
+            state=fields.text("state", "commanded", STATES),
+            action=fields.text("action", "joint", SPACES),
+            horizon=horizon,
+            execute=None if execute is None else fields.whole("execute", None, 1, horizon),
+            history=tuple(history),
+            image_codec=fields.text("image_codec", "raw", CODECS),
+            batch=fields.whole("batch", 1, 1, 4096),
+            seeded=fields.flag("seeded", False),
+            privileged=fields.flag("privileged", False),
+            embodiments=tuple(embodiments),
+            action_dim=None if action_dim is None else fields.whole("action_dim", None, 1, 256),
+        )
+
+    @property
+    def action_dims(self) -> tuple[int, ...]:
+        """The allowed column counts of an action chunk (14: two 6-joint arms; 16: two 7-joint
+        arms, or two poses with a gripper each)."""
+        if self.action_dim is not None:
+            return (self.action_dim,)
+        return (16,) if self.action == "ee" else (14, 16)
+
+
+def _camera(value: Any) -> CameraSpec:
+    if isinstance(value, CameraSpec):
+        return value
+    fields = Fields("spec camera", value)
+    return CameraSpec(
+        fields.text("name", choices=CAMERAS),
+        fields.whole("width", 320, 1, 8192),
+        fields.whole("height", 240, 1, 8192),
+    )
 
 
 @dataclass(frozen=True)
@@ -85,6 +142,26 @@ class TrialInfo:
     instruction: str
     policy_seed: int = 0
     extra: Mapping[str, Any] = field(default_factory=dict)
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain JSON values; `from_json` is the inverse."""
+        return {**{k: v for k, v in self.__dict__.items() if k != "extra"}, "extra": self.extra}
+
+    @classmethod
+    def from_json(cls, value: Any) -> TrialInfo:
+        """The trial in a decoded map; unknown fields are ignored. Raises DecodeError."""
+        fields = Fields("trial", value)
+        return cls(
+            task=fields.text("task"),
+            level=fields.whole("level", low=0),
+            seed=fields.whole("seed", low=0, high=2**64 - 1),
+            embodiment=fields.text("embodiment"),
+            mode=fields.text("mode"),
+            split=fields.text("split"),
+            instruction=fields.text("instruction"),
+            policy_seed=fields.whole("policy_seed", 0, 0, 2**64 - 1),
+            extra=fields.map("extra", {}),
+        )
 
 
 class Policy(Protocol):

@@ -1,0 +1,203 @@
+"""One WebSocket to a policy server, with every failure turned into an error of this package.
+
+Chosen for large messages on a quiet line: no compression, one buffer per message, large socket
+buffers, and no keepalive pings (a server that computes for a minute is not dead; deadlines are
+set per call instead). A channel that failed once is closed and stays closed.
+"""
+
+from __future__ import annotations
+
+import ipaddress
+import socket
+import ssl as ssl_module
+import struct
+import time
+from dataclasses import dataclass
+from http import HTTPStatus
+from typing import Any
+from urllib.parse import urlsplit
+
+from websockets.exceptions import ConnectionClosed, InvalidStatus, WebSocketException
+from websockets.sync.client import ClientConnection
+from websockets.sync.client import connect as websocket_connect
+from websockets.typing import Subprotocol
+
+from robospa.protocol.codec import DEFAULT_LIMITS, Limits
+from robospa.protocol.errors import (
+    CallTimeout,
+    ConnectFailed,
+    ConnectionLost,
+    HandshakeError,
+    TransportError,
+    Unauthorized,
+)
+from robospa.protocol.messages import SUBPROTOCOL
+
+SOCKET_BUFFER = 4 * 2**20
+"""Bytes asked of the kernel each way (it may give less): a full observation fits."""
+
+
+@dataclass(frozen=True)
+class Timeouts:
+    """Deadlines in seconds. `wait`: how long to keep trying while nobody listens. `first_infer`
+    is for the first answer on a connection and after a change of task (compilation, loading)."""
+
+    wait: float = 0.0
+    connect: float = 30.0
+    hello: float = 120.0
+    reset: float = 600.0
+    first_infer: float = 600.0
+    infer: float = 120.0
+    end: float = 30.0
+    close: float = 1.0
+
+
+@dataclass(frozen=True)
+class Address:
+    """Where and how to connect."""
+
+    url: str
+    token: str | None = None
+    ssl: ssl_module.SSLContext | None = None
+
+    def headers(self) -> dict[str, str]:
+        return {"Authorization": f"Bearer {self.token}"} if self.token is not None else {}
+
+
+class Channel:
+    """Sends and receives whole messages; `subprotocol` is what the server selected, or None."""
+
+    def __init__(
+        self,
+        address: Address,
+        timeouts: Timeouts,
+        limits: Limits = DEFAULT_LIMITS,
+        offer: bool = True,
+    ) -> None:
+        self.url = address.url
+        self._socket = _open(address, timeouts, limits, offer)
+        self.subprotocol = self._socket.subprotocol
+        seconds = max(timeouts.first_infer, timeouts.infer)
+        whole = int(seconds)
+        self._socket.socket.setsockopt(
+            socket.SOL_SOCKET,
+            socket.SO_SNDTIMEO,
+            struct.pack("@ll", whole, int((seconds - whole) * 1e6)),
+        )
+
+    def send(self, message: bytes) -> None:
+        """Raises ConnectionLost."""
+        try:
+            self._socket.send(message)
+        except (ConnectionClosed, OSError) as error:
+            raise self._lost("while sending", error) from error
+
+    def receive(self, timeout: float, what: str) -> bytes | str:
+        """The next message: bytes, or str for a text frame. After CallTimeout the channel is
+        closed, because a late answer could be taken for the next one."""
+        try:
+            return self._socket.recv(timeout)
+        except TimeoutError as error:
+            self.close()
+            raise CallTimeout(
+                f"{self.url} did not send {what} within {timeout:g} s; "
+                "look at the server's log, or allow more time"
+            ) from error
+        except (ConnectionClosed, OSError) as error:
+            raise self._lost(f"while waiting for {what}", error) from error
+
+    def close(self) -> None:
+        """Close; harmless when closed already."""
+        self._socket.close()
+
+    def _lost(self, when: str, error: Exception) -> TransportError:
+        self.close()
+        reason = str(error) or type(error).__name__
+        return ConnectionLost(f"the connection to {self.url} ended {when}: {reason}")
+
+
+def _open(address: Address, timeouts: Timeouts, limits: Limits, offer: bool) -> ClientConnection:
+    give_up = time.monotonic() + timeouts.wait
+    while True:
+        try:
+            return _open_once(address, timeouts, limits, offer)
+        except ConnectionRefusedError as error:
+            if time.monotonic() >= give_up:
+                raise ConnectFailed(
+                    f"nobody listens at {address.url}: start the policy server first"
+                ) from error
+            time.sleep(0.05)
+        except InvalidStatus as error:
+            raise _refused(address, error) from error
+        except TimeoutError as error:
+            raise ConnectFailed(
+                f"{address.url} did not finish the handshake within {timeouts.connect:g} s"
+            ) from error
+        except (OSError, ValueError, EOFError, WebSocketException) as error:
+            raise ConnectFailed(f"cannot connect to {address.url}: {error}") from error
+
+
+def _open_once(
+    address: Address, timeouts: Timeouts, limits: Limits, offer: bool
+) -> ClientConnection:
+    options: dict[str, Any] = {}
+    parts = urlsplit(address.url)
+    if _is_loopback(parts.hostname or ""):
+        # Own socket: no detour through a proxy that the environment names, and buffers that
+        # are set before the connection exists (the kernel scales its window by them).
+        port = parts.port or (443 if parts.scheme == "wss" else 80)
+        options["sock"] = _loopback_socket(parts.hostname or "", port, timeouts.connect)
+    connection: ClientConnection = websocket_connect(
+        address.url,
+        ssl=address.ssl,
+        subprotocols=[Subprotocol(SUBPROTOCOL)] if offer else None,
+        additional_headers=address.headers(),
+        compression=None,
+        max_size=limits.message,
+        open_timeout=timeouts.connect,
+        close_timeout=timeouts.close,
+        ping_interval=None,
+        **options,
+    )
+    _enlarge(connection.socket)
+    return connection
+
+
+def _loopback_socket(host: str, port: int, timeout: float) -> socket.socket:
+    error: OSError = ConnectionRefusedError(f"{host} has no address")
+    for family, kind, proto, _, target in socket.getaddrinfo(host, port, type=socket.SOCK_STREAM):
+        sock = socket.socket(family, kind, proto)
+        try:
+            _enlarge(sock)
+            sock.settimeout(timeout)
+            sock.connect(target)
+            sock.settimeout(None)
+            return sock
+        except OSError as failure:
+            sock.close()
+            error = failure
+    raise error
+
+
+def _enlarge(sock: socket.socket) -> None:
+    for option in (socket.SO_SNDBUF, socket.SO_RCVBUF):
+        sock.setsockopt(socket.SOL_SOCKET, option, SOCKET_BUFFER)
+
+
+def _is_loopback(host: str) -> bool:
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+def _refused(address: Address, error: InvalidStatus) -> Exception:
+    status = error.response.status_code
+    body = bytes(error.response.body or b"")[:300].decode("utf-8", "replace").strip()
+    if status in (HTTPStatus.UNAUTHORIZED, HTTPStatus.FORBIDDEN):
+        return Unauthorized(f"{address.url} refused the token: {body or status}")
+    if status in (HTTPStatus.BAD_REQUEST, HTTPStatus.UPGRADE_REQUIRED):
+        return HandshakeError(f"{address.url} refused the connection: {body or status}")
+    return ConnectFailed(f"{address.url} answered HTTP {status}: {body or 'no reason given'}")

@@ -1,0 +1,76 @@
+"""Is this a chunk, does this observation fit the spec, are these two specs the same?
+
+The same functions run at both ends, so that a mistake is reported where it was made.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robospa.protocol.errors import DecodeError, PolicyAnswerError
+from robospa.protocol.policy import Observation, PolicySpec
+
+
+def check_chunk(answer: Any, spec: PolicySpec) -> NDArray[np.float32]:
+    """`answer` as the float32 (T, D) chunk that `spec` promises, or PolicyAnswerError."""
+    if not isinstance(answer, np.ndarray) or answer.dtype.kind != "f":
+        found = getattr(answer, "dtype", type(answer).__name__)
+        raise PolicyAnswerError(f"the policy answered {found}, not an array of float32")
+    if answer.ndim != 2 or not 1 <= len(answer) <= spec.horizon:
+        raise PolicyAnswerError(
+            f"the policy answered an array of shape {answer.shape}, not (T, D) with T from 1 to "
+            f"its horizon {spec.horizon}"
+        )
+    if answer.shape[1] not in spec.action_dims:
+        raise PolicyAnswerError(
+            f"the policy answered {answer.shape[1]} numbers per action, but a {spec.action} "
+            f"action has {' or '.join(map(str, spec.action_dims))}"
+        )
+    with np.errstate(over="ignore"):
+        chunk = np.ascontiguousarray(answer, dtype=np.float32)
+    finite = np.isfinite(chunk)
+    if not finite.all():
+        row, column = np.argwhere(~finite)[0]
+        raise PolicyAnswerError(f"action {row}, number {column} of the chunk is not finite")
+    return chunk
+
+
+def check_observation(observation: Observation, spec: PolicySpec) -> None:
+    """Raises DecodeError if `observation` (images decoded) lacks what `spec` asks for."""
+    _check_view("observation", observation, spec)
+    if not isinstance(observation.get("instruction"), str):
+        raise DecodeError("observation: 'instruction' must be text")
+    history = observation.get("history", {}) if spec.history else {}
+    for offset in spec.history:
+        if not isinstance(history, dict) or offset not in history:
+            raise DecodeError(f"observation lacks history {offset}, which the spec asks for")
+        _check_view(f"history {offset}", history[offset], spec)
+    if spec.privileged and not isinstance(observation.get("privileged"), dict):
+        raise DecodeError("observation lacks the privileged state that the spec asks for")
+
+
+def _check_view(what: str, view: Any, spec: PolicySpec) -> None:
+    images = view.get("images", {}) if isinstance(view, dict) else None
+    if not isinstance(images, dict):
+        raise DecodeError(f"{what}: 'images' must be a map from camera to array")
+    for camera in spec.cameras:
+        image, shape = images.get(camera.name), (camera.height, camera.width, 3)
+        if not isinstance(image, np.ndarray):
+            raise DecodeError(f"{what} lacks the image of camera {camera.name!r}")
+        if image.shape != shape or image.dtype != np.uint8:
+            raise DecodeError(
+                f"{what}: image {camera.name!r} is {image.dtype} {image.shape}, not uint8 {shape}"
+            )
+    if spec.state != "none":
+        state = view.get("state")
+        if not isinstance(state, np.ndarray) or state.ndim != 1 or state.dtype != np.float32:
+            raise DecodeError(f"{what}: 'state' must be a float32 array of one axis")
+
+
+def compare_specs(expected: PolicySpec, found: PolicySpec) -> list[str]:
+    """One phrase per field that differs; empty if the specs are the same."""
+    old, new = expected.to_json(), found.to_json()
+    return [f"{name} was {old[name]} and is {new[name]}" for name in old if old[name] != new[name]]

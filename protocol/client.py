@@ -1,0 +1,237 @@
+"""The synchronous client: a `Policy` whose model runs behind a WebSocket.
+
+`connect(url)` offers `robospa.v1`; a server that does not select it is spoken to in openpi's
+dialect (`robospa.protocol.openpi`). Requests are answered one by one; an answer with the wrong id
+ends the connection, because from then on every action could belong to another observation. There
+is no reconnect inside a trial: `reconnect()` is for the harness, between trials, and refuses a
+server whose spec has changed meanwhile. Errors: see `robospa.protocol.errors`.
+"""
+
+from __future__ import annotations
+
+import ssl as ssl_module
+import time
+from collections.abc import Mapping
+from types import TracebackType
+from typing import Any, Self, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robospa.protocol.channel import Address, Channel, Timeouts
+from robospa.protocol.checks import check_chunk, compare_specs
+from robospa.protocol.codec import DEFAULT_LIMITS, Limits
+from robospa.protocol.errors import (
+    ConnectionLost,
+    DecodeError,
+    PolicyAnswerError,
+    ProtocolViolation,
+    ServerError,
+    SpecMismatch,
+    TransportError,
+)
+from robospa.protocol.images import encode_images
+from robospa.protocol.messages import (
+    BAD_ANSWER,
+    Actions,
+    End,
+    Ended,
+    Error,
+    Hello,
+    Infer,
+    Message,
+    Ready,
+    Reset,
+    pack,
+    unpack,
+)
+from robospa.protocol.openpi import OpenPiOptions, OpenPiSession
+from robospa.protocol.policy import Observation, PolicySpec, TrialInfo
+
+M = TypeVar("M", bound=Message)
+
+
+class RemotePolicy:
+    """A policy behind a server; made by `connect`. Not thread-safe: one per worker.
+
+    `spec` is what the server wants. `hello` is the server's greeting as JSON values, for records.
+    `last_timing` holds the last answer's times [ms]: `round_trip_ms`, and what the server told
+    (`queue_ms`, `infer_ms`, `batch`).
+    """
+
+    def __init__(
+        self,
+        address: Address,
+        timeouts: Timeouts,
+        limits: Limits,
+        openpi: OpenPiOptions,
+        force_openpi: bool = False,
+    ) -> None:
+        self.address, self.timeouts, self.limits = address, timeouts, limits
+        self.last_timing: dict[str, float] = {}
+        self._openpi, self._force_openpi = openpi, force_openpi
+        self._next_id = 1
+        self._task: str | None = None
+        self._warm = False
+        self._session = self._open()
+        self.spec: PolicySpec = self._session.spec
+
+    @property
+    def hello(self) -> dict[str, Any]:
+        """Dialect, version, server name and spec (or openpi's metadata) as JSON values."""
+        return self._session.hello
+
+    @property
+    def dialect(self) -> str:
+        """`robospa.v1` or `openpi`."""
+        return str(self._session.hello["dialect"])
+
+    def _open(self) -> _Session | OpenPiSession:
+        offer = not self._force_openpi
+        channel = Channel(self.address, self.timeouts, self.limits, offer)
+        try:
+            if channel.subprotocol is None:
+                return OpenPiSession(channel, self._openpi, self.timeouts, self.limits)
+            return _Session(channel, self.timeouts, self.limits)
+        except BaseException:
+            channel.close()
+            raise
+
+    def reset(self, trial: TrialInfo) -> None:
+        """Begin a trial; returns when the server says that it is ready."""
+        self._warm = self._warm and trial.task == self._task
+        self._task = trial.task
+        self._session.reset(self._id(), trial)
+
+    def infer(self, observation: Observation) -> NDArray[np.float32]:
+        """The action chunk, float32 (T, D), finite, 1 <= T <= spec.horizon."""
+        if self.spec.image_codec == "jpeg":
+            observation = encode_images(observation)
+        timeout = self.timeouts.infer if self._warm else self.timeouts.first_infer
+        start = time.perf_counter()
+        answer, timing = self._session.infer(self._id(), observation, timeout)
+        self.last_timing = {**timing, "round_trip_ms": (time.perf_counter() - start) * 1e3}
+        self._warm = True
+        return check_chunk(answer, self.spec)
+
+    def end(self, outcome: Mapping[str, Any] | None = None) -> None:
+        """Tell the server how the trial ended (JSON values); optional."""
+        self._session.end(self._id(), outcome or {})
+
+    def reconnect(self) -> None:
+        """A new connection, between trials only. Raises SpecMismatch if the spec has changed."""
+        self.close()
+        session = self._open()
+        changes = compare_specs(self.spec, session.spec)
+        if changes:
+            session.close()
+            raise SpecMismatch(
+                f"the server at {self.address.url} is another one than before: {'; '.join(changes)}"
+            )
+        self._session, self._warm = session, False
+
+    def close(self) -> None:
+        """Close the connection; harmless when closed already."""
+        self._session.close()
+
+    def _id(self) -> int:
+        self._next_id += 1
+        return self._next_id
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+class _Session:
+    """One connection in `robospa.v1`."""
+
+    def __init__(self, channel: Channel, timeouts: Timeouts, limits: Limits) -> None:
+        self._channel, self._timeouts, self._limits = channel, timeouts, limits
+        hello = self._receive(Hello, 0, timeouts.hello)
+        self.spec = hello.spec
+        self.hello = {
+            "dialect": "robospa.v1",
+            "version": hello.version,
+            "server": hello.server,
+            "spec": hello.spec.to_json(),
+        }
+
+    def reset(self, id: int, trial: TrialInfo) -> None:
+        self._call(Reset(id, trial), Ready, self._timeouts.reset)
+
+    def infer(
+        self, id: int, observation: Observation, timeout: float
+    ) -> tuple[Any, Mapping[str, float]]:
+        actions = self._call(Infer(id, observation), Actions, timeout)
+        return actions.chunk, actions.timing
+
+    def end(self, id: int, outcome: Mapping[str, Any]) -> None:
+        self._call(End(id, outcome), Ended, self._timeouts.end)
+
+    def close(self) -> None:
+        self._channel.close()
+
+    def _call(self, request: Message, answer: type[M], timeout: float) -> M:
+        self._channel.send(pack(request, self._limits))
+        return self._receive(answer, request.id, timeout)
+
+    def _receive(self, wanted: type[M], id: int, timeout: float) -> M:
+        data = self._channel.receive(timeout, wanted.type)
+        if isinstance(data, str):
+            raise self._violation(f"a text frame came instead of {wanted.type}: {data[:200]!r}")
+        try:
+            message = unpack(data, self._limits)
+        except DecodeError as error:
+            raise self._violation(f"the answer cannot be read: {error}") from error
+        if isinstance(message, Error) and message.id in (id, 0):
+            if message.id == 0:
+                self.close()
+                raise ConnectionLost(f"the server gave up the connection: {message.message}")
+            if message.code == BAD_ANSWER:
+                raise PolicyAnswerError(message.message)
+            raise ServerError(message.code, message.message, message.retriable)
+        if message.id != id:
+            raise self._violation(f"answer {message.id} came to request {id}")
+        if not isinstance(message, wanted):
+            raise self._violation(f"{message.type} came where {wanted.type} was due")
+        return message
+
+    def _violation(self, reason: str) -> TransportError:
+        self.close()
+        return ProtocolViolation(f"{self._channel.url} broke the protocol: {reason}")
+
+
+def connect(
+    url: str,
+    token: str | None = None,
+    timeouts: Timeouts | None = None,
+    *,
+    limits: Limits = DEFAULT_LIMITS,
+    ssl: ssl_module.SSLContext | None = None,
+    expect: PolicySpec | None = None,
+    openpi: OpenPiOptions | None = None,
+    force_openpi: bool = False,
+) -> RemotePolicy:
+    """Connect to a policy server at a ws:// or wss:// URL and check that both ends fit.
+
+    `expect`: refuse (SpecMismatch) a server with another spec. `openpi`: how to treat a server
+    that speaks openpi's dialect, which `force_openpi` assumes without offering ours. Raises
+    ConnectFailed, HandshakeError and its children, ProtocolViolation.
+    """
+    address = Address(url, token, ssl)
+    policy = RemotePolicy(
+        address, timeouts or Timeouts(), limits, openpi or OpenPiOptions(), force_openpi
+    )
+    changes = compare_specs(expect, policy.spec) if expect is not None else []
+    if changes:
+        policy.close()
+        raise SpecMismatch(f"the server at {url} has another spec: {'; '.join(changes)}")
+    return policy

@@ -1,0 +1,349 @@
+"""Values to bytes and back: msgpack, with numpy arrays as raw bytes, dtype and shape.
+
+An array is a map with the four binary keys `__ndarray__` (true), `data`, `dtype`, `shape`: the
+layout of openpi, so one codec serves both dialects. Encoding copies each array once, into the
+final buffer; decoding copies none (arrays are read-only views of the received bytes; only
+multi-byte items at an odd address are copied, so that every array is aligned).
+
+Refused, with EncodeError or DecodeError: object, string, structured and complex dtypes (there is
+no pickle here), extension types, repeated keys, anything beyond `Limits`. All lengths are compared
+with the bytes that are really there before anything is allocated, so that a short message cannot
+claim a large array. That is why the decoder is written here: the msgpack package copies binary
+values and allocates by claimed counts.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import msgpack
+import numpy as np
+
+from robospa.protocol.errors import DecodeError, EncodeError
+
+Buffer = bytes | bytearray | memoryview
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Upper bounds per message. `message`, `array` and `text` in bytes; `ndim` axes per array;
+    `depth` levels of nesting; `items` values and keys in all."""
+
+    message: int = 64 * 2**20
+    array: int = 64 * 2**20
+    text: int = 2**20
+    depth: int = 32
+    items: int = 200_000
+    ndim: int = 8
+
+
+DEFAULT_LIMITS = Limits()
+
+_NAMES = "|b1 |i1 |u1 <i2 <i4 <i8 <u2 <u4 <u8 <f2 <f4 <f8".split()
+DTYPES = {name: np.dtype(name) for name in _NAMES}
+"""The dtypes that exist on the wire, by the name they have there (little endian)."""
+
+_MARK, _DATA, _DTYPE, _SHAPE = b"__ndarray__", b"data", b"dtype", b"shape"
+_SCALAR = b"__npgeneric__"
+_ARRAY_KEYS = frozenset((_MARK, _DATA, _DTYPE, _SHAPE))
+_SCALAR_KEYS = frozenset((_SCALAR, _DATA, _DTYPE))
+_BINARY_KEYS = _ARRAY_KEYS | _SCALAR_KEYS
+
+
+# ---------------------------------------------------------------- encoding
+
+
+def encode(value: Any, limits: Limits = DEFAULT_LIMITS) -> bytes:
+    """One contiguous message from None, bool, int, float, str, bytes, lists, maps and arrays.
+
+    Tuples become lists and numpy scalars become Python numbers. Raises EncodeError.
+    """
+    writer = _Writer(limits)
+    try:
+        writer.value(value, 0)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise EncodeError(f"cannot encode a value: {error}") from error
+    if writer.size > limits.message:
+        raise EncodeError(f"message of {writer.size} bytes is over the limit of {limits.message}")
+    return b"".join(writer.parts)
+
+
+class _Writer:
+    """Collects the parts of a message; arrays stay where they are until the final join."""
+
+    def __init__(self, limits: Limits) -> None:
+        self.limits = limits
+        self.parts: list[Any] = []
+        self.size = 0
+        self.items = 0
+        self.packer = msgpack.Packer(use_bin_type=True)
+
+    def add(self, part: Any, size: int) -> None:
+        self.parts.append(part)
+        self.size += size
+
+    def value(self, value: Any, depth: int) -> None:
+        self.items += 1
+        if depth > self.limits.depth or self.items > self.limits.items:
+            raise EncodeError(
+                f"a message may have {self.limits.depth} levels and {self.limits.items} items"
+            )
+        if isinstance(value, np.ndarray):
+            self.array(value)
+        elif isinstance(value, Mapping):
+            self.map(value, depth)
+        elif isinstance(value, (list, tuple)):
+            header = self.packer.pack_array_header(len(value))
+            self.add(header, len(header))
+            for item in value:
+                self.value(item, depth + 1)
+        else:
+            self.leaf(value)
+
+    def map(self, value: Mapping[Any, Any], depth: int) -> None:
+        header = self.packer.pack_map_header(len(value))
+        self.add(header, len(header))
+        for key, item in value.items():
+            if type(key) is not str and type(key) is not int:
+                raise EncodeError(f"map key {key!r} is neither a string nor an integer")
+            self.items += 1
+            self.leaf(key)
+            self.value(item, depth + 1)
+
+    def leaf(self, value: Any) -> None:
+        if isinstance(value, np.generic):
+            if value.dtype.kind not in "biuf":
+                raise EncodeError(f"numpy scalar of dtype {value.dtype} cannot be sent")
+            value = value.item()
+        if value is not None and not isinstance(value, (bool, int, float, str, bytes, bytearray)):
+            raise EncodeError(f"a value of type {type(value).__name__} cannot be sent")
+        packed = self.packer.pack(value)
+        if isinstance(value, str) and len(packed) > self.limits.text:
+            raise EncodeError(f"text of {len(value)} characters is over the limit")
+        self.add(packed, len(packed))
+
+    def array(self, array: np.ndarray[Any, Any]) -> None:
+        name = array.dtype.newbyteorder("<").str
+        if name not in DTYPES:
+            raise EncodeError(f"array of dtype {array.dtype} cannot be sent, only {list(DTYPES)}")
+        if array.nbytes > self.limits.array or array.ndim > self.limits.ndim:
+            raise EncodeError(
+                f"array of shape {array.shape} ({array.nbytes} bytes) is over a limit"
+            )
+        self.items += 7 + array.ndim
+        flat = np.ascontiguousarray(array, dtype=DTYPES[name]).reshape(-1)
+        pack = self.packer.pack
+        head = b"".join(
+            (
+                _ARRAY_HEAD,
+                pack(name),
+                _SHAPE_KEY,
+                pack(array.shape),
+                _DATA_KEY,
+                _bin_header(array.nbytes),
+            )
+        )
+        self.add(head, len(head))
+        self.add(flat.view(np.uint8).data if flat.size else b"", array.nbytes)
+
+
+def _bin_header(size: int) -> bytes:
+    if size < 2**8:
+        return struct.pack(">BB", 0xC4, size)
+    if size < 2**16:
+        return struct.pack(">BH", 0xC5, size)
+    return struct.pack(">BI", 0xC6, size)
+
+
+def _binary(key: bytes) -> bytes:
+    return _bin_header(len(key)) + key
+
+
+_ARRAY_HEAD = b"\x84" + _binary(_MARK) + b"\xc3" + _binary(_DTYPE)
+_SHAPE_KEY, _DATA_KEY = _binary(_SHAPE), _binary(_DATA)
+
+
+# ---------------------------------------------------------------- decoding
+
+
+def decode(buffer: Buffer, limits: Limits = DEFAULT_LIMITS) -> Any:
+    """The value in `buffer`, which must hold exactly one. Raises DecodeError and nothing else."""
+    if len(buffer) > limits.message:
+        raise DecodeError(f"message of {len(buffer)} bytes is over the limit of {limits.message}")
+    reader = _Reader(buffer, limits)
+    value = reader.value(0)
+    if reader.pos != reader.end:
+        raise DecodeError(f"{reader.end - reader.pos} bytes follow the message's end")
+    return value
+
+
+_FIXED = {
+    0xCA: struct.Struct(">f"),
+    0xCB: struct.Struct(">d"),
+    0xCC: struct.Struct(">B"),
+    0xCD: struct.Struct(">H"),
+    0xCE: struct.Struct(">I"),
+    0xCF: struct.Struct(">Q"),
+    0xD0: struct.Struct(">b"),
+    0xD1: struct.Struct(">h"),
+    0xD2: struct.Struct(">i"),
+    0xD3: struct.Struct(">q"),
+}
+_LENGTHS = {1: struct.Struct(">B"), 2: struct.Struct(">H"), 4: struct.Struct(">I")}
+_CONSTANTS = {0xC0: None, 0xC2: False, 0xC3: True}
+_BIN = {0xC4: 1, 0xC5: 2, 0xC6: 4}
+_STR = {0xD9: 1, 0xDA: 2, 0xDB: 4}
+_LIST = {0xDC: 2, 0xDD: 4}
+_MAP = {0xDE: 2, 0xDF: 4}
+
+
+class _Reader:
+    """A cursor over one message. Every length is checked against what is left before use."""
+
+    __slots__ = ("end", "items", "limits", "pos", "view")
+
+    def __init__(self, buffer: Buffer, limits: Limits) -> None:
+        self.view = memoryview(buffer).cast("B")
+        self.pos = 0
+        self.end = len(self.view)
+        self.items = 0
+        self.limits = limits
+
+    def fail(self, reason: str) -> DecodeError:
+        return DecodeError(f"byte {self.pos}: {reason}")
+
+    def take(self, size: int) -> int:
+        """Advance by `size` bytes; returns where they start."""
+        start = self.pos
+        if size > self.end - start:
+            raise self.fail(f"{size} bytes announced, {self.end - start} left")
+        self.pos = start + size
+        return start
+
+    def length(self, width: int) -> int:
+        number: int = _LENGTHS[width].unpack_from(self.view, self.take(width))[0]
+        return number
+
+    def value(self, depth: int) -> Any:
+        self.items += 1
+        if self.items > self.limits.items:
+            raise self.fail(f"more than {self.limits.items} items")
+        if depth > self.limits.depth:
+            raise self.fail(f"nested deeper than {self.limits.depth} levels")
+        tag = self.view[self.take(1)]
+        if tag < 0x80:
+            return tag
+        if tag >= 0xE0:
+            return tag - 0x100
+        if tag < 0x90:
+            return self.map(tag & 0x0F, depth)
+        if tag < 0xA0:
+            return self.list(tag & 0x0F, depth)
+        if tag < 0xC0:
+            return self.text(tag & 0x1F)
+        if tag in _FIXED:
+            form = _FIXED[tag]
+            return form.unpack_from(self.view, self.take(form.size))[0]
+        if tag in _CONSTANTS:
+            return _CONSTANTS[tag]
+        if tag in _STR:
+            return self.text(self.length(_STR[tag]))
+        if tag in _BIN:
+            start = self.take(self.length(_BIN[tag]))
+            return bytes(self.view[start : self.pos])
+        if tag in _LIST:
+            return self.list(self.length(_LIST[tag]), depth)
+        if tag in _MAP:
+            return self.map(self.length(_MAP[tag]), depth)
+        raise self.fail(f"extension or unused type 0x{tag:02x} does not exist in this protocol")
+
+    def text(self, size: int) -> str:
+        if size > self.limits.text:
+            raise self.fail(f"text of {size} bytes is over the limit of {self.limits.text}")
+        start = self.take(size)
+        try:
+            return str(self.view[start : self.pos], "utf-8")
+        except UnicodeDecodeError as error:
+            raise self.fail("text is not UTF-8") from error
+
+    def count(self, count: int, least: int) -> None:
+        """`count` members of at least `least` bytes each must fit into what is left."""
+        if count * least > self.end - self.pos:
+            raise self.fail(f"{count} members announced, only {self.end - self.pos} bytes left")
+        if self.items + count * least > self.limits.items:
+            raise self.fail(f"more than {self.limits.items} items")
+
+    def list(self, count: int, depth: int) -> list[Any]:
+        self.count(count, 1)
+        return [self.value(depth + 1) for _ in range(count)]
+
+    def map(self, count: int, depth: int) -> Any:
+        self.count(count, 2)
+        if count and self.pos < self.end and self.view[self.pos] in _BIN:
+            return self.numpy(count)
+        result: dict[Any, Any] = {}
+        for _ in range(count):
+            key = self.value(depth + 1)
+            if type(key) is not str and type(key) is not int:
+                raise self.fail("a map key is neither a string nor an integer")
+            if key in result:
+                raise self.fail(f"map key {str(key)[:50]!r} appears twice")
+            result[key] = self.value(depth + 1)
+        return result
+
+    def binary(self) -> memoryview:
+        tag = self.view[self.take(1)]
+        if tag not in _BIN:
+            raise self.fail("binary data expected")
+        start = self.take(self.length(_BIN[tag]))
+        return self.view[start : self.pos]
+
+    def numpy(self, count: int) -> Any:
+        """A map with binary keys: an array, or a scalar as openpi sends it."""
+        found: dict[bytes, Any] = {}
+        for _ in range(count):
+            key = bytes(self.binary()[:16])
+            if key not in _BINARY_KEYS or key in found:
+                raise self.fail(f"unknown or repeated binary key {key!r}")
+            self.items += 2
+            if key == _DATA and _SCALAR not in found and self._next_is_binary():
+                found[key] = self.binary()
+            else:
+                found[key] = self.value(self.limits.depth - 1)
+        if found.keys() == _ARRAY_KEYS and found[_MARK] is True:
+            return self.array(found[_DATA], found[_DTYPE], found[_SHAPE])
+        if found.keys() == _SCALAR_KEYS and type(found[_DATA]) in (bool, int, float):
+            return found[_DATA]
+        raise self.fail("a map with binary keys is neither an array nor a scalar")
+
+    def _next_is_binary(self) -> bool:
+        return self.pos < self.end and self.view[self.pos] in _BIN
+
+    def array(self, data: Any, name: Any, shape: Any) -> np.ndarray[Any, Any]:
+        dtype = DTYPES.get(name) if isinstance(name, str) else None
+        if dtype is None:
+            raise self.fail(f"array dtype {str(name)[:20]!r} is not one of {list(DTYPES)}")
+        if not isinstance(data, memoryview):
+            raise self.fail("array data is not binary")
+        if not isinstance(shape, list) or not all(type(n) is int and n >= 0 for n in shape):
+            raise self.fail("array shape is not a list of numbers from 0 up")
+        if len(shape) > self.limits.ndim:
+            raise self.fail(f"array of {len(shape)} axes, at most {self.limits.ndim} are allowed")
+        wanted = dtype.itemsize
+        for size in shape:
+            wanted *= size
+        if wanted != len(data):
+            raise self.fail(f"array {name} of shape {shape} has {len(data)} bytes, not {wanted}")
+        if wanted > self.limits.array:
+            raise self.fail(f"array of {wanted} bytes is over the limit of {self.limits.array}")
+        if max(shape, default=0) > self.limits.array:
+            raise self.fail(f"array axis of {max(shape)} is over the limit")
+        array = np.frombuffer(data, dtype=dtype) if wanted else np.empty(0, dtype)
+        if not array.flags.aligned:
+            array = array.copy()
+        array = array.reshape(shape)
+        array.flags.writeable = False
+        return array

@@ -1,0 +1,153 @@
+"""Runs policies off the event loop and keeps the trials of different connections apart.
+
+Three ways to hand over a policy, by what it knows about sessions:
+
+    policy_factory   a function that makes one policy object per connection: right for every
+                     policy that remembers anything between calls. Weights belong in the closure.
+    BatchPolicy      one object for all connections, asked through `infer_batch(observations,
+                     sessions)`. It keeps per-trial state by session number, or none at all; if it
+                     has `reset_session(session, trial)` and `end_session(session)`, these are
+                     called instead of `reset(trial)`.
+    any other policy one object, hence one connection at a time; a second one is refused, because
+                     two trials would share its state unseen.
+
+A policy may have `end(outcome)` and `close()`. It is called from `threads` threads, one by default:
+then it need not be thread-safe.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+import time
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, Protocol, TypeVar
+
+from robospa.protocol.batching import Batcher
+from robospa.protocol.policy import Observation, Policy, PolicySpec, TrialInfo
+
+T = TypeVar("T")
+PolicyFactory = Callable[[], Policy]
+Answer = tuple[Any, dict[str, float]]
+
+
+class PolicySession(Protocol):
+    """The policy as one connection sees it. Every call raises what the policy raises."""
+
+    async def reset(self, trial: TrialInfo) -> None: ...
+
+    async def infer(self, observation: Observation) -> Answer: ...
+
+    async def end(self, outcome: Mapping[str, Any]) -> None: ...
+
+    async def close(self) -> None: ...
+
+
+class Engine:
+    """Owns the policy or its factory, and the threads that it runs in."""
+
+    def __init__(
+        self,
+        policy: Policy | None = None,
+        policy_factory: PolicyFactory | None = None,
+        *,
+        threads: int = 1,
+        queue: int = 256,
+    ) -> None:
+        if (policy is None) == (policy_factory is None):
+            raise ValueError("give either a policy or a policy_factory")
+        self._factory = policy_factory
+        self._spare: Policy | None = policy if policy is not None else policy_factory()  # type: ignore[misc]
+        assert self._spare is not None
+        self.spec: PolicySpec = self._spare.spec
+        self._shared = self._spare if policy is not None else None
+        self._batched = policy is not None and hasattr(policy, "infer_batch")
+        self.max_sessions = None if self._factory is not None or self._batched else 1
+        self._executor = ThreadPoolExecutor(threads, thread_name_prefix="robospa-policy")
+        self._numbers = itertools.count(1)
+        self._batcher = Batcher(self._infer_batch, self.spec.batch, queue)
+
+    async def run(self, call: Callable[..., T], *args: Any) -> T:
+        """`call(*args)` in a policy thread."""
+        return await asyncio.get_running_loop().run_in_executor(self._executor, call, *args)
+
+    async def open(self) -> PolicySession:
+        """A session for a new connection."""
+        number = next(self._numbers)
+        if self._factory is None:
+            assert self._shared is not None
+            if self._batched:
+                return _SharedSession(self, self._shared, self._batcher, number)
+            return _OwnSession(self, self._shared, keep=True)
+        policy, self._spare = self._spare, None
+        if policy is None:
+            policy = await self.run(self._factory)
+        return _OwnSession(self, policy, keep=False)
+
+    async def _infer_batch(
+        self, observations: Sequence[Observation], sessions: Sequence[int]
+    ) -> Sequence[Any]:
+        policy: Any = self._shared
+        answers: Sequence[Any] = await self.run(policy.infer_batch, observations, sessions)
+        return answers
+
+    def close(self) -> None:
+        """Let the running call finish and start no other."""
+        self._executor.shutdown(wait=False, cancel_futures=True)
+
+
+class _OwnSession:
+    """A policy object of its own."""
+
+    def __init__(self, engine: Engine, policy: Policy, keep: bool) -> None:
+        self._engine, self._policy, self._keep = engine, policy, keep
+
+    async def reset(self, trial: TrialInfo) -> None:
+        await self._engine.run(self._policy.reset, trial)
+
+    async def infer(self, observation: Observation) -> Answer:
+        return await self._engine.run(self._timed, time.perf_counter(), observation)
+
+    def _timed(self, asked: float, observation: Observation) -> Answer:
+        start = time.perf_counter()
+        answer = self._policy.infer(observation)
+        end = time.perf_counter()
+        times = {"queue_ms": (start - asked) * 1e3, "infer_ms": (end - start) * 1e3, "batch": 1.0}
+        return answer, times
+
+    async def end(self, outcome: Mapping[str, Any]) -> None:
+        await self._optional("end", outcome)
+
+    async def close(self) -> None:
+        if not self._keep:
+            await self._optional("close")
+
+    async def _optional(self, name: str, *args: Any) -> None:
+        method = getattr(self._policy, name, None)
+        if method is not None:
+            await self._engine.run(method, *args)
+
+
+class _SharedSession:
+    """One session of a policy that serves many at once."""
+
+    def __init__(self, engine: Engine, policy: Any, batcher: Batcher, number: int) -> None:
+        self._engine, self._policy, self._batcher, self._number = engine, policy, batcher, number
+
+    async def reset(self, trial: TrialInfo) -> None:
+        if hasattr(self._policy, "reset_session"):
+            await self._engine.run(self._policy.reset_session, self._number, trial)
+        else:
+            await self._engine.run(self._policy.reset, trial)
+
+    async def infer(self, observation: Observation) -> Answer:
+        return await self._batcher.infer(self._number, observation)
+
+    async def end(self, outcome: Mapping[str, Any]) -> None:
+        self._batcher.forget(self._number)
+
+    async def close(self) -> None:
+        self._batcher.forget(self._number)
+        if hasattr(self._policy, "end_session"):
+            await self._engine.run(self._policy.end_session, self._number)

@@ -1,0 +1,302 @@
+"""The policy server: several connections, one policy, inference off the event loop.
+
+`serve(policy, host, port)` runs until it is interrupted; `ServerThread` is the same inside another
+program. A client that offers `robospa.v1` gets it, one that offers nothing gets openpi's dialect,
+one that offers another version of ours is refused. `GET /healthz` answers 200.
+
+A token, if set, is required at the handshake (`Authorization: Bearer ...`, or `Api-Key ...` as
+openpi's client sends it) and compared in constant time. Browsers are refused (no `Origin`). Without
+TLS (`ssl`) tokens and frames travel in the clear.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import hmac
+import logging
+import signal
+import socket
+import ssl as ssl_module
+import threading
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from http import HTTPStatus
+from types import TracebackType
+from typing import Self
+
+from websockets.asyncio.server import Server, ServerConnection
+from websockets.asyncio.server import serve as websocket_serve
+from websockets.exceptions import ConnectionClosed
+from websockets.http11 import Request, Response
+from websockets.typing import Subprotocol
+
+from robospa.protocol.channel import SOCKET_BUFFER
+from robospa.protocol.codec import DEFAULT_LIMITS, Limits
+from robospa.protocol.engine import Engine, PolicyFactory
+from robospa.protocol.messages import SUBPROTOCOL
+from robospa.protocol.policy import Policy
+from robospa.protocol.session import Session
+
+log = logging.getLogger("robospa.server")
+
+
+@dataclass(frozen=True)
+class ServerOptions:
+    """Bounds of one server. `idle`: seconds of silence after which a connection is closed.
+    `patience`: seconds that a new connection waits for a free place. `queue`: requests that may
+    wait. `threads`: how many threads call policies (more than one only if they allow it)."""
+
+    max_connections: int = 64
+    queue: int = 256
+    threads: int = 1
+    idle: float = 3600.0
+    patience: float = 2.0
+    name: str = "robospa"
+    limits: Limits = field(default_factory=lambda: DEFAULT_LIMITS)
+
+
+class PolicyServer:
+    """An async context manager around one listening socket. See `serve` for the arguments."""
+
+    def __init__(
+        self,
+        policy: Policy | None = None,
+        host: str = "127.0.0.1",
+        port: int = 0,
+        token: str | None = None,
+        *,
+        policy_factory: PolicyFactory | None = None,
+        ssl: ssl_module.SSLContext | None = None,
+        options: ServerOptions | None = None,
+    ) -> None:
+        self._options = options or ServerOptions()
+        self._engine = Engine(
+            policy,
+            policy_factory,
+            threads=self._options.threads,
+            queue=self._options.queue,
+        )
+        self._host, self._port, self._token, self._ssl = host, port, token, ssl
+        self._places = min(
+            self._options.max_connections,
+            self._engine.max_sessions or self._options.max_connections,
+        )
+        self._taken = 0
+        self._server: Server | None = None
+
+    @property
+    def url(self) -> str:
+        """Where to connect; the real port also when 0 was asked for."""
+        assert self._server is not None, "the server is not running"
+        host, port = next(iter(self._server.sockets)).getsockname()[:2]
+        scheme = "ws" if self._ssl is None else "wss"
+        return f"{scheme}://[{host}]:{port}" if ":" in host else f"{scheme}://{host}:{port}"
+
+    async def __aenter__(self) -> Self:
+        self._server = await websocket_serve(
+            self._handle,
+            self._host,
+            self._port,
+            ssl=self._ssl,
+            origins=[None],
+            select_subprotocol=_select,
+            process_request=self._admit,
+            compression=None,
+            max_size=self._options.limits.message,
+            max_queue=2,
+            write_limit=2**20,
+            ping_interval=None,
+            open_timeout=10 + self._options.patience,
+            close_timeout=1,
+        )
+        for listener in self._server.sockets:
+            _tune(listener)
+        return self
+
+    async def __aexit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        assert self._server is not None
+        self._server.close()
+        with contextlib.suppress(TimeoutError):
+            await asyncio.wait_for(self._server.wait_closed(), 5)
+        self._engine.close()
+
+    async def _admit(self, connection: ServerConnection, request: Request) -> Response | None:
+        """None to go on with the handshake, else the HTTP answer."""
+        if request.path == "/healthz":
+            return connection.respond(HTTPStatus.OK, "OK\n")
+        if not _authorized(self._token, request):
+            return connection.respond(HTTPStatus.UNAUTHORIZED, "missing or wrong token\n")
+        offered = ",".join(request.headers.get_all("Sec-WebSocket-Protocol"))
+        names = [name.strip() for name in offered.split(",")]
+        if SUBPROTOCOL not in names and any(name.startswith("robospa.") for name in names):
+            text = f"this server speaks {SUBPROTOCOL}, not {offered}\n"
+            return connection.respond(HTTPStatus.BAD_REQUEST, text)
+        if not await self._place():
+            text = f"all {self._places} places of this server are taken\n"
+            return connection.respond(HTTPStatus.SERVICE_UNAVAILABLE, text)
+        return None
+
+    async def _place(self) -> bool:
+        """Wait a little for a free place: a client that reconnects may be faster than the news
+        that its old connection is gone."""
+        clock = asyncio.get_running_loop().time
+        give_up = clock() + self._options.patience
+        while self._taken >= self._places:
+            if clock() >= give_up:
+                return False
+            await asyncio.sleep(0.01)
+        return True
+
+    async def _handle(self, connection: ServerConnection) -> None:
+        if self._taken >= self._places:
+            return await connection.close(1013, "all places of this server are taken")
+        self._taken += 1
+        try:
+            await self._converse(connection)
+        except ConnectionClosed:
+            pass
+        except TimeoutError:
+            log.warning("closing a connection that was silent for %g s", self._options.idle)
+        finally:
+            self._taken -= 1
+
+    async def _converse(self, connection: ServerConnection) -> None:
+        policy = await self._engine.open()
+        options = self._options
+        try:
+            session = Session(
+                connection, policy, self._engine.spec, options.name, options.limits, options.idle
+            )
+            ours = connection.subprotocol == SUBPROTOCOL
+            await (session.run() if ours else session.run_openpi())
+        finally:
+            await policy.close()
+
+
+def _select(connection: ServerConnection, offered: Sequence[Subprotocol]) -> Subprotocol | None:
+    return Subprotocol(SUBPROTOCOL) if SUBPROTOCOL in offered else None
+
+
+def _authorized(token: str | None, request: Request) -> bool:
+    if token is None:
+        return True
+    headers = request.headers.get_all("Authorization")
+    kind, _, given = (headers[0] if len(headers) == 1 else "").partition(" ")
+    same = hmac.compare_digest(given.strip().encode(), token.encode())
+    return same and kind.lower() in ("bearer", "api-key")
+
+
+def _tune(listener: socket.socket) -> None:
+    """Accepted sockets inherit these: room for a whole observation, and the kernel notices a
+    client whose machine is gone."""
+    for option in (socket.SO_RCVBUF, socket.SO_SNDBUF):
+        listener.setsockopt(socket.SOL_SOCKET, option, SOCKET_BUFFER)
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+
+
+def serve(
+    policy: Policy | None = None,
+    host: str = "127.0.0.1",
+    port: int = 8000,
+    token: str | None = None,
+    *,
+    policy_factory: PolicyFactory | None = None,
+    ssl: ssl_module.SSLContext | None = None,
+    options: ServerOptions | None = None,
+    on_ready: Callable[[str], None] | None = None,
+) -> None:
+    """Serve until SIGINT or SIGTERM. Give a policy or a factory (see `robospa.protocol.engine`).
+
+    `on_ready` is called with the URL once clients can connect. Raises OSError if the port is taken.
+    """
+    server = PolicyServer(
+        policy, host, port, token, policy_factory=policy_factory, ssl=ssl, options=options
+    )
+    if token is None and host not in ("127.0.0.1", "localhost", "::1"):
+        log.warning("listening on %s without a token: anybody who reaches it can use it", host)
+
+    async def main() -> None:
+        stop = asyncio.Event()
+        loop = asyncio.get_running_loop()
+        for name in (signal.SIGINT, signal.SIGTERM):
+            loop.add_signal_handler(name, stop.set)
+        async with server:
+            if on_ready is not None:
+                on_ready(server.url)
+            await stop.wait()
+
+    asyncio.run(main())
+
+
+class ServerThread:
+    """A policy server in a background thread: `with ServerThread(policy) as server: server.url`.
+
+    Takes the arguments of `PolicyServer`; the port is chosen freely unless given.
+    """
+
+    def __init__(
+        self,
+        policy: Policy | None = None,
+        host: str = "127.0.0.1",
+        port: int = 0,
+        token: str | None = None,
+        *,
+        policy_factory: PolicyFactory | None = None,
+        ssl: ssl_module.SSLContext | None = None,
+        options: ServerOptions | None = None,
+    ) -> None:
+        self._server = PolicyServer(
+            policy, host, port, token, policy_factory=policy_factory, ssl=ssl, options=options
+        )
+        self._thread = threading.Thread(target=self._main, name="robospa-server", daemon=True)
+        self._ready = threading.Event()
+        self._failure: BaseException | None = None
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._stop: asyncio.Event | None = None
+        self.url = ""
+
+    def start(self) -> Self:
+        """Returns when clients can connect. Raises OSError if the port is taken."""
+        self._thread.start()
+        self._ready.wait()
+        if self._failure is not None:
+            raise self._failure
+        return self
+
+    def stop(self) -> None:
+        """Close all connections and the port."""
+        if self._loop is not None and self._stop is not None and self._thread.is_alive():
+            with contextlib.suppress(RuntimeError):
+                self._loop.call_soon_threadsafe(self._stop.set)
+        self._thread.join(10)
+
+    def _main(self) -> None:
+        try:
+            asyncio.run(self._run())
+        except BaseException as error:
+            self._failure = error
+        finally:
+            self._ready.set()
+
+    async def _run(self) -> None:
+        self._loop, self._stop = asyncio.get_running_loop(), asyncio.Event()
+        async with self._server:
+            self.url = self._server.url
+            self._ready.set()
+            await self._stop.wait()
+
+    __enter__ = start
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.stop()

@@ -1,0 +1,71 @@
+"""Typed access to the fields of a decoded map; every refusal names the field and what came."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from robospa.protocol.errors import DecodeError
+
+MISSING: Any = object()
+
+
+class Fields:
+    """A map with string keys, read field by field. Unknown fields are left alone: they belong to
+    later minor versions."""
+
+    def __init__(self, what: str, value: Any) -> None:
+        if not isinstance(value, Mapping) or not all(type(key) is str for key in value):
+            raise DecodeError(f"{what} is not a map with text keys but {kind(value)}")
+        self.what = what
+        self.value = value
+
+    def raw(self, name: str, default: Any = MISSING) -> Any:
+        found = self.value.get(name, default)
+        if found is MISSING:
+            raise DecodeError(f"{self.what} lacks the field {name!r}")
+        return found
+
+    def refuse(self, name: str, wanted: str, found: Any) -> DecodeError:
+        return DecodeError(f"{self.what}: {name!r} must be {wanted}, not {kind(found)}")
+
+    def text(self, name: str, default: Any = MISSING, choices: tuple[str, ...] = ()) -> str:
+        found = self.raw(name, default)
+        if type(found) is not str:
+            raise self.refuse(name, "text", found)
+        if choices and found not in choices:
+            raise self.refuse(name, f"one of {', '.join(choices)}", found)
+        return found
+
+    def whole(
+        self, name: str, default: Any = MISSING, low: int = -(2**63), high: int = 2**63 - 1
+    ) -> int:
+        found = self.raw(name, default)
+        if type(found) is not int or not low <= found <= high:
+            raise self.refuse(name, f"a whole number from {low} to {high}", found)
+        return found
+
+    def flag(self, name: str, default: Any = MISSING) -> bool:
+        found = self.raw(name, default)
+        if type(found) is not bool:
+            raise self.refuse(name, "true or false", found)
+        return found
+
+    def items(self, name: str, default: Any = MISSING) -> list[Any]:
+        found = self.raw(name, default)
+        if not isinstance(found, (list, tuple)):
+            raise self.refuse(name, "a list", found)
+        return list(found)
+
+    def map(self, name: str, default: Any = MISSING) -> dict[str, Any]:
+        found = self.raw(name, default)
+        if not isinstance(found, Mapping) or not all(type(key) is str for key in found):
+            raise self.refuse(name, "a map with text keys", found)
+        return dict(found)
+
+
+def kind(value: Any) -> str:
+    """A short name for what came instead."""
+    if value is None or isinstance(value, (bool, int, float, str)):
+        return repr(value)[:60]
+    return f"a {type(value).__name__}"
