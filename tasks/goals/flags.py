@@ -51,13 +51,18 @@ def grasp_centre(end_effector: Pose) -> Vec3:
 
 def closed_near(snapshot: Snapshot, point: Vec3, radius: float) -> bool:
     """Whether a gripper that is not open has its grasp centre within `radius` [m] of `point`."""
-    for opening, pose in zip(snapshot.gripper, snapshot.end_effector, strict=True):
-        if opening <= GRIPPER_OPEN:
-            x, y, z = grasp_centre(pose)
+    return holding_arm(snapshot, point, radius) is not None
+
+
+def holding_arm(snapshot: Snapshot, point: Vec3, radius: float) -> int | None:
+    """The arm (0 left, 1 right) whose gripper is not open and within `radius` [m] of `point`."""
+    for arm in (0, 1):
+        if snapshot.gripper[arm] <= GRIPPER_OPEN:
+            x, y, z = grasp_centre(snapshot.end_effector[arm])
             dx, dy, dz = x - point[0], y - point[1], z - point[2]
             if dx * dx + dy * dy + dz * dz < radius * radius:
-                return True
-    return False
+                return arm
+    return None
 
 
 def inside_box(point: Vec3, centre: Vec3, half: Vec3) -> bool:

@@ -1,17 +1,18 @@
 """Which objects are carried and which fall: events for the failure analysis, never for success.
 
 An object is grasped once it is 3 cm above its rest height with a gripper that is not open around
-it. It is dropped if it then falls faster than 0.6 m/s, which takes about 2 cm of free fall, at a
-place where it is not meant to fall.
+it. It is dropped if it then falls faster than 0.6 m/s, which takes about 2 cm of free fall, away
+from that gripper and at a place where it is not meant to fall.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 
 from robospa.tasks.events import Event
 from robospa.tasks.geometry import Vec3
-from robospa.tasks.goals.flags import closed_near
+from robospa.tasks.goals.flags import grasp_centre, holding_arm
 from robospa.tasks.snapshot import Snapshot
 
 LIFT = 0.03
@@ -22,6 +23,19 @@ FALL_SPEED = 0.6
 
 RELEASE = 0.2
 """Seconds after letting go during which a fall still belongs to the lift."""
+
+
+SLIP = 0.01
+"""A falling object has left the gripper by more than this [m]."""
+
+
+@dataclass
+class _Hold:
+    """Who held an object, when last, and how far [m] below the grasp centre its origin was."""
+
+    arm: int
+    time: float
+    below: float
 
 
 def _nowhere(position: Vec3) -> bool:
@@ -43,7 +57,7 @@ class Handling:
         self._names = tuple(names)
         self._radius = radius
         self._may_fall = may_fall
-        self._lifted: dict[str, float] = {}  # when it was last held
+        self._lifted: dict[str, _Hold] = {}
         self._rest: dict[str, float] = {}
         self._last: dict[str, tuple[float, float]] = {}
         self.drops = 0
@@ -59,25 +73,42 @@ class Handling:
             z = pose.position[2]
             before_time, before = self._last.get(name, (time - 0.02, z))
             self._last[name] = (time, z)
-            rest = self._rest.setdefault(name, z)
-            held_at = self._lifted.get(name)
-            if held_at is None:
-                if z == before:
-                    continue
-                if not closed_near(snapshot, pose.position, self._radius):
-                    self._rest[name] = z
-                elif z > rest + LIFT:
-                    self._lifted[name] = time
-                    events += (Event(time, "grasped", name),)
-            elif (before - z) / max(time - before_time, 1e-6) > FALL_SPEED:
-                del self._lifted[name]
-                self._rest[name] = z
-                if not self._may_fall(pose.position):
-                    self.drops += 1
-                    events += (Event(time, "dropped", name),)
-            elif closed_near(snapshot, pose.position, self._radius):
-                self._lifted[name] = time
-            elif time - held_at > RELEASE:
-                del self._lifted[name]
-                self._rest[name] = z
+            self._rest.setdefault(name, z)
+            if name not in self._lifted:
+                if z != before:
+                    events += self._raised(snapshot, name, pose.position)
+            else:
+                speed = (before - z) / max(time - before_time, 1e-6)
+                events += self._carried(snapshot, name, pose.position, speed)
         return events
+
+    def _raised(self, snapshot: Snapshot, name: str, at: Vec3) -> tuple[Event, ...]:
+        """An object that moves up or down and is not lifted yet."""
+        arm = holding_arm(snapshot, at, self._radius)
+        if arm is None:
+            self._rest[name] = at[2]
+        elif at[2] > self._rest[name] + LIFT:
+            below = grasp_centre(snapshot.end_effector[arm])[2] - at[2]
+            self._lifted[name] = _Hold(arm, snapshot.time, below)
+            return (Event(snapshot.time, "grasped", name),)
+        return ()
+
+    def _carried(self, snapshot: Snapshot, name: str, at: Vec3, speed: float) -> tuple[Event, ...]:
+        """A lifted object that falls at `speed` [m/s]."""
+        hold = self._lifted[name]
+        below = grasp_centre(snapshot.end_effector[hold.arm])[2] - at[2]
+        if speed > FALL_SPEED and below > hold.below + SLIP:
+            del self._lifted[name]
+            self._rest[name] = at[2]
+            if not self._may_fall(at):
+                self.drops += 1
+                return (Event(snapshot.time, "dropped", name),)
+            return ()
+        arm = holding_arm(snapshot, at, self._radius)
+        if arm is not None and speed <= FALL_SPEED:
+            below = grasp_centre(snapshot.end_effector[arm])[2] - at[2]
+            self._lifted[name] = _Hold(arm, snapshot.time, below)
+        elif snapshot.time - hold.time > RELEASE:
+            del self._lifted[name]
+            self._rest[name] = at[2]
+        return ()

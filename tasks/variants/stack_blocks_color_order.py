@@ -20,7 +20,6 @@ from robospa.tasks.variants.tabletop import (
     Point,
     apart,
     named,
-    resting_home,
     scatter,
     side,
     standing,
@@ -101,7 +100,7 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
             skills.append(Place(name, (x, y, TABLE_TOP + HALF), arm=arm))
         else:
             skills.append(Place(name, on=order[i - 1], arm=arm))
-    return resting_home(skills)
+    return tuple(skills)
 
 
 def slots(scene: Scene) -> Slots:

@@ -15,8 +15,9 @@ import numpy as np
 
 from robospa.tasks import objects
 from robospa.tasks.geometry import Pose, yaw_rotation
-from robospa.tasks.plan import Home, Skill
 from robospa.tasks.scene import TABLE_TOP, SceneObject
+from robospa.tasks.shapes import ObjectModel
+from robospa.tasks.task import Draft
 
 Point = tuple[float, float]
 TRIES_PER_POINT = 100
@@ -53,6 +54,12 @@ def named(
 def draw_look(rng: np.random.Generator, asset: str) -> dict[str, int]:
     """Parameters of one of the asset's looks, each equally likely."""
     return {"look": int(rng.integers(objects.looks(asset)))}
+
+
+def radius(asset: str, params: Mapping[str, Any]) -> float:
+    """Radius [m] of the asset's footprint around its origin."""
+    model: ObjectModel = objects.object_model(asset, params)
+    return model.radius
 
 
 def standing(point: Point, yaw: float = 0.0, height: float = 0.0) -> Pose:
@@ -98,20 +105,21 @@ def scatter(
     )
 
 
+def retry(attempt: Callable[[], Draft | None], what: str) -> Draft:
+    """The first draft that `attempt` makes in 200 tries; RuntimeError naming `what` if none."""
+    for _ in range(LAYOUTS):
+        draft = attempt()
+        if draft is not None:
+            return draft
+    raise RuntimeError(f"no free layout of the {what} in {LAYOUTS} draws; skip this seed")
+
+
 def side(x: float) -> str:
     """The arm that works at `x` [m]: left of the middle the left one, else the right one."""
     return "left" if x < 0 else "right"
 
 
-def resting_home(skills: Iterable[Skill]) -> tuple[Skill, ...]:
-    """`skills` with the arm that has finished sent home whenever the other one takes over."""
-    result: list[Skill] = []
-    busy: str | None = None
-    for skill in skills:
-        arm = getattr(skill, "arm", None)
-        if arm is not None and not isinstance(skill, Home):
-            if busy is not None and arm != busy:
-                result.append(Home(busy))
-            busy = arm
-        result.append(skill)
-    return tuple(result)
+def look_phrasings(model: ObjectModel) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """A model's own phrases: those for training sentences, and the last third, held out."""
+    cut = len(model.phrases) - max(1, len(model.phrases) // 3)
+    return model.phrases[:cut], model.phrases[cut:]

@@ -1,0 +1,92 @@
+"""Put_Bottles_Dustbin: throw all bottles into the bin beside the table.
+
+Draw: upright bottles scattered on the far half of a table that stands 0.3 m farther right; the bin
+stands on the floor at its left. Success: every bottle lies inside the bin's walls at once. The
+right arm cannot reach the bin, so it hands bottles over by setting them down in the middle.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from robospa.tasks import objects
+from robospa.tasks.geometry import Pose
+from robospa.tasks.goals.anyorder import Collect, Container
+from robospa.tasks.instructions import words_procedural
+from robospa.tasks.instructions.words import Slots
+from robospa.tasks.plan import Drop, Pick, Place, Skill
+from robospa.tasks.scene import TABLE_TOP, Scene
+from robospa.tasks.task import Draft, Level, Task
+from robospa.tasks.variants.tabletop import Item, named, scatter, side, standing
+
+BIN = Pose((-0.45, 0.0, 0.0))
+TABLE_SHIFT = (0.3, 0.0)
+X, Y, DISTANCE, MIDDLE = (-0.25, 0.3), (0.03, 0.23), 0.13, 0.05
+CEILING = 0.7
+"""Highest origin [m, world] of a bottle that counts (official), should the bin be higher."""
+
+EXCHANGE = (-0.03, -0.08)
+"""Where the right arm leaves a bottle for the left one: free of bottles, easy for both."""
+
+LEVELS = {n: Level(candidates=n, subtasks=n, steps=400 * n) for n in range(1, 6)}
+
+
+def draw(level: int, rng: np.random.Generator) -> Draft:
+    """Bottles anywhere in the region but the middle strip; different looks up to level 3."""
+    points = scatter(rng, level, X, Y, DISTANCE, lambda point: abs(point[0]) >= MIDDLE)
+    count = objects.looks("bottle")
+    looks = rng.choice(count, size=level, replace=level > min(3, count))
+    items = [Item("dustbin", "dustbin", BIN, {"look": 0}, fixed=True)]
+    for i, (point, look) in enumerate(zip(points, looks, strict=True)):
+        items.append(Item(f"bottle {i}", "bottle", standing(point), {"look": int(look)}))
+    scene_objects, names = named(rng, items)
+    facts = {
+        "dustbin": names["dustbin"],
+        "bottles": [names[f"bottle {i}"] for i in range(level)],
+    }
+    return Draft(scene_objects, facts, TABLE_SHIFT)
+
+
+def goal(scene: Scene) -> Collect:
+    """All bottles inside the bin's walls."""
+    dustbin = scene.object(scene.facts["dustbin"])
+    size = objects.object_model(dustbin.asset, dustbin.params).size
+    rim = min(size[2], CEILING - dustbin.pose.position[2])
+    container = Container(dustbin.pose, (size[0] / 2, size[1] / 2), rim)
+    return Collect(scene.facts["bottles"], container, lost_below=TABLE_TOP - 0.1)
+
+
+def plan(scene: Scene) -> tuple[Skill, ...]:
+    """Left bottles first, then those on the right by way of the exchange place; near to far."""
+
+    def turn(name: str) -> tuple[bool, float]:
+        x, y, _ = scene.object(name).pose.position
+        return x >= 0, y
+
+    dustbin = scene.facts["dustbin"]
+    skills: list[Skill] = []
+    for name in sorted(scene.facts["bottles"], key=turn):
+        if side(scene.object(name).pose.position[0]) == "right":
+            skills.append(Pick(name, arm="right"))
+            skills.append(Place(name, (*EXCHANGE, TABLE_TOP), arm="right"))
+        skills.append(Pick(name, arm="left"))
+        skills.append(Drop(name, into=dustbin, arm="left"))
+    return tuple(skills)
+
+
+def slots(scene: Scene) -> Slots:
+    """How the bottles and the bin are said."""
+    return words_procedural.dustbin(len(scene.facts["bottles"]))
+
+
+TASK = Task(
+    name="Put_Bottles_Dustbin",
+    category="OFE",
+    levels=LEVELS,
+    draw=draw,
+    goal=goal,
+    plan=plan,
+    slots=slots,
+    summary="Throw all bottles into the dustbin.",
+    success="Every bottle is inside the bin's walls, below its rim, and came to rest there.",
+)
