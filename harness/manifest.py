@@ -13,7 +13,7 @@ import platform
 import subprocess
 import sys
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -27,11 +27,13 @@ FORMAT = 1
 
 @dataclass(frozen=True)
 class Manifest:
-    """A run's `settings`, its fixed `keys` and what is known `about` where it ran."""
+    """A run's `settings`, its fixed `keys`, what is known `about` where it ran, and the category
+    of each of its tasks."""
 
     settings: Mapping[str, Any]
     keys: tuple[TrialKey, ...]
     about: Mapping[str, Any]
+    categories: Mapping[str, str] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, Any]:
         """Plain JSON values."""
@@ -39,6 +41,7 @@ class Manifest:
             "format": FORMAT,
             "settings": json.loads(json.dumps(self.settings)),
             "seed_hash": seed_hash(self.keys),
+            "categories": dict(self.categories),
             "trials": group_keys(self.keys),
             "about": json.loads(json.dumps(self.about, default=str)),
         }
