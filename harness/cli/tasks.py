@@ -1,0 +1,225 @@
+"""`robospa tasks`: list the tasks, look at one scene, or make the contact sheet of all variants."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+
+    from robospa.tasks.scene import Scene
+    from robospa.tasks.task import Task
+
+GALLERY = Path("docs/images/gallery.jpg")
+SPLITS = ("train", "heldout")
+
+
+def tasks(
+    name: Annotated[str | None, typer.Argument(help="a task; without it, all are listed")] = None,
+    level: Annotated[int, typer.Option(help="1 to 5")] = 1,
+    seed: Annotated[int, typer.Option(help="the scene's seed")] = 100_000,
+    split: Annotated[str | None, typer.Option(help="train or heldout; without it, both")] = None,
+    camera: Annotated[
+        str, typer.Option(help="head, left_wrist, right_wrist, front, third")
+    ] = "head",
+    size: Annotated[str, typer.Option(help="WIDTHxHEIGHT of the picture [px]")] = "640x480",
+    out: Annotated[Path | None, typer.Option(help="PNG file (or JPEG with --gallery)")] = None,
+    frame: Annotated[bool, typer.Option(help="render the scene's first frame")] = True,
+    gallery: Annotated[bool, typer.Option("--gallery", help="one picture of all variants")] = False,
+) -> None:
+    """List the tasks; describe and draw one scene; or draw all variants on one sheet."""
+    from rich.console import Console
+
+    from robospa.protocol.policy import CAMERAS
+
+    console = Console()
+    if camera not in CAMERAS:
+        raise typer.BadParameter(f"no camera {camera!r}; there are {', '.join(CAMERAS)}")
+    if split is not None and split not in SPLITS:
+        raise typer.BadParameter(f"{split!r} is no split; there are {' and '.join(SPLITS)}")
+    if gallery:
+        _gallery(console, name, seed, split or "heldout", out or GALLERY)
+    elif name is None:
+        console.print(_listing())
+    else:
+        scene = _scene(name, level, seed)
+        pixels = parse_size(size)
+        _describe(console, scene, SPLITS if split is None else (split,))
+        if frame:
+            path = out or Path(f"{scene.task}-L{level}-{seed}.png")
+            _draw(console, scene, camera, pixels, path)
+
+
+def parse_size(text: str) -> tuple[int, int]:
+    """(width, height) of "640x480"; BadParameter if it is something else or beyond 4096."""
+    width, _, height = text.partition("x")
+    if not (width.isdecimal() and height.isdecimal()):
+        raise typer.BadParameter(f"size {text!r} is not WIDTHxHEIGHT, such as 640x480")
+    if not (1 <= int(width) <= 4096 and 1 <= int(height) <= 4096):
+        raise typer.BadParameter(f"size {text!r} is not between 1x1 and 4096x4096")
+    return int(width), int(height)
+
+
+def _find(name: str) -> Task:
+    from robospa.tasks.catalog import task
+
+    try:
+        return task(name)
+    except KeyError as error:
+        raise typer.BadParameter(str(error.args[0])) from None
+
+
+def _scene(name: str, level: int, seed: int) -> Scene:
+    from robospa.tasks.catalog import build_scene
+
+    found = _find(name)
+    if seed < 0:
+        raise typer.BadParameter(f"seed {seed} is negative; shipped seeds start at 100000")
+    try:
+        return build_scene(found.name, level, seed)
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from None
+
+
+# -- all tasks --------------------------------------------------------------------------------
+
+
+def per_level(values: list[int]) -> str:
+    """The values of all levels, or the one value that all share."""
+    return str(values[0]) if len(set(values)) == 1 else " ".join(map(str, values))
+
+
+def _listing() -> Table:
+    from rich.table import Table
+
+    from robospa.tasks.catalog import tasks as all_tasks
+
+    table = Table(caption="n: candidates, T: subtasks, steps: limit in actions; for levels 1 to 5")
+    for heading in ("task", "category", "dimension", "n", "T", "steps"):
+        table.add_column(heading, no_wrap=heading == "task")
+    for task in all_tasks().values():
+        levels = [task.levels[k] for k in sorted(task.levels)]
+        table.add_row(
+            task.name,
+            task.category,
+            task.dimension,
+            per_level([item.candidates for item in levels]),
+            per_level([item.subtasks for item in levels]),
+            per_level([item.steps for item in levels]),
+        )
+    return table
+
+
+# -- one scene --------------------------------------------------------------------------------
+
+
+def describe_skill(skill: object) -> str:
+    """A skill call as "Pick object_2, lift 0.12": its fields that are set."""
+    values = {f.name: getattr(skill, f.name) for f in fields(skill)}  # type: ignore[arg-type]
+    shown = {key: value for key, value in values.items() if value is not None}
+    subject = shown.pop("object", "")
+    rest = [f"{key} {_plain(value)}" for key, value in shown.items()]
+    head = f"{type(skill).__name__} {subject}".strip()
+    return ", ".join([head, *rest])
+
+
+def _plain(value: Any) -> str:
+    """Numbers shortened, everything else as it is."""
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    if isinstance(value, list | tuple):
+        return "(" + ", ".join(map(_plain, value)) + ")"
+    if isinstance(value, Mapping):
+        return ", ".join(f"{key} {_plain(item)}" for key, item in value.items())
+    return str(value)
+
+
+def _describe(console: Console, scene: Scene, splits: tuple[str, ...]) -> None:
+    from rich.table import Table
+    from rich.text import Text
+
+    from robospa.tasks.instructions import instruction
+
+    task = _find(scene.task)
+    limits = task.levels[scene.level]
+    table = Table.grid(padding=(0, 2))
+    table.add_column(style="bold", no_wrap=True)
+    table.add_column()
+
+    def row(label: str, value: str) -> None:
+        table.add_row(label, Text(value))
+
+    row("task", f"{task.name}, level {scene.level}, seed {scene.seed}")
+    row("category", f"{task.category} ({task.dimension})")
+    row("summary", task.summary)
+    row("success", task.success)
+    row("limits", f"n {limits.candidates}, T {limits.subtasks}, {limits.steps} actions")
+    for split in splits:
+        row(f"instruction ({split})", instruction(scene, split))
+    for i, (key, value) in enumerate(scene.facts.items()):
+        row("facts" if i == 0 else "", f"{key}: {_plain(value)}")
+    for i, item in enumerate(scene.objects):
+        row("objects" if i == 0 else "", _object_line(item))
+    for i, skill in enumerate(task.plan(scene)):
+        row("plan" if i == 0 else "", f"{i + 1}. {describe_skill(skill)}")
+    row("scene digest", scene.digest)
+    console.print(table)
+
+
+def _object_line(item: Any) -> str:
+    late = "" if item.appears_at is None else f", appears at {item.appears_at:g} s"
+    fixed = ", fixed" if item.fixed else ""
+    return f"{item.name}: {item.asset} at {_plain(item.pose.position)}{fixed}{late}"
+
+
+def _draw(console: Console, scene: Scene, camera: str, size: tuple[int, int], path: Path) -> None:
+    from robospa.harness import gallery
+    from robospa.harness.sapien_world import SapienWorld
+    from robospa.harness.world import RenderUnavailable, SceneUnstable
+
+    world = SapienWorld()
+    try:
+        image = gallery.first_frame(world, scene, camera, size)
+        gallery.save_png(image, path)
+    except (RenderUnavailable, SceneUnstable, OSError) as error:
+        console.print(f"[red]no picture:[/red] {error}")
+        raise typer.Exit(1) from None
+    finally:
+        world.close()
+    console.print(f"[bold]first frame[/bold]  {path}", soft_wrap=True)
+
+
+# -- the contact sheet ------------------------------------------------------------------------
+
+
+def _gallery(console: Console, name: str | None, seed: int, split: str, path: Path) -> None:
+    from rich.progress import track
+
+    from robospa.harness import gallery
+    from robospa.harness.sapien_world import SapienWorld
+    from robospa.harness.world import RenderUnavailable, SceneUnstable
+    from robospa.tasks.catalog import tasks as all_tasks
+    from robospa.tasks.instructions import instruction
+
+    chosen = list(all_tasks().values()) if name is None else [_find(name)]
+    world = SapienWorld()
+    try:
+        rows = [
+            gallery.task_row(world, task, seed, lambda scene: instruction(scene, split))
+            for task in track(chosen, "drawing", console=console)
+        ]
+        count = sum(len(row.cells) for row in rows)
+        page = gallery.sheet(rows, f"RoboSPA · {len(rows)} tasks, {count} variants, seed {seed}")
+        size = gallery.save_jpeg(page, path)
+    except (RenderUnavailable, SceneUnstable, OSError, ValueError) as error:
+        console.print(f"[red]no gallery:[/red] {error}")
+        raise typer.Exit(1) from None
+    finally:
+        world.close()
+    console.print(f"{count} variants in {path} ({size / 1000:.0f} kB)", soft_wrap=True)
