@@ -1,0 +1,72 @@
+"""The object library: an asset name and its parameters give shapes, grasps, frames and words.
+
+Assets are made by small functions from primitives and low-polygon meshes: nothing is downloaded
+and nothing here knows a simulator. Body frames stand on z = 0 with the origin at the centre of
+the underside (asset `block`: at its centre); the front looks towards -y.
+"""
+
+from __future__ import annotations
+
+import difflib
+import json
+from collections.abc import Mapping
+from functools import cache, lru_cache
+from types import MappingProxyType
+from typing import Any
+
+from robospa.tasks.objects import blocks, boxes, bread, cans, containers, desk, food, gadgets
+from robospa.tasks.objects.build import Asset
+from robospa.tasks.shapes import ObjectModel
+
+__all__ = ["assets", "looks", "object_model"]
+
+FAMILIES = (blocks, boxes, cans, containers, food, bread, desk, gadgets)
+
+
+@cache
+def _library() -> Mapping[str, Asset]:
+    return {name: asset for family in FAMILIES for name, asset in family.ASSETS.items()}
+
+
+def assets() -> tuple[str, ...]:
+    """All asset names, sorted."""
+    return tuple(sorted(_library()))
+
+
+def looks(asset: str) -> int:
+    """How many looks `asset` has: params {"look": k} takes k = 0 .. looks - 1."""
+    return _asset(asset).looks
+
+
+def object_model(asset: str, params: Mapping[str, Any] = MappingProxyType({})) -> ObjectModel:
+    """The model of `asset`. `params` are JSON values: "look" (default 0); for `block` also "half"
+    (three half sizes in metres) and "color" (linear RGB).
+
+    Equal arguments give the same object. KeyError, naming near matches, for an unknown asset;
+    ValueError for an unknown parameter, a look out of range or a malformed value.
+    """
+    _asset(asset)
+    return _build(asset, json.dumps(dict(params), sort_keys=True, separators=(",", ":")))
+
+
+def _asset(name: str) -> Asset:
+    library = _library()
+    if name not in library:
+        near = difflib.get_close_matches(name, list(library), n=3, cutoff=0.4)
+        hint = f"did you mean {', '.join(near)}?" if near else f"there are {', '.join(assets())}"
+        raise KeyError(f"no asset {name!r}; {hint}")
+    return library[name]
+
+
+@lru_cache(maxsize=4096)
+def _build(name: str, text: str) -> ObjectModel:
+    asset = _asset(name)
+    params: dict[str, Any] = json.loads(text)
+    unknown = sorted(set(params) - asset.params - {"look"})
+    if unknown:
+        allowed = ", ".join(sorted(asset.params | {"look"}))
+        raise ValueError(f"asset {name!r} has no parameter {unknown[0]!r}; it takes {allowed}")
+    look = params.get("look", 0)
+    if isinstance(look, bool) or not isinstance(look, int) or not 0 <= look < asset.looks:
+        raise ValueError(f"asset {name!r} has looks 0 to {asset.looks - 1}, not {look!r}")
+    return asset.build(look, params)

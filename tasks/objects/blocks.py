@@ -1,0 +1,130 @@
+"""Box primitives and things that are cubes: `block` and `rubikscube`."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from robospa.tasks.geometry import Vec3
+from robospa.tasks.objects import meshes as m
+from robospa.tasks.objects.build import Asset, across, box_grasps, model, paint, solid, srgb
+from robospa.tasks.shapes import Box, Color, Grasp, ObjectModel, Shape
+
+BLOCK_COLORS: Mapping[str, Color] = {
+    "red": (1.0, 0.0, 0.0),
+    "green": (0.0, 1.0, 0.0),
+    "blue": (0.0, 0.0, 1.0),
+    "yellow": (1.0, 1.0, 0.0),
+    "cyan": (0.0, 1.0, 1.0),
+    "magenta": (1.0, 0.0, 1.0),
+    "orange": (1.0, 0.5, 0.0),
+    "purple": (0.5, 0.0, 0.5),
+    "white": (1.0, 1.0, 1.0),
+    "black": (0.1, 0.1, 0.1),
+}
+"""The official colours of box primitives."""
+
+
+def _triple(value: Sequence[float], what: str) -> Vec3:
+    if len(value) != 3:
+        raise ValueError(f"block {what} must be three numbers, not {list(value)}")
+    return (float(value[0]), float(value[1]), float(value[2]))
+
+
+def block(look: int, params: Mapping[str, Any]) -> ObjectModel:
+    """A plain cuboid around its origin; params "half" [m] and "color" (linear RGB)."""
+    names = list(BLOCK_COLORS)
+    half = _triple(params.get("half", (0.02, 0.02, 0.02)), "half")
+    color = _triple(params.get("color", BLOCK_COLORS[names[look]]), "color")
+    if min(half) <= 0:
+        raise ValueError(f"block half sizes must be positive, not {list(half)}")
+    gaps = [float(np.linalg.norm(np.subtract(color, BLOCK_COLORS[n]))) for n in names]
+    word = names[int(np.argmin(gaps))]
+    phrases = (
+        f"{word} block", f"{word} box", f"block that is {word}", f"{word} building block",
+        f"{word}-coloured block", f"block painted {word}", f"block with {word} sides",
+    )  # fmt: skip
+    return model(
+        "block",
+        [solid(Box(half), color, roughness=0.6)],
+        "block",
+        phrases,
+        _block_grasps(half),
+        press=(0.0, 0.0, half[2]),
+        support=(0.0, 0.0, half[2]),
+    )
+
+
+def _block_grasps(half: Vec3) -> tuple[Grasp, ...]:
+    """At half height; a tall block is taken higher, where the palm still clears its top."""
+    z = max(0.0, half[2] - 0.035)
+    found = list(box_grasps(half[0], half[1], z))
+    if len(found) == 2 and half[1] < half[0]:
+        found.reverse()
+    return tuple(found)
+
+
+CUBE_HALF = 0.028
+STICKERS: Mapping[str, Color] = {
+    "white": srgb("#f4f4f0"), "red": srgb("#c41e2a"), "blue": srgb("#1648b8"),
+    "green": srgb("#109a48"), "orange": srgb("#f77a10"), "yellow": srgb("#ffd812"),
+}  # fmt: skip
+CUBES: tuple[tuple[str, bool, int, tuple[str, ...]], ...] = (
+    ("#141416", True, 3, (
+        "scrambled Rubik's cube", "mixed-up puzzle cube", "black puzzle cube with mixed colours",
+        "unsolved Rubik's cube", "colourful scrambled magic cube", "jumbled colour cube",
+    )),
+    ("#141416", False, 0, (
+        "solved Rubik's cube", "finished puzzle cube", "puzzle cube with one colour per side",
+        "Rubik's cube with matching sides", "completed magic cube", "sorted colour cube",
+    )),
+    ("#f2f2ee", True, 8, (
+        "white-framed Rubik's cube", "puzzle cube with a white frame", "white magic cube",
+        "white puzzle cube with mixed colours", "Rubik's cube with white edges",
+        "colour cube on a white body",
+    )),
+)  # fmt: skip
+
+
+def rubikscube(look: int, params: Mapping[str, Any]) -> ObjectModel:
+    """A 3 x 3 puzzle cube of 5.6 cm."""
+    body, mixed, seed, phrases = CUBES[look]
+    h = CUBE_HALF
+    faces = ("white", "red", "orange", "blue", "green")  # top, -y, +y, +x, -x
+    colors = [name for name in faces for _ in range(9)]
+    if mixed:
+        colors = random.Random(seed).sample([n for n in STICKERS for _ in range(9)], 45)
+        colors[4::9] = list(faces)
+    patches: dict[str, list[Any]] = {}
+    cell = 2 * h / 3
+    tile = m.rounded_rectangle(cell * 0.43, cell * 0.43, cell * 0.1, 2)
+    for i, name in enumerate(colors):
+        u, v = (i % 3 - 1) * cell, (i // 3 % 3 - 1) * cell
+        side, lift = i // 9, h + 0.0004
+        if side == 0:
+            patch = m.flat(tile, 2 * h + 0.0004, (u, v))
+        else:
+            at = ((u, -lift), (u, lift), (lift, u), (-lift, u))[side - 1]
+            facing = (-np.pi / 2, np.pi / 2, 0.0, np.pi)[side - 1]
+            patch = m.upright(tile, (at[0], at[1], h + v), facing)
+        patches.setdefault(name, []).append(patch)
+    parts: list[Shape] = [solid(Box((h, h, h)), srgb(body), (0.0, 0.0, h), roughness=0.4)]
+    parts += [paint(m.merge(*p), STICKERS[n], roughness=0.35) for n, p in patches.items()]
+    return model(
+        "rubikscube",
+        parts,
+        "Rubik's cube",
+        phrases,
+        [across((0.0, 0.0, h), 2 * h, 0.0), across((0.0, 0.0, h), 2 * h, np.pi / 2)],
+        mass=0.06,
+        support=(0.0, 0.0, 2 * h),
+    )
+
+
+ASSETS = {
+    "block": Asset(len(BLOCK_COLORS), block, frozenset({"half", "color"})),
+    "rubikscube": Asset(len(CUBES), rubikscube),
+}

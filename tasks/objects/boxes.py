@@ -1,0 +1,215 @@
+"""Cartons: `tea_box`, `tissue_box`, `playing_cards`; and the `soap` bar."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from robospa.tasks.geometry import Vec3
+from robospa.tasks.objects import meshes as m
+from robospa.tasks.objects.build import (
+    PAPER,
+    Asset,
+    box_grasps,
+    colour,
+    feel,
+    model,
+    named,
+    paint,
+    solid,
+    srgb,
+)
+from robospa.tasks.shapes import Box, Color, Mesh, ObjectModel
+
+SIDES = (-math.pi / 2, 0.0, math.pi / 2, math.pi)
+"""Directions of an upright box's four faces: front (-y), right, back, left."""
+
+
+def on_side(polygon: m.Polygon, half: Vec3, side: float, gap: float = 0.0004) -> Mesh:
+    """`polygon` (right, up from the box's middle) laid on one face of a box standing on z = 0."""
+    x, y = round(math.cos(side)), round(math.sin(side))
+    at = (x * (half[0] + gap), y * (half[1] + gap), half[2])
+    return m.upright(polygon, at, side)
+
+
+def leaf(size: float, x: float = 0.0, y: float = 0.0) -> list[m.Point]:
+    """A pointed oval, tip up."""
+    ring = [(0.0, -1.0), (0.5, -0.45), (0.62, 0.1), (0.4, 0.6), (0.0, 1.0)]
+    ring += [(-0.4, 0.6), (-0.62, 0.1), (-0.5, -0.45)]
+    return [(x + size * u, y + size * v) for u, v in ring]
+
+
+TEAS: tuple[tuple[str, str, str], ...] = (
+    ("dark green", "#8fc35a", "green"), ("red", "#f5c816", "red"), ("yellow", "#8a3b12", "yellow"),
+    ("purple", "#e7b7ef", "purple"), ("navy", "#7fbde8", "blue"), ("cream", "#5b8a3c", "cream"),
+)  # fmt: skip
+
+
+def tea_box(look: int, params: Mapping[str, Any]) -> ObjectModel:
+    """A standing carton of tea bags, with a leaf in a pale oval on every side."""
+    base, mark, word = TEAS[look]
+    half = (0.026, 0.034, 0.038)
+    ovals, leaves, bands = [], [], []
+    for side in SIDES:
+        width = half[0] if round(math.sin(side)) else half[1]
+        ovals.append(on_side(m.ellipse(0.017, 0.021, 14), half, side))
+        leaves.append(on_side(leaf(0.014), half, side, 0.0009))
+        bands.append(on_side(m.rectangle(width, 0.004, 0.0, 0.0315), half, side, 0.0003))
+    lid = m.flat(m.rounded_rectangle(0.02, 0.028, 0.004), 2 * half[2] + 0.0004)
+    badge = m.flat(leaf(0.017), 2 * half[2] + 0.0008)
+    parts = [
+        solid(Box(half), colour(base), (0.0, 0.0, half[2]), roughness=0.7),
+        paint(m.merge(*ovals, lid), PAPER),
+        paint(m.merge(*leaves, badge), srgb(mark) if base != "cream" else colour("green")),
+        paint(m.merge(*bands), srgb(mark)),
+    ]
+    phrases = named(
+        word, "{} tea box", "{} box of tea", "{} carton of tea bags", "tea box in {} cardboard",
+        "{} package of tea", "box of tea with {} sides", "{} tea carton",
+    )  # fmt: skip
+    grasps = box_grasps(half[0], half[1], 0.044)
+    return model("tea_box", parts, "tea box", phrases, grasps, mass=0.06)
+
+
+TISSUES = (
+    ("light blue", "white", "light blue"), ("pink", "white", "pink"), ("green", "yellow", "green"),
+    ("purple", "pink", "purple"),
+)  # fmt: skip
+
+
+def tissue_box(look: int, params: Mapping[str, Any]) -> ObjectModel:
+    """A low carton with a paper tissue sticking out of its slot."""
+    base, mark, word = TISSUES[look]
+    half = (0.042, 0.0295, 0.023)
+    dots = [
+        on_side(m.ellipse(0.0065, 0.0065, 8, 0.2), half, side) for side in SIDES for _ in range(1)
+    ]
+    for side in SIDES:
+        span = (-0.026, 0.026) if round(math.sin(side)) else (-0.017, 0.017)
+        dots += [
+            on_side(m.ellipse(0.005, 0.005, 8), half, side)
+            if u is None
+            else on_side([(a + u, b + v) for a, b in m.ellipse(0.005, 0.005, 8)], half, side)
+            for u in span
+            for v in (-0.011, 0.011)
+        ]
+    slot = m.flat(m.ellipse(0.027, 0.012, 14), 2 * half[2] + 0.0004)
+    parts = [
+        solid(Box(half), colour(base), (0.0, 0.0, half[2]), roughness=0.8),
+        paint(m.merge(*dots), colour(mark)),
+        paint(slot, srgb("#3a3f46")),
+        paint(_tissue(2 * half[2]), srgb("#ffffff"), roughness=0.9),
+    ]
+    phrases = named(
+        word, "{} tissue box", "{} box of tissues", "tissue box in {}",
+        "{} carton of paper tissues",        "{} box with a tissue sticking out", "box of tissues with {} sides", "{} facial tissue box",
+    )  # fmt: skip
+    grasps = box_grasps(half[0], half[1], 0.024)
+    top = (0.0, 0.0, 2 * half[2])
+    return model("tissue_box", parts, "tissue box", phrases, grasps, mass=0.05, support=top)
+
+
+def _tissue(z: float) -> Mesh:
+    """A crumpled paper fan rising out of the slot."""
+    low = [
+        (0.021, 0.004),
+        (0.0, 0.006),
+        (-0.021, 0.004),
+        (-0.02, -0.004),
+        (0.0, -0.006),
+        (0.02, -0.004),
+    ]
+    mid = [
+        (0.016, 0.011),
+        (0.002, 0.005),
+        (-0.018, 0.009),
+        (-0.015, -0.006),
+        (-0.002, -0.01),
+        (0.017, -0.004),
+    ]
+    top = [
+        (0.019, 0.002),
+        (0.001, 0.009),
+        (-0.013, 0.003),
+        (-0.019, -0.002),
+        (0.003, -0.004),
+        (0.009, -0.006),
+    ]
+    rise = [(0.024, 0.02, 0.027, 0.022, 0.017, 0.025)]
+    rings = [[(x, y, z) for x, y in low], [(x, y, z + 0.011) for x, y in mid]]
+    rings.append([(x, y, z + h) for (x, y), h in zip(top, rise[0], strict=True)])
+    return m.loft(rings)
+
+
+CARDS = (("red", "#ffffff", "red"), ("blue", "#ffffff", "blue"), ("black", "#d6a52c", "black"),
+         ("green", "#f6f4ec", "green"))  # fmt: skip
+
+
+def playing_cards(look: int, params: Mapping[str, Any]) -> ObjectModel:
+    """A pack of cards lying flat: a framed panel with a big spade-like suit sign on top."""
+    base, mark, word = CARDS[look]
+    half = (0.0175, 0.0262, 0.0105)
+    top = 2 * half[2]
+    frame = m.flat(m.rounded_rectangle(0.0145, 0.0232, 0.003), top + 0.0003)
+    panel = m.flat(m.rounded_rectangle(0.0128, 0.0215, 0.0025), top + 0.0006)
+    diamond = m.flat([(0.0085, 0.0), (0.0, 0.013), (-0.0085, 0.0), (0.0, -0.013)], top + 0.001)
+    corner = [(0.0025, 0.0), (0.0, 0.0035), (-0.0025, 0.0), (0.0, -0.0035)]
+    small = [m.flat(corner, top + 0.001, at) for at in ((0.009, 0.0165), (-0.009, -0.0165))]
+    edges = [
+        on_side(m.rectangle(w - 0.004, 0.0045), half, side)
+        for side, w in zip(SIDES, (half[0], half[1], half[0], half[1]), strict=True)
+    ]
+    parts = [
+        solid(Box(half), colour(base), (0.0, 0.0, half[2])),
+        paint(m.merge(frame, diamond, *small, *edges), srgb(mark)),
+        paint(panel, colour(base)),
+    ]
+    phrases = named(
+        word, "{} pack of playing cards", "{} card box", "{} deck of cards", "{} playing cards",
+        "boxed deck of cards in {}", "{} box of playing cards", "card pack with a {} back",
+    )  # fmt: skip
+    grasps = box_grasps(half[0], half[1], 0.010, 0.6)
+    return model("playing_cards", parts, "pack of playing cards", phrases, grasps)
+
+
+SOAPS: tuple[tuple[Color, str], ...] = (
+    (srgb("#f3a6bf"), "pink"), (srgb("#9fd6a0"), "green"), (srgb("#f1e7c4"), "cream"),
+    (srgb("#8fc0ea"), "light blue"), (srgb("#f0c257"), "yellow"),
+)  # fmt: skip
+
+
+def soap(look: int, params: Mapping[str, Any]) -> ObjectModel:
+    """A bar of soap with softened edges and a pressed oval on top."""
+    color, word = SOAPS[look]
+    half = (0.0285, 0.0168, 0.0118)
+    dark: Color = (color[0] * 0.72, color[1] * 0.72, color[2] * 0.72)
+    pale: Color = (min(1, color[0] * 1.12), min(1, color[1] * 1.12), min(1, color[2] * 1.12))
+    top = 2 * half[2]
+    parts = [
+        feel(Box((half[0], half[1] - 0.0005, half[2])), (0.0, 0.0, half[2])),
+        paint(m.slab(half[0], half[1], top, 0.008, 0.004, 4), color, roughness=0.35),
+        paint(m.flat(m.ellipse(0.019, 0.0088, 18), top + 0.0003), dark),
+        paint(m.flat(m.ellipse(0.0172, 0.0073, 18), top + 0.0006), pale),
+        paint(m.merge(*_letters(top + 0.0009)), dark),
+    ]
+    phrases = named(
+        word, "{} soap bar", "{} bar of soap", "bar of {} soap", "{} soap", "soap bar in {}",
+        "{} hand soap", "{} block of soap",
+    )  # fmt: skip
+    grasps = box_grasps(half[0], half[1] - 0.0005, 0.011, 0.6)[::-1]
+    return model("soap", parts, "soap", phrases, grasps, mass=0.06)
+
+
+def _letters(z: float) -> list[Mesh]:
+    """Three strokes that read as a stamped word from afar."""
+    strokes = ((-0.009, 0.0022), (-0.003, 0.0022), (0.003, 0.0022), (0.009, 0.0022))
+    return [m.flat(m.rectangle(w, 0.0026, x), z) for x, w in strokes]
+
+
+ASSETS = {
+    "tea_box": Asset(len(TEAS), tea_box),
+    "tissue_box": Asset(len(TISSUES), tissue_box),
+    "playing_cards": Asset(len(CARDS), playing_cards),
+    "soap": Asset(len(SOAPS), soap),
+}

@@ -1,0 +1,238 @@
+"""Putting shapes together into an `ObjectModel`: colours, pieces, bounds and the usual grasps.
+
+Everything here works in the object's body frame (metres, z up, origin at the centre of the
+underside, front towards -y).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from robospa.tasks.geometry import Array, Pose, Quat, Vec3, to_matrix
+from robospa.tasks.shapes import (
+    Box,
+    Color,
+    Cylinder,
+    Geometry,
+    Grasp,
+    Mesh,
+    ObjectModel,
+    Shape,
+    Sphere,
+)
+
+Parts = Sequence[Shape]
+Look = Mapping[str, Any]
+
+UPRIGHT: Quat = (1.0, 0.0, 0.0, 0.0)
+ALONG_X: Quat = (math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0)
+"""Turns a cylinder's axis from z to x."""
+ALONG_Y: Quat = (math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0)
+"""Turns a cylinder's axis from z to -y."""
+
+DOWN: Vec3 = (0.0, 0.0, -1.0)
+MAX_WIDTH = 0.07
+"""Widest object [m] that a grasp is offered for."""
+
+
+@dataclass(frozen=True)
+class Asset:
+    """How one asset is made: the number of its looks, and `build(look, params)`.
+
+    `params` are the allowed names of further parameters.
+    """
+
+    looks: int
+    build: Callable[[int, Mapping[str, Any]], ObjectModel]
+    params: frozenset[str] = frozenset()
+
+
+def srgb(code: str) -> Color:
+    """Linear RGB of a colour written as on a screen, `#rrggbb`."""
+    values = (int(code[i : i + 2], 16) / 255 for i in (1, 3, 5))
+    r, g, b = (c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in values)
+    return (round(r, 4), round(g, 4), round(b, 4))
+
+
+PALETTE: Mapping[str, Color] = {
+    name: srgb(code)
+    for name, code in {
+        "red": "#cf1f27", "green": "#2c9a3f", "blue": "#1f55c4", "yellow": "#f5c816",
+        "orange": "#f07818", "purple": "#7232a8", "pink": "#ee7fae", "white": "#f2f2ee",
+        "black": "#1c1c20", "grey": "#85898f", "silver": "#b9bec4", "brown": "#7a4a26",
+        "teal": "#158f8c", "cream": "#f2e3bd", "gold": "#d6a52c", "light blue": "#7fbde8",
+        "dark green": "#1c5a34", "navy": "#1a2a5c", "beige": "#d9c29a", "tan": "#c79a62",
+    }.items()
+}  # fmt: skip
+"""Colours by the word that an instruction would use."""
+
+STEEL: Color = srgb("#c3c7cc")
+DARK: Color = srgb("#26282c")
+PAPER: Color = srgb("#f6f4ec")
+
+
+def colour(name: str) -> Color:
+    """The palette's colour called `name`."""
+    return PALETTE[name]
+
+
+def paint(
+    geometry: Geometry,
+    color: Color,
+    at: Vec3 = (0.0, 0.0, 0.0),
+    rotation: Quat = UPRIGHT,
+    roughness: float = 0.5,
+    metallic: float = 0.0,
+) -> Shape:
+    """A piece that is seen but not felt."""
+    return Shape(geometry, Pose(at, rotation), color, True, False, roughness, metallic)
+
+
+def feel(geometry: Geometry, at: Vec3 = (0.0, 0.0, 0.0), rotation: Quat = UPRIGHT) -> Shape:
+    """A piece that is felt but not seen."""
+    return Shape(geometry, Pose(at, rotation), visual=False)
+
+
+def solid(
+    geometry: Geometry,
+    color: Color,
+    at: Vec3 = (0.0, 0.0, 0.0),
+    rotation: Quat = UPRIGHT,
+    roughness: float = 0.5,
+    metallic: float = 0.0,
+) -> Shape:
+    """A piece that is seen and felt."""
+    return Shape(geometry, Pose(at, rotation), color, True, True, roughness, metallic)
+
+
+def points_of(shape: Shape) -> Array:
+    """Points [m] (n, 3) in the body frame whose hull contains `shape`, and hardly more."""
+    geometry = shape.geometry
+    if isinstance(geometry, Mesh):
+        local = np.asarray(geometry.vertices, dtype=float)
+    elif isinstance(geometry, Box):
+        signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+        local = signs * np.asarray(geometry.half)
+    elif isinstance(geometry, Cylinder):
+        angles = np.arange(64) * (2 * math.pi / 64)
+        circle = geometry.radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        ends = [np.full((64, 1), s * geometry.half_length) for s in (-1, 1)]
+        local = np.concatenate([np.concatenate([circle, z], axis=1) for z in ends])
+    else:
+        local = _ball(geometry)
+    return local @ to_matrix(shape.pose.rotation).T + np.asarray(shape.pose.position)
+
+
+def _ball(sphere: Sphere) -> Array:
+    rows = []
+    for polar in np.arange(17) * (math.pi / 16):
+        for turn in np.arange(32) * (2 * math.pi / 32):
+            s = math.sin(polar)
+            rows.append([s * math.cos(turn), s * math.sin(turn), math.cos(polar)])
+    return np.asarray(rows) * sphere.radius
+
+
+def _up(value: float, digits: int = 4) -> float:
+    """`value` rounded up, so that a bound stays a bound."""
+    return math.ceil(value * 10**digits - 1e-6) / 10**digits
+
+
+def model(
+    asset: str,
+    parts: Parts,
+    noun: str,
+    phrases: Iterable[str],
+    grasps: Iterable[Grasp] = (),
+    mass: float = 0.05,
+    friction: float = 0.6,
+    press: Vec3 | None = None,
+    support: Vec3 | None = None,
+) -> ObjectModel:
+    """The finished object; its size, radius and bottom are measured from its shapes."""
+    points = np.concatenate([points_of(p) for p in parts])
+    span = points.max(axis=0) - points.min(axis=0)
+    frames = {}
+    if support is None:
+        support = (0.0, 0.0, float(points[:, 2].max()))
+    frames["support"] = Pose(support)
+    frames["press"] = Pose(press if press is not None else support)
+    return ObjectModel(
+        asset=asset,
+        shapes=tuple(parts),
+        size=(_up(float(span[0])), _up(float(span[1])), _up(float(span[2]))),
+        radius=_up(float(np.hypot(points[:, 0], points[:, 1]).max())),
+        noun=noun,
+        phrases=tuple(phrases),
+        bottom=round(float(points[:, 2].min()), 6),
+        mass=mass,
+        friction=friction,
+        grasps=tuple(grasps),
+        frames=frames,
+    )
+
+
+def across(
+    point: Vec3, width: float, angle: float = 0.0, tilt: float = 0.7, approach: Vec3 = DOWN
+) -> Grasp:
+    """A grasp from above whose fingers close along the direction `angle` [rad] about z."""
+    closing = (round(math.cos(angle), 9), round(math.sin(angle), 9), 0.0)
+    return Grasp(point, approach, closing, width, tilt)
+
+
+def box_grasps(hx: float, hy: float, z: float, tilt: float = 0.7) -> tuple[Grasp, ...]:
+    """Grasps of an upright box of half sizes `hx`, `hy` with the fingertips at height `z`."""
+    found = []
+    if 2 * hx <= MAX_WIDTH:
+        found.append(across((0.0, 0.0, z), 2 * hx, 0.0, tilt))
+    if 2 * hy <= MAX_WIDTH:
+        found.append(across((0.0, 0.0, z), 2 * hy, math.pi / 2, tilt))
+    return tuple(found)
+
+
+def round_grasps(
+    width: float, z: float, tilt: float = 0.7, count: int = 4, start: float = 0.0
+) -> tuple[Grasp, ...]:
+    """Grasps of something round, `width` thick at height `z`, closing every pi / `count`."""
+    return tuple(
+        across((0.0, 0.0, z), width, start + math.pi * i / count, tilt) for i in range(count)
+    )
+
+
+def rim_grasps(
+    radius: float, thickness: float, z: float, count: int = 8, start: float = 0.0, tilt: float = 0.5
+) -> tuple[Grasp, ...]:
+    """Grasps astride a round wall whose middle is `radius` from the axis."""
+    found = []
+    for i in range(count):
+        a = start + 2 * math.pi * i / count
+        point = (round(radius * math.cos(a), 6), round(radius * math.sin(a), 6), z)
+        found.append(across(point, thickness, a, tilt))
+    return tuple(found)
+
+
+def wall_ring(
+    inner: float, thickness: float, low: float, high: float, count: int = 8, lean: float = 0.0
+) -> list[Shape]:
+    """Felt walls of something round: `count` boxes around `inner`, leaning out by `lean` [rad]."""
+    pieces = []
+    middle = inner + thickness / 2
+    half_width = (inner + thickness) * math.tan(math.pi / count)
+    for i in range(count):
+        a = 2 * math.pi * i / count
+        turn = (math.cos(a / 2), 0.0, 0.0, math.sin(a / 2))
+        tip = (math.cos(lean / 2), 0.0, math.sin(lean / 2), 0.0)
+        rotation = (Pose((0.0, 0.0, 0.0), turn) * Pose((0.0, 0.0, 0.0), tip)).rotation
+        at = (middle * math.cos(a), middle * math.sin(a), (low + high) / 2)
+        box = Box((thickness / 2, half_width, (high - low) / 2 / math.cos(lean)))
+        pieces.append(feel(box, at, rotation))
+    return pieces
+
+
+def named(adjective: str, *patterns: str) -> tuple[str, ...]:
+    """`patterns` with `{}` replaced by `adjective`."""
+    return tuple(p.format(adjective) for p in patterns)

@@ -1,0 +1,250 @@
+"""Hollow things: `bowl`, `mug`, `bread_basket`, `dustbin` and the `cover` that hides a block."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from robospa.tasks.objects import meshes as m
+from robospa.tasks.objects.build import (
+    STEEL,
+    Asset,
+    across,
+    colour,
+    feel,
+    model,
+    named,
+    paint,
+    rim_grasps,
+    round_grasps,
+    srgb,
+    wall_ring,
+)
+from robospa.tasks.shapes import Box, Color, Cylinder, Mesh, ObjectModel, Shape
+
+BOWLS = (
+    ("blue", "white", "blue"), ("white", "blue", "white"), ("green", "cream", "green"),
+    ("orange", "cream", "orange"), ("brown", "beige", "brown"),
+)  # fmt: skip
+
+
+def bowl(look: int, params: Mapping[str, Any]) -> ObjectModel:
+    """An open bowl on a foot ring, glazed differently inside, with a painted rim."""
+    outside, stripe, word = BOWLS[look]
+    h = 0.046
+    outer = [(0.027, 0.0), (0.027, 0.004), (0.042, 0.012), (0.053, 0.028), (0.0585, h)]
+    inner = [(0.0555, h), (0.0505, 0.029), (0.040, 0.0145), (0.022, 0.008), (0.0, 0.007)]
+    lining = colour("cream") if word != "white" else colour("white")
+    ring = [(0.0548, 0.0325), (0.0571, 0.0395)]
+    parts = [
+        paint(m.lathe(outer, 18), colour(outside), roughness=0.25),
+        paint(m.lathe([outer[-1], inner[0]], 18, False), colour(stripe), roughness=0.25),
+        paint(m.lathe(inner, 18, False), lining, roughness=0.25),
+        paint(m.lathe(ring, 18, False), colour(stripe), roughness=0.25),
+        feel(Cylinder(0.030, 0.0035), (0.0, 0.0, 0.0035)),
+        *wall_ring(0.0428, 0.004, 0.006, h, 12, 0.55),
+    ]
+    phrases = named(
+        word, "{} bowl", "{} soup bowl", "bowl in {}", "round {} bowl", "{} cereal bowl",
+        "bowl that is {} on the outside", "{} ceramic bowl",
+    )  # fmt: skip
+    grasps = rim_grasps(0.0530, 0.0047, 0.037, 12)
+    return model(
+        "bowl", parts, "bowl", phrases, grasps, 0.06, 0.8,
+        support=(0.0, 0.0, 0.007), press=(0.0, 0.0, 0.007),
+    )  # fmt: skip
+
+
+MUGS = (
+    ("red", "white"), ("blue", "white"), ("yellow", "brown"), ("white", "red"), ("green", "cream"),
+    ("black", "orange"),
+)  # fmt: skip
+
+
+def mug(look: int, params: Mapping[str, Any]) -> ObjectModel:
+    """An upright mug, its handle towards +x, with a painted band."""
+    base, mark = MUGS[look]
+    r, h, inside = 0.0297, 0.068, 0.0262
+    outer = [(r - 0.002, 0.0), (r, 0.002), (r, h)]
+    inner = [(r, h), (inside, h), (inside, 0.006), (0.0, 0.006)]
+    arc = [
+        (0.0275 + 0.0235 * math.cos(a), 0.0, 0.035 + 0.021 * math.sin(a))
+        for a in (-1.45, -0.95, -0.45, 0.0, 0.45, 0.95, 1.45)
+    ]
+    glaze = colour("white") if base != "white" else colour("cream")
+    parts = [
+        paint(m.lathe(outer, 18), colour(base), roughness=0.25),
+        paint(m.lathe([(r, h), (inside, h)], 18, False), colour(base), roughness=0.25),
+        paint(m.lathe(inner[1:], 18, False), glaze, roughness=0.25),
+        paint(m.lathe([(r + 0.0004, 0.050), (r + 0.0004, 0.058)], 18, False), colour(mark)),
+        paint(m.tube(arc, 0.0045, 6), colour(base), roughness=0.25),
+        feel(Cylinder(0.0285, 0.003), (0.0, 0.0, 0.003)),
+        *wall_ring(inside, 0.0035, 0.0, h),
+        feel(Box((0.009, 0.004, 0.004)), (0.0385, 0.0, 0.054)),
+        feel(Box((0.0035, 0.004, 0.023)), (0.051, 0.0, 0.035)),
+        feel(Box((0.009, 0.004, 0.004)), (0.0385, 0.0, 0.016)),
+    ]
+    phrases = named(
+        base, "{} mug", "{} coffee mug", "mug in {}", "{} cup with a handle", "{} ceramic mug",
+        "{} tea mug",
+    )  # fmt: skip
+    phrases = (*phrases[:4], f"{base} mug with a {mark} stripe", *phrases[4:])
+    body = [across((0.0, 0.0, 0.040), 2 * r, k * math.pi / 4, 0.8) for k in (2, 1, 3)]
+    rims = rim_grasps((r + inside) / 2, 0.0035, 0.058, 8)
+    return model(
+        "mug", parts, "mug", phrases, [*body, *rims[1:]], 0.06, 0.8,
+        support=(0.0, 0.0, 0.006), press=(0.0, 0.0, 0.006),
+    )  # fmt: skip
+
+
+BASKETS = (
+    ("#8a5526", "#b9803f", "brown", "cream"), ("#c79a5a", "#e0bd84", "tan", "white"),
+    ("#e9e4d8", "#c9c2b2", "white", "light blue"), ("#4a2d18", "#6e4626", "dark brown", "red"),
+    ("#8b8f94", "#b4b8bc", "grey", "yellow"),
+)  # fmt: skip
+
+
+def bread_basket(look: int, params: Mapping[str, Any]) -> ObjectModel:
+    """A low round wicker basket lined with a cloth; wide enough for a whole bread."""
+    dark, pale, word, cloth = BASKETS[look]
+    h, inside, outside = 0.038, 0.0735, 0.0785
+    floor = 0.008
+    rows = 4
+    weave: dict[str, list[Mesh]] = {dark: [], pale: []}
+    step = h / rows
+    for k in range(rows):
+        for i in range(24):
+            a = 2 * math.pi * (i + 0.5) / 24
+            shade = dark if (i + k) % 2 else pale
+            weave[shade].append(m.band(outside, k * step, (k + 1) * step, a, 2 * math.pi / 24, 1))
+    rim = [((inside + outside) / 2 * x, (inside + outside) / 2 * y, h) for x, y in _circle(24)]
+    parts = [
+        paint(m.merge(*weave[dark]), srgb(dark), roughness=0.9),
+        paint(m.merge(*weave[pale]), srgb(pale), roughness=0.9),
+        paint(m.lathe([(inside, h), (inside, floor), (0.0, floor)], 24, False), colour(cloth)),
+        paint(m.tube(rim, 0.0042, 4, True), srgb(pale), roughness=0.9),
+        feel(Cylinder(0.077, floor / 2), (0.0, 0.0, floor / 2)),
+        *wall_ring(inside, 0.005, 0.0, h, 16),
+    ]
+    phrases = named(
+        word, "{} bread basket", "{} basket", "{} wicker basket", "basket for bread in {}",
+        "round {} basket",
+    )  # fmt: skip
+    lining = f"{word} basket lined with {cloth} cloth"
+    phrases = (*phrases[:4], lining, *phrases[4:], f"{word} woven basket")
+    grasps = rim_grasps((inside + outside) / 2, 0.005, 0.026, 16)
+    return model(
+        "bread_basket", parts, "bread basket", phrases, grasps, 0.08, 0.7,
+        support=(0.0, 0.0, floor), press=(0.0, 0.0, floor),
+    )  # fmt: skip
+
+
+def _circle(n: int) -> list[m.Point]:
+    return m.ellipse(1.0, 1.0, n)
+
+
+BINS = (
+    ("#3f7d4e", "#2d5f3a", "green"), ("#5b6670", "#444d55", "grey"), ("#2f5fa8", "#234a85", "blue"),
+)  # fmt: skip
+
+
+def dustbin(look: int, params: Mapping[str, Any]) -> ObjectModel:
+    """An open rectangular bin for the floor; its raised inner floor is 0.21 m above the ground."""
+    shell, dark, word = BINS[look]
+    hx, hy, h, wall, floor = 0.196, 0.296, 0.60, 0.014, 0.21
+    foot = 0.86
+    outer = m.rounded_rectangle(hx, hy, 0.03, 3)
+    rings = [[(x * foot, y * foot, 0.0) for x, y in outer], [(x, y, h - 0.03) for x, y in outer]]
+    inner = m.rounded_rectangle(hx - wall, hy - wall, 0.02, 3)
+    lip = [[(x, y, h) for x, y in outer], [(x, y, h) for x, y in inner]]
+    well = [[(x, y, h) for x, y in inner], [(x, y, floor) for x, y in inner]]
+    band = [[(x, y, h - 0.05) for x, y in outer], [(x, y, h) for x, y in outer]]
+    parts = [
+        paint(m.loft(rings, False), srgb(shell), roughness=0.6),
+        paint(m.loft(band, False), srgb(dark), roughness=0.6),
+        paint(m.loft(lip, False), srgb(dark), roughness=0.6),
+        paint(m.loft(well, False), srgb(shell), roughness=0.7),
+        paint(m.flat(inner, floor), srgb(dark), roughness=0.8),
+        paint(_recycling(hx, h), colour("white")),
+        feel(Box((hx * foot, hy * foot, floor / 2)), (0.0, 0.0, floor / 2)),
+    ]
+    for sign in (-1.0, 1.0):
+        half = (h - floor) / 2
+        at_x = (sign * (hx - wall / 2), 0.0, floor + half)
+        at_y = (0.0, sign * (hy - wall / 2), floor + half)
+        parts.append(feel(Box((wall / 2, hy, half)), at_x))
+        parts.append(feel(Box((hx, wall / 2, half)), at_y))
+    parts.append(feel(Box((hx - wall, hy - wall, 0.02)), (0.0, 0.0, floor - 0.02)))
+    phrases = named(
+        word, "{} dustbin", "{} trash bin", "{} waste bin", "dustbin in {}", "open {} bin",
+        "{} rubbish bin", "{} garbage bin",
+    )  # fmt: skip
+    return model(
+        "dustbin", parts, "dustbin", phrases, (), 2.0,
+        support=(0.0, 0.0, floor), press=(0.0, 0.0, floor),
+    )  # fmt: skip
+
+
+def _recycling(hx: float, h: float) -> Mesh:
+    """Three bent arrows on both long walls, leaning as the walls do."""
+    arrow = [(-0.034, 0.052), (0.012, 0.052), (0.012, 0.038), (0.042, 0.066), (0.012, 0.094),
+             (0.012, 0.080), (-0.034, 0.080)]  # fmt: skip
+    pieces = []
+    for side in (-1, 1):
+        for k in range(3):
+            a = 2 * math.pi * k / 3
+            turned = [
+                (u * math.cos(a) + v * math.sin(a), v * math.cos(a) - u * math.sin(a))
+                for u, v in arrow
+            ]
+            part = m.upright(turned, (side * hx, 0.0, 0.40), 0.0 if side > 0 else math.pi)
+            lean = 0.14 * hx / (h - 0.03)
+            shifted = [
+                (x - side * (lean * (h - 0.03 - z) - 0.002), y, z) for x, y, z in part.vertices
+            ]
+            pieces.append(m.mesh(shifted, part.faces))
+    return m.merge(*pieces)
+
+
+COVERS: tuple[tuple[Color, Color, str, float], ...] = (
+    (srgb("#d9d2c4"), srgb("#6b4a2c"), "cream", 0.0), (STEEL, srgb("#2a2c30"), "silver", 0.4),
+    (srgb("#9a6a3c"), srgb("#5a3a1e"), "brown", 0.0),
+)  # fmt: skip
+COVER_INNER_RADIUS = 0.0312
+COVER_INNER_HEIGHT = 0.047
+
+
+def cover(look: int, params: Mapping[str, Any]) -> ObjectModel:
+    """An opaque domed cup turned upside down, a knob on top; a 4 cm cube fits under it."""
+    shell, trim, word, metallic = COVERS[look]
+    r, hollow, top = COVER_INNER_RADIUS, COVER_INNER_HEIGHT, 0.052
+    outer = [(r + 0.0033, 0.0), (r + 0.0033, 0.036), (r - 0.001, 0.0465), (0.022, top), (0.0, top)]
+    inner = [(0.0, hollow), (r - 0.0062, hollow), (r, 0.042), (r, 0.0), (r + 0.0033, 0.0)]
+    knob = [(0.006, top - 0.001), (0.006, top + 0.004), (0.0112, top + 0.009)]
+    knob += [(0.0112, top + 0.019), (0.0085, top + 0.024), (0.0, top + 0.025)]
+    ring = [(r + 0.0037, 0.004), (r + 0.0037, 0.010)]
+    parts: list[Shape] = [
+        paint(m.lathe(outer, 18, False), shell, roughness=0.35, metallic=metallic),
+        paint(m.lathe(inner, 18, False), trim, roughness=0.8),
+        paint(m.lathe(knob, 14, False), trim, roughness=0.4),
+        paint(m.lathe(ring, 18, False), trim, roughness=0.5),
+        feel(Cylinder(0.0285, (top - hollow) / 2), (0.0, 0.0, (top + hollow) / 2)),
+        feel(Cylinder(0.0112, 0.0125), (0.0, 0.0, top + 0.0125)),
+        *wall_ring(r, 0.0033, 0.0, hollow, 12),
+    ]
+    phrases = named(
+        word, "{} cover", "{} lid", "{} dome", "cover in {}", "{} cup turned upside down",
+        "{} cover with a knob", "{} domed lid",
+    )  # fmt: skip
+    grasps = round_grasps(0.0224, top + 0.014, 0.7, 8)
+    return model("cover", parts, "cover", phrases, grasps, 0.05, 0.8)
+
+
+ASSETS = {
+    "bowl": Asset(len(BOWLS), bowl),
+    "mug": Asset(len(MUGS), mug),
+    "bread_basket": Asset(len(BASKETS), bread_basket),
+    "dustbin": Asset(len(BINS), dustbin),
+    "cover": Asset(len(COVERS), cover),
+}

@@ -1,0 +1,295 @@
+"""Things of a desk: `stapler`, `seal` (a stamp), `mouse` (of a computer), `bell` and `fan`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from robospa.tasks.geometry import axis_rotation
+from robospa.tasks.objects import meshes as m
+from robospa.tasks.objects.build import (
+    ALONG_X,
+    ALONG_Y,
+    DARK,
+    STEEL,
+    Asset,
+    across,
+    colour,
+    feel,
+    model,
+    named,
+    paint,
+    round_grasps,
+    srgb,
+)
+from robospa.tasks.shapes import Box, Cylinder, Mesh, ObjectModel, Shape
+
+STAPLERS = (
+    ("red", "black"), ("blue", "black"), ("black", "grey"), ("green", "white"),
+    ("yellow", "black"), ("white", "navy"), ("purple", "silver"),
+)  # fmt: skip
+
+
+def stapler(look: int, params: Mapping[str, Any]) -> ObjectModel:
+    """A desk stapler along y, its pressing head towards -y."""
+    top, base = STAPLERS[look]
+    w = 0.0118
+    arm = [(-0.0405, 0.0225), (-0.034, 0.0195), (0.030, 0.0140), (0.0405, 0.0140)]
+    arm += [(0.0405, 0.0250), (0.033, 0.0335), (0.004, 0.0385), (-0.030, 0.0385), (-0.0405, 0.0330)]
+    rail = [
+        (-0.0385, 0.0155),
+        (0.030, 0.0095),
+        (0.030, 0.0145),
+        (-0.0345, 0.0200),
+        (-0.0385, 0.0200),
+    ]
+    ridges = [
+        m.moved(
+            m.prism(m.rectangle(0.0072, 0.0011), 0.0, 0.0009), (0.0, -0.036 + 0.0042 * i, 0.0384)
+        )
+        for i in range(4)
+    ]
+    stripe = m.flat(m.rectangle(0.0016, 0.0135, 0.0, -0.006), 0.0390)
+    parts = [
+        feel(Box((w, 0.0412, 0.0035)), (0.0, 0.0, 0.0035)),
+        feel(m.side_prism(arm, w)),
+        feel(Box((w, 0.006, 0.008)), (0.0, 0.033, 0.013)),
+        paint(m.slab(0.0124, 0.0415, 0.0075, 0.005, 0.0015), colour(base), roughness=0.5),
+        paint(m.side_prism(rail, 0.0078), STEEL, roughness=0.3, metallic=0.5),
+        paint(_rounded_arm(arm, w), colour(top), roughness=0.3),
+        paint(m.merge(*ridges, stripe), colour(base) if base != "black" else srgb("#3a3c42")),
+        paint(m.prism(m.rectangle(0.0062, 0.0045, 0.0, -0.034), 0.0074, 0.0084), STEEL),
+        paint(Cylinder(0.0048, 0.0128), STEEL, (0.0, 0.0345, 0.0165), ALONG_X, 0.3, 0.4),
+    ]
+    phrases = named(
+        top, "{} stapler", "stapler with a {} top", "{} desk stapler", "stapler in {}",
+        "{} paper stapler", "{} office stapler", "small {} stapler",
+    )  # fmt: skip
+    grasps = (across((0.0, 0.0, 0.020), 2 * w), across((0.0, 0.012, 0.020), 2 * w))
+    return model(
+        "stapler", parts, "stapler", phrases, grasps, 0.07, 0.7,
+        press=(0.0, -0.026, 0.0385), support=(0.0, -0.010, 0.0385),
+    )  # fmt: skip
+
+
+def _rounded_arm(profile: m.Polygon, half: float) -> Mesh:
+    """The arm with its long upper edges cut: a narrower copy on top of the full one."""
+    lower = [(y, min(z, 0.0345 if y < 0.01 else z)) for y, z in profile]
+    return m.merge(m.side_prism(lower, half), m.side_prism(profile, half - 0.0028))
+
+
+SEALS = (
+    ("#8a4f24", "#c8202a", "brown", "round", "red"),
+    ("#1d1e22", "#1f55c4", "black", "round", "blue"),
+    ("#c8202a", "#26282c", "red", "square", "black"),
+    ("#e0b878", "#2c9a3f", "tan", "square", "green"),
+    ("#1f55c4", "#f2f2ee", "blue", "round", "white"),
+    ("#2c9a3f", "#26282c", "green", "square", "black"),
+)  # fmt: skip
+
+
+def seal(look: int, params: Mapping[str, Any]) -> ObjectModel:
+    """A hand stamp: a foot with a coloured edge, a thin neck and a round knob."""
+    wood, edge, word, form, ink = SEALS[look]
+    r, h = 0.0235, 0.064
+    handle = [(0.0165, 0.015), (0.0095, 0.021), (0.0085, 0.030), (0.0125, 0.037), (0.0152, 0.046)]
+    handle += [(0.0138, 0.056), (0.0085, 0.0625), (0.0, h)]
+    if form == "round":
+        foot = m.lathe([(r, 0.0), (r, 0.006)], 18)
+        block = m.lathe([(r - 0.001, 0.006), (r - 0.001, 0.0135), (r - 0.004, 0.0155)], 18)
+        under: Shape = feel(Cylinder(r, 0.0077), (0.0, 0.0, 0.0077))
+    else:
+        foot = m.slab(r - 0.002, r - 0.002, 0.006, 0.002, 0.0, 2)
+        block = m.moved(m.slab(r - 0.003, r - 0.003, 0.0095, 0.003, 0.002, 2), (0.0, 0.0, 0.006))
+        under = feel(Box((r - 0.002, r - 0.002, 0.0077)), (0.0, 0.0, 0.0077))
+    band = m.lathe([(0.0098, 0.0295), (0.0098, 0.033)], 12, False)
+    parts = [
+        under,
+        feel(Cylinder(0.0085, 0.011), (0.0, 0.0, 0.026)),
+        feel(m.lathe([(0.0125, 0.037), (0.0150, 0.043), (0.0150, 0.049), (0.0085, h)], 12)),
+        paint(foot, srgb(edge), roughness=0.9),
+        paint(block, srgb(wood), roughness=0.4),
+        paint(m.lathe(handle, 14), srgb(wood), roughness=0.3),
+        paint(band, colour("gold"), roughness=0.3, metallic=0.4),
+    ]
+    phrases = named(
+        word, "{} stamp", "{} hand stamp", "{} seal", "stamp with a {} handle", "{} stamper",
+        "{} rubber stamp",
+    )  # fmt: skip
+    phrases = (*phrases, f"{word} stamp with a {ink} base")
+    grasps = round_grasps(0.030, 0.046, 0.7)
+    return model("seal", parts, "seal", phrases, grasps, mass=0.05)
+
+
+MICE = (
+    ("#f0f0ec", "#b7bcc2", "white"), ("#26282c", "#4a4d54", "black"), ("#c3202a", "#26282c", "red"),
+    ("#2257bd", "#d5d9de", "blue"), ("#8c9197", "#26282c", "grey"),
+)  # fmt: skip
+
+
+def mouse(look: int, params: Mapping[str, Any]) -> ObjectModel:
+    """A wireless computer mouse, its buttons towards +y (away from the hand's heel)."""
+    shell, detail, word = MICE[look]
+    levels = ((0.0185, 0.0345, 0.0), (0.0205, 0.0375, 0.004), (0.0200, 0.0365, 0.011))
+    levels += ((0.0180, 0.0330, 0.018), (0.0135, 0.0255, 0.0235), (0.0075, 0.0150, 0.026))
+    body = m.pillow(levels, 16, 0.85)
+    belt = m.pillow([(0.0207, 0.0377, 0.0045), (0.0203, 0.0370, 0.0085)], 16, 0.85)
+    parts = [
+        feel(m.pillow(levels[:5], 14, 0.85)),
+        paint(body, srgb(shell), roughness=0.35),
+        paint(belt, srgb(detail), roughness=0.5),
+        paint(m.merge(*_seams(levels)), srgb(detail)),
+        paint(Cylinder(0.0052, 0.0024), DARK, (0.0, 0.020, 0.0215), ALONG_X),
+    ]
+    phrases = named(
+        word, "{} computer mouse", "{} mouse", "mouse in {}", "{} wireless mouse",
+        "computer mouse with a {} shell", "{} PC mouse",
+    )  # fmt: skip
+    grasps = (
+        across((0.0, 0.0, 0.010), 0.0405, 0.0, 0.6),
+        across((0.0, -0.006, 0.010), 0.040, 0.0, 0.6),
+    )
+    return model("mouse", parts, "computer mouse", phrases, grasps, mass=0.06, friction=0.8)
+
+
+def _seams(levels: tuple[tuple[float, float, float], ...]) -> list[Mesh]:
+    """The line between the two buttons and the one behind them, laid on the back."""
+
+    def height(x: float, y: float) -> float:
+        inside = [
+            (max(abs(x) / rx, abs(y) / ry, math.hypot(x / rx, y / ry) * 0.97), z)
+            for rx, ry, z in levels
+        ]
+        fits = [(s, z) for s, z in inside if s <= 1]
+        if len(fits) == len(levels):
+            return levels[-1][2]
+        s1, z1 = max(fits, key=lambda p: p[1])
+        s2, z2 = min((p for p in inside if p[1] > z1), key=lambda p: p[1])
+        return z1 + (z2 - z1) * (1 - s1) / (s2 - s1)
+
+    strips = []
+    long = [(0.0, -0.001 + 0.0045 * i) for i in range(8)]
+    wide = [(-0.017 + 0.034 * i / 8, -0.001) for i in range(9)]
+    for line, dx, dy in ((long, 0.0007, 0.0), (wide, 0.0, 0.0007)):
+        points = []
+        for x, y in line:
+            z = height(x, y) + 0.0006
+            points += [(x - dx, y + dy, z), (x + dx, y - dy, z)]
+        faces = []
+        for i in range(0, len(points) - 2, 2):
+            faces += [(i, i + 1, i + 3), (i, i + 3, i + 2)]
+        strips.append(m.mesh(points, faces))
+    return strips
+
+
+BELLS = (
+    ("#cfd3d8", "#1c1c20", "silver", "black", 0.55), ("#d9a62a", "#5a3216", "gold", "brown", 0.45),
+    ("#c8202a", "#1c1c20", "red", "black", 0.0), ("#2257bd", "#d5d9de", "blue", "silver", 0.0),
+)  # fmt: skip
+
+
+def bell(look: int, params: Mapping[str, Any]) -> ObjectModel:
+    """A call bell: a round dome over a dark foot, with the button on top."""
+    dome, foot, word, low, metallic = BELLS[look]
+    r, h = 0.0300, 0.046
+    shell = [(r - 0.0005, 0.0085), (r - 0.0005, 0.0115), (r - 0.0025, 0.0195), (r - 0.0075, 0.0275)]
+    shell += [(r - 0.0150, 0.0335), (r - 0.0245, 0.0365)]
+    parts = [
+        feel(m.lathe([(r, 0.0), (r, 0.0125), *shell[2:]], 16)),
+        feel(Cylinder(0.0065, 0.005), (0.0, 0.0, 0.041)),
+        paint(m.lathe([(r, 0.0), (r, 0.006), (r - 0.003, 0.0085)], 18), srgb(foot), roughness=0.5),
+        paint(m.lathe(shell, 18), srgb(dome), roughness=0.25, metallic=metallic),
+        paint(m.lathe([(0.0038, 0.036), (0.0038, 0.041)], 10), STEEL, roughness=0.3),
+        paint(m.lathe([(0.0065, 0.040), (0.0068, 0.043), (0.004, h), (0.0, h)], 12), srgb(foot)),
+    ]
+    phrases = named(
+        word, "{} bell", "{} call bell", "{} desk bell", "bell with a {} dome", "{} service bell",
+        "{} reception bell",
+    )  # fmt: skip
+    phrases = (*phrases, f"{word} bell on a {low} base")
+    grasps = round_grasps(2 * r, 0.011, 0.6)
+    return model("bell", parts, "bell", phrases, grasps, 0.07, press=(0.0, 0.0, h))
+
+
+FANS = (
+    ("white", "light blue"), ("pink", "white"), ("black", "red"), ("teal", "yellow"),
+)  # fmt: skip
+
+
+def fan(look: int, params: Mapping[str, Any]) -> ObjectModel:
+    """A small desk fan blowing towards -y: round foot, stem, ringed blades."""
+    frame, blade = FANS[look]
+    r, z, deep = 0.0325, 0.068, 0.0125
+    foot = [(0.034, 0.0), (0.034, 0.004), (0.029, 0.010), (0.012, 0.0135)]
+    ring = [(r - 0.0035, -deep), (r, -deep + 0.002), (r, deep - 0.002), (r - 0.0035, deep)]
+    hoop = m.lathe([*ring, ring[0]], 20, False)
+    back = m.moved(m.lathe([(r - 0.003, 0.002), (r - 0.003, 0.004)], 20), (0.0, 0.0, 0.0))
+    spokes = [
+        m.box_mesh(
+            (0.0130, 0.0006, 0.0006),
+            (0.018 * math.cos(a), 0.018 * math.sin(a), deep - 0.001),
+            axis_rotation((0.0, 0.0, 1.0), a),
+        )
+        for a in (2 * math.pi * i / 10 for i in range(10))
+    ]
+    guard = m.tube(
+        [(0.0185 * x, 0.0185 * y, deep - 0.001) for x, y in m.ellipse(1, 1, 14)], 0.0007, 3, True
+    )
+    at = (0.0, 0.0, z)
+    rim = srgb("#c6cbd1") if frame != "black" else srgb("#70757c")
+    parts = [
+        feel(Cylinder(0.034, 0.006), (0.0, 0.0, 0.006)),
+        feel(Cylinder(0.008, 0.012), (0.0, 0.0, 0.024)),
+        feel(Cylinder(r, deep), at, ALONG_Y),
+        paint(m.lathe(foot, 18), colour(frame), roughness=0.35),
+        paint(m.lathe([(0.007, 0.012), (0.006, 0.037)], 10), colour(frame), roughness=0.35),
+        paint(hoop, colour(frame), at, ALONG_Y, 0.35),
+        paint(back, srgb("#3a3f47"), (0.0, 0.009, z), ALONG_Y, 0.8),
+        paint(_blades(), colour(blade), (0.0, 0.0, z), ALONG_Y, 0.4),
+        paint(m.merge(*spokes, guard), rim, at, ALONG_Y, 0.3),
+        paint(
+            m.lathe([(0.0068, 0.0), (0.0068, deep), (0.004, deep + 0.001)], 12),
+            colour(frame),
+            at,
+            ALONG_Y,
+        ),
+        paint(m.lathe([(0.004, 0.0), (0.004, 0.002)], 8), colour("red"), (0.0, -0.025, 0.0108)),
+    ]
+    phrases = named(
+        frame, "{} fan", "small {} fan", "{} desk fan", "fan with a {} frame", "{} electric fan",
+        "{} table fan",
+    )  # fmt: skip
+    phrases = (*phrases, f"{frame} fan with {blade} blades")
+    grasps = (
+        across((0.0, 0.0, z + 0.012), 2 * deep, math.pi / 2, 0.8),
+        across((0.0, 0.0, z), 2 * r, 0.0, 0.5),
+    )
+    return model("fan", parts, "fan", phrases, grasps, mass=0.06)
+
+
+def _blades() -> Mesh:
+    """Four twisted blades around z."""
+    parts = []
+    petal = [
+        (0.004, -0.004),
+        (0.022, -0.012),
+        (0.0275, -0.004),
+        (0.0265, 0.006),
+        (0.016, 0.009),
+        (0.004, 0.004),
+    ]
+    for i in range(4):
+        turn = axis_rotation((0.0, 0.0, 1.0), math.pi / 2 * i + 0.3)
+        twist = m.moved(m.prism(petal, 0.0, 0.0012), rotation=axis_rotation((1.0, 0.0, 0.0), 0.35))
+        parts.append(m.moved(twist, (0.0, 0.0, 0.002), turn))
+    return m.merge(*parts)
+
+
+ASSETS = {
+    "stapler": Asset(len(STAPLERS), stapler),
+    "seal": Asset(len(SEALS), seal),
+    "mouse": Asset(len(MICE), mouse),
+    "bell": Asset(len(BELLS), bell),
+    "fan": Asset(len(FANS), fan),
+}

@@ -1,0 +1,301 @@
+"""Small devices and a toy: `phone`, `remote_control`, `alarm_clock` and `toycar`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from robospa.tasks.geometry import axis_rotation
+from robospa.tasks.objects import meshes as m
+from robospa.tasks.objects.build import (
+    ALONG_X,
+    ALONG_Y,
+    DARK,
+    PAPER,
+    STEEL,
+    Asset,
+    across,
+    colour,
+    feel,
+    model,
+    named,
+    paint,
+    srgb,
+)
+from robospa.tasks.shapes import Box, Cylinder, Mesh, ObjectModel, Shape
+
+PHONES = (
+    ("black", "#1f4f9c"), ("white", "#3aa6a0"), ("red", "#2b2e63"), ("gold", "#7a3d8f"),
+    ("blue", "#d8703a"),
+)  # fmt: skip
+ICONS = ("#5ad35a", "#f6c12d", "#f05a4e", "#ffffff")
+
+
+def phone(look: int, params: Mapping[str, Any]) -> ObjectModel:
+    """A phone lying on its back, screen up, with rows of coloured icons."""
+    body, wall = PHONES[look]
+    hx, hy, h = 0.0235, 0.0445, 0.0100
+    icons: list[list[Mesh]] = [[] for _ in ICONS]
+    square = m.rounded_rectangle(0.0033, 0.0033, 0.0009, 2)
+    for row in range(4):
+        for column in range(4):
+            at = (-0.0141 + 0.0094 * column, 0.026 - 0.0115 * row)
+            icons[(row * 3 + column + look) % 4].append(m.flat(square, h + 0.0011, at))
+    dock = m.flat(m.rounded_rectangle(0.0175, 0.0055, 0.002, 2), h + 0.0009, (0.0, -0.031))
+    side = [
+        m.upright(m.rectangle(s, 0.0013), (hx + 0.0004, y, h / 2), 0.0)
+        for s, y in ((0.005, 0.018), (0.0085, 0.001))
+    ]
+    parts = [
+        feel(Box((hx, hy, h / 2)), (0.0, 0.0, h / 2)),
+        paint(m.slab(hx, hy, h, 0.006, 0.0015), colour(body), roughness=0.3),
+        paint(
+            m.flat(m.rounded_rectangle(hx - 0.0018, hy - 0.0018, 0.0045), h + 0.0003),
+            srgb("#0c0d10"),
+        ),
+        paint(
+            m.flat(m.rounded_rectangle(hx - 0.0035, hy - 0.0040, 0.003), h + 0.0006),
+            srgb(wall),
+            roughness=0.2,
+        ),
+        paint(dock, srgb("#dfe5ee")),
+        *(paint(m.merge(*p), srgb(c)) for p, c in zip(icons, ICONS, strict=True)),
+        paint(m.merge(*side), DARK),
+    ]
+    phrases = named(
+        body, "{} phone", "{} mobile phone", "{} smartphone", "phone in a {} case", "{} cell phone",
+        "phone with a {} frame", "{} touchscreen phone",
+    )  # fmt: skip
+    grasps = (
+        across((0.0, 0.0, 0.006), 2 * hx, 0.0, 0.5),
+        across((0.0, -0.015, 0.006), 2 * hx, 0.0, 0.5),
+    )
+    return model("phone", parts, "phone", phrases, grasps, mass=0.06, friction=0.8)
+
+
+REMOTES = (
+    ("black", "#d5d9de", "#cf2a24"), ("white", "#5a5f66", "#cf2a24"),
+    ("grey", "#f2f2ee", "#cf2a24"),
+    ("blue", "#f2f2ee", "#f5c816"), ("red", "#f2f2ee", "#1c1c20"), ("green", "#f2f2ee", "#cf2a24"),
+    ("yellow", "#26282c", "#cf2a24"),
+)  # fmt: skip
+
+
+def remote_control(look: int, params: Mapping[str, Any]) -> ObjectModel:
+    """A remote control lying on its back, its power button towards +y."""
+    body, keys, power = REMOTES[look]
+    hx, hy, h = 0.0155, 0.0385, 0.0145
+    buttons = []
+    key = m.rounded_rectangle(0.0030, 0.0020, 0.0008, 2)
+    for row in range(4):
+        for column in range(3):
+            buttons.append(_key(key, h, (0.0084 * (column - 1), -0.031 + 0.0068 * row)))
+    ring_out, ring_in = m.ellipse(0.0105, 0.0105, 16), m.ellipse(0.0042, 0.0042, 10)
+    pad = m.moved(m.prism(ring_out, 0.0, 0.0010), (0.0, 0.0085, h - 0.0002))
+    bars = [_key(m.rectangle(0.0016, 0.0042), h, (s * 0.009, 0.0255)) for s in (-1, 1)]
+    shade = srgb("#3a3d44") if body == "black" else DARK
+    parts = [
+        feel(Box((hx, hy, h / 2)), (0.0, 0.0, h / 2)),
+        paint(m.slab(hx, hy, h, 0.006, 0.0025), colour(body), roughness=0.45),
+        paint(m.merge(*buttons, *bars), srgb(keys), roughness=0.6),
+        paint(pad, srgb(keys) if look % 2 else shade, roughness=0.5),
+        paint(m.flat(ring_in, h + 0.0012, (0.0, 0.0085)), shade if look % 2 else srgb(keys)),
+        paint(_key(m.ellipse(0.0036, 0.0036, 10), h, (0.0, 0.0310)), srgb(power)),
+        paint(
+            m.upright(m.rectangle(0.0075, 0.0035), (0.0, hy + 0.0003, h / 2), math.pi / 2),
+            srgb("#400c14"),
+        ),
+    ]
+    phrases = named(
+        body, "{} remote control", "{} remote", "{} TV remote", "remote control in {}",
+        "{} television remote", "{} remote with buttons", "{} TV control",
+    )  # fmt: skip
+    grasps = (
+        across((0.0, 0.0, 0.008), 2 * hx, 0.0, 0.6),
+        across((0.0, 0.014, 0.008), 2 * hx, 0.0, 0.6),
+    )
+    return model("remote_control", parts, "remote control", phrases, grasps, mass=0.05)
+
+
+def _key(outline: m.Polygon, h: float, at: m.Point) -> Mesh:
+    return m.moved(m.prism(outline, -0.0002, 0.0011, 0.9), (at[0], at[1], h))
+
+
+CLOCKS = (
+    ("red", "gold"), ("blue", "silver"), ("green", "gold"),
+    ("black", "silver"), ("yellow", "black"),
+)  # fmt: skip
+
+
+def alarm_clock(look: int, params: Mapping[str, Any]) -> ObjectModel:
+    """A twin-bell alarm clock facing -y, showing ten past ten."""
+    body, metal = CLOCKS[look]
+    r, z, deep = 0.0310, 0.0385, 0.0150
+    at = (0.0, 0.0, z)
+    drum = [(r - 0.002, -deep), (r, -deep + 0.002), (r, deep - 0.0005), (r - 0.0025, deep)]
+    dial = m.lathe([(r - 0.0035, deep - 0.0002), (r - 0.0035, deep + 0.0003)], 20)
+    ticks = []
+    for i in range(12):
+        a = math.pi / 6 * i
+        long = 0.0035 if i % 3 == 0 else 0.0020
+        bar = m.rectangle(long, 0.0013 if i % 3 == 0 else 0.0009, r - 0.0095 + 0.0035 - long)
+        turned = [
+            (u * math.cos(a) - v * math.sin(a), u * math.sin(a) + v * math.cos(a)) for u, v in bar
+        ]
+        ticks.append(m.flat(turned, deep + 0.0006))
+    hands = [_hand(0.0115, 0.0020, math.radians(150)), _hand(0.0175, 0.0014, math.radians(30))]
+    domes = []
+    for s in (-1, 1):
+        cap = m.lathe([(0.0125, 0.0), (0.0112, 0.0055), (0.0060, 0.0095), (0.0, 0.0105)], 12)
+        tip = axis_rotation((0.0, 1.0, 0.0), s * 0.55)
+        domes.append(m.moved(cap, (s * 0.0180, 0.0, z + r - 0.0045), tip))
+    legs = [
+        m.tube([(s * 0.016, y, z - r + 0.010), (s * 0.0225, y, 0.0018)], 0.0030, 6)
+        for s in (-1, 1)
+        for y in (-0.008, 0.008)
+    ]
+    handle = m.tube(
+        [
+            (-0.007, 0.0, z + r - 0.001),
+            (-0.0045, 0.0, z + r + 0.011),
+            (0.0045, 0.0, z + r + 0.011),
+            (0.007, 0.0, z + r - 0.001),
+        ],
+        0.0016,
+        5,
+    )
+    trim = colour(metal)
+    parts: list[Shape] = [
+        feel(Cylinder(r, deep), at, ALONG_Y),
+        feel(Box((0.025, 0.012, 0.011)), (0.0, 0.0, 0.011)),
+        feel(Box((0.024, 0.010, 0.007)), (0.0, 0.0, z + r)),
+        paint(m.lathe(drum, 22), colour(body), at, ALONG_Y, 0.35),
+        paint(dial, PAPER, at, ALONG_Y),
+        paint(m.merge(*ticks, *hands), DARK, at, ALONG_Y),
+        paint(
+            m.merge(*domes, handle), trim, roughness=0.3, metallic=0.4 if metal != "black" else 0.0
+        ),
+        paint(_grounded(m.merge(*legs)), trim, roughness=0.4),
+    ]
+    phrases = named(
+        body, "{} alarm clock", "{} clock", "alarm clock in {}", "{} twin-bell alarm clock",
+        "round {} alarm clock", "{} clock with two bells",
+    )  # fmt: skip
+    phrases = (*phrases, f"{body} alarm clock with {metal} bells")
+    grasps = (
+        across((0.0, 0.0, z + 0.006), 2 * deep, math.pi / 2, 0.7),
+        across((0.0, 0.0, z), 2 * r, 0.0, 0.5),
+    )
+    return model("alarm_clock", parts, "alarm clock", phrases, grasps, 0.07)
+
+
+def _grounded(part: Mesh) -> Mesh:
+    """`part` cut off at z = 0."""
+    return m.mesh([(x, y, max(0.0, z)) for x, y, z in part.vertices], part.faces)
+
+
+def _hand(length: float, half: float, angle: float) -> Mesh:
+    bar = [(-0.003, -half / 2), (length, -half / 3), (length, half / 3), (-0.003, half / 2)]
+    c, s = math.cos(angle), math.sin(angle)
+    return m.flat([(u * c - v * s, u * s + v * c) for u, v in bar], 0.0150 + 0.0009)
+
+
+CARS = (
+    ("red", "white"), ("blue", "white"), ("yellow", "black"), ("green", "white"),
+    ("white", "red"), ("orange", "black"), ("purple", "yellow"),
+)  # fmt: skip
+
+
+def toycar(look: int, params: Mapping[str, Any]) -> ObjectModel:
+    """A toy car, its bonnet towards -y."""
+    body, stripe = CARS[look]
+    w = 0.0165
+    low = [(-0.0365, 0.0075), (0.0365, 0.0075), (0.0365, 0.0185), (0.031, 0.0215), (-0.012, 0.0220)]
+    low += [(-0.032, 0.0190), (-0.0365, 0.0150)]
+    glass = _cabin(0.0216, 0.0328)
+    roof = m.loft([
+        [(x, y + 0.0075, 0.0326) for x, y in m.rounded_rectangle(0.0124, 0.0128, 0.004, 2)],
+        [(x, y + 0.0075, 0.0350) for x, y in m.rounded_rectangle(0.0108, 0.0112, 0.004, 2)],
+    ])  # fmt: skip
+    bands = [
+        m.flat(m.rectangle(0.0040, 0.0098, 0.0, 0.0075), 0.0354),
+        m.mesh(
+            [
+                (-0.004, -0.0315, 0.0194),
+                (0.004, -0.0315, 0.0194),
+                (0.004, -0.0125, 0.0224),
+                (-0.004, -0.0125, 0.0224),
+            ],
+            [(0, 1, 2), (0, 2, 3)],
+        ),
+        m.flat(m.rectangle(0.0040, 0.0038, 0.0, 0.0270), 0.0219),
+    ]
+    posts = [
+        m.box_mesh(
+            (0.0013, 0.0022, 0.0056),
+            (s * 0.0138, 0.0085, 0.0272),
+            axis_rotation((0.0, 1.0, 0.0), -s * 0.19),
+        )
+        for s in (-1, 1)
+    ]
+    lamps = [
+        m.upright(m.ellipse(0.0030, 0.0022, 8), (s * 0.0115, -0.0369, 0.0120)) for s in (-1, 1)
+    ]
+    tails = [
+        m.upright(m.rectangle(0.0028, 0.0017), (s * 0.0120, 0.0369, 0.0150), math.pi / 2)
+        for s in (-1, 1)
+    ]
+    bumper = [m.box_mesh((0.0160, 0.0011, 0.0018), (0.0, s * 0.0366, 0.0085)) for s in (-1, 1)]
+    wheels = [(s * 0.0150, y) for s in (-1, 1) for y in (-0.0225, 0.0225)]
+    tyre, hub = (
+        m.lathe([(0.0084, -0.0035), (0.0088, -0.002), (0.0088, 0.002), (0.0084, 0.0035)], 12),
+        m.lathe([(0.0046, -0.0039), (0.0046, 0.0039)], 8),
+    )
+    parts: list[Shape] = [
+        feel(Box((0.0183, 0.0360, 0.0105)), (0.0, 0.0, 0.0105)),
+        feel(_cabin(0.0210, 0.0350)),
+        paint(m.side_prism(low, w), colour(body), roughness=0.25),
+        paint(glass, srgb("#1d2a3a"), roughness=0.15),
+        paint(m.merge(roof, *posts), colour(body), roughness=0.25),
+        paint(m.merge(*bands), colour(stripe), roughness=0.3),
+        paint(m.merge(*lamps), srgb("#fff3b0")),
+        paint(m.merge(*tails), srgb("#a3101a") if body != "red" else srgb("#ffb0a0")),
+        paint(m.merge(*bumper), STEEL, roughness=0.3, metallic=0.3),
+        paint(
+            m.merge(*(m.moved(tyre, (x, y, 0.0088), ALONG_X) for x, y in wheels)),
+            srgb("#18181a"),
+            roughness=0.9,
+        ),
+        paint(
+            m.merge(*(m.moved(hub, (x, y, 0.0088), ALONG_X) for x, y in wheels)),
+            srgb("#cfd3d8"),
+            roughness=0.3,
+        ),
+    ]
+    phrases = named(
+        body, "{} toy car", "{} car", "small {} car", "toy car in {}", "{} model car",
+        "{} racing car",
+    )  # fmt: skip
+    phrases = (*phrases, f"{body} toy car with a {stripe} stripe")
+    grasps = (
+        across((0.0, 0.0, 0.012), 0.0366, 0.0, 0.6),
+        across((0.0, 0.010, 0.012), 0.0366, 0.0, 0.6),
+    )
+    return model("toycar", parts, "toy car", phrases, grasps, 0.05, 0.7)
+
+
+def _cabin(low: float, high: float) -> Mesh:
+    wide = m.rounded_rectangle(0.0148, 0.0195, 0.004, 2)
+    narrow = m.rounded_rectangle(0.0122, 0.0126, 0.004, 2)
+    return m.loft(
+        [[(x, y + 0.0075, low) for x, y in wide], [(x, y + 0.0075, high) for x, y in narrow]]
+    )
+
+
+ASSETS = {
+    "phone": Asset(len(PHONES), phone),
+    "remote_control": Asset(len(REMOTES), remote_control),
+    "alarm_clock": Asset(len(CLOCKS), alarm_clock),
+    "toycar": Asset(len(CARS), toycar),
+}
