@@ -103,7 +103,8 @@ def tissue_box(look: int, params: Mapping[str, Any]) -> ObjectModel:
     ]
     phrases = named(
         word, "{} tissue box", "{} box of tissues", "tissue box in {}",
-        "{} carton of paper tissues",        "{} box with a tissue sticking out", "box of tissues with {} sides", "{} facial tissue box",
+        "{} carton of paper tissues",        "{} box with a tissue sticking out",
+        "box of tissues with {} sides", "{} facial tissue box",
     )  # fmt: skip
     grasps = box_grasps(half[0], half[1], 0.024)
     top = (0.0, 0.0, 2 * half[2])

@@ -125,7 +125,8 @@ def points_of(shape: Shape) -> Array:
         local = np.concatenate([np.concatenate([circle, z], axis=1) for z in ends])
     else:
         local = _ball(geometry)
-    return local @ to_matrix(shape.pose.rotation).T + np.asarray(shape.pose.position)
+    placed: Array = local @ to_matrix(shape.pose.rotation).T + np.asarray(shape.pose.position)
+    return placed
 
 
 def _ball(sphere: Sphere) -> Array:
@@ -139,7 +140,7 @@ def _ball(sphere: Sphere) -> Array:
 
 def _up(value: float, digits: int = 4) -> float:
     """`value` rounded up, so that a bound stays a bound."""
-    return math.ceil(value * 10**digits - 1e-6) / 10**digits
+    return math.ceil(value * 10.0**digits - 1e-6) / 10.0**digits
 
 
 def model(

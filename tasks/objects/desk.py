@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from robospa.tasks.geometry import axis_rotation
@@ -131,8 +131,10 @@ MICE = (
 def mouse(look: int, params: Mapping[str, Any]) -> ObjectModel:
     """A wireless computer mouse, its buttons towards +y (away from the hand's heel)."""
     shell, detail, word = MICE[look]
-    levels = ((0.0185, 0.0345, 0.0), (0.0205, 0.0375, 0.004), (0.0200, 0.0365, 0.011))
-    levels += ((0.0180, 0.0330, 0.018), (0.0135, 0.0255, 0.0235), (0.0075, 0.0150, 0.026))
+    levels = (
+        (0.0185, 0.0345, 0.0), (0.0205, 0.0375, 0.004), (0.0200, 0.0365, 0.011),
+        (0.0180, 0.0330, 0.018), (0.0135, 0.0255, 0.0235), (0.0075, 0.0150, 0.026),
+    )  # fmt: skip
     body = m.pillow(levels, 16, 0.85)
     belt = m.pillow([(0.0207, 0.0377, 0.0045), (0.0203, 0.0370, 0.0085)], 16, 0.85)
     parts = [
@@ -153,7 +155,7 @@ def mouse(look: int, params: Mapping[str, Any]) -> ObjectModel:
     return model("mouse", parts, "computer mouse", phrases, grasps, mass=0.06, friction=0.8)
 
 
-def _seams(levels: tuple[tuple[float, float, float], ...]) -> list[Mesh]:
+def _seams(levels: Sequence[tuple[float, float, float]]) -> list[Mesh]:
     """The line between the two buttons and the one behind them, laid on the back."""
 
     def height(x: float, y: float) -> float:

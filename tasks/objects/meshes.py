@@ -193,21 +193,16 @@ def tube(path: Sequence[Vec3], radius: float, n: int = 6, closed: bool = False) 
         side = side - along * float(side @ along)
         side = side / np.linalg.norm(side)
         up = np.cross(along, side)
-        rings.append(
-            [
-                tuple(
-                    float(c) for c in points[i] + radius * (math.cos(a) * side + math.sin(a) * up)
-                )
-                for a in (2 * math.pi * k / n for k in range(n))
-            ]  # type: ignore[arg-type]
-        )
+        angles = (2 * math.pi * k / n for k in range(n))
+        ring = [points[i] + radius * (math.cos(a) * side + math.sin(a) * up) for a in angles]
+        rings.append([(float(x), float(y), float(z)) for x, y, z in ring])
     vertices = [v for ring in rings for v in ring]
     faces: list[Face] = []
     for k in range(count if closed else count - 1):
         for i in range(n):
-            a, b = k * n + i, k * n + (i + 1) % n
-            c, d = (a + n) % (n * count), (b + n) % (n * count)
-            faces += [(a, b, d), (a, d, c)]
+            j, m = k * n + i, k * n + (i + 1) % n
+            c, d = (j + n) % (n * count), (m + n) % (n * count)
+            faces += [(j, m, d), (j, d, c)]
     if not closed:
         last = (count - 1) * n
         faces += [(0, i + 1, i) for i in range(1, n - 1)]
@@ -226,8 +221,8 @@ def decal(polygon: Polygon, radius: float, height: float, angle: float) -> Mesh:
     n = len(polygon)
     faces: list[Face] = []
     for i in range(n):
-        a, b = 1 + i, 1 + (i + 1) % n
-        faces += [(0, a, b), (a, a + n, b + n), (a, b + n, b)]
+        j, k = 1 + i, 1 + (i + 1) % n
+        faces += [(0, j, k), (j, j + n, k + n), (j, k + n, k)]
     vertices = []
     for u, v in flat:
         a = angle + u / radius
