@@ -64,6 +64,7 @@ class Collect:
 
     def start(self, snapshot: Snapshot) -> tuple[Event, ...]:
         """Nothing is collected yet."""
+        self._handling.start(snapshot)
         self._remember(snapshot)
         return ()
 

@@ -63,6 +63,7 @@ class ClickAndPlace:
     def start(self, snapshot: Snapshot) -> tuple[Event, ...]:
         """Placements that hold already, if any."""
         self._counter.start(snapshot)
+        self._handling.start(snapshot)
         return self._placements(snapshot)
 
     def update(self, snapshot: Snapshot) -> tuple[Event, ...]:

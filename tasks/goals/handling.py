@@ -62,6 +62,13 @@ class Handling:
         self._last: dict[str, tuple[float, float]] = {}
         self.drops = 0
 
+    def start(self, snapshot: Snapshot) -> None:
+        """Take the heights at rest from the settled scene (else from the first update)."""
+        for name in self._names:
+            if name in snapshot.poses:
+                z = snapshot.poses[name].position[2]
+                self._rest[name], self._last[name] = z, (snapshot.time, z)
+
     def update(self, snapshot: Snapshot) -> tuple[Event, ...]:
         """`grasped` and `dropped` events of this instant."""
         events: tuple[Event, ...] = ()

@@ -44,6 +44,7 @@ class Stack:
 
     def start(self, snapshot: Snapshot) -> tuple[Event, ...]:
         """The bottom part counts as done."""
+        self._handling.start(snapshot)
         events = self._flags.set(0, True, snapshot.time, self._order[0])
         self._idle = 1
         return events
@@ -106,6 +107,7 @@ class Bring:
 
     def start(self, snapshot: Snapshot) -> tuple[Event, ...]:
         """Remember the height at which the object rests."""
+        self._handling.start(snapshot)
         self._height = snapshot.poses[self._name].position[2]
         return ()
 
