@@ -44,7 +44,7 @@ def policy_factory(name: str) -> Callable[..., Any]:
 
 def is_url(target: str) -> bool:
     """Whether `target` names a server rather than a policy of this process."""
-    return target.startswith(("ws://", "wss://"))
+    return "://" in target
 
 
 def open_policy(target: str, options: dict[str, Any]) -> Any:

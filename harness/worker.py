@@ -42,6 +42,7 @@ class WorkerConfig:
     policy: str
     options: Mapping[str, Any] = field(default_factory=dict)
     world: str = "robospa.harness.sapien_world:SapienWorld"
+    world_arguments: Mapping[str, Any] = field(default_factory=dict)
     parts: str = "robospa.harness.trial:task_parts"
     run_seed: int = 0
     video: str = "none"
@@ -69,19 +70,26 @@ class Worker:
         record = run_trial(
             self._world, self._policy, key, policy_seed=seed, recorder=recorder, parts=self.parts
         )
-        finish = getattr(self._policy, "finish", None)
-        if finish is not None:
-            finish({"end": record.end, "success": record.success})
         record = replace(record, attempts=attempt)
         write_actions(self.config.folder, key, recorder.actions, self._policy.spec.action)
         if self.config.video == "all" or (self.config.video == "failures" and not record.success):
             record = replace(record, video=recorder.write_video(self.config.folder, key))
         self.writer.write(record)
+        self._say_goodbye(record)
         return record
+
+    def _say_goodbye(self, record: TrialRecord) -> None:
+        """Tell the policy's server how it went; the record is safe whatever comes of it."""
+        end = getattr(self._policy, "end", None)
+        if end is not None:
+            try:
+                end({"end": record.end, "success": record.success})
+            except Exception:  # the next trial starts on a new connection
+                self._stale = True
 
     def _prepare(self) -> None:
         if self._world is None:
-            self._world = load(self.config.world)()
+            self._world = load(self.config.world)(**self.config.world_arguments)
         if self._policy is None:
             self._policy = open_policy(self.config.policy, dict(self.config.options))
         elif self._stale:

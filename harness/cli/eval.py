@@ -1,0 +1,86 @@
+"""`robospa eval`: evaluate the policy behind a URL, on a fixed list of trials."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+
+def evaluate(
+    policy: Annotated[
+        str, typer.Argument(help="ws://host:port, wss://..., openpi://..., or a local policy's name")
+    ],
+    tasks: Annotated[
+        str, typer.Option(help="task names, categories (GAC), spatial, procedural, or all")
+    ] = "all",
+    levels: Annotated[str, typer.Option(help="such as 1,3-5")] = "1-5",
+    trials: Annotated[int, typer.Option(help="trials per variant")] = 100,
+    workers: Annotated[int, typer.Option(help="worker processes; 0 for one per core")] = 0,
+    out: Annotated[Path | None, typer.Option(help="folder of the run")] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="go on with the run in --out")] = False,
+    video: Annotated[str, typer.Option(help="which trials to film: failures, all, none")] = "none",
+    split: Annotated[str, typer.Option(help="instructions: heldout or train")] = "heldout",
+    seeds: Annotated[
+        str | None, typer.Option(help="JSON file or 100000-100099; default: the shipped lists")
+    ] = None,
+    embodiment: Annotated[str, typer.Option(help="robot")] = "aloha-agilex",
+    mode: Annotated[str, typer.Option(help="scene mode")] = "clean",
+    control: Annotated[str, typer.Option(help="rest_to_rest or fixed_rate")] = "rest_to_rest",
+    run_seed: Annotated[int, typer.Option(help="enters the policy's seed of every trial")] = 0,
+    timeout: Annotated[float, typer.Option(help="seconds for one answer")] = 120.0,
+    first_timeout: Annotated[float, typer.Option(help="seconds for the first answer")] = 600.0,
+    wait: Annotated[float, typer.Option(help="seconds to wait for the server to listen")] = 0.0,
+    trial_timeout: Annotated[
+        float, typer.Option(help="seconds for one trial before its worker is killed")
+    ] = 1800.0,
+    attempts: Annotated[int, typer.Option(help="times a trial is tried if it cannot be run")] = 3,
+    backoff: Annotated[float, typer.Option(help="seconds before the first retry")] = 2.0,
+    token: Annotated[
+        str | None, typer.Option(envvar="ROBOSPA_TOKEN", help="bearer token of the server")
+    ] = None,
+    world: Annotated[str | None, typer.Option(hidden=True)] = None,
+    parts: Annotated[str | None, typer.Option(hidden=True)] = None,
+) -> None:
+    """Evaluate a policy; its report is one command further.
+
+    Trials are seeded and their list is fixed before the run. A trial that cannot be run is retried
+    and, if need be, reported as missing: it never counts as a failure. Ctrl-C is safe; add
+    --resume to go on.
+    """
+    from robospa.harness.cli import running, selection
+
+    arguments = {k: v for k, v in locals().items() if k not in ("token", "running", "selection")}
+    keys = selection.list_trials(
+        selection.parse_tasks(tasks),
+        selection.parse_levels(levels),
+        trials,
+        selection.parse_seeds(seeds),
+        embodiment=embodiment,
+        mode=mode,
+        split=split,
+    )
+    request = running.make_request(
+        policy,
+        keys,
+        running.run_folder(out, policy, resume),
+        connection={"timeout": timeout, "first_timeout": first_timeout, "wait": wait},
+        token=token,
+        workers=workers,
+        attempts=attempts,
+        backoff=backoff,
+        trial_seconds=trial_timeout,
+        video=video,
+        control=control,
+        run_seed=run_seed,
+        world=world,
+        parts=parts,
+        resume=resume,
+        arguments=_plain(arguments),
+    )
+    running.run_and_show(request)
+
+
+def _plain(arguments: dict[str, Any]) -> dict[str, Any]:
+    return {k: str(v) if isinstance(v, Path) else v for k, v in arguments.items()}

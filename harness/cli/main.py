@@ -1,0 +1,85 @@
+"""The `robospa` command. Imports only what the chosen subcommand needs, so that help is instant.
+
+Every error is one sentence on stderr and a non-zero exit code; `--debug` anywhere shows where it
+came from.
+"""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from collections.abc import Sequence
+
+COMMANDS = {
+    "demo": "Evaluate a policy server over the wire on a few trials, and write a report.",
+    "doctor": "Check that this machine can simulate and render.",
+    "serve": "Serve a policy by name or module:function.",
+    "check": "Test a policy server against the protocol.",
+    "eval": "Evaluate the policy behind a URL.",
+    "report": "Turn a run into tables, a figure and a page with its videos.",
+    "tasks": "List the tasks; show, draw or collect their scenes.",
+    "seeds": "Make the lists of accepted seeds, or measure the expert.",
+}
+"""Subcommand -> summary; each is a function of that name in `robospa.harness.cli.<name>`."""
+
+NAMES = {"eval": "evaluate"}
+"""Functions that cannot be called like their subcommand."""
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line; ends in SystemExit."""
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    debug = "--debug" in words
+    words = [w for w in words if w != "--debug"]
+    try:
+        _run(words)
+    except KeyboardInterrupt:
+        print("robospa: interrupted", file=sys.stderr)
+        sys.exit(130)
+    except Exception as error:
+        if debug:
+            raise
+        print(f"robospa: {sentence(error)}", file=sys.stderr)
+        sys.exit(1)
+
+
+def _run(words: list[str]) -> None:
+    import typer
+
+    chosen = next((w for w in words if not w.startswith("-")), "")
+    app = typer.Typer(
+        name="robospa",
+        help="Evaluate robot policies on the RoboSPA benchmark.",
+        no_args_is_help=True,
+        add_completion=False,
+        pretty_exceptions_enable=False,
+        epilog="Add --debug to any command to see where an error came from.",
+    )
+    for name, summary in COMMANDS.items():
+        if name == chosen:
+            module = importlib.import_module(f"robospa.harness.cli.{name}")
+            app.command(name)(getattr(module, NAMES.get(name, name)))
+        else:
+            app.command(name, help=summary)(_unloaded)
+    typer.main.get_command(app).main(words, prog_name="robospa")
+
+
+def _unloaded() -> None:
+    """Stands for a subcommand that was not chosen."""
+
+
+def sentence(error: BaseException) -> str:
+    """`error` in one line; its class only where the text was not written for users."""
+    words = error.args[0] if isinstance(error, KeyError) and error.args else error
+    text = " ".join(str(words).split())
+    ours = type(error).__module__.startswith("robospa.")
+    if isinstance(error, ModuleNotFoundError):
+        extra = "report" if error.name in ("jinja2", "matplotlib", "scipy") else "sim"
+        return f"{text}; install it with: pip install 'robospa[{extra}]'"
+    if text and (ours or isinstance(error, (KeyError, ValueError, OSError))):
+        return text
+    return f"{type(error).__name__}: {text} (add --debug to see where)"
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,151 @@
+"""What `eval` and `demo` share: from options to a request, and from a finished run to its table."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import typer
+
+from robospa.harness.cli.selection import BadChoice
+from robospa.harness.evaluate import Request, RunAborted, evaluate
+from robospa.harness.factory import is_url
+from robospa.harness.runner import RunOptions
+from robospa.harness.worker import VIDEO, WorkerConfig
+from robospa.results.records import TrialKey
+
+CONTROLS = ("rest_to_rest", "fixed_rate")
+
+
+def run_folder(out: Path | None, policy: str, resume: bool) -> Path:
+    """Where the run goes; by default a new folder under `runs`."""
+    if out is not None:
+        return out
+    if resume:
+        raise BadChoice("--resume needs --out to say which run to go on with")
+    name = policy.rpartition("/")[2] if is_url(policy) else policy
+    safe = "".join(c if c.isalnum() else "-" for c in name)
+    return Path("runs") / f"{safe}-{time.strftime('%Y%m%d-%H%M%S')}"
+
+
+def cores() -> int:
+    """Processor cores that this process may use."""
+    return len(os.sched_getaffinity(0))
+
+
+def make_request(
+    policy: str,
+    keys: Sequence[TrialKey],
+    folder: Path,
+    *,
+    connection: Mapping[str, float],
+    token: str | None = None,
+    workers: int = 0,
+    attempts: int = 3,
+    backoff: float = 2.0,
+    trial_seconds: float = 1800.0,
+    video: str = "none",
+    control: str = "rest_to_rest",
+    run_seed: int = 0,
+    world: str | None = None,
+    parts: str | None = None,
+    resume: bool = False,
+    arguments: Mapping[str, Any] | None = None,
+) -> Request:
+    """Check the options and put them where they belong; raises BadChoice."""
+    if video not in VIDEO:
+        raise BadChoice(f"--video {video!r} is none of {', '.join(VIDEO)}")
+    if control not in CONTROLS:
+        raise BadChoice(f"--control {control!r} is none of {', '.join(CONTROLS)}")
+    if workers < 0 or attempts < 1 or trial_seconds <= 0 or backoff < 0:
+        raise BadChoice("--workers, --attempts, --backoff and --trial-timeout cannot be that small")
+    if video != "none":
+        import av  # noqa: F401  (fails now rather than after the first trial)
+    client: dict[str, Any] = {}
+    if is_url(policy):
+        from robospa.protocol.channel import Timeouts
+
+        client["timeouts"] = Timeouts(
+            infer=connection["timeout"],
+            first_infer=connection["first_timeout"],
+            reset=connection["first_timeout"],
+            wait=connection["wait"],
+        )
+        client["token"] = token
+    config = WorkerConfig(
+        folder=folder,
+        policy=policy,
+        options=client,
+        run_seed=run_seed,
+        video=video,
+        world_arguments={"render": None, "control": control},
+    )
+    if world is not None:
+        config = _replace(config, world=world, world_arguments={})
+    if parts is not None:
+        config = _replace(config, parts=parts)
+    options = RunOptions(workers or cores(), attempts, backoff, trial_seconds)
+    return Request(config, keys, options, _settings(keys), dict(arguments or {}), resume)
+
+
+def _replace(config: WorkerConfig, **changes: Any) -> WorkerConfig:
+    from dataclasses import replace
+
+    return replace(config, **changes)
+
+
+def _settings(keys: Sequence[TrialKey]) -> dict[str, Any]:
+    """What all trials share; the trials themselves are compared one by one."""
+    return {
+        "embodiment": sorted({k.embodiment for k in keys}),
+        "mode": sorted({k.mode for k in keys}),
+        "split": sorted({k.split for k in keys}),
+    }
+
+
+def run_and_show(request: Request) -> None:
+    """Evaluate, print the table, and end with 1 if trials are missing, 130 on Ctrl-C."""
+    from robospa.results.reading import read_run
+    from robospa.results.tables import terminal
+
+    folder = request.config.folder
+    again = f"the same command with --out {folder} --resume goes on from here"
+    try:
+        with _terminable():
+            evaluate(request)
+    except KeyboardInterrupt:
+        print(f"robospa: interrupted; {again}", file=sys.stderr)
+        raise typer.Exit(130) from None
+    except RunAborted as error:
+        raise RunAborted(f"the run stopped: {error}; {again}") from error
+    run = read_run(folder)
+    terminal(run)
+    if run.missing:
+        print(
+            f"robospa: {len(run.missing)} of {len(run.keys)} trials could not be run and are "
+            f"missing from these numbers; {again}",
+            file=sys.stderr,
+        )
+        raise typer.Exit(1)
+    print(f"Run: {folder}   Report: robospa report {folder}")
+
+
+class _terminable:
+    """Treat SIGTERM like Ctrl-C while a run is going on."""
+
+    def __enter__(self) -> None:
+        import signal
+
+        def interrupt(number: int, frame: object) -> None:
+            raise KeyboardInterrupt
+
+        self._before = signal.signal(signal.SIGTERM, interrupt)
+
+    def __exit__(self, *_: object) -> None:
+        import signal
+
+        signal.signal(signal.SIGTERM, self._before)

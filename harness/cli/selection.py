@@ -1,0 +1,130 @@
+"""What the user means by `--tasks`, `--levels` and `--seeds`."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from robospa.results.metrics import CATEGORIES, DIMENSIONS
+from robospa.results.records import TrialKey
+
+SPLITS = ("heldout", "train")
+
+
+class BadChoice(Exception):
+    """The user asked for something that does not exist."""
+
+
+def parse_tasks(text: str) -> list[str]:
+    """Official names of `all`, or of a comma-separated list of tasks, categories, dimensions."""
+    from robospa.tasks.catalog import task, tasks
+
+    known = tasks()
+    chosen: list[str] = []
+    for word in (w.strip() for w in text.split(",") if w.strip()):
+        members = DIMENSIONS.get(word.lower(), (word.upper(),))
+        if word.lower() == "all":
+            chosen += known
+        elif set(members) <= set(CATEGORIES):
+            chosen += [t.name for t in known.values() if t.category in members]
+        else:
+            try:
+                chosen.append(task(word).name)
+            except KeyError as error:
+                raise BadChoice(str(error.args[0])) from error
+    if not chosen:
+        raise BadChoice(f"--tasks {text!r} names no task; see `robospa tasks`")
+    return list(dict.fromkeys(chosen))
+
+
+def parse_numbers(text: str, what: str) -> list[int]:
+    """The numbers of a list like `1,3-5`, in order, each once; raises BadChoice."""
+    numbers: list[int] = []
+    for word in (w.strip() for w in text.split(",")):
+        found = re.fullmatch(r"(\d+)(?:-(\d+))?", word)
+        first, last = (int(found[1]), int(found[2] or found[1])) if found else (1, 0)
+        if last < first or last - first > 1_000_000:
+            raise BadChoice(f"{word!r} in {what} is neither a number nor a range such as 3-5")
+        numbers += range(first, last + 1)
+    return list(dict.fromkeys(numbers))
+
+
+def parse_levels(text: str) -> list[int]:
+    """Levels of a list like `1,3-5`; raises BadChoice beyond 1 to 5."""
+    levels = parse_numbers(text, "--levels")
+    wrong = [n for n in levels if n not in range(1, 6)]
+    if wrong:
+        raise BadChoice(f"there is no level {wrong[0]}; levels are 1 to 5")
+    return levels
+
+
+Seeds = Callable[[str, int], Sequence[int]]
+
+
+def parse_seeds(text: str | None) -> Seeds:
+    """A function (task, level) -> seeds.
+
+    Without `text` the shipped lists of accepted seeds; else a list like `100000-100099` for every
+    variant, or a JSON file: a list, or {task: {level: list}} as in the shipped lists.
+    """
+    if text is None:
+        return _shipped
+    if not Path(text).exists():
+        if not re.fullmatch(r"[\d,\s-]+", text):
+            raise BadChoice(f"--seeds {text!r} is neither a file nor a list such as 100000-100099")
+        numbers = parse_numbers(text, "--seeds")
+        return lambda task, level: numbers
+    try:
+        data = json.loads(Path(text).read_text())
+    except (OSError, ValueError) as error:
+        raise BadChoice(f"cannot read the seeds in {text}: {error}") from error
+
+    def look_up(task: str, level: int) -> Sequence[int]:
+        found = data if isinstance(data, list) else data.get(task, {}).get(str(level))
+        if not isinstance(found, list) or not all(type(n) is int and n >= 0 for n in found):
+            raise BadChoice(f"{text} has no list of seeds for {task} level {level}")
+        return found
+
+    return look_up
+
+
+def _shipped(task: str, level: int) -> Sequence[int]:
+    from robospa.tasks.seeds import accepted
+
+    try:
+        found: Sequence[int] = accepted(task, level)
+    except (KeyError, OSError, ValueError) as error:
+        raise BadChoice(
+            f"no accepted seeds of {task} level {level} are shipped; name some with --seeds"
+        ) from error
+    return found
+
+
+def list_trials(
+    tasks: Sequence[str],
+    levels: Sequence[int],
+    trials: int,
+    seeds: Seeds,
+    *,
+    embodiment: str,
+    mode: str,
+    split: str,
+) -> list[TrialKey]:
+    """The first `trials` seeds of every variant; raises BadChoice if a variant has fewer."""
+    if split not in SPLITS:
+        raise BadChoice(f"{split!r} is no instruction split; there are {' and '.join(SPLITS)}")
+    if trials < 1:
+        raise BadChoice("--trials must be at least 1")
+    keys = []
+    for task in tasks:
+        for level in levels:
+            found = list(dict.fromkeys(seeds(task, level)))
+            if len(found) < trials:
+                raise BadChoice(
+                    f"{task} level {level} has {len(found)} seeds, not {trials}; "
+                    "lower --trials or name more with --seeds"
+                )
+            keys += [TrialKey(task, level, s, embodiment, mode, split) for s in found[:trials]]
+    return keys
