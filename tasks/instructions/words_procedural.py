@@ -42,8 +42,8 @@ def dustbin(count: int) -> Slots:
     word = NUMBERS[count]
     if count == 1:
         bottles = (
-            ("the bottle", "the bottle on the table"),
-            ("the single bottle", "the one bottle", "the only bottle"),
+            ("the bottle", "the one bottle"),
+            ("the single bottle", "the only bottle", "the lone bottle"),
         )
     elif count == 2:
         bottles = (
@@ -108,7 +108,7 @@ def stack(colors: Sequence[str]) -> Slots:
         {
             "order": (
                 (chain, f"first {', then '.join(colors)}"),
-                (last, " followed by ".join(colors), f"starting with {', next '.join(colors)}"),
+                (last, " followed by ".join(colors), ", next ".join(colors)),
             ),
             "pairs": (
                 (
@@ -139,6 +139,7 @@ def stack(colors: Sequence[str]) -> Slots:
                     "around the table's center",
                     "close to the tabletop's midpoint",
                     "near the table's central spot",
+                    "in the table's central area",
                 ),
             ),
         }
@@ -179,7 +180,7 @@ def click(level: int) -> Slots:
 
 
 def memory(colors: Sequence[str]) -> Slots:
-    """{order}, {where}; {color} for one block.
+    """{order}, {where}; {block} instead of {order} for one block.
 
     {where} says which way a cover goes and where it ends: the goal region is a spot 13 cm behind
     the block, and nothing else in the sentence could tell.
@@ -194,11 +195,11 @@ def memory(colors: Sequence[str]) -> Slots:
                 "directly away from the robot, ending 13 cm behind its block",
                 "in a straight line from the robot to 13 cm beyond its block",
                 "straight away from the robot, 13 cm past its block",
+                "straight back from the robot until it lies 13 cm behind its block",
             ),
         ),
     }
     if len(colors) == 1:
-        slots["color"] = ((colors[0],), (colors[0],))
         slots["block"] = (
             (f"the {colors[0]} block", f"the {colors[0]} cube"),
             (
@@ -211,6 +212,6 @@ def memory(colors: Sequence[str]) -> Slots:
         last = ", ".join(f"{c} {p}" for c, p in zip(colors, _places(len(colors)), strict=True))
         slots["order"] = (
             (listed(colors, ", then "), f"first {', then '.join(colors)}"),
-            (last, " followed by ".join(colors), f"starting with {', next '.join(colors)}"),
+            (last, " followed by ".join(colors), ", next ".join(colors)),
         )
     return with_common(slots)

@@ -21,8 +21,8 @@ _REFERENCES: Slots = {
         ("tissue carton", "tissue package", "carton of tissues"),
     ),
     "french fries": (
-        ("french fries", "box of french fries"),
-        ("carton of fries", "fries", "packet of fries"),
+        ("box of french fries", "french fries box"),
+        ("carton of fries", "packet of fries", "fries carton"),
     ),
 }
 
@@ -55,7 +55,7 @@ _ROWS: Slots = {
 
 _ROBOT_VIEW = (
     ("as seen from the robot", "from the robot's viewpoint"),
-    ("from the robot's perspective", "as the robot looks at them", "from where the robot stands"),
+    ("from the robot's perspective", "through the robot's eyes", "from where the robot stands"),
 )
 
 _VIEWS: Slots = {
@@ -99,6 +99,8 @@ def size(rank: int, count: int) -> Slots:
     if not 1 <= rank <= count:
         raise ValueError(f"size rank {rank} does not exist among {count} blocks")
     number, word = ordinal(rank)
+    train: tuple[str, ...]
+    held: tuple[str, ...]
     if count == 2:
         more, other = ("larger", "bigger") if rank == 1 else ("smaller", "less large")
         train = (f"the {more} block", f"the {other} block")
@@ -124,18 +126,27 @@ def size(rank: int, count: int) -> Slots:
         )
         held = (
             f"the {word} largest of the blocks",
-            f"the block that is {number} in size, counted from the largest,",
-            f"the block ranked {word} from the largest",
+            f"the block that ranks {number} from the largest",
+            f"the block that comes {word} from the largest",
             f"the {number} biggest of the blocks",
         )
     return with_common({"block": (train, held)})
 
 
-def distance(rank: int, reference: str) -> Slots:
+def distance(
+    rank: int,
+    reference: str,
+    phrases: tuple[tuple[str, ...], tuple[str, ...]] = ((), ()),
+) -> Slots:
     """{rank}, {reference}: the object `rank` farthest (1 = farthest) from `reference`.
 
-    `reference` is a category ("tea box") or an asset ("112_tea-box"); KeyError if unknown.
+    `reference` is a category ("tea box") or an asset ("112_tea-box"), KeyError if unknown;
+    `phrases` are further (train, held-out) names of this very object, without article.
     """
+    plain = _REFERENCES[category(reference)]
+    names = tuple(tuple(dict.fromkeys((*a, *b))) for a, b in zip(plain, phrases, strict=True))
+    train_names = names[0]
+    held_names = tuple(name for name in names[1] if name not in train_names)
     number, word = ordinal(rank)
     if rank == 1:
         train: tuple[str, ...] = ("farthest", "farthest away")
@@ -148,7 +159,7 @@ def distance(rank: int, reference: str) -> Slots:
             f"{number} most distant",
             f"{word} most distant",
         )
-    return with_common({"rank": (train, held), "reference": _REFERENCES[category(reference)]})
+    return with_common({"rank": (train, held), "reference": (train_names, held_names)})
 
 
 def category(name: str) -> str:
@@ -213,12 +224,12 @@ def relational(direction: str, reference: str, level: int) -> Slots:
     )
     convention = (
         (
-            "front means far from the robot and back means near it",
-            "the front is the far side and the back is the side nearest the robot",
+            "seen from the robot, front means far and back means near",
+            "from the robot's viewpoint, the front is the far side and the back is the near side",
         ),
         (
-            "front points away from the robot and back points towards it",
-            "the front side lies far from the robot, the back side close to it",
+            "directions are the robot's own, front pointing away from it and back towards it",
+            "the robot is the viewer, with front for the far side and back for the near side",
         ),
     )
     return with_common({"relation": relation, "reference": names, "convention": convention})

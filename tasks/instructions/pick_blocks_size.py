@@ -1,0 +1,78 @@
+"""Templates of Pick_Blocks_Size: {block} says which one, e.g. "the 3rd largest block"."""
+
+from __future__ import annotations
+
+from robospa.tasks.instructions.grammar import Templates, templates_of
+
+REQUIRED = ("block",)
+
+_TRAIN = (
+    "pick up {block}.",
+    "lift {block} off {table}.",
+    "grab {block} and raise it above {table}.",
+    "take {block} from {table} with {arm}.",
+    "use {arm} to pick up {block}.",
+    "compare the sizes of the blocks, then pick up {block}.",
+    "find {block} and lift it.",
+    "look at how big each block is and lift {block}.",
+    "with {arm}, raise {block} clear of {table}.",
+    "reach for {block}, grip it, and bring it up.",
+    "close a gripper around {block} and lift.",
+    "sort the blocks by size in your head and grab {block}.",
+    "locate {block} on {table}, then pick it up.",
+    "rank the blocks from largest to smallest and take {block}.",
+    "hoist {block} into the air using {arm}.",
+    "grasp {block} firmly and move it upward.",
+    "please pick {block} up from {table}.",
+    "judge the blocks by size alone and remove {block} from {table}.",
+    "have {arm} grasp {block} and lift it.",
+    "move a gripper to {block}, close it, and go up.",
+    "get {block} off {table}.",
+    "leave the rest where it lies and pick up {block}.",
+    "identify {block} by size and raise it with {arm}.",
+    "ignore where the blocks lie; lift {block}.",
+    "measure the blocks by eye, choose {block}, and lift it up.",
+    "go to {block} and pick it up with {arm}.",
+    "collect {block} from {table} and hold it up.",
+    "hold {block} above {table} after picking it up.",
+    "single out {block} and take it off {table}.",
+    "guide {arm} to {block}, grasp it, and raise it.",
+    "order the blocks by size, largest first, and pick {block}.",
+    "choose {block} and nothing else; lift it from {table}.",
+    "check every block's size before you lift {block}.",
+    "bring {block} up into the air.",
+    "pinch {block} between the fingers of {arm} and lift it.",
+    "seize {block}, then raise it well above {table}.",
+    "size is what counts: pick up {block}.",
+    "among the blocks on {table}, grab {block}.",
+    "from the blocks in front of you, take {block} with {arm}.",
+    "by size, select {block} and lift it away from {table}.",
+    "without touching the rest, pick up {block}.",
+    "lower {arm} onto {block}, close the gripper, and lift.",
+    "spot {block}, grip it, and carry it upward.",
+    "scan the blocks on {table} and fetch {block}.",
+    "elevate {block} using {arm}.",
+    "target {block}: grasp it and raise it.",
+    "do a size comparison first and then seize {block}.",
+    "work out which one is {block} and lift it up.",
+    "pull {block} up from {table} with {arm}.",
+    "now pick {block} and keep it in the air.",
+)
+
+_HELDOUT = (
+    "what I need is {block} raised off {table}.",
+    "could {block} be lifted from {table}, please?",
+    "the one to end up in a gripper, high above {table}, is {block}.",
+    "for this trial to succeed, {block} has to be lifted by {arm}.",
+    "I would like to see {block} held in the air by {arm}.",
+    "if only one may leave {table}, it must be {block}.",
+    "my wish is that {block} rises from {table} while the rest stays put.",
+    "going by size, it is {block} that should come up from {table}.",
+    "which one leaves {table}? That would be {block}.",
+    "the goal is reached once {arm} has {block} hanging in its gripper.",
+)
+
+
+def templates(level: int) -> Templates:
+    """The same at every level: the wording holds for any number of blocks."""
+    return templates_of(_TRAIN, _HELDOUT)
