@@ -22,7 +22,7 @@ from robospa.protocol.policy import Observation
 
 BatchCall = Callable[[Sequence[Observation], Sequence[int]], Awaitable[Sequence[Any]]]
 
-PATIENCE = 0.5  # of a call's duration: the longest that a waiting request is held back
+PATIENCE = 0.5  # of a call's duration: the longest that an idle model is held back
 SMOOTHING = 0.3  # weight of the newest measurement in the running means
 SLACK = 0.002  # [s] added to a predicted arrival
 
@@ -62,6 +62,7 @@ class Batcher:
     _pending: list[_Request] = field(default_factory=list)
     _paces: dict[int, _Pace] = field(default_factory=dict)
     _duration: float | None = None
+    _free: float = 0.0
     _arrived: asyncio.Event = field(default_factory=asyncio.Event)
     _task: asyncio.Task[None] | None = None
 
@@ -109,7 +110,7 @@ class Batcher:
         waiting = {request.session for request in self._pending}
         if len(waiting) >= self.size or self._duration is None or not waiting:
             return 0.0
-        limit = self._pending[0].arrival + PATIENCE * self._duration
+        limit = max(self._pending[0].arrival, self._free) + PATIENCE * self._duration
         expected = [
             due
             for session, pace in self._paces.items()
@@ -129,7 +130,7 @@ class Batcher:
         start = self.clock()
         outcomes = await self._call(batch)
         end = self.clock()
-        self._duration = _mean(self._duration, end - start)
+        self._duration, self._free = _mean(self._duration, end - start), end
         for request, outcome in zip(batch, outcomes, strict=True):
             if request.session in self._paces:
                 self._paces[request.session].answered = end

@@ -42,7 +42,7 @@ class Limits:
 
 DEFAULT_LIMITS = Limits()
 
-_NAMES = "|b1 |i1 |u1 <i2 <i4 <i8 <u2 <u4 <u8 <f2 <f4 <f8".split()
+_NAMES = ["|b1", "|i1", "|u1", "<i2", "<i4", "<i8", "<u2", "<u4", "<u8", "<f2", "<f4", "<f8"]
 DTYPES = {name: np.dtype(name) for name in _NAMES}
 """The dtypes that exist on the wire, by the name they have there (little endian)."""
 
@@ -203,12 +203,14 @@ _MAP = {0xDE: 2, 0xDF: 4}
 class _Reader:
     """A cursor over one message. Every length is checked against what is left before use."""
 
-    __slots__ = ("end", "items", "limits", "pos", "view")
+    __slots__ = ("bytes", "end", "items", "limits", "pos", "view")
 
     def __init__(self, buffer: Buffer, limits: Limits) -> None:
-        self.view = memoryview(buffer).cast("B")
+        # Items and text are read from `bytes`, which is faster; arrays are cut out of `view`.
+        self.bytes = bytes(buffer) if isinstance(buffer, memoryview) else buffer
+        self.view = memoryview(self.bytes)
         self.pos = 0
-        self.end = len(self.view)
+        self.end = len(self.bytes)
         self.items = 0
         self.limits = limits
 
@@ -224,7 +226,7 @@ class _Reader:
         return start
 
     def length(self, width: int) -> int:
-        number: int = _LENGTHS[width].unpack_from(self.view, self.take(width))[0]
+        number: int = _LENGTHS[width].unpack_from(self.bytes, self.take(width))[0]
         return number
 
     def value(self, depth: int) -> Any:
@@ -233,27 +235,27 @@ class _Reader:
             raise self.fail(f"more than {self.limits.items} items")
         if depth > self.limits.depth:
             raise self.fail(f"nested deeper than {self.limits.depth} levels")
-        tag = self.view[self.take(1)]
+        tag = self.bytes[self.take(1)]
         if tag < 0x80:
             return tag
+        if 0xA0 <= tag < 0xC0:
+            return self.text(tag & 0x1F)
         if tag >= 0xE0:
             return tag - 0x100
         if tag < 0x90:
             return self.map(tag & 0x0F, depth)
         if tag < 0xA0:
             return self.list(tag & 0x0F, depth)
-        if tag < 0xC0:
-            return self.text(tag & 0x1F)
         if tag in _FIXED:
             form = _FIXED[tag]
-            return form.unpack_from(self.view, self.take(form.size))[0]
+            return form.unpack_from(self.bytes, self.take(form.size))[0]
         if tag in _CONSTANTS:
             return _CONSTANTS[tag]
         if tag in _STR:
             return self.text(self.length(_STR[tag]))
         if tag in _BIN:
             start = self.take(self.length(_BIN[tag]))
-            return bytes(self.view[start : self.pos])
+            return bytes(self.bytes[start : self.pos])
         if tag in _LIST:
             return self.list(self.length(_LIST[tag]), depth)
         if tag in _MAP:
@@ -265,7 +267,7 @@ class _Reader:
             raise self.fail(f"text of {size} bytes is over the limit of {self.limits.text}")
         start = self.take(size)
         try:
-            return str(self.view[start : self.pos], "utf-8")
+            return self.bytes[start : self.pos].decode()
         except UnicodeDecodeError as error:
             raise self.fail("text is not UTF-8") from error
 
@@ -282,8 +284,9 @@ class _Reader:
 
     def map(self, count: int, depth: int) -> Any:
         self.count(count, 2)
-        if count and self.pos < self.end and self.view[self.pos] in _BIN:
-            return self.numpy(count)
+        if count and self.bytes[self.pos] in _BIN:
+            array = self.usual_array()
+            return array if array is not None else self.numpy(count)
         result: dict[Any, Any] = {}
         for _ in range(count):
             key = self.value(depth + 1)
@@ -295,11 +298,26 @@ class _Reader:
         return result
 
     def binary(self) -> memoryview:
-        tag = self.view[self.take(1)]
+        tag = self.bytes[self.take(1)]
         if tag not in _BIN:
             raise self.fail("binary data expected")
         start = self.take(self.length(_BIN[tag]))
         return self.view[start : self.pos]
+
+    def usual_array(self) -> np.ndarray[Any, Any] | None:
+        """An array with its keys in the order in which `encode` writes them, else None."""
+        start, items, depth = self.pos, self.items, self.limits.depth - 1
+        if self.bytes.startswith(_ARRAY_HEAD, start - 1):
+            self.pos += len(_ARRAY_HEAD) - 1
+            name = self.value(depth)
+            if self.bytes.startswith(_SHAPE_KEY, self.pos):
+                self.pos += len(_SHAPE_KEY)
+                shape = self.value(depth)
+                if self.bytes.startswith(_DATA_KEY, self.pos):
+                    self.pos += len(_DATA_KEY)
+                    return self.array(self.binary(), name, shape)
+        self.pos, self.items = start, items
+        return None
 
     def numpy(self, count: int) -> Any:
         """A map with binary keys: an array, or a scalar as openpi sends it."""
@@ -320,7 +338,7 @@ class _Reader:
         raise self.fail("a map with binary keys is neither an array nor a scalar")
 
     def _next_is_binary(self) -> bool:
-        return self.pos < self.end and self.view[self.pos] in _BIN
+        return self.pos < self.end and self.bytes[self.pos] in _BIN
 
     def array(self, data: Any, name: Any, shape: Any) -> np.ndarray[Any, Any]:
         dtype = DTYPES.get(name) if isinstance(name, str) else None
