@@ -103,7 +103,8 @@ class Booth:
     def _take(camera: Any) -> NDArray[np.uint8]:
         camera.take_picture()
         picture = np.asarray(camera.get_picture("Color"))[..., :3]
-        return (np.clip(picture, 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
+        image: NDArray[np.uint8] = (np.clip(picture, 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
+        return image
 
 
 def _looking(eye: NDArray[np.float64], target: NDArray[np.float64]) -> Pose:

@@ -32,12 +32,13 @@ Made = tuple[list[Shape], tuple[Grasp, ...]]
 
 def _arch(half: float, wall: float, height: float) -> list[m.Point]:
     """Cross-section of a tin loaf: straight walls under a bulging top."""
-    bulge = half * 1.06
+    bulge = half * 1.04
     dome = [
         (bulge * math.cos(a), wall + (height - wall) * math.sin(a))
         for a in (0.15, 0.5, 0.9, 1.3, math.pi - 1.3, math.pi - 0.9, math.pi - 0.5, math.pi - 0.15)
     ]
-    return [(-half, 0.0), (half, 0.0), (half, wall), *dome, (-half, wall)]
+    foot = half * 0.94
+    return [(-foot, 0.0), (foot, 0.0), (half, wall * 0.7), *dome, (-half, wall * 0.7)]
 
 
 def _loaf() -> Made:
@@ -51,7 +52,7 @@ def _loaf() -> Made:
         paint(m.merge(*ends), CRUMB, roughness=0.9),
         paint(m.merge(*scores), GOLD, roughness=0.9),
     ]
-    return shapes, (across((0.0, 0.0, 0.022), 0.0493),)
+    return shapes, (across((0.0, 0.0, 0.022), 0.0475),)
 
 
 def _stroke(hx: float, hy: float, x: float, y: float, z: float, turn: float = 0.0) -> Mesh:

@@ -43,7 +43,7 @@ SAUCES = (
 def sauce_can(look: int, params: Mapping[str, Any]) -> ObjectModel:
     """A short tin with a paper label, a round picture and a pull ring on its lid."""
     base, field, mark, content, word = SAUCES[look]
-    r, h = 0.031, 0.072
+    r, h = 0.030, 0.072
     rim = [(r - 0.002, 0.0), (r, 0.001), (r, 0.004), (r - 0.0012, 0.005)]
     rim += [
         (r - 0.0012, h - 0.005),
@@ -159,7 +159,8 @@ def bottle(look: int, params: Mapping[str, Any]) -> ObjectModel:
     body += [(0.0095, 0.122)]
     parts = [
         feel(Cylinder(r, 0.042), (0.0, 0.0, 0.042)),
-        feel(m.lathe([(r * 0.95, 0.084), (0.0125, 0.106), (0.0125, h)], 10)),
+        feel(m.lathe([(r * 0.95, 0.084), (0.0125, 0.107)], 10)),
+        feel(Cylinder(0.01225, 0.0155), (0.0, 0.0, h - 0.0155)),
         paint(m.lathe(body, 16), srgb(glass), roughness=0.15),
         paint(m.lathe([(r + 0.0004, 0.028), (r + 0.0004, 0.068)], 16, False), colour(label)),
         paint(around(m.ellipse(0.0105, 0.0135, 10), r + 0.0011, 0.048), _emblem(label)),

@@ -38,7 +38,7 @@ def bowl(look: int, params: Mapping[str, Any]) -> ObjectModel:
     lining = colour("cream") if word != "white" else colour("white")
     ring = [(0.0548, 0.0325), (0.0571, 0.0395)]
     parts = [
-        paint(m.lathe(outer, 18), colour(outside), roughness=0.25),
+        paint(m.lathe([(0.0, 0.0), *outer], 18, False), colour(outside), roughness=0.25),
         paint(m.lathe([outer[-1], inner[0]], 18, False), colour(stripe), roughness=0.25),
         paint(m.lathe(inner, 18, False), lining, roughness=0.25),
         paint(m.lathe(ring, 18, False), colour(stripe), roughness=0.25),
@@ -74,7 +74,7 @@ def mug(look: int, params: Mapping[str, Any]) -> ObjectModel:
     ]
     glaze = colour("white") if base != "white" else colour("cream")
     parts = [
-        paint(m.lathe(outer, 18), colour(base), roughness=0.25),
+        paint(m.lathe([(0.0, 0.0), *outer], 18, False), colour(base), roughness=0.25),
         paint(m.lathe([(r, h), (inside, h)], 18, False), colour(base), roughness=0.25),
         paint(m.lathe(inner[1:], 18, False), glaze, roughness=0.25),
         paint(m.lathe([(r + 0.0004, 0.050), (r + 0.0004, 0.058)], 18, False), colour(mark)),

@@ -151,7 +151,7 @@ def alarm_clock(look: int, params: Mapping[str, Any]) -> ObjectModel:
         tip = axis_rotation((0.0, 1.0, 0.0), s * 0.55)
         domes.append(m.moved(cap, (s * 0.0180, 0.0, z + r - 0.0045), tip))
     legs = [
-        m.tube([(s * 0.016, y, z - r + 0.010), (s * 0.0225, y, 0.0018)], 0.0030, 6)
+        m.tube([(s * 0.016, y, z - r + 0.010), (s * 0.0225, y, 0.0008)], 0.0030, 6)
         for s in (-1, 1)
         for y in (-0.008, 0.008)
     ]

@@ -1,0 +1,349 @@
+"""The object library: every look builds, and its numbers are true of its shapes."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from robospa.tasks.geometry import to_matrix
+from robospa.tasks.objects import assets, looks, object_model
+from robospa.tasks.objects import meshes as m
+from robospa.tasks.objects.containers import COVER_INNER_HEIGHT, COVER_INNER_RADIUS
+from robospa.tasks.shapes import Box, Cylinder, Grasp, Mesh, ObjectModel, Shape
+
+Array = NDArray[np.float64]
+
+EVERY = [(asset, look) for asset in assets() for look in range(looks(asset))]
+NOT_PICKED = {"dustbin"}
+RADIUS_LIMITS = {
+    **dict.fromkeys(
+        ("rubikscube", "alarm_clock", "mouse", "bell", "hamburger", "mug", "glue"), 0.06
+    ),
+    **dict.fromkeys(("tea_box", "sauce_can", "bowl", "fan", "tissue_box", "french_fries"), 0.065),
+    "bread": 0.048,
+    "seal": 0.045,
+    "toycar": 0.042,
+    "phone": 0.052,
+    "rubikscube": 0.044,
+    "remote_control": 0.042,
+    "stapler": 0.044,
+    "playing_cards": 0.032,
+    "soap": 0.036,
+    "can": 0.038,
+}
+NEEDED = set(
+    [
+        "block",
+        "tea_box",
+        "sauce_can",
+        "bowl",
+        "toycar",
+        "fan",
+        "tissue_box",
+        "french_fries",
+        "rubikscube",
+        "alarm_clock",
+        "mouse",
+        "stapler",
+        "bell",
+        "hamburger",
+        "playing_cards",
+        "mug",
+        "phone",
+        "glue",
+        "seal",
+        "soap",
+        "bread",
+        "remote_control",
+        "bottle",
+        "dustbin",
+        "can",
+        "bread_basket",
+        "pill_bottle",
+        "cover",
+    ]
+)
+
+
+@pytest.fixture(params=EVERY, ids=lambda pair: f"{pair[0]}-{pair[1]}")
+def model(request: pytest.FixtureRequest) -> ObjectModel:
+    asset, look = request.param
+    return object_model(asset, {"look": look})
+
+
+def corners(shape: Shape) -> Array:
+    """Points of a shape in the body frame, independent of the library's own bounds."""
+    g = shape.geometry
+    if isinstance(g, Mesh):
+        local = np.array(g.vertices)
+    elif isinstance(g, Box):
+        local = np.array([[a, b, c] for a in (-1, 1) for b in (-1, 1) for c in (-1, 1)]) * g.half
+    else:
+        assert isinstance(g, Cylinder)
+        t = np.linspace(0, 2 * math.pi, 37)
+        ring = np.stack([g.radius * np.cos(t), g.radius * np.sin(t)], axis=1)
+        ends = [np.column_stack([ring, np.full(37, s * g.half_length)]) for s in (-1, 1)]
+        local = np.concatenate(ends)
+    turned: Array = local @ to_matrix(shape.pose.rotation).T + shape.pose.position
+    return turned
+
+
+def test_the_tasks_assets_exist() -> None:
+    assert set(assets()) >= NEEDED
+
+
+def test_bounds_are_those_of_the_shapes(model: ObjectModel) -> None:
+    points = np.concatenate([corners(s) for s in model.shapes])
+    span = points.max(axis=0) - points.min(axis=0)
+    assert np.all(span <= np.array(model.size) + 1e-9)
+    assert np.all(span >= np.array(model.size) - 1.1e-3)
+    radius = float(np.hypot(points[:, 0], points[:, 1]).max())
+    assert model.radius - 5e-4 <= radius <= model.radius + 1e-9
+
+
+def test_the_origin_is_the_middle_of_the_underside(model: ObjectModel) -> None:
+    points = np.concatenate([corners(s) for s in model.shapes])
+    expected = -model.size[2] / 2 if model.asset == "block" else 0.0
+    assert model.bottom == pytest.approx(expected, abs=1e-6)
+    assert points[:, 2].min() == pytest.approx(model.bottom, abs=1e-6)
+
+
+def test_collision_shapes_stand_on_the_underside(model: ObjectModel) -> None:
+    points = np.concatenate([corners(s) for s in model.shapes if s.collision])
+    assert points[:, 2].min() == pytest.approx(model.bottom, abs=3e-4)
+    drawn = np.concatenate([corners(s) for s in model.shapes if s.visual])
+    assert abs(drawn[:, 2].min() - model.bottom) < 6e-4
+
+
+@pytest.mark.parametrize("asset", RADIUS_LIMITS)
+def test_footprints_fit_the_layouts(asset: str) -> None:
+    for look in range(looks(asset)):
+        assert object_model(asset, {"look": look}).radius <= RADIUS_LIMITS[asset]
+
+
+def test_soap_fits_between_its_neighbours() -> None:
+    for look in range(looks("soap")):
+        size = object_model("soap", {"look": look}).size
+        assert size[0] <= 0.058 and size[1] <= 0.034 and size[2] <= 0.0255
+
+
+def test_masses_are_those_of_small_things(model: ObjectModel) -> None:
+    assert 0.03 <= model.mass <= (2.0 if model.asset == "dustbin" else 0.15)
+    assert 0.5 <= model.friction <= 1.0
+
+
+def planes(shape: Shape) -> Iterator[tuple[Array, float]]:
+    """Half spaces n.x <= d of a convex collision shape, in the body frame."""
+    rotation, at = to_matrix(shape.pose.rotation), np.array(shape.pose.position)
+    g = shape.geometry
+    if isinstance(g, Mesh):
+        v = np.array(g.vertices)
+        pairs = []
+        for a, b, c in g.faces:
+            n = np.cross(v[b] - v[a], v[c] - v[a])
+            pairs.append((n / np.linalg.norm(n), v[a]))
+        local = [(n, float(n @ p)) for n, p in pairs]
+    elif isinstance(g, Box):
+        local = [(s * np.eye(3)[i], g.half[i]) for i in range(3) for s in (-1.0, 1.0)]
+    else:
+        assert isinstance(g, Cylinder)
+        t = np.linspace(0, 2 * math.pi, 145)[:-1]
+        local = [(np.array([math.cos(a), math.sin(a), 0.0]), g.radius) for a in t]
+        local += [(np.array([0.0, 0.0, s]), g.half_length) for s in (-1.0, 1.0)]
+    for n, d in local:
+        turned = rotation @ n
+        yield turned, d + float(turned @ at)
+
+
+def chords(model: ObjectModel, grasp: Grasp) -> list[tuple[float, float]]:
+    """Where the line through the grasp point along `closing` is inside collision shapes [m]."""
+    point, along = np.array(grasp.point), np.array(grasp.closing)
+    found = []
+    for shape in model.shapes:
+        if not shape.collision:
+            continue
+        low, high = -1.0, 1.0
+        for n, d in planes(shape):
+            speed, gap = float(n @ along), d - float(n @ point)
+            if abs(speed) < 1e-9:
+                if gap < 0:
+                    low, high = 1.0, -1.0
+            elif speed > 0:
+                high = min(high, gap / speed)
+            else:
+                low = max(low, gap / speed)
+        if low < high:
+            found.append((low, high))
+    return found
+
+
+def test_everything_to_be_picked_has_a_grasp(model: ObjectModel) -> None:
+    if model.asset in NOT_PICKED:
+        assert model.grasps == ()
+    else:
+        assert min(g.width for g in model.grasps) <= 0.0605
+
+
+def test_grasps_are_well_formed(model: ObjectModel) -> None:
+    for grasp in model.grasps:
+        assert np.linalg.norm(grasp.approach) == pytest.approx(1.0)
+        assert np.linalg.norm(grasp.closing) == pytest.approx(1.0)
+        assert np.dot(grasp.approach, grasp.closing) == pytest.approx(0.0, abs=1e-9)
+        assert 0 < grasp.width <= 0.07
+        assert 0.0 <= grasp.tilt <= 1.2
+        assert grasp.point[2] >= model.bottom + 0.005
+
+
+def test_grasps_hold_the_object_at_the_stated_width(model: ObjectModel) -> None:
+    for grasp in model.grasps:
+        inside = chords(model, grasp)
+        astride = [c for c in inside if c[0] <= 1e-3 and c[1] >= -1e-3]
+        around = astride or inside  # a hollow thing may be empty at the point itself
+        assert around, f"nothing between the fingers at {grasp.point}"
+        low, high = min(c[0] for c in around), max(c[1] for c in around)
+        assert high - low == pytest.approx(grasp.width, abs=2.5e-3)
+        assert (low + high) / 2 == pytest.approx(0.0, abs=2e-3)
+
+
+def test_meshes_look_outwards_and_are_small(model: ObjectModel) -> None:
+    count = 0
+    for shape in model.shapes:
+        if isinstance(shape.geometry, Mesh):
+            count += len(shape.geometry.faces) if shape.visual else 0
+            if shape.collision:
+                assert m.volume(shape.geometry) > 0
+    assert count <= 1000
+
+
+def test_colliding_meshes_are_convex(model: ObjectModel) -> None:
+    for shape in model.shapes:
+        if shape.collision and isinstance(shape.geometry, Mesh):
+            points = np.array(shape.geometry.vertices)
+            for n, d in planes(Shape(shape.geometry)):
+                assert float((points @ n).max()) <= d + 6e-4
+
+
+def test_frames_lie_on_the_object(model: ObjectModel) -> None:
+    assert {"press", "support"} <= set(model.frames)
+    for frame in model.frames.values():
+        x, y, z = frame.position
+        assert math.hypot(x, y) <= model.radius
+        assert model.bottom < z <= model.bottom + model.size[2]
+
+
+def test_phrases_describe_a_look_in_several_ways(model: ObjectModel) -> None:
+    assert len(set(model.phrases)) == len(model.phrases) >= 6
+    for phrase in model.phrases:
+        assert phrase == phrase.strip() and "  " not in phrase
+        assert phrase.split()[0] not in {"a", "an", "the"}
+
+
+@pytest.mark.parametrize("asset", assets())
+def test_looks_of_an_asset_share_no_phrase(asset: str) -> None:
+    found = [p for k in range(looks(asset)) for p in object_model(asset, {"look": k}).phrases]
+    assert len(set(found)) == len(found)
+
+
+def test_covers_hide_a_block_of_four_centimetres() -> None:
+    assert math.hypot(0.02, 0.02) + 0.002 < COVER_INNER_RADIUS
+    assert COVER_INNER_HEIGHT >= 0.045
+    for look in range(looks("cover")):
+        model = object_model("cover", {"look": look})
+        for shape in (s for s in model.shapes if s.collision):
+            for corner in [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (0, 2)]:
+                point = np.array(corner) * 0.02
+                assert max(float(n @ point) - d for n, d in planes(shape)) > 0.001
+        shell = next(s.geometry for s in model.shapes if s.visual)
+        assert isinstance(shell, Mesh)
+        assert min(v[2] for v in shell.vertices) == 0.0
+        walls = [math.hypot(v[0], v[1]) for v in shell.vertices if v[2] < 0.04]
+        assert min(walls) > COVER_INNER_RADIUS
+
+
+def test_the_dustbin_counts_what_lies_in_it() -> None:
+    """Official rule: a bottle's origin within 0.221, 0.325 of the bin's and 0.2 < z < 0.7."""
+    model = object_model("dustbin")
+    assert model.size[0] / 2 <= 0.221 and model.size[1] / 2 <= 0.325
+    assert 0.2 < model.frames["support"].position[2] < 0.3
+    assert model.size[2] < 0.69
+
+
+def test_the_basket_takes_every_bread() -> None:
+    floor = object_model("bread_basket").frames["support"].position[2]
+    assert floor < 0.01
+    for look in range(looks("bread")):
+        assert object_model("bread", {"look": look}).radius < 0.07
+
+
+def test_block_takes_size_and_colour() -> None:
+    model = object_model("block", {"half": [0.015, 0.02, 0.03], "color": [0.0, 0.0, 0.95]})
+    assert model.size == (0.03, 0.04, 0.06)
+    assert model.bottom == -0.03
+    assert "blue block" in model.phrases
+
+
+def test_models_are_cached_by_value() -> None:
+    first = object_model("block", {"half": [0.02, 0.02, 0.02], "look": 1})
+    assert object_model("block", {"look": 1, "half": (0.02, 0.02, 0.02)}) is first
+
+
+def test_parameters_survive_json() -> None:
+    params = {"half": [0.012, 0.013, 0.014], "color": [1.0, 0.5, 0.0]}
+    assert object_model("block", json.loads(json.dumps(params))) == object_model("block", params)
+
+
+def test_an_unknown_asset_names_near_ones() -> None:
+    with pytest.raises(KeyError, match=r"did you mean .*stapler"):
+        object_model("staplr")
+
+
+@pytest.mark.parametrize(
+    ("params", "message"),
+    [
+        ({"look": 99}, "looks 0 to"),
+        ({"look": -1}, "looks 0 to"),
+        ({"look": 1.0}, "looks 0 to"),
+        ({"colour": 1}, "no parameter 'colour'"),
+    ],
+)
+def test_bad_parameters_are_refused(params: dict[str, object], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        object_model("stapler", params)
+
+
+def test_lathe_makes_a_closed_outward_surface() -> None:
+    """A 4-sided lathe of radius 1 and height 1 is a square prism of volume 2."""
+    assert m.volume(m.lathe([(1.0, 0.0), (1.0, 1.0)], 4)) == pytest.approx(2.0)
+
+
+def test_triangulate_handles_a_concave_polygon() -> None:
+    shape = [(0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (1.0, 0.5), (0.0, 2.0)]
+    area = sum(m._cross(*(shape[i] for i in f)) / 2 for f in m.triangulate(shape))
+    assert area == pytest.approx(2.5)
+
+
+@pytest.mark.sim
+def test_objects_stay_where_they_stand(model: ObjectModel) -> None:
+    """Half a second on the table moves no object's origin by 2 mm, nor turns it by 2 degrees."""
+    import sapien
+    from sapien import physx
+
+    from robospa.harness.bodies import dynamic_body, ground_body
+    from robospa.tasks.geometry import Pose
+
+    scene = sapien.Scene([physx.PhysxCpuSystem()])
+    scene.set_timestep(1 / 250)
+    scene.add_entity(ground_body("ground"))
+    entity, _ = dynamic_body(model, "thing", Pose((0.0, 0.0, 0.001 - model.bottom)), False)
+    scene.add_entity(entity)
+    for _ in range(125):
+        scene.step()
+    x, y, z = (float(c) for c in entity.pose.p)
+    assert math.hypot(x, y) < 0.002
+    assert z == pytest.approx(-model.bottom, abs=0.001)
+    assert 2 * math.acos(min(1.0, abs(float(entity.pose.q[0])))) < math.radians(2)
