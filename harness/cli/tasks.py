@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import fields
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -91,18 +92,27 @@ def _scene(name: str, level: int, seed: int) -> Scene:
 
 
 def per_level(values: list[int]) -> str:
-    """The values of all levels, or the one value that all share."""
-    return str(values[0]) if len(set(values)) == 1 else " ".join(map(str, values))
+    """The values of all levels: "150" if they agree, "1..5" if they rise evenly, else each."""
+    rises = {b - a for a, b in pairwise(values)}
+    if len(rises) == 1 and rises != {0}:
+        return f"{values[0]}..{values[-1]}"
+    return str(values[0]) if rises <= {0} else " ".join(map(str, values))
 
 
 def _listing() -> Table:
+    from rich import box
     from rich.table import Table
 
     from robospa.tasks.catalog import tasks as all_tasks
 
-    table = Table(caption="n: candidates, T: subtasks, steps: limit in actions; for levels 1 to 5")
-    for heading in ("task", "category", "dimension", "n", "T", "steps"):
-        table.add_column(heading, no_wrap=heading == "task")
+    table = Table(
+        box=box.SIMPLE_HEAD,
+        padding=(0, 1, 0, 0),
+        pad_edge=False,
+        caption="n candidates, T subtasks, limit in policy actions: values of levels 1 to 5",
+    )
+    for heading in ("task", "", "dimension", "n", "T", "limit"):
+        table.add_column(heading, no_wrap=True)
     for task in all_tasks().values():
         levels = [task.levels[k] for k in sorted(task.levels)]
         table.add_row(

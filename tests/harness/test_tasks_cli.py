@@ -78,9 +78,10 @@ def test_size_is_width_then_height() -> None:
 
 
 @pytest.mark.parametrize(
-    ("values", "text"), [([150] * 5, "150"), ([2, 3, 4, 5, 6], "2 3 4 5 6"), ([7], "7")]
+    ("values", "text"),
+    [([150] * 5, "150"), ([2, 3, 4, 5, 6], "2..6"), ([3, 6, 8, 9, 12], "3 6 8 9 12"), ([7], "7")],
 )
-def test_levels_that_agree_are_shown_once(values: list[int], text: str) -> None:
+def test_the_values_of_all_levels_are_shown_briefly(values: list[int], text: str) -> None:
     assert per_level(values) == text
 
 
