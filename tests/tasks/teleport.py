@@ -1,0 +1,153 @@
+"""A plan carried out by moving poses about: no physics, no robot, just what each skill promises.
+
+It tells whether a task's plan and its goal mean the same, on hundreds of scenes a second.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from snapshots_by_hand import AWAY, DOWN, TICK
+
+from robospa.tasks.events import Event
+from robospa.tasks.geometry import Pose, Vec3
+from robospa.tasks.objects import object_model
+from robospa.tasks.plan import Drop, Home, Pick, Place, Press, Skill, Wait
+from robospa.tasks.scene import Scene
+from robospa.tasks.snapshot import ARMS, Contact, Snapshot
+from robospa.tasks.task import Tracker
+
+STEP = 0.01
+"""Length [m] of one tick's motion."""
+
+
+def mix(a: Vec3, b: Vec3, t: float) -> Vec3:
+    """The point between `a` (t = 0) and `b` (t = 1)."""
+    return (a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1]), a[2] + t * (b[2] - a[2]))
+
+
+class Teleport:
+    """One trial of `scene` under `tracker`; `events` holds what the tracker said."""
+
+    def __init__(self, scene: Scene, tracker: Tracker) -> None:
+        self.scene = scene
+        self.tracker = tracker
+        self.models = {o.name: object_model(o.asset, o.params) for o in scene.objects}
+        self.poses = {o.name: o.pose for o in scene.objects}
+        self.gripper = [1.0, 1.0]
+        self.grasp = list(AWAY)
+        self.time = 0.0
+        self.events: list[Event] = list(tracker.start(self.snapshot()))
+
+    @property
+    def ended(self) -> bool:
+        """Whether the trial is won or lost."""
+        return any(e.kind in ("success", "failed") for e in self.events)
+
+    def snapshot(self, contacts: Iterable[Contact] = ()) -> Snapshot:
+        """The state now."""
+        there = {
+            o.name: self.poses[o.name]
+            for o in self.scene.objects
+            if o.appears_at is None or o.appears_at <= self.time + 1e-9
+        }
+        left, right = (Pose((x, y, z + 0.12), DOWN) for x, y, z in self.grasp)
+        opening = (self.gripper[0], self.gripper[1])
+        return Snapshot(self.time, there, opening, (left, right), contacts=tuple(contacts))
+
+    def tick(self, count: int = 1, contacts: Iterable[Contact] = ()) -> None:
+        """Let time pass; nothing is heard after the end."""
+        for _ in range(count):
+            if not self.ended:
+                self.time += TICK
+                self.events += self.tracker.update(self.snapshot(contacts))
+
+    def run(self, plan: Iterable[Skill]) -> Teleport:
+        """Carry out a whole plan, then wait a little."""
+        for skill in plan:
+            self.do(skill)
+        self.tick(30)
+        return self
+
+    def do(self, skill: Skill) -> None:
+        """Carry out one skill."""
+        if isinstance(skill, Wait):
+            self.tick(round(skill.seconds / TICK))
+        elif isinstance(skill, Home):
+            self.gripper, self.grasp = [1.0, 1.0], list(AWAY)
+            self.tick()
+        elif isinstance(skill, Press):
+            self._press(skill)
+        elif isinstance(skill, Pick):
+            self._pick(skill)
+        elif isinstance(skill, Place):
+            self._place(skill)
+        elif isinstance(skill, Drop):
+            self._drop(skill)
+        else:
+            raise AssertionError(f"no such skill here: {skill}")
+
+    def _arm(self, name: str | None, at: Vec3) -> int:
+        return ARMS.index(name) if name is not None else int(at[0] >= 0)
+
+    def _carry(self, name: str, arm: int, to: Vec3) -> None:
+        """Move a held object and the gripper around it along a straight line."""
+        start = self.poses[name]
+        length = sum((b - a) ** 2 for a, b in zip(start.position, to, strict=True)) ** 0.5
+        pieces = max(1, round(length / STEP))
+        for i in range(1, pieces + 1):
+            here = mix(start.position, to, i / pieces)
+            self.poses[name] = Pose(here, start.rotation)
+            self.grasp[arm] = (here[0], here[1], here[2] + 0.02)
+            self.tick()
+
+    def _press(self, skill: Press) -> None:
+        frame = self.poses[skill.object] * self.models[skill.object].frames[skill.frame]
+        arm = self._arm(skill.arm, frame.position)
+        self.gripper[arm] = 0.0
+        self.grasp[arm] = frame.position
+        self.tick(5, [Contact(skill.object, f"{ARMS[arm]}_gripper", frame.position)])
+        self.tick(10)
+
+    def _pick(self, skill: Pick) -> None:
+        x, y, z = self.poses[skill.object].position
+        arm = self._arm(skill.arm, (x, y, z))
+        self.grasp[arm] = (x, y, z + 0.02)
+        self.gripper[arm] = 0.1
+        self.tick()
+        self._carry(skill.object, arm, (x, y, z + skill.lift))
+
+    def _place(self, skill: Place) -> None:
+        goal = skill.position
+        if skill.on is not None:
+            frame = self.poses[skill.on] * self.models[skill.on].frames["support"]
+            x, y, z = frame.apply(skill.position)
+            goal = (x, y, z - self.models[skill.object].bottom)
+        arm = self._arm(skill.arm, self.poses[skill.object].position)
+        high = max(goal[2] + 0.07, self.poses[skill.object].position[2])
+        self._carry(skill.object, arm, (goal[0], goal[1], high))
+        self._carry(skill.object, arm, goal)
+        self._let_go(arm)
+
+    def _drop(self, skill: Drop) -> None:
+        bin_pose, model = self.poses[skill.into], self.models[skill.into]
+        x, y, z = bin_pose.position
+        arm = self._arm(skill.arm, self.poses[skill.object].position)
+        self._carry(skill.object, arm, (x, y, z + model.size[2] + skill.height))
+        self.gripper[arm] = 1.0
+        floor = (bin_pose * model.frames["support"]).position[2]
+        height, speed = self.poses[skill.object].position[2], 0.0
+        while height > floor:
+            speed += 9.81 * TICK
+            height = max(floor, height - speed * TICK)
+            self.poses[skill.object] = Pose((x, y, height), (0.6, 0.8, 0.0, 0.0))
+            self.tick()
+        self.tick(3)
+        self.grasp[arm] = AWAY[arm]
+
+    def _let_go(self, arm: int) -> None:
+        for opening in (0.3, 0.6, 1.0):
+            self.gripper[arm] = opening
+            self.tick()
+        self.grasp[arm] = AWAY[arm]
+        self.tick(12)
