@@ -17,15 +17,14 @@ then it need not be thread-safe.
 
 from __future__ import annotations
 
-import asyncio
 import itertools
 import time
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Protocol, TypeVar
 
 from robospa.protocol.batching import Batcher
 from robospa.protocol.policy import Observation, Policy, PolicySpec, TrialInfo
+from robospa.protocol.threads import PolicyThreads
 
 T = TypeVar("T")
 PolicyFactory = Callable[[], Policy]
@@ -64,13 +63,13 @@ class Engine:
         self._shared = self._spare if policy is not None else None
         self._batched = policy is not None and hasattr(policy, "infer_batch")
         self.max_sessions = None if self._factory is not None or self._batched else 1
-        self._executor = ThreadPoolExecutor(threads, thread_name_prefix="robospa-policy")
+        self._threads = PolicyThreads(threads)
         self._numbers = itertools.count(1)
         self._batcher = Batcher(self._infer_batch, self.spec.batch, queue)
 
     async def run(self, call: Callable[..., T], *args: Any) -> T:
         """`call(*args)` in a policy thread."""
-        return await asyncio.get_running_loop().run_in_executor(self._executor, call, *args)
+        return await self._threads.run(call, *args)
 
     async def open(self) -> PolicySession:
         """A session for a new connection."""
@@ -93,8 +92,8 @@ class Engine:
         return answers
 
     def close(self) -> None:
-        """Let the running call finish and start no other."""
-        self._executor.shutdown(wait=False, cancel_futures=True)
+        """Let go of the threads."""
+        self._threads.close()
 
 
 class _OwnSession:
