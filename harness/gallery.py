@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 
 CELL = (320, 240)
 """Size of a picture on the sheet [px]; it is rendered at twice that and averaged."""
-GAP, MARGIN, HEADER, TITLE, CAPTION = 10, 24, 34, 64, 50  # [px]
-TEXT, CAPTION_SIZE, LINES = "#20262e", 12, 3
+GAP, MARGIN, HEADER, TITLE, CAPTION = 10, 24, 34, 64, 66  # [px]
+TEXT, CAPTION_SIZE, LINES = "#20262e", 12, 4
 PAPER, QUIET = "#ffffff", "#68727f"
 TRIES = 20
 """Seeds that `settled_scene` tries."""

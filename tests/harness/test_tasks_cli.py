@@ -106,8 +106,8 @@ def test_text_is_wrapped_at_words() -> None:
 
 
 def test_text_that_is_too_long_ends_in_an_ellipsis() -> None:
-    lines = gallery.wrapped("aa bb cc dd ee ff gg hh", 5, len)
-    assert lines == ["aa bb", "cc dd", "ee …"]
+    lines = gallery.wrapped("aa bb cc dd ee ff gg hh ii jj", 5, len)
+    assert lines == ["aa bb", "cc dd", "ee ff", "gg …"]
 
 
 def test_the_sheet_has_a_row_a_task_and_a_column_a_level() -> None:
