@@ -1,4 +1,4 @@
-"""What cameras see: a scene that is only drawn, posed like the physics at the moment of the picture.
+"""What cameras see: a scene that is only drawn, posed like the physics when the picture is taken.
 
 Drawing has its own scene, without physics: a world that never looks pays nothing, and looking
 cannot change a trial. Robot, table, lights and cameras stay from trial to trial (they hold no
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from robospa.harness import furniture
 from robospa.harness.robots.embodiment import Embodiment
+from robospa.harness.shaders import shader_folder
 from robospa.harness.world import RenderUnavailable
 from robospa.protocol.policy import CameraSpec
 from robospa.tasks.geometry import Pose
@@ -30,6 +31,8 @@ Links = Sequence[Mapping[str, Pose]]
 AMBIENT = (0.5, 0.5, 0.5)
 SUN_DIRECTION, SUN_COLOR = (0.0, 0.5, -1.0), (0.5, 0.5, 0.5)
 LAMPS, LAMP_COLOR = ((1.0, 0.0, 1.8), (-1.0, 0.0, 1.8)), (1.0, 1.0, 1.0)
+SHADOW_SIZE = 1024
+"""[px] of the shadow map: 2 mm on the table."""
 NEAR, FAR = 0.1, 100.0
 WRIST_NEAR = 0.01
 """[m]: the fingers are nearer to the wrist cameras than the official near plane."""
@@ -86,7 +89,7 @@ class Studio:
             shadow_scale=1.0,
             shadow_near=-2.0,
             shadow_far=4.0,
-            shadow_map_size=2048,
+            shadow_map_size=SHADOW_SIZE,
         )
         for position in LAMPS:
             self._scene.add_point_light(position, LAMP_COLOR)
@@ -106,7 +109,7 @@ class Studio:
         embodiment: Embodiment,
         model: Callable[[str, Mapping[str, Any]], ObjectModel],
     ) -> None:
-        """Take the objects of `scene` and the robot `embodiment`; cheap if they are here already."""
+        """Take the objects of `scene` and the robot; costs nothing if they are here already."""
         if self._embodiment is not embodiment:
             self._set_robot(embodiment)
         if self._loaded is not scene:
@@ -179,7 +182,7 @@ class Studio:
                     f"camera {spec.name!r} cannot be {spec.width}x{spec.height}; "
                     f"sizes are 1 to {LARGEST}"
                 )
-            camera = sapien.render.RenderCameraComponent(spec.width, spec.height)
+            camera = sapien.render.RenderCameraComponent(spec.width, spec.height, shader_folder())
             camera.set_fovy(fov, compute_x=True)
             camera.near, camera.far = near, FAR
             entity = sapien.Entity()

@@ -1,0 +1,122 @@
+"""SAPIEN's default shader without what a scene of ours never uses: same pixels, sooner.
+
+On its first picture SAPIEN integrates a table for image-based lighting: five seconds on two cores in
+software, in every process, although a scene without environment map multiplies it by black. The
+passes for lines, points and transparent surfaces cost a fifth of every picture, and nothing
+here is transparent. This module copies the installed shader into the user's cache folder and leaves
+these parts out. If the installed shader is not the one that these edits were written for, it is
+used as it is.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from functools import cache
+from pathlib import Path
+
+UNUSED = (
+    "gbuffer1.frag",
+    "gbuffer1.vert",
+    "line.frag",
+    "line.vert",
+    "point.frag",
+    "point.vert",
+)
+
+# (file, text that is there, text to put instead); each must occur exactly once
+EDITS = (
+    (
+        "scene_set.glsl",
+        "layout(set = SET_NUM, binding = 8) uniform sampler2D samplerBRDFLUT;",
+        "",
+    ),
+    (
+        "deferred.frag",
+        "vec2 envBRDF = texture(samplerBRDFLUT, vec2(roughness, dotNV)).xy;",
+        "vec2 envBRDF = vec2(0);",
+    ),
+    (
+        "composite0.frag",
+        """  vec4 lineColor = texture(samplerLine, inUV);
+  if (texture(samplerLineDepth, inUV).x < 1) {
+    outColor = vec4(lineColor.xyz, 1);
+  }
+
+  vec4 pointColor = texture(samplerPoint, inUV);
+  if (texture(samplerPointDepth, inUV).x < 1) {
+    outColor = vec4(pointColor.xyz, 1);
+  }
+""",
+        "",
+    ),
+    (
+        "composite0.frag",
+        """layout(set = 0, binding = 3) uniform sampler2D samplerLineDepth;
+layout(set = 0, binding = 4) uniform sampler2D samplerLine;
+layout(set = 0, binding = 5) uniform sampler2D samplerPointDepth;
+layout(set = 0, binding = 6) uniform sampler2D samplerPoint;
+layout(set = 0, binding = 7) uniform sampler2D samplerGbufferDepth;
+""",
+        "layout(set = 0, binding = 3) uniform sampler2D samplerGbufferDepth;\n",
+    ),
+)
+
+
+def trimmed(folder: Path) -> bool:
+    """Edit the shader files in `folder` in place; False, with nothing done, if they differ."""
+    texts: dict[str, str] = {}
+    for name, old, new in EDITS:
+        path = folder / name
+        if name not in texts:
+            if not path.is_file():
+                return False
+            texts[name] = path.read_text()
+        if texts[name].count(old) != 1:
+            return False
+        texts[name] = texts[name].replace(old, new)
+    for name, text in texts.items():
+        (folder / name).write_text(text)
+    for name in UNUSED:
+        (folder / name).unlink(missing_ok=True)
+    return True
+
+
+def cache_folder() -> Path:
+    """Where this user's caches go."""
+    base = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
+    return Path(base) / "robospa"
+
+
+@cache
+def shader_folder() -> str:
+    """The shader for cameras, as SAPIEN wants it named: a folder, or "" for its own default."""
+    import sapien
+
+    installed = Path(sapien.__file__).parent / "vulkan_shader"
+    try:
+        root = cache_folder()
+        target = root / f"shader-sapien-{sapien.__version__}-1"
+        if not target.is_dir():
+            root.mkdir(parents=True, exist_ok=True)
+            work = Path(tempfile.mkdtemp(dir=root))
+            for part in ("default", "common"):
+                shutil.copytree(installed / part, work / part)
+            if not trimmed(work / "default"):
+                shutil.rmtree(work)
+                return ""
+            _publish(work, target)
+        return str(target / "default")
+    except OSError:
+        return ""
+
+
+def _publish(work: Path, target: Path) -> None:
+    """Rename the finished copy into place; another process may have been first."""
+    try:
+        work.rename(target)
+    except OSError:
+        if not target.is_dir():
+            raise
+        shutil.rmtree(work, ignore_errors=True)
