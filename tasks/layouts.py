@@ -66,6 +66,15 @@ def in_head_view(
     return inside
 
 
+def view_span(
+    y: float, radius: float = 0.0, height: float = 0.0, margin: float = 0.02
+) -> tuple[float, float]:
+    """The x range [m] in which a cylinder of this `radius` and `height` at `y` is in view."""
+    depth = 0.6 * (y - EYE[1]) + 0.8 * (EYE[2] - TABLE_TOP - height)
+    half = (0.5 - margin) * WIDTH / FOCAL * depth - radius
+    return EYE[0] - half, EYE[0] + half
+
+
 def in_reach(x: Array, y: Array) -> Mask:
     """Whether the nearer arm can grasp at these places, as a boolean array."""
     near = [np.hypot(x - bx, y - by) for bx, by in BASES]

@@ -13,11 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from robospa.tasks.geometry import Array, Pose, yaw_rotation
-from robospa.tasks.goals.pick import Lift, PickTracker
+from robospa.tasks.goals.pick import Lift
 from robospa.tasks.layouts import Area, Mask, Points, in_head_view, scatter, spread
-from robospa.tasks.plan import Pick, Skill
 from robospa.tasks.scene import TABLE_TOP, Scene, SceneObject
-from robospa.tasks.task import Draft, Level, Task, Tracker
+from robospa.tasks.task import Draft, Level, Task
+from robospa.tasks.variants.picking import lifted, pick_target
 from robospa.tasks.variants.wording import NOUN_CUBE, Slots, ordinals
 
 HALF_EDGES = (
@@ -110,17 +110,6 @@ def draw(level: int, rng: np.random.Generator) -> Draft:
     return Draft(objects, {"target": f"object_{target}", "size_rank": ranks[target]})
 
 
-def goal(scene: Scene) -> Tracker:
-    """The target's centre is above 0.82 m."""
-    names = tuple(o.name for o in scene.objects)
-    return PickTracker(str(scene.facts["target"]), names, Lift(above=0.82))
-
-
-def plan(scene: Scene) -> tuple[Skill, ...]:
-    """Pick the target."""
-    return (Pick(str(scene.facts["target"])),)
-
-
 def slots(scene: Scene) -> Slots:
     """`size_rank` ("2nd largest") and `noun`."""
     rank = int(scene.facts["size_rank"])
@@ -137,8 +126,8 @@ TASK = Task(
     category="GAC",
     levels=LEVELS,
     draw=draw,
-    goal=goal,
-    plan=plan,
+    goal=lifted(Lift(above=0.82)),
+    plan=pick_target,
     slots=slots,
     summary="Pick the block of the named size rank among 2 to 6 blocks of one colour.",
     success="the target's centre is higher than 0.82 m while a gripper carries it",
