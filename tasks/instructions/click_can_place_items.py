@@ -63,9 +63,9 @@ _RESULTS = (
 
 _EVENTS = (
     "a press of {can}",
-    "{bread} into {basket}",
+    "{bread} going into {basket}",
     "another press of {can}",
-    "{bottle} onto {pad}",
+    "{bottle} going onto {pad}",
     "a final press of {can}",
 )
 """The steps as names of events."""
@@ -76,13 +76,13 @@ def _numbered(steps: Sequence[str]) -> str:
 
 
 def _announced(steps: Sequence[str]) -> str:
-    words = ("first", "next", "after that", "then", "finally")
-    last = [*words[: len(steps) - 1], "finally"]
-    return ", ".join(f"{word} {step}" for word, step in zip(last, steps, strict=True)) + "."
+    words = ("first", "next", "after that", "then")[: len(steps) - 1]
+    last = "and then" if len(steps) == 2 else "and finally"
+    return ", ".join(f"{w} {s}" for w, s in zip((*words, last), steps, strict=True)) + "."
 
 
 def _sentences(steps: Sequence[str]) -> str:
-    words = ("", "afterwards ", "next ", "then ", "last ")
+    words = ("", "afterwards ", "next ", "then ", "finally ")
     return " ".join(f"{word}{step}." for word, step in zip(words, steps, strict=False))
 
 
@@ -99,7 +99,7 @@ _CHAINS: tuple[Callable[[Sequence[str]], str], ...] = (
     lambda steps: listed(steps) + ", in that order.",
     lambda steps: "do the following one after another: " + ", ".join(steps) + ".",
     _sentences,
-    lambda steps: "finish each step before the next: " + listed(steps, ", and ") + ".",
+    lambda steps: "finish each step before the next: " + listed(steps) + ".",
     _paired,
     lambda steps: "start: " + steps[0] + ". Continue: " + listed(steps[1:], ", then ") + ".",
 )
@@ -107,17 +107,17 @@ _CHAINS: tuple[Callable[[Sequence[str]], str], ...] = (
 
 
 def _heldout(results: Sequence[str], events: Sequence[str]) -> tuple[str, ...]:
-    should = [_passive(result, "should be") for result in results]
+    should = _passive(results[0], "should be")
     present = [_passive(result, "is") for result in results]
     infinitive = [_passive(result, "to be") for result in results]
     return (
         f"what I need is {listed(results, ', and then ')}.",
         f"could I have {listed(results, ' and afterwards ')}?",
-        f"{', after which '.join(should)}.",
+        f"{should}, then {listed(results[1:], ' and eventually ')}.",
         f"the task consists of {', followed by '.join(events)}.",
         f"I would like to see {', and later '.join(results)}.",
         f"if all goes well, {listed(present, ', and at last ')}.",
-        f"the order of events ought to be {', '.join(events)}.",
+        f"the order of events ought to be {', then '.join(events)}.",
         f"what comes when? It is {' before '.join(events)}.",
         f"success requires {listed(infinitive, ' and thereafter ')}.",
         f"it all ends with {events[-1]}; what precedes is {', and later '.join(events[:-1])}.",

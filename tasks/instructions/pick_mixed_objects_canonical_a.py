@@ -12,7 +12,7 @@ from robospa.tasks.instructions.pick_clauses import named, wrapped
 _WRAPPERS = (
     "{viewer}, <C>.",
     "counting {viewer}, <C>.",
-    "view the objects {viewer} and <C>.",
+    "view the objects {viewer}, then <C>.",
     "read the arrangement {viewer}; <C>.",
     "with positions counted {viewer}, <C>.",
     "<C>, counting {viewer}.",
@@ -35,11 +35,11 @@ _GRID = (
 
 _LINE_HELDOUT = (
     "the object in {column} position {column_direction}",
-    "the one whose turn is {column} {column_direction}",
+    "the thing found {column} {column_direction}",
 )
 _GRID_HELDOUT = (
     "the object where the {row} row {row_direction} meets the {column} column {column_direction}",
-    "the one in row place {row} {row_direction} and column place {column} {column_direction}",
+    "the thing found {column} {column_direction} along the {row} row {row_direction}",
 )
 
 _HELDOUT = (

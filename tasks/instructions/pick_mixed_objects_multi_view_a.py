@@ -14,13 +14,13 @@ REQUIRED = ("target", "view", "convention")
 _WRAPPERS = (
     "seen {view}, where {convention}, <C>.",
     "looking {view}, <C>; {convention}.",
-    "imagine the scene {view}, where {convention}, and <C>.",
+    "imagine the scene {view}, where {convention}, then <C>.",
     "<C>, as judged {view}, where {convention}.",
     "picture the scene {view}; {convention}. Then <C>.",
     "assume a viewer looking {view}; {convention}. Now <C>.",
     "<C>. The scene is viewed {view}, and {convention}.",
     "judge positions {view}, where {convention}: <C>.",
-    "given that the view is {view} and that {convention}, <C>.",
+    "for somebody looking {view}, where {convention}, <C>.",
     "<C>, with positions as they appear {view}; {convention}.",
 )
 

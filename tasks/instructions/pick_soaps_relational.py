@@ -13,16 +13,16 @@ from robospa.tasks.instructions.pick_clauses import named, wrapped
 REQUIRED = ("relation", "reference", "convention")
 
 _WRAPPERS = (
-    "given that {convention}, <C>.",
-    "<C>, where {convention}.",
-    "note that {convention}, and <C>.",
-    "remember that {convention}; <C>.",
-    "<C>; here {convention}.",
-    "<C>. In this scene, {convention}.",
-    "<C>, bearing in mind that {convention}.",
-    "assuming that {convention}, <C>.",
-    "keep in mind that {convention}, then <C>.",
-    "since {convention}, <C>.",
+    "seen from the robot, {convention}; <C>.",
+    "<C>, using the robot's directions, where {convention}.",
+    "take the robot's viewpoint, where {convention}, then <C>.",
+    "with the robot as the viewer, so that {convention}, <C>.",
+    "<C>. From the robot's side, {convention}.",
+    "<C>, bearing in mind that {convention} as the robot sees it.",
+    "all directions are the robot's, so {convention}; <C>.",
+    "remember that {convention} from the robot's viewpoint, then <C>.",
+    "<C>; for the robot, {convention}.",
+    "since {convention} when seen from the robot, <C>.",
 )
 
 _NAMES = (
@@ -34,16 +34,16 @@ _NAMES = (
 _NAMES_HELDOUT = ("the soap bar {relation} {reference}", "the bar {relation} {reference}")
 
 _HELDOUT = (
-    "what I need is <X> raised off {table}, and {convention}.",
-    "could <X> be brought up for me, if {convention}?",
-    "if {convention}, then <X> should be off {table} in the end.",
-    "the goal, in which {convention}, is a gripper holding <X>.",
-    "I would like to see <X> in the air; as for words, {convention}.",
-    "the convention is this: {convention}. It is <X> that has to go up.",
-    "<X> has to leave {table}, with the understanding that {convention}.",
-    "which one should go up? It is <X>, and {convention}.",
-    "success requires {arm} to hold <X>, provided {convention}.",
-    "it would help to have <X> in the grip of {arm}; {convention}.",
+    "what I need is <X> raised, with directions as the robot has them: {convention}.",
+    "could <X> be brought up for me, if the robot is the viewer and {convention}?",
+    "if the robot does the looking and {convention}, then <X> should be off {table}.",
+    "the goal, in the robot's own terms, where {convention}, is a gripper holding <X>.",
+    "I would like to see <X> in the air; to the robot, {convention}.",
+    "the robot is the viewer here, and {convention}. It is <X> that has to go up.",
+    "<X> has to leave {table}, named the way the robot sees it, so {convention}.",
+    "which one should go up? It is <X>, from the robot's view, where {convention}.",
+    "success requires {arm} to hold <X>, in the robot's terms: {convention}.",
+    "it would help to have <X> in the grip of {arm}; to the robot's eyes, {convention}.",
 )
 
 

@@ -36,7 +36,7 @@ _DEEDS_ONE = (
 _HELDOUT_ONE = (
     "what I need, once the cover is on, is the cover of {block} moved {where}.",
     "could the cover of {block} be moved {where}, but only after it has come?",
-    "the cover of {block} should go {where} as soon as it is in place, with no motion before.",
+    "the cover of {block} should go {where}, as soon as it is in place, with no motion before.",
     "the arms must rest until hiding is over; the cover of {block} has to go {where}.",
     "I would like to see {block} revealed, its cover gone {where}, after a motionless wait.",
     "if {block} has been hidden, its cover may go {where}, not earlier.",
@@ -73,9 +73,9 @@ _DEEDS = (
 _HELDOUT = (
     "what I need, once the covers are on, is each cover moved {where}: {order}.",
     "could each cover be moved {where}, going {order}, but not before all blocks are hidden?",
-    "each cover should go {where} as soon as all are in place, no motion before; by color {order}.",
+    "each cover should go {where}, once all are in place, no motion before; by color {order}.",
     "the arms must rest until hiding is over; the covers have to go {order}, each {where}.",
-    "I would like the hidden blocks revealed {order}, covers going {where}, no motion earlier.",
+    "I would like the hidden blocks revealed {order}, each cover going {where}, no motion earlier.",
     "if the colors have been hidden, not earlier, each cover may go {where}, by color {order}.",
     "the goal, with everything at rest until hiding, is every cover moved {where}, going {order}.",
     "nothing may move until the covers come. What follows is {order}, each cover going {where}.",

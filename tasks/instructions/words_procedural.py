@@ -18,7 +18,7 @@ def press(count: int) -> Slots:
     slots: Slots = {
         "stapler": (
             ("the stapler", "the desk stapler", "the office stapler"),
-            ("the paper stapler", "the stapling device", "the stapler on display", "that stapler"),
+            ("the paper stapler", "the stapling device", "the stapling tool", "that stapler"),
         )
     }
     word = NUMBERS[count]
@@ -89,25 +89,25 @@ def stack(colors: Sequence[str]) -> Slots:
                 ),
                 "middle": (
                     (
-                        "the middle of the table, close to the robot",
-                        "the center of the table, near the robot",
+                        "the middle of the table close to the robot",
+                        "the center of the table near the robot",
                     ),
                     (
-                        "the table's center line, right by the robot",
+                        "the spot on the table's center line right by the robot",
                         "the central spot close to the robot",
                         "the center of the robot's side of the table",
                     ),
                 ),
             }
         )
-    chain = listed(colors, ", then ")
+    chain, steps = listed(colors, ", then "), _steps(colors)
     last = ", ".join(f"{c} {p}" for c, p in zip(colors, _places(len(colors)), strict=True))
     onto = list(zip(colors[1:], colors[:-1], strict=True))
     number = NUMBERS[len(colors)]
     return with_common(
         {
             "order": (
-                (chain, f"first {', then '.join(colors)}"),
+                (chain, steps),
                 (last, " followed by ".join(colors), ", next ".join(colors)),
             ),
             "pairs": (
@@ -146,6 +146,11 @@ def stack(colors: Sequence[str]) -> Slots:
     )
 
 
+def _steps(colors: Sequence[str]) -> str:
+    """ "red, then green, then blue"; two colours are joined by "and then"."""
+    return (", then " if len(colors) > 2 else " and then ").join(colors)
+
+
 def _places(count: int) -> tuple[str, ...]:
     return (*("first", "second", "third", "fourth")[: count - 1], "last")
 
@@ -165,7 +170,7 @@ def click(level: int) -> Slots:
         )
         slots["basket"] = (
             ("the basket", "the bread basket"),
-            ("the breadbasket", "the basket for bread", "the basket container"),
+            ("the breadbasket", "the basket for bread", "the bread container"),
         )
     if level >= 4:
         slots["bottle"] = (
@@ -193,7 +198,7 @@ def memory(colors: Sequence[str]) -> Slots:
             ),
             (
                 "directly away from the robot, ending 13 cm behind its block",
-                "in a straight line from the robot to 13 cm beyond its block",
+                "in a straight line away from the robot, to 13 cm beyond its block",
                 "straight away from the robot, 13 cm past its block",
                 "straight back from the robot until it lies 13 cm behind its block",
             ),
@@ -211,7 +216,7 @@ def memory(colors: Sequence[str]) -> Slots:
     else:
         last = ", ".join(f"{c} {p}" for c, p in zip(colors, _places(len(colors)), strict=True))
         slots["order"] = (
-            (listed(colors, ", then "), f"first {', then '.join(colors)}"),
+            (listed(colors, ", then "), _steps(colors)),
             (last, " followed by ".join(colors), ", next ".join(colors)),
         )
     return with_common(slots)

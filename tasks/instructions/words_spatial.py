@@ -59,7 +59,7 @@ _ROBOT_VIEW = (
 )
 
 _VIEWS: Slots = {
-    "back": (
+    "robot": (
         ("from the robot's own viewpoint", "from the robot's side of the table"),
         (
             "from where the robot stands",
@@ -67,18 +67,18 @@ _VIEWS: Slots = {
             "from the place of the robot",
         ),
     ),
-    "front": (
+    "opposite": (
         ("from the viewpoint opposite the robot", "from the side of the table facing the robot"),
         (
             "from across the table, opposite the robot",
             "from the place that faces the robot",
-            "from the far side of the table, looking at the robot",
+            "from the far side of the table, towards the robot",
         ),
     ),
     "left": (
         ("from the viewpoint on the robot's left", "from the table side to the robot's left"),
         (
-            "from the robot's left, looking across the table",
+            "from the robot's left, across the table",
             "from a place at the robot's left-hand side",
             "from the table end to the left of the robot",
         ),
@@ -86,7 +86,7 @@ _VIEWS: Slots = {
     "right": (
         ("from the viewpoint on the robot's right", "from the table side to the robot's right"),
         (
-            "from the robot's right, looking across the table",
+            "from the robot's right, across the table",
             "from a place at the robot's right-hand side",
             "from the table end to the right of the robot",
         ),
@@ -102,13 +102,13 @@ def size(rank: int, count: int) -> Slots:
     train: tuple[str, ...]
     held: tuple[str, ...]
     if count == 2:
-        more, other = ("larger", "bigger") if rank == 1 else ("smaller", "less large")
-        train = (f"the {more} block", f"the {other} block")
+        more = "larger" if rank == 1 else "smaller"
+        train = (f"the {more} block", "the bigger block" if rank == 1 else "the 2nd largest block")
         held = (
             f"the {more} of the two blocks",
             f"the block that is {more} than the other",
             f"the {more} one of the two blocks",
-            f"the {other} of the two blocks",
+            "the bigger of the two blocks" if rank == 1 else "the second largest of the two blocks",
         )
     elif rank == 1:
         train = ("the largest block", "the biggest block")
@@ -174,20 +174,25 @@ def canonical(
 ) -> Slots:
     """{column}, {column_direction}, {viewer} and, if there are rows, {row}, {row_direction}.
 
-    Positions count from 1 along "from left to right" or "from right to left", and along "from near
-    to far" or "from far to near".
+    Positions count from 1 along "left_to_right" or "right_to_left", and along "near_to_far" or
+    "far_to_near".
     """
     spelled = ordinal(column)
     slots: Slots = {
         "column": (spelled, spelled),
-        "column_direction": _COLUMNS[column_direction],
+        "column_direction": _COLUMNS[_direction(column_direction)],
         "viewer": _ROBOT_VIEW,
     }
     if row is not None and row_direction is not None:
         spelled = ordinal(row)
         slots["row"] = (spelled, spelled)
-        slots["row_direction"] = _ROWS[row_direction]
+        slots["row_direction"] = _ROWS[_direction(row_direction)]
     return with_common(slots)
+
+
+def _direction(name: str) -> str:
+    """ "left_to_right" or "from left to right", as the latter."""
+    return "from " + name.removeprefix("from ").replace("_", " ")
 
 
 def relational(direction: str, reference: str, level: int) -> Slots:
@@ -224,12 +229,12 @@ def relational(direction: str, reference: str, level: int) -> Slots:
     )
     convention = (
         (
-            "seen from the robot, front means far and back means near",
-            "from the robot's viewpoint, the front is the far side and the back is the near side",
+            "front means far and back means near",
+            "the front is the far side and the back the near side",
         ),
         (
-            "directions are the robot's own, front pointing away from it and back towards it",
-            "the robot is the viewer, with front for the far side and back for the near side",
+            "front stands for far and back for near",
+            "the far side counts as front, the near side as back",
         ),
     )
     return with_common({"relation": relation, "reference": names, "convention": convention})
@@ -238,8 +243,8 @@ def relational(direction: str, reference: str, level: int) -> Slots:
 def multi_view(position: str, view: str) -> Slots:
     """{target}, {view}, {convention}: the extreme object, named from a viewpoint.
 
-    `position` is leftmost, rightmost, frontmost or backmost *in that view*; `view` is back (the
-    robot's own), front, left or right, as the fact sheets name them.
+    `position` is leftmost, rightmost, frontmost or backmost *in that view*; the viewer is the
+    robot, someone opposite, or someone at the robot's left or right.
     """
     side = position.removesuffix("most")
     if side not in ("left", "right", "front", "back"):
