@@ -7,6 +7,8 @@ right arm cannot reach the bin, so it hands bottles over by setting them down in
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from robospa.tasks import objects
@@ -14,10 +16,11 @@ from robospa.tasks.geometry import Pose
 from robospa.tasks.goals.anyorder import Collect, Container
 from robospa.tasks.instructions import words_procedural
 from robospa.tasks.instructions.words import Slots
+from robospa.tasks.layouts import BASES, MAX_REACH
 from robospa.tasks.plan import Drop, Pick, Place, Skill
 from robospa.tasks.scene import TABLE_TOP, Scene
 from robospa.tasks.task import Draft, Level, Task
-from robospa.tasks.variants.tabletop import Item, named, scatter, side, standing
+from robospa.tasks.variants.tabletop import Item, Point, named, scatter, side, standing
 
 BIN = Pose((-0.45, 0.0, 0.0))
 TABLE_SHIFT = (0.3, 0.0)
@@ -31,9 +34,15 @@ EXCHANGE = (-0.03, -0.08)
 LEVELS = {n: Level(candidates=n, subtasks=n, steps=400 * n) for n in range(1, 6)}
 
 
+def _usable(point: Point) -> bool:
+    """Off the middle strip and within reach of the arm on that side."""
+    base = BASES[int(point[0] > 0)]
+    return abs(point[0]) >= MIDDLE and math.dist(point, base) <= MAX_REACH
+
+
 def draw(level: int, rng: np.random.Generator) -> Draft:
     """Bottles anywhere in the region but the middle strip; different looks up to level 3."""
-    points = scatter(rng, level, X, Y, DISTANCE, lambda point: abs(point[0]) >= MIDDLE)
+    points = scatter(rng, level, X, Y, DISTANCE, _usable)
     count = objects.looks("bottle")
     looks = rng.choice(count, size=level, replace=level > min(3, count))
     items = [Item("dustbin", "dustbin", BIN, {"look": 0}, fixed=True)]

@@ -6,12 +6,14 @@ import itertools
 import math
 from collections import Counter
 
+import numpy as np
 import pytest
 from teleport import Teleport
 
 from robospa.tasks.catalog import build_scene, task
 from robospa.tasks.events import outcome
 from robospa.tasks.geometry import rotate
+from robospa.tasks.layouts import in_head_view, in_reach
 from robospa.tasks.objects import object_model
 from robospa.tasks.scene import TABLE_TOP, Scene, SceneObject
 
@@ -218,3 +220,12 @@ def test_slots_are_filled_for_both_splits(name: str, level: int) -> None:
     scene = build_scene(name, level, 100_000)
     for slot, (train, held_out) in task(name).slots(scene).items():
         assert train and held_out, slot
+
+
+@pytest.mark.parametrize(("name", "level"), VARIANTS)
+def test_the_head_camera_sees_every_centre_and_an_arm_reaches_it(name: str, level: int) -> None:
+    for scene in scenes(name, level, SEEDS[:100]):
+        spots = [o.pose.position for o in scene.objects if o.asset != "dustbin"]
+        x, y = (np.array([spot[i] for spot in spots]) for i in (0, 1))
+        assert in_head_view(x, y, margin=(0.0, 0.0)).all(), scene.seed
+        assert in_reach(x, y).all(), scene.seed
