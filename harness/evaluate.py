@@ -10,7 +10,6 @@ import multiprocessing
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from multiprocessing.connection import Connection
-from pathlib import Path
 from typing import Any
 
 from robospa.harness.factory import is_url, load, open_policy
@@ -93,7 +92,9 @@ def probe_world(config: WorkerConfig, render: bool) -> dict[str, Any]:
         child.join()
         ours.close()
     if trouble:
-        raise WorldBroken(f"no world can be built: {trouble}; `robospa doctor` says what is missing")
+        raise WorldBroken(
+            f"no world can be built: {trouble}; `robospa doctor` says what is missing"
+        )
     return dict(info)
 
 

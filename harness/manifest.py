@@ -148,7 +148,9 @@ def open_run(folder: Path, manifest: Manifest, resume: bool) -> None:
     """
     if not (folder / MANIFEST).exists():
         if resume and not folder.exists():
-            raise RunError(f"there is no run in {folder} to resume; leave --resume out to start one")
+            raise RunError(
+                f"there is no run in {folder} to resume; leave --resume out to start one"
+            )
         write_manifest(folder, manifest)
         return
     if not resume:

@@ -72,7 +72,7 @@ def policy_seed(key: TrialKey, run_seed: int = 0) -> int:
 
 
 def check_chunk(answer: object, spec: PolicySpec) -> NDArray[np.float32]:
-    """`answer` as float32 (T, D); raises PolicyAnswerError, saying which rule of the spec it breaks."""
+    """`answer` as float32 (T, D); PolicyAnswerError says which rule of the spec it breaks."""
     try:
         chunk = np.asarray(answer, dtype=np.float32)
     except (TypeError, ValueError) as error:

@@ -85,7 +85,7 @@ class Average:
 
 @dataclass(frozen=True)
 class Scores:
-    """Everything that a run's tables show. Level 0 stands for the mean over levels, as do `tasks`."""
+    """Everything that a run's tables show. Level 0, like `tasks`, is the mean over levels."""
 
     cells: Mapping[tuple[str, int], Cell]
     levels: tuple[int, ...]

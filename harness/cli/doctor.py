@@ -1,4 +1,4 @@
-"""`robospa doctor`: can this machine simulate and render, and if not, what is the one thing to do?"""
+"""`robospa doctor`: can this machine simulate and render, and if not, what is to be done?"""
 
 from __future__ import annotations
 

@@ -10,7 +10,8 @@ import typer
 
 def evaluate(
     policy: Annotated[
-        str, typer.Argument(help="ws://host:port, wss://..., openpi://..., or a local policy's name")
+        str,
+        typer.Argument(help="ws://host:port, wss://..., openpi://..., or a local policy's name"),
     ],
     tasks: Annotated[
         str, typer.Option(help="task names, categories (GAC), spatial, procedural, or all")

@@ -11,7 +11,7 @@ import sys
 from collections.abc import Sequence
 
 COMMANDS = {
-    "demo": "Evaluate a policy server over the wire on a few trials, and write a report.",
+    "demo": "See a policy server evaluated: a few trials and a report.",
     "doctor": "Check that this machine can simulate and render.",
     "serve": "Serve a policy by name or module:function.",
     "check": "Test a policy server against the protocol.",
@@ -53,6 +53,7 @@ def _run(words: list[str]) -> None:
         no_args_is_help=True,
         add_completion=False,
         pretty_exceptions_enable=False,
+        rich_markup_mode=None,  # plain help: importing the fancy one takes longer than all the rest
         epilog="Add --debug to any command to see where an error came from.",
     )
     for name, summary in COMMANDS.items():

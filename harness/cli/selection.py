@@ -95,7 +95,7 @@ def _shipped(task: str, level: int) -> Sequence[int]:
 
     try:
         found: Sequence[int] = accepted(task, level)
-    except (KeyError, OSError, ValueError) as error:
+    except LookupError as error:
         raise BadChoice(
             f"no accepted seeds of {task} level {level} are shipped; name some with --seeds"
         ) from error

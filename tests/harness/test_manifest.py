@@ -63,9 +63,7 @@ def test_resuming_with_another_version_is_refused(tmp_path: Path) -> None:
     about = {"versions": {"robospa": "1"}}
     open_run(tmp_path, replace(MANIFEST, about=about), resume=False)
     with pytest.raises(RunError, match=r"versions\.robospa: '1' -> '2'"):
-        open_run(
-            tmp_path, replace(MANIFEST, about={"versions": {"robospa": "2"}}), resume=True
-        )
+        open_run(tmp_path, replace(MANIFEST, about={"versions": {"robospa": "2"}}), resume=True)
 
 
 def test_resuming_nothing_is_refused(tmp_path: Path) -> None:

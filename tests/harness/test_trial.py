@@ -23,7 +23,12 @@ def play(policy: FakePolicy, key: TrialKey = KEY, world: FakeWorld | None = None
 
 def test_success_ends_the_trial_inside_a_chunk() -> None:
     record = play(FakePolicy(length=4))
-    assert (record.end, record.success, record.steps, record.policy_calls) == ("success", True, 5, 2)
+    assert (record.end, record.success, record.steps, record.policy_calls) == (
+        "success",
+        True,
+        5,
+        2,
+    )
     assert (record.done, record.best, record.total) == (2, 2, 2)
     assert record.physics_steps == 25
 
@@ -150,5 +155,3 @@ def test_the_recorder_keeps_every_executed_action() -> None:
     recorder = TrialRecorder()
     run_trial(FakeWorld(), FakePolicy(), KEY, policy_seed=0, recorder=recorder, parts=parts)
     assert recorder.actions.shape == (5, 14)
-
-

@@ -1,0 +1,29 @@
+"""Hold still: sends the commanded joints back. What a policy that does nothing scores."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robospa.protocol.policy import Observation, PolicySpec, TrialInfo
+
+CHUNK = 10
+
+
+class Hold:
+    """Never moves. Needs no image."""
+
+    spec = PolicySpec(name="hold", cameras=(), state="commanded", horizon=CHUNK, seeded=True)
+
+    def reset(self, trial: TrialInfo) -> None:
+        """Nothing to prepare."""
+
+    def infer(self, observation: Observation) -> NDArray[np.float32]:
+        """The present command, float32 (CHUNK, D)."""
+        state = np.asarray(observation["state"], dtype=np.float32)
+        return np.tile(state, (CHUNK, 1))
+
+
+def create() -> Hold:
+    """A new policy, one per connection."""
+    return Hold()

@@ -1,0 +1,43 @@
+"""Random walk of both arms: the floor that a task's success criterion must not reach by chance.
+
+Repeatable: the walk of a trial follows from its policy seed and the step alone.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robospa.protocol.policy import Observation, PolicySpec, TrialInfo
+
+CHUNK = 10
+STRIDE = 0.15
+"""Standard deviation of one action's joint change [rad]."""
+
+
+class Random:
+    """Walks from where the arms are; grippers open and close at random. Needs no image."""
+
+    spec = PolicySpec(name="random", cameras=(), state="commanded", horizon=CHUNK, seeded=True)
+
+    def __init__(self) -> None:
+        self._seed = 0
+
+    def reset(self, trial: TrialInfo) -> None:
+        """Start the walk of this trial."""
+        self._seed = trial.policy_seed
+
+    def infer(self, observation: Observation) -> NDArray[np.float32]:
+        """The next stretch of the walk, float32 (CHUNK, D)."""
+        generator = np.random.default_rng([self._seed, int(observation["step"])])
+        state = np.asarray(observation["state"], dtype=np.float32)
+        strides = generator.normal(0.0, STRIDE, (CHUNK, len(state)))
+        walk = state + np.cumsum(strides, axis=0)
+        grippers = [len(state) // 2 - 1, len(state) - 1]
+        walk[:, grippers] = generator.uniform(0.0, 1.0, (CHUNK, 2))
+        return walk.astype(np.float32)
+
+
+def create() -> Random:
+    """A new policy, one per connection."""
+    return Random()

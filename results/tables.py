@@ -1,0 +1,204 @@
+"""A run's scores as rows: for the terminal, as Markdown and as JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+from robospa.results.intervals import Estimate
+from robospa.results.metrics import (
+    CATEGORIES,
+    CATEGORY_NAMES,
+    DIMENSIONS,
+    METRIC_NAMES,
+    METRICS,
+    Average,
+    Cell,
+    Scores,
+    score_run,
+)
+from robospa.results.reading import Run
+
+NOTE = (
+    "Values in percent with 95 % intervals: Wilson for success rates (SR) of single variants and "
+    "their chance-corrected form (ONTA: 0 is guessing among the candidates), bootstrap over "
+    "episodes for progress (PS), MOVER for averages. Categories are means of tasks; dimensions "
+    "and the overall value are means of categories."
+)
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of a table: `cells` holds (level, cell or average), level 0 the mean of levels."""
+
+    label: str
+    kind: str
+    parts: tuple[tuple[int, Cell | Average | None], ...]
+
+
+def percent(estimate: Estimate | None, digits: int = 1) -> str:
+    """`12.0 [5.6, 23.8]`, or a dash."""
+    if estimate is None:
+        return "–"
+    value, low, high = (f"{100 * x + 0.0:.{digits}f}" for x in _all(estimate))
+    return f"{value} [{low}, {high}]"
+
+
+def short(estimate: Estimate | None) -> str:
+    """The value alone, without decimals where there are none."""
+    return "–" if estimate is None else f"{100 * estimate.value:.1f}"
+
+
+def _all(estimate: Estimate) -> tuple[float, float, float]:
+    return estimate.value, estimate.low, estimate.high
+
+
+def rows(scores: Scores) -> list[Row]:
+    """Tasks grouped by category, then categories, dimensions and the overall value."""
+    levels = (*scores.levels, 0)
+    made: list[Row] = []
+    category_of = {task: cell.category for (task, _), cell in scores.cells.items()}
+    ordered = [t for c in (*CATEGORIES, "") for t in category_of if category_of[t] == c]
+    for task in ordered:
+        cells = [(n, scores.cells.get((task, n))) for n in scores.levels]
+        made.append(Row(task.replace("_", " "), "task", (*cells, (0, scores.tasks[task]))))
+    for category in CATEGORIES:
+        if (category, 0) in scores.categories:
+            parts = tuple((n, scores.categories.get((category, n))) for n in levels)
+            made.append(Row(f"{category} {CATEGORY_NAMES[category]}", "category", parts))
+    for dimension in DIMENSIONS:
+        if (dimension, 0) in scores.dimensions:
+            parts = tuple((n, scores.dimensions.get((dimension, n))) for n in levels)
+            made.append(Row(f"{dimension} categories", "dimension", parts))
+    made.append(Row("overall", "overall", tuple((n, scores.overall.get(n)) for n in levels)))
+    return made
+
+
+def metrics_of(row: Row) -> list[str]:
+    """The metrics that apply to `row`, in their order."""
+    present = {m for _, part in row.parts if part is not None for m in part.values}
+    return [m for m in METRICS if m in present]
+
+
+def level_name(level: int) -> str:
+    """Column title."""
+    return f"L{level}" if level else "mean"
+
+
+def _counts(part: Cell | Average) -> str:
+    lost = f", {part.missing} missing" if part.missing else ""
+    if isinstance(part, Cell):
+        return f"{part.successes}/{part.trials}{lost}"
+    return f"n={part.trials}{lost}"
+
+
+def markdown_table(scores: Scores, metric: str) -> str:
+    """One table of `metric`: a row a task, category..., a column a level."""
+    levels = (*scores.levels, 0)
+    title = " | ".join(level_name(n) for n in levels)
+    lines = [f"| {METRIC_NAMES[metric]} [%] | {title} |", "|---|" + "---|" * len(levels)]
+    for row in rows(scores):
+        if metric in metrics_of(row):
+            name = row.label if row.kind == "task" else f"**{row.label}**"
+            texts = [_markdown_cell(part, metric) for _, part in row.parts]
+            lines.append(f"| {name} | " + " | ".join(texts) + " |")
+    return "\n".join(lines)
+
+
+def _markdown_cell(part: Cell | Average | None, metric: str) -> str:
+    if part is None:
+        return ""
+    text = percent(part.values.get(metric))
+    if isinstance(part, Cell) and metric == "sr":
+        text += f" ({_counts(part)})"
+    elif part.missing and metric == "sr":
+        text += f" ({part.missing} missing: {100 * part.worst:.1f} to {100 * part.best:.1f})"
+    return text
+
+
+def missing_lines(scores: Scores) -> list[str]:
+    """One sentence for every variant that lacks trials."""
+    return [
+        f"{cell.task} L{cell.level}: {cell.missing} of {cell.listed} trials are missing; if all "
+        f"had failed SR would be {100 * cell.worst:.1f}, if all had succeeded {100 * cell.best:.1f}"
+        for cell in scores.cells.values()
+        if cell.missing
+    ]
+
+
+def to_json(scores: Scores) -> dict[str, Any]:
+    """All scores as JSON values; rates are fractions."""
+
+    def part(item: Cell | Average) -> dict[str, Any]:
+        data: dict[str, Any] = {"trials": item.trials, "missing": item.missing}
+        if isinstance(item, Cell):
+            data["successes"] = item.successes
+        if item.missing:
+            data["sr_bounds"] = [item.worst, item.best]
+        for metric, found in item.values.items():
+            data[metric] = None if found is None else list(_all(found))
+        return data
+
+    def table(pairs: Iterable[tuple[tuple[str, int], Cell | Average]]) -> dict[str, Any]:
+        made: dict[str, Any] = {}
+        for (name, level), item in pairs:
+            made.setdefault(name, {})[level_name(level)] = part(item)
+        return made
+
+    return {
+        "estimate": ["value", "low", "high"],
+        "variants": table(scores.cells.items()),
+        "tasks": {name: part(item) for name, item in scores.tasks.items()},
+        "categories": table(scores.categories.items()),
+        "dimensions": table(scores.dimensions.items()),
+        "overall": {level_name(n): part(item) for n, item in scores.overall.items()},
+    }
+
+
+def terminal(run: Run) -> None:
+    """Print the run's table on the terminal."""
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    scores = score_run(run)
+    name = run.manifest.get("settings", {}).get("policy", {}).get("spec", {}).get("name", "policy")
+    privileged = " (privileged: sees the exact state)" if is_privileged(run) else ""
+    table = Table(title=f"{name}{privileged}", title_justify="left", box=None, pad_edge=False)
+    table.add_column("")
+    for level in scores.levels:
+        table.add_column(level_name(level), justify="right", no_wrap=True)
+    table.add_column("SR [95 %]", justify="right", no_wrap=True)
+    table.add_column("ONTA", justify="right")
+    table.add_column("PS", justify="right")
+    table.add_column("trials", justify="right")
+    last = "task"
+    for row in rows(scores):
+        if row.kind != last:
+            table.add_section()
+            last = row.kind
+        mean = dict(row.parts)[0]
+        cells = [short(p.values.get("sr")) if p else "" for n, p in row.parts if n]
+        tail = ["", "", "", ""]
+        if mean is not None:
+            lost = f" -{mean.missing}" if mean.missing else ""
+            tail = [
+                percent(mean.values.get("sr")),
+                short(mean.values["onta"]) if "onta" in mean.values else "",
+                short(mean.values["ps"]) if "ps" in mean.values else "",
+                f"{mean.trials}{lost}",
+            ]
+        style = "" if row.kind == "task" else "bold"
+        table.add_row(*(Text(t, style=style) for t in (row.label, *cells, *tail)))
+    console = Console()
+    if not console.is_terminal:
+        console = Console(width=130)  # a file is as wide as the table needs
+    console.print(table, highlight=False)
+    for line in missing_lines(scores):
+        console.print(line, style="yellow", highlight=False)
+
+
+def is_privileged(run: Run) -> bool:
+    """Whether the policy saw the exact state."""
+    return bool(run.manifest.get("settings", {}).get("privileged"))
