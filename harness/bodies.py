@@ -19,7 +19,7 @@ from sapien import physx
 
 from robospa.harness.robots.embodiment import Arm, Embodiment, Joint
 from robospa.tasks.geometry import Pose, Quat, axis_rotation, look_rotation, multiply
-from robospa.tasks.shapes import Box, Cylinder, Geometry, Mesh, ObjectModel, Shape, Sphere
+from robospa.tasks.shapes import Box, Cylinder, Geometry, ObjectModel, Shape, Sphere
 
 Array = NDArray[np.float64]
 
@@ -28,6 +28,9 @@ FRICTION = 0.5
 DENSITY = 1000.0
 ROBOT_GROUPS = [1, 1, 1, 1]
 """Links share an ignore group: the robot does not collide with itself."""
+
+LINK_MARGIN = 0.03
+"""How far a link's mass reaches beyond its joints [m]."""
 
 Z_TO_X: Quat = axis_rotation((0, 1, 0), -math.pi / 2)
 """Turns SAPIEN's cylinders, which lie along x, to stand along z."""
@@ -131,27 +134,16 @@ def entity_of(component: Any, name: str, pose: Pose) -> Any:
     return entity
 
 
-def _corners(shape: Shape) -> list[tuple[float, float, float]]:
-    """Points that span a shape, in its body's frame."""
-    geometry = shape.geometry
-    if isinstance(geometry, Mesh):
-        return [shape.pose.apply(v) for v in geometry.vertices]
-    if isinstance(geometry, Box):
-        x, y, z = geometry.half
-    elif isinstance(geometry, Sphere):
-        x = y = z = geometry.radius
-    else:
-        x = y = geometry.radius
-        z = geometry.half_length
-    signs = (-1.0, 1.0)
-    return [shape.pose.apply((a * x, b * y, c * z)) for a in signs for b in signs for c in signs]
+def _link_inertia(arm: Arm, link: str, mass: float) -> tuple[Any, Array]:
+    """Centre of mass (as pose) and principal inertia (3,) of `mass` [kg] spread over a link.
 
-
-def _link_inertia(shapes: Sequence[Shape], mass: float) -> tuple[Any, Array]:
-    """Centre of mass (as pose) and principal inertia (3,) of a block that bounds `shapes`."""
-    points = np.array([p for shape in shapes for p in _corners(shape)] or [(0.0, 0.0, 0.0)])
-    low, high = points.min(axis=0), points.max(axis=0)
-    x, y, z = np.maximum(high - low, 0.02)
+    A block from the link's own joint to those that it carries: it follows from the joints alone, so
+    that what a robot looks like does not change how it moves.
+    """
+    carried = [j.origin.position for j in (*arm.joints, *arm.fingers) if j.parent == link]
+    points = np.array([(0.0, 0.0, 0.0), *carried])
+    low, high = points.min(axis=0) - LINK_MARGIN, points.max(axis=0) + LINK_MARGIN
+    x, y, z = high - low
     inertia = mass / 12.0 * np.array([y * y + z * z, x * x + z * z, x * x + y * y])
     return sapien.Pose((low + high) / 2), inertia
 
@@ -183,8 +175,6 @@ def build_arm(scene: Any, embodiment: Embodiment, arm: Arm, prefix: str) -> Any:
         record = builder.create_link_builder(made[joint.parent] if joint else None)
         record.set_name(f"{prefix}_gripper" if link in gripper else f"{prefix}_arm")
         record.set_joint_name(joint.name if joint else "")
-        centre, inertia = _link_inertia(arm.shapes[link], embodiment.link_mass)
-        record.set_mass_and_inertia(embodiment.link_mass, centre, inertia)
         if joint:
             in_parent, in_child = _joint_frames(joint)
             limits = [[joint.lower, joint.upper]]
@@ -196,7 +186,7 @@ def build_arm(scene: Any, embodiment: Embodiment, arm: Arm, prefix: str) -> Any:
         attach_collisions(component, arm.shapes[link], material(), groups=ROBOT_GROUPS)
         component.mass = embodiment.link_mass
         component.cmass_local_pose, component.inertia = _link_inertia(
-            arm.shapes[link], embodiment.link_mass
+            arm, link, embodiment.link_mass
         )
         component.disable_gravity = True
     articulation = entities[0].components[0].articulation

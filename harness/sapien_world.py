@@ -21,6 +21,7 @@ from robospa.harness.physics import FLOATS, Physics, unpack
 from robospa.harness.robots import embodiment as embodiment_named
 from robospa.harness.world import Poll, RenderUnavailable, SceneUnstable, StepResult
 from robospa.protocol.policy import CameraSpec, PolicySpec
+from robospa.tasks.geometry import Pose
 from robospa.tasks.scene import Scene
 from robospa.tasks.shapes import ObjectModel
 from robospa.tasks.snapshot import Snapshot, snapshot_to_json
@@ -275,7 +276,8 @@ class SapienWorld:
         left, right = self._joints.tolist()
         grip_left, grip_right = self._gripper.tolist()
         tools = [
-            unpack(values, self._last_links[a]) * self._embodiment.arms[a].tool for a in range(2)
+            _upright(unpack(values, self._last_links[a]) * self._embodiment.arms[a].tool)
+            for a in range(2)
         ]
         measured = []
         for a, writers in enumerate(self._writers):
@@ -398,6 +400,14 @@ def _state(physics: Physics, names: list[str]) -> Array:
     values = physics.packed()
     first = [FLOATS * physics.rows[name] for name in names]
     return np.array([values[i : i + FLOATS] for i in first])
+
+
+def _upright(pose: Pose) -> Pose:
+    """The same pose with the quaternion whose w is not negative."""
+    if pose.rotation[0] >= 0.0:
+        return pose
+    w, x, y, z = pose.rotation
+    return Pose(pose.position, (-w, -x, -y, -z))
 
 
 def _restless(names: list[str], before: Array, after: Array) -> str:

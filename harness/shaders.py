@@ -1,7 +1,7 @@
 """SAPIEN's default shader without what a scene of ours never uses: same pixels, sooner.
 
-On its first picture SAPIEN integrates a table for image-based lighting: five seconds on two cores in
-software, in every process, although a scene without environment map multiplies it by black. The
+On its first picture SAPIEN integrates a table for image-based lighting: five seconds of two cores
+in software, in every process, although a scene without environment map multiplies it by black. The
 passes for lines, points and transparent surfaces cost a fifth of every picture, and nothing
 here is transparent. This module copies the installed shader into the user's cache folder and leaves
 these parts out. If the installed shader is not the one that these edits were written for, it is

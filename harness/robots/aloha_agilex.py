@@ -9,7 +9,12 @@ from __future__ import annotations
 
 import math
 
-from robospa.harness.robots.aloha_agilex_shapes import FINGER_SHAPES, LINK_SHAPES, STAND_SHAPES
+from robospa.harness.robots.aloha_agilex_shapes import (
+    FINGER_SHAPES,
+    LINK_SHAPES,
+    STAND_SHAPES,
+    WRIST_CAMERA,
+)
 from robospa.harness.robots.embodiment import Arm, Embodiment, Joint, StaticCamera
 from robospa.tasks.geometry import Pose, Vec3, axis_rotation, look_rotation, yaw_rotation
 
@@ -71,9 +76,7 @@ def _arm(name: str, prefix: str, base: Vec3) -> Arm:
         home=(0.0,) * 6,
         seeds=SEEDS,
         shapes=shapes,
-        # above the gripper, looking along the fingers so that both tips and what is between them
-        # are in the lower half of the picture
-        camera=Pose((-0.03, 0.0, 0.075), axis_rotation((0, 1, 0), math.radians(22))),
+        camera=WRIST_CAMERA,
     )
 
 

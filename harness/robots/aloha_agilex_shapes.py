@@ -1,52 +1,117 @@
-"""What the Aloha-AgileX arms are made of: few boxes and cylinders in the sizes of the real links.
+"""What the Aloha-AgileX arms are made of: rounded bars, housings and pins of the real links' size.
 
-Each entry is in its link's frame. Fingers carry the contacts that matter; the palm, the wrist and
-the forearm collide too, so that a careless policy cannot move through the scene.
+Each entry is in its link's frame. What is drawn and what collides are separate: the fingers carry
+the contacts that matter; palm, wrist and forearm collide too, as plain boxes, so that a
+careless policy cannot move through the scene. A whole arm is drawn with under 1,500 triangles.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from robospa.tasks.geometry import Pose, Vec3, axis_rotation
-from robospa.tasks.shapes import Box, Color, Cylinder, Shape
+from robospa.tasks.shapes import Box, Color, Cylinder, Mesh, Shape
 
-BLACK: Color = (0.035, 0.035, 0.04)
-DARK: Color = (0.09, 0.09, 0.10)
-GREY: Color = (0.32, 0.33, 0.35)
+BLACK: Color = (0.028, 0.028, 0.032)
+DARK: Color = (0.07, 0.07, 0.08)
+STEEL: Color = (0.36, 0.37, 0.39)
+RED: Color = (0.45, 0.03, 0.03)
 ALONG_Y = axis_rotation((1, 0, 0), math.pi / 2)
 ALONG_X = axis_rotation((0, 1, 0), math.pi / 2)
+ARC = 7
+"""Corners of a drawn half circle."""
+
+WRIST_CAMERA = Pose((-0.005, 0.0, 0.095), axis_rotation((0, 1, 0), math.radians(31)))
+"""In link 6, above the palm and tilted to the fingers: both tips and what is between them are in
+the middle of the picture, the palm just outside of it. The official mounting is unknown."""
 
 
-def _box(centre: Vec3, half: Vec3, color: Color, pitch: float = 0.0, solid: bool = False) -> Shape:
+def _solid(centre: Vec3, half: Vec3, pitch: float = 0.0) -> Shape:
+    """A box that collides and is not drawn."""
     pose = Pose(centre, axis_rotation((0, 1, 0), pitch))
-    return Shape(Box(half), pose, color, collision=solid)
+    return Shape(Box(half), pose, BLACK, visual=False)
+
+
+def _drawn(shape: Shape) -> Shape:
+    return replace(shape, collision=False, roughness=0.45)
+
+
+def _box(centre: Vec3, half: Vec3, color: Color, pitch: float = 0.0) -> Shape:
+    return _drawn(Shape(Box(half), Pose(centre, axis_rotation((0, 1, 0), pitch)), color))
 
 
 def _pin(centre: Vec3, radius: float, half: float, color: Color) -> Shape:
-    return Shape(Cylinder(radius, half), Pose(centre, ALONG_Y), color, collision=False)
+    return _drawn(Shape(Cylinder(radius, half), Pose(centre, ALONG_Y), color))
+
+
+def _bar(
+    start: tuple[float, float],
+    end: tuple[float, float],
+    radii: tuple[float, float],
+    half: float,
+    color: Color,
+) -> Shape:
+    """A bar with round ends from `start` to `end` (x, z), `half` thick to either side along y."""
+    heading = math.atan2(end[1] - start[1], end[0] - start[0])
+    outline: list[tuple[float, float]] = []
+    for (x, z), radius, first in ((end, radii[1], -math.pi / 2), (start, radii[0], math.pi / 2)):
+        for i in range(ARC):
+            angle = heading + first + math.pi * i / (ARC - 1)
+            outline.append((x + radius * math.cos(angle), z + radius * math.sin(angle)))
+    count = len(outline)
+    vertices = tuple((x, side * half, z) for side in (-1.0, 1.0) for x, z in outline)
+    # x to z is clockwise seen from +y: the -y cap is listed in outline order
+    caps = [(0, i, i + 1) for i in range(1, count - 1)]
+    caps += [(count, count + i + 1, count + i) for i in range(1, count - 1)]
+    sides = []
+    for i in range(count):
+        j = (i + 1) % count
+        sides += [(i, count + i, count + j), (i, count + j, j)]
+    return _drawn(Shape(Mesh(vertices, (*caps, *sides)), color=color))
 
 
 LINK_SHAPES: tuple[tuple[Shape, ...], ...] = (
-    (Shape(Cylinder(0.03, 0.031), Pose((0, 0, 0.031)), DARK, collision=False),),
     (
-        _box((0.008, 0, 0.03), (0.026, 0.036, 0.028), GREY),
-        _pin((0.02, 0, 0.0402), 0.028, 0.04, DARK),
+        _drawn(Shape(Cylinder(0.038, 0.008), Pose((0, 0, 0.008)), STEEL)),
+        _drawn(Shape(Cylinder(0.03, 0.031), Pose((0, 0, 0.031)), DARK)),
     ),
     (
-        _box((-0.132, 0, 0), (0.132, 0.027, 0.025), BLACK),
-        _pin((0, 0, 0), 0.03, 0.034, GREY),
-        _pin((-0.264, 0, 0), 0.03, 0.036, GREY),
+        _box((0.01, 0, 0.012), (0.026, 0.03, 0.012), DARK),
+        _box((0.018, 0.034, 0.032), (0.02, 0.005, 0.025), STEEL),
+        _box((0.018, -0.034, 0.032), (0.02, 0.005, 0.025), STEEL),
+        _pin((0.02, 0, 0.0402), 0.026, 0.0395, STEEL),
     ),
     (
-        _box((0.12, 0, -0.045), (0.125, 0.03, 0.026), BLACK, 0.18, solid=True),
-        _pin((0.245, 0, -0.056), 0.028, 0.036, GREY),
+        _bar((0.0, 0.0), (-0.264, 0.0), (0.031, 0.029), 0.026, BLACK),
+        _bar((-0.06, 0.0), (-0.205, 0.0), (0.012, 0.012), 0.0285, DARK),
+        _pin((-0.264, 0, 0), 0.022, 0.037, STEEL),
     ),
-    (_box((0.045, 0, -0.035), (0.042, 0.028, 0.026), DARK, 0.7, solid=True),),
-    (Shape(Cylinder(0.03, 0.052), Pose((0, 0, 0.056)), BLACK, collision=False),),
     (
-        _box((0.03, 0, 0), (0.03, 0.045, 0.026), DARK, solid=True),
-        _box((0.052, 0, 0), (0.013, 0.087, 0.018), GREY),
+        _bar((0.0, 0.0), (0.05, -0.045), (0.03, 0.034), 0.03, BLACK),
+        _bar((0.05, -0.045), (0.245, -0.056), (0.034, 0.027), 0.03, BLACK),
+        _bar((0.085, -0.048), (0.19, -0.053), (0.012, 0.011), 0.0325, DARK),
+        _pin((0.245, 0, -0.056), 0.02, 0.038, STEEL),
+        _solid((0.12, 0, -0.045), (0.125, 0.03, 0.026), 0.18),
+    ),
+    (
+        _bar((0.0, 0.0), (0.06, -0.055), (0.0175, 0.03), 0.027, DARK),
+        _box((0.0657, -0.001, -0.079), (0.024, 0.024, 0.005), STEEL),
+        _solid((0.045, 0, -0.035), (0.042, 0.028, 0.026), 0.7),
+    ),
+    (
+        _drawn(Shape(Cylinder(0.0295, 0.05), Pose((0, 0, 0.055)), BLACK)),
+        _drawn(Shape(Cylinder(0.024, 0.004), Pose((0.0245, 0, 0.0825), ALONG_X), STEEL)),
+    ),
+    (
+        _drawn(Shape(Cylinder(0.027, 0.012), Pose((0.01, 0, 0), ALONG_X), STEEL)),
+        _box((0.035, 0, 0), (0.021, 0.045, 0.026), BLACK),
+        _box((0.052, 0, 0), (0.013, 0.087, 0.017), DARK),
+        _box((0.0655, 0, 0.0), (0.0015, 0.08, 0.006), STEEL),
+        # bracket and housing of the wrist camera, behind and above its optical centre
+        _box((-0.008, 0, 0.058), (0.003, 0.012, 0.034), STEEL),
+        _box((-0.012, 0, 0.095), (0.006, 0.042, 0.011), DARK, math.radians(31)),
+        _solid((0.03, 0, 0), (0.03, 0.045, 0.026)),
     ),
 )
 """Base link and links 1 to 6."""
@@ -54,12 +119,22 @@ LINK_SHAPES: tuple[tuple[Shape, ...], ...] = (
 # Inner faces meet at the gripper's middle plane when the travel is 0; the tips reach 12 mm beyond
 # the grasp centre.
 _FINGER_HALF: Vec3 = (0.0475, 0.004, 0.010)
-FINGER_SHAPES: tuple[tuple[Shape, ...], tuple[Shape, ...]] = (
-    (Shape(Box(_FINGER_HALF), Pose((0.0355, -0.020629, 0.0)), BLACK),),
-    (Shape(Box(_FINGER_HALF), Pose((0.0355, 0.020629, 0.0)), BLACK),),
-)
+
+
+def _finger(side: float) -> tuple[Shape, ...]:
+    """The finger whose inner face looks to -`side` y."""
+    inner = -side * 0.020629
+    return (
+        Shape(Box(_FINGER_HALF), Pose((0.0355, inner, 0.0)), BLACK, visual=False),
+        _box((0.0355, inner + side * 0.0008, 0.0), (0.0475, 0.0032, 0.010), DARK),
+        _box((0.061, inner - side * 0.0031, 0.0), (0.021, 0.0009, 0.0095), STEEL),
+        _box((-0.006, inner + side * 0.008, 0.0), (0.011, 0.008, 0.0125), BLACK),
+    )
+
+
+FINGER_SHAPES: tuple[tuple[Shape, ...], tuple[Shape, ...]] = (_finger(1.0), _finger(-1.0))
 
 STAND_SHAPES: tuple[Shape, ...] = (
-    _box((0.0035, -0.45, 0.755), (0.36, 0.05, 0.0225), GREY),
+    _box((0.0035, -0.45, 0.755), (0.36, 0.05, 0.0225), STEEL),
     _box((0.0035, -0.60, 0.37), (0.25, 0.20, 0.37), DARK),
 )

@@ -22,6 +22,9 @@ POSITION_TOLERANCE = 5e-4  # [m]
 ROTATION_TOLERANCE = 3e-3  # [rad]
 ITERATIONS = 60
 DAMPING = 1e-3
+PATIENCE = 6
+PROGRESS = 0.6
+"""A row whose error has not shrunk to this share within PATIENCE iterations is given up."""
 STEP_LIMIT = 0.35  # [rad] per iteration and joint, keeps far starts from jumping
 
 
@@ -116,22 +119,32 @@ def _errors(frame: Array, target: Array) -> Array:
     return np.concatenate([target[:, :3, 3] - frame[:, :3, 3], vector * scale[:, None]], axis=1)
 
 
-def _descend(chain: Chain, targets: Array, joints: Array) -> tuple[Array, Array]:
-    """Damped least squares from `joints` (N, J); returns joints and which of them arrived (N,)."""
+def _descend(chain: Chain, targets: Array, joints: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Damped least squares from `joints` (N, J); returns joints and which of them arrived (N,).
+
+    Rows that no longer come nearer are given up: most targets that a caller tries are out of reach.
+    """
     lower, upper = chain.lower, chain.upper
     width = joints.shape[1]
     joints = joints.copy()
     arrived = np.zeros(len(joints), dtype=bool)
     active = np.arange(len(joints))
+    marks = np.full(len(joints), np.inf)
     damping = DAMPING * np.eye(width)
-    for _ in range(ITERATIONS):
+    for turn in range(ITERATIONS):
         frame, jacobian = forward(chain, joints[active])
         error = _errors(frame, targets[active])
-        near = (np.abs(error[:, :3]).max(axis=1) < POSITION_TOLERANCE) & (
-            np.abs(error[:, 3:]).max(axis=1) < ROTATION_TOLERANCE
+        size = np.abs(error)
+        near = (size[:, :3].max(axis=1) < POSITION_TOLERANCE) & (
+            size[:, 3:].max(axis=1) < ROTATION_TOLERANCE
         )
         arrived[active[near]] = True
-        active, error, jacobian = active[~near], error[~near], jacobian[~near]
+        keep = ~near
+        if turn and turn % PATIENCE == 0:
+            total = size.sum(axis=1)
+            keep &= total < PROGRESS * marks[active]
+            marks[active] = total
+        active, error, jacobian = active[keep], error[keep], jacobian[keep]
         if not len(active):
             break
         transposed = jacobian.transpose(0, 2, 1)
@@ -147,8 +160,8 @@ def inverse(
     """Joints (N, J) [rad] that bring the end-effector frame to each target, and success (N,).
 
     With `near` only the solution reached from those joints counts, so that it stays on the same
-    branch; otherwise every posture of the arm's `seeds`, aimed at the target, is tried and
-    the one that arrives nearest to its start is taken. A target that is out of reach or beyond the
+    branch; otherwise the postures of the arm's `seeds`, aimed at the target, are tried in
+    their order until one arrives. A target that is out of reach or beyond the
     joint limits has success False and the best joints found.
     """
     wanted = np.stack([matrix(t) for t in targets])
@@ -158,14 +171,15 @@ def inverse(
         return _descend(chain, wanted, start)
     local = np.linalg.inv(chain.base) @ wanted
     aim = np.arctan2(local[:, 1, 3], local[:, 0, 3])
-    seeds = np.repeat(chain.seeds[None], count, axis=0)  # (N, S, J)
-    seeds[:, :, 0] += aim[:, None]
-    many = seeds.shape[1]
-    joints, arrived = _descend(
-        chain, np.repeat(wanted, many, axis=0), seeds.reshape(count * many, -1)
-    )
-    joints, arrived = joints.reshape(count, many, -1), arrived.reshape(count, many)
-    cost = np.abs(joints - seeds).sum(axis=2) + np.where(arrived, 0.0, 1e6)
-    best = np.argmin(cost, axis=1)
-    rows = np.arange(count)
-    return joints[rows, best], arrived[rows, best]
+    joints = np.zeros((count, len(chain.axes)))
+    arrived = np.zeros(count, dtype=bool)
+    for seed in chain.seeds:
+        open_rows = np.flatnonzero(~arrived)
+        if not len(open_rows):
+            break
+        start = np.repeat(seed[None], len(open_rows), axis=0)
+        start[:, 0] += aim[open_rows]
+        found, ok = _descend(chain, wanted[open_rows], start)
+        joints[open_rows] = found
+        arrived[open_rows] = ok
+    return joints, arrived
