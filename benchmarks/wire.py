@@ -1,8 +1,9 @@
 """What a round trip costs: bare `websockets`, ours, and openpi's client, side by side in one run.
 
 One request is a full observation (three 240x320x3 uint8 frames, 14 + 16 float32, 20 words: about
-691 KB), one answer a 50x14 float32 chunk. Every server is a process of its own on loopback, and
-the variants take turns request by request, so that other load on the machine hits all alike.
+691 KB), one answer a 50x14 float32 chunk. Every variant has a server process of its own on
+loopback, and they take turns request by request in random order, so that caches and other load on
+the machine hit all alike.
 
     bare          sync client and asyncio server of `websockets`, compression off, same bytes
     robospa       our client and server, robospa.v1
@@ -27,11 +28,11 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Sequence
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import websockets
 from numpy.typing import NDArray
 
 from robospa.clients import connect
@@ -167,9 +168,9 @@ def round_trips(requests: int, clients: int) -> dict[str, Any]:
     """Medians and tails [ms] per variant, and ratios to bare."""
     usable = importlib.util.find_spec("openpi_client") is not None
     variants = {k: v for k, v in VARIANTS.items() if usable or v[0] != "openpi"}
-    servers = {kind: _start(kind) for kind in {kind for kind, _ in variants.values()}}
+    servers = {name: _start(kind) for name, (kind, _) in variants.items()}
     try:
-        urls = {kind: str(server.stdout.readline()).strip() for kind, server in servers.items()}  # type: ignore[union-attr]
+        urls = {n: str(server.stdout.readline()).strip() for n, server in servers.items()}  # type: ignore[union-attr]
         times: dict[str, list[float]] = {name: [] for name in variants}
         threads = [
             threading.Thread(target=_measure, args=(variants, urls, requests, times))
@@ -188,6 +189,7 @@ def round_trips(requests: int, clients: int) -> dict[str, Any]:
         "message_bytes": len(pack(Infer(1, observation()))),
         "openpi_message_bytes": len(encode(to_openpi(observation(), OpenPiOptions()))),
         "median_ms": {name: round(value, 3) for name, value in medians.items()},
+        "p10_ms": {n: round(float(np.percentile(v, 10)), 3) for n, v in times.items()},
         "p99_ms": {n: round(float(np.percentile(v, 99)), 3) for n, v in times.items()},
         "ratio_to_bare": {n: round(value / medians["bare"], 3) for n, value in medians.items()},
     }
@@ -205,11 +207,13 @@ def _measure(
     requests: int,
     times: dict[str, list[float]],
 ) -> None:
-    calls = {name: make(urls[kind]) for name, (kind, make) in variants.items()}
+    calls = {name: make(urls[name]) for name, (_, make) in variants.items()}
+    order, rng = list(calls), np.random.default_rng(0)
     for number in range(requests + 20):
-        for name, call in calls.items():
+        rng.shuffle(order)
+        for name in order:
             start = time.perf_counter()
-            call()
+            calls[name]()
             if number >= 20:
                 times[name].append((time.perf_counter() - start) * 1e3)
 
@@ -256,7 +260,7 @@ def main() -> None:
         return _serve(arguments.serve)
     result: dict[str, Any] = {
         "machine": {"cpus": os.cpu_count(), "load": os.getloadavg()[0], "cpu": platform.machine()},
-        "versions": {"python": platform.python_version(), "websockets": websockets.__version__},
+        "versions": {"python": platform.python_version(), "websockets": version("websockets")},
         "requests": arguments.requests,
         "clients": arguments.clients,
     }

@@ -1,9 +1,9 @@
 """Requests that arrive together become one call of the model, without anything to tune.
 
 While a call runs, requests gather. When it is over the batcher may still wait for those that are
-about to come: each session's pause between answer and next request is remembered, and only
-sessions that are expected soon, measured against the duration of a call, are waited for. So a lone
-client never waits, eight clients in step share one call, and a client in the middle of a long
+about to come: each session's pause between answer and next request is remembered, and it waits as
+long as that raises the number of answers per second, at most for the duration of one call. So a
+lone client never waits, eight clients in step share one call, and a client in the middle of a long
 simulation delays nobody.
 
 If a call of several observations fails, each is tried alone: one bad sample must not fail the
@@ -22,7 +22,6 @@ from robospa.protocol.policy import Observation
 
 BatchCall = Callable[[Sequence[Observation], Sequence[int]], Awaitable[Sequence[Any]]]
 
-PATIENCE = 0.5  # of a call's duration: the longest that an idle model is held back
 SMOOTHING = 0.3  # weight of the newest measurement in the running means
 SLACK = 0.002  # [s] added to a predicted arrival
 
@@ -106,24 +105,33 @@ class Batcher:
                 return
 
     def wait_for(self, now: float) -> float:
-        """Seconds that it is worth waiting for more requests; 0 to call the model now."""
+        """Seconds that it is worth waiting for more requests; 0 to call the model now.
+
+        With k requests here and j more due within w seconds, waiting pays if it answers more
+        requests per second: (k + j) / (duration + w) > k / duration.
+        """
         waiting = {request.session for request in self._pending}
         if len(waiting) >= self.size or self._duration is None or not waiting:
             return 0.0
-        limit = max(self._pending[0].arrival, self._free) + PATIENCE * self._duration
-        expected = [
+        limit = max(self._pending[0].arrival, self._free) + self._duration
+        expected = sorted(
             due
             for session, pace in self._paces.items()
             if session not in waiting
             and (due := self._due(pace)) is not None
             and now < due <= limit
-        ]
-        return max(expected, default=now) - now
+        )[: self.size - len(waiting)]
+        best, best_rate = 0.0, len(waiting) / self._duration
+        for more, due in enumerate(expected, start=1):
+            rate = (len(waiting) + more) / (self._duration + due - now)
+            if rate > best_rate:
+                best, best_rate = due - now, rate
+        return best
 
     def _due(self, pace: _Pace) -> float | None:
         if pace.answered is None or self._duration is None:
             return None
-        pause = pace.pause if pace.pause is not None else PATIENCE * self._duration / 2
+        pause = pace.pause if pace.pause is not None else self._duration / 4
         return pace.answered + 1.5 * pause + SLACK
 
     async def _answer(self, batch: list[_Request]) -> None:
