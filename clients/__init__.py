@@ -12,7 +12,7 @@ from urllib.parse import urlsplit
 from robospa.protocol.client import RemotePolicy
 from robospa.protocol.client import connect as _connect
 
-__all__ = ["SCHEMES", "RemotePolicy", "connect"]
+__all__ = ["SCHEMES", "RemotePolicy", "address", "connect"]
 
 SCHEMES = {
     "ws": "robospa.v1, or openpi's dialect if the server does not know it",
@@ -26,6 +26,12 @@ def connect(url: str, **options: Any) -> RemotePolicy:
 
     Raises ValueError for a URL of another form, and the errors of `robospa.protocol.errors`.
     """
+    where, implied = address(url)
+    return _connect(where, **{**implied, **options})
+
+
+def address(url: str) -> tuple[str, dict[str, Any]]:
+    """The WebSocket URL behind `url` and the options that its scheme implies."""
     parts = urlsplit(url)
     if parts.scheme not in SCHEMES:
         known = ", ".join(f"{name}:// ({what})" for name, what in SCHEMES.items())
@@ -35,5 +41,5 @@ def connect(url: str, **options: Any) -> RemotePolicy:
             f"{url!r} names no host: write for example {parts.scheme}://localhost:8000"
         )
     if parts.scheme == "openpi":
-        return _connect(f"ws{url[len('openpi') :]}", force_openpi=True, **options)
-    return _connect(url, **options)
+        return f"ws{url[len('openpi') :]}", {"force_openpi": True}
+    return url, {}

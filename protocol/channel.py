@@ -76,11 +76,11 @@ class Channel:
         address: Address,
         timeouts: Timeouts,
         limits: Limits = DEFAULT_LIMITS,
-        offer: bool = True,
+        subprotocol: str | None = SUBPROTOCOL,
     ) -> None:
         self.url = address.url
-        self._socket = _open(address, timeouts, limits, offer)
-        self.subprotocol = self._socket.subprotocol
+        self._socket = _open(address, timeouts, limits, subprotocol)
+        self.subprotocol: str | None = self._socket.subprotocol
         seconds = max(timeouts.first_infer, timeouts.infer)
         whole = int(seconds)
         self._socket.socket.setsockopt(
@@ -124,7 +124,9 @@ class Channel:
         return ConnectionLost(f"the connection to {self.url} ended {when}: {reason}")
 
 
-def _open(address: Address, timeouts: Timeouts, limits: Limits, offer: bool) -> ClientConnection:
+def _open(
+    address: Address, timeouts: Timeouts, limits: Limits, offer: str | None
+) -> ClientConnection:
     give_up = time.monotonic() + timeouts.wait
     while True:
         try:
@@ -146,7 +148,7 @@ def _open(address: Address, timeouts: Timeouts, limits: Limits, offer: bool) -> 
 
 
 def _open_once(
-    address: Address, timeouts: Timeouts, limits: Limits, offer: bool
+    address: Address, timeouts: Timeouts, limits: Limits, offer: str | None
 ) -> ClientConnection:
     options: dict[str, Any] = {}
     parts = urlsplit(address.url)
@@ -158,7 +160,7 @@ def _open_once(
     manager = websocket_connect(
         address.url,
         ssl=address.ssl,
-        subprotocols=[Subprotocol(SUBPROTOCOL)] if offer else None,
+        subprotocols=[Subprotocol(offer)] if offer else None,
         additional_headers=address.headers(),
         compression=None,
         max_size=limits.message,

@@ -33,6 +33,7 @@ from robospa.protocol.errors import (
 from robospa.protocol.images import encode_images
 from robospa.protocol.messages import (
     BAD_ANSWER,
+    SUBPROTOCOL,
     Actions,
     End,
     Ended,
@@ -87,7 +88,7 @@ class RemotePolicy:
         return str(self._session.hello["dialect"])
 
     def _open(self) -> _Session | OpenPiSession:
-        offer = not self._force_openpi
+        offer = None if self._force_openpi else SUBPROTOCOL
         channel = Channel(self.address, self.timeouts, self.limits, offer)
         try:
             if channel.subprotocol is None:
@@ -171,6 +172,8 @@ class _Session:
         self, id: int, observation: Observation, timeout: float
     ) -> tuple[Any, Mapping[str, float]]:
         actions = self._call(Infer(id, observation), Actions, timeout)
+        if actions.chunk.dtype != np.float32:
+            raise PolicyAnswerError(f"the policy answered {actions.chunk.dtype}, not float32")
         return actions.chunk, actions.timing
 
     def end(self, id: int, outcome: Mapping[str, Any]) -> None:

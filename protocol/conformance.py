@@ -1,0 +1,330 @@
+"""Is this server fit to be evaluated? The specification as checks that run against any server.
+
+`check(url)` talks to the server as a harness would, plus the ways in which harnesses and servers
+are known to fail each other: a wrong version, a request out of turn, an error followed by a reset,
+two trials at once, a connection that goes away and comes back. It costs the server about ten calls
+of its model. A server that speaks openpi's dialect gets the checks that make sense there.
+"""
+
+from __future__ import annotations
+
+import ssl as ssl_module
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from robospa.protocol.channel import Address, Channel, Timeouts
+from robospa.protocol.checks import compare_specs
+from robospa.protocol.client import RemotePolicy, connect
+from robospa.protocol.codec import DEFAULT_LIMITS, encode
+from robospa.protocol.errors import TransportError, WireError
+from robospa.protocol.messages import (
+    VERSION,
+    Actions,
+    Error,
+    Hello,
+    Infer,
+    Message,
+    Ready,
+    Reset,
+    pack,
+    unpack,
+)
+from robospa.protocol.openpi import OpenPiOptions
+from robospa.protocol.policy import PolicySpec, TrialInfo
+
+TRIAL = TrialInfo(
+    task="conformance",
+    level=1,
+    seed=100_000,
+    embodiment="aloha-agilex",
+    mode="clean",
+    split="train",
+    instruction="Pick up the red block.",
+    policy_seed=7,
+)
+
+
+@dataclass(frozen=True)
+class CheckResult:
+    """One check: what it is, whether it passed (None: does not apply), and what was seen."""
+
+    name: str
+    passed: bool | None
+    detail: str
+
+
+class _Skip(Exception):
+    """The check does not apply to this server."""
+
+
+@dataclass
+class _Target:
+    """How to reach the server under test, and what it said first."""
+
+    url: str
+    token: str | None
+    timeouts: Timeouts
+    ssl: ssl_module.SSLContext | None
+    options: dict[str, Any] = field(default_factory=dict)
+    dialect: str = ""
+    spec: PolicySpec = field(default_factory=lambda: PolicySpec("unknown"))
+
+    def connect(self) -> RemotePolicy:
+        return connect(self.url, self.token, self.timeouts, ssl=self.ssl, **self.options)
+
+    def raw(self) -> Channel:
+        if self.dialect != "robospa.v1":
+            raise _Skip("openpi's dialect has nothing like it")
+        channel = Channel(Address(self.url, self.token, self.ssl), self.timeouts)
+        hello = unpack(_bytes(channel, self.timeouts.hello))
+        assert isinstance(hello, Hello)
+        return channel
+
+
+def check(
+    url: str,
+    token: str | None = None,
+    *,
+    timeouts: Timeouts | None = None,
+    ssl: ssl_module.SSLContext | None = None,
+    force_openpi: bool = False,
+    openpi: OpenPiOptions | None = None,
+) -> list[CheckResult]:
+    """Run every check against the server at a ws:// or wss:// URL. Raises nothing of the server's
+    making: what goes wrong becomes a failed check. Stops after a failed handshake."""
+    options = {"force_openpi": force_openpi, "openpi": openpi}
+    target = _Target(url, token, timeouts or Timeouts(), ssl, options)
+    results = []
+    for name, function in CHECKS.items():
+        result = _run(name, function, target)
+        results.append(result)
+        if name == "handshake" and not result.passed:
+            break
+    return results
+
+
+def _run(name: str, function: Callable[[_Target], str], target: _Target) -> CheckResult:
+    try:
+        return CheckResult(name, True, function(target))
+    except _Skip as reason:
+        return CheckResult(name, None, str(reason))
+    except (WireError, AssertionError) as error:
+        return CheckResult(name, False, str(error) or type(error).__name__)
+
+
+def synthetic_observation(spec: PolicySpec, step: int = 0, seed: int = 0) -> dict[str, Any]:
+    """An observation of the form that `spec` asks for, filled with reproducible noise."""
+    rng = np.random.default_rng(seed)
+    width = 16 if spec.action == "joint" and spec.action_dim == 16 else 14
+
+    def view() -> dict[str, Any]:
+        images = {
+            c.name: rng.integers(0, 256, (c.height, c.width, 3), np.uint8) for c in spec.cameras
+        }
+        seen: dict[str, Any] = {"images": images, "ee": np.zeros((2, 8), np.float32)}
+        if spec.state != "none":
+            seen["state"] = np.zeros(width, np.float32)
+        return seen
+
+    observation = {**view(), "instruction": TRIAL.instruction, "step": step}
+    if spec.history:
+        observation["history"] = {offset: view() for offset in spec.history}
+    if spec.privileged:
+        observation["privileged"] = {}
+    return observation
+
+
+# ---------------------------------------------------------------- the checks
+
+
+def _handshake(target: _Target) -> str:
+    with target.connect() as policy:
+        target.dialect, target.spec = policy.dialect, policy.spec
+        if policy.dialect == "openpi":
+            return "speaks openpi's dialect"
+        hello = policy.hello
+        return f"robospa.v1, version {hello['version']} (ours {VERSION}), {hello['server']!r}"
+
+
+def _spec(target: _Target) -> str:
+    spec = target.spec
+    again = PolicySpec.from_json(spec.to_json())
+    assert again == spec, "the spec does not survive JSON"
+    if target.dialect == "openpi":
+        raise _Skip("openpi servers send no spec: the one chosen at this side is used")
+    cameras = ", ".join(f"{c.name} {c.width}x{c.height}" for c in spec.cameras) or "none"
+    return f"{spec.name}: {spec.action} actions, horizon {spec.horizon}, cameras {cameras}"
+
+
+def _subprotocol(target: _Target) -> str:
+    if target.dialect != "robospa.v1":
+        raise _Skip("openpi's dialect has no versions")
+    try:
+        channel = Channel(
+            Address(target.url, target.token, target.ssl),
+            replace(target.timeouts, wait=0.0),
+            subprotocol="robospa.v999",
+        )
+    except WireError as error:
+        return f"refused: {error}"
+    chosen = channel.subprotocol
+    channel.close()
+    assert chosen is None, "the server accepted a version that does not exist"
+    raise AssertionError("a client that offers only robospa.v999 must be refused")
+
+
+def _reset(target: _Target) -> str:
+    with target.connect() as policy:
+        policy.reset(TRIAL)
+        policy.reset(TRIAL)
+    return "acknowledged twice"
+
+
+def _infer(target: _Target) -> str:
+    if target.spec.privileged:
+        raise _Skip("the policy needs the exact state, which only a simulator can give")
+    with target.connect() as policy:
+        policy.reset(TRIAL)
+        chunk = policy.infer(synthetic_observation(target.spec))
+        first = policy.last_timing["round_trip_ms"]
+        policy.infer(synthetic_observation(target.spec, step=len(chunk)))
+        then = policy.last_timing["round_trip_ms"]
+        policy.end({"success": False, "end": "step_limit"})
+    return f"float32 {chunk.shape}, finite; {first:.1f} ms, then {then:.1f} ms"
+
+
+def _order(target: _Target) -> str:
+    channel = target.raw()
+    try:
+        answer = _ask(channel, Infer(1, synthetic_observation(target.spec)), target.timeouts)
+        assert isinstance(answer, Error), f"infer before reset was answered with {answer.type}"
+        answer = _ask(channel, Reset(2, TRIAL), target.timeouts)
+        assert isinstance(answer, Ready), f"reset was then answered with {answer.type}"
+        return "infer before reset is refused, and the reset after it works"
+    finally:
+        channel.close()
+
+
+def _bad_observation(target: _Target) -> str:
+    if not target.spec.cameras:
+        raise _Skip("the policy asks for no image that could be left out")
+    channel = target.raw()
+    try:
+        _ask(channel, Reset(1, TRIAL), target.timeouts)
+        broken = {**synthetic_observation(target.spec), "images": {}}
+        answer = _ask(channel, Infer(2, broken), target.timeouts)
+        assert isinstance(answer, Error), "an observation without images was accepted"
+        assert answer.message, "the error has no message"
+        answer = _ask(channel, Reset(3, TRIAL), target.timeouts)
+        assert isinstance(answer, Ready), "the reset after an error failed"
+        if target.spec.privileged:
+            return "refused, and the next reset works"
+        answer = _ask(channel, Infer(4, synthetic_observation(target.spec)), target.timeouts)
+        assert isinstance(answer, Actions), f"infer after the error gave {answer.type}"
+        return "refused, and the next trial gets its own answers"
+    finally:
+        channel.close()
+
+
+def _unknown_fields(target: _Target) -> str:
+    channel = target.raw()
+    try:
+        later = {"type": "reset", "id": 1, "trial": TRIAL.to_json(), "field_of_1_9": [1, 2]}
+        channel.send(encode(later))
+        answer = unpack(_bytes(channel, target.timeouts.reset))
+        assert isinstance(answer, Ready), f"a reset with an unknown field gave {answer.type}"
+        return "fields of later minor versions are ignored"
+    finally:
+        channel.close()
+
+
+def _two_sessions(target: _Target) -> str:
+    if target.spec.privileged:
+        raise _Skip("the policy needs the exact state, which only a simulator can give")
+    with target.connect() as first:
+        try:
+            second = target.connect()
+        except TransportError as error:
+            raise _Skip(f"one connection at a time: {error}") from error
+        with second:
+            first.reset(TRIAL)
+            second.reset(replace(TRIAL, seed=100_001))
+            for policy in (second, first, second):
+                policy.infer(synthetic_observation(target.spec))
+    return "two trials at once are answered"
+
+
+def _determinism(target: _Target) -> str:
+    if not target.spec.seeded:
+        raise _Skip("the server does not promise repeatable answers (spec.seeded is false)")
+    if target.spec.privileged:
+        raise _Skip("the policy needs the exact state, which only a simulator can give")
+    chunks = []
+    for _ in range(2):
+        with target.connect() as policy:
+            policy.reset(TRIAL)
+            chunks.append([policy.infer(synthetic_observation(target.spec)) for _ in range(2)])
+    same = all(np.array_equal(a, b) for a, b in zip(*chunks, strict=True))
+    assert same, "the same policy seed and observations gave other actions"
+    return "the same policy seed and observations give the same actions"
+
+
+def _reconnect(target: _Target) -> str:
+    policy = target.connect()
+    try:
+        policy.reset(TRIAL)
+        policy.reconnect()
+        changes = compare_specs(target.spec, policy.spec)
+        assert not changes, "; ".join(changes)
+        policy.reset(TRIAL)
+        return "a trial that was cut off can be begun again"
+    finally:
+        policy.close()
+
+
+def _garbage(target: _Target) -> str:
+    channel = target.raw()
+    channel.send(b"\xc1 no message")
+    try:
+        answer: Any = unpack(_bytes(channel, target.timeouts.end))
+        assert isinstance(answer, Error), f"garbage was answered with {answer.type}"
+    except TransportError:
+        answer = None
+    finally:
+        channel.close()
+    with target.connect() as policy:
+        policy.reset(TRIAL)
+    return "garbage is refused and the server lives on"
+
+
+CHECKS: dict[str, Callable[[_Target], str]] = {
+    "handshake": _handshake,
+    "spec": _spec,
+    "foreign version refused": _subprotocol,
+    "reset acknowledged": _reset,
+    "actions": _infer,
+    "requests in order": _order,
+    "error, then recovery": _bad_observation,
+    "unknown fields": _unknown_fields,
+    "two sessions": _two_sessions,
+    "determinism": _determinism,
+    "reconnect": _reconnect,
+    "garbage": _garbage,
+}
+
+
+def _ask(channel: Channel, request: Message, timeouts: Timeouts) -> Message:
+    channel.send(pack(request))
+    answer = unpack(_bytes(channel, timeouts.first_infer))
+    assert answer.id == request.id, f"answer {answer.id} came to request {request.id}"
+    return answer
+
+
+def _bytes(channel: Channel, timeout: float) -> bytes:
+    data = channel.receive(timeout, "an answer")
+    assert not isinstance(data, str), "a text frame came in robospa.v1"
+    assert len(data) <= DEFAULT_LIMITS.message
+    return data
