@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from robospa.tasks.geometry import Array
 from robospa.tasks.goals.pick import Lift
@@ -52,7 +53,7 @@ class Choices:
     """Layouts (count, n, 2) and, per rank, which (layout, reference place) make it a clear one."""
 
     layouts: Array
-    by_rank: tuple[Array, ...]
+    by_rank: tuple[NDArray[np.intp], ...]
 
 
 def allowed(x: Array, y: Array) -> Mask:
@@ -82,7 +83,8 @@ def choices(level: int) -> Choices:
     clear = ranked[:, :, :-1] - ranked[:, :, 1:] >= RANK_GAP
     edge = np.ones((*clear.shape[:2], 1), dtype=bool)
     eligible = np.concatenate([edge, clear], axis=2) & np.concatenate([clear, edge], axis=2)
-    return Choices(layouts, tuple(np.argwhere(eligible[:, :, k]) for k in range(count - 1)))
+    pairs = (np.stack(np.nonzero(eligible[:, :, k]), axis=1) for k in range(count - 1))
+    return Choices(layouts, tuple(pairs))
 
 
 def by_distance(points: Array, reference: int) -> list[tuple[float, int]]:

@@ -23,8 +23,6 @@ from robospa.tasks.variants.picking import lifted, pick_target
 from robospa.tasks.variants.tabletop import draw_look, standing
 from robospa.tasks.variants.wording import NOUN_SOAP, Slots, place_phrases, relation_phrases
 
-RADIUS = 0.036
-"""Bound of a soap bar's footprint [m]."""
 MARGIN = (0.06, 0.08)
 DRAWS = 200
 DIRECTIONS: Mapping[str, tuple[int, int]] = {
