@@ -225,4 +225,5 @@ def _rgb(picture: Any) -> NDArray[np.uint8]:
     colors = np.asarray(picture)[..., :3]
     if colors.dtype == np.uint8:
         return np.ascontiguousarray(colors)
-    return (np.clip(colors, 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
+    levels: NDArray[np.uint8] = (np.clip(colors, 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
+    return levels

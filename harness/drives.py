@@ -1,0 +1,141 @@
+"""Both arms' drives: what they were told last, and what to tell them next.
+
+All targets of an action become one table before its first physics step, with one column per SAPIEN
+call and only for drives that change, so that the stepping loop does nothing but these calls.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robospa.harness.motion import Trajectory
+from robospa.harness.robots.embodiment import Arm, Embodiment
+
+Array = NDArray[np.float64]
+Setter = Callable[[float], None]
+Pair = tuple[tuple[float, ...], tuple[float, ...]]
+
+
+@dataclass(frozen=True)
+class _ArmDrives:
+    """SAPIEN's setters of one arm's drives, and where its joints are in qpos."""
+
+    articulation: Any
+    position: list[Setter]
+    velocity: list[Setter]
+    fingers: list[Setter]
+    columns: list[int]
+    finger_columns: list[int]
+
+
+class Drives:
+    """The drives of a loaded robot. `joints` (2, J) [rad] and `gripper` (2,) are as commanded;
+    `opening` (2,) is the grippers' drive target, which may lag an opening gripper's command.
+
+    Grippers get position targets only (official), so they follow with a time constant of
+    damping / stiffness = 0.2 s; arm joints get position and velocity targets.
+    """
+
+    def __init__(self, embodiment: Embodiment, articulations: list[Any]) -> None:
+        self._embodiment = embodiment
+        self._arms = [
+            _bind(arm, articulation)
+            for arm, articulation in zip(embodiment.arms, articulations, strict=True)
+        ]
+        self.joints: Array = np.array([arm.home for arm in embodiment.arms], dtype=float)
+        self.gripper: Array = np.ones(2)
+        self.opening: Array = np.ones(2)
+        self._go_home()
+
+    def _go_home(self) -> None:
+        """Joints at home, grippers open, at rest, and every target where its joint is."""
+        for a, arm in enumerate(self._arms):
+            qpos = np.zeros(arm.articulation.dof, dtype=np.float32)
+            qpos[arm.columns] = self.joints[a]
+            qpos[arm.finger_columns] = self._travel(a, 1.0)
+            arm.articulation.qpos = qpos
+            arm.articulation.qvel = np.zeros_like(qpos)
+            for joint, value in zip(arm.articulation.active_joints, qpos.tolist(), strict=True):
+                joint.set_drive_target(value)
+                joint.set_drive_velocity_target(0.0)
+
+    def _travel(self, arm: int, opening: Any) -> Any:
+        """Finger travel [m] of gripper values 0..1."""
+        closed, opened = self._embodiment.arms[arm].gripper
+        return closed + opening * (opened - closed)
+
+    def program(self, path: Trajectory) -> tuple[list[Setter], list[list[float]]]:
+        """What to call in every physics step of `path`, and with which values (n, calls)."""
+        calls: list[Setter] = []
+        columns: list[Array] = []
+        for a, arm in enumerate(self._arms):
+            moves = (path.joints[a] != self.joints[a]).any(axis=0)
+            moves |= (path.velocities[a] != 0.0).any(axis=0)
+            for j in np.flatnonzero(moves):
+                calls += [arm.position[j], arm.velocity[j]]
+                columns += [path.joints[a, :, j], path.velocities[a, :, j]]
+            if (path.gripper[a] != self.opening[a]).any():
+                calls += arm.fingers
+                columns += [self._travel(a, path.gripper[a])] * len(arm.fingers)
+        if not calls:
+            return [], [[] for _ in range(len(path))]
+        return calls, np.stack(columns, axis=1).tolist()
+
+    def reached(self, path: Trajectory, row: int) -> None:
+        """The targets of `row` of `path` have been set."""
+        self.joints = path.joints[:, row]
+        self.gripper = path.commanded[:, row]
+        self.opening = path.gripper[:, row]
+
+    def halt(self) -> None:
+        """No joint is to move on: velocity targets to zero."""
+        for arm in self._arms:
+            for write in arm.velocity:
+                write(0.0)
+
+    def commanded(self) -> Pair:
+        """Commanded joints [rad] of left and right."""
+        left, right = self.joints.tolist()
+        return tuple(left), tuple(right)
+
+    def measured(self) -> Pair:
+        """Measured joints [rad] of left and right."""
+        left, right = (
+            tuple([qpos[c] for c in arm.columns])
+            for arm, qpos in ((arm, arm.articulation.qpos.tolist()) for arm in self._arms)
+        )
+        return left, right
+
+    def state(self, measured: bool) -> NDArray[np.float32]:
+        """Joints [rad] and gripper 0..1 of left and right (D,): as commanded, or as they are."""
+        parts: list[float] = []
+        joints = self.measured() if measured else self.commanded()
+        for a, arm in enumerate(self._arms):
+            opening = float(self.gripper[a])
+            if measured:
+                closed, opened = self._embodiment.arms[a].gripper
+                travel = float(arm.articulation.qpos[arm.finger_columns].mean())
+                opening = min(1.0, max(0.0, (travel - closed) / (opened - closed)))
+            parts += [*joints[a], opening]
+        return np.array(parts, dtype=np.float32)
+
+
+def _bind(arm: Arm, articulation: Any) -> _ArmDrives:
+    """Look up the joints of `arm` once."""
+    active = articulation.active_joints
+    column = {joint.name: i for i, joint in enumerate(active)}
+    joints = [column[joint.name] for joint in arm.joints]
+    fingers = [column[finger.name] for finger in arm.fingers]
+    return _ArmDrives(
+        articulation=articulation,
+        position=[active[c].set_drive_target for c in joints],
+        velocity=[active[c].set_drive_velocity_target for c in joints],
+        fingers=[active[c].set_drive_target for c in fingers],
+        columns=joints,
+        finger_columns=fingers,
+    )
