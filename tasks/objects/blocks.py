@@ -81,10 +81,10 @@ CUBES: tuple[tuple[str, bool, int, tuple[str, ...]], ...] = (
         "solved Rubik's cube", "finished puzzle cube", "puzzle cube with one colour per side",
         "Rubik's cube with matching sides", "completed magic cube", "sorted colour cube",
     )),
-    ("#f2f2ee", True, 8, (
-        "white-framed Rubik's cube", "puzzle cube with a white frame", "white magic cube",
-        "white puzzle cube with mixed colours", "Rubik's cube with white edges",
-        "colour cube on a white body",
+    ("#8d939a", True, 2, (
+        "grey-framed Rubik's cube", "puzzle cube with a grey frame", "magic cube in grey",
+        "grey puzzle cube with mixed colours", "Rubik's cube with grey edges",
+        "colour cube on a grey body",
     )),
 )  # fmt: skip
 

@@ -132,22 +132,22 @@ def _croissant() -> Made:
     for i, size in enumerate(sizes):
         a = math.pi / 2 + (i - 3) * 0.42
         at = (bend * 1.12 * math.cos(a), bend * math.sin(a) - 0.021, 0.0)
-        sections = [(0.0085 * s, size * s, 2 * size * 0.92 * t) for s, t in _ROUND]
-        part = m.moved(m.pillow(sections, 10), at, yaw_rotation(a - math.pi / 2))
+        sections = [(0.0112 * s, size * s, 2 * size * 0.92 * t) for s, t in _ROUND]
+        part = m.moved(m.pillow(sections, 8), at, yaw_rotation(a - math.pi / 2))
         (golden if i % 2 else brown).append(part)
         if i in (1, 3, 5):
             shapes.append(feel(part))
-    middle = [(0.0105, 0.015, 0.0), (0.0105, 0.015, 0.026)]
+    middle = [(0.0105, 0.0162, 0.0), (0.0105, 0.0162, 0.026)]
     shapes.append(feel(m.moved(m.pillow(middle, 10), (0.0, bend - 0.021, 0.0))))
     shapes += [
         paint(m.merge(*golden), srgb("#d18a35"), roughness=0.5),
         paint(m.merge(*brown), srgb("#a9611f"), roughness=0.5),
     ]
-    grasp = across((0.0, bend - 0.021, 0.014), 0.033, math.pi / 2)
+    grasp = across((0.0, bend - 0.021, 0.014), 0.0324, math.pi / 2)
     return shapes, (grasp,)
 
 
-_ROUND = ((0.7, 0.0), (1.0, 0.3), (0.95, 0.6), (0.66, 0.87), (0.3, 1.0))
+_ROUND = ((0.75, 0.0), (1.0, 0.32), (0.84, 0.72), (0.35, 1.0))
 
 
 def _toast() -> Made:

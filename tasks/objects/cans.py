@@ -195,18 +195,16 @@ def pill_bottle(look: int, params: Mapping[str, Any]) -> ObjectModel:
     """A stubby medicine bottle with a wide ribbed cap and a white label."""
     shell, cap, word = PILLS[look]
     r, h = 0.0215, 0.070
-    body = [(r - 0.0015, 0.0), (r, 0.0015), (r, 0.045), (r * 0.86, 0.050)]
+    body = [(r - 0.0015, 0.0), (r, 0.0015), (r, 0.047), (r * 0.84, 0.054)]
     label = srgb("#cfe0f4") if word == "white" else PAPER
-    bars = [m.rectangle(0.011, 0.0016, 0.0, v) for v in (-0.007, -0.0022)]
-    cross = m.rectangle(0.0022, 0.0055), m.rectangle(0.0055, 0.0022)
+    cross = m.rectangle(0.0024, 0.0075), m.rectangle(0.0075, 0.0024)
     print_color = srgb("#c8202a") if word != "orange" else srgb("#1f55c4")
     parts = [
         feel(Cylinder(r, h / 2), (0.0, 0.0, h / 2)),
         paint(m.lathe(body, 16), srgb(shell), roughness=0.2),
-        paint(m.lathe([(r + 0.0004, 0.008), (r + 0.0004, 0.038)], 16, False), label),
-        paint(m.merge(*(around(b, r + 0.001, 0.022) for b in bars)), srgb("#5a5f66")),
-        paint(m.merge(*(around(c, r + 0.0013, 0.030) for c in cross)), print_color),
-        paint(_ribbed(r - 0.0005, 0.050, h), colour(cap), roughness=0.5),
+        paint(m.lathe([(r + 0.0004, 0.009), (r + 0.0004, 0.030)], 16, False), label),
+        paint(m.merge(*(around(c, r + 0.0009, 0.0195) for c in cross)), print_color),
+        paint(_ribbed(r - 0.0022, 0.053, h), colour(cap), roughness=0.5),
     ]
     phrases = named(
         word, "{} pill bottle", "{} medicine bottle", "{} bottle of pills", "pill bottle in {}",

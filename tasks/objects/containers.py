@@ -35,13 +35,16 @@ def bowl(look: int, params: Mapping[str, Any]) -> ObjectModel:
     h = 0.046
     outer = [(0.027, 0.0), (0.027, 0.004), (0.042, 0.012), (0.053, 0.028), (0.0585, h)]
     inner = [(0.0555, h), (0.0505, 0.029), (0.040, 0.0145), (0.022, 0.008), (0.0, 0.007)]
-    lining = colour("cream") if word != "white" else colour("white")
+    r, g, b = colour(outside)
+    lining = (0.9 * r + 0.035, 0.9 * g + 0.035, 0.9 * b + 0.035)
     ring = [(0.0548, 0.0325), (0.0571, 0.0395)]
+    inside = [(0.0541, 0.0425), (0.0523, 0.0365)]
     parts = [
         paint(m.lathe([(0.0, 0.0), *outer], 18, False), colour(outside), roughness=0.25),
         paint(m.lathe([outer[-1], inner[0]], 18, False), colour(stripe), roughness=0.25),
         paint(m.lathe(inner, 18, False), lining, roughness=0.25),
         paint(m.lathe(ring, 18, False), colour(stripe), roughness=0.25),
+        paint(m.lathe(inside, 18, False), colour(stripe), roughness=0.25),
         feel(Cylinder(0.030, 0.0035), (0.0, 0.0, 0.0035)),
         *wall_ring(0.0428, 0.004, 0.006, h, 12, 0.55),
     ]
@@ -118,12 +121,18 @@ def bread_basket(look: int, params: Mapping[str, Any]) -> ObjectModel:
             a = 2 * math.pi * (i + 0.5) / 24
             shade = dark if (i + k) % 2 else pale
             weave[shade].append(m.band(outside, k * step, (k + 1) * step, a, 2 * math.pi / 24, 1))
-    rim = [((inside + outside) / 2 * x, (inside + outside) / 2 * y, h) for x, y in _circle(24)]
+    middle = (inside + outside) / 2
+    for i in range(24):
+        ends = ((math.cos(a), math.sin(a)) for a in (math.pi * i / 12, math.pi * (i + 1) / 12))
+        path = [(middle * x, middle * y, h) for x, y in ends]
+        weave[dark if i % 2 else pale].append(m.tube(path, 0.0042, 4))
     parts = [
         paint(m.merge(*weave[dark]), srgb(dark), roughness=0.9),
         paint(m.merge(*weave[pale]), srgb(pale), roughness=0.9),
-        paint(m.lathe([(inside, h), (inside, floor), (0.0, floor)], 24, False), colour(cloth)),
-        paint(m.tube(rim, 0.0042, 4, True), srgb(pale), roughness=0.9),
+        paint(
+            m.lathe([(inside, h - 0.012), (inside, floor), (0.0, floor)], 20, False), colour(cloth)
+        ),
+        paint(m.lathe([(inside, h), (inside, h - 0.012)], 20, False), srgb(dark), roughness=0.9),
         feel(Cylinder(0.077, floor / 2), (0.0, 0.0, floor / 2)),
         *wall_ring(inside, 0.005, 0.0, h, 16),
     ]
@@ -138,10 +147,6 @@ def bread_basket(look: int, params: Mapping[str, Any]) -> ObjectModel:
         "bread_basket", parts, "bread basket", phrases, grasps, 0.08, 0.7,
         support=(0.0, 0.0, floor), press=(0.0, 0.0, floor),
     )  # fmt: skip
-
-
-def _circle(n: int) -> list[m.Point]:
-    return m.ellipse(1.0, 1.0, n)
 
 
 BINS = (

@@ -194,16 +194,16 @@ BELLS = (
 def bell(look: int, params: Mapping[str, Any]) -> ObjectModel:
     """A call bell: a round dome over a dark foot, with the button on top."""
     dome, foot, word, low, metallic = BELLS[look]
-    r, h = 0.0300, 0.046
-    shell = [(r - 0.0005, 0.0085), (r - 0.0005, 0.0115), (r - 0.0025, 0.0195), (r - 0.0075, 0.0275)]
-    shell += [(r - 0.0150, 0.0335), (r - 0.0245, 0.0365)]
+    r, h = 0.0300, 0.044
+    shell = [(r - 0.0005, 0.0085), (r - 0.0005, 0.0115), (r - 0.0025, 0.0180), (r - 0.0075, 0.0247)]
+    shell += [(r - 0.0150, 0.0295), (r - 0.0245, 0.0315)]
     parts = [
         feel(m.lathe([(r, 0.0), (r, 0.0125), *shell[2:]], 16)),
-        feel(Cylinder(0.0065, 0.005), (0.0, 0.0, 0.041)),
+        feel(Cylinder(0.0065, 0.0065), (0.0, 0.0, h - 0.0065)),
         paint(m.lathe([(r, 0.0), (r, 0.006), (r - 0.003, 0.0085)], 18), srgb(foot), roughness=0.5),
         paint(m.lathe(shell, 18), srgb(dome), roughness=0.25, metallic=metallic),
-        paint(m.lathe([(0.0038, 0.036), (0.0038, 0.041)], 10), STEEL, roughness=0.3),
-        paint(m.lathe([(0.0065, 0.040), (0.0068, 0.043), (0.004, h), (0.0, h)], 12), srgb(foot)),
+        paint(m.lathe([(0.0038, 0.031), (0.0038, 0.038)], 8), STEEL, roughness=0.3),
+        paint(m.lathe([(0.0070, 0.037), (0.0073, 0.041), (0.0045, h), (0.0, h)], 12), srgb(foot)),
     ]
     phrases = named(
         word, "{} bell", "{} call bell", "{} desk bell", "bell with a {} dome", "{} service bell",
@@ -247,8 +247,8 @@ def fan(look: int, params: Mapping[str, Any]) -> ObjectModel:
         paint(m.lathe(foot, 18), colour(frame), roughness=0.35),
         paint(m.lathe([(0.007, 0.012), (0.006, 0.037)], 10), colour(frame), roughness=0.35),
         paint(hoop, colour(frame), at, ALONG_Y, 0.35),
-        paint(back, srgb("#3a3f47"), (0.0, 0.009, z), ALONG_Y, 0.8),
-        paint(_blades(), colour(blade), (0.0, 0.0, z), ALONG_Y, 0.4),
+        paint(back, srgb("#343941"), (0.0, 0.006, z), ALONG_Y, 0.8),
+        paint(_blades(), colour(blade), (0.0, -0.005, z), ALONG_Y, 0.4),
         paint(m.merge(*spokes, guard), rim, at, ALONG_Y, 0.3),
         paint(
             m.lathe([(0.0068, 0.0), (0.0068, deep), (0.004, deep + 0.001)], 12),

@@ -53,9 +53,9 @@ def hamburger(look: int, params: Mapping[str, Any]) -> ObjectModel:
         feel(m.lathe([(r, 0.031), (r - 0.004, 0.040), (r - 0.013, 0.047), (0.004, 0.050)], 14)),
         paint(m.lathe(low, 16), srgb(bun), roughness=0.8),
         paint(_lettuce(r, 0.0125), srgb("#57b030"), roughness=0.8),
-        paint(m.lathe(patty, 16), srgb("#4b2413"), roughness=0.9),
+        paint(m.lathe(patty, 14), srgb("#4b2413"), roughness=0.9),
         paint(m.prism(turned, 0.0225, 0.0245), srgb(cheese), roughness=0.5),
-        paint(m.lathe(tomato, 16), srgb("#cf2a1c"), roughness=0.5),
+        paint(m.lathe(tomato, 14), srgb("#cf2a1c"), roughness=0.5),
         paint(m.lathe(top, 16), srgb(bun), roughness=0.6),
         paint(_seeds(r), srgb("#fbeecb")),
     ]
@@ -77,11 +77,13 @@ def _lettuce(r: float, z: float) -> Mesh:
 
 def _seeds(r: float) -> Mesh:
     """Sesame on the domed bun."""
+    tip = [(0.0, 0.0, 0.0011)]
+    foot = [(x, y, 0.0) for x, y in m.ellipse(0.0024, 0.0013, 5)]
+    seed = m.loft([foot, tip * 5], False)
     parts = []
     for ring, z, count in ((0.009, 0.0487, 5), (0.0165, 0.0474, 8), (0.0222, 0.0437, 9)):
         for i in range(count):
             a = 2 * math.pi * (i + 0.5 * (count % 2)) / count
-            seed = m.pillow([(0.0022, 0.0012, 0.0), (0.0014, 0.0007, 0.0011)], 5)
             turn = axis_rotation((0.0, 0.0, 1.0), a)
             parts.append(m.moved(seed, (ring * math.cos(a), ring * math.sin(a), z - 0.0004), turn))
     return m.merge(*parts)
