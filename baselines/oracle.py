@@ -52,7 +52,7 @@ class Oracle:
         snapshot = snapshot_from_json(state)
         if self._expert is None:
             self._expert = Expert(self._scene, snapshot)
-        return self._expert.next(snapshot)[:HORIZON]
+        return self._expert.next(snapshot)
 
 
 def create() -> Oracle:

@@ -77,6 +77,7 @@ def _arm(name: str, prefix: str, base: Vec3) -> Arm:
         seeds=SEEDS,
         shapes=shapes,
         camera=WRIST_CAMERA,
+        geometry="arx",
     )
 
 

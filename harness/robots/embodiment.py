@@ -54,6 +54,8 @@ class Arm:
     shapes: Mapping[str, tuple[Shape, ...]]
     camera: Pose
     """Wrist camera in the last arm link: x looks forward, z is up in the image."""
+    geometry: str = "any"
+    """"arx" if `robospa.harness.robots.arx` solves this arm in closed form, else "any"."""
 
     @property
     def links(self) -> tuple[str, ...]:

@@ -1,7 +1,7 @@
 """Forward and inverse kinematics of one arm in plain numpy, many poses at a time.
 
-Damped least squares on the end-effector pose, started from a few postures aimed at the target, for
-N targets at once: that costs little more than one. No simulator, no global state: the same
+Inverse kinematics is closed-form where the arm allows it (`arx`), else damped least squares on the
+end-effector pose from a few postures aimed at the target. No simulator, no global state: the same
 arguments give the same bits on one machine.
 """
 
@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from robospa.harness.robots import arx
 from robospa.harness.robots.embodiment import Arm
 from robospa.tasks.geometry import Pose, from_matrix, to_matrix
 
@@ -39,6 +40,7 @@ class Chain:
     lower: Array  # (J,)
     upper: Array  # (J,)
     seeds: Array  # (S, J)
+    links: arx.Links | None = None
 
 
 def matrix(pose: Pose) -> Array:
@@ -57,11 +59,14 @@ def pose_of(transform: Array) -> Pose:
 
 def chain_of(arm: Arm) -> Chain:
     """The arm's joints as arrays, ending in its end-effector frame."""
+    origins = np.stack([matrix(j.origin) for j in arm.joints])
+    tool = matrix(arm.tool)
     return Chain(
         base=matrix(arm.base),
-        origins=np.stack([matrix(j.origin) for j in arm.joints]),
+        origins=origins,
         axes=np.array([j.axis for j in arm.joints], dtype=float),
-        tool=matrix(arm.tool),
+        tool=tool,
+        links=arx.links_of(origins, tool) if arm.geometry == "arx" else None,
         lower=np.array([j.lower for j in arm.joints]),
         upper=np.array([j.upper for j in arm.joints]),
         seeds=np.array(arm.seeds, dtype=float),
@@ -159,13 +164,16 @@ def inverse(
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Joints (N, J) [rad] that bring the end-effector frame to each target, and success (N,).
 
-    With `near` only the solution reached from those joints counts, so that it stays on the same
-    branch; otherwise the postures of the arm's `seeds`, aimed at the target, are tried in
-    their order until one arrives. A target that is out of reach or beyond the
-    joint limits has success False and the best joints found.
+    An arm with a closed form has one solution. Otherwise, with `near` only the solution reached
+    from those joints counts, so that it stays on the same branch; without, the postures of the
+    arm's `seeds`, aimed at the target, are tried in their order until one arrives. A target that
+    is out of reach or beyond the joint limits has success False and the best joints found.
     """
     wanted = np.stack([matrix(t) for t in targets])
     count = len(targets)
+    if chain.links is not None:
+        local = np.linalg.inv(chain.base) @ wanted
+        return arx.solve(chain.links, local, chain.lower, chain.upper)
     if near is not None:
         start = np.broadcast_to(np.asarray(near, dtype=float), (count, len(chain.axes)))
         return _descend(chain, wanted, start)
