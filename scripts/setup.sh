@@ -133,7 +133,7 @@ ensure_packages() {
     stamped "$kind" "$now" && return 0
     if [ "$kind" = requirements ] && # the development lock contains this one
         stamped requirements-dev "$(echo requirements-dev.lock | fingerprint)"; then return 0; fi
-    say "installing the packages of $lock (a minute or two: about 250 MB to fetch)"
+    say "installing the packages of $lock (a minute or two)"
     pip_install -r "$lock" || fail "pip could not install $lock: see its message above."
     if [ "$kind" = requirements-dev ]; then
         pip_install --no-deps "$openpi_client" || fail "pip could not install $openpi_client."
