@@ -14,11 +14,12 @@ import numpy as np
 
 from robospa.tasks.geometry import Array, Pose, yaw_rotation
 from robospa.tasks.goals.pick import Lift
+from robospa.tasks.instructions import words_spatial
+from robospa.tasks.instructions.words import Slots
 from robospa.tasks.layouts import Area, Mask, Points, in_head_view, scatter, spread
 from robospa.tasks.scene import TABLE_TOP, Scene, SceneObject
 from robospa.tasks.task import Draft, Level, Task
 from robospa.tasks.variants.picking import lifted, pick_target
-from robospa.tasks.variants.wording import NOUN_CUBE, Slots, ordinals
 
 HALF_EDGES = (
     (0.032, 0.033),
@@ -111,12 +112,8 @@ def draw(level: int, rng: np.random.Generator) -> Draft:
 
 
 def slots(scene: Scene) -> Slots:
-    """`size_rank` ("2nd largest") and `noun`."""
-    rank = int(scene.facts["size_rank"])
-    return {
-        "size_rank": ordinals(rank, ("largest", "biggest"), ("bulkiest", "most sizeable")),
-        "noun": NOUN_CUBE,
-    }
+    """What the instruction says: which block."""
+    return words_spatial.size(int(scene.facts["size_rank"]), len(scene.objects))
 
 
 LEVELS: Mapping[int, Level] = {k: Level(k + 1, 1, 150) for k in range(1, 6)}

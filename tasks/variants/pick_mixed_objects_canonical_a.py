@@ -12,18 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from robospa.tasks.goals.pick import Lift
+from robospa.tasks.instructions import words_spatial
+from robospa.tasks.instructions.words import Slots
 from robospa.tasks.layouts import view_span
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.task import Draft, Level, Task
 from robospa.tasks.variants.picking import lifted, pick_target
 from robospa.tasks.variants.tabletop import draw_look, standing
-from robospa.tasks.variants.wording import (
-    COLUMN_DIRECTIONS,
-    NOUN_OBJECT,
-    ROW_DIRECTIONS,
-    Slots,
-    index,
-)
 
 ASSETS = (
     "rubikscube", "alarm_clock", "mouse", "stapler", "bell", "hamburger",
@@ -104,17 +99,11 @@ def draw(level: int, rng: np.random.Generator) -> Draft:
 
 
 def slots(scene: Scene) -> Slots:
-    """`column`, `column_direction`, `noun`; with more than one row `row`, `row_direction`."""
+    """What the instruction says: column and, with more than one row, row."""
     facts = scene.facts
-    found = {
-        "column": index(int(facts["column"])),
-        "column_direction": COLUMN_DIRECTIONS[str(facts["column_direction"])],
-        "noun": NOUN_OBJECT,
-    }
-    if "row" in facts:
-        found["row"] = index(int(facts["row"]))
-        found["row_direction"] = ROW_DIRECTIONS[str(facts["row_direction"])]
-    return found
+    return words_spatial.canonical(
+        facts["column"], facts["column_direction"], facts.get("row"), facts.get("row_direction")
+    )
 
 
 LEVELS: Mapping[int, Level] = {k: Level(g.rows * g.columns, 1, 150) for k, g in GRIDS.items()}

@@ -18,6 +18,8 @@ from numpy.typing import NDArray
 
 from robospa.tasks.geometry import Array
 from robospa.tasks.goals.pick import Lift
+from robospa.tasks.instructions import words_spatial
+from robospa.tasks.instructions.words import Slots
 from robospa.tasks.layouts import Mask, in_head_view
 from robospa.tasks.objects import object_model
 from robospa.tasks.packing import Fits, apart, pool, walk
@@ -25,7 +27,6 @@ from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.task import Draft, Level, Task
 from robospa.tasks.variants.picking import lifted, pick_target
 from robospa.tasks.variants.tabletop import draw_look, look_phrasings, standing
-from robospa.tasks.variants.wording import NOUN_OBJECT, Slots, ordinals
 
 ASSETS = ("tea_box", "sauce_can", "bowl", "toycar", "fan", "tissue_box", "french_fries")
 """Level k uses the first k + 2."""
@@ -139,14 +140,10 @@ def draw(level: int, rng: np.random.Generator) -> Draft:
 
 
 def slots(scene: Scene) -> Slots:
-    """`distance_rank` ("2nd farthest"), `reference` ("tea box") and `noun`."""
+    """What the instruction says: the rank and the reference."""
     reference = scene.object(str(scene.facts["reference"]))
-    rank = int(scene.facts["distance_rank"])
-    return {
-        "distance_rank": ordinals(rank, ("farthest", "most distant"), ("furthest", "most far-off")),
-        "reference": look_phrasings(object_model(reference.asset, reference.params)),
-        "noun": NOUN_OBJECT,
-    }
+    names = look_phrasings(object_model(reference.asset, reference.params))
+    return words_spatial.distance(int(scene.facts["distance_rank"]), reference.asset, names)
 
 
 LEVELS: Mapping[int, Level] = {k: Level(k + 2, 1, 150) for k in range(1, 6)}

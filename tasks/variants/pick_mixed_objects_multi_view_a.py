@@ -16,13 +16,14 @@ from numpy.typing import NDArray
 
 from robospa.tasks.geometry import Array
 from robospa.tasks.goals.pick import Lift
+from robospa.tasks.instructions import words_spatial
+from robospa.tasks.instructions.words import Slots
 from robospa.tasks.layouts import Mask, head_pixel, in_head_view
 from robospa.tasks.packing import Fits, pool, walk
 from robospa.tasks.scene import TABLE_TOP, Scene, SceneObject
 from robospa.tasks.task import Draft, Level, Task
 from robospa.tasks.variants.picking import lifted, pick_target
 from robospa.tasks.variants.tabletop import draw_look, standing
-from robospa.tasks.variants.wording import NOUN_OBJECT, POSITIONS, VIEWPOINTS, Slots
 
 ASSETS = ("block", "bread", "seal", "toycar", "phone", "rubikscube", "remote_control")
 OBJECTS = {1: 3, 2: 4, 3: 5, 4: 6, 5: 7}
@@ -166,12 +167,8 @@ def draw(level: int, rng: np.random.Generator) -> Draft:
 
 
 def slots(scene: Scene) -> Slots:
-    """`viewpoint` (goes before "side" or "view"), `position` ("leftmost") and `noun`."""
-    return {
-        "viewpoint": VIEWPOINTS[str(scene.facts["viewpoint"])],
-        "position": POSITIONS[str(scene.facts["position"])],
-        "noun": NOUN_OBJECT,
-    }
+    """What the instruction says: the extreme in the viewer's words, and the viewer."""
+    return words_spatial.multi_view(scene.facts["position"], scene.facts["viewpoint"])
 
 
 LEVELS: Mapping[int, Level] = {k: Level(min(n, 4), 1, 150) for k, n in OBJECTS.items()}

@@ -16,12 +16,13 @@ import numpy as np
 
 from robospa.tasks.geometry import Array
 from robospa.tasks.goals.pick import Lift
+from robospa.tasks.instructions import words_spatial
+from robospa.tasks.instructions.words import Slots
 from robospa.tasks.layouts import LayoutError, in_head_view
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.task import Draft, Level, Task
 from robospa.tasks.variants.picking import lifted, pick_target
 from robospa.tasks.variants.tabletop import draw_look, standing
-from robospa.tasks.variants.wording import NOUN_SOAP, Slots, place_phrases, relation_phrases
 
 MARGIN = (0.06, 0.08)
 DRAWS = 200
@@ -165,12 +166,9 @@ def draw(level: int, rng: np.random.Generator) -> Draft:
 
 
 def slots(scene: Scene) -> Slots:
-    """`relation` ("directly to the left of"), `reference` ("front-left soap bar") and `noun`."""
-    return {
-        "relation": relation_phrases(str(scene.facts["relation"]), len(scene.objects) > 2),
-        "reference": place_phrases(str(scene.facts["reference_label"])),
-        "noun": NOUN_SOAP,
-    }
+    """What the instruction says: the direction and the reference's place."""
+    facts = scene.facts
+    return words_spatial.relational(facts["relation"], facts["reference_label"], scene.level)
 
 
 LEVELS: Mapping[int, Level] = {k: Level(g.count, 1, 150) for k, g in GRIDS.items()}
