@@ -88,6 +88,21 @@ def git_state(folder: Path) -> dict[str, Any]:
         return {}
 
 
+def code_hash() -> str:
+    """Hash of the installed code and data that decide a trial's result.
+
+    Unlike a commit it also exists outside a checkout, and does not change with the documentation.
+    """
+    digest = hashlib.sha256()
+    root = Path(__file__).resolve().parent.parent
+    for folder in ("protocol", "clients", "tasks", "harness"):
+        for path in sorted((root / folder).rglob("*")):
+            inside = path.relative_to(root)
+            if path.suffix in (".py", ".json") and "cli" not in inside.parts:
+                digest.update(f"{inside}\0".encode() + path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
 def about_machine(world: Mapping[str, Any]) -> dict[str, Any]:
     """Versions, checkout and machine, with what the `world` says about itself."""
     return {
@@ -98,6 +113,7 @@ def about_machine(world: Mapping[str, Any]) -> dict[str, Any]:
             "sapien": _version("sapien"),
         },
         "git": git_state(Path(__file__).resolve().parent),
+        "code": code_hash(),
         "machine": {
             "system": platform.platform(),
             "processor": platform.machine(),
@@ -161,10 +177,9 @@ def open_run(folder: Path, manifest: Manifest, resume: bool) -> None:
     new = manifest.to_json()
     changes = changed_settings(old["settings"], new["settings"])
     changes += _list_changes(manifest_keys(old), manifest.keys)
-    for part in ("versions", "git"):
-        before, now = dict(old["about"].get(part, {})), dict(new["about"].get(part, {}))
-        before.pop("dirty", None), now.pop("dirty", None)
-        changes += [f"{part}.{c}" for c in changed_settings(before, now)]
+    for part in ("versions", "code"):
+        before, now = old["about"].get(part), new["about"].get(part)
+        changes += changed_settings({part: before}, {part: now})
     if changes:
         raise RunError(
             f"the run in {folder} was started with other settings ({'; '.join(changes)}); "

@@ -11,6 +11,7 @@ import os
 import signal
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -173,3 +174,16 @@ class SuicidalPolicy(FakePolicy):
 
 def slow() -> FakePolicy:
     return SlowPolicy()
+
+
+def other() -> FakePolicy:
+    return FakePolicy(replace(SPEC, name="other"))
+
+
+def picky() -> FakePolicy:
+    return FakePolicy(replace(SPEC, embodiments=("only-me",)))
+
+
+class Broken:
+    def __init__(self) -> None:
+        raise RuntimeError("no Vulkan device")
