@@ -20,7 +20,7 @@ from robospa.harness.motion import RATE, Trajectory, fixed_rate, rest_to_rest
 from robospa.harness.physics import Physics, unpack
 from robospa.harness.robots import embodiment as embodiment_named
 from robospa.harness.settling import settle
-from robospa.harness.world import Poll, RenderUnavailable, StepResult
+from robospa.harness.world import Poll, RenderUnavailable, SceneUnstable, StepResult
 from robospa.protocol.policy import CameraSpec, PolicySpec
 from robospa.tasks.geometry import Pose
 from robospa.tasks.scene import Scene
@@ -77,7 +77,9 @@ class SapienWorld:
         """
         self._drop_physics()
         self._embodiment = embodiment_named(scene.embodiment)
-        self._reader = self._readers.setdefault(scene.embodiment, ActionReader(self._embodiment))
+        if scene.embodiment not in self._readers:
+            self._readers[scene.embodiment] = ActionReader(self._embodiment)
+        self._reader = self._readers[scene.embodiment]
         self._scene = scene
         self._contacts = contacts
         self._steps = 0
@@ -95,7 +97,11 @@ class SapienWorld:
         for i, item in enumerate(scene.objects):
             if item.appears_at is None:
                 self._create(physics, i)
-        settle(physics, f"{scene.task} level {scene.level} seed {scene.seed}")
+        try:
+            settle(physics, f"{scene.task} level {scene.level} seed {scene.seed}")
+        except SceneUnstable:
+            self._drop_physics()
+            raise
         self._appear(physics)
 
     def _create(self, physics: Physics, index: int) -> None:

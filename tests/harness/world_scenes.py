@@ -1,0 +1,67 @@
+"""Small scenes of blocks for the tests of the world."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robospa.tasks.geometry import Pose
+from robospa.tasks.scene import TABLE_TOP, Scene, SceneObject
+
+READY = (0.0, 1.6, 1.5, 0.0, 0.0, 0.0)
+RED = (0.7, 0.1, 0.1)
+
+
+def block(
+    name: str, x: float, y: float, half: float = 0.02, lift: float = 0.0, **more: Any
+) -> SceneObject:
+    """A cube on the table, `lift` above it."""
+    pose = Pose((x, y, TABLE_TOP + half + lift))
+    return SceneObject(name, "block", pose, {"half": [half] * 3, "color": list(RED)}, **more)
+
+
+def scene(*objects: SceneObject, **more: Any) -> Scene:
+    """A scene of a task that does not exist."""
+    return Scene("Test_Blocks", 1, 100000, "aloha-agilex", "clean", objects, {}, **more)
+
+
+def two_blocks() -> Scene:
+    return scene(block("one", -0.1, 0.0), block("two", 0.15, 0.05))
+
+
+def joint_action(
+    left: tuple[float, ...] = READY,
+    right: tuple[float, ...] = READY,
+    grip: tuple[float, float] = (1.0, 1.0),
+) -> NDArray[np.float32]:
+    return np.array([*left, grip[0], *right, grip[1]], dtype=np.float32)
+
+
+def wandering(count: int, seed: int) -> list[NDArray[np.float32]]:
+    """Random joint actions that sweep both arms over the table."""
+    rng = np.random.default_rng(seed)
+    low, high = (
+        np.array([-0.5, 1.2, 1.0, -1.2, -0.5, -0.5]),
+        np.array([0.5, 2.4, 1.8, 0.5, 0.5, 0.5]),
+    )
+    return [
+        np.concatenate(
+            [
+                rng.uniform(low, high),
+                rng.uniform(size=1),
+                rng.uniform(low, high),
+                rng.uniform(size=1),
+            ]
+        ).astype(np.float32)
+        for _ in range(count)
+    ]
+
+
+def run_digest(world: Any, loaded: Scene, seed: int, actions: int = 4) -> str:
+    """Load, wander, hash."""
+    world.load(loaded)
+    for action in wandering(actions, seed):
+        world.step(action, "joint", lambda snapshot: False)
+    return str(world.digest())
