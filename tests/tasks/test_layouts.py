@@ -1,0 +1,137 @@
+"""Layouts: the head camera's projection against official figures, bounded scatter, the pool."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from robospa.tasks.layouts import (
+    EYE,
+    Area,
+    LayoutError,
+    head_pixel,
+    in_head_view,
+    in_reach,
+    scatter,
+    spread,
+    view_span,
+)
+from robospa.tasks.packing import apart, pool, walk
+from robospa.tasks.scene import TABLE_TOP
+
+A = np.array
+
+
+def test_point_on_the_optical_axis_is_the_image_centre() -> None:
+    u, v = head_pixel(A([EYE[0]]), A([EYE[1] + 0.6]), A([EYE[2] - 0.8]))
+    assert (u[0], v[0]) == pytest.approx((160.0, 120.0))
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "axis", "edge"),
+    [
+        (0.0, -0.248, 1, 240.0),
+        (0.0, 0.432, 1, 0.0),
+        (-0.303, -0.248, 0, 0.0),
+        (0.239, -0.248, 0, 320.0),
+        (0.421, 0.432, 0, 320.0),
+    ],
+)
+def test_edges_of_the_visible_table_are_the_official_ones(
+    x: float, y: float, axis: int, edge: float
+) -> None:
+    assert head_pixel(A([x]), A([y]), TABLE_TOP)[axis][0] == pytest.approx(edge, abs=1.0)
+
+
+def test_pixels_per_metre_at_the_table_centre_are_the_official_ones() -> None:
+    u, _ = head_pixel(A([0.0, 0.01]), A([0.0, 0.0]), TABLE_TOP)
+    assert (u[1] - u[0]) / 0.01 == pytest.approx(474, abs=2)
+
+
+def test_tall_object_leaves_the_view_before_a_flat_one() -> None:
+    x, y = A([0.24]), A([-0.1])
+    flat, tall = in_head_view(x, y, 0.0, 0.0), in_head_view(x, y, 0.0, 0.12)
+    assert (bool(flat[0]), bool(tall[0])) == (True, False)
+
+
+@pytest.mark.parametrize("y", [-0.18, 0.0, 0.1])
+def test_view_span_ends_where_the_view_does(y: float) -> None:
+    low, high = view_span(y, 0.03, 0.05)
+    inside = in_head_view(A([low, high]) + A([1e-6, -1e-6]), A([y, y]), 0.03, 0.05)
+    outside = in_head_view(A([low, high]) + A([-1e-3, 1e-3]), A([y, y]), 0.03, 0.05)
+    assert inside.all() and not outside.any()
+
+
+def test_reach_covers_the_work_area_and_not_the_far_edge() -> None:
+    assert in_reach(A([0.0, -0.25, 0.25]), A([0.19, 0.2, 0.2])).all()
+    assert not in_reach(A([0.0]), A([0.34]))[0]
+
+
+def test_area_clears_the_far_middle() -> None:
+    x, y = Area((-0.3, 0.3), (-0.1, 0.2), True).draw(np.random.default_rng(0), (2000,))
+    assert y[np.abs(x) < 0.15].max() <= 0.0
+    assert y[np.abs(x) >= 0.15].max() > 0.15
+
+
+def propose_square(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    x, y = Area((0.0, 1.0), (0.0, 1.0)).draw(rng, (4, 30))
+    return x, y, x > 0.1
+
+
+def test_scatter_keeps_distances_and_refuses_what_is_not_usable() -> None:
+    rng = np.random.default_rng(0)
+    limits = [[0.3] * 4] * 4
+    for _ in range(50):
+        points = A(scatter(rng, propose_square, limits))
+        gaps = np.linalg.norm(points[:, None] - points, axis=-1) + np.eye(4)
+        assert gaps.min() >= 0.3 and points[:, 0].min() > 0.1
+
+
+def test_scatter_gives_up_in_bounded_work() -> None:
+    calls = []
+
+    def propose(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        calls.append(1)
+        return propose_square(rng)
+
+    with pytest.raises(LayoutError, match="4 objects in 7 draws"):
+        scatter(np.random.default_rng(0), propose, [[2.0] * 4] * 4, restarts=7)
+    assert len(calls) == 7
+
+
+def test_spread_is_the_range() -> None:
+    assert spread([0.3, -0.1, 0.2]) == pytest.approx(0.4)
+
+
+def fits_square(points: np.ndarray, wanted: np.ndarray, i: int) -> np.ndarray:
+    inside = (wanted >= 0).all(axis=1) & (wanted <= 0.2).all(axis=1)
+    return inside & apart(points, wanted, i, 0.15)
+
+
+CORNERS = A([[[0.0, 0.0], [0.2, 0.0], [0.0, 0.2], [0.2, 0.2]]] * 16)
+
+
+def test_pool_holds_layouts_only_and_is_repeatable() -> None:
+    layouts = pool(CORNERS, fits_square, sweeps=40, samples=4)
+    assert layouts.shape == (4, 16, 4, 2)
+    for i in range(4):
+        flat = layouts.reshape(-1, 4, 2)
+        assert fits_square(flat, flat[:, i], i).all()
+    assert np.array_equal(layouts, pool(CORNERS, fits_square, sweeps=40, samples=4))
+
+
+def test_pool_leaves_its_starts() -> None:
+    layouts = pool(CORNERS, fits_square, sweeps=40, samples=1)
+    assert np.abs(layouts[0] - CORNERS).max(axis=(1, 2)).min() > 0.005
+
+
+def test_pool_refuses_starts_that_break_the_rules() -> None:
+    with pytest.raises(LayoutError, match="start layouts of 4 objects"):
+        pool(CORNERS * 0.5, fits_square)
+
+
+def test_walk_never_leaves_the_layouts() -> None:
+    rng, points = np.random.default_rng(0), CORNERS.copy()
+    for _ in range(20):
+        walk(rng, points, fits_square, 0.1)
+        assert all(fits_square(points, points[:, i], i).all() for i in range(4))
