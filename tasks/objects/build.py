@@ -205,14 +205,26 @@ def round_grasps(
 
 
 def rim_grasps(
-    radius: float, thickness: float, z: float, count: int = 8, start: float = 0.0, tilt: float = 0.5
+    radius: float,
+    thickness: float,
+    z: float,
+    count: int = 8,
+    start: float = 0.0,
+    tilt: float = 0.5,
+    lean: float = 0.0,
 ) -> tuple[Grasp, ...]:
-    """Grasps astride a round wall whose middle is `radius` from the axis."""
+    """Grasps astride a round wall whose middle is `radius` from the axis at height `z`.
+
+    Where the wall leans outwards by `lean` [rad], so does the gripper.
+    """
     found = []
     for i in range(count):
         a = start + 2 * math.pi * i / count
-        point = (round(radius * math.cos(a), 6), round(radius * math.sin(a), 6), z)
-        found.append(across(point, thickness, a, tilt))
+        c, s = math.cos(a), math.sin(a)
+        point = (round(radius * c, 6), round(radius * s, 6), z)
+        sink, rise = math.sin(lean), math.cos(lean)
+        approach = (-sink * c, -sink * s, -rise)
+        found.append(Grasp(point, approach, (rise * c, rise * s, -sink), thickness, tilt))
     return tuple(found)
 
 

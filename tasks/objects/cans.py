@@ -171,7 +171,7 @@ def bottle(look: int, params: Mapping[str, Any]) -> ObjectModel:
         "{} bottle with a cap", "tall {} bottle",
     )  # fmt: skip
     phrases = (*phrases[:4], f"{word} bottle with a {detail}", *phrases[4:])
-    grasps = [*round_grasps(2 * r, 0.070, 1.2), *round_grasps(0.0245, 0.121, 0.9)]
+    grasps = [*round_grasps(2 * r, 0.076, 1.2), *round_grasps(0.0245, 0.121, 0.9)]
     top = (0.0, 0.0, h)
     return model("bottle", parts, "bottle", phrases, grasps, 0.06, support=top)
 

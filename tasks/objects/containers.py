@@ -28,17 +28,20 @@ BOWLS = (
     ("orange", "cream", "orange"), ("brown", "beige", "brown"),
 )  # fmt: skip
 
+BOWL_LEAN = 0.2
+"""How far the upper wall of a bowl leans outwards [rad]."""
+
 
 def bowl(look: int, params: Mapping[str, Any]) -> ObjectModel:
     """An open bowl on a foot ring, glazed differently inside, with a painted rim."""
     outside, stripe, word = BOWLS[look]
     h = 0.046
-    outer = [(0.027, 0.0), (0.027, 0.004), (0.042, 0.012), (0.053, 0.028), (0.0585, h)]
-    inner = [(0.0555, h), (0.0505, 0.029), (0.040, 0.0145), (0.022, 0.008), (0.0, 0.007)]
+    outer = [(0.027, 0.0), (0.027, 0.004), (0.036, 0.008), (0.0535, 0.025), (0.0585, h)]
+    inner = [(0.0553, h), (0.0500, 0.0262), (0.0345, 0.0125), (0.020, 0.008), (0.0, 0.007)]
     r, g, b = colour(outside)
     lining = (0.9 * r + 0.035, 0.9 * g + 0.035, 0.9 * b + 0.035)
-    ring = [(0.0548, 0.0325), (0.0571, 0.0395)]
-    inside = [(0.0541, 0.0425), (0.0523, 0.0365)]
+    ring = [(0.0557, 0.0325), (0.0574, 0.0395)]
+    inside = [(0.0538, 0.0425), (0.0522, 0.0365)]
     parts = [
         paint(m.lathe([(0.0, 0.0), *outer], 18, False), colour(outside), roughness=0.25),
         paint(m.lathe([outer[-1], inner[0]], 18, False), colour(stripe), roughness=0.25),
@@ -46,13 +49,14 @@ def bowl(look: int, params: Mapping[str, Any]) -> ObjectModel:
         paint(m.lathe(ring, 18, False), colour(stripe), roughness=0.25),
         paint(m.lathe(inside, 18, False), colour(stripe), roughness=0.25),
         feel(Cylinder(0.030, 0.0035), (0.0, 0.0, 0.0035)),
-        *wall_ring(0.0428, 0.004, 0.006, h, 12, 0.55),
+        *wall_ring(0.0407, 0.004, 0.007, 0.026, 12, 0.77),
+        *wall_ring(0.0520, 0.004, 0.0245, h, 12, BOWL_LEAN),
     ]
     phrases = named(
         word, "{} bowl", "{} soup bowl", "bowl in {}", "round {} bowl", "{} cereal bowl",
         "bowl that is {} on the outside", "{} ceramic bowl",
     )  # fmt: skip
-    grasps = rim_grasps(0.0530, 0.0047, 0.037, 12)
+    grasps = rim_grasps(0.0544, 0.0041, 0.037, 12, lean=BOWL_LEAN)
     return model(
         "bowl", parts, "bowl", phrases, grasps, 0.06, 0.8,
         support=(0.0, 0.0, 0.007), press=(0.0, 0.0, 0.007),
