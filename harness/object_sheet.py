@@ -28,8 +28,10 @@ if TYPE_CHECKING:
 HEAD = (-0.032, -0.45, 1.35)
 """Where the head camera is [m] (official)."""
 FOV = math.radians(37.0)
-LARGE, CROP, ZOOM = 256, 64, 4
-"""Size of a portrait [px]; width cut from the head camera's frame [px], and its magnification."""
+LARGE, ZOOM = 256, 4
+"""Size of a portrait [px]; magnification of the cut from the head camera's frame."""
+TALL, FLOOR = 0.3, (0.0, -1.3, 0.0)
+"""Objects higher than this [m] stand on the floor, there."""
 PLACE: Vec3 = (0.0, -0.05, TABLE_TOP)
 TURN = 0.45
 """Yaw [rad] at which objects are shown, so that two sides are seen."""
@@ -83,21 +85,27 @@ class Booth:
         from robospa.harness.bodies import to_sapien
 
         entity = self._render_body(model.shapes, model.asset)
-        floor = (PLACE[0], PLACE[1], PLACE[2] - model.bottom)
-        entity.pose = to_sapien(Pose(floor, yaw_rotation(turn)))
+        place = FLOOR if model.size[2] > TALL else PLACE
+        origin = (place[0], place[1], place[2] - model.bottom)
+        entity.pose = to_sapien(Pose(origin, yaw_rotation(turn)))
         self._scene.add_entity(entity)
-        middle = np.array((PLACE[0], PLACE[1], PLACE[2] + model.size[2] / 2))
+        middle = np.array((place[0], place[1], place[2] + model.size[2] / 2))
         reach = 0.62 * float(np.linalg.norm(model.size)) / math.tan(FOV / 2)
-        toward = np.array(HEAD) - middle
+        eye = np.array(HEAD) + np.array(place) - np.array(PLACE)
+        toward = eye - middle
         toward /= np.linalg.norm(toward)
         self._near.entity.pose = to_sapien(_looking(middle + toward * max(reach, 0.12), middle))
-        self._head.entity.pose = to_sapien(_looking(np.array(HEAD), middle))
+        self._head.entity.pose = to_sapien(_looking(eye, middle))
         self._scene.update_render()
         large, frame = self._take(self._near), self._take(self._head)
         self._scene.remove_entity(entity)
-        top, left = (240 - CROP) // 2, (320 - CROP) // 2
-        cut = frame[top : top + CROP, left : left + CROP]
-        return large, cut.repeat(ZOOM, axis=0).repeat(ZOOM, axis=1)
+        zoom = ZOOM if model.radius < 0.07 else ZOOM // 2 if model.radius < 0.15 else 1
+        side = min(LARGE // zoom, 240)
+        top, left = (240 - side) // 2, (320 - side) // 2
+        cut = frame[top : top + side, left : left + side]
+        shown = np.full((LARGE, LARGE, 3), 255, dtype=np.uint8)
+        shown[: side * zoom, : side * zoom] = cut.repeat(zoom, axis=0).repeat(zoom, axis=1)
+        return large, shown
 
     @staticmethod
     def _take(camera: Any) -> NDArray[np.uint8]:

@@ -222,18 +222,18 @@ FANS = (
 def fan(look: int, params: Mapping[str, Any]) -> ObjectModel:
     """A small desk fan blowing towards -y: round foot, stem, ringed blades."""
     frame, blade = FANS[look]
-    r, z, deep = 0.0325, 0.068, 0.0125
+    r, z, deep = 0.0325, 0.068, 0.0105
     foot = [(0.034, 0.0), (0.034, 0.004), (0.029, 0.010), (0.012, 0.0135)]
     ring = [(r - 0.0035, -deep), (r, -deep + 0.002), (r, deep - 0.002), (r - 0.0035, deep)]
     hoop = m.lathe([*ring, ring[0]], 20, False)
     back = m.moved(m.lathe([(r - 0.003, 0.002), (r - 0.003, 0.004)], 20), (0.0, 0.0, 0.0))
     spokes = [
         m.box_mesh(
-            (0.0130, 0.0006, 0.0006),
+            (0.0130, 0.0005, 0.0005),
             (0.018 * math.cos(a), 0.018 * math.sin(a), deep - 0.001),
             axis_rotation((0.0, 0.0, 1.0), a),
         )
-        for a in (2 * math.pi * i / 10 for i in range(10))
+        for a in (2 * math.pi * i / 8 for i in range(8))
     ]
     guard = m.tube(
         [(0.0185 * x, 0.0185 * y, deep - 0.001) for x, y in m.ellipse(1, 1, 14)], 0.0007, 3, True
@@ -247,11 +247,11 @@ def fan(look: int, params: Mapping[str, Any]) -> ObjectModel:
         paint(m.lathe(foot, 18), colour(frame), roughness=0.35),
         paint(m.lathe([(0.007, 0.012), (0.006, 0.037)], 10), colour(frame), roughness=0.35),
         paint(hoop, colour(frame), at, ALONG_Y, 0.35),
-        paint(back, srgb("#343941"), (0.0, 0.006, z), ALONG_Y, 0.8),
-        paint(_blades(), colour(blade), (0.0, -0.005, z), ALONG_Y, 0.4),
+        paint(back, srgb("#343941"), (0.0, 0.003, z), ALONG_Y, 0.8),
+        paint(_blades(), colour(blade), (0.0, -0.004, z), ALONG_Y, 0.4),
         paint(m.merge(*spokes, guard), rim, at, ALONG_Y, 0.3),
         paint(
-            m.lathe([(0.0068, 0.0), (0.0068, deep), (0.004, deep + 0.001)], 12),
+            m.lathe([(0.0055, 0.0), (0.0055, deep), (0.003, deep + 0.001)], 12),
             colour(frame),
             at,
             ALONG_Y,

@@ -36,38 +36,11 @@ RADIUS_LIMITS = {
     "soap": 0.036,
     "can": 0.038,
 }
-NEEDED = set(
-    [
-        "block",
-        "tea_box",
-        "sauce_can",
-        "bowl",
-        "toycar",
-        "fan",
-        "tissue_box",
-        "french_fries",
-        "rubikscube",
-        "alarm_clock",
-        "mouse",
-        "stapler",
-        "bell",
-        "hamburger",
-        "playing_cards",
-        "mug",
-        "phone",
-        "glue",
-        "seal",
-        "soap",
-        "bread",
-        "remote_control",
-        "bottle",
-        "dustbin",
-        "can",
-        "bread_basket",
-        "pill_bottle",
-        "cover",
-    ]
-)
+NEEDED = """
+    block tea_box sauce_can bowl toycar fan tissue_box french_fries rubikscube alarm_clock mouse
+    stapler bell hamburger playing_cards mug phone glue seal soap bread remote_control bottle
+    dustbin can bread_basket pill_bottle cover
+"""
 
 
 @pytest.fixture(params=EVERY, ids=lambda pair: f"{pair[0]}-{pair[1]}")
@@ -94,7 +67,7 @@ def corners(shape: Shape) -> Array:
 
 
 def test_the_tasks_assets_exist() -> None:
-    assert set(assets()) >= NEEDED
+    assert set(assets()) >= set(NEEDED.split())
 
 
 def test_bounds_are_those_of_the_shapes(model: ObjectModel) -> None:
@@ -325,25 +298,3 @@ def test_triangulate_handles_a_concave_polygon() -> None:
     shape = [(0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (1.0, 0.5), (0.0, 2.0)]
     area = sum(m._cross(*(shape[i] for i in f)) / 2 for f in m.triangulate(shape))
     assert area == pytest.approx(2.5)
-
-
-@pytest.mark.sim
-def test_objects_stay_where_they_stand(model: ObjectModel) -> None:
-    """Half a second on the table moves no object's origin by 2 mm, nor turns it by 2 degrees."""
-    import sapien
-    from sapien import physx
-
-    from robospa.harness.bodies import dynamic_body, ground_body
-    from robospa.tasks.geometry import Pose
-
-    scene = sapien.Scene([physx.PhysxCpuSystem()])
-    scene.set_timestep(1 / 250)
-    scene.add_entity(ground_body("ground"))
-    entity, _ = dynamic_body(model, "thing", Pose((0.0, 0.0, 0.001 - model.bottom)), False)
-    scene.add_entity(entity)
-    for _ in range(125):
-        scene.step()
-    x, y, z = (float(c) for c in entity.pose.p)
-    assert math.hypot(x, y) < 0.002
-    assert z == pytest.approx(-model.bottom, abs=0.001)
-    assert 2 * math.acos(min(1.0, abs(float(entity.pose.q[0])))) < math.radians(2)
