@@ -140,7 +140,8 @@ def evaluate(request: Request) -> None:
     spec, hello = probe_policy(request.config)
     check_fit(spec, request.keys)
     manifest = make_manifest(request, spec, hello)
-    config = request.config
+    first = {key.task: key for key in reversed(list(request.keys))}
+    config = replace(request.config, samples=frozenset(first.values()))
     if is_url(config.policy):
         config = replace(config, options={**config.options, "expect": spec})
     fresh = not folder.exists()

@@ -42,8 +42,14 @@ class Recorder(Protocol):
     def started(self, world: World) -> None:
         """The scene has settled; no action has been executed."""
 
+    def polled(self, world: World, time: float) -> None:
+        """An action is being executed; `time` [s, simulated] since the start. 50 Hz."""
+
     def executed(self, world: World, action: NDArray[np.float32]) -> None:
         """`action` has just been executed."""
+
+    def ended(self, world: World) -> None:
+        """The trial is over."""
 
 
 @dataclass(frozen=True)
@@ -110,6 +116,9 @@ class _Stopwatch:
             spent = time.perf_counter() - begun
             self.seconds[purpose] = self.seconds.get(purpose, 0.0) + spent
 
+    def sum(self, *purposes: str) -> float:
+        return sum(self.seconds.get(purpose, 0.0) for purpose in purposes)
+
 
 @dataclass
 class _Run:
@@ -125,10 +134,13 @@ class _Run:
     latencies: list[float] = field(default_factory=list)
     past: dict[int, dict[str, Any]] = field(default_factory=dict)
     physics_steps: int = 0
+    physics_seconds: float = 0.0
 
     def poll(self, snapshot: Snapshot) -> bool:
         new = self.watch.call("goal", self.parts.tracker.update, snapshot)
         self.events.extend(new)
+        if self.recorder is not None:
+            self.watch.call("recording", self.recorder.polled, self.world, snapshot.time)
         return any(event.kind in ("success", "failed") for event in new)
 
     def observation(self, spec: PolicySpec) -> dict[str, Any]:
@@ -168,7 +180,10 @@ class _Run:
     def execute(self, action: NDArray[np.float32], space: str) -> bool:
         """Whether the goal was met or lost during `action`."""
         self.actions.append(action)
-        done = self.watch.call("physics", self.world.step, action, space, self.poll)
+        begun, other = time.perf_counter(), self.watch.sum("goal", "recording")
+        done = self.world.step(action, space, self.poll)
+        spent = time.perf_counter() - begun
+        self.physics_seconds += spent - (self.watch.sum("goal", "recording") - other)
         self.physics_steps += done.physics_steps
         if self.recorder is not None:
             self.watch.call("recording", self.recorder.executed, self.world, action)
@@ -262,10 +277,12 @@ def run_trial(
         policy_seed=policy_seed,
     )
     end, message = _play(run, info, level.steps)
+    if recorder is not None:
+        run.watch.call("recording", recorder.ended, world)
     reached = outcome(run.events, tracker.total)
     diagnostics = getattr(tracker, "diagnostics", None)
     timing = dict(run.watch.seconds)
-    timing["physics"] = timing.get("physics", 0.0) - timing.get("goal", 0.0)
+    timing["physics"] = run.physics_seconds
     return TrialRecord(
         key=key,
         category=wanted.task.category,

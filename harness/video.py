@@ -1,4 +1,7 @@
-"""Keeps a trial's actions and, if asked, a video: one head-camera frame per executed action.
+"""Keeps a trial's actions and, if asked, a video from the head camera, at twice real time.
+
+A frame every 0.2 s of simulated time: about one an action, as in the official recordings, for a
+policy that moves in small steps, and still smooth for one that sends a whole reach as one action.
 
 Only the end tells whether a video is wanted, so it is encoded into memory while the trial runs
 (tens of kilobytes) and reaches the disk, or not, at the end. H.264 in yuv420p: every browser plays
@@ -20,7 +23,9 @@ from robospa.protocol.policy import CameraSpec
 from robospa.results.records import TrialKey
 
 FPS = 10
-"""Frames per second of a video: one frame an action, as in the official recordings."""
+"""Frames per second of a video."""
+EVERY = 0.2
+"""Simulated seconds between two frames."""
 CAMERA = CameraSpec("head")
 
 
@@ -62,6 +67,7 @@ class TrialRecorder:
     def __init__(self, video: bool = False) -> None:
         self._video = VideoBuffer() if video else None
         self._actions: list[NDArray[np.float32]] = []
+        self._due = EVERY
 
     @property
     def actions(self) -> NDArray[np.float32]:
@@ -73,11 +79,22 @@ class TrialRecorder:
         if self._video is not None:
             self._video.add(world.render(CAMERA))
 
-    def executed(self, world: World, action: NDArray[np.float32]) -> None:
-        """Keep `action` and the view after it."""
-        self._actions.append(action)
-        if self._video is not None:
+    def polled(self, world: World, time: float) -> None:
+        """Keep the view if the next frame is due."""
+        if self._video is not None and time >= self._due - 1e-6:
+            self._due += EVERY
             self._video.add(world.render(CAMERA))
+
+    def executed(self, world: World, action: NDArray[np.float32]) -> None:
+        """Keep `action`."""
+        self._actions.append(action)
+
+    def ended(self, world: World) -> None:
+        """Keep the last view, for half a second."""
+        if self._video is not None:
+            last = world.render(CAMERA)
+            for _ in range(FPS // 2):
+                self._video.add(last)
 
     def write_video(self, folder: Path, key: TrialKey) -> str:
         """Write the video and return its path inside `folder` ("" if none was kept)."""

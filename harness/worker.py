@@ -27,7 +27,7 @@ from robospa.harness.store import RecordWriter, write_actions
 from robospa.results.records import TrialKey, TrialRecord
 
 LOGS = "logs"
-VIDEO = ("none", "failures", "all")
+VIDEO = ("none", "failures", "first", "all")
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,8 @@ class WorkerConfig:
     """What a worker needs to know; picklable.
 
     `policy` is a server's URL or a policy's name, `options` go to the client. `world` and `parts`
-    are `module:function` paths of a world factory and of what finds a trial's scene and goal.
+    are `module:function` paths of a world factory and of what finds a trial's scene and goal. `video` is one of
+    VIDEO; "first" films the trials in `samples`.
     """
 
     folder: Path
@@ -46,6 +47,11 @@ class WorkerConfig:
     parts: str = "robospa.harness.trial:task_parts"
     run_seed: int = 0
     video: str = "none"
+    samples: frozenset[TrialKey] = frozenset()
+
+    def filmed(self, key: TrialKey) -> bool:
+        """Whether a video of `key` may be wanted."""
+        return self.video in ("failures", "all") or (self.video == "first" and key in self.samples)
 
 
 class Worker:
@@ -65,14 +71,14 @@ class Worker:
         from robospa.harness.video import TrialRecorder
 
         self._prepare()
-        recorder = TrialRecorder(video=self.config.video != "none")
+        recorder = TrialRecorder(video=self.config.filmed(key))
         seed = policy_seed(key, self.config.run_seed)
         record = run_trial(
             self._world, self._policy, key, policy_seed=seed, recorder=recorder, parts=self.parts
         )
         record = replace(record, attempts=attempt)
         write_actions(self.config.folder, key, recorder.actions, self._policy.spec.action)
-        if self.config.video == "all" or (self.config.video == "failures" and not record.success):
+        if self.config.video != "failures" or not record.success:
             record = replace(record, video=recorder.write_video(self.config.folder, key))
         self.writer.write(record)
         self._say_goodbye(record)

@@ -113,7 +113,7 @@ def facts(run: Run) -> list[tuple[str, str]]:
         ("ends", ", ".join(f"{count} {name}" for name, count in ends(run).items())),
         ("list of trials", f"hash {info['seed_hash']}"),
         ("software", f"robospa {info['versions'].get('robospa', '?')}{commit}"),
-        ("world", ", ".join(f"{k} {v}" for k, v in world.items() if v is not None)),
+        ("world", ", ".join(f"{k} {_line(v)}" for k, v in world.items() if v is not None)),
     ]
     if spent:
         text = (
@@ -271,3 +271,8 @@ def film(run: Run, record: TrialRecord, folder: Path) -> str:
         except OSError:
             shutil.copyfile(source, target)
     return f"{FILMS}/{source.name}"
+
+
+def _line(value: object) -> str:
+    """`value` as text without line breaks."""
+    return " ".join(str(value).split())

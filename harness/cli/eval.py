@@ -21,7 +21,9 @@ def evaluate(
     workers: Annotated[int, typer.Option(help="worker processes; 0 for one per core")] = 0,
     out: Annotated[Path | None, typer.Option(help="folder of the run")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="go on with the run in --out")] = False,
-    video: Annotated[str, typer.Option(help="which trials to film: failures, all, none")] = "none",
+    video: Annotated[
+        str, typer.Option(help="which trials to film: none, failures, first (of each task), all")
+    ] = "none",
     split: Annotated[str, typer.Option(help="instructions: heldout or train")] = "heldout",
     seeds: Annotated[
         str | None, typer.Option(help="JSON file or 100000-100099; default: the shipped lists")

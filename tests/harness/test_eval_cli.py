@@ -165,7 +165,7 @@ def test_a_torn_line_is_owed_again(tmp_path: Path) -> None:
         (["run_fakes:FakePolicy", "--tasks", "Pick_Block_Size"], "did you mean Pick_Blocks_Size"),
         (["run_fakes:FakePolicy", "--seeds", "nowhere.json"], "neither a file nor a list"),
         (["run_fakes:FakePolicy", "--trials", "9"], "has 4 seeds, not 9"),
-        (["run_fakes:FakePolicy", "--video", "some"], "none of none, failures, all"),
+        (["run_fakes:FakePolicy", "--video", "some"], "none of none, failures, first, all"),
         (["run_fakes:FakePolicy", "--split", "test"], "heldout and train"),
         (["run_fakes:FakePolicy", "--world", "run_fakes:Broken"], "robospa doctor"),
         (["run_fakes:FakePolicy", "--embodiment", "nobot"], "drives only-me, not nobot"),
