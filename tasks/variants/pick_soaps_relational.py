@@ -24,7 +24,10 @@ from robospa.tasks.task import Draft, Level, Task
 from robospa.tasks.variants.picking import lifted, pick_target
 from robospa.tasks.variants.tabletop import draw_look, standing
 
+RADIUS = 0.036
+"""Bound of a soap bar's footprint [m]; all of it is in view."""
 MARGIN = (0.06, 0.08)
+"""Centres are this far inside the head image (official)."""
 DRAWS = 200
 DIRECTIONS: Mapping[str, tuple[int, int]] = {
     "left": (-1, 0),
@@ -118,7 +121,9 @@ def _places(grid: Grid, used: list[tuple[int, int]], rng: np.random.Generator) -
         )
         steps_x, steps_y = np.diff(sorted(cx.values())), np.diff(sorted(cy.values()))
         straight = (steps_x >= grid.gaps[0]).all() and (steps_y >= grid.gaps[1]).all()
-        if straight and in_head_view(points[:, 0], points[:, 1], 0.0, 0.0, MARGIN).all():
+        x, y = points.T
+        seen = in_head_view(x, y, 0.0, 0.0, MARGIN) & in_head_view(x, y, RADIUS, 0.0)
+        if straight and seen.all():
             return points
     raise LayoutError(f"no grid of {len(used)} soap bars fits in {DRAWS} draws; skip this seed")
 
