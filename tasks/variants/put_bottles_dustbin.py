@@ -20,7 +20,7 @@ from robospa.tasks.layouts import BASES, MAX_REACH
 from robospa.tasks.plan import Drop, Pick, Place, Skill
 from robospa.tasks.scene import TABLE_TOP, Scene
 from robospa.tasks.task import Draft, Level, Task
-from robospa.tasks.variants.tabletop import Item, Point, named, scatter, side, standing
+from robospa.tasks.variants.tabletop import Item, Point, named, scatter, standing
 
 BIN = Pose((-0.45, 0.0, 0.0))
 TABLE_SHIFT = (0.3, 0.0)
@@ -30,6 +30,9 @@ CEILING = 0.7
 
 EXCHANGE = (-0.03, -0.08)
 """Where the right arm leaves a bottle for the left one: free of bottles, easy for both."""
+
+LIFT = 0.16
+"""How high the expert lifts a bottle [m]: more than the bottles are tall."""
 
 LEVELS = {n: Level(candidates=n, subtasks=n, steps=400 * n) for n in range(1, 6)}
 
@@ -66,19 +69,24 @@ def goal(scene: Scene) -> Collect:
 
 
 def plan(scene: Scene) -> tuple[Skill, ...]:
-    """Left bottles first, then those on the right by way of the exchange place; near to far."""
+    """Left bottles first, then those on the right by way of the exchange place.
+
+    On each side the one nearest to where it goes is first, so that no bottle is carried over one
+    that still stands: the lift alone does not clear it.
+    """
 
     def turn(name: str) -> tuple[bool, float]:
-        x, y, _ = scene.object(name).pose.position
-        return x >= 0, y
+        point = scene.object(name).pose.position[:2]
+        right = point[0] > 0
+        return right, math.dist(point, EXCHANGE if right else BIN.position[:2])
 
     dustbin = scene.facts["dustbin"]
     skills: list[Skill] = []
     for name in sorted(scene.facts["bottles"], key=turn):
-        if side(scene.object(name).pose.position[0]) == "right":
-            skills.append(Pick(name, arm="right"))
+        if turn(name)[0]:
+            skills.append(Pick(name, lift=LIFT, arm="right"))
             skills.append(Place(name, (*EXCHANGE, TABLE_TOP), arm="right"))
-        skills.append(Pick(name, arm="left"))
+        skills.append(Pick(name, lift=LIFT, arm="left"))
         skills.append(Drop(name, into=dustbin, arm="left"))
     return tuple(skills)
 
