@@ -62,10 +62,10 @@ ONCE_HELDOUT = (
     "the goal is for <X> to have been pushed down by {arm}.",
     "I would like to see <X> pressed, {arm} doing the work.",
     "if {arm} has pressed <X>, the task is complete.",
-    "to finish this task, it takes one push on <X> by {arm}.",
+    "to finish this task, <X> has to be pushed down by {arm}.",
     "what has to go down? It is <X>, under {arm}.",
     "one press of <X> by {arm} is all that is wanted.",
-    "my request is that <X> gets pushed down by {arm}.",
+    "my request is for <X> to receive a push by {arm}.",
 )
 
 

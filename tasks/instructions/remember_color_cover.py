@@ -20,6 +20,21 @@ _WAITS_ONE = (
     "stay put until the block is covered, and then <D>.",
     "let the cover come while the arms rest, and <D>.",
     "do not move while the block is visible; afterwards <D>.",
+    "leave the arms where they are until hiding ends; next, <D>.",
+    "be patient and motionless at first. As soon as the cover is there, <D>.",
+    "freeze, see the cover arrive, and only then <D>.",
+    "begin with a still phase; with the cover in place, <D>.",
+    "pause until nothing of the block can be seen, then <D>.",
+    "remain at the start pose until a cover hides the block, then <D>.",
+    "first wait, arms unmoved, for the cover. Second, <D>.",
+    "look on while the block gets its cover; after that <D>.",
+    "avoid any motion before covering; later <D>.",
+    "idle until the block disappears from view, then <D>.",
+    "start moving only once the cover is on: <D>.",
+    "with the cover on and not sooner, <D>.",
+    "give the cover time to appear, arms at rest, then <D>.",
+    "stand by without moving until the cover shows up. Now <D>.",
+    "postpone every motion until the block is under its cover, then <D>.",
 )
 _DEEDS_ONE = (
     "move the cover of {block} {where}",
@@ -32,6 +47,21 @@ _DEEDS_ONE = (
     "grasp the cover of {block} and transfer it {where}",
     "shift the cover that sits on {block} {where}",
     "use {arm} to take the cover of {block} {where}",
+    "grip what hides {block} and bring it {where}",
+    "make {block} visible again, taking the cover {where}",
+    "lift the cover over {block} and set it down again, {where}",
+    "free {block} by transporting the cover {where}",
+    "show {block} by sliding the cover {where}",
+    "with {arm}, shift the cover on {block} {where}",
+    "open up {block}; the cover goes {where}",
+    "relocate the cover above {block} {where}",
+    "expose {block} and leave the cover lying {where}",
+    "get the cover away from {block}, {where}",
+    "pull the cover off {block} and move it {where}",
+    "steer the cover of {block} {where}",
+    "unveil {block}, pushing the cover {where}",
+    "have {arm} carry the cover on {block} {where}",
+    "find the cover that hides {block} and take it {where}",
 )
 _HELDOUT_ONE = (
     "what I need, once the cover is on, is the cover of {block} moved {where}.",
@@ -57,6 +87,21 @@ _WAITS = (
     "stay put until every block is covered, and then <D>.",
     "learn where each color is, wait for the covers, and <D>.",
     "do not move while colors are visible; afterwards <D>.",
+    "leave the arms alone and note the colors; next, <D>, once all are hidden.",
+    "be motionless at first. As soon as all covers are there, <D>.",
+    "freeze, see the covers arrive, and only then <D>.",
+    "begin with a still phase; with the covers in place, <D>.",
+    "pause until no color can be seen, then <D>.",
+    "remain at the start pose until covers hide the blocks, then <D>.",
+    "first wait, arms unmoved, for the covers. Second, <D>.",
+    "look on while the blocks get their covers; after that <D>.",
+    "avoid any motion before covering; later <D>.",
+    "idle until all colors disappear from view, then <D>.",
+    "start moving only once the covers are on: <D>.",
+    "with all covers on and not sooner, <D>.",
+    "give the covers time to appear, arms at rest, then <D>.",
+    "stand by, colors in mind, until the covers show up. Now <D>.",
+    "postpone every motion until the blocks are hidden, then <D>.",
 )
 _DEEDS = (
     "move each cover {where}, in this color order: {order}",
@@ -69,6 +114,21 @@ _DEEDS = (
     "work through {order} and bring each cover {where}",
     "open the blocks by color, {order}, sliding each cover {where}",
     "transfer each cover {where} with {arm}, the colors going {order}",
+    "make the blocks visible again, {order}, taking each cover {where}",
+    "lift the covers by color, {order}, and set each down {where}",
+    "free the blocks one by one, {order}, with each cover going {where}",
+    "show the colors again in sequence, {order}: slide each cover {where}",
+    "follow the color sequence {order} and shift each cover {where}",
+    "relocate each cover {where}, keeping to {order}",
+    "expose the blocks in turn, {order}, and leave each cover {where}",
+    "pull off the covers hiding {order}, in that order, each {where}",
+    "steer each cover {where}, by hidden color {order}",
+    "unveil the blocks, {order}, pushing each cover {where}",
+    "employ {arm} to take each cover {where}: {order}",
+    "from memory, uncover {order}, each cover moving {where}",
+    "find the hidden colors, {order}, and take each cover {where}",
+    "recall the places and open {order}, each cover going {where}",
+    "deal with the colors in the order {order}: every cover travels {where}",
 )
 _HELDOUT = (
     "what I need, once the covers are on, is each cover moved {where}: {order}.",
@@ -97,9 +157,9 @@ def templates(level: int) -> Templates:
 
 
 def _paired(waits: tuple[str, ...], deeds: tuple[str, ...]) -> tuple[str, ...]:
-    """Fifty of the hundred combinations, every opening and every deed five times."""
+    """Fifty of the 625 combinations, every opening and every deed twice."""
     return tuple(
-        wait.replace("<D>", deeds[(i + 2 * turn) % len(deeds)])
-        for turn in range(5)
+        wait.replace("<D>", deeds[(i + 12 * turn) % len(deeds)])
+        for turn in range(2)
         for i, wait in enumerate(waits)
     )

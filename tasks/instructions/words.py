@@ -21,11 +21,11 @@ _ORDINALS = (
 COMMON: Slots = {
     "arm": (
         ("one arm", "a single arm", "either arm"),
-        ("just one arm", "whichever arm is handier", "one of the two arms"),
+        ("just one arm", "any one arm", "one of the two arms"),
     ),
     "table": (
         ("the table", "the tabletop"),
-        ("the work surface", "the table surface", "the surface of the table"),
+        ("the work surface", "the table surface", "this table"),
     ),
 }
 """Slots that any task may use: they change the wording and carry no information."""

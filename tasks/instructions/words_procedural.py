@@ -95,6 +95,7 @@ def stack(colors: Sequence[str]) -> Slots:
                     (
                         "the spot on the table's center line right by the robot",
                         "the central spot close to the robot",
+                        "the middle spot near the robot",
                         "the center of the robot's side of the table",
                     ),
                 ),

@@ -26,6 +26,9 @@ _REFERENCES: Slots = {
     ),
 }
 
+_TRAILING = {"with", "that", "in", "on", "wrapped"}
+"""Words that start a modifier behind a noun."""
+
 _COLUMNS: Slots = {
     f"from {a} to {b}": (
         (f"from {a} to {b}", f"from the {a} to the {b}"),
@@ -70,15 +73,15 @@ _VIEWS: Slots = {
     "opposite": (
         ("from the viewpoint opposite the robot", "from the side of the table facing the robot"),
         (
-            "from across the table, opposite the robot",
+            "from across the table opposite the robot",
             "from the place that faces the robot",
-            "from the far side of the table, towards the robot",
+            "from the far side of the table towards the robot",
         ),
     ),
     "left": (
         ("from the viewpoint on the robot's left", "from the table side to the robot's left"),
         (
-            "from the robot's left, across the table",
+            "from the robot's left across the table",
             "from a place at the robot's left-hand side",
             "from the table end to the left of the robot",
         ),
@@ -86,7 +89,7 @@ _VIEWS: Slots = {
     "right": (
         ("from the viewpoint on the robot's right", "from the table side to the robot's right"),
         (
-            "from the robot's right, across the table",
+            "from the robot's right across the table",
             "from a place at the robot's right-hand side",
             "from the table end to the right of the robot",
         ),
@@ -141,10 +144,13 @@ def distance(
     """{rank}, {reference}: the object `rank` farthest (1 = farthest) from `reference`.
 
     `reference` is a category ("tea box") or an asset ("112_tea-box"), KeyError if unknown;
-    `phrases` are further (train, held-out) names of this very object, without article.
+    `phrases` are further (train, held-out) names of this very object, without article. Those with
+    a modifier behind the noun are left out: "the object farthest from the bowl that is blue" could
+    be read as a blue object.
     """
     plain = _REFERENCES[category(reference)]
-    names = tuple(tuple(dict.fromkeys((*a, *b))) for a, b in zip(plain, phrases, strict=True))
+    usable = ([p for p in some if not _TRAILING & set(p.split())] for some in phrases)
+    names = tuple(tuple(dict.fromkeys((*a, *b))) for a, b in zip(plain, usable, strict=True))
     train_names = names[0]
     held_names = tuple(name for name in names[1] if name not in train_names)
     number, word = ordinal(rank)

@@ -1,0 +1,359 @@
+"""Every instruction means one thing only, and the right one.
+
+A sentence is read back without the phrasing tables: its template tells where the slots are, and a
+few regular expressions tell what they mean. What comes out must be what the scene drew, and, for
+the spatial tasks, must single out the target from where the objects lie.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import cache
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+
+from robospa.tasks import catalog
+from robospa.tasks.instructions import sentences, templates
+from robospa.tasks.instructions.grammar import slot_names
+from robospa.tasks.scene import Scene
+
+VARIANTS = [(name, level) for name in catalog.MODULES for level in catalog.LEVELS]
+SLOW = {"pick_mixed_objects_distance_b", "pick_mixed_objects_multi_view_a"}
+
+each_variant = pytest.mark.parametrize(("name", "level"), VARIANTS)
+each_split = pytest.mark.parametrize("split", ["train", "heldout"])
+
+
+@cache
+def scene_of(name: str, level: int, seed: int = 100000) -> Scene:
+    return catalog.build_scene(name, level, seed)
+
+
+@cache
+def sentences_of(name: str, level: int, split: str, seed: int = 100000) -> tuple[str, ...]:
+    return sentences(scene_of(name, level, seed), split)
+
+
+# Reading a sentence back
+
+NUMBER = {w: i for i, w in enumerate(("zero", "one", "two", "three", "four", "five"))}
+WORDS = ("first", "second", "third", "fourth", "fifth", "sixth")
+COLORS = ("red", "green", "blue", "yellow", "purple", "cyan", "magenta", "orange", "white", "black")
+EXACT = {
+    "pick_blocks_size": ("block",),
+    "pick_mixed_objects_distance_b": ("rank", "reference"),
+    "pick_soaps_relational": ("relation", "reference", "convention"),
+    "pick_mixed_objects_multi_view_a": ("target", "view", "convention"),
+    "put_bottles_dustbin": ("bottles", "bin", "side"),
+}
+
+
+def required(name: str, level: int) -> tuple[str, ...]:
+    """Slots without which a sentence of the variant would not say enough ("a|b": one of them)."""
+    many = level > 1
+    return (
+        EXACT.get(name)
+        or {
+            "pick_mixed_objects_canonical_a": ("column", "column_direction", "viewer")
+            + (("row", "row_direction") if many else ()),
+            "press_stapler_repeat": ("stapler", "times|presses") if many else ("stapler",),
+            "stack_blocks_color_order": ("middle", "order|pairs") if many else ("middle", "block"),
+            "click_can_place_items": ("can", "bread", "basket", "bottle", "pad")[
+                : (1, 3, 3, 5, 5)[level - 1]
+            ],
+            "remember_color_cover": ("where", "order" if many else "block"),
+        }[name]
+    )
+
+
+@each_variant
+def test_every_template_has_every_slot_that_carries_meaning(name: str, level: int) -> None:
+    for template in (*templates(name, level).train, *templates(name, level).heldout):
+        have = set(slot_names(template))
+        for slot in required(name, level):
+            assert have & set(slot.split("|")), (slot, template)
+
+
+def slots_read(template: str, text: str) -> dict[str, str]:
+    """What stands in a sentence where its template has slots."""
+    seen: set[str] = set()
+    pattern = ""
+    for part in re.split(r"(\{\w+\})", template):
+        slot = part[1:-1]
+        if not part.startswith("{"):
+            pattern += re.escape(part)
+        elif slot in seen:
+            pattern += f"(?P={slot})"
+        else:
+            seen.add(slot)
+            pattern += f"(?P<{slot}>.+?)"
+    found = re.fullmatch(pattern, text, re.IGNORECASE)
+    assert found, (template, text)
+    return {slot: value.lower() for slot, value in found.groupdict().items()}
+
+
+def ordinal_in(text: str, otherwise: int = 0) -> int:
+    """The first ordinal of a text."""
+    found = re.search(rf"\b(\d)(?:st|nd|rd|th)\b|\b({'|'.join(WORDS)})\b", text)
+    if not found:
+        assert otherwise, text
+        return otherwise
+    return int(found[1]) if found[1] else WORDS.index(found[2]) + 1
+
+
+def colors_in(text: str) -> list[str]:
+    return re.findall(rf"\b({'|'.join(COLORS)})\b", text)
+
+
+def read_size(said: Mapping[str, str], scene: Scene) -> dict[str, Any]:
+    rank = len(scene.objects) if "smaller" in said["block"] else ordinal_in(said["block"], 1)
+    return {"size_rank": rank}
+
+
+def read_distance(said: Mapping[str, str], scene: Scene) -> dict[str, Any]:
+    kinds = {"tea": "tea", "sauce|pesto|gravy": "sauce", "bowl": "bowl", "car|toycar": "car",
+             "fan": "fan", "tissues?": "tissue", "fries": "fries"}  # fmt: skip
+    (kind,) = [k for word, k in kinds.items() if re.search(rf"\b({word})\b", said["reference"])]
+    (name,) = [o.name for o in scene.objects if kind in o.asset]
+    return {"distance_rank": ordinal_in(said["rank"], 1), "reference": name}
+
+
+def read_canonical(said: Mapping[str, str], scene: Scene) -> dict[str, Any]:
+    assert "robot" in said["viewer"]
+    ways = re.findall(r"left|right", said["column_direction"])
+    facts: dict[str, Any] = {
+        "column": ordinal_in(said["column"]),
+        "column_direction": "_to_".join(ways),
+    }
+    if scene.level > 1:
+        ways = re.findall(r"near|far", said["row_direction"])
+        facts |= {"row": ordinal_in(said["row"]), "row_direction": "_to_".join(ways)}
+    return facts
+
+
+def read_relational(said: Mapping[str, str], scene: Scene) -> dict[str, Any]:
+    assert re.search(r"front\b.*\bfar\b.*\bback\b.*\bnear\b|far\b.*front.*near\b.*back",
+                     said["convention"])  # fmt: skip
+    relation, reference = f"{said['relation']} {said['reference']}".split(" of the ", 1)
+    side = re.findall(r"(?:front|back)-(?:left|right)|left|right|front|back", relation)
+    place = re.findall(r"front|middle|back|left|right|center", reference)
+    near = re.search("directly|immediately", relation)
+    assert bool(near) == (scene.level >= (4 if "-" in side[0] else 2)), relation
+    return {"relation": side[0].replace("-", "_"), "reference_label": "_".join(place)}
+
+
+def read_view(said: Mapping[str, str], scene: Scene) -> dict[str, Any]:
+    side = re.findall("left|right|front|back", said["target"])
+    who = re.findall(r"left|right|opposite|facing|faces|far side", said["view"])
+    viewer = {"left": "left", "right": "right"}.get(who[0], "opposite") if who else "robot"
+    return {"position": f"{side[0]}most", "viewpoint": viewer}
+
+
+def read_press(said: Mapping[str, str], scene: Scene) -> dict[str, Any]:
+    text = said.get("times") or said.get("presses") or "once"
+    text = text.replace("twice", "2").replace("once", "1").replace("single", "1")
+    found = re.search(rf"\d|\b({'|'.join(NUMBER)})\b", text)
+    assert found, said
+    return {"count": NUMBER.get(found[0]) or int(found[0])}
+
+
+def read_stack(said: Mapping[str, str], scene: Scene) -> dict[str, Any]:
+    if "block" in said:
+        return {"colors": colors_in(said["block"])[:1]}
+    if "order" in said:
+        return {"colors": colors_in(said["order"])}
+    pairs = re.findall(r"(\w+) (?:on top of|on|onto|over|above) (\w+)\b", " ".join(said.values()))
+    pairs = [(a, b) for a, b in pairs if a in COLORS and b in COLORS]
+    assert pairs, said
+    assert [above for above, _ in pairs[:-1]] == [below for _, below in pairs[1:]], said
+    return {"colors": [pairs[0][1], *(above for above, _ in pairs)]}
+
+
+def read_memory(said: Mapping[str, str], scene: Scene) -> dict[str, Any]:
+    assert re.search(r"from the robot.*13 cm (behind|past|beyond) its block", said["where"])
+    return {"colors": colors_in(said.get("order") or f"{said['block']} {said['where']}")}
+
+
+READERS: dict[str, Callable[[Mapping[str, str], Scene], dict[str, Any]]] = {
+    "pick_blocks_size": read_size,
+    "pick_mixed_objects_distance_b": read_distance,
+    "pick_mixed_objects_canonical_a": read_canonical,
+    "pick_soaps_relational": read_relational,
+    "pick_mixed_objects_multi_view_a": read_view,
+    "press_stapler_repeat": read_press,
+    "stack_blocks_color_order": read_stack,
+    "remember_color_cover": read_memory,
+}
+
+
+def read(scene: Scene, split: str, index: int) -> dict[str, Any]:
+    """The facts that sentence `index` of a split states."""
+    name = scene.task.lower()
+    which = templates(name, scene.level)[0 if split == "train" else 1]
+    texts = sentences_of(name, scene.level, split, scene.seed)
+    template = which[index // (len(texts) // len(which))]
+    return READERS[name](slots_read(template, texts[index]), scene)
+
+
+@pytest.mark.parametrize("name", READERS)
+@pytest.mark.parametrize("level", [1, 2, 3, 4, 5])
+def test_sentences_say_what_the_scene_drew(name: str, level: int) -> None:
+    for seed in range(2 if name in SLOW else 12):
+        scene = scene_of(name, level, 100000 + seed)
+        for split in ("train", "heldout"):
+            for index in range(seed, 100, 7):
+                said = read(scene, split, index)
+                assert said == {key: scene.facts[key] for key in said}, (split, seed, index)
+
+
+@each_split
+@pytest.mark.parametrize("level", [1, 2, 3, 4, 5])
+def test_dustbin_sentences_count_the_bottles(level: int, split: str) -> None:
+    for text in sentences_of("put_bottles_dustbin", level, split):
+        counts = {1: r"\bbottle\b", 2: r"\b(both|two|pair)\b"}
+        wanted = counts.get(level) or rf"\b({level}|{list(NUMBER)[level]})\b"
+        assert re.search(wanted, text.lower()) and "left" in text, text
+
+
+@pytest.mark.parametrize("level", [1, 2, 3, 4, 5])
+def test_click_templates_name_the_steps_in_order(level: int) -> None:
+    steps = [["can"], ["bread", "basket"], ["can"], ["bottle", "pad"], ["can"]][:level]
+    wanted = [slot for step in steps for slot in step]
+    for template in (*templates("click_can_place_items", level)[0],
+                     *templates("click_can_place_items", level)[1]):  # fmt: skip
+        found = [s for s in re.findall(r"\{(\w+)\}", template) if s not in ("arm", "table")]
+        if template.startswith("it all ends with"):
+            found = found[len(steps[-1]) :] + found[: len(steps[-1])]
+        assert found == wanted, template
+
+
+# From the words to the object
+
+
+def target_of(scene: Scene) -> str:
+    """The object that the facts of a spatial scene single out, from where the objects lie."""
+    facts, name = scene.facts, scene.task.lower()
+    at = {o.name: np.array(o.pose.position) for o in scene.objects}
+    names = list(at)
+    if name == "pick_blocks_size":
+        size = {o.name: o.params["half"][0] for o in scene.objects}
+        return sorted(names, key=lambda n: -float(size[n]))[int(facts["size_rank"]) - 1]
+    if name == "pick_mixed_objects_distance_b":
+        origin = at[facts["reference"]]
+        far = {n: float(np.hypot(*(at[n] - origin)[:2])) for n in names if n != facts["reference"]}
+        return sorted(far, key=lambda n: -far[n])[int(facts["distance_rank"]) - 1]
+    if name == "pick_mixed_objects_multi_view_a":
+        right, front = {
+            "robot": ((1, 0), (0, 1)),
+            "opposite": ((-1, 0), (0, -1)),
+            "left": ((0, -1), (1, 0)),
+            "right": ((0, 1), (-1, 0)),
+        }[facts["viewpoint"]]
+        axis, sign = {
+            "leftmost": (right, -1),
+            "rightmost": (right, 1),
+            "frontmost": (front, 1),
+            "backmost": (front, -1),
+        }[facts["position"]]
+        return max(names, key=lambda n: sign * float(at[n][:2] @ np.array(axis)))
+    if name == "pick_mixed_objects_canonical_a":
+        rows = grouped({n: at[n][1] for n in names})
+        row = rows[0]
+        if scene.level > 1:
+            ordered = rows if facts["row_direction"] == "near_to_far" else rows[::-1]
+            row = ordered[int(facts["row"]) - 1]
+        line = sorted(row, key=lambda n: at[n][0])
+        ordered_line = line if facts["column_direction"] == "left_to_right" else line[::-1]
+        return ordered_line[int(facts["column"]) - 1]
+    return neighbour(scene, at)
+
+
+def grouped(values: Mapping[str, float], gap: float = 0.05) -> list[list[str]]:
+    """Names in groups of like value, smallest first; a step wider than `gap` starts a new group."""
+    names = sorted(values, key=lambda n: values[n])
+    groups = [[names[0]]]
+    for before, name in pairwise(names):
+        if values[name] - values[before] > gap:
+            groups.append([])
+        groups[-1].append(name)
+    return groups
+
+
+def neighbour(scene: Scene, at: Mapping[str, Any]) -> str:
+    """The bar next to the labelled one in the asked direction, found on the grid of bars."""
+    columns = grouped({n: p[0] for n, p in at.items()}, 0.03)
+    rows = grouped({n: p[1] for n, p in at.items()}, 0.03)
+    cell = {n: (c, r) for c, column in enumerate(columns) for n in column
+            for r, row in enumerate(rows) if n in row}  # fmt: skip
+    label = scene.facts["reference_label"].replace("center", "middle_middle")
+    parts = label.split("_")
+    depth = {"back": 0, "middle": 1, "front": len(rows) - 1}
+    side = {"left": 0, "middle": 1, "right": len(columns) - 1}
+    if len(parts) == 2:
+        origin = (side[parts[1]], depth[parts[0]])
+    else:
+        origin = (side[label], 0) if label in side else (0, depth[label])
+    assert cell[scene.facts["reference"]] == origin
+    step = {"left": (-1, 0), "right": (1, 0), "front": (0, 1), "back": (0, -1)}
+    moves = [step[part] for part in scene.facts["relation"].split("_")]
+    goal = tuple(o + sum(m[i] for m in moves) for i, o in enumerate(origin))
+    (found,) = [n for n, place in cell.items() if place == goal]
+    return found
+
+
+SPATIAL = catalog.MODULES[:5]
+
+
+@pytest.mark.parametrize("name", SPATIAL)
+@pytest.mark.parametrize("level", [1, 2, 3, 4, 5])
+def test_facts_single_out_the_target(name: str, level: int) -> None:
+    for seed in range(3 if name in SLOW else 150):
+        scene = catalog.build_scene(name, level, 100000 + seed)
+        assert target_of(scene) == scene.facts["target"], seed
+
+
+def alternatives(scene: Scene) -> list[Scene]:
+    """The same objects with every other thing that could have been asked of them."""
+    facts, count = dict(scene.facts), len(scene.objects)
+    name, level = scene.task.lower(), scene.level
+    other: list[dict[str, Any]] = []
+    if name == "pick_blocks_size":
+        other = [{"size_rank": k} for k in range(1, count + 1)]
+    elif name == "pick_mixed_objects_distance_b":
+        other = [{"distance_rank": k, "reference": o.name}
+                 for k in range(1, count) for o in scene.objects]  # fmt: skip
+    elif name == "pick_mixed_objects_canonical_a":
+        rows: list[dict[str, Any]] = [{}]
+        if level > 1:
+            rows = [{"row": r, "row_direction": d} for r in (1, 2)
+                    for d in ("near_to_far", "far_to_near")]  # fmt: skip
+        other = [{"column": c, "column_direction": d, **row} for c in (1, 2, 3)
+                 for d in ("left_to_right", "right_to_left") for row in rows]  # fmt: skip
+    elif name == "pick_soaps_relational":
+        sides = ("left", "right", "front", "back", "front_left", "back_right")
+        labels = ("front_left", "front_right", "back_left", "back_right", "center", "front_middle")
+        other = [{"relation": s, "reference_label": p} for s in sides for p in labels]
+    elif name == "pick_mixed_objects_multi_view_a":
+        other = [{"position": f"{p}most", "viewpoint": v}
+                 for p in ("left", "right", "front", "back")
+                 for v in ("robot", "opposite", "left", "right")]  # fmt: skip
+    elif name == "press_stapler_repeat" and level > 1:
+        other = [{"count": k} for k in range(2, 6)]
+    elif name == "remember_color_cover":
+        colors = list(facts["colors"])
+        orders = {tuple(np.roll(colors, k)) for k in range(len(colors))} | {tuple(colors[::-1])}
+        other = [{"colors": [str(c) for c in order]} for order in sorted(orders)]
+    return [replace(scene, facts={**facts, **change}) for change in other]
+
+
+@each_variant
+def test_sentences_for_different_targets_never_coincide(name: str, level: int) -> None:
+    scenes = alternatives(scene_of(name, level))
+    for split in ("train", "heldout"):
+        said = [text for scene in scenes for text in sentences(scene, split)]
+        assert len(set(said)) == len(said)

@@ -1,0 +1,154 @@
+"""Instruction templates: counts, disjoint splits, clean English, and the sentence of a trial."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from functools import cache
+
+import pytest
+
+from robospa.tasks import catalog
+from robospa.tasks.instructions import instruction, sentences, templates
+from robospa.tasks.instructions.grammar import fill, masked_words, similarity
+from robospa.tasks.scene import Scene
+
+VARIANTS = [(name, level) for name in catalog.MODULES for level in catalog.LEVELS]
+NEAR = 0.75
+"""Two templates this alike (slots masked) count as near-equal; see `grammar.similarity`."""
+
+each_variant = pytest.mark.parametrize(("name", "level"), VARIANTS)
+each_split = pytest.mark.parametrize("split", ["train", "heldout"])
+
+
+@cache
+def scene_of(name: str, level: int, seed: int = 100000) -> Scene:
+    return catalog.build_scene(name, level, seed)
+
+
+@cache
+def sentences_of(name: str, level: int, split: str) -> tuple[str, ...]:
+    return sentences(scene_of(name, level), split)
+
+
+# Counts and splits
+
+
+@each_variant
+def test_fifty_and_ten_distinct_templates(name: str, level: int) -> None:
+    made = templates(name, level)
+    assert (len(set(made.train)), len(set(made.heldout))) == (50, 10)
+
+
+@each_variant
+def test_no_heldout_template_is_near_a_train_one(name: str, level: int) -> None:
+    made = templates(name, level)
+    near = [(a, b) for a in made.train for b in made.heldout if similarity(a, b) >= NEAR]
+    assert near == []
+
+
+def test_no_opening_of_heldout_templates_occurs_in_training() -> None:
+    def openings(split: int) -> set[tuple[str, ...]]:
+        return {masked_words(t)[:3] for n, k in VARIANTS for t in templates(n, k)[split]}
+
+    assert openings(0) & openings(1) == set()
+
+
+FINITE = re.compile(
+    r"\b(should|must|could|would|has to|have to|is|are|means|requires|consists|may|ought)\b"
+)
+
+
+@each_variant
+def test_heldout_templates_state_or_ask_and_never_start_with_a_bare_order(
+    name: str, level: int
+) -> None:
+    starts = {t.split()[0] for t in templates(name, level).train}
+    for template in templates(name, level).heldout:
+        assert FINITE.search(template) or template.startswith("it all ends"), template
+        assert template.split()[0] not in starts - {"{viewer},", "for"}, template
+
+
+@each_variant
+@each_split
+def test_a_hundred_distinct_sentences(name: str, level: int, split: str) -> None:
+    assert len(set(sentences_of(name, level, split))) == 100
+
+
+@each_variant
+def test_train_and_heldout_sentences_share_nothing(name: str, level: int) -> None:
+    train, held = sentences_of(name, level, "train"), sentences_of(name, level, "heldout")
+    assert {s.lower() for s in train} & {s.lower() for s in held} == set()
+
+
+# English
+
+
+@each_variant
+@each_split
+def test_sentences_are_clean(name: str, level: int, split: str) -> None:
+    for text in sentences_of(name, level, split):
+        assert not re.search(r"[{}<>]|  | [.,;:?]|[.,;:?]{2}|\b(\w+) \1\b", text), text
+        assert text[0].isupper() and text[-1] in ".?", text
+        assert all(s[0].isupper() or s[0].isdigit() for s in re.split(r"[.?] ", text)), text
+        assert not re.search(r"\ba [aeio]|\ban [^aeiou]", text, re.IGNORECASE), text
+        assert len(text.split()) <= (52 if name == "click_can_place_items" else 46), text
+
+
+@each_split
+def test_one_press_is_never_called_repeated(split: str) -> None:
+    for name in ("press_stapler_repeat", "click_can_place_items"):
+        for text in sentences_of(name, 1, split):
+            assert not re.search(r"again|repeat|times|\beach|1 |twice|in a row", text), text
+
+
+@each_split
+@pytest.mark.parametrize("level", [1, 2, 3, 4, 5])
+def test_counts_agree_with_their_nouns(level: int, split: str) -> None:
+    wrong = (
+        r"\b(1|one) (times|presses|bottles|blocks)\b"
+        r"|\b([2-9]|two|three|four|five) (time|press|bottle|block)\b"
+    )
+    for name in ("press_stapler_repeat", "put_bottles_dustbin", "stack_blocks_color_order"):
+        for text in sentences_of(name, level, split):
+            assert not re.search(wrong, text), text
+
+
+@each_split
+def test_single_bottle_is_never_plural(split: str) -> None:
+    for text in sentences_of("put_bottles_dustbin", 1, split):
+        assert not re.search(r"\bbottles\b|\bthem\b|one by one|any order", text), text
+
+
+# Which sentence a trial gets
+
+
+@each_split
+def test_instruction_is_one_of_the_sentences_and_ignores_the_robot(split: str) -> None:
+    scene = scene_of("press_stapler_repeat", 3)
+    assert instruction(scene, split) in sentences(scene, split)
+    assert instruction(replace(scene, embodiment="franka"), split) == instruction(scene, split)
+
+
+def test_instruction_is_pinned() -> None:
+    scene = scene_of("press_stapler_repeat", 2)
+    assert instruction(scene) == "What I need is the paper stapler pressed a total of 2 times."
+
+
+def test_instructions_of_many_seeds_use_all_heldout_templates() -> None:
+    openings = {instruction(scene_of("press_stapler_repeat", 2, 100000 + s)) for s in range(100)}
+    assert len({text.split()[0] for text in openings}) >= 9
+
+
+def test_unknown_names_are_refused() -> None:
+    with pytest.raises(KeyError, match="no instruction templates"):
+        templates("Pick_Nothing", 1)
+    with pytest.raises(ValueError, match="no level 6"):
+        templates("press_stapler_repeat", 6)
+    with pytest.raises(ValueError, match="no instruction split 'unseen'"):
+        instruction(scene_of("press_stapler_repeat", 1), "unseen")
+
+
+def test_fill_names_the_missing_slot() -> None:
+    with pytest.raises(KeyError, match="no value for slot 'block'"):
+        fill("lift {block}.", {"arm": "one arm"})
