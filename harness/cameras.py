@@ -42,13 +42,6 @@ LARGEST = 4096
 ADVICE = "run `robospa doctor` to see what is missing"
 
 
-def device_summary() -> str:
-    """SAPIEN's description of the device that draws."""
-    import sapien
-
-    return str(sapien.render.get_device_summary()).strip()
-
-
 def open_render_system() -> Any:
     """A SAPIEN render system; RenderUnavailable, with the reason, where there is no device."""
     try:
@@ -192,6 +185,17 @@ class Studio:
         camera = self._cameras[key]
         self._place(camera.entity, pose)
         return camera
+
+    def device(self) -> Mapping[str, str]:
+        """Name of the device that draws, its driver and the driver's version."""
+        from robospa.harness.vulkan import VulkanError, devices
+
+        name = str(self._system.device.name)
+        try:
+            found = [device for device in devices() if device.name == name]
+        except VulkanError:
+            found = []
+        return found[0].to_json() if found else {"name": name, "driver": "", "version": ""}
 
     def close(self) -> None:
         """Free what was drawn."""

@@ -236,11 +236,9 @@ class SapienWorld:
 
     def info(self) -> Mapping[str, Any]:
         """Simulator, versions, control, and the render device if it is open."""
-        renderer = None
+        renderer: Mapping[str, str] | None = None
         if self._studio:
-            from robospa.harness.cameras import device_summary
-
-            renderer = device_summary()
+            renderer = self._studio.device()
         return {
             "simulator": "sapien",
             **versions(),

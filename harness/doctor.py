@@ -1,0 +1,146 @@
+"""What a machine needs to simulate and to draw, checked one by one, each with the one thing to do.
+
+Every check runs in a process of its own with a time limit: a broken driver may end or hang the
+process that asks it, and the doctor is there to say so.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+SETUP = "run `make install` in the repository (it installs what is missing)"
+DRIVER = (
+    "install a Vulkan driver: `sudo apt-get install mesa-vulkan-drivers` (Mesa 24.3 or newer; on "
+    "Debian 12 from bookworm-backports), or `make install`, which does it"
+)
+TIME_LIMIT = 120.0
+"""[s] for one check; the first picture of a machine takes a few seconds in software."""
+
+
+@dataclass(frozen=True)
+class Check:
+    """One finding: `fix` is the one thing to do, empty if `ok`."""
+
+    name: str
+    ok: bool
+    detail: str
+    fix: str = ""
+
+
+def run_checks() -> Iterator[Check]:
+    """All checks, in the order in which they build on each other, as they are done.
+
+    After a failed "simulator" check the ones that need it are left out.
+    """
+    simulator = _run("simulator", "check_simulator", SETUP)
+    yield simulator
+    if simulator.ok:
+        yield _run("physics", "check_physics", SETUP)
+    device = _run("vulkan device", "check_device", DRIVER)
+    yield device
+    if simulator.ok and device.ok:
+        yield _run("first picture", "check_picture", DRIVER)
+
+
+def _run(name: str, function: str, fix: str) -> Check:
+    """One check function of this module, in a child process."""
+    code = f"from robospa.harness import doctor; doctor.report(doctor.{function})"
+    command = [sys.executable, "-W", "ignore", "-c", code]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=TIME_LIMIT)
+    except subprocess.TimeoutExpired:
+        return Check(name, False, f"no answer within {TIME_LIMIT:g} s", fix)
+    lines = done.stdout.splitlines()
+    if lines and lines[-1].startswith("{"):
+        found = json.loads(lines[-1])
+        return Check(name, found["ok"], found["detail"], "" if found["ok"] else fix)
+    why = (done.stderr.strip().splitlines() or [f"it ended with code {done.returncode}"])[-1]
+    return Check(name, False, f"the check itself broke: {why}", fix)
+
+
+def report(check: Callable[[], str]) -> None:
+    """Run `check` and print the outcome as one line of JSON: what it says, or why it failed."""
+    try:
+        print(json.dumps({"ok": True, "detail": check()}))
+    except Exception as error:  # whatever it is, the reader wants to see it
+        print(json.dumps({"ok": False, "detail": f"{type(error).__name__}: {error}"}))
+
+
+def check_simulator() -> str:
+    """SAPIEN can be imported; its versions."""
+    import sapien
+
+    return f"SAPIEN {sapien.__version__}, PhysX {sapien.physx.version()}"
+
+
+def check_device() -> str:
+    """There is a Vulkan device, with a driver that SAPIEN starts on; raises VulkanError if not."""
+    from robospa.harness.vulkan import OLDEST_MESA, VulkanError, devices
+
+    found = devices()
+    usable = [device for device in found if not device.too_old]
+    if not usable:
+        seen = ", ".join(f"{d.name} with {d.version}" for d in found) or "no device"
+        oldest = ".".join(map(str, OLDEST_MESA))
+        raise VulkanError(f"found {seen}; SAPIEN needs a GPU or Mesa {oldest} or newer")
+    return "; ".join(f"{d.name}, {d.version}" for d in usable)
+
+
+def check_physics() -> str:
+    """A cube falls one second and lies where it should; raises RuntimeError if not."""
+    import sapien
+    from sapien import physx
+
+    system = physx.PhysxCpuSystem()
+    system.timestep = 1 / 250
+    scene = sapien.Scene([system])
+    scene.add_ground(0.0, render=False)
+    builder = scene.create_actor_builder()
+    builder.add_box_collision(half_size=[0.1, 0.1, 0.1])
+    builder.set_initial_pose(sapien.Pose([0.0, 0.0, 0.5]))
+    cube = builder.build(name="cube")
+    began = time.perf_counter()
+    for _ in range(250):
+        system.step()
+    took = time.perf_counter() - began
+    height = float(cube.pose.p[2])
+    if abs(height - 0.1) > 1e-3:
+        raise RuntimeError(f"a cube of 0.2 m came to rest at height {height:.4f} m, not 0.1 m")
+    return f"one second of a falling cube in {took * 1e3:.0f} ms"
+
+
+def check_picture() -> str:
+    """A red cube is red in the picture; raises RuntimeError if not."""
+    import sapien
+
+    from robospa.harness.shaders import shader_folder
+
+    began = time.perf_counter()
+    system = sapien.render.RenderSystem()
+    scene = sapien.Scene([system])
+    scene.set_ambient_light([1.0, 1.0, 1.0])
+    builder = scene.create_actor_builder()
+    builder.add_box_visual(
+        half_size=[0.2, 0.2, 0.2],
+        material=sapien.render.RenderMaterial(base_color=[1.0, 0.0, 0.0, 1.0]),
+    )
+    entity = sapien.Entity()
+    entity.add_component(builder.build_render_component())
+    entity.pose = sapien.Pose([1.0, 0.0, 0.0])
+    scene.add_entity(entity)
+    camera = sapien.render.RenderCameraComponent(32, 24, shader_folder())
+    mount = sapien.Entity()
+    mount.add_component(camera)
+    scene.add_entity(mount)
+    scene.update_render()
+    camera.take_picture()
+    red, green, blue = (float(v) for v in camera.get_picture("Color")[12, 16, :3])
+    took = time.perf_counter() - began
+    if not (red > 0.5 and green < 0.2 and blue < 0.2):
+        raise RuntimeError(f"a red cube has colour ({red:.2f}, {green:.2f}, {blue:.2f})")
+    return f"32x24 on {system.device.name}, drawn {took:.1f} s after the start"
