@@ -41,6 +41,10 @@ FRAGMENT = 2**17
 """Bytes per WebSocket frame of a large message."""
 
 
+class BadAddress(ValueError):
+    """The URL cannot be that of a policy server."""
+
+
 @dataclass(frozen=True)
 class Timeouts:
     """Deadlines in seconds. `wait`: how long to keep trying while nobody listens. `first_infer`
@@ -137,6 +141,8 @@ def _open(
                     f"nobody listens at {address.url}: start the policy server first"
                 ) from error
             time.sleep(0.05)
+        except BadAddress:
+            raise
         except InvalidStatus as error:
             raise _refused(address, error) from error
         except TimeoutError as error:
@@ -152,6 +158,8 @@ def _open_once(
 ) -> ClientConnection:
     options: dict[str, Any] = {}
     parts = urlsplit(address.url)
+    if parts.scheme not in ("ws", "wss") or not parts.hostname:
+        raise BadAddress(f"{address.url!r} is not of the form ws://host:port or wss://host:port")
     if _is_loopback(parts.hostname or ""):
         # Own socket: no detour through a proxy that the environment names, and buffers that
         # are set before the connection exists (the kernel scales its window by them).

@@ -227,7 +227,7 @@ def connect(
 
     `expect`: refuse (SpecMismatch) a server with another spec. `openpi`: how to treat a server
     that speaks openpi's dialect, which `force_openpi` assumes without offering ours. Raises
-    ConnectFailed, HandshakeError and its children, ProtocolViolation.
+    ConnectFailed, HandshakeError and its children, ProtocolViolation; ValueError for a wrong URL.
     """
     address = Address(url, token, ssl)
     policy = RemotePolicy(

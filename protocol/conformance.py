@@ -36,7 +36,7 @@ from robospa.protocol.openpi import OpenPiOptions
 from robospa.protocol.policy import PolicySpec, TrialInfo
 
 TRIAL = TrialInfo(
-    task="conformance",
+    task="Pick_Blocks_Size",  # a real one: a server may load a checkpoint by this name
     level=1,
     seed=100_000,
     embodiment="aloha-agilex",

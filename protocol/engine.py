@@ -40,7 +40,7 @@ class PolicySession(Protocol):
 
     async def end(self, outcome: Mapping[str, Any]) -> None: ...
 
-    async def close(self) -> None: ...
+    def close(self) -> None: ...
 
 
 class Engine:
@@ -57,7 +57,7 @@ class Engine:
         if (policy is None) == (policy_factory is None):
             raise ValueError("give either a policy or a policy_factory")
         self._factory = policy_factory
-        self._spare: Policy | None = policy if policy is not None else policy_factory()  # type: ignore[misc]
+        self._spare: Policy | None = policy_factory() if policy_factory is not None else policy
         assert self._spare is not None
         self.spec: PolicySpec = self._spare.spec
         self._shared = self._spare if policy is not None else None
@@ -83,6 +83,10 @@ class Engine:
         if policy is None:
             policy = await self.run(self._factory)
         return _OwnSession(self, policy, keep=False)
+
+    def post(self, call: Callable[..., object], *args: Any) -> None:
+        """The same without waiting: a hanging model must not hold up a closing connection."""
+        self._threads.post(call, *args)
 
     async def _infer_batch(
         self, observations: Sequence[Observation], sessions: Sequence[int]
@@ -116,16 +120,13 @@ class _OwnSession:
         return answer, times
 
     async def end(self, outcome: Mapping[str, Any]) -> None:
-        await self._optional("end", outcome)
-
-    async def close(self) -> None:
-        if not self._keep:
-            await self._optional("close")
-
-    async def _optional(self, name: str, *args: Any) -> None:
-        method = getattr(self._policy, name, None)
+        method = getattr(self._policy, "end", None)
         if method is not None:
-            await self._engine.run(method, *args)
+            await self._engine.run(method, outcome)
+
+    def close(self) -> None:
+        if not self._keep and hasattr(self._policy, "close"):
+            self._engine.post(self._policy.close)
 
 
 class _SharedSession:
@@ -146,7 +147,7 @@ class _SharedSession:
     async def end(self, outcome: Mapping[str, Any]) -> None:
         self._batcher.forget(self._number)
 
-    async def close(self) -> None:
+    def close(self) -> None:
         self._batcher.forget(self._number)
         if hasattr(self._policy, "end_session"):
-            await self._engine.run(self._policy.end_session, self._number)
+            self._engine.post(self._policy.end_session, self._number)

@@ -122,7 +122,7 @@ class PolicyServer:
         assert self._server is not None
         self._server.close()
         with contextlib.suppress(TimeoutError):
-            await asyncio.wait_for(self._server.wait_closed(), 5)
+            await asyncio.wait_for(self._server.wait_closed(), 1)
         self._engine.close()
 
     async def _admit(self, connection: ServerConnection, request: Request) -> Response | None:
@@ -175,7 +175,7 @@ class PolicyServer:
             ours = connection.subprotocol == SUBPROTOCOL
             await (session.run() if ours else session.run_openpi())
         finally:
-            await policy.close()
+            policy.close()
 
 
 def _select(connection: ServerConnection, offered: Sequence[Subprotocol]) -> Subprotocol | None:

@@ -8,13 +8,20 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
 import threading
 from collections.abc import Callable
 from queue import SimpleQueue
 from typing import Any, TypeVar
 
 T = TypeVar("T")
-_Job = tuple[asyncio.AbstractEventLoop, "asyncio.Future[Any]", Callable[..., Any], tuple[Any, ...]]
+_Job = tuple[
+    asyncio.AbstractEventLoop | None,
+    "asyncio.Future[Any] | None",
+    Callable[..., Any],
+    tuple[Any, ...],
+]
+log = logging.getLogger("robospa.server")
 
 
 class PolicyThreads:
@@ -34,6 +41,10 @@ class PolicyThreads:
         self._jobs.put((loop, future, call, args))
         return await future
 
+    def post(self, call: Callable[..., object], *args: Any) -> None:
+        """`call(*args)` in one of the threads, without waiting; a failure is logged."""
+        self._jobs.put((None, None, call, args))
+
     def close(self) -> None:
         """End the threads after the calls that are queued already."""
         for _ in range(self._count):
@@ -47,8 +58,11 @@ class PolicyThreads:
             except Exception as failure:
                 result, error = None, failure
             del job, call, args  # an idle thread must not keep the last observation alive
-            with contextlib.suppress(RuntimeError):  # the loop is gone: nobody waits
-                loop.call_soon_threadsafe(_deliver, future, result, error)
+            if loop is not None and future is not None:
+                with contextlib.suppress(RuntimeError):  # the loop is gone: nobody waits
+                    loop.call_soon_threadsafe(_deliver, future, result, error)
+            elif error is not None:
+                log.error("a policy failed while it was closed", exc_info=error)
             del loop, future, result, error
 
 

@@ -1,0 +1,82 @@
+"""The conformance suite passes what is right and notices what is wrong."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from wire_helpers import QUICK, SPEC, Recall, Scripted, answer
+
+from robospa.protocol.checks import check_observation
+from robospa.protocol.conformance import CHECKS, check, synthetic_observation
+from robospa.protocol.messages import Actions, Hello, Ready, pack
+from robospa.protocol.policy import CameraSpec, PolicySpec
+
+
+def verdicts(url: str, **options: Any) -> dict[str, bool | None]:
+    return {r.name: r.passed for r in check(url, timeouts=QUICK, **options)}
+
+
+def test_our_server_passes_everything(start: Any) -> None:
+    server = start(policy_factory=lambda: Recall(replace(SPEC, seeded=True)))
+    assert verdicts(server.url) == dict.fromkeys(CHECKS, True)
+
+
+def test_our_server_passes_in_openpis_dialect(start: Any) -> None:
+    from robospa.protocol.openpi import OpenPiOptions
+
+    url = start(policy_factory=Recall).url
+    found = verdicts(url, force_openpi=True, openpi=OpenPiOptions(spec=SPEC))
+    assert found["handshake"] and found["actions"] and found["two sessions"]
+    assert False not in found.values()
+
+
+def test_nobody_there() -> None:
+    results = check("ws://127.0.0.1:9", timeouts=QUICK)
+    assert [(r.name, r.passed) for r in results] == [("handshake", False)]
+    assert "nobody listens" in results[0].detail
+
+
+def test_a_server_of_another_version() -> None:
+    with Scripted(pack(Hello(0, "99.0", "s", SPEC))) as url:
+        results = check(url, timeouts=QUICK)
+    assert [(r.name, r.passed) for r in results] == [("handshake", False)]
+    assert "99.0" in results[0].detail
+
+
+@pytest.mark.parametrize("bad", [np.full((2, 14), np.nan, "f4"), np.zeros((9, 14), "f4")])
+def test_a_bad_chunk_fails_the_check_of_actions(start: Any, bad: Any) -> None:
+    policy = Recall()
+    policy.answer = bad
+    assert verdicts(start(policy).url)["actions"] is False
+
+
+def test_a_broken_promise_of_repeatability(start: Any) -> None:
+    class Moody(Recall):
+        count = itertools.count()
+
+        def infer(self, observation: Any) -> Any:
+            return np.full((1, 14), next(self.count), np.float32)
+
+    server = start(policy_factory=lambda: Moody(replace(SPEC, seeded=True)))
+    assert verdicts(server.url)["determinism"] is False
+
+
+def test_a_server_that_takes_any_order() -> None:
+    zeros = np.zeros((2, 14), np.float32)
+    careless = [answer(lambda id: Actions(id, zeros)), answer(Ready)] * 2
+    with Scripted(pack(Hello(0, "1.0", "s", SPEC)), careless) as url:
+        assert verdicts(url)["requests in order"] is False
+
+
+def test_the_synthetic_observation_fits_any_spec() -> None:
+    spec = PolicySpec(
+        "s",
+        cameras=(CameraSpec("head", 8, 6), CameraSpec("third", 4, 4)),
+        history=(-1, -10),
+        privileged=True,
+    )
+    check_observation(synthetic_observation(spec), spec)

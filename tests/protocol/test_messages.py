@@ -1,0 +1,226 @@
+"""Messages: round trips, strict types, tolerated additions, versions, specs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from wire_helpers import SPEC, TRIAL, observation
+
+from robospa.protocol.checks import check_chunk, check_observation, compare_specs
+from robospa.protocol.codec import encode
+from robospa.protocol.errors import DecodeError, PolicyAnswerError, VersionMismatch
+from robospa.protocol.messages import (
+    MAX_ID,
+    Actions,
+    End,
+    Ended,
+    Error,
+    Hello,
+    Infer,
+    Message,
+    Ready,
+    Reset,
+    pack,
+    unpack,
+)
+from robospa.protocol.policy import CAMERAS, SPACES, STATES, CameraSpec, PolicySpec, TrialInfo
+
+IDS = st.integers(0, MAX_ID)
+TEXT = st.text(max_size=20)
+JSON = st.recursive(
+    st.none() | st.booleans() | st.integers(-(2**63), 2**63) | st.floats(allow_nan=False) | TEXT,
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(TEXT, inner, max_size=3),
+    max_leaves=10,
+)
+JSON_MAP = st.dictionaries(TEXT, JSON, max_size=3)
+SPECS = st.builds(
+    PolicySpec,
+    name=TEXT,
+    cameras=st.lists(
+        st.builds(CameraSpec, st.sampled_from(CAMERAS), st.integers(1, 8192), st.integers(1, 8192)),
+        unique_by=lambda camera: camera.name,
+    ).map(tuple),
+    state=st.sampled_from(STATES),
+    action=st.sampled_from(SPACES),
+    horizon=st.integers(50, 10_000),
+    execute=st.none() | st.integers(1, 50),
+    history=st.lists(st.integers(-100, -1), max_size=3).map(tuple),
+    image_codec=st.sampled_from(["raw", "jpeg"]),
+    batch=st.integers(1, 4096),
+    seeded=st.booleans(),
+    privileged=st.booleans(),
+    embodiments=st.lists(TEXT, max_size=2).map(tuple),
+    action_dim=st.none() | st.integers(1, 256),
+)
+TRIALS = st.builds(
+    TrialInfo,
+    task=TEXT,
+    level=st.integers(0, 9),
+    seed=st.integers(0, 2**64 - 1),
+    embodiment=TEXT,
+    mode=TEXT,
+    split=TEXT,
+    instruction=TEXT,
+    policy_seed=st.integers(0, 2**64 - 1),
+    extra=JSON_MAP,
+)
+MESSAGES = (
+    st.builds(Hello, IDS, st.just("1.7"), TEXT, SPECS)
+    | st.builds(Reset, IDS, TRIALS)
+    | st.builds(Ready, IDS)
+    | st.builds(Error, IDS, TEXT, TEXT, st.booleans())
+    | st.builds(End, IDS, JSON_MAP)
+    | st.builds(Ended, IDS)
+)
+
+
+@given(MESSAGES)
+def test_any_message_survives(message: Message) -> None:
+    assert unpack(pack(message)) == message
+
+
+@given(IDS, JSON_MAP, st.integers(0, 2**40))
+def test_an_observation_survives_with_its_privileged_state(
+    id: int, privileged: dict[str, Any], step: int
+) -> None:
+    sent = observation(step, privileged=privileged, history={-3: {"state": np.ones(14)}})
+    found = unpack(pack(Infer(id, sent)))
+    assert isinstance(found, Infer)
+    assert found.observation["privileged"] == privileged
+    assert found.observation["step"] == step
+    assert found.observation["history"][-3]["state"].tolist() == [1.0] * 14
+    assert np.array_equal(found.observation["images"]["head"], sent["images"]["head"])
+
+
+def test_actions_survive() -> None:
+    chunk = np.arange(28, dtype=np.float32).reshape(2, 14)
+    found = unpack(pack(Actions(5, chunk, {"infer_ms": 1.5, "batch": 3})))
+    assert isinstance(found, Actions)
+    assert found.id == 5
+    assert found.timing == {"infer_ms": 1.5, "batch": 3}
+    assert np.array_equal(found.chunk, chunk)
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({"type": None}, "'type' must be text"),
+        ({"type": "hallo"}, "not one of hello, reset"),
+        ({"id": -1}, "'id'"),
+        ({"id": True}, "'id'"),
+        ({"id": 2**53 + 1}, "'id'"),
+        ({"id": "3"}, "'id'"),
+        ({"trial": []}, "trial is not a map"),
+        ({"trial": {**TRIAL.to_json(), "level": "1"}}, "'level'"),
+        ({"trial": {**TRIAL.to_json(), "task": None}}, "'task'"),
+        ({"trial": {**TRIAL.to_json(), "extra": [1]}}, "'extra'"),
+        ({"trial": {"task": "x"}}, "lacks the field 'level'"),
+    ],
+)
+def test_wrong_fields_are_refused_by_name(changes: dict[str, Any], reason: str) -> None:
+    message = {"type": "reset", "id": 1, "trial": TRIAL.to_json(), **changes}
+    with pytest.raises(DecodeError, match=reason):
+        unpack(encode(message))
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({"cameras": [{"name": "ceiling"}]}, "one of head"),
+        ({"cameras": [{"name": "head"}, {"name": "head"}]}, "twice"),
+        ({"cameras": [{"name": "head", "width": 0}]}, "'width'"),
+        ({"horizon": 0}, "'horizon'"),
+        ({"execute": 99}, "'execute'"),
+        ({"history": [1]}, "negative"),
+        ({"action": "fly"}, "joint, ee"),
+        ({"image_codec": "png"}, "raw, jpeg"),
+        ({"batch": 0}, "'batch'"),
+        ({"seeded": 1}, "true or false"),
+        ({"embodiments": [1]}, "list of text"),
+        ({"action_dim": 0}, "'action_dim'"),
+        ({"name": 3}, "'name'"),
+    ],
+)
+def test_a_wrong_spec_is_refused(changes: dict[str, Any], reason: str) -> None:
+    with pytest.raises(DecodeError, match=reason):
+        PolicySpec.from_json({**SPEC.to_json(), **changes})
+
+
+@pytest.mark.parametrize("value", [None, 3, [], "hello", b"x", {1: 2}, {}])
+def test_what_is_no_message_is_refused(value: Any) -> None:
+    with pytest.raises(DecodeError):
+        unpack(encode(value))
+
+
+def test_fields_of_later_minor_versions_are_ignored() -> None:
+    spec = {**SPEC.to_json(), "audio": True}
+    hello = {"type": "hello", "id": 0, "version": "1.9", "server": "s", "spec": spec, "new": [1]}
+    assert unpack(encode(hello)) == Hello(0, "1.9", "s", SPEC)
+
+
+def test_another_major_version_is_refused() -> None:
+    with pytest.raises(VersionMismatch, match=r"99\.0.*same major version"):
+        unpack(pack(Hello(0, "99.0", "s", SPEC)))
+
+
+def test_an_observation_needs_its_step() -> None:
+    with pytest.raises(DecodeError, match="'step'"):
+        unpack(encode({"type": "infer", "id": 1, "observation": {}}))
+
+
+@pytest.mark.parametrize("chunk", [None, [[0.0]], "x"])
+def test_actions_must_be_an_array(chunk: Any) -> None:
+    with pytest.raises(DecodeError, match="'chunk' must be an array"):
+        unpack(encode({"type": "actions", "id": 1, "chunk": chunk}))
+
+
+def test_specs_are_compared_by_field() -> None:
+    assert compare_specs(SPEC, SPEC) == []
+    assert compare_specs(SPEC, replace(SPEC, horizon=9)) == ["horizon was 4 and is 9"]
+
+
+@pytest.mark.parametrize(
+    ("answer", "reason"),
+    [
+        (None, "NoneType"),
+        ([[0.0] * 14], "list"),
+        (np.zeros((2, 14), np.int32), "int32"),
+        (np.zeros(14, np.float32), r"\(14,\)"),
+        (np.zeros((0, 14), np.float32), r"\(0, 14\)"),
+        (np.zeros((5, 14), np.float32), "horizon 4"),
+        (np.zeros((2, 13), np.float32), "13 numbers"),
+        (np.full((2, 14), np.nan, np.float32), "action 0, number 0"),
+        (np.full((2, 14), 1e300), "not finite"),
+    ],
+)
+def test_chunks_that_cannot_be_executed(answer: Any, reason: str) -> None:
+    with pytest.raises(PolicyAnswerError, match=reason):
+        check_chunk(answer, SPEC)
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({"images": {}}, "camera 'head'"),
+        ({"images": None}, "'images'"),
+        ({"images": {"head": np.zeros((6, 8, 1), np.uint8)}}, r"\(6, 8, 1\)"),
+        ({"images": {"head": np.zeros((6, 8, 3))}}, "float64"),
+        ({"state": np.zeros(14)}, "'state'"),
+        ({"state": [0.0]}, "'state'"),
+        ({"instruction": None}, "'instruction'"),
+    ],
+)
+def test_observations_that_do_not_fit_the_spec(changes: dict[str, Any], reason: str) -> None:
+    with pytest.raises(DecodeError, match=reason):
+        check_observation(observation(**changes), SPEC)
+
+
+@pytest.mark.parametrize("history", [None, {}, {-3: None}, {-3: {}}])
+def test_missing_history_is_noticed(history: Any) -> None:
+    with pytest.raises(DecodeError, match="history -3"):
+        check_observation(observation(history=history), replace(SPEC, history=(-3,)))

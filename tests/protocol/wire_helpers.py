@@ -1,0 +1,130 @@
+"""Policies, observations and a scripted server for the wire's tests."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from websockets.sync.server import serve
+
+from robospa.protocol.channel import Timeouts
+from robospa.protocol.messages import Hello, pack, unpack
+from robospa.protocol.policy import CameraSpec, Observation, PolicySpec, TrialInfo
+
+CAMERA = CameraSpec("head", 8, 6)
+SPEC = PolicySpec("test", cameras=(CAMERA,), horizon=4, action_dim=14)
+TRIAL = TrialInfo("pick_blocks_size", 1, 100_000, "aloha-agilex", "clean", "heldout", "pick it", 7)
+QUICK = Timeouts(connect=10, hello=10, reset=10, first_infer=10, infer=10, end=10, close=0.2)
+
+
+class Recall:
+    """Answers the step of the observation in every number; remembers its trials."""
+
+    def __init__(self, spec: PolicySpec = SPEC) -> None:
+        self.spec = spec
+        self.trials: list[TrialInfo] = []
+        self.seen: list[Observation] = []
+        self.outcomes: list[Any] = []
+        self.fail_reset = 0
+        self.fail_infer = 0
+        self.answer: Any = None
+
+    def reset(self, trial: TrialInfo) -> None:
+        if self.fail_reset:
+            self.fail_reset -= 1
+            raise RuntimeError("the checkpoint is not loaded yet\nsecond line")
+        self.trials.append(trial)
+
+    def infer(self, observation: Observation) -> NDArray[np.float32]:
+        if self.fail_infer:
+            self.fail_infer -= 1
+            raise RuntimeError("CUDA error: device lost")
+        self.seen.append(observation)
+        if self.answer is not None:
+            found: NDArray[np.float32] = self.answer
+            return found
+        return np.full((2, 14), observation["step"], np.float32)
+
+    def end(self, outcome: Any) -> None:
+        self.outcomes.append(outcome)
+
+
+class Together(Recall):
+    """Answers batches; waits for `open` before each call, so that a test decides what gathers."""
+
+    def __init__(self, size: int = 8) -> None:
+        super().__init__(PolicySpec("together", cameras=(), state="none", horizon=4, batch=size))
+        self.open = threading.Event()
+        self.started = threading.Event()
+        self.batches: list[list[int]] = []
+
+    def infer_batch(
+        self, observations: Sequence[Observation], sessions: Sequence[int]
+    ) -> list[NDArray[np.float32]]:
+        self.batches.append([o["step"] for o in observations])
+        self.started.set()
+        assert self.open.wait(20)
+        if any(o["instruction"] == "poison" for o in observations):
+            raise ValueError("one sample is bad")
+        return [np.full((1, 14), o["step"], np.float32) for o in observations]
+
+
+def observation(step: int = 0, **changes: Any) -> dict[str, Any]:
+    """What SPEC asks for."""
+    image = np.arange(6 * 8 * 3, dtype=np.uint8).reshape(6, 8, 3)
+    seen = {
+        "images": {"head": image},
+        "state": np.arange(14, dtype=np.float32),
+        "ee": np.zeros((2, 8), np.float32),
+        "instruction": "pick it",
+        "step": step,
+    }
+    return {**seen, **changes}
+
+
+class Scripted:
+    """A server that sends prepared frames: each of `answers` is a frame, or a function of the
+    request's bytes. `greeting` is sent first. Frames of type str go out as text."""
+
+    def __init__(self, greeting: Any, answers: Sequence[Any] = (), v1: bool = True) -> None:
+        def handler(socket: Any) -> None:
+            if greeting is not None:
+                socket.send(greeting)
+            for answer in answers:
+                request = socket.recv()
+                frame = answer(request) if callable(answer) else answer
+                if frame is None:
+                    return
+                socket.send(frame)
+            with contextlib.suppress(Exception):
+                socket.recv()
+
+        self._server = serve(
+            handler,
+            "127.0.0.1",
+            0,
+            select_subprotocol=lambda _, offered: "robospa.v1" if v1 and offered else None,
+            compression=None,
+            max_size=None,
+        )
+        self._thread = threading.Thread(target=self._server.serve_forever, daemon=True)
+
+    def __enter__(self) -> str:
+        self._thread.start()
+        return f"ws://127.0.0.1:{self._server.socket.getsockname()[1]}"
+
+    def __exit__(self, *_: object) -> None:
+        self._server.shutdown()
+        self._thread.join(5)
+
+
+HELLO = pack(Hello(0, "1.0", "scripted", SPEC))
+
+
+def answer(make: Any) -> Any:
+    """A frame for `Scripted` from a function of the request's id."""
+    return lambda request: pack(make(unpack(request).id))
