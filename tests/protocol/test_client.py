@@ -292,7 +292,10 @@ def test_images_travel_as_jpeg_if_the_spec_says_so(start: Any) -> None:
     policy = Recall(replace(SPEC, image_codec="jpeg", history=(-1,)))
     remote = connect(start(policy).url, timeouts=QUICK)
     remote.reset(TRIAL)
-    flat = {"images": {"head": np.full((6, 8, 3), 100, np.uint8)}, "state": np.zeros(14, "f4")}
+    flat: dict[str, Any] = {
+        "images": {"head": np.full((6, 8, 3), 100, np.uint8)},
+        "state": np.zeros(14, "f4"),
+    }
     remote.infer(observation(**flat, history={-1: flat}))
     remote.close()
     for view in (policy.seen[0], policy.seen[0]["history"][-1]):

@@ -99,7 +99,7 @@ def test_our_protocol_need_not_be_offered() -> None:
 def test_a_text_frame_is_the_servers_traceback() -> None:
     trace = 'Traceback (most recent call last):\n  File "policy.py"\nKeyError: "cam_high"\n'
     with openpi_server(trace) as remote:
-        with pytest.raises(ServerError, match='KeyError: "cam_high"$') as caught:
+        with pytest.raises(ServerError, match=r'KeyError: "cam_high"$') as caught:
             remote.infer(observation())
         assert caught.value.retriable
         assert "policy.py" in caught.value.__notes__[0]

@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect as open_socket
+from websockets.typing import Origin
 from wire_helpers import QUICK, SPEC, TRIAL, Recall, Together, observation
 
 from robospa.protocol.channel import Address, Channel
@@ -54,7 +55,7 @@ def test_a_failed_reset_shifts_no_answer(start: Any) -> None:
     policy = Recall()
     policy.fail_reset = 1
     with connect(start(policy).url, timeouts=QUICK) as remote:
-        with pytest.raises(ServerError, match="not loaded yet$") as caught:
+        with pytest.raises(ServerError, match=r"not loaded yet$") as caught:
             remote.reset(TRIAL)
         assert caught.value.code == "policy_failed"
         assert caught.value.retriable
@@ -277,9 +278,12 @@ def test_reconnecting_finds_the_place_that_it_left(start: Any) -> None:
 def test_places_are_limited(start: Any) -> None:
     options = ServerOptions(max_connections=2, patience=0.05)
     server = start(policy_factory=Recall, options=options)
-    with connect(server.url, timeouts=QUICK), connect(server.url, timeouts=QUICK):
-        with pytest.raises(ConnectFailed, match="all 2 places"):
-            connect(server.url, timeouts=QUICK)
+    with (
+        connect(server.url, timeouts=QUICK),
+        connect(server.url, timeouts=QUICK),
+        pytest.raises(ConnectFailed, match="all 2 places"),
+    ):
+        connect(server.url, timeouts=QUICK)
 
 
 def test_a_client_that_leaves_during_inference_harms_nobody(start: Any) -> None:
@@ -434,7 +438,7 @@ def test_another_version_is_refused(start: Any) -> None:
 
 def test_browsers_are_refused(start: Any) -> None:
     url = start(Recall()).url
-    with pytest.raises(InvalidStatus), open_socket(url, origin="https://example.org"):  # type: ignore[arg-type]
+    with pytest.raises(InvalidStatus), open_socket(url, origin=Origin("https://example.org")):
         pass
 
 
@@ -461,18 +465,10 @@ def test_either_a_policy_or_a_factory() -> None:
 def test_tls(start: Any, tmp_path: Path) -> None:
     key, certificate = tmp_path / "key.pem", tmp_path / "certificate.pem"
     command = [
-        "openssl",
-        "req",
-        "-x509",
-        "-newkey",
-        "rsa:2048",
-        "-nodes",
-        "-days",
-        "1",
-        "-subj",
-        "/CN=localhost",
+        *("openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "1"),
+        *("-subj", "/CN=localhost", "-addext", "subjectAltName=IP:127.0.0.1"),
+        *("-keyout", str(key), "-out", str(certificate)),
     ]
-    command += ["-addext", "subjectAltName=IP:127.0.0.1", "-keyout", key, "-out", certificate]
     try:
         subprocess.run(command, check=True, capture_output=True, timeout=60)
     except FileNotFoundError:

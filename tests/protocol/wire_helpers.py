@@ -107,7 +107,7 @@ class Scripted:
             handler,
             "127.0.0.1",
             0,
-            select_subprotocol=lambda _, offered: "robospa.v1" if v1 and offered else None,
+            select_subprotocol=lambda _, offered: offered[0] if v1 and offered else None,
             compression=None,
             max_size=None,
         )
