@@ -162,7 +162,7 @@ def dustbin(look: int, params: Mapping[str, Any]) -> ObjectModel:
     """An open rectangular bin for the floor; its raised inner floor is 0.21 m above the ground."""
     shell, dark, word = BINS[look]
     hx, hy, h, wall, floor = 0.196, 0.296, 0.60, 0.014, 0.21
-    foot = 0.86
+    foot = 0.94
     outer = m.rounded_rectangle(hx, hy, 0.03, 3)
     rings = [[(x * foot, y * foot, 0.0) for x, y in outer], [(x, y, h - 0.03) for x, y in outer]]
     inner = m.rounded_rectangle(hx - wall, hy - wall, 0.02, 3)
@@ -173,8 +173,8 @@ def dustbin(look: int, params: Mapping[str, Any]) -> ObjectModel:
         paint(m.loft(rings, False), srgb(shell), roughness=0.6),
         paint(m.loft(band, False), srgb(dark), roughness=0.6),
         paint(m.loft(lip, False), srgb(dark), roughness=0.6),
-        paint(m.loft(well, False), srgb(shell), roughness=0.7),
-        paint(m.flat(inner, floor), srgb(dark), roughness=0.8),
+        paint(m.loft(well, False), srgb("#2b2e32"), roughness=0.8),
+        paint(m.flat(inner, floor), srgb("#3a3e43"), roughness=0.8),
         paint(_recycling(hx, h), colour("white")),
         feel(Box((hx * foot, hy * foot, floor / 2)), (0.0, 0.0, floor / 2)),
     ]
@@ -208,7 +208,7 @@ def _recycling(hx: float, h: float) -> Mesh:
                 for u, v in arrow
             ]
             part = m.upright(turned, (side * hx, 0.0, 0.40), 0.0 if side > 0 else math.pi)
-            lean = 0.14 * hx / (h - 0.03)
+            lean = 0.06 * hx / (h - 0.03)
             shifted = [
                 (x - side * (lean * (h - 0.03 - z) - 0.002), y, z) for x, y, z in part.vertices
             ]

@@ -233,7 +233,7 @@ def fan(look: int, params: Mapping[str, Any]) -> ObjectModel:
             (0.018 * math.cos(a), 0.018 * math.sin(a), deep - 0.001),
             axis_rotation((0.0, 0.0, 1.0), a),
         )
-        for a in (2 * math.pi * i / 8 for i in range(8))
+        for a in (2 * math.pi * i / 6 for i in range(6))
     ]
     guard = m.tube(
         [(0.0185 * x, 0.0185 * y, deep - 0.001) for x, y in m.ellipse(1, 1, 14)], 0.0007, 3, True
@@ -247,7 +247,9 @@ def fan(look: int, params: Mapping[str, Any]) -> ObjectModel:
         paint(m.lathe(foot, 18), colour(frame), roughness=0.35),
         paint(m.lathe([(0.007, 0.012), (0.006, 0.037)], 10), colour(frame), roughness=0.35),
         paint(hoop, colour(frame), at, ALONG_Y, 0.35),
-        paint(back, srgb("#343941"), (0.0, 0.003, z), ALONG_Y, 0.8),
+        paint(
+            back, srgb("#e4e8ec" if frame == "black" else "#4a5058"), (0.0, 0.003, z), ALONG_Y, 0.8
+        ),
         paint(_blades(), colour(blade), (0.0, -0.004, z), ALONG_Y, 0.4),
         paint(m.merge(*spokes, guard), rim, at, ALONG_Y, 0.3),
         paint(
@@ -271,18 +273,14 @@ def fan(look: int, params: Mapping[str, Any]) -> ObjectModel:
 
 
 def _blades() -> Mesh:
-    """Four twisted blades around z."""
+    """Three twisted blades around z."""
     parts = []
     petal = [
-        (0.004, -0.004),
-        (0.022, -0.012),
-        (0.0275, -0.004),
-        (0.0265, 0.006),
-        (0.016, 0.009),
-        (0.004, 0.004),
-    ]
-    for i in range(4):
-        turn = axis_rotation((0.0, 0.0, 1.0), math.pi / 2 * i + 0.3)
+        (0.003, -0.006), (0.018, -0.016), (0.026, -0.009), (0.0285, 0.002), (0.024, 0.011),
+        (0.012, 0.010), (0.003, 0.004),
+    ]  # fmt: skip
+    for i in range(3):
+        turn = axis_rotation((0.0, 0.0, 1.0), 2 * math.pi / 3 * i + 0.5)
         twist = m.moved(m.prism(petal, 0.0, 0.0012), rotation=axis_rotation((1.0, 0.0, 0.0), 0.35))
         parts.append(m.moved(twist, (0.0, 0.0, 0.002), turn))
     return m.merge(*parts)
