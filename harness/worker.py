@@ -35,8 +35,8 @@ class WorkerConfig:
     """What a worker needs to know; picklable.
 
     `policy` is a server's URL or a policy's name, `options` go to the client. `world` and `parts`
-    are `module:function` paths of a world factory and of what finds a trial's scene and goal. `video` is one of
-    VIDEO; "first" films the trials in `samples`.
+    are `module:function` paths of a world factory and of what finds a trial's scene and goal.
+    `video` is one of VIDEO; "first" films the trials in `samples`.
     """
 
     folder: Path

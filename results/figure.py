@@ -68,7 +68,15 @@ def _panel(axis: Any, scores: Scores, category: str, chance: dict[tuple[str, int
         axis.legend(frameon=False, fontsize=7.5, loc="best", handlelength=1.6)
     if found:
         axis.errorbar(
-            levels, values, yerr=[down, up], color=colour, marker="o", ms=4, lw=1.4, capsize=2.5
+            levels,
+            values,
+            yerr=[down, up],
+            color=colour,
+            marker="o",
+            ms=4,
+            lw=1.6,
+            elinewidth=0.9,
+            capsize=2.5,
         )
     axis.set_title(f"{category}  {CATEGORY_NAMES[category]}", fontsize=8)
     axis.set_ylim(-4, 104)

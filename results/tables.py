@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -35,13 +35,14 @@ class Row:
     label: str
     kind: str
     parts: tuple[tuple[int, Cell | Average | None], ...]
+    category: str = ""
 
 
 def percent(estimate: Estimate | None, digits: int = 1) -> str:
     """`12.0 [5.6, 23.8]`, or a dash."""
     if estimate is None:
         return "–"
-    value, low, high = (f"{100 * x + 0.0:.{digits}f}" for x in _all(estimate))
+    value, low, high = (f"{100 * x:z.{digits}f}" for x in _all(estimate))
     return f"{value} [{low}, {high}]"
 
 
@@ -62,17 +63,31 @@ def rows(scores: Scores) -> list[Row]:
     ordered = [t for c in (*CATEGORIES, "") for t in category_of if category_of[t] == c]
     for task in ordered:
         cells = [(n, scores.cells.get((task, n))) for n in scores.levels]
-        made.append(Row(task.replace("_", " "), "task", (*cells, (0, scores.tasks[task]))))
+        parts = (*cells, (0, scores.tasks[task]))
+        made.append(Row(task.replace("_", " "), "task", parts, category_of[task]))
     for category in CATEGORIES:
         if (category, 0) in scores.categories:
-            parts = tuple((n, scores.categories.get((category, n))) for n in levels)
-            made.append(Row(f"{category} {CATEGORY_NAMES[category]}", "category", parts))
+            parts = _averages(scores.categories, category, levels)
+            label = f"{category} {CATEGORY_NAMES[category]}"
+            made.append(Row(label, "category", parts, category))
     for dimension in DIMENSIONS:
         if (dimension, 0) in scores.dimensions:
-            parts = tuple((n, scores.dimensions.get((dimension, n))) for n in levels)
+            parts = _averages(scores.dimensions, dimension, levels)
             made.append(Row(f"{dimension} categories", "dimension", parts))
     made.append(Row("overall", "overall", tuple((n, scores.overall.get(n)) for n in levels)))
     return made
+
+
+def _averages(
+    found: Mapping[tuple[str, int], Average], name: str, levels: tuple[int, ...]
+) -> tuple[tuple[int, Cell | Average | None], ...]:
+    return tuple((level, found.get((name, level))) for level in levels)
+
+
+def category_size(scores: Scores, row: Row) -> int:
+    """How many tasks a category's row sums up; 0 for other rows."""
+    tasks = {task for (task, _), cell in scores.cells.items() if cell.category == row.category}
+    return len(tasks) if row.kind == "category" else 0
 
 
 def metrics_of(row: Row) -> list[str]:
@@ -163,6 +178,9 @@ def terminal(run: Run) -> None:
     from rich.text import Text
 
     scores = score_run(run)
+    shown = rows(scores)
+    if all(category_size(scores, row) < 2 for row in shown):
+        shown = [row for row in shown if row.kind != "category"]  # they would repeat their task
     name = run.manifest.get("settings", {}).get("policy", {}).get("spec", {}).get("name", "policy")
     privileged = " (privileged: sees the exact state)" if is_privileged(run) else ""
     table = Table(title=f"{name}{privileged}", title_justify="left", box=None, pad_edge=False)
@@ -174,7 +192,7 @@ def terminal(run: Run) -> None:
     table.add_column("PS", justify="right")
     table.add_column("trials", justify="right")
     last = "task"
-    for row in rows(scores):
+    for row in shown:
         if row.kind != last:
             table.add_section()
             last = row.kind
@@ -190,7 +208,8 @@ def terminal(run: Run) -> None:
                 f"{mean.trials}{lost}",
             ]
         style = "" if row.kind == "task" else "bold"
-        table.add_row(*(Text(t, style=style) for t in (row.label, *cells, *tail)))
+        label = f"{row.category} {row.label}" if row.kind == "task" else row.label
+        table.add_row(*(Text(t, style=style) for t in (label, *cells, *tail)))
     console = Console()
     if not console.is_terminal:
         console = Console(width=130)  # a file is as wide as the table needs

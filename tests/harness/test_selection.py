@@ -1,0 +1,71 @@
+"""What users write for tasks, levels and seeds, and what they are told when it is wrong."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from robospa.harness.cli.selection import (
+    BadChoice,
+    list_trials,
+    parse_levels,
+    parse_numbers,
+    parse_seeds,
+    parse_tasks,
+)
+
+
+def test_all_tasks_in_the_papers_order() -> None:
+    names = parse_tasks("all")
+    assert len(names) == len(set(names)) >= 10
+    assert names[0] == "Pick_Blocks_Size"
+
+
+def test_tasks_by_category_dimension_and_name() -> None:
+    assert "Pick_Blocks_Size" in parse_tasks("gac")
+    assert set(parse_tasks("spatial")) | set(parse_tasks("procedural")) == set(parse_tasks("all"))
+    assert parse_tasks("pick blocks size, GAC")[0] == "Pick_Blocks_Size"
+    assert parse_tasks("Pick_Blocks_Size,Pick_Blocks_Size") == ["Pick_Blocks_Size"]
+
+
+@pytest.mark.parametrize("text", ["", "Pick_Nothing_At_All", "XYZ"])
+def test_unknown_tasks_are_refused(text: str) -> None:
+    with pytest.raises(BadChoice):
+        parse_tasks(text)
+
+
+def test_levels() -> None:
+    assert parse_levels("1,3-5") == [1, 3, 4, 5]
+
+
+@pytest.mark.parametrize("text", ["0", "6", "", "2-1", "1-", "-1", "a", "1,,2", "1-99999999"])
+def test_levels_that_do_not_exist_are_refused(text: str) -> None:
+    with pytest.raises(BadChoice):
+        parse_levels(text)
+
+
+def test_numbers_keep_their_order_and_lose_repetitions() -> None:
+    assert parse_numbers("5,3-4,5", "--seeds") == [5, 3, 4]
+
+
+@pytest.mark.parametrize("text", ["{", '{"A": {"1": [1.5]}}', '{"A": {"1": [-1]}}', "{}"])
+def test_bad_seed_files_are_named(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "seeds.json"
+    path.write_text(text)
+    with pytest.raises(BadChoice, match=r"seeds\.json"):
+        parse_seeds(str(path))("A", 1)
+
+
+def test_the_first_seeds_of_every_variant() -> None:
+    keys = list_trials(
+        ["A", "B"],
+        [1, 2],
+        2,
+        lambda task, level: [7, 8, 9],
+        embodiment="e",
+        mode="m",
+        split="train",
+    )
+    assert [(k.task, k.level, k.seed) for k in keys][:3] == [("A", 1, 7), ("A", 1, 8), ("A", 2, 7)]
+    assert len(keys) == 8

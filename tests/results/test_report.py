@@ -1,0 +1,163 @@
+"""A run's folder becomes tables and a page; text from outside stays text."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from robospa.results import tables
+from robospa.results.intervals import Estimate, wilson
+from robospa.results.metrics import score_run
+from robospa.results.reading import Run, RunError, read_run, to_line
+from robospa.results.records import TrialKey, TrialRecord
+from robospa.results.report import event_text, write_report
+
+EVIL = "<script>alert(1)</script>"
+
+
+def record(task: str, level: int, seed: int, success: bool, **changes: object) -> TrialRecord:
+    made = TrialRecord(
+        key=TrialKey(task, level, seed),
+        category="GAC" if task == "Pick_It" else "RPF",
+        instruction="take it",
+        scene_digest="s",
+        end="success" if success else "step_limit",
+        success=success,
+        done=int(success),
+        best=int(success),
+        total=2 if task != "Pick_It" else 1,
+        candidates=4,
+        steps=10,
+        physics_steps=500,
+        policy_calls=2,
+        digest="d",
+        actions_digest="a",
+        wall_time=2.0,
+        latency={"p50": 5.0, "p95": 6.0, "p99": 7.0, "max": 8.0},
+        timing={"physics": 1.0, "waiting": 0.5},
+    )
+    return replace(made, **changes)  # type: ignore[arg-type]
+
+
+def make_run(folder: Path, records: list[TrialRecord], lost: int = 0) -> Run:
+    """A run on disk with `records`, and `lost` more listed trials of Pick_It level 1."""
+    rows = [
+        {
+            "task": r.key.task,
+            "level": r.key.level,
+            "embodiment": r.key.embodiment,
+            "mode": r.key.mode,
+            "split": r.key.split,
+            "seeds": [r.key.seed],
+        }
+        for r in records
+    ]
+    extra = {**rows[0], "task": "Pick_It", "level": 1, "seeds": [900 + n for n in range(lost)]}
+    manifest = {
+        "settings": {"policy": {"spec": {"name": f"model {EVIL}"}}, "privileged": False},
+        "categories": {"Pick_It": "GAC", "Press_It": "RPF"},
+        "trials": [*rows, extra],
+        "about": {"versions": {"robospa": "1.0"}},
+    }
+    (folder / "trials").mkdir(parents=True)
+    (folder / "run.json").write_text(json.dumps(manifest))
+    (folder / "trials" / "0000.jsonl").write_text("".join(map(to_line, records)))
+    return read_run(folder)
+
+
+RECORDS = [record("Pick_It", 1, n, n < 3) for n in range(4)] + [
+    record("Press_It", 2, n, False, done=1, message=EVIL) for n in range(2)
+]
+
+
+def test_the_report_holds_what_other_programs_need(tmp_path: Path) -> None:
+    folder = write_report(make_run(tmp_path / "run", RECORDS), tmp_path / "report")
+    data = json.loads((folder / "report.json").read_text())
+    cell = data["variants"]["Pick_It"]["L1"]
+    assert (cell["trials"], cell["successes"], cell["missing"]) == (4, 3, 0)
+    assert cell["sr"] == pytest.approx([0.75, wilson(3, 4).low, wilson(3, 4).high])
+    assert cell["onta"][0] == pytest.approx((0.75 - 0.25) / 0.75)
+    assert data["variants"]["Press_It"]["L2"]["ps"][0] == 0.5
+    assert data["ends"] == {"success": 3, "step limit": 3}
+    assert data["overall"]["mean"]["sr"][0] == pytest.approx(0.375)
+
+
+def test_the_page_is_whole_and_escapes_what_comes_from_outside(tmp_path: Path) -> None:
+    folder = write_report(make_run(tmp_path / "run", RECORDS), tmp_path / "report")
+    page = (folder / "report.html").read_text()
+    assert EVIL not in page
+    assert "&lt;script&gt;alert(1)&lt;/script&gt;" in page
+    assert page.count("<tr data-end=") == 6
+    assert "http" not in page  # nothing is loaded from elsewhere
+    assert (folder / "success.png").read_bytes()[:4] == b"\x89PNG"
+    assert (folder / "success.svg").exists()
+
+
+def test_missing_trials_are_shown_with_the_worst_and_the_best_case(tmp_path: Path) -> None:
+    run = make_run(tmp_path / "run", RECORDS, lost=4)
+    folder = write_report(run, tmp_path / "report")
+    sentence = (
+        "Pick_It L1: 4 of 8 trials are missing; if all had failed SR would be 37.5, "
+        "if all had succeeded 87.5"
+    )
+    assert sentence in (folder / "report.md").read_text()
+    assert sentence in (folder / "report.html").read_text()
+    assert json.loads((folder / "report.json").read_text())["overall"]["L1"]["missing"] == 4
+
+
+def test_videos_are_put_into_the_report_and_nothing_else_is(tmp_path: Path) -> None:
+    secret = tmp_path / "secret.mp4"
+    secret.write_bytes(b"secret")
+    films = [
+        replace(RECORDS[0], video="videos/a.mp4"),
+        replace(RECORDS[1], video="../secret.mp4"),
+        replace(RECORDS[2], video="videos/none.mp4"),
+    ]
+    run = make_run(tmp_path / "run", films)
+    (run.folder / "videos").mkdir()
+    (run.folder / "videos" / "a.mp4").write_bytes(b"film")
+    folder = write_report(run, tmp_path / "report")
+    assert [p.name for p in (folder / "videos").iterdir()] == ["a.mp4"]
+    page = (folder / "report.html").read_text()
+    assert page.count("<video") == 1
+    assert 'src="videos/a.mp4"' in page
+
+
+def test_a_run_without_any_record_still_makes_a_report(tmp_path: Path) -> None:
+    run = make_run(tmp_path / "run", RECORDS[:1], lost=1)
+    (run.folder / "trials" / "0000.jsonl").unlink()
+    folder = write_report(read_run(run.folder), tmp_path / "report")
+    assert "not run" in (folder / "report.html").read_text()
+
+
+def test_a_folder_that_is_no_run_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(RunError, match="is not a run"):
+        read_run(tmp_path)
+
+
+def test_the_terminal_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    tables.terminal(make_run(tmp_path / "run", RECORDS, lost=1))
+    text = capsys.readouterr().out
+    assert "GAC Pick It" in text
+    assert "75.0" in text
+    assert "1 of 5 trials are missing" in text
+
+
+def test_every_metric_has_a_markdown_table(tmp_path: Path) -> None:
+    scores = score_run(make_run(tmp_path / "run", RECORDS))
+    assert "| Pick It | 75.0 [30.1, 95.4] (3/4) |" in tables.markdown_table(scores, "sr")
+    assert "Press It" not in tables.markdown_table(scores, "onta")
+    assert "| Press It |  | 50.0" in tables.markdown_table(scores, "ps")
+
+
+def test_percent_has_no_negative_zero() -> None:
+    assert tables.percent(Estimate(-0.0, -0.00001, 0.1)) == "0.0 [0.0, 10.0]"
+    assert tables.percent(None) == "–"
+
+
+def test_an_event_in_words() -> None:
+    event = {"time": 1.5, "kind": "wrong_object", "object": "cup", "index": 1, "note": "lifted"}
+    assert event_text(event) == "1.50 s wrong object #2 cup lifted"
