@@ -19,13 +19,26 @@ from robospa.harness.skills.workspace import (
     FINGERTIP,
     Workspace,
 )
-from robospa.tasks.geometry import Pose, Vec3, axis_rotation, look_rotation, rotate, to_matrix
+from robospa.tasks.geometry import (
+    Pose,
+    Vec3,
+    axis_rotation,
+    look_rotation,
+    multiply,
+    rotate,
+    to_matrix,
+)
 from robospa.tasks.scene import TABLE_TOP
 from robospa.tasks.shapes import Grasp, ObjectModel
 
 Array = NDArray[np.float64]
 
 TILTS = (0.0, 0.2, -0.2, 0.4, -0.4, 0.6, -0.6, 0.8, -0.8, 1.0, -1.0, 1.2, -1.2)
+LEANS = (0.0, 0.2, -0.2, 0.4, -0.4)
+"""Sideways leans of the gripper [rad], tried when nothing else reaches."""
+PALM_BACK = (0.095, 0.125, 0.155)
+"""How far behind the fingertips the palm is looked at [m]."""
+PALM_HALF, PALM_THICK = 0.08, 0.026
 OPENING_MARGIN = 0.022
 """How much wider than the object the fingers open [m]."""
 MAX_OPENING = 0.088
@@ -75,23 +88,35 @@ def grasps_now(model: ObjectModel, pose: Pose) -> tuple[Grasp, ...]:
     )
 
 
-def candidate_poses(grasp: Grasp, reach: float) -> list[tuple[Pose, Vec3, float]]:
-    """End-effector poses for one grasp: both finger orders, all tilts that it allows."""
+def candidate_poses(
+    grasp: Grasp, reach: float, leans: tuple[float, ...] = (0.0,)
+) -> list[tuple[Pose, Vec3, float]]:
+    """End-effector poses for one grasp: both finger orders, all tilts that it allows.
+
+    `leans` turn the gripper about the approach's other side, so that one finger comes lower.
+    """
     found = []
-    for tilt in TILTS:
-        if abs(tilt) > grasp.tilt + 1e-9:
-            continue
-        approach = rotate(axis_rotation(grasp.closing, tilt), grasp.approach)
-        if approach[2] > -0.05:
-            continue
-        lean = math.sqrt(max(0.0, 1 - approach[2] ** 2))
-        lowest = FINGERTIP * -approach[2] + FINGER_HALF_WIDTH * lean
-        x, y, z = grasp.point
-        z = max(z, TABLE_TOP + TABLE_CLEARANCE + lowest)
-        position = (x - approach[0] * reach, y - approach[1] * reach, z - approach[2] * reach)
-        for sign in (1.0, -1.0):
-            closing = tuple(sign * c for c in grasp.closing)
-            found.append((Pose(position, look_rotation(approach, closing)), approach, tilt))
+    across = np.cross(grasp.approach, grasp.closing)
+    for lean in leans:
+        leaning = axis_rotation(across, lean)
+        for tilt in TILTS:
+            if abs(tilt) > grasp.tilt + 1e-9:
+                continue
+            turn = multiply(leaning, axis_rotation(grasp.closing, tilt))
+            approach = rotate(turn, grasp.approach)
+            if approach[2] > -0.05:
+                continue
+            closing = rotate(leaning, grasp.closing)
+            slope = math.sqrt(max(0.0, 1 - approach[2] ** 2))
+            lowest = FINGERTIP * -approach[2] + FINGER_HALF_WIDTH * slope
+            lowest += abs(closing[2]) * (grasp.width / 2 + FINGER_THICKNESS)
+            x, y, z = grasp.point
+            z = max(z, TABLE_TOP + TABLE_CLEARANCE + lowest)
+            position = (x - approach[0] * reach, y - approach[1] * reach, z - approach[2] * reach)
+            for sign in (1.0, -1.0):
+                facing = (sign * closing[0], sign * closing[1], sign * closing[2])
+                pose = Pose(position, look_rotation(approach, facing))
+                found.append((pose, approach, abs(tilt) + 2 * abs(lean)))
     return found
 
 
@@ -118,6 +143,12 @@ def crowding(ws: Workspace, target: str, pose: Pose, approach: Vec3, opening: fl
         for t in (0.0, FINGER_THICKNESS)
         for w in (-FINGER_HALF_WIDTH, FINGER_HALF_WIDTH)
     ]
+    points += [
+        tip - frame[:, 0] * back + side * s + across * w
+        for back in PALM_BACK
+        for s in (-PALM_HALF, -PALM_HALF / 2, 0.0, PALM_HALF / 2, PALM_HALF)
+        for w in (-PALM_THICK, PALM_THICK)
+    ]
     cloud = np.array(points)
     worst = 0.0
     for body, model in _boxes_near(ws, target):
@@ -131,6 +162,12 @@ def crowding(ws: Workspace, target: str, pose: Pose, approach: Vec3, opening: fl
 
 def reachable_grasps(ws: Workspace, name: str, arms: tuple[int, ...]) -> list[Reach]:
     """All grasps of `name` that one of `arms` can take now, best first."""
+    return _reachable(ws, name, arms, (0.0,)) or _reachable(ws, name, arms, LEANS)
+
+
+def _reachable(
+    ws: Workspace, name: str, arms: tuple[int, ...], leans: tuple[float, ...]
+) -> list[Reach]:
     model = ws.models[name]
     body = ws.pose(name)
     grasps = grasps_now(model, body)
@@ -140,7 +177,7 @@ def reachable_grasps(ws: Workspace, name: str, arms: tuple[int, ...]) -> list[Re
         poses: list[tuple[Pose, Vec3, float, float]] = []
         for grasp in grasps:
             opening = min(MAX_OPENING, grasp.width + OPENING_MARGIN)
-            poses += [(*c, opening) for c in candidate_poses(grasp, reach)]
+            poses += [(*c, opening) for c in candidate_poses(grasp, reach, leans)]
         if not poses:
             continue
         joints, ok = inverse(ws.chains[arm], [p[0] for p in poses])
@@ -151,7 +188,7 @@ def reachable_grasps(ws: Workspace, name: str, arms: tuple[int, ...]) -> list[Re
             pose, approach, tilt, opening = poses[i]
             depth = crowding(ws, name, pose, approach, opening)
             roll = abs(float(joints[i][-1])) + 0.5 * abs(float(joints[i][-2]))
-            cost = wrong + 0.5 * abs(tilt) + 0.25 * roll + 60.0 * depth
+            cost = wrong + 0.5 * tilt + 0.25 * roll + 60.0 * depth
             share = opening / MAX_OPENING
             found.append(Reach(arm, pose, approach, joints[i], share, cost, tilt))
     return sorted(found, key=lambda r: r.cost)

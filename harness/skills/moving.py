@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.harness.robots.kinematics import forward, pose_of
-from robospa.harness.skills.workspace import TRAVEL_HEIGHT, Workspace, raised
+from robospa.harness.skills.workspace import FINGERTIP, TRAVEL_HEIGHT, Workspace, raised
 from robospa.tasks.geometry import Pose
 from robospa.tasks.scene import TABLE_TOP
 
@@ -14,7 +14,11 @@ Array = NDArray[np.float64]
 
 NEAR_HOME = 0.15
 """An arm whose joints are all this close to home [rad] is out of the way."""
-SAMPLES = np.linspace(0.0, 1.0, 9)[1:-1, None]
+HIGHEST = TABLE_TOP + 0.3
+GRIPPER_RADIUS = 0.05
+SPARE = 0.025
+"""Room between what is carried and what it is carried over [m]."""
+SAMPLES = np.linspace(0.0, 1.0, 12)[1:-1, None]
 
 
 def tip_heights(ws: Workspace, arm: int, joints: Array) -> Array:
@@ -23,8 +27,52 @@ def tip_heights(ws: Workspace, arm: int, joints: Array) -> Array:
     return np.asarray(frames[:, 2, 3] + frames[:, 2, 0] * ws.robot.arms[arm].reach)
 
 
-def rise(ws: Workspace, arm: int, to: float = TRAVEL_HEIGHT) -> None:
+def tops(ws: Workspace, but: str | None) -> list[tuple[Array, float, float]]:
+    """Centre (2,), footprint radius and top [m] of every object except `but`."""
+    found = []
+    for name, pose in ws.snapshot.poses.items():
+        if name != but:
+            model = ws.models[name]
+            top = pose.position[2] + model.bottom + model.size[2]
+            found.append((np.array(pose.position[:2]), model.radius, top))
+    return found
+
+
+def hangs(ws: Workspace, arm: int) -> float:
+    """How far the lowest point of the gripper, or of what it holds, is below the grasp centre."""
+    name = ws.held[arm]
+    if name is None:
+        return FINGERTIP
+    centre = float(tip_heights(ws, arm, ws.joints[arm][None])[0])
+    return max(FINGERTIP, centre - (ws.pose(name).position[2] + ws.models[name].bottom))
+
+
+def travel_height(ws: Workspace, arm: int) -> float:
+    """Height [m] of the grasp centre at which the arm and what it holds clear everything."""
+    highest = max((top for _, _, top in tops(ws, ws.held[arm])), default=TABLE_TOP)
+    return min(HIGHEST, max(TRAVEL_HEIGHT, highest + hangs(ws, arm) + SPARE))
+
+
+def blocked(ws: Workspace, arm: int, start: Array, goal: Array) -> bool:
+    """Whether the joint line would lead the gripper or what it holds through another object.
+
+    The ends are the caller's business: only what is met on the way counts.
+    """
+    frames, _ = forward(ws.chains[arm], start + (goal - start) * SAMPLES)
+    centres = frames[:, :3, 3] + frames[:, :3, 0] * ws.robot.arms[arm].reach
+    low = centres[:, 2] - hangs(ws, arm)
+    name = ws.held[arm]
+    wide = GRIPPER_RADIUS if name is None else max(GRIPPER_RADIUS, ws.models[name].radius + 0.01)
+    for centre, radius, top in tops(ws, name):
+        near = np.linalg.norm(centres[:, :2] - centre, axis=1) < radius + wide
+        if bool((near & (low < top + 0.01)).any()):
+            return True
+    return False
+
+
+def rise(ws: Workspace, arm: int, to: float | None = None) -> None:
     """Lift the arm's grasp centre to height `to` if it is lower, as far as the arm can."""
+    to = travel_height(ws, arm) if to is None else to
     height = float(tip_heights(ws, arm, ws.joints[arm][None])[0])
     if height >= to - 0.01:
         return
@@ -37,23 +85,19 @@ def rise(ws: Workspace, arm: int, to: float = TRAVEL_HEIGHT) -> None:
             return
 
 
-def travel(ws: Workspace, arm: int, goal: Array, floor: float = TABLE_TOP + 0.07) -> None:
-    """Go to joints `goal`: up first, then along the joint line, over a detour if that dips.
-
-    `floor` [m] is the height that the grasp centre must keep between the two ends.
-    """
+def travel(ws: Workspace, arm: int, goal: Array) -> None:
+    """Go to joints `goal`: up first, then along the joint line, from above if that is blocked."""
     rise(ws, arm)
     start = ws.joints[arm]
-    line = start + (goal - start) * SAMPLES
-    ends = min(*tip_heights(ws, arm, np.stack([start, goal])), floor)
-    if float(tip_heights(ws, arm, line).min()) < ends - 0.01:
-        middle = (start + goal) / 2
-        frames, _ = forward(ws.chains[arm], middle[None])
+    if blocked(ws, arm, start, goal):
+        frames, _ = forward(ws.chains[arm], goal[None])
         here = pose_of(frames[0])
-        height = float(tip_heights(ws, arm, middle[None])[0])
-        detour = ws.solve(arm, raised(here, max(0.0, TRAVEL_HEIGHT - height)), middle)
-        if detour is not None:
-            ws.add(arm, detour)
+        climb = travel_height(ws, arm) - float(tip_heights(ws, arm, goal[None])[0])
+        for share in (1.0, 0.7, 0.4):
+            above = ws.solve(arm, raised(here, climb * share), goal) if climb > 0.01 else None
+            if above is not None:
+                ws.add(arm, above)
+                break
     ws.add(arm, goal)
 
 

@@ -20,7 +20,7 @@ Fits = Callable[[Reach], bool]
 
 STANDOFF = 0.08
 ATTEMPTS = 5
-LOOKAHEAD = 12
+LOOKAHEAD = 80
 """How many of the best grasps are tested against what comes after."""
 
 

@@ -13,7 +13,7 @@ from robospa.harness.robots.kinematics import inverse
 from robospa.harness.skills.grasping import Reach
 from robospa.harness.skills.moving import line, retreat_home, rise, travel
 from robospa.harness.skills.workspace import SkillFailed, Steps, Workspace, backed, raised
-from robospa.tasks.geometry import Pose, rotate, yaw_rotation
+from robospa.tasks.geometry import Pose, axis_rotation, multiply, rotate, yaw_rotation
 from robospa.tasks.plan import Drop, Place
 
 Array = NDArray[np.float64]
@@ -79,6 +79,20 @@ def place_targets(ws: Workspace, call: Place) -> list[Pose]:
     return [Pose((x, y, z + call.drop), yaw_rotation(yaw)) for yaw in yaws]
 
 
+def tipped_targets(ws: Workspace, call: Place) -> list[Pose]:
+    """The same with the object tipped and higher up, for what is hard to reach: it falls flat."""
+    radius = ws.models[call.object].radius
+    return [
+        Pose(
+            (pose.position[0], pose.position[1], pose.position[2] + radius * math.sin(tip)),
+            multiply(pose.rotation, axis_rotation((math.cos(turn), math.sin(turn), 0), tip)),
+        )
+        for tip in (0.3, 0.6)
+        for turn in YAWS[::2]
+        for pose in place_targets(ws, call)
+    ]
+
+
 def drop_targets(ws: Workspace, call: Drop) -> list[Pose]:
     """Object poses over the container's mouth."""
     bin_pose, model = ws.pose(call.into), ws.models[call.into]
@@ -99,7 +113,9 @@ def place(ws: Workspace, call: Place) -> Steps:
     """Carry, set down, let go, back off."""
     arm = holder(ws, call.object)
     offset = grip_offset(ws, arm, call.object)
-    found = spots(ws, arm, offset, place_targets(ws, call), ABOVE, ws.joints[arm])
+    near = ws.joints[arm]
+    found = spots(ws, arm, offset, place_targets(ws, call), ABOVE, near)
+    found = found or spots(ws, arm, offset, tipped_targets(ws, call), ABOVE, near)
     if not found:
         raise SkillFailed(f"{call.object} cannot be brought to {place_position(ws, call)}")
     spot = found[0]
