@@ -26,6 +26,8 @@ from robospa.tasks.snapshot import ARMS, Contact
 
 Array = NDArray[np.float64]
 
+FURNITURE = ("ground", "table", "wall")
+
 FLOATS = 7  # of a pose in SAPIEN's packed form: qw qx qy qz, x y z
 
 
@@ -112,21 +114,24 @@ class Physics:
         return PoseTable(values, self.rows)
 
     def contacts(self) -> tuple[Contact, ...]:
-        """Every pair of bodies that push on each other, once, at the point of the largest impulse.
+        """Every point at which two bodies push on each other, except of objects on furniture.
 
-        In alphabetical order: the simulator's own order is that of its memory.
+        In a fixed order: the simulator's own order is that of its memory.
         """
-        found: dict[tuple[str, str], tuple[float, tuple[float, float, float]]] = {}
+        found: list[tuple[str, str, tuple[float, float, float]]] = []
         for contact in self.system.get_contacts():
             one, other = (body.name for body in contact.bodies)
-            pair = (one, other) if one <= other else (other, one)
+            if other < one:
+                one, other = other, one
+            if (one in FURNITURE and other in self.rows) or (
+                other in FURNITURE and one in self.rows
+            ):
+                continue
             for point in contact.points:
-                ix, iy, iz = point.impulse.tolist()
-                size = ix * ix + iy * iy + iz * iz
-                if size > 0.0 and (pair not in found or size > found[pair][0]):
+                if any(point.impulse.tolist()):
                     x, y, z = point.position.tolist()
-                    found[pair] = (size, (x, y, z))
-        return tuple(Contact(a, b, found[a, b][1]) for a, b in sorted(found))
+                    found.append((one, other, (x, y, z)))
+        return tuple([Contact(*pair) for pair in sorted(found)])
 
     def moving(self) -> dict[str, Any]:
         """Components of the objects that can move, by name."""

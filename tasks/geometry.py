@@ -57,7 +57,8 @@ def multiply(a: Quat, b: Quat) -> Quat:
 def rotate(q: Quat, v: ArrayLike) -> Vec3:
     """Vector `v` turned by the unit quaternion `q`."""
     w, x, y, z = q
-    vx, vy, vz = (float(c) for c in np.asarray(v, dtype=float))
+    # tuples, which poses consist of, are by far the most frequent and need no conversion
+    vx, vy, vz = v if isinstance(v, tuple) else (float(c) for c in np.asarray(v, dtype=float))
     tx, ty, tz = 2 * (y * vz - z * vy), 2 * (z * vx - x * vz), 2 * (x * vy - y * vx)
     return (
         vx + w * tx + y * tz - z * ty,

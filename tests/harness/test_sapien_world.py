@@ -215,9 +215,11 @@ def test_an_object_weighs_what_its_model_says() -> None:
 
 
 def test_contacts_name_both_bodies(world: SapienWorld) -> None:
-    world.load(scene(block("one", 0.0, 0.0)), contacts=True)
+    world.load(scene(block("low", 0.0, 0.0), block("high", 0.0, 0.0, lift=0.04)), contacts=True)
     world.step(joint_action((0,) * 6, (0,) * 6), "joint", go_on)
-    assert [(c.first, c.second) for c in world.snapshot().contacts] == [("one", "table")]
+    contacts = world.snapshot().contacts
+    assert {(c.first, c.second) for c in contacts} == {("high", "low")}
+    assert all(c.point[2] == pytest.approx(TABLE_TOP + 0.04, abs=1e-3) for c in contacts)
 
 
 def test_contacts_are_empty_unless_asked_for(world: SapienWorld) -> None:
