@@ -6,6 +6,7 @@ side, so the same object has several names; what it is plays no part.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -27,8 +28,8 @@ ASSETS = (
 """A level uses the first n, one each."""
 RADIUS, TALL = 0.06, 0.12
 """Bounds of footprint and height [m], for the view."""
-YAW = 0.0
-"""All objects stand straight [rad]."""
+SIDEWAYS = ("alarm_clock",)
+"""All objects stand straight; these show their narrow side, across which a far one is grasped."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +84,7 @@ def draw(level: int, rng: np.random.Generator) -> Draft:
         row, column = divmod(cell, grid.columns)
         x = centre_x + (column - (grid.columns - 1) / 2) * grid.pitch_x + float(jitter[k, 0])
         y = centre_y + (row - (grid.rows - 1) / 2) * grid.pitch_y + float(jitter[k, 1])
-        pose = standing((x, y), YAW)
+        pose = standing((x, y), math.pi / 2 if assets[k] in SIDEWAYS else 0.0)
         objects.append(SceneObject(f"object_{k}", assets[k], pose, draw_look(rng, assets[k])))
     row, column = int(rng.integers(grid.rows)), int(rng.integers(grid.columns))
     from_right, from_far = bool(rng.integers(2)), bool(rng.integers(2))

@@ -25,7 +25,7 @@ from robospa.tasks.objects import object_model
 from robospa.tasks.packing import Fits, apart, pool, walk
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.task import Draft, Level, Task
-from robospa.tasks.variants.picking import lifted, pick_target
+from robospa.tasks.variants.picking import drawn_yaw, lifted, pick_target
 from robospa.tasks.variants.tabletop import draw_look, look_phrasings, standing
 
 ASSETS = ("tea_box", "sauce_can", "bowl", "toycar", "fan", "tissue_box", "french_fries")
@@ -120,23 +120,19 @@ def draw(level: int, rng: np.random.Generator) -> Draft:
         points = shifted[0]
     target = by_distance(points, reference)[rank - 1][1]
     assets = [ASSETS[int(i)] for i in rng.permutation(count)]
-    yaws = rng.uniform(-math.pi / 2, math.pi / 2, count)
     order = [int(i) for i in rng.permutation(count)]
-    objects = tuple(
-        SceneObject(
-            f"object_{k}",
-            assets[i],
-            standing((float(points[i, 0]), float(points[i, 1])), float(yaws[i])),
-            draw_look(rng, assets[i]),
-        )
-        for k, i in enumerate(order)
-    )
+    objects = []
+    for k, i in enumerate(order):
+        x, y = points[i].tolist()
+        look = draw_look(rng, assets[i])
+        yaw = drawn_yaw(rng, assets[i], look, y, math.pi / 2)
+        objects.append(SceneObject(f"object_{k}", assets[i], standing((x, y), yaw), look))
     facts = {
         "target": f"object_{order.index(target)}",
         "reference": f"object_{order.index(reference)}",
         "distance_rank": rank,
     }
-    return Draft(objects, facts)
+    return Draft(tuple(objects), facts)
 
 
 def slots(scene: Scene) -> Slots:

@@ -22,7 +22,7 @@ from robospa.tasks.layouts import Mask, head_pixel, in_head_view
 from robospa.tasks.packing import Fits, pool, walk
 from robospa.tasks.scene import TABLE_TOP, Scene, SceneObject
 from robospa.tasks.task import Draft, Level, Task
-from robospa.tasks.variants.picking import lifted, pick_target
+from robospa.tasks.variants.picking import drawn_yaw, lifted, pick_target
 from robospa.tasks.variants.tabletop import draw_look, standing
 
 ASSETS = ("block", "bread", "seal", "toycar", "phone", "rubikscube", "remote_control")
@@ -153,10 +153,11 @@ def draw(level: int, rng: np.random.Generator) -> Draft:
     objects = []
     for k, i in enumerate(order):
         is_block = assets[k] == "block"
-        yaw = float(rng.uniform(-0.75, 0.75) if is_block else rng.uniform(-math.pi, math.pi))
         x, y = points[0, i].tolist()
+        params = _params(rng, assets[k])
+        yaw = drawn_yaw(rng, assets[k], params, y, 0.75 if is_block else math.pi)
         pose = standing((x, y), yaw, BLOCK_HALF if is_block else 0.0)
-        objects.append(SceneObject(f"object_{k}", assets[k], pose, _params(rng, assets[k])))
+        objects.append(SceneObject(f"object_{k}", assets[k], pose, params))
     facts = {
         "target": f"object_{order.index(0)}",
         "extreme": EXTREMES[extreme],

@@ -21,7 +21,7 @@ from robospa.tasks.instructions.words import Slots
 from robospa.tasks.layouts import LayoutError, in_head_view
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.task import Draft, Level, Task
-from robospa.tasks.variants.picking import lifted, pick_target
+from robospa.tasks.variants.picking import drawn_yaw, lifted, pick_target
 from robospa.tasks.variants.tabletop import draw_look, standing
 
 RADIUS = 0.036
@@ -155,19 +155,18 @@ def draw(level: int, rng: np.random.Generator) -> Draft:
     used = [target, reference, *(rest[int(i)] for i in rng.permutation(len(rest)))][: grid.count]
     used = [used[int(i)] for i in rng.permutation(len(used))]
     points = _places(grid, used, rng)
-    yaws = rng.uniform(-math.pi, math.pi, len(used))
     look = draw_look(rng, "soap")
-    objects = tuple(
-        SceneObject(f"object_{i}", "soap", standing((float(x), float(y)), float(yaw)), look)
-        for i, ((x, y), yaw) in enumerate(zip(points, yaws, strict=True))
-    )
+    objects = []
+    for i, (x, y) in enumerate(points.tolist()):
+        yaw = drawn_yaw(rng, "soap", look, y, math.pi)
+        objects.append(SceneObject(f"object_{i}", "soap", standing((x, y), yaw), look))
     facts = {
         "target": f"object_{used.index(target)}",
         "reference": f"object_{used.index(reference)}",
         "relation": direction,
         "reference_label": _label(grid, reference, used),
     }
-    return Draft(objects, facts)
+    return Draft(tuple(objects), facts)
 
 
 def slots(scene: Scene) -> Slots:

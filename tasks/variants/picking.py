@@ -1,10 +1,16 @@
-"""What the five pick tasks share: the plan is to pick the target, the goal that it is lifted."""
+"""What the five pick tasks share: plan, goal, and turns at which every object can be grasped."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
 
 from robospa.tasks.goals.pick import Lift, PickTracker
+from robospa.tasks.layouts import LayoutError
+from robospa.tasks.objects import object_model
 from robospa.tasks.plan import Pick, Skill
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Tracker
@@ -22,3 +28,30 @@ def lifted(lift: Lift) -> Callable[[Scene], Tracker]:
 def pick_target(scene: Scene) -> tuple[Skill, ...]:
     """The plan: pick the target."""
     return (Pick(str(scene.facts["target"])),)
+
+
+FAR = 0.02
+"""Beyond this y [m] an arm cannot close its fingers along its own direction of reach."""
+ACROSS = math.cos(math.radians(40))
+"""Least x component of a closing direction (unit) that is reached out there."""
+TURNS = 60
+
+
+def drawn_yaw(
+    rng: np.random.Generator, asset: str, params: Mapping[str, Any], y: float, half_range: float
+) -> float:
+    """A uniform yaw [rad] in +-`half_range` at which an object at `y` [m] can be grasped.
+
+    Far from the robot one of the object's grasps has to close sideways, within 40 degrees of the
+    x axis. The rule holds for every object, so it tells nothing about the target. LayoutError if
+    60 draws do not meet it.
+    """
+    closings = [g.closing for g in object_model(asset, params).grasps] if y > FAR else []
+    for _ in range(TURNS):
+        yaw = float(rng.uniform(-half_range, half_range))
+        if y <= FAR:
+            return yaw
+        cos, sin = math.cos(yaw), math.sin(yaw)
+        if any(abs(cos * c[0] - sin * c[1]) >= ACROSS for c in closings):
+            return yaw
+    raise LayoutError(f"no turn of {asset} at y = {y:.3f} can be grasped; skip this seed")
