@@ -216,8 +216,8 @@ def _is_loopback(host: str) -> bool:
 def _refused(address: Address, error: InvalidStatus) -> Exception:
     status = error.response.status_code
     body = bytes(error.response.body or b"")[:300].decode("utf-8", "replace").strip()
-    if status in (HTTPStatus.UNAUTHORIZED, HTTPStatus.FORBIDDEN):
+    if status == HTTPStatus.UNAUTHORIZED:
         return Unauthorized(f"{address.url} refused the token: {body or status}")
-    if status in (HTTPStatus.BAD_REQUEST, HTTPStatus.UPGRADE_REQUIRED):
+    if status in (HTTPStatus.BAD_REQUEST, HTTPStatus.FORBIDDEN, HTTPStatus.UPGRADE_REQUIRED):
         return HandshakeError(f"{address.url} refused the connection: {body or status}")
     return ConnectFailed(f"{address.url} answered HTTP {status}: {body or 'no reason given'}")

@@ -136,6 +136,7 @@ class _SharedSession:
         self._engine, self._policy, self._batcher, self._number = engine, policy, batcher, number
 
     async def reset(self, trial: TrialInfo) -> None:
+        self._batcher.forget(self._number)
         if hasattr(self._policy, "reset_session"):
             await self._engine.run(self._policy.reset_session, self._number, trial)
         else:

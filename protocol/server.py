@@ -36,7 +36,7 @@ from robospa.protocol.codec import DEFAULT_LIMITS, Limits
 from robospa.protocol.engine import Engine, PolicyFactory
 from robospa.protocol.messages import SUBPROTOCOL
 from robospa.protocol.policy import Policy
-from robospa.protocol.session import Session
+from robospa.protocol.session import Session, refuse
 
 log = logging.getLogger("robospa.server")
 
@@ -166,13 +166,16 @@ class PolicyServer:
             self._taken -= 1
 
     async def _converse(self, connection: ServerConnection) -> None:
-        policy = await self._engine.open()
-        options = self._options
+        options, ours = self._options, connection.subprotocol == SUBPROTOCOL
+        try:
+            policy = await self._engine.open()
+        except Exception as error:
+            log.exception("no policy could be made for a new connection")
+            return await refuse(connection, ours, error)
         try:
             session = Session(
                 connection, policy, self._engine.spec, options.name, options.limits, options.idle
             )
-            ours = connection.subprotocol == SUBPROTOCOL
             await (session.run() if ours else session.run_openpi())
         finally:
             policy.close()

@@ -62,7 +62,7 @@ class Session:
     _last_id: int = 0
 
     async def run(self) -> None:
-        """Speak `robospa.v1`."""
+        """Speak `robospa.v1`. Raises ConnectionClosed, and TimeoutError after a long silence."""
         await self._send(Hello(0, VERSION, self.server, self.spec))
         while True:
             data = await self._receive()
@@ -76,7 +76,9 @@ class Session:
             if type(id) is not int or not self._last_id < id <= MAX_ID:
                 return await self._give_up(1008, f"request ids must increase from {self._last_id}")
             self._last_id = id
-            await self._send(await self._answer(id, value))
+            answer = await self._answer(id, value)
+            del data, value  # let the memory of this observation be used for the next one
+            await self._send(answer)
 
     async def _answer(self, id: int, value: Any) -> Message:
         try:
@@ -167,6 +169,13 @@ class Session:
             times = {"infer_ms": timing["infer_ms"]}
             reply = {"actions": chunk, "policy_timing": times, "server_timing": times}
             await self.socket.send(encode(reply, self.limits))
+
+
+async def refuse(socket: ServerConnection, ours: bool, error: Exception) -> None:
+    """Say in either dialect why there is no session, and close."""
+    reason = _sentence(error)
+    await socket.send(pack(Error(0, POLICY_FAILED, reason)) if ours else reason)
+    await socket.close(1011, "no policy for this connection")
 
 
 def _openpi_trial(prompt: str, spec: PolicySpec) -> TrialInfo:

@@ -288,6 +288,16 @@ def test_large_messages_arrive_whole(start: Any) -> None:
     assert np.array_equal(policy.seen[0]["noise"], noise)
 
 
+def test_a_server_that_stops_reading_is_given_up() -> None:
+    given_up = threading.Event()
+    with Scripted(HELLO, [lambda _: given_up.wait(20) and None]) as url:
+        remote = connect(url, timeouts=replace(QUICK, first_infer=0.2, infer=0.2))
+        with pytest.raises(TransportError):
+            for _ in range(9):
+                remote._session._channel.send(bytes(8_000_000))
+        given_up.set()
+
+
 def test_images_travel_as_jpeg_if_the_spec_says_so(start: Any) -> None:
     policy = Recall(replace(SPEC, image_codec="jpeg", history=(-1,)))
     remote = connect(start(policy).url, timeouts=QUICK)

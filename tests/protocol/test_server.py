@@ -259,6 +259,23 @@ def test_every_connection_has_a_policy_of_its_own(start: Any) -> None:
     assert [[o["step"] for o in policy.seen] for policy in made] == [[10], [20]]
 
 
+def test_a_factory_that_fails_says_why(start: Any) -> None:
+    made: list[Recall] = []
+
+    def create() -> Recall:
+        if made:
+            raise MemoryError("no room for a second model")
+        made.append(Recall())
+        return made[0]
+
+    server = start(policy_factory=create)
+    with (
+        connect(server.url, timeouts=QUICK),
+        pytest.raises(ConnectionLost, match="no room for a second model"),
+    ):
+        connect(server.url, timeouts=QUICK)
+
+
 def test_a_policy_that_knows_no_sessions_serves_one_connection(start: Any) -> None:
     server = start(Recall(), options=ServerOptions(patience=0.05))
     with connect(server.url, timeouts=QUICK) as first:
