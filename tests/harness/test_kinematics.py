@@ -1,0 +1,94 @@
+"""Forward and inverse kinematics of the arms, closed-form and numerical."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from robospa.harness.robots import embodiment
+from robospa.harness.robots.embodiment import Arm
+from robospa.harness.robots.kinematics import chain_of, end_effector, forward, inverse, pose_of
+from robospa.tasks.geometry import Pose, look_rotation
+
+ARMS = embodiment("aloha-agilex").arms
+
+
+def random_joints(arm: Arm, count: int) -> np.ndarray:
+    """Postures in front of the robot with the elbow up, away from the limits."""
+    rng = np.random.default_rng(7)
+    low, high = (-0.8, 1.2, 0.9, -1.2, -1.2, -1.4), (0.8, 2.4, 2.2, 1.2, 1.2, 1.4)
+    return rng.uniform(low, high, (count, len(arm.joints)))
+
+
+@pytest.mark.parametrize("arm", ARMS, ids=lambda a: a.name)
+def test_home_is_where_the_joint_origins_say(arm: Arm) -> None:
+    # all joints zero: origins add up along the base's x axis, which is the world's y axis
+    pose = end_effector(chain_of(arm), arm.home)
+    ahead = 0.02 - 0.264 + 0.245 + 0.06575 + 0.02845 + 0.025
+    assert pose.position[1] == pytest.approx(arm.base.position[1] + ahead, abs=1e-9)
+    assert pose.position[2] == pytest.approx(0.7775 + 0.0603 + 0.0402 + 0.056, abs=1e-9)
+
+
+@pytest.mark.parametrize("arm", ARMS, ids=lambda a: a.name)
+def test_closed_form_returns_the_joints_that_made_the_pose(arm: Arm) -> None:
+    chain = chain_of(arm)
+    joints = random_joints(arm, 500)
+    frames, _ = forward(chain, joints)
+    found, ok = inverse(chain, [pose_of(f) for f in frames])
+    assert ok.all()
+    assert np.abs(found - joints).max() < 1e-6
+
+
+@pytest.mark.parametrize("arm", ARMS, ids=lambda a: a.name)
+def test_numerical_way_agrees_with_the_closed_form(arm: Arm) -> None:
+    chain = replace(chain_of(arm), links=None)
+    frames, _ = forward(chain, random_joints(arm, 60))
+    found, ok = inverse(chain, [pose_of(f) for f in frames])
+    reached, _ = forward(chain, found[ok])
+    assert ok.mean() > 0.9
+    assert np.abs(reached - frames[ok]).max() < 5e-3
+
+
+def test_out_of_reach_is_said_not_raised() -> None:
+    down = look_rotation((0, 0, -1), (-1, 0, 0))
+    _, ok = inverse(
+        chain_of(ARMS[0]), [Pose((-0.3, 0.6, 0.9), down), Pose((-0.3, -0.1, 0.9), down)]
+    )
+    assert ok.tolist() == [False, True]
+
+
+def test_jacobian_is_the_derivative() -> None:
+    chain = chain_of(ARMS[1])
+    joints = random_joints(ARMS[1], 1)
+    frame, jacobian = forward(chain, joints)
+    step = 1e-6
+    for j in range(joints.shape[1]):
+        moved = joints.copy()
+        moved[0, j] += step
+        after, _ = forward(chain, moved)
+        speed = (after[0, :3, 3] - frame[0, :3, 3]) / step
+        assert np.abs(speed - jacobian[0, :3, j]).max() < 1e-4
+
+
+def test_unknown_embodiment_names_what_exists() -> None:
+    with pytest.raises(ValueError, match="aloha-agilex"):
+        embodiment("no-such-robot")
+
+
+def test_links_stay_inside_their_limits() -> None:
+    chain = chain_of(ARMS[0])
+    rng = np.random.default_rng(1)
+    targets = [
+        Pose(
+            (float(x), float(y), 0.9),
+            look_rotation((0, math.sin(t), -math.cos(t)), (-1, 0, 0)),
+        )
+        for x, y, t in rng.uniform((-0.4, -0.2, 0.0), (0.2, 0.2, 1.0), (300, 3))
+    ]
+    found, ok = inverse(chain, targets)
+    assert ok.any()
+    assert (found[ok] >= chain.lower - 1e-6).all()
+    assert (found[ok] <= chain.upper + 1e-6).all()
