@@ -43,11 +43,11 @@ _STEPS = (
         "click {can} once again",
     ),
     (
-        "use {arm} to press {can}",
+        "touch the top of {can}",
         "lay {bread} inside {basket}",
-        "press {can} a second time",
+        "touch {can} a second time",
         "stand {bottle} on {pad}",
-        "press {can} one last time",
+        "touch {can} one last time",
     ),
 )
 """Five ways to word the five steps, as imperative clauses."""

@@ -18,7 +18,7 @@ _WRAPPERS = (
     "take the robot's viewpoint, where {convention}, then <C>.",
     "with the robot as the viewer, so that {convention}, <C>.",
     "<C>. From the robot's side, {convention}.",
-    "<C>, bearing in mind that {convention} as the robot sees it.",
+    "<C>, given that {convention} as the robot sees it.",
     "all directions are the robot's, so {convention}; <C>.",
     "remember that {convention} from the robot's viewpoint, then <C>.",
     "<C>; for the robot, {convention}.",

@@ -21,7 +21,7 @@ _ORDINALS = (
 COMMON: Slots = {
     "arm": (
         ("one arm", "a single arm", "either arm"),
-        ("just one arm", "any one arm", "one of the two arms"),
+        ("just one arm", "any one arm", "one arm only"),
     ),
     "table": (
         ("the table", "the tabletop"),

@@ -194,13 +194,13 @@ def memory(colors: Sequence[str]) -> Slots:
     slots: Slots = {
         "where": (
             (
-                "straight away from the robot to 13 cm behind its block",
+                "away from the robot, to the spot 13 cm behind its block",
                 "straight back, away from the robot, to 13 cm behind its block",
             ),
             (
                 "directly away from the robot, ending 13 cm behind its block",
                 "in a straight line away from the robot, to 13 cm beyond its block",
-                "straight away from the robot, 13 cm past its block",
+                "away from the robot, to a point 13 cm past its block",
                 "straight back from the robot until it lies 13 cm behind its block",
             ),
         ),
