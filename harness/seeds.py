@@ -18,6 +18,9 @@ from robospa.protocol.policy import Policy
 from robospa.results.records import TrialKey
 
 BATCH = 10
+ORACLE = "robospa.baselines.oracle:create"
+"""By path, not by entry point: the harness does not import baselines, and a list of seeds must come
+from this very policy."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +43,7 @@ def _start() -> None:
     from robospa.harness.factory import policy_factory
     from robospa.harness.sapien_world import SapienWorld
 
-    _WORKER.append((SapienWorld(render=False), policy_factory("oracle")()))
+    _WORKER.append((SapienWorld(render=False), policy_factory(ORACLE)()))
 
 
 def attempt(world: World, policy: Policy, name: str, level: int, seed: int) -> Attempt:
