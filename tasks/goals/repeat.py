@@ -90,4 +90,8 @@ class Repeat:
 
     def diagnostics(self) -> dict[str, float]:
         """`presses` counted, and `raw_presses` as a counter without re-arming would see them."""
-        return {"presses": self.counter.count, "raw_presses": self.counter.raw_count}
+        return {
+            "idle_progress": 0.0,
+            "presses": self.counter.count,
+            "raw_presses": self.counter.raw_count,
+        }

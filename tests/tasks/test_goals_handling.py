@@ -10,10 +10,11 @@ from robospa.tasks.events import Event
 from robospa.tasks.geometry import Vec3
 from robospa.tasks.goals.handling import Handling
 
+Step = tuple[float, float, float | None]
 REST: Vec3 = (0.0, 0.0, 0.74)
 
 
-def play(steps: Iterable[tuple[float, float, float | None]]) -> list[Event]:
+def play(steps: Iterable[Step]) -> list[Event]:
     """Steps are (object height, gripper opening, grasp height above the object or None)."""
     handling = Handling(["o"])
     handling.start(snap(0, {"o": REST}))
@@ -24,12 +25,12 @@ def play(steps: Iterable[tuple[float, float, float | None]]) -> list[Event]:
     return events
 
 
-def lift(to: float = 0.84) -> list[tuple[float, float, float | None]]:
+def lift(to: float = 0.84) -> list[Step]:
     return [(0.74 + (to - 0.74) * i / 10, 0.2, 0.02) for i in range(11)]
 
 
 def test_lifting_is_reported_once() -> None:
-    assert kinds(play(lift() * 1)) == ["grasped"]
+    assert kinds(play(lift())) == ["grasped"]
 
 
 def test_rising_without_a_gripper_is_not_a_grasp() -> None:
@@ -41,21 +42,25 @@ def test_an_open_gripper_holds_nothing() -> None:
 
 
 def test_lowering_fast_in_the_gripper_is_not_a_drop() -> None:
-    down = [(0.84 - 0.02 * i, 0.2, 0.02) for i in range(1, 5)]
+    down: list[Step] = [(0.84 - 0.02 * i, 0.2, 0.02) for i in range(1, 5)]
     assert kinds(play(lift() + down)) == ["grasped"]
 
 
 def test_slipping_out_and_falling_is() -> None:
-    fall = [(0.84 - d, 0.2, 0.02 + d) for d in (0.002, 0.008, 0.018, 0.035, 0.06, 0.1, 0.1)]
+    fall: list[Step] = [
+        (0.84 - d, 0.2, 0.02 + d) for d in (0.002, 0.008, 0.018, 0.035, 0.06, 0.1, 0.1)
+    ]
     assert kinds(play(lift() + fall)) == ["grasped", "dropped"]
 
 
 def test_letting_go_high_above_the_table_is_a_drop() -> None:
-    fall = [(0.84 - d, 1.0, 0.02 + d) for d in (0.002, 0.008, 0.018, 0.035, 0.06, 0.1, 0.1)]
+    fall: list[Step] = [
+        (0.84 - d, 1.0, 0.02 + d) for d in (0.002, 0.008, 0.018, 0.035, 0.06, 0.1, 0.1)
+    ]
     assert kinds(play(lift() + fall)) == ["grasped", "dropped"]
 
 
 def test_setting_down_and_lifting_again_is_a_second_grasp() -> None:
-    down = [(0.84 - 0.01 * i, 0.2, 0.02) for i in range(1, 11)]
-    rest: list[tuple[float, float, float | None]] = [(0.74, 1.0, None)] * 15
+    down: list[Step] = [(0.84 - 0.01 * i, 0.2, 0.02) for i in range(1, 11)]
+    rest: list[Step] = [(0.74, 1.0, None)] * 15
     assert kinds(play(lift() + down + rest + lift())) == ["grasped", "grasped"]

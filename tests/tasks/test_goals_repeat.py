@@ -42,7 +42,7 @@ def test_a_long_press_counts_once() -> None:
 def test_chatter_shorter_than_the_rearm_time_counts_once(gap: int) -> None:
     goal = tracker(2)
     assert kinds(run(goal, touches("." + ("x" + "." * gap) * 6))) == ["subtask_done"]
-    assert goal.diagnostics() == {"presses": 1, "raw_presses": 6}
+    assert goal.diagnostics() == {"idle_progress": 0.0, "presses": 1, "raw_presses": 6}
 
 
 def test_a_tenth_of_a_second_without_a_touch_rearms() -> None:

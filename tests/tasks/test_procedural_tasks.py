@@ -98,7 +98,7 @@ def test_idling_earns_only_what_is_given(name: str, level: int) -> None:
     free = 1 if name == "Stack_Blocks_Color_Order" and level > 1 else 0
     assert outcome(trial.events, trial.tracker.total).done == free
     diagnostics = trial.tracker.diagnostics()  # type: ignore[attr-defined]
-    assert diagnostics.get("idle_progress", 0.0) == pytest.approx(free / level)
+    assert diagnostics["idle_progress"] == pytest.approx(free / level)
 
 
 @pytest.mark.parametrize(("name", "level"), VARIANTS)
