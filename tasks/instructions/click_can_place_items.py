@@ -129,11 +129,6 @@ def _passive(result: str, verb: str) -> str:
     return f"{noun}}} {verb} {rest}"
 
 
-def required(level: int) -> tuple[str, ...]:
-    """The slots that every template of a level has."""
-    return ("can", "bread", "basket", "bottle", "pad")[: 1 if level == 1 else 3 if level < 4 else 5]
-
-
 def templates(level: int) -> Templates:
     """The first `level` steps of the sequence."""
     if level == 1:

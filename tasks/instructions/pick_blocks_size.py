@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from robospa.tasks.instructions.grammar import Templates, templates_of
 
-REQUIRED = ("block",)
-
 _TRAIN = (
     "pick up {block}.",
     "lift {block} off {table}.",

@@ -56,12 +56,6 @@ _HELDOUT = (
 )
 
 
-def required(level: int) -> tuple[str, ...]:
-    """The slots that every template of a level has."""
-    line = ("column", "column_direction", "viewer")
-    return line if level == 1 else (*line, "row", "row_direction")
-
-
 def templates(level: int) -> Templates:
     """A line of objects at level 1, a grid from level 2 on."""
     if level == 1:

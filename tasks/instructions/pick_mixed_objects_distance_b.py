@@ -7,8 +7,6 @@ from __future__ import annotations
 
 from robospa.tasks.instructions.grammar import Templates, templates_of
 
-REQUIRED = ("rank", "reference")
-
 _TRAIN = (
     "pick up the object {rank} from the {reference}.",
     "lift the object that is {rank} from the {reference}.",

@@ -9,8 +9,6 @@ from __future__ import annotations
 from robospa.tasks.instructions.grammar import Templates, templates_of
 from robospa.tasks.instructions.pick_clauses import named, wrapped
 
-REQUIRED = ("target", "view", "convention")
-
 _WRAPPERS = (
     "seen {view}, where {convention}, <C>.",
     "looking {view}, <C>; {convention}.",

@@ -10,8 +10,6 @@ from __future__ import annotations
 from robospa.tasks.instructions.grammar import Templates, templates_of
 from robospa.tasks.instructions.pick_clauses import named, wrapped
 
-REQUIRED = ("relation", "reference", "convention")
-
 _WRAPPERS = (
     "seen from the robot, {convention}; <C>.",
     "<C>, using the robot's directions, where {convention}.",

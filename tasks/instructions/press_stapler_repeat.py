@@ -75,11 +75,6 @@ _HELDOUT = (
 )
 
 
-def required(level: int) -> tuple[str, ...]:
-    """The slots that every template of a level has ("a|b": one of them)."""
-    return ("stapler",) if level == 1 else ("stapler", "times|presses")
-
-
 def templates(level: int) -> Templates:
     """One press at level 1, a counted number of presses from level 2 on."""
     return templates_of(*sentences_about("{stapler}")) if level == 1 else _REPEATED

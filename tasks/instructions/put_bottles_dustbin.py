@@ -9,8 +9,6 @@ from __future__ import annotations
 
 from robospa.tasks.instructions.grammar import Templates, templates_of
 
-REQUIRED = ("bottles", "bin", "side")
-
 _ANY = (
     "put {bottles} into {bin} {side}.",
     "throw {bottles} away in {bin} {side}.",

@@ -144,11 +144,6 @@ _HELDOUT = (
 )
 
 
-def required(level: int) -> tuple[str, ...]:
-    """The slots that every template of a level has."""
-    return ("block", "where") if level == 1 else ("order", "where")
-
-
 def templates(level: int) -> Templates:
     """One cover at level 1, an order of colours from level 2 on."""
     if level == 1:

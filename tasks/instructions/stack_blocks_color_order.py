@@ -141,11 +141,6 @@ _SEVERAL_HELDOUT = (
 )
 
 
-def required(level: int) -> tuple[str, ...]:
-    """The slots that every template of a level has ("a|b": one of them)."""
-    return ("block", "middle") if level == 1 else ("middle", "order|pairs")
-
-
 def templates(level: int) -> Templates:
     """One block to move at level 1, a tower from level 2 on."""
     if level == 1:

@@ -12,7 +12,7 @@ from robospa.tasks.instructions.words import NUMBERS, Slots, listed, with_common
 
 
 def press(count: int) -> Slots:
-    """{stapler}, {times} and, from two presses on, {presses}."""
+    """{stapler} and, from two presses on, {times} and {presses}."""
     if not 1 <= count <= 10:
         raise ValueError(f"cannot word {count} presses; use 1 to 10")
     slots: Slots = {
@@ -23,7 +23,6 @@ def press(count: int) -> Slots:
     }
     word = NUMBERS[count]
     if count == 1:
-        slots["times"] = (("once", "one time"), ("exactly once", "just once", "a single time"))
         return with_common(slots)
     plain = ("twice", "two times", "2 times") if count == 2 else (f"{word} times", f"{count} times")
     slots["times"] = (
