@@ -14,7 +14,7 @@ demo: install ## Install what is missing, then evaluate a policy server end to e
 	$(BIN)/robospa demo
 
 test: install-dev ## Install what is missing, then lint, types, fast tests, simulator tests
-	$(MAKE) --no-print-directory lint types fast sim
+	@$(MAKE) --no-print-directory --keep-going lint types fast sim
 
 install: ## .venv, packages, robospa itself, a Vulkan driver: only what is missing
 	@bash scripts/setup.sh
