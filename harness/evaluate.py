@@ -13,7 +13,7 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from robospa.harness.factory import is_url, load, open_policy
-from robospa.harness.manifest import Manifest, about_machine, open_run
+from robospa.harness.manifest import Manifest, about_machine, check_folder, open_run
 from robospa.harness.progress import Progress
 from robospa.harness.runner import RunAborted, Runner, RunOptions
 from robospa.harness.store import locked
@@ -29,7 +29,8 @@ PROBE_SECONDS = 120.0
 class Request:
     """What to evaluate: `keys` with the policy and world of `config`, as `options` say.
 
-    `settings` decide the result beside the policy's spec; `arguments` are only kept.
+    `settings` decide the result beside the policy's spec; `arguments` are only kept. `wait`: how
+    long the policy's server may take to come up at the start [s].
     """
 
     config: WorkerConfig
@@ -38,15 +39,22 @@ class Request:
     settings: Mapping[str, Any] = field(default_factory=dict)
     arguments: Mapping[str, Any] = field(default_factory=dict)
     resume: bool = False
+    wait: float = 0.0
 
 
 class WorldBroken(Exception):
     """No world can be built on this machine."""
 
 
-def probe_policy(config: WorkerConfig) -> tuple[PolicySpec, dict[str, Any]]:
-    """(spec, hello) of the policy; raises what connecting raises."""
-    policy = open_policy(config.policy, dict(config.options))
+def probe_policy(config: WorkerConfig, wait: float = 0.0) -> tuple[PolicySpec, dict[str, Any]]:
+    """(spec, hello) of the policy, after at most `wait` s of nobody listening.
+
+    Raises what connecting raises.
+    """
+    options = dict(config.options)
+    if "timeouts" in options:
+        options["timeouts"] = replace(options["timeouts"], wait=wait)
+    policy = open_policy(config.policy, options)
     hello = dict(getattr(policy, "hello", None) or {"dialect": "in process"})
     close = getattr(policy, "close", None)
     if close is not None:
@@ -137,22 +145,16 @@ def evaluate(request: Request) -> None:
     KeyboardInterrupt the run stays resumable.
     """
     folder = request.config.folder
-    spec, hello = probe_policy(request.config)
+    check_folder(folder, request.resume)
+    spec, hello = probe_policy(request.config, request.wait)
     check_fit(spec, request.keys)
     manifest = make_manifest(request, spec, hello)
     first = {key.task: key for key in reversed(list(request.keys))}
     config = replace(request.config, samples=frozenset(first.values()))
     if is_url(config.policy):
         config = replace(config, options={**config.options, "expect": spec})
-    fresh = not folder.exists()
     with locked(folder):
-        try:
-            open_run(folder, manifest, request.resume)
-        except BaseException:
-            if fresh:
-                (folder / ".lock").unlink(missing_ok=True)
-                folder.rmdir()
-            raise
+        open_run(folder, manifest, request.resume)
         known = read_records(folder)
         owed = [key for key in request.keys if not finished(known.get(key))]
         with Progress(len(request.keys), len(request.keys) - len(owed)) as progress:

@@ -156,23 +156,31 @@ def write_manifest(folder: Path, manifest: Manifest) -> None:
     replace_file(folder / MANIFEST, text.encode())
 
 
-def open_run(folder: Path, manifest: Manifest, resume: bool) -> None:
-    """Start the run in `folder` or take it up again.
-
-    Raises RunError if it exists and `resume` is off, or if it was started with other settings or
-    trials (naming them).
-    """
-    if not (folder / MANIFEST).exists():
-        if resume and not folder.exists():
-            raise RunError(
-                f"there is no run in {folder} to resume; leave --resume out to start one"
-            )
-        write_manifest(folder, manifest)
-        return
-    if not resume:
+def check_folder(folder: Path, resume: bool) -> None:
+    """Raises RunError if a run cannot be started in `folder`, or if there is none to resume."""
+    there = (folder / MANIFEST).exists()
+    if there and not resume:
         raise RunError(
             f"{folder} already holds a run; add --resume to go on with it or choose another --out"
         )
+    if resume and not there:
+        raise RunError(f"there is no run in {folder} to resume; leave --resume out to start one")
+    if folder.exists() and not folder.is_dir():
+        raise RunError(f"{folder} is a file; choose another --out")
+    if not there and folder.exists() and any(p.name != ".lock" for p in folder.iterdir()):
+        raise RunError(f"{folder} is neither empty nor a run; choose another --out")
+
+
+def open_run(folder: Path, manifest: Manifest, resume: bool) -> None:
+    """Start the run in `folder` or take it up again.
+
+    Raises RunError as `check_folder` does, or if the run was started with other settings or
+    trials (naming them).
+    """
+    check_folder(folder, resume)
+    if not resume:
+        write_manifest(folder, manifest)
+        return
     old = read_manifest(folder)
     new = manifest.to_json()
     changes = changed_settings(old["settings"], new["settings"])

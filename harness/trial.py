@@ -135,6 +135,8 @@ class _Run:
     past: dict[int, dict[str, Any]] = field(default_factory=dict)
     physics_steps: int = 0
     physics_seconds: float = 0.0
+    unreachable: int = 0
+    first_problem: str = ""
 
     def poll(self, snapshot: Snapshot) -> bool:
         new = self.watch.call("goal", self.parts.tracker.update, snapshot)
@@ -185,6 +187,11 @@ class _Run:
         spent = time.perf_counter() - begun
         self.physics_seconds += spent - (self.watch.sum("goal", "recording") - other)
         self.physics_steps += done.physics_steps
+        if done.problems:
+            self.unreachable += 1
+            self.first_problem = self.first_problem or f"action {len(self.actions)}: " + "; ".join(
+                done.problems
+            )
         if self.recorder is not None:
             self.watch.call("recording", self.recorder.executed, self.world, action)
         return bool(done.stopped)
@@ -246,6 +253,16 @@ def _play(run: _Run, info: TrialInfo, limit: int) -> tuple[str, str]:
         return "policy_error", str(error)
 
 
+def _diagnostics(run: _Run) -> dict[str, Any]:
+    """What stands beside the result: the goal's own, and actions that were not done as asked."""
+    own = getattr(run.parts.tracker, "diagnostics", None)
+    found = dict(own()) if own is not None else {}
+    if run.unreachable:
+        found["unreachable_actions"] = run.unreachable
+        found["first_unreachable"] = run.first_problem
+    return found
+
+
 def run_trial(
     world: World,
     policy: Policy,
@@ -280,7 +297,6 @@ def run_trial(
     if recorder is not None:
         run.watch.call("recording", recorder.ended, world)
     reached = outcome(run.events, tracker.total)
-    diagnostics = getattr(tracker, "diagnostics", None)
     timing = dict(run.watch.seconds)
     timing["physics"] = run.physics_seconds
     return TrialRecord(
@@ -305,5 +321,5 @@ def run_trial(
         events=tuple(asdict(event) for event in run.events),
         latency=_percentiles(run.latencies),
         timing=timing,
-        diagnostics=dict(diagnostics()) if diagnostics is not None else {},
+        diagnostics=_diagnostics(run),
     )

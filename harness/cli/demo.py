@@ -77,7 +77,7 @@ def _evaluate(policy: str, keys: Any, folder: Path, workers: int, video: str) ->
             url,
             keys,
             folder,
-            connection={"timeout": 60.0, "first_timeout": 60.0, "wait": 10.0},
+            connection={"timeout": 60.0, "first_timeout": 60.0, "wait": 10.0, "patience": 10.0},
             workers=workers,
             video=video,
             arguments={"command": "demo"},

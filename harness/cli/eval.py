@@ -35,6 +35,9 @@ def evaluate(
     timeout: Annotated[float, typer.Option(help="seconds for one answer")] = 120.0,
     first_timeout: Annotated[float, typer.Option(help="seconds for the first answer")] = 600.0,
     wait: Annotated[float, typer.Option(help="seconds to wait for the server to listen")] = 0.0,
+    patience: Annotated[
+        float, typer.Option(help="seconds that a worker waits for a server that went away")
+    ] = 60.0,
     trial_timeout: Annotated[
         float, typer.Option(help="seconds for one trial before its worker is killed")
     ] = 1800.0,
@@ -42,6 +45,10 @@ def evaluate(
     backoff: Annotated[float, typer.Option(help="seconds before the first retry")] = 2.0,
     token: Annotated[
         str | None, typer.Option(envvar="ROBOSPA_TOKEN", help="bearer token of the server")
+    ] = None,
+    openpi: Annotated[
+        Path | None,
+        typer.Option(help="JSON file with spec, cameras, extra for a server of openpi's dialect"),
     ] = None,
     world: Annotated[str | None, typer.Option(hidden=True)] = None,
     parts: Annotated[str | None, typer.Option(hidden=True)] = None,
@@ -68,8 +75,14 @@ def evaluate(
         policy,
         keys,
         running.run_folder(out, policy, resume),
-        connection={"timeout": timeout, "first_timeout": first_timeout, "wait": wait},
+        connection={
+            "timeout": timeout,
+            "first_timeout": first_timeout,
+            "wait": wait,
+            "patience": patience,
+        },
         token=token,
+        openpi=openpi,
         workers=workers,
         attempts=attempts,
         backoff=backoff,

@@ -44,6 +44,7 @@ def make_request(
     *,
     connection: Mapping[str, float],
     token: str | None = None,
+    openpi: Path | None = None,
     workers: int = 0,
     attempts: int = 3,
     backoff: float = 2.0,
@@ -73,9 +74,11 @@ def make_request(
             infer=connection["timeout"],
             first_infer=connection["first_timeout"],
             reset=connection["first_timeout"],
-            wait=connection["wait"],
+            wait=connection["patience"],
         )
         client["token"] = token
+        if openpi is not None:
+            client["openpi"] = openpi_options(openpi)
     config = WorkerConfig(
         folder=folder,
         policy=policy,
@@ -89,7 +92,28 @@ def make_request(
     if parts is not None:
         config = _replace(config, parts=parts)
     options = RunOptions(workers or cores(), attempts, backoff, trial_seconds)
-    return Request(config, keys, options, _settings(keys), dict(arguments or {}), resume)
+    return Request(
+        config, keys, options, _settings(keys), dict(arguments or {}), resume, connection["wait"]
+    )
+
+
+def openpi_options(path: Path) -> Any:
+    """What an openpi server does not say about itself, from a JSON file; raises BadChoice.
+
+    `{"spec": {...}, "cameras": {our name: its name}, "extra": {...}}`, each of them optional.
+    """
+    import json
+
+    from robospa.protocol.openpi import OpenPiOptions
+    from robospa.protocol.policy import PolicySpec
+
+    try:
+        data = json.loads(path.read_text())
+        if "spec" in data:
+            data["spec"] = PolicySpec.from_json({"name": "openpi", **data["spec"]})
+        return OpenPiOptions(**data)
+    except (OSError, ValueError, TypeError) as error:
+        raise BadChoice(f"--openpi {path}: {error}") from error
 
 
 def _replace(config: WorkerConfig, **changes: Any) -> WorkerConfig:

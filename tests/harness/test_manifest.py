@@ -67,8 +67,17 @@ def test_resuming_with_another_version_is_refused(tmp_path: Path) -> None:
 
 
 def test_resuming_nothing_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(RunError, match="no run"):
-        open_run(tmp_path / "none", MANIFEST, resume=True)
+    for folder in (tmp_path, tmp_path / "none"):
+        with pytest.raises(RunError, match="no run"):
+            open_run(folder, MANIFEST, resume=True)
+
+
+def test_a_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "thesis.tex").touch()
+    with pytest.raises(RunError, match="neither empty nor a run"):
+        open_run(tmp_path, MANIFEST, resume=False)
+    with pytest.raises(RunError, match="is a file"):
+        open_run(tmp_path / "thesis.tex", MANIFEST, resume=False)
 
 
 @pytest.mark.parametrize("text", ["{", "[]", '{"trials": 3}'])

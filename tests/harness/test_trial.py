@@ -11,7 +11,7 @@ from run_fakes import LIMIT, SPEC, FakePolicy, FakeWorld, NanPolicy, parts
 
 from robospa.harness.trial import policy_seed, run_trial
 from robospa.harness.video import TrialRecorder
-from robospa.harness.world import SceneUnstable
+from robospa.harness.world import Poll, SceneUnstable, StepResult
 from robospa.results.records import TrialKey, TrialRecord
 
 KEY = TrialKey("Pick_Fake", 2, 100004)
@@ -121,6 +121,17 @@ def test_an_action_that_cannot_be_executed_is_a_failure_with_the_reason() -> Non
     record = play(Wild())
     assert record.end == "policy_error"
     assert "left arm joint 2" in record.message
+
+
+def test_actions_that_were_not_done_as_asked_are_noted() -> None:
+    class Short(FakeWorld):
+        def step(self, action: np.ndarray, space: str, poll: Poll) -> StepResult:
+            return replace(super().step(action, space, poll), problems=("the arm holds",))
+
+    record = play(FakePolicy(), world=Short())
+    assert record.diagnostics["unreachable_actions"] == 5
+    assert record.diagnostics["first_unreachable"] == "action 1: the arm holds"
+    assert record.success
 
 
 def test_transport_trouble_is_passed_on() -> None:
