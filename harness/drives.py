@@ -74,12 +74,11 @@ class Drives:
         calls: list[Setter] = []
         columns: list[Array] = []
         for a, arm in enumerate(self._arms):
-            moves = (path.joints[a] != self.joints[a]).any(axis=0)
-            moves |= (path.velocities[a] != 0.0).any(axis=0)
-            for j in np.flatnonzero(moves):
+            # along a straight line a joint moves all the way or not at all
+            for j in np.flatnonzero(path.joints[a, -1] != self.joints[a]).tolist():
                 calls += [arm.position[j], arm.velocity[j]]
                 columns += [path.joints[a, :, j], path.velocities[a, :, j]]
-            if (path.gripper[a] != self.opening[a]).any():
+            if path.gripper[a, 0] != self.opening[a] or path.gripper[a, -1] != self.opening[a]:
                 calls += arm.fingers
                 columns += [self._travel(a, path.gripper[a])] * len(arm.fingers)
         if not calls:
@@ -97,6 +96,11 @@ class Drives:
         for arm in self._arms:
             for write in arm.velocity:
                 write(0.0)
+
+    @property
+    def columns(self) -> tuple[tuple[int, ...], ...]:
+        """Where the arm joints are in the qpos of left and right."""
+        return tuple(tuple(arm.columns) for arm in self._arms)
 
     def commanded(self) -> Pair:
         """Commanded joints [rad] of left and right."""

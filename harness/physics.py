@@ -8,8 +8,6 @@ bodies are created in an order that follows from the trial alone.
 from __future__ import annotations
 
 import hashlib
-import struct
-from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -28,40 +26,6 @@ Array = NDArray[np.float64]
 
 FURNITURE = ("ground", "table", "wall")
 
-FLOATS = 7  # of a pose in SAPIEN's packed form: qw qx qy qz, x y z
-
-
-class PoseTable(Mapping[str, Pose]):
-    """Poses by object name over a packed state; a `Pose` is made only when it is asked for."""
-
-    __slots__ = ("_made", "_rows", "_values")
-
-    def __init__(self, values: tuple[float, ...], rows: Mapping[str, int]) -> None:
-        self._values = values
-        self._rows = rows
-        self._made: dict[str, Pose] = {}
-
-    def __getitem__(self, name: str) -> Pose:
-        pose = self._made.get(name)
-        if pose is None:
-            pose = self._made[name] = unpack(self._values, self._rows[name])
-        return pose
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._rows)
-
-    def __len__(self) -> int:
-        return len(self._rows)
-
-    def __repr__(self) -> str:
-        return repr(dict(self))
-
-
-def unpack(values: tuple[float, ...], row: int) -> Pose:
-    """The pose of one entity of a packed state."""
-    qw, qx, qy, qz, x, y, z = values[FLOATS * row : FLOATS * row + FLOATS]
-    return Pose((x, y, z), (qw, qx, qy, qz))
-
 
 class Physics:
     """The physics of one trial; `step` is SAPIEN's own."""
@@ -71,12 +35,11 @@ class Physics:
         self.system.timestep = 1.0 / RATE
         self.scene: Any = sapien.Scene([self.system])
         self.step = self.system.step
-        self._entities: list[Any] = []
+        self._pack = self.scene.pack_poses
         self.links: list[dict[str, int]] = []
         self.rows: dict[str, int] = {}
         self.components: dict[str, Any] = {}
         self._moving: dict[str, Any] = {}
-        self._unpacker = struct.Struct("")
         self._add(bodies.ground_body("ground"))
         x, y = table_at
         self._add(bodies.static_body(furniture.table(), "table", Pose((x, y, 0.0))))
@@ -86,15 +49,11 @@ class Physics:
             first = len(self.scene.entities)
             self.arms.append(bodies.build_arm(self.scene, embodiment, arm, name))
             self.links.append({link: first + i for i, link in enumerate(arm.links)})
-        self._count()
 
     def _add(self, entity: Any) -> int:
         """Put an entity into the scene; its row in the packed state."""
         self.scene.add_entity(entity)
         return len(self.scene.entities) - 1
-
-    def _count(self) -> None:
-        self._unpacker = struct.Struct(f"<{FLOATS * len(self.scene.entities)}f")
 
     def add_object(self, name: str, model: ObjectModel, pose: Pose, fixed: bool) -> None:
         """Create an object at `pose`; it exists from the next physics step on."""
@@ -103,15 +62,10 @@ class Physics:
         self.components[name] = component
         if not fixed:
             self._moving[name] = component
-        self._count()
 
-    def packed(self) -> tuple[float, ...]:
-        """Poses of all entities, FLOATS numbers each."""
-        return self._unpacker.unpack(self.scene.pack_poses())
-
-    def poses(self, values: tuple[float, ...]) -> PoseTable:
-        """Object poses of a packed state."""
-        return PoseTable(values, self.rows)
+    def packed(self) -> bytes:
+        """Poses of all entities, as `robospa.harness.live` unpacks them."""
+        return self._pack()  # type: ignore[no-any-return]
 
     def contacts(self) -> tuple[Contact, ...]:
         """Every point at which two bodies push on each other, except of objects on furniture.

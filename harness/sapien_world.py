@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 
 from robospa.harness.actions import ActionReader
 from robospa.harness.drives import Drives
+from robospa.harness.live import Layout, LiveSnapshot, PoseTable, unpack
 from robospa.harness.motion import RATE, Trajectory, fixed_rate, rest_to_rest
-from robospa.harness.physics import Physics, unpack
+from robospa.harness.physics import Physics
 from robospa.harness.robots import embodiment as embodiment_named
 from robospa.harness.settling import settle
 from robospa.harness.world import Poll, RenderUnavailable, SceneUnstable, StepResult
 from robospa.protocol.policy import CameraSpec, PolicySpec
-from robospa.tasks.geometry import Pose
 from robospa.tasks.scene import Scene
 from robospa.tasks.shapes import ObjectModel
 from robospa.tasks.snapshot import Snapshot, snapshot_to_json
@@ -85,10 +85,13 @@ class SapienWorld:
         self._steps = 0
         physics = self._physics = Physics(self._embodiment, scene.table_shift)
         self._drives = Drives(self._embodiment, physics.arms)
-        self._tools = [
-            (physics.links[a][arm.last_link], arm.tool)
-            for a, arm in enumerate(self._embodiment.arms)
-        ]
+        self._layout = Layout(
+            tuple(
+                (physics.links[a][arm.last_link], arm.tool)
+                for a, arm in enumerate(self._embodiment.arms)
+            ),
+            self._drives.columns,
+        )
         self._later = sorted(
             (math.ceil(item.appears_at * RATE - 1e-9), i)
             for i, item in enumerate(scene.objects)
@@ -169,17 +172,16 @@ class SapienWorld:
     def snapshot(self) -> Snapshot:
         """The state at this instant."""
         physics = self._loaded()
-        values = physics.packed()
-        left, right = (_upright(unpack(values, row) * tool) for row, tool in self._tools)
-        grip_left, grip_right = self._drives.gripper.tolist()
-        return Snapshot(
-            time=self._steps / RATE,
-            poses=physics.poses(values),
-            gripper=(grip_left, grip_right),
-            end_effector=(left, right),
-            joints=self._drives.commanded(),
-            measured=self._drives.measured(),
-            contacts=physics.contacts() if self._contacts else (),
+        drives = self._drives
+        left, right = physics.arms
+        return LiveSnapshot(
+            self._steps / RATE,
+            physics.packed(),
+            physics.rows,
+            self._layout,
+            (drives.joints, drives.gripper),
+            (left.qpos, right.qpos),
+            physics.contacts() if self._contacts else (),
         )
 
     def observe(self, spec: PolicySpec) -> dict[str, Any]:
@@ -216,11 +218,11 @@ class SapienWorld:
         physics = self._loaded()
         studio = self._studio or self._open_studio()
         studio.arrange(self._scene, self._embodiment, self._model)
-        values = physics.packed()
+        packed = physics.packed()
         links = [
-            {link: unpack(values, row) for link, row in rows.items()} for rows in physics.links
+            {link: unpack(packed, row) for link, row in rows.items()} for rows in physics.links
         ]
-        return studio.pictures(cameras, links, physics.poses(values))
+        return studio.pictures(cameras, links, PoseTable(packed, physics.rows))
 
     def _open_studio(self) -> Studio:
         if self._render is False:
@@ -265,14 +267,6 @@ class SapienWorld:
         if self._physics is None:
             raise RuntimeError("no scene is loaded; call load(scene) first")
         return self._physics
-
-
-def _upright(pose: Pose) -> Pose:
-    """The same pose with the quaternion whose w is not negative."""
-    if pose.rotation[0] >= 0.0:
-        return pose
-    w, x, y, z = pose.rotation
-    return Pose(pose.position, (-w, -x, -y, -z))
 
 
 def versions() -> dict[str, str]:

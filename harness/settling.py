@@ -11,8 +11,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from robospa.harness.live import FLOATS
 from robospa.harness.motion import RATE
-from robospa.harness.physics import FLOATS, Physics
+from robospa.harness.physics import Physics
 from robospa.harness.world import SceneUnstable
 
 Array = NDArray[np.float64]
@@ -58,9 +59,8 @@ def settle(physics: Physics, where: str) -> None:
 
 def _state(physics: Physics, names: list[str]) -> Array:
     """Packed poses (N, 7: rotation, position) of the named objects."""
-    values = physics.packed()
-    first = [FLOATS * physics.rows[name] for name in names]
-    return np.array([values[i : i + FLOATS] for i in first])
+    poses = np.frombuffer(physics.packed(), dtype=np.float32).reshape(-1, FLOATS)
+    return poses[[physics.rows[name] for name in names]].astype(np.float64)
 
 
 def mover(names: list[str], before: Array, after: Array) -> str:

@@ -175,6 +175,17 @@ def test_the_privileged_state_is_the_snapshot(world: SapienWorld) -> None:
     assert snapshot_from_json(seen).poses == dict(world.snapshot().poses)
 
 
+def test_a_snapshot_stays_as_it_was_when_the_world_moves_on(world: SapienWorld) -> None:
+    from robospa.tasks.snapshot import snapshot_to_json
+
+    world.load(two_blocks())
+    early, late = world.snapshot(), world.snapshot()
+    before = snapshot_to_json(early)
+    world.step(joint_action(grip=(0.0, 0.0)), "joint", go_on)
+    assert snapshot_to_json(late) == before
+    assert snapshot_to_json(world.snapshot()) != before
+
+
 def test_an_object_appears_at_its_time(world: SapienWorld) -> None:
     world.load(scene(block("one", 0.0, 0.0), block("late", 0.2, 0.0, appears_at=0.1)))
     seen: list[int] = []

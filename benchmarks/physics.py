@@ -1,0 +1,157 @@
+"""Physics: the trial loop of `SapienWorld` against bare SAPIEN stepping of the same scene.
+
+    python benchmarks/physics.py [--blocks 8] [--actions 40] [--rounds 5]
+
+Both sides start from the same scene and write the same drive targets in the same physics steps, so
+they must end in the same state to the bit (checked). "bare" is the loop one would write by hand:
+set the targets, step. "alone" is SAPIEN's step with nothing moving, for scale. The trial loop
+("trial", and "contacts" with contacts gathered) includes reading the action, planning, and a poll
+with a snapshot at 50 Hz. They take turns action by action, so that other load on the machine hits
+all alike; the ratio is of the medians over rounds, in CPU time. Prints JSON.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import platform
+import statistics
+import time
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robospa.harness.drives import Setter
+from robospa.harness.motion import RATE, rest_to_rest
+from robospa.harness.sapien_world import SapienWorld, versions
+from robospa.tasks.geometry import Pose
+from robospa.tasks.scene import TABLE_TOP, Scene, SceneObject
+from robospa.tasks.snapshot import Snapshot
+
+BAR = 1.15
+
+
+def table_of_blocks(count: int) -> Scene:
+    """Blocks of several sizes in two rows."""
+    rng = np.random.default_rng(7)
+    objects = []
+    for i in range(count):
+        half = [float(h) for h in rng.uniform(0.012, 0.03, 3)]
+        place = (-0.35 + 0.7 * (i // 2) / max(1, (count - 1) // 2), -0.15 + 0.2 * (i % 2))
+        pose = Pose((*place, TABLE_TOP + half[2]))
+        params = {"half": half, "color": [0.7, 0.2, 0.1]}
+        objects.append(SceneObject(f"block {i}", "block", pose, params))
+    return Scene("Benchmark", 1, 0, "aloha-agilex", "clean", tuple(objects), {})
+
+
+def sweeping(count: int) -> list[NDArray[np.float32]]:
+    """Actions that move all joints and grippers above the table."""
+    rng = np.random.default_rng(11)
+    low = np.array([-0.4, 1.2, 1.0, -1.0, -0.4, -0.4, 0.0])
+    high = np.array([0.4, 1.9, 1.8, 0.3, 0.4, 0.4, 1.0])
+    return [
+        np.concatenate([rng.uniform(low, high), rng.uniform(low, high)]).astype(np.float32)
+        for _ in range(count)
+    ]
+
+
+def watch(snapshot: Snapshot) -> bool:
+    """A goal that looks at every object."""
+    return any(pose.position[2] > 2.0 for pose in snapshot.poses.values())
+
+
+Steps = Callable[[], int]
+
+
+def trial_loop(world: SapienWorld, actions: list[NDArray[np.float32]]) -> list[Steps]:
+    """One call per action: the world's own loop."""
+
+    def run(action: NDArray[np.float32]) -> int:
+        return world.step(action, "joint", watch).physics_steps
+
+    return [partial(run, action) for action in actions]
+
+
+def hand_written(world: SapienWorld, actions: list[NDArray[np.float32]]) -> list[Steps]:
+    """The same motions as a plain loop over SAPIEN's calls, all targets computed beforehand."""
+    drives, system = world._drives, world._loaded().system
+    tables = []
+    for action in actions:
+        goals = world._reader.goals(action, "joint", drives.joints)
+        plan = rest_to_rest(
+            drives.joints, goals.joints, drives.gripper, goals.gripper, drives.opening
+        )
+        tables.append(drives.program(plan))
+        drives.reached(plan, len(plan) - 1)
+
+    def run(setters: list[Setter], rows: list[list[float]]) -> int:
+        for row in rows:
+            for i in range(len(setters)):
+                setters[i](row[i])
+            system.step()
+        return len(rows)
+
+    return [partial(run, *table) for table in tables]
+
+
+def turns(sides: dict[str, list[Steps]]) -> tuple[dict[str, float], int]:
+    """CPU time [us] per physics step of every side, and the steps that each took."""
+    spent, steps = dict.fromkeys(sides, 0.0), dict.fromkeys(sides, 0)
+    for calls in zip(*sides.values(), strict=True):
+        for name, call in zip(sides, calls, strict=True):
+            began = time.process_time()
+            steps[name] += call()
+            spent[name] += time.process_time() - began
+    return {name: spent[name] / steps[name] * 1e6 for name in sides}, min(steps.values())
+
+
+def measure(blocks: int, actions: int, rounds: int) -> dict[str, object]:
+    """All figures of one run."""
+    scene, plan = table_of_blocks(blocks), sweeping(actions)
+    worlds = {name: SapienWorld(render=False) for name in ("bare", "trial", "contacts")}
+    costs: list[dict[str, float]] = []
+    digests: set[str] = set()
+    steps = 0
+    for _ in range(rounds):
+        for name, world in worlds.items():
+            world.load(scene, contacts=name == "contacts")
+        loops = {
+            name: (hand_written if name == "bare" else trial_loop)(world, plan)
+            for name, world in worlds.items()
+        }
+        cost, steps = turns(loops)
+        digests |= {world.digest() for world in worlds.values()}
+        costs.append(cost)
+    idle = worlds["bare"]._loaded().system
+    alone, _ = turns({"alone": [lambda: sum(idle.step() is None for _ in range(2000))]})
+    middle = {name: statistics.median(c[name] for c in costs) for name in worlds} | alone
+    return {
+        "benchmark": "physics",
+        "blocks": blocks,
+        "physics_steps": steps,
+        "us_per_step": {name: round(cost, 2) for name, cost in middle.items()},
+        "steps_per_second": round(1e6 / middle["trial"]),
+        "times_real_time": round(1e6 / middle["trial"] / RATE, 1),
+        "trial_over_bare": round(middle["trial"] / middle["bare"], 3),
+        "with_contacts_over_bare": round(middle["contacts"] / middle["bare"], 3),
+        "bar": BAR,
+        "same_state_to_the_bit": len(digests) == 1,
+        "machine": {"cores": os.cpu_count(), "python": platform.python_version(), **versions()},
+    }
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--blocks", type=int, default=8)
+    parser.add_argument("--actions", type=int, default=40)
+    parser.add_argument("--rounds", type=int, default=5)
+    options = parser.parse_args()
+    print(json.dumps(measure(options.blocks, options.actions, options.rounds), indent=2))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,152 @@
+"""Snapshots that cost little to take: what a goal does not look at is never computed.
+
+A poll happens every five physics steps and most goals look at one object or two. So a live snapshot
+keeps the simulator's packed state, which SAPIEN copies in one call, and unpacks from it on demand.
+It does not change when the world moves on.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from robospa.tasks.geometry import Pose
+from robospa.tasks.snapshot import Contact, Snapshot
+
+FLOATS = 7
+"""Numbers of a pose in SAPIEN's packed form: qw qx qy qz, x y z, float32."""
+_POSE = struct.Struct(f"<{FLOATS}f")
+
+Pair = tuple[tuple[float, ...], tuple[float, ...]]
+_put = object.__setattr__
+
+
+def unpack(packed: bytes, row: int) -> Pose:
+    """The pose of one entity of a packed state."""
+    qw, qx, qy, qz, x, y, z = _POSE.unpack_from(packed, _POSE.size * row)
+    return Pose((x, y, z), (qw, qx, qy, qz))
+
+
+class PoseTable(Mapping[str, Pose]):
+    """Poses by object name over a packed state; a `Pose` is made only when it is asked for."""
+
+    __slots__ = ("_made", "_packed", "_rows")
+
+    def __init__(self, packed: bytes, rows: Mapping[str, int]) -> None:
+        self._packed = packed
+        self._rows = rows
+        self._made: dict[str, Pose] = {}
+
+    def __getitem__(self, name: str) -> Pose:
+        pose = self._made.get(name)
+        if pose is None:
+            pose = self._made[name] = unpack(self._packed, self._rows[name])
+        return pose
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._rows)
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._rows
+
+    def __repr__(self) -> str:
+        return repr(dict(self))
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """What the rows and columns of a state mean: of one embodiment in one scene.
+
+    `tools` are, per arm, the row of the last link and the end-effector frame in it; `columns` the
+    arm joints' places in qpos.
+    """
+
+    tools: tuple[tuple[int, Pose], ...]
+    columns: tuple[tuple[int, ...], ...]
+
+
+class LiveSnapshot(Snapshot):
+    """A `Snapshot` of a running world: the same values, computed when first asked for."""
+
+    __slots__ = ("_commanded", "_ends", "_layout", "_packed", "_qpos", "_table")
+
+    _packed: bytes
+    _table: PoseTable
+    _layout: Layout
+    _commanded: tuple[Any, Any]
+    _qpos: tuple[Any, Any]
+    _ends: tuple[Pose, Pose] | None
+
+    def __init__(
+        self,
+        time: float,
+        packed: bytes,
+        rows: Mapping[str, int],
+        layout: Layout,
+        commanded: tuple[Any, Any],
+        qpos: tuple[Any, Any],
+        contacts: tuple[Contact, ...],
+    ) -> None:
+        """`commanded`: joints (2, J) and grippers (2,); `qpos` of both arms. None may change."""
+        _put(self, "time", time)
+        _put(self, "contacts", contacts)
+        _put(self, "_packed", packed)
+        _put(self, "_table", PoseTable(packed, rows))
+        _put(self, "_layout", layout)
+        _put(self, "_commanded", commanded)
+        _put(self, "_qpos", qpos)
+        _put(self, "_ends", None)
+
+    @property
+    def poses(self) -> Mapping[str, Pose]:
+        """Poses of the objects that exist."""
+        return self._table
+
+    @property
+    def gripper(self) -> tuple[float, float]:
+        """Commanded grippers."""
+        left, right = self._commanded[1].tolist()
+        return left, right
+
+    @property
+    def end_effector(self) -> tuple[Pose, Pose]:
+        """Measured end-effector frames."""
+        ends = self._ends
+        if ends is None:
+            left, right = (
+                _upright(unpack(self._packed, row) * tool) for row, tool in self._layout.tools
+            )
+            ends = (left, right)
+            _put(self, "_ends", ends)
+        return ends
+
+    @property
+    def joints(self) -> Pair:
+        """Commanded joints."""
+        left, right = self._commanded[0].tolist()
+        return tuple(left), tuple(right)
+
+    @property
+    def measured(self) -> Pair:
+        """Measured joints."""
+        left, right = (
+            tuple([values[c] for c in columns])
+            for values, columns in (
+                (qpos.tolist(), columns)
+                for qpos, columns in zip(self._qpos, self._layout.columns, strict=True)
+            )
+        )
+        return left, right
+
+
+def _upright(pose: Pose) -> Pose:
+    """The same pose with the quaternion whose w is not negative."""
+    if pose.rotation[0] >= 0.0:
+        return pose
+    w, x, y, z = pose.rotation
+    return Pose(pose.position, (-w, -x, -y, -z))
