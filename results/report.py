@@ -193,7 +193,7 @@ def _page_cell(part: Any, metric: str) -> dict[str, Any]:
     return {
         "value": value,
         "interval": interval,
-        "shade": 0 if estimate is None else round(100 * max(0.0, min(1.0, estimate.value))),
+        "shade": 0 if estimate is None else round(0.3 * max(0.0, min(1.0, estimate.value)), 3),
         "missing": lost if part.missing else "",
         "count": f"{successes} of {part.trials}"
         if successes is not None
@@ -229,7 +229,7 @@ def trial_row(run: Run, key: TrialKey, folder: Path) -> dict[str, Any]:
         "seconds": f"{record.wall_time:.1f}",
         "message": record.message,
         "events": [event_text(e) for e in record.events],
-        "digest": record.digest,
+        "digest": record.digest[:16],
         "video": film(run, record, folder),
     }
 
@@ -274,5 +274,7 @@ def film(run: Run, record: TrialRecord, folder: Path) -> str:
 
 
 def _line(value: object) -> str:
-    """`value` as text without line breaks."""
+    """`value` as text without line breaks; of a mapping, its values."""
+    if isinstance(value, Mapping):
+        return " ".join(dict.fromkeys(_line(v) for v in value.values() if v is not None))
     return " ".join(str(value).split())

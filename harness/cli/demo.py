@@ -1,8 +1,7 @@
 """`robospa demo`: an oracle server on loopback, evaluated over the wire on all ten tasks.
 
 Shows the whole way in a minute or two: server, handshake, seeded trials, records, table, report
-with videos. A policy that walks at random follows on the same first-level trials as a contrast, if
-there is time left.
+with videos. A policy that moves at random follows on some of the same trials, if time is left.
 """
 
 from __future__ import annotations
@@ -41,10 +40,18 @@ def demo(
     keys = _keys(names, numbers, trials)
     page = _evaluate("oracle", keys, folder / "oracle", workers, video)
     if contrast and time.monotonic() - begun < seconds:
-        print(f"\nThe same first level with a policy that moves at random ({CONTRAST}):")
-        lowest = [k for k in keys if k.level == min(numbers)]
-        _evaluate(CONTRAST, lowest, folder / CONTRAST, workers, "none")
+        lowest = [k for k in keys if k.level == min(numbers) and k.task in _spatial()]
+        if lowest:
+            print("\nFor contrast, some of the same trials with arms that move at random:")
+            _evaluate(CONTRAST, lowest, folder / CONTRAST, workers, "none")
     print(f"\nDone in {time.monotonic() - begun:.0f} s. Open {page} in a browser.")
+
+
+def _spatial() -> set[str]:
+    """The tasks with the shortest trials: one pick each."""
+    from robospa.harness.cli import selection
+
+    return set(selection.parse_tasks("spatial"))
 
 
 def _keys(names: Sequence[str], levels: Sequence[int], trials: int) -> Any:
