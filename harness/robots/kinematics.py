@@ -160,7 +160,7 @@ def _descend(chain: Chain, targets: Array, joints: Array) -> tuple[Array, NDArra
 
 
 def inverse(
-    chain: Chain, targets: Sequence[Pose], near: Sequence[float] | None = None
+    chain: Chain, targets: Sequence[Pose], near: Sequence[float] | Array | None = None
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Joints (N, J) [rad] that bring the end-effector frame to each target, and success (N,).
 

@@ -34,6 +34,7 @@ from robospa.tasks.shapes import Grasp, ObjectModel
 Array = NDArray[np.float64]
 
 TILTS = (0.0, 0.2, -0.2, 0.4, -0.4, 0.6, -0.6, 0.8, -0.8, 1.0, -1.0, 1.2, -1.2)
+LEVEL = (0.0,)
 LEANS = (0.0, 0.2, -0.2, 0.4, -0.4)
 """Sideways leans of the gripper [rad], tried when nothing else reaches."""
 PALM_BACK = (0.095, 0.125, 0.155)
@@ -89,7 +90,7 @@ def grasps_now(model: ObjectModel, pose: Pose) -> tuple[Grasp, ...]:
 
 
 def candidate_poses(
-    grasp: Grasp, reach: float, leans: tuple[float, ...] = (0.0,)
+    grasp: Grasp, reach: float, leans: tuple[float, ...] = LEVEL
 ) -> list[tuple[Pose, Vec3, float]]:
     """End-effector poses for one grasp: both finger orders, all tilts that it allows.
 
@@ -160,14 +161,10 @@ def crowding(ws: Workspace, target: str, pose: Pose, approach: Vec3, opening: fl
     return worst
 
 
-def reachable_grasps(ws: Workspace, name: str, arms: tuple[int, ...]) -> list[Reach]:
-    """All grasps of `name` that one of `arms` can take now, best first."""
-    return _reachable(ws, name, arms, (0.0,)) or _reachable(ws, name, arms, LEANS)
-
-
-def _reachable(
-    ws: Workspace, name: str, arms: tuple[int, ...], leans: tuple[float, ...]
+def reachable_grasps(
+    ws: Workspace, name: str, arms: tuple[int, ...], leans: tuple[float, ...] = LEVEL
 ) -> list[Reach]:
+    """All grasps of `name` that one of `arms` can take now, best first."""
     model = ws.models[name]
     body = ws.pose(name)
     grasps = grasps_now(model, body)

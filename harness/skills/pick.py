@@ -8,9 +8,10 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.harness.skills.grasping import Reach, reachable_grasps
+from robospa.harness.skills.grasping import LEANS, LEVEL, Reach, reachable_grasps
 from robospa.harness.skills.moving import clear_other, line, retreat_home, rise, travel
-from robospa.harness.skills.workspace import SkillFailed, Steps, Workspace, backed, raised
+from robospa.harness.skills.workspace import SkillFailed, Steps, Workspace, backed
+from robospa.tasks.geometry import Pose
 from robospa.tasks.plan import Pick
 from robospa.tasks.snapshot import ARMS
 
@@ -20,6 +21,8 @@ Fits = Callable[[Reach], bool]
 
 STANDOFF = 0.08
 ATTEMPTS = 5
+PULLS = (0.0, 0.05, 0.1, 0.15)
+"""How far a lift may come towards the arm's base where straight up is out of reach [m]."""
 LOOKAHEAD = 80
 """How many of the best grasps are tested against what comes after."""
 
@@ -62,26 +65,41 @@ def _choose(
 ) -> tuple[Reach, list[Array], list[Array]]:
     """The best grasp not yet tried, with the joints of the way in and of the lift."""
     arms = tuple(a for a in arms_for(call.arm) if ws.held[a] is None)
-    options = reachable_grasps(ws, call.object, arms)
-    fresh = [o for o in options if not any(_alike(o, t) for t in tried)]
     spare: tuple[Reach, list[Array], list[Array]] | None = None
-    for rank, option in enumerate(fresh or options):
-        out = backed(option.pose, option.approach, STANDOFF)
-        back = ws.straight(option.arm, option.joints, line(option.pose, out, 2))
-        up = ws.straight(
-            option.arm, option.joints, line(option.pose, raised(option.pose, call.lift), 2)
-        )
-        if back is None or up is None:
-            continue
-        found = (option, [*reversed(back), option.joints], up)
-        if fits is None or fits(option):
-            return found
-        spare = spare or found
-        if rank >= LOOKAHEAD:
-            break
+    for leans in (LEVEL, LEANS):
+        options = reachable_grasps(ws, call.object, arms, leans)
+        fresh = [o for o in options if not any(_alike(o, t) for t in tried)]
+        for rank, option in enumerate(fresh or options):
+            out = backed(option.pose, option.approach, STANDOFF)
+            back = ws.straight(option.arm, option.joints, line(option.pose, out, 2))
+            up = _lift(ws, call, option) if back is not None else None
+            if back is None or up is None:
+                continue
+            found = (option, [*reversed(back), option.joints], up)
+            if fits is None or fits(option):
+                return found
+            spare = spare or found
+            if rank >= LOOKAHEAD:
+                break
     if spare is not None:
         return spare
     raise SkillFailed(f"no arm can reach {call.object} at {ws.pose(call.object).position}")
+
+
+def _lift(ws: Workspace, call: Pick, option: Reach) -> list[Array] | None:
+    """Joints of the way up: straight, or towards the arm's base where that is out of reach."""
+    x, y, z = option.pose.position
+    base = ws.robot.arms[option.arm].base.position
+    away = math.hypot(x - base[0], y - base[1])
+    for pull in PULLS:
+        end = Pose(
+            (x + (base[0] - x) * pull / away, y + (base[1] - y) * pull / away, z + call.lift),
+            option.pose.rotation,
+        )
+        up = ws.straight(option.arm, option.joints, line(option.pose, end, 2))
+        if up is not None:
+            return up
+    return None
 
 
 def _alike(a: Reach, b: Reach) -> bool:

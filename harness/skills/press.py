@@ -9,7 +9,14 @@ import numpy as np
 from robospa.harness.robots.kinematics import inverse
 from robospa.harness.skills.moving import clear_other, line, travel
 from robospa.harness.skills.pick import arms_for
-from robospa.harness.skills.workspace import FINGERTIP, SkillFailed, Steps, Workspace, raised
+from robospa.harness.skills.workspace import (
+    FINGERTIP,
+    SkillFailed,
+    Steps,
+    Workspace,
+    backed,
+    raised,
+)
 from robospa.tasks.geometry import Pose, axis_rotation, look_rotation, rotate
 from robospa.tasks.plan import Press
 
@@ -48,9 +55,8 @@ def _plan(ws: Workspace, call: Press) -> tuple[int, np.ndarray, np.ndarray]:
                 closing = (math.cos(turn), math.sin(turn), 0.0)
                 for sign in (1, -1):
                     approach = rotate(axis_rotation(closing, sign * tilt), (0, 0, -1))
-                    # the lowest corner of the tilted tip should meet the point
-                    tip = (x, y, z - DEPTH)
-                    position = tuple(t - a * reach for t, a in zip(tip, approach, strict=True))
+                    tip = Pose((x, y, z - DEPTH), look_rotation(approach, closing))
+                    position = backed(tip, approach, reach).position
                     for side in (1, -1):
                         facing = tuple(side * c for c in closing)
                         poses.append(Pose(position, look_rotation(approach, facing)))
