@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import importlib
+import os
+import sys
 from collections.abc import Callable
 from importlib import metadata
 from typing import Any
@@ -34,6 +36,8 @@ def policy_names() -> tuple[str, ...]:
 def policy_factory(name: str) -> Callable[..., Any]:
     """The function that makes a policy, by entry-point name or `module:function`."""
     if ":" in name:
+        if os.getcwd() not in sys.path:
+            sys.path.append(os.getcwd())  # so that a policy's own folder is enough to serve it
         return load(name)
     for point in metadata.entry_points(group=GROUP):
         if point.name == name:

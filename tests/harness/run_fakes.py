@@ -172,6 +172,15 @@ class SuicidalPolicy(FakePolicy):
         return super().infer(observation)
 
 
+class LastWordsPolicy(FakePolicy):
+    """Kills its own process after the record of seed 100003 is on disk, before it is reported."""
+
+    def end(self, outcome: Mapping[str, Any]) -> None:
+        assert self.trial is not None
+        if self.trial.seed == 100003:
+            os.kill(os.getpid(), signal.SIGKILL)
+
+
 def slow() -> FakePolicy:
     return SlowPolicy()
 

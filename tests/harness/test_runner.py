@@ -107,6 +107,13 @@ def test_dead_and_stuck_workers_are_replaced(
     assert any("was stuck for 4 s" in note for note in notes)
 
 
+def test_a_record_on_disk_counts_although_its_worker_died_before_saying_so(
+    tmp_path: Path,
+) -> None:
+    records, _ = go(tmp_path, "LastWordsPolicy", keys())
+    assert sorted(r.key for r in records) == sorted(r.key for r in lines(tmp_path)) == keys()
+
+
 def test_a_policy_that_does_not_exist_stops_the_run(tmp_path: Path) -> None:
     with pytest.raises(RunAborted, match="run_fakes:Nobody"):
         go(tmp_path, "Nobody", keys(1))
