@@ -3,7 +3,8 @@
 One request is a full observation (three 240x320x3 uint8 frames, 14 + 16 float32, 20 words: about
 691 KB), one answer a 50x14 float32 chunk. Every variant has a server process of its own on
 loopback, and they take turns request by request in random order, so that caches and other load on
-the machine hit all alike.
+the machine hit all alike. Wall time on a busy machine measures mostly the scheduler: then look at
+the processor time (`*_cpu_ms`, with one client only).
 
     bare          sync client and asyncio server of `websockets`, compression off, same bytes
     robospa       our client and server, robospa.v1
@@ -42,6 +43,7 @@ from robospa.protocol.openpi import OpenPiOptions, to_openpi
 from robospa.protocol.policy import Observation, PolicySpec, TrialInfo
 from robospa.protocol.server import ServerOptions, ServerThread, serve
 
+WARM_UP = 20
 TRIAL = TrialInfo("wire", 1, 100_000, "aloha-agilex", "clean", "heldout", "nothing")
 
 
@@ -172,18 +174,23 @@ def round_trips(requests: int, clients: int) -> dict[str, Any]:
     try:
         urls = {n: str(server.stdout.readline()).strip() for n, server in servers.items()}  # type: ignore[union-attr]
         times: dict[str, list[float]] = {name: [] for name in variants}
+        client_cpu = dict.fromkeys(variants, 0.0)
+        before = {name: _cpu_seconds(server.pid) for name, server in servers.items()}
         threads = [
-            threading.Thread(target=_measure, args=(variants, urls, requests, times))
+            threading.Thread(target=_measure, args=(variants, urls, requests, times, client_cpu))
             for _ in range(clients)
         ]
         for thread in threads:
             thread.start()
         for thread in threads:
             thread.join()
+        server_cpu = {n: _cpu_seconds(server.pid) - before[n] for n, server in servers.items()}
     finally:
         for server in servers.values():
             server.terminate()
             server.wait()
+    calls = clients * (requests + WARM_UP)
+    cpu = {n: (client_cpu[n] / calls * 1e3, server_cpu[n] / calls * 1e3) for n in variants}
     medians = {name: statistics.median(values) for name, values in times.items()}
     return {
         "message_bytes": len(pack(Infer(1, observation()))),
@@ -191,7 +198,10 @@ def round_trips(requests: int, clients: int) -> dict[str, Any]:
         "median_ms": {name: round(value, 3) for name, value in medians.items()},
         "p10_ms": {n: round(float(np.percentile(v, 10)), 3) for n, v in times.items()},
         "p99_ms": {n: round(float(np.percentile(v, 99)), 3) for n, v in times.items()},
+        "client_cpu_ms": {n: round(value[0], 3) for n, value in cpu.items()},
+        "server_cpu_ms": {n: round(value[1], 3) for n, value in cpu.items()},
         "ratio_to_bare": {n: round(value / medians["bare"], 3) for n, value in medians.items()},
+        "cpu_ratio_to_bare": {n: round(sum(v) / sum(cpu["bare"]), 3) for n, v in cpu.items()},
     }
 
 
@@ -206,16 +216,24 @@ def _measure(
     urls: dict[str, str],
     requests: int,
     times: dict[str, list[float]],
+    client_cpu: dict[str, float],
 ) -> None:
     calls = {name: make(urls[name]) for name, (_, make) in variants.items()}
     order, rng = list(calls), np.random.default_rng(0)
-    for number in range(requests + 20):
+    for number in range(requests + WARM_UP):
         rng.shuffle(order)
         for name in order:
-            start = time.perf_counter()
+            spent, start = time.process_time(), time.perf_counter()
             calls[name]()
-            if number >= 20:
+            if number >= WARM_UP:
                 times[name].append((time.perf_counter() - start) * 1e3)
+            client_cpu[name] += time.process_time() - spent
+
+
+def _cpu_seconds(pid: int) -> float:
+    """Processor time of a process and its threads so far (Linux; 0 elsewhere)."""
+    files = Path(f"/proc/{pid}/task").glob("*/schedstat")
+    return sum(int(file.read_text().split()[0]) for file in files) / 1e9
 
 
 def batch_fill(clients: int = 8, requests: int = 40) -> dict[str, Any]:

@@ -1,9 +1,9 @@
 """One WebSocket to a policy server, with every failure turned into an error of this package.
 
-Chosen for large messages on a quiet line: no compression, large socket buffers, one buffer per
-message, sent in fragments (while the server unmasks one, we mask the next: almost twice as fast as
-one frame), and no keepalive pings (a server that computes for a minute is not dead; deadlines are
-set per call instead). A channel that failed once is closed and stays closed.
+Chosen for large messages on a quiet line: no compression, large socket buffers, one buffer and one
+frame per message (fragments cost more wake-ups than their overlap saves on a busy machine), and no
+keepalive pings (a server that computes for a minute is not dead; deadlines are set per call
+instead). A channel that failed once is closed and stays closed.
 """
 
 from __future__ import annotations
@@ -32,13 +32,11 @@ from robospa.protocol.errors import (
     TransportError,
     Unauthorized,
 )
+from robospa.protocol.memory import keep_freed_memory
 from robospa.protocol.messages import SUBPROTOCOL
 
 SOCKET_BUFFER = 4 * 2**20
 """Bytes asked of the kernel each way (it may give less): a full observation fits."""
-
-FRAGMENT = 2**17
-"""Bytes per WebSocket frame of a large message."""
 
 
 class BadAddress(ValueError):
@@ -83,6 +81,7 @@ class Channel:
         subprotocol: str | None = SUBPROTOCOL,
     ) -> None:
         self.url = address.url
+        keep_freed_memory()
         self._socket = _open(address, timeouts, limits, subprotocol)
         self.subprotocol: str | None = self._socket.subprotocol
         seconds = max(timeouts.first_infer, timeouts.infer)
@@ -96,11 +95,7 @@ class Channel:
     def send(self, message: bytes) -> None:
         """Raises ConnectionLost."""
         try:
-            if len(message) <= FRAGMENT:
-                self._socket.send(message)
-            else:
-                view = memoryview(message)
-                self._socket.send(view[i : i + FRAGMENT] for i in range(0, len(view), FRAGMENT))
+            self._socket.send(message)
         except (ConnectionClosed, OSError) as error:
             raise self._lost("while sending", error) from error
 

@@ -34,6 +34,7 @@ from websockets.typing import Subprotocol
 from robospa.protocol.channel import SOCKET_BUFFER
 from robospa.protocol.codec import DEFAULT_LIMITS, Limits
 from robospa.protocol.engine import Engine, PolicyFactory
+from robospa.protocol.memory import keep_freed_memory
 from robospa.protocol.messages import SUBPROTOCOL
 from robospa.protocol.policy import Policy
 from robospa.protocol.session import Session, refuse
@@ -94,6 +95,7 @@ class PolicyServer:
         return f"{scheme}://[{host}]:{port}" if ":" in host else f"{scheme}://{host}:{port}"
 
     async def __aenter__(self) -> Self:
+        keep_freed_memory()
         self._server = await websocket_serve(
             self._handle,
             self._host,
