@@ -1,17 +1,17 @@
 """What a round trip costs: bare `websockets`, ours, and openpi's client, side by side in one run.
 
 One request is a full observation (three 240x320x3 uint8 frames, 14 + 16 float32, 20 words: about
-691 KB), one answer a 50x14 float32 chunk. Every variant has a server process of its own on
-loopback, and they take turns request by request in random order, so that caches and other load on
-the machine hit all alike. Wall time on a busy machine measures mostly the scheduler: then look at
-the processor time (`*_cpu_ms`, with one client only).
+691 KB), one answer a 50x14 float32 chunk. Every variant has a client and a server process of its
+own on loopback, and they take turns request by request in random order, so that caches and other
+load on the machine hit all alike. On a busy machine the wall time measures the scheduler as well;
+`process_cpu_s` (client, server; with their start) does not.
 
     bare          sync client and asyncio server of `websockets`, compression off, same bytes
     robospa       our client and server, robospa.v1
     openpi        openpi-client and a server of openpi's form (only if openpi-client is installed)
     robospa+openpi  our client against that server
 
-    python benchmarks/wire.py [--requests 1000] [--clients 1] [--out wire.json]
+    python benchmarks/wire.py [--requests 1000] [--out wire.json]
     python benchmarks/wire.py --fill     how full batches get: 8 clients, a 50 ms model
 """
 
@@ -166,31 +166,20 @@ VARIANTS: dict[str, tuple[str, Callable[[str], Callable[[], Any]]]] = {
 }
 
 
-def round_trips(requests: int, clients: int) -> dict[str, Any]:
+def round_trips(requests: int) -> dict[str, Any]:
     """Medians and tails [ms] per variant, and ratios to bare."""
     usable = importlib.util.find_spec("openpi_client") is not None
     variants = {k: v for k, v in VARIANTS.items() if usable or v[0] != "openpi"}
-    servers = {name: _start(kind) for name, (kind, _) in variants.items()}
+    servers = {name: _start("--serve", kind) for name, (kind, _) in variants.items()}
+    urls = {name: _line(server) for name, server in servers.items()}
+    clients = {name: _start("--call", name, urls[name]) for name in variants}
     try:
-        urls = {n: str(server.stdout.readline()).strip() for n, server in servers.items()}  # type: ignore[union-attr]
-        times: dict[str, list[float]] = {name: [] for name in variants}
-        client_cpu = dict.fromkeys(variants, 0.0)
-        before = {name: _cpu_seconds(server.pid) for name, server in servers.items()}
-        threads = [
-            threading.Thread(target=_measure, args=(variants, urls, requests, times, client_cpu))
-            for _ in range(clients)
-        ]
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join()
-        server_cpu = {n: _cpu_seconds(server.pid) - before[n] for n, server in servers.items()}
+        times = _measure(clients, requests)
+        cpu = {n: (_cpu_seconds(clients[n].pid), _cpu_seconds(servers[n].pid)) for n in variants}
     finally:
-        for server in servers.values():
-            server.terminate()
-            server.wait()
-    calls = clients * (requests + WARM_UP)
-    cpu = {n: (client_cpu[n] / calls * 1e3, server_cpu[n] / calls * 1e3) for n in variants}
+        for process in (*servers.values(), *clients.values()):  # in this order without noise
+            process.terminate()
+            process.wait()
     medians = {name: statistics.median(values) for name, values in times.items()}
     return {
         "message_bytes": len(pack(Infer(1, observation()))),
@@ -198,36 +187,44 @@ def round_trips(requests: int, clients: int) -> dict[str, Any]:
         "median_ms": {name: round(value, 3) for name, value in medians.items()},
         "p10_ms": {n: round(float(np.percentile(v, 10)), 3) for n, v in times.items()},
         "p99_ms": {n: round(float(np.percentile(v, 99)), 3) for n, v in times.items()},
-        "client_cpu_ms": {n: round(value[0], 3) for n, value in cpu.items()},
-        "server_cpu_ms": {n: round(value[1], 3) for n, value in cpu.items()},
+        "process_cpu_s": {n: [round(x, 3) for x in value] for n, value in cpu.items()},
         "ratio_to_bare": {n: round(value / medians["bare"], 3) for n, value in medians.items()},
-        "cpu_ratio_to_bare": {n: round(sum(v) / sum(cpu["bare"]), 3) for n, v in cpu.items()},
     }
 
 
-def _start(kind: str) -> subprocess.Popen[str]:
-    return subprocess.Popen(
-        [sys.executable, __file__, "--serve", kind], stdout=subprocess.PIPE, text=True
-    )
+def _start(*words: str) -> subprocess.Popen[str]:
+    pipe = subprocess.PIPE
+    return subprocess.Popen([sys.executable, __file__, *words], stdin=pipe, stdout=pipe, text=True)
 
 
-def _measure(
-    variants: dict[str, tuple[str, Callable[[str], Callable[[], Any]]]],
-    urls: dict[str, str],
-    requests: int,
-    times: dict[str, list[float]],
-    client_cpu: dict[str, float],
-) -> None:
-    calls = {name: make(urls[name]) for name, (_, make) in variants.items()}
-    order, rng = list(calls), np.random.default_rng(0)
+def _line(process: subprocess.Popen[str]) -> str:
+    assert process.stdout is not None
+    return process.stdout.readline().strip()
+
+
+def _measure(clients: dict[str, subprocess.Popen[str]], requests: int) -> dict[str, list[float]]:
+    times: dict[str, list[float]] = {name: [] for name in clients}
+    order, rng = list(clients), np.random.default_rng(0)
     for number in range(requests + WARM_UP):
         rng.shuffle(order)
         for name in order:
-            spent, start = time.process_time(), time.perf_counter()
-            calls[name]()
+            stdin = clients[name].stdin
+            assert stdin is not None
+            stdin.write("go\n")
+            stdin.flush()
+            spent = float(_line(clients[name]))
             if number >= WARM_UP:
-                times[name].append((time.perf_counter() - start) * 1e3)
-            client_cpu[name] += time.process_time() - spent
+                times[name].append(spent)
+    return times
+
+
+def _call(name: str, url: str) -> None:
+    """A client process: one round trip per line of input, its milliseconds as output."""
+    call = VARIANTS[name][1](url)
+    for _ in sys.stdin:
+        start = time.perf_counter()
+        call()
+        print((time.perf_counter() - start) * 1e3, flush=True)
 
 
 def _cpu_seconds(pid: int) -> float:
@@ -270,22 +267,23 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
     parser.add_argument("--serve", choices=("bare", "robospa", "openpi"), help=argparse.SUPPRESS)
     parser.add_argument("--requests", type=int, default=1000)
-    parser.add_argument("--clients", type=int, default=1)
+    parser.add_argument("--call", nargs=2, metavar=("NAME", "URL"), help=argparse.SUPPRESS)
     parser.add_argument("--fill", action="store_true")
     parser.add_argument("--out", type=Path)
     arguments = parser.parse_args()
     if arguments.serve:
         return _serve(arguments.serve)
+    if arguments.call:
+        return _call(*arguments.call)
     result: dict[str, Any] = {
         "machine": {"cpus": os.cpu_count(), "load": os.getloadavg()[0], "cpu": platform.machine()},
         "versions": {"python": platform.python_version(), "websockets": version("websockets")},
         "requests": arguments.requests,
-        "clients": arguments.clients,
     }
     if arguments.fill:
         result["batching"] = batch_fill()
     else:
-        result.update(round_trips(arguments.requests, arguments.clients))
+        result.update(round_trips(arguments.requests))
     text = json.dumps(result, indent=2)
     print(text)
     if arguments.out:

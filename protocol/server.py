@@ -106,6 +106,7 @@ class PolicyServer:
             process_request=self._admit,
             compression=None,
             max_size=self._options.limits.message,
+            max_queue=2,  # frames that may wait while one request is served
             write_limit=2**20,
             ping_interval=None,
             open_timeout=10 + self._options.patience,

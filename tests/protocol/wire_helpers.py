@@ -110,6 +110,7 @@ class Scripted:
             select_subprotocol=lambda _, offered: offered[0] if v1 and offered else None,
             compression=None,
             max_size=None,
+            max_queue=1,
         )
         self._thread = threading.Thread(target=self._server.serve_forever, daemon=True)
 
