@@ -6,8 +6,8 @@ Both sides start from the same scene and write the same drive targets in the sam
 they must end in the same state to the bit (checked). "bare" is the loop one would write by hand:
 set the targets, step. "alone" is SAPIEN's step with nothing moving, for scale. The trial loop
 ("trial", and "contacts" with contacts gathered) includes reading the action, planning, and a poll
-with a snapshot at 50 Hz. They take turns action by action, so that other load on the machine hits
-all alike; the ratio is of the medians over rounds, in CPU time. Prints JSON.
+with a snapshot at 50 Hz. They take turns action by action, and of every action the fastest round
+counts, in CPU time, so that other load on the machine does not decide. Prints JSON.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ import argparse
 import json
 import os
 import platform
-import statistics
 import time
 from collections.abc import Callable
 from functools import partial
@@ -84,8 +83,9 @@ def hand_written(world: SapienWorld, actions: list[NDArray[np.float32]]) -> list
         plan = rest_to_rest(
             drives.joints, goals.joints, drives.gripper, goals.gripper, drives.opening
         )
-        tables.append(drives.program(plan))
-        drives.reached(plan, len(plan) - 1)
+        setters, table = drives.program(plan)
+        tables.append((setters, table.tolist()))
+        drives.now = (plan, len(plan) - 1)
 
     def run(setters: list[Setter], rows: list[list[float]]) -> int:
         for row in rows:
@@ -97,22 +97,23 @@ def hand_written(world: SapienWorld, actions: list[NDArray[np.float32]]) -> list
     return [partial(run, *table) for table in tables]
 
 
-def turns(sides: dict[str, list[Steps]]) -> tuple[dict[str, float], int]:
-    """CPU time [us] per physics step of every side, and the steps that each took."""
-    spent, steps = dict.fromkeys(sides, 0.0), dict.fromkeys(sides, 0)
+def turns(sides: dict[str, list[Steps]]) -> tuple[dict[str, list[float]], int]:
+    """CPU time [s] of every call of every side, and the physics steps that one side took."""
+    spent: dict[str, list[float]] = {name: [] for name in sides}
+    steps = dict.fromkeys(sides, 0)
     for calls in zip(*sides.values(), strict=True):
         for name, call in zip(sides, calls, strict=True):
             began = time.process_time()
             steps[name] += call()
-            spent[name] += time.process_time() - began
-    return {name: spent[name] / steps[name] * 1e6 for name in sides}, min(steps.values())
+            spent[name].append(time.process_time() - began)
+    return spent, min(steps.values())
 
 
 def measure(blocks: int, actions: int, rounds: int) -> dict[str, object]:
     """All figures of one run."""
     scene, plan = table_of_blocks(blocks), sweeping(actions)
     worlds = {name: SapienWorld(render=False) for name in ("bare", "trial", "contacts")}
-    costs: list[dict[str, float]] = []
+    costs: list[dict[str, list[float]]] = []
     digests: set[str] = set()
     steps = 0
     for _ in range(rounds):
@@ -125,18 +126,22 @@ def measure(blocks: int, actions: int, rounds: int) -> dict[str, object]:
         cost, steps = turns(loops)
         digests |= {world.digest() for world in worlds.values()}
         costs.append(cost)
+    best = {
+        name: sum(min(c[name][i] for c in costs) for i in range(actions)) / steps * 1e6
+        for name in worlds
+    }
     idle = worlds["bare"]._loaded().system
     alone, _ = turns({"alone": [lambda: sum(idle.step() is None for _ in range(2000))]})
-    middle = {name: statistics.median(c[name] for c in costs) for name in worlds} | alone
+    best["alone"] = alone["alone"][0] / 2000 * 1e6
     return {
         "benchmark": "physics",
         "blocks": blocks,
         "physics_steps": steps,
-        "us_per_step": {name: round(cost, 2) for name, cost in middle.items()},
-        "steps_per_second": round(1e6 / middle["trial"]),
-        "times_real_time": round(1e6 / middle["trial"] / RATE, 1),
-        "trial_over_bare": round(middle["trial"] / middle["bare"], 3),
-        "with_contacts_over_bare": round(middle["contacts"] / middle["bare"], 3),
+        "us_per_step": {name: round(cost, 2) for name, cost in best.items()},
+        "steps_per_second": round(1e6 / best["trial"]),
+        "times_real_time": round(1e6 / best["trial"] / RATE, 1),
+        "trial_over_bare": round(best["trial"] / best["bare"], 3),
+        "with_contacts_over_bare": round(best["contacts"] / best["bare"], 3),
         "bar": BAR,
         "same_state_to_the_bit": len(digests) == 1,
         "machine": {"cores": os.cpu_count(), "python": platform.python_version(), **versions()},

@@ -34,8 +34,10 @@ class _ArmDrives:
 
 
 class Drives:
-    """The drives of a loaded robot. `joints` (2, J) [rad] and `gripper` (2,) are as commanded;
-    `opening` (2,) is the grippers' drive target, which may lag an opening gripper's command.
+    """The drives of a loaded robot; `now` is the trajectory that they follow and the row reached.
+
+    `joints` (2, J) [rad] and `gripper` (2,) are as commanded; `opening` (2,) is the grippers' drive
+    target, which may lag an opening gripper's command.
 
     Grippers get position targets only (official), so they follow with a time constant of
     damping / stiffness = 0.2 s; arm joints get position and velocity targets.
@@ -47,16 +49,34 @@ class Drives:
             _bind(arm, articulation)
             for arm, articulation in zip(embodiment.arms, articulations, strict=True)
         ]
-        self.joints: Array = np.array([arm.home for arm in embodiment.arms], dtype=float)
-        self.gripper: Array = np.ones(2)
-        self.opening: Array = np.ones(2)
+        home = np.array([[arm.home] for arm in embodiment.arms], dtype=float)
+        opened = np.ones((2, 1))
+        self.now = (Trajectory(home, np.zeros_like(home), opened, opened), 0)
         self._go_home()
+
+    @property
+    def joints(self) -> Array:
+        """Commanded joints (2, J) [rad]."""
+        path, row = self.now
+        return path.joints[:, row]
+
+    @property
+    def gripper(self) -> Array:
+        """Commanded grippers (2,)."""
+        path, row = self.now
+        return path.commanded[:, row]
+
+    @property
+    def opening(self) -> Array:
+        """Drive targets of the grippers (2,)."""
+        path, row = self.now
+        return path.gripper[:, row]
 
     def _go_home(self) -> None:
         """Joints at home, grippers open, at rest, and every target where its joint is."""
         for a, arm in enumerate(self._arms):
             qpos = np.zeros(arm.articulation.dof, dtype=np.float32)
-            qpos[arm.columns] = self.joints[a]
+            qpos[arm.columns] = self._embodiment.arms[a].home
             qpos[arm.finger_columns] = self._travel(a, 1.0)
             arm.articulation.qpos = qpos
             arm.articulation.qvel = np.zeros_like(qpos)
@@ -69,27 +89,23 @@ class Drives:
         closed, opened = self._embodiment.arms[arm].gripper
         return closed + opening * (opened - closed)
 
-    def program(self, path: Trajectory) -> tuple[list[Setter], list[list[float]]]:
+    def program(self, path: Trajectory) -> tuple[list[Setter], Array]:
         """What to call in every physics step of `path`, and with which values (n, calls)."""
+        joints, opening = self.joints, self.opening
         calls: list[Setter] = []
         columns: list[Array] = []
         for a, arm in enumerate(self._arms):
             # along a straight line a joint moves all the way or not at all
-            for j in np.flatnonzero(path.joints[a, -1] != self.joints[a]).tolist():
+            for j in np.flatnonzero(path.joints[a, -1] != joints[a]).tolist():
                 calls += [arm.position[j], arm.velocity[j]]
                 columns += [path.joints[a, :, j], path.velocities[a, :, j]]
-            if path.gripper[a, 0] != self.opening[a] or path.gripper[a, -1] != self.opening[a]:
+            if path.gripper[a, 0] != opening[a] or path.gripper[a, -1] != opening[a]:
                 calls += arm.fingers
                 columns += [self._travel(a, path.gripper[a])] * len(arm.fingers)
-        if not calls:
-            return [], [[] for _ in range(len(path))]
-        return calls, np.stack(columns, axis=1).tolist()
-
-    def reached(self, path: Trajectory, row: int) -> None:
-        """The targets of `row` of `path` have been set."""
-        self.joints = path.joints[:, row]
-        self.gripper = path.commanded[:, row]
-        self.opening = path.gripper[:, row]
+        table = np.empty((len(path), len(calls)))
+        for i, column in enumerate(columns):
+            table[:, i] = column
+        return calls, table
 
     def halt(self) -> None:
         """No joint is to move on: velocity targets to zero."""
@@ -102,11 +118,6 @@ class Drives:
         """Where the arm joints are in the qpos of left and right."""
         return tuple(tuple(arm.columns) for arm in self._arms)
 
-    def commanded(self) -> Pair:
-        """Commanded joints [rad] of left and right."""
-        left, right = self.joints.tolist()
-        return tuple(left), tuple(right)
-
     def measured(self) -> Pair:
         """Measured joints [rad] of left and right."""
         left, right = (
@@ -118,9 +129,10 @@ class Drives:
     def state(self, measured: bool) -> NDArray[np.float32]:
         """Joints [rad] and gripper 0..1 of left and right (D,): as commanded, or as they are."""
         parts: list[float] = []
-        joints = self.measured() if measured else self.commanded()
+        gripper = self.gripper
+        joints = self.measured() if measured else self.joints.tolist()
         for a, arm in enumerate(self._arms):
-            opening = float(self.gripper[a])
+            opening = float(gripper[a])
             if measured:
                 closed, opened = self._embodiment.arms[a].gripper
                 travel = float(arm.articulation.qpos[arm.finger_columns].mean())

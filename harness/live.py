@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from robospa.harness.motion import Trajectory
 from robospa.tasks.geometry import Pose
 from robospa.tasks.snapshot import Contact, Snapshot
 
@@ -78,7 +79,7 @@ class LiveSnapshot(Snapshot):
     _packed: bytes
     _table: PoseTable
     _layout: Layout
-    _commanded: tuple[Any, Any]
+    _commanded: tuple[Trajectory, int]
     _qpos: tuple[Any, Any]
     _ends: tuple[Pose, Pose] | None
 
@@ -88,11 +89,11 @@ class LiveSnapshot(Snapshot):
         packed: bytes,
         rows: Mapping[str, int],
         layout: Layout,
-        commanded: tuple[Any, Any],
+        commanded: tuple[Trajectory, int],
         qpos: tuple[Any, Any],
         contacts: tuple[Contact, ...],
     ) -> None:
-        """`commanded`: joints (2, J) and grippers (2,); `qpos` of both arms. None may change."""
+        """`commanded`: the trajectory and the row reached; `qpos` of both arms."""
         _put(self, "time", time)
         _put(self, "contacts", contacts)
         _put(self, "_packed", packed)
@@ -110,7 +111,8 @@ class LiveSnapshot(Snapshot):
     @property
     def gripper(self) -> tuple[float, float]:
         """Commanded grippers."""
-        left, right = self._commanded[1].tolist()
+        path, row = self._commanded
+        left, right = path.commanded[:, row].tolist()
         return left, right
 
     @property
@@ -128,7 +130,8 @@ class LiveSnapshot(Snapshot):
     @property
     def joints(self) -> Pair:
         """Commanded joints."""
-        left, right = self._commanded[0].tolist()
+        path, row = self._commanded
+        left, right = path.joints[:, row].tolist()
         return tuple(left), tuple(right)
 
     @property

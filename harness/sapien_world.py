@@ -147,19 +147,19 @@ class SapienWorld:
     def _follow(self, physics: Physics, path: Trajectory, poll: Poll) -> tuple[int, bool]:
         """Drive along `path`; physics steps taken and whether `poll` ended it."""
         drives = self._drives
-        writers, rows = drives.program(path)
+        writers, table = drives.program(path)
         total, done, step = len(path), 0, physics.step
         while done < total:
             upto = min(total, done + POLL_STEPS - self._steps % POLL_STEPS)
             if self._later:
                 upto = min(upto, done + self._later[0][0] - self._steps)
-            for row in rows[done:upto]:
+            for row in table[done:upto].tolist():
                 for write, value in zip(writers, row, strict=True):
                     write(value)
                 step()
             self._steps += upto - done
             done = upto
-            drives.reached(path, done - 1)
+            drives.now = (path, done - 1)
             if self._later:
                 self._appear(physics)
             if self._steps % POLL_STEPS == 0 and poll(self.snapshot()):
@@ -172,14 +172,13 @@ class SapienWorld:
     def snapshot(self) -> Snapshot:
         """The state at this instant."""
         physics = self._loaded()
-        drives = self._drives
         left, right = physics.arms
         return LiveSnapshot(
             self._steps / RATE,
             physics.packed(),
             physics.rows,
             self._layout,
-            (drives.joints, drives.gripper),
+            self._drives.now,
             (left.qpos, right.qpos),
             physics.contacts() if self._contacts else (),
         )
