@@ -1,4 +1,4 @@
-"""Fixture of the wire's tests."""
+"""Settings and fixture of the wire's tests."""
 
 from __future__ import annotations
 
@@ -6,8 +6,13 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 from robospa.protocol.server import ServerThread
+
+# Timing decides no test: a busy machine may be slow at generating examples.
+settings.register_profile("wire", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("wire")
 
 
 @pytest.fixture

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from websockets.sync.server import serve
 
-from robospa.protocol.channel import Timeouts
-from robospa.protocol.messages import Hello, pack, unpack
+from robospa.protocol.channel import Address, Channel, Timeouts
+from robospa.protocol.messages import Hello, Message, pack, unpack
 from robospa.protocol.policy import CameraSpec, Observation, PolicySpec, TrialInfo
 
 CAMERA = CameraSpec("head", 8, 6)
@@ -129,3 +129,23 @@ HELLO = pack(Hello(0, "1.0", "scripted", SPEC))
 def answer(make: Any) -> Any:
     """A frame for `Scripted` from a function of the request's id."""
     return lambda request: pack(make(unpack(request).id))
+
+
+def raw(url: str) -> Channel:
+    """A connection past the hello."""
+    channel = Channel(Address(url), QUICK)
+    channel.receive(10, "hello")
+    return channel
+
+
+def ask(channel: Channel, frame: bytes) -> Message:
+    channel.send(frame)
+    data = channel.receive(10, "answer")
+    assert isinstance(data, bytes)
+    return unpack(data)
+
+
+def until(condition: Any) -> None:
+    """Return as soon as `condition()` holds."""
+    while not condition():
+        threading.Event().wait(0.005)

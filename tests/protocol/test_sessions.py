@@ -1,0 +1,205 @@
+"""Sessions are kept apart, and requests that wait together become one call."""
+
+from __future__ import annotations
+
+import socket
+import threading
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from wire_helpers import QUICK, TRIAL, Recall, Together, observation, raw, until
+
+from robospa.protocol.client import connect
+from robospa.protocol.errors import (
+    ConnectFailed,
+    ConnectionLost,
+    ServerError,
+)
+from robospa.protocol.messages import Infer, Reset, pack
+from robospa.protocol.server import ServerOptions, ServerThread
+
+
+def test_every_connection_has_a_policy_of_its_own(start: Any) -> None:
+    made: list[Recall] = []
+
+    def create() -> Recall:
+        made.append(Recall())
+        return made[-1]
+
+    server = start(policy_factory=create)
+    with connect(server.url, timeouts=QUICK) as a, connect(server.url, timeouts=QUICK) as b:
+        a.reset(replace(TRIAL, seed=1))
+        b.reset(replace(TRIAL, seed=2))
+        a.infer(observation(10))
+        b.infer(observation(20))
+    assert [[t.seed for t in policy.trials] for policy in made] == [[1], [2]]
+    assert [[o["step"] for o in policy.seen] for policy in made] == [[10], [20]]
+
+
+def test_a_factory_that_fails_says_why(start: Any) -> None:
+    made: list[Recall] = []
+
+    def create() -> Recall:
+        if made:
+            raise MemoryError("no room for a second model")
+        made.append(Recall())
+        return made[0]
+
+    server = start(policy_factory=create)
+    with (
+        connect(server.url, timeouts=QUICK),
+        pytest.raises(ConnectionLost, match="no room for a second model"),
+    ):
+        connect(server.url, timeouts=QUICK)
+
+
+def test_a_policy_that_knows_no_sessions_serves_one_connection(start: Any) -> None:
+    server = start(Recall(), options=ServerOptions(patience=0.05))
+    with connect(server.url, timeouts=QUICK) as first:
+        with pytest.raises(ConnectFailed, match="all 1 places"):
+            connect(server.url, timeouts=QUICK)
+        first.reset(TRIAL)
+    connect(server.url, timeouts=QUICK).close()
+
+
+def test_reconnecting_finds_the_place_that_it_left(start: Any) -> None:
+    with connect(start(Recall()).url, timeouts=QUICK) as remote:
+        for _ in range(5):
+            remote.reconnect()
+            remote.reset(TRIAL)
+
+
+def test_places_are_limited(start: Any) -> None:
+    options = ServerOptions(max_connections=2, patience=0.05)
+    server = start(policy_factory=Recall, options=options)
+    with (
+        connect(server.url, timeouts=QUICK),
+        connect(server.url, timeouts=QUICK),
+        pytest.raises(ConnectFailed, match="all 2 places"),
+    ):
+        connect(server.url, timeouts=QUICK)
+
+
+def test_a_client_that_leaves_during_inference_harms_nobody(start: Any) -> None:
+    policy = Together()
+    server = start(policy)
+    channel = raw(server.url)
+    channel.send(pack(Reset(1, TRIAL)))
+    channel.receive(10, "ready")
+    channel.send(pack(Infer(2, observation(1))))
+    policy.started.wait(10)
+    channel._socket.socket.shutdown(socket.SHUT_RDWR)
+    policy.open.set()
+    with connect(server.url, timeouts=QUICK) as remote:
+        remote.reset(TRIAL)
+        assert remote.infer(observation(5))[0, 0] == 5
+
+
+def test_the_server_answers_others_while_a_policy_computes(start: Any) -> None:
+    policy = Together()
+    server = start(policy)
+    with connect(server.url, timeouts=QUICK) as busy, ThreadPoolExecutor(1) as pool:
+        busy.reset(TRIAL)
+        waiting = pool.submit(busy.infer, observation(1))
+        assert policy.started.wait(10)
+        connect(server.url, timeouts=QUICK).close()
+        policy.open.set()
+        assert waiting.result(10)[0, 0] == 1
+
+
+def test_stopping_a_server_whose_model_hangs() -> None:
+    policy = Together()
+    server = ServerThread(policy).start()
+    channel = raw(server.url)
+    channel.send(pack(Reset(1, TRIAL)))
+    channel.receive(10, "ready")
+    channel.send(pack(Infer(2, observation(1))))
+    assert policy.started.wait(10)
+    server.stop()
+    with pytest.raises(ConnectionLost):
+        channel.receive(10, "actions")
+    policy.open.set()
+
+
+def test_requests_that_wait_together_become_one_call(start: Any) -> None:
+    policy = Together()
+    server = start(policy)
+    remotes = [connect(server.url, timeouts=QUICK) for _ in range(4)]
+    for remote in remotes:
+        remote.reset(TRIAL)
+    with ThreadPoolExecutor(4) as pool:
+        first = pool.submit(remotes[0].infer, observation(0))
+        assert policy.started.wait(10)
+        rest = [pool.submit(remotes[n].infer, observation(n)) for n in (1, 2, 3)]
+        until(lambda: len(server._server._engine._batcher._pending) == 3)
+        policy.open.set()
+        assert [future.result(10)[0, 0] for future in (first, *rest)] == [0, 1, 2, 3]
+    assert [sorted(batch) for batch in policy.batches] == [[0], [1, 2, 3]]
+    assert remotes[1].last_timing["batch"] == 3
+    for remote in remotes:
+        remote.close()
+
+
+def test_one_bad_sample_spares_the_others(start: Any) -> None:
+    policy = Together()
+    server = start(policy)
+    remotes = [connect(server.url, timeouts=QUICK) for _ in range(4)]
+    for remote in remotes:
+        remote.reset(TRIAL)
+    with ThreadPoolExecutor(4) as pool:
+        first = pool.submit(remotes[0].infer, observation(0))
+        assert policy.started.wait(10)
+        good = [pool.submit(remotes[n].infer, observation(n)) for n in (1, 2)]
+        bad = pool.submit(remotes[3].infer, observation(3, instruction="poison"))
+        until(lambda: len(server._server._engine._batcher._pending) == 3)
+        policy.open.set()
+        assert [future.result(10)[0, 0] for future in (first, *good)] == [0, 1, 2]
+        with pytest.raises(ServerError, match="one sample is bad"):
+            bad.result(10)
+    for remote in remotes:
+        remote.close()
+
+
+def test_too_many_waiting_requests_are_refused(start: Any) -> None:
+    policy = Together(size=1)
+    server = start(policy, options=ServerOptions(queue=1))
+    remotes = [connect(server.url, timeouts=QUICK) for _ in range(3)]
+    for remote in remotes:
+        remote.reset(TRIAL)
+    with ThreadPoolExecutor(3) as pool:
+        first = pool.submit(remotes[0].infer, observation(0))
+        assert policy.started.wait(10)
+        second = pool.submit(remotes[1].infer, observation(1))
+        until(lambda: len(server._server._engine._batcher._pending) == 1)
+        with pytest.raises(ServerError, match="busy") as caught:
+            remotes[2].infer(observation(2))
+        assert caught.value.retriable
+        policy.open.set()
+        assert [first.result(10)[0, 0], second.result(10)[0, 0]] == [0, 1]
+    for remote in remotes:
+        remote.close()
+
+
+def test_a_batch_policy_is_told_which_session_resets_and_ends(start: Any) -> None:
+    class Aware(Together):
+        def __init__(self) -> None:
+            super().__init__()
+            self.log: list[tuple[str, int]] = []
+            self.gone = threading.Event()
+            self.open.set()
+
+        def reset_session(self, session: int, trial: Any) -> None:
+            self.log.append(("reset", session))
+
+        def end_session(self, session: int) -> None:
+            self.log.append(("end", session))
+            self.gone.set()
+
+    policy = Aware()
+    with connect(start(policy).url, timeouts=QUICK) as remote:
+        remote.reset(TRIAL)
+    assert policy.gone.wait(10)
+    assert [name for name, _ in policy.log] == ["reset", "end"]
+    assert len({session for _, session in policy.log}) == 1
