@@ -71,7 +71,7 @@ def _version(package: str) -> str:
 
 
 def git_state(folder: Path) -> dict[str, Any]:
-    """Commit and dirty flag of the checkout that holds `folder`; empty if there is none."""
+    """Commit and dirty flag of the checkout that this package's `folder` is part of, or empty."""
 
     def git(*words: str) -> str:
         done = subprocess.run(
@@ -80,8 +80,9 @@ def git_state(folder: Path) -> dict[str, Any]:
         return done.stdout.strip() if done.returncode == 0 else ""
 
     try:
+        tracked = git("ls-files", "--error-unmatch", str(folder / "manifest.py"))
         commit = git("rev-parse", "HEAD")
-        if not commit:
+        if not commit or not tracked:  # installed inside a checkout of something else
             return {}
         return {"commit": commit, "dirty": bool(git("status", "--porcelain"))}
     except (OSError, subprocess.TimeoutExpired):

@@ -9,8 +9,11 @@ is replaced. Which worker runs a trial, and when, does not enter the record.
 from __future__ import annotations
 
 import multiprocessing
+import signal
+import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
@@ -105,7 +108,8 @@ class Runner:
         process = spawn.Process(
             target=worker_main, args=(theirs, self.config, name), name=name, daemon=True
         )
-        process.start()
+        with _deaf():
+            process.start()
         theirs.close()
         return _Hand(process, ours, name, time.monotonic() + START_SECONDS)
 
@@ -230,6 +234,19 @@ class Runner:
                 hand.process.kill()
             hand.process.join()
             hand.pipe.close()
+
+
+@contextmanager
+def _deaf() -> Iterator[None]:
+    """Start processes that Ctrl-C does not reach, not even while they are starting."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def _exit_text(code: int | None) -> str:

@@ -34,9 +34,15 @@ def command(url: str, out: Path, *more: str, trials: int = 4) -> list[str]:
 
 
 def start(words: list[str]) -> subprocess.Popen[str]:
+    """In a process group of its own, so that Ctrl-C can reach all of it as in a terminal."""
     environment = {**os.environ, "PYTHONPATH": HERE, "NO_COLOR": "1"}
     return subprocess.Popen(
-        words, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        words,
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
     )
 
 
@@ -114,7 +120,7 @@ def test_ctrl_c_leaves_a_run_that_can_be_resumed(tmp_path: Path) -> None:
         words = command(server.url, tmp_path / "run", trials=15)
         process = start(words)
         wait_for_records(tmp_path / "run", 3, process)
-        process.send_signal(signal.SIGINT)
+        os.killpg(process.pid, signal.SIGINT)
         _, err = process.communicate(timeout=60)
         assert process.returncode == 130
         assert "--resume" in err

@@ -1,0 +1,28 @@
+"""The demo as a user sees it: a server process, a table, a report with a film."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from robospa.harness.cli.main import main
+from robospa.harness.factory import policy_names
+
+pytestmark = [
+    pytest.mark.sim,
+    pytest.mark.skipif("oracle" not in policy_names(), reason="robospa is not installed"),
+]
+
+
+def test_the_demo_leaves_a_report_with_a_film(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["demo", "--tasks", "Pick_Blocks_Size", "--levels", "1", "--no-contrast"]
+    with pytest.raises(SystemExit) as end:
+        main([*words, "--workers", "1", "--out", str(tmp_path / "demo")])
+    assert end.value.code == 0
+    assert "Pick Blocks Size" in capsys.readouterr().out
+    report = tmp_path / "demo" / "oracle" / "report"
+    assert len(list((report / "videos").glob("*.mp4"))) == 1
+    assert "<video" in (report / "report.html").read_text()
