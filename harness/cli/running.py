@@ -104,6 +104,7 @@ def openpi_options(path: Path) -> Any:
     """
     import json
 
+    from robospa.protocol.errors import DecodeError
     from robospa.protocol.openpi import OpenPiOptions
     from robospa.protocol.policy import PolicySpec
 
@@ -112,7 +113,7 @@ def openpi_options(path: Path) -> Any:
         if "spec" in data:
             data["spec"] = PolicySpec.from_json({"name": "openpi", **data["spec"]})
         return OpenPiOptions(**data)
-    except (OSError, ValueError, TypeError) as error:
+    except (OSError, ValueError, TypeError, DecodeError) as error:
         raise BadChoice(f"--openpi {path}: {error}") from error
 
 

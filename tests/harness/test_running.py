@@ -1,0 +1,57 @@
+"""From options to a request."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from robospa.harness.cli.running import make_request, openpi_options, run_folder
+from robospa.harness.cli.selection import BadChoice
+from robospa.results.records import TrialKey
+
+KEYS = [TrialKey("A", 1, 0)]
+TIMES = {"timeout": 1.0, "first_timeout": 2.0, "wait": 3.0, "patience": 4.0}
+
+
+def test_a_server_gets_its_deadlines_and_its_token(tmp_path: Path) -> None:
+    request = make_request("ws://h:1", KEYS, tmp_path, connection=TIMES, token="t", workers=3)
+    timeouts = request.config.options["timeouts"]
+    assert (timeouts.infer, timeouts.first_infer, timeouts.wait) == (1.0, 2.0, 4.0)
+    assert request.wait == 3.0
+    assert request.config.options["token"] == "t"
+    assert request.options.workers == 3
+
+
+def test_the_token_is_nowhere_in_what_is_kept(tmp_path: Path) -> None:
+    request = make_request("ws://h:1", KEYS, tmp_path, connection=TIMES, token="hidden")
+    assert "hidden" not in json.dumps([request.settings, request.arguments])
+
+
+def test_openpi_options_from_a_file(tmp_path: Path) -> None:
+    path = tmp_path / "openpi.json"
+    path.write_text('{"spec": {"horizon": 25, "execute": 10}, "cameras": {"head": "cam"}}')
+    options = openpi_options(path)
+    assert (options.spec.name, options.spec.horizon, options.spec.execute) == ("openpi", 25, 10)
+    assert options.cameras == {"head": "cam"}
+
+
+@pytest.mark.parametrize("text", ["{", "[]", '{"sped": {}}', '{"spec": {"horizon": "x"}}'])
+def test_broken_openpi_options_are_named(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "openpi.json"
+    path.write_text(text)
+    with pytest.raises(BadChoice, match=r"--openpi .*openpi\.json"):
+        openpi_options(path)
+
+
+@pytest.mark.parametrize("wrong", [{"workers": -1}, {"attempts": 0}, {"trial_seconds": 0.0}])
+def test_impossible_numbers_are_refused(tmp_path: Path, wrong: dict[str, float]) -> None:
+    with pytest.raises(BadChoice, match="cannot be that small"):
+        make_request("hold", KEYS, tmp_path, connection=TIMES, **wrong)  # type: ignore[arg-type]
+
+
+def test_the_default_folder_is_named_after_the_policy() -> None:
+    assert run_folder(None, "ws://host:8000", False).name.startswith("host-8000-")
+    with pytest.raises(BadChoice, match="needs --out"):
+        run_folder(None, "hold", True)
