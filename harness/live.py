@@ -74,14 +74,15 @@ class Layout:
 class LiveSnapshot(Snapshot):
     """A `Snapshot` of a running world: the same values, computed when first asked for."""
 
-    __slots__ = ("_commanded", "_ends", "_layout", "_packed", "_qpos", "_table")
+    __slots__ = ("_commanded", "_ends", "_layout", "_packed", "_qpos", "_rows", "_table")
 
     _packed: bytes
-    _table: PoseTable
+    _rows: Mapping[str, int]
     _layout: Layout
     _commanded: tuple[Trajectory, int]
     _qpos: tuple[Any, Any]
-    _ends: tuple[Pose, Pose] | None
+    _table: PoseTable
+    _ends: tuple[Pose, Pose]
 
     def __init__(
         self,
@@ -94,19 +95,23 @@ class LiveSnapshot(Snapshot):
         contacts: tuple[Contact, ...],
     ) -> None:
         """`commanded`: the trajectory and the row reached; `qpos` of both arms."""
-        _put(self, "time", time)
-        _put(self, "contacts", contacts)
-        _put(self, "_packed", packed)
-        _put(self, "_table", PoseTable(packed, rows))
-        _put(self, "_layout", layout)
-        _put(self, "_commanded", commanded)
-        _put(self, "_qpos", qpos)
-        _put(self, "_ends", None)
+        _time(self, time)
+        _contacts(self, contacts)
+        _packed(self, packed)
+        _rows(self, rows)
+        _layout(self, layout)
+        _commanded(self, commanded)
+        _qpos(self, qpos)
 
     @property
     def poses(self) -> Mapping[str, Pose]:
         """Poses of the objects that exist."""
-        return self._table
+        try:
+            return self._table
+        except AttributeError:
+            table = PoseTable(self._packed, self._rows)
+            _put(self, "_table", table)
+            return table
 
     @property
     def gripper(self) -> tuple[float, float]:
@@ -118,14 +123,14 @@ class LiveSnapshot(Snapshot):
     @property
     def end_effector(self) -> tuple[Pose, Pose]:
         """Measured end-effector frames."""
-        ends = self._ends
-        if ends is None:
+        try:
+            return self._ends
+        except AttributeError:
             left, right = (
                 _upright(unpack(self._packed, row) * tool) for row, tool in self._layout.tools
             )
-            ends = (left, right)
-            _put(self, "_ends", ends)
-        return ends
+            _put(self, "_ends", (left, right))
+            return left, right
 
     @property
     def joints(self) -> Pair:
@@ -145,6 +150,21 @@ class LiveSnapshot(Snapshot):
             )
         )
         return left, right
+
+
+# Slots of a frozen class can only be filled from outside; their descriptors do so fastest.
+_time, _contacts, _packed, _rows, _layout, _commanded, _qpos = (
+    getattr(cls, name).__set__
+    for cls, name in (
+        (Snapshot, "time"),
+        (Snapshot, "contacts"),
+        (LiveSnapshot, "_packed"),
+        (LiveSnapshot, "_rows"),
+        (LiveSnapshot, "_layout"),
+        (LiveSnapshot, "_commanded"),
+        (LiveSnapshot, "_qpos"),
+    )
+)
 
 
 def _upright(pose: Pose) -> Pose:
