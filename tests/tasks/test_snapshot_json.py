@@ -1,0 +1,39 @@
+"""Snapshots survive JSON."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from robospa.tasks.geometry import Pose
+from robospa.tasks.snapshot import Contact, Snapshot, snapshot_from_json, snapshot_to_json
+
+SNAPSHOT = Snapshot(
+    time=1.25,
+    poses={"one": Pose((0.1, 0.2, 0.3), (0.6, 0.0, 0.8, 0.0))},
+    gripper=(0.0, 1.0),
+    end_effector=(Pose(), Pose((1.0, 2.0, 3.0))),
+    joints=((0.1, 0.2), (0.3, 0.4)),
+    measured=((0.11, 0.21), (0.31, 0.41)),
+)
+
+
+def test_a_snapshot_comes_back_from_json() -> None:
+    assert snapshot_from_json(json.loads(json.dumps(snapshot_to_json(SNAPSHOT)))) == SNAPSHOT
+
+
+def test_poses_are_position_then_quaternion() -> None:
+    assert snapshot_to_json(SNAPSHOT)["poses"]["one"] == [0.1, 0.2, 0.3, 0.6, 0.0, 0.8, 0.0]
+
+
+def test_contacts_stay_with_goals() -> None:
+    touching = Snapshot(
+        0.0, {}, (0.0, 0.0), (Pose(), Pose()), contacts=(Contact("a", "b", (0,) * 3),)
+    )
+    assert "contacts" not in snapshot_to_json(touching)
+
+
+def test_something_else_is_refused() -> None:
+    with pytest.raises(KeyError):
+        snapshot_from_json({"time": 0.0})
