@@ -51,7 +51,8 @@ class World(Protocol):
     def load(self, scene: Scene, contacts: bool = False) -> None:
         """Build `scene` afresh and settle it; nothing of an earlier trial survives.
 
-        Simulated time is 0 afterwards. `contacts`: fill `Snapshot.contacts` when polling (costs time). Raises SceneUnstable.
+        Simulated time is 0 afterwards. `contacts`: fill `Snapshot.contacts` when polling (costs
+        time). Raises SceneUnstable.
         """
 
     def step(self, action: NDArray[np.float32], space: str, poll: Poll) -> StepResult:
