@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.harness.world import ActionError, World
+from robospa.protocol.checks import check_chunk
 from robospa.protocol.errors import PolicyAnswerError
 from robospa.protocol.policy import Policy, PolicySpec, TrialInfo
 from robospa.results.records import TrialKey, TrialRecord
@@ -31,9 +32,6 @@ from robospa.tasks.events import Event, outcome
 from robospa.tasks.scene import Scene
 from robospa.tasks.snapshot import Snapshot
 from robospa.tasks.task import Task, Tracker
-
-SIZES = {"joint": (14, 16), "ee": (16,), "delta_ee": (16, 14)}
-"""Action sizes that any embodiment of ours takes; the world checks the exact one."""
 
 
 class Recorder(Protocol):
@@ -75,31 +73,6 @@ def policy_seed(key: TrialKey, run_seed: int = 0) -> int:
     """The seed that a stochastic policy gets for `key`: the same in every worker and order."""
     digest = hashlib.sha256(f"{run_seed}/{key.slug}".encode()).digest()
     return int.from_bytes(digest[:4], "big") >> 1
-
-
-def check_chunk(answer: object, spec: PolicySpec) -> NDArray[np.float32]:
-    """`answer` as float32 (T, D); PolicyAnswerError says which rule of the spec it breaks."""
-    try:
-        chunk = np.asarray(answer, dtype=np.float32)
-    except (TypeError, ValueError) as error:
-        raise PolicyAnswerError(f"the policy answered no array of numbers: {error}") from error
-    sizes = SIZES.get(spec.action, ())
-    if chunk.ndim != 2 or chunk.shape[0] < 1 or (sizes and chunk.shape[1] not in sizes):
-        wanted = " or ".join(map(str, sizes))
-        raise PolicyAnswerError(
-            f"the policy answered an array of shape {chunk.shape}; "
-            f"a chunk of {spec.action!r} actions has shape (T, {wanted}) with T >= 1"
-        )
-    if chunk.shape[0] > spec.horizon:
-        raise PolicyAnswerError(
-            f"the policy answered {chunk.shape[0]} actions; its spec allows {spec.horizon} a chunk"
-        )
-    if not np.isfinite(chunk).all():
-        row, column = np.argwhere(~np.isfinite(chunk))[0]
-        raise PolicyAnswerError(
-            f"the policy answered {chunk[row, column]} in action {row}, dimension {column}"
-        )
-    return np.ascontiguousarray(chunk)
 
 
 class _Stopwatch:

@@ -34,7 +34,9 @@ def check_chunk(answer: Any, spec: PolicySpec) -> NDArray[np.float32]:
     finite = np.isfinite(chunk)
     if not finite.all():
         row, column = np.argwhere(~finite)[0]
-        raise PolicyAnswerError(f"action {row}, number {column} of the chunk is not finite")
+        raise PolicyAnswerError(
+            f"the policy answered {chunk[row, column]} in action {row}, dimension {column}"
+        )
     return chunk
 
 

@@ -91,12 +91,12 @@ def test_long_history_offsets_reach_back_over_chunks() -> None:
     ("answer", "words"),
     [
         (np.full((2, 14), np.inf), "inf in action 0"),
-        (np.zeros((2, 13)), "shape (2, 13)"),
+        (np.zeros((2, 13)), "13 numbers per action"),
         (np.zeros((0, 14)), "shape (0, 14)"),
-        (np.zeros((5, 14)), "5 actions"),
+        (np.zeros((5, 14)), "shape (5, 14)"),
         (np.zeros(14), "shape (14,)"),
-        ("up", "no array"),
-        ({"actions": 1}, "no array"),
+        ("up", "answered str"),
+        ({"actions": 1}, "answered dict"),
     ],
 )
 def test_a_bad_answer_is_a_failure_with_the_reason(answer: object, words: str) -> None:

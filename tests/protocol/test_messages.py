@@ -194,8 +194,8 @@ def test_specs_are_compared_by_field() -> None:
         (np.zeros((0, 14), np.float32), r"\(0, 14\)"),
         (np.zeros((5, 14), np.float32), "horizon 4"),
         (np.zeros((2, 13), np.float32), "13 numbers"),
-        (np.full((2, 14), np.nan, np.float32), "action 0, number 0"),
-        (np.full((2, 14), 1e300), "not finite"),
+        (np.full((2, 14), np.nan, np.float32), "nan in action 0"),
+        (np.full((2, 14), 1e300), "inf in action 0"),
     ],
 )
 def test_chunks_that_cannot_be_executed(answer: Any, reason: str) -> None:
