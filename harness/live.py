@@ -19,6 +19,8 @@ from robospa.tasks.snapshot import Contact, Snapshot
 FLOATS = 7
 """Numbers of a pose in SAPIEN's packed form: qw qx qy qz, x y z, float32."""
 _POSE = struct.Struct(f"<{FLOATS}f")
+_HEIGHT = struct.Struct("<f")
+_Z = _POSE.size - _HEIGHT.size  # a pose ends in its z
 
 Pair = tuple[tuple[float, ...], tuple[float, ...]]
 _put = object.__setattr__
@@ -112,6 +114,11 @@ class LiveSnapshot(Snapshot):
             table = PoseTable(self._packed, self._rows)
             _put(self, "_table", table)
             return table
+
+    def height(self, name: str) -> float:
+        """Height [m] of the object's origin: goals ask for it of every object at every poll."""
+        z: float = _HEIGHT.unpack_from(self._packed, _POSE.size * self._rows[name] + _Z)[0]
+        return z
 
     @property
     def gripper(self) -> tuple[float, float]:

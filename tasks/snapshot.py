@@ -47,6 +47,10 @@ class Snapshot:
     measured: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())
     contacts: tuple[Contact, ...] = field(default=())
 
+    def height(self, name: str) -> float:
+        """Height [m] of the origin of the object called `name`."""
+        return self.poses[name].position[2]
+
     def gripper_contacts(self, name: str) -> list[Contact]:
         """Contacts between any gripper and the object called `name`."""
         grippers = ("left_gripper", "right_gripper")

@@ -73,20 +73,20 @@ class Handling:
         """`grasped` and `dropped` events of this instant."""
         events: tuple[Event, ...] = ()
         time = snapshot.time
+        poses = snapshot.poses
         for name in self._names:
-            pose = snapshot.poses.get(name)
-            if pose is None:
+            if name not in poses:
                 continue
-            z = pose.position[2]
+            z = snapshot.height(name)
             before_time, before = self._last.get(name, (time - 0.02, z))
             self._last[name] = (time, z)
             self._rest.setdefault(name, z)
             if name not in self._lifted:
                 if z != before:
-                    events += self._raised(snapshot, name, pose.position)
+                    events += self._raised(snapshot, name, poses[name].position)
             else:
                 speed = (before - z) / max(time - before_time, 1e-6)
-                events += self._carried(snapshot, name, pose.position, speed)
+                events += self._carried(snapshot, name, poses[name].position, speed)
         return events
 
     def _raised(self, snapshot: Snapshot, name: str, at: Vec3) -> tuple[Event, ...]:

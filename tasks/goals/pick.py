@@ -68,10 +68,10 @@ class PickTracker:
     def start(self, snapshot: Snapshot) -> tuple[Event, ...]:
         """Remember the heights of the settled scene."""
         self._begin()
-        self._heights = [snapshot.poses[name].position[2] for name in self.others]
+        self._heights = [snapshot.height(name) for name in self.others]
         heights = [] if self.lift.above is None else [self.lift.above]
         if self.lift.rise is not None:
-            heights.append(snapshot.poses[self.target].position[2] + self.lift.rise)
+            heights.append(snapshot.height(self.target) + self.lift.rise)
         self._goal_height = max(heights)
         return self._handling.update(snapshot)
 
@@ -80,9 +80,9 @@ class PickTracker:
         if self._done:
             return ()
         events = self._handling.update(snapshot)
-        poses, steady = snapshot.poses, True
+        steady = True
         for name, start in zip(self.others, self._heights, strict=True):
-            rise = poses[name].position[2] - start
+            rise = snapshot.height(name) - start
             if self.lift.steady is not None and abs(rise) > self.lift.steady:
                 steady = False
             if rise > WRONG and name not in self._wrong:
@@ -90,7 +90,7 @@ class PickTracker:
                 events += (Event(snapshot.time, "wrong_object", name),)
             elif rise < BACK:
                 self._wrong.discard(name)
-        if steady and poses[self.target].position[2] > self._goal_height and self._held(snapshot):
+        if steady and snapshot.height(self.target) > self._goal_height and self._held(snapshot):
             self._done = True
             events += (
                 Event(snapshot.time, "subtask_done", self.target, 0),
