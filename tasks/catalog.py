@@ -46,8 +46,8 @@ def task(name: str) -> Task:
     if plain(name) in known:
         return known[plain(name)]
     near = difflib.get_close_matches(plain(name), list(known), n=3, cutoff=0.5)
-    hint = ", ".join(known[n].name for n in near) or "see `robospa tasks`"
-    raise KeyError(f"no task {name!r}; did you mean {hint}?")
+    hint = f"did you mean {', '.join(known[n].name for n in near)}?" if near else ""
+    raise KeyError(f"no task {name!r}; {hint or 'see `robospa tasks` for all of them'}")
 
 
 def build_scene(
