@@ -54,6 +54,11 @@ class Oracle:
             self._expert = Expert(self._scene, snapshot)
         return self._expert.next(snapshot)
 
+    @property
+    def trouble(self) -> tuple[str, ...]:
+        """What the expert could not do in this trial, one sentence each."""
+        return tuple(self._expert.trouble) if self._expert is not None else ()
+
 
 def create() -> Oracle:
     """A new oracle, one per connection."""
