@@ -1,0 +1,34 @@
+"""The shipped lists of accepted seeds."""
+
+from __future__ import annotations
+
+import pytest
+from robospa.tasks.catalog import LEVELS, tasks
+from robospa.tasks.seeds import FIRST_SEED, PER_VARIANT, accepted, seed_list_hash
+
+VARIANTS = [(name, level) for name in tasks() for level in LEVELS]
+
+
+@pytest.mark.parametrize(("name", "level"), VARIANTS)
+def test_every_variant_ships_its_seeds(name: str, level: int) -> None:
+    seeds = accepted(name, level)
+    assert len(seeds) == PER_VARIANT
+    assert list(seeds) == sorted(set(seeds))
+    assert seeds[0] >= FIRST_SEED
+
+
+@pytest.mark.parametrize(("name", "level"), VARIANTS)
+def test_the_expert_solves_nearly_every_seed(name: str, level: int) -> None:
+    # the list holds the first accepted seeds: its span shows how many were refused
+    assert accepted(name, level)[-1] - FIRST_SEED < PER_VARIANT / 0.98
+
+
+def test_a_variant_without_a_list_says_how_to_make_it() -> None:
+    with pytest.raises(LookupError, match="robospa seeds"):
+        accepted("Pick_Blocks_Size", 6)
+
+
+def test_the_hash_depends_on_the_variants_not_on_their_order() -> None:
+    one, other = ("Pick_Blocks_Size", 1), ("Press_Stapler_Repeat", 2)
+    assert seed_list_hash([one, other]) == seed_list_hash([other, one])
+    assert seed_list_hash([one]) != seed_list_hash([one, other])
