@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+
 from robospa.tasks.catalog import LEVELS, tasks
 from robospa.tasks.seeds import FIRST_SEED, PER_VARIANT, accepted, seed_list_hash
 
