@@ -5,9 +5,9 @@ distribution is known: the n-th convolution power of the outcomes' histogram (fo
 binomial). So a resample of a variant costs one number instead of n. `resample_episodes` is the slow
 way, kept as the reference that the tests hold the fast one to.
 
-What it answers: the same tasks with other seeds. `draw_over_tasks` resamples the tasks as well. Where
-all outcomes of a variant are equal its resamples are all equal too, so a percentile interval there
-is a point: see `robospa.results.intervals` for what to print instead.
+What it answers: the same tasks with other seeds. `draw_over_tasks` resamples the tasks as well.
+Where all outcomes of a variant are equal its resamples are all equal too, so a percentile interval
+there is a point: see `robospa.results.intervals` for what to print instead.
 """
 
 from __future__ import annotations
@@ -40,9 +40,9 @@ class Sample:
 
     def __post_init__(self) -> None:
         if sum(self.counts) < 1 or min(self.counts) < 0 or len(self.counts) < 2:
-            raise ValueError(f"{self.counts} are no counts of outcomes: at least one trial, 0 and 1")
+            raise ValueError(f"{self.counts} are no counts of the outcomes of trials")
         if self.scale <= 0:
-            raise ValueError(f"a scale of {self.scale} turns outcomes around; it has to be positive")
+            raise ValueError(f"a scale of {self.scale} is not positive")
 
     @property
     def trials(self) -> int:
@@ -101,7 +101,8 @@ def _chances(counts: tuple[int, ...]) -> NDArray[np.float64]:
     size = trials * (len(counts) - 1) + 1
     spectrum = np.fft.rfft(np.array(counts) / trials, n=size)
     chances: NDArray[np.float64] = np.fft.irfft(spectrum**trials, n=size).clip(min=0.0)
-    return chances / chances.sum()
+    chances /= chances.sum()
+    return chances
 
 
 @lru_cache(maxsize=1024)
@@ -109,9 +110,9 @@ def _deck(counts: tuple[int, ...]) -> NDArray[np.uint16]:
     """The sum that belongs to each of GRID equally likely random numbers."""
     cumulated = np.rint(np.cumsum(_chances(counts)) * GRID).astype(np.int64)
     cumulated[-1] = GRID
-    return np.repeat(
-        np.arange(len(cumulated), dtype=np.uint16), np.diff(cumulated, prepend=0).clip(min=0)
-    )
+    sums = np.arange(len(cumulated), dtype=np.uint16)
+    deck: NDArray[np.uint16] = np.repeat(sums, np.diff(cumulated, prepend=0).clip(min=0))
+    return deck
 
 
 def draw(
