@@ -47,7 +47,10 @@ def boschloo(first: Sample, second: Sample) -> float:
     n, m = first.trials, second.trials
     if max(n, m) > LARGEST:
         raise ValueError(f"Boschloo's test of {max(n, m)} trials takes too long: use the interval")
-    return min(1.0, 2 * min(_boschloo_less(a, n, b, m), _boschloo_less(b, m, a, n)))
+    if a * m == b * n:
+        return 1.0
+    less = _boschloo_less(a, n, b, m) if a * m < b * n else _boschloo_less(b, m, a, n)
+    return min(1.0, 2 * less)
 
 
 def p_of_interval(found: Estimate) -> float:
@@ -127,20 +130,20 @@ def _log_choose(n: int, k: int) -> float:
 
 @lru_cache(maxsize=4096)
 def _boschloo_less(a: int, n: int, b: int, m: int) -> float:
-    """One-sided p of "the first rate is smaller": Fisher's p is only the order of the tables."""
+    """One-sided p of "the first rate is smaller": Fisher's p is only the order of the tables.
+
+    For each first count the tables at least as extreme are those from some second count on.
+    """
     order = _fisher_less(n, m)
-    region = (order <= order[a, b] * (1 + 1e-9)).astype(float)
+    starts = (order > order[a, b] * (1 + 1e-9)).sum(axis=1)
 
-    def chance(rates: NDArray[np.float64]) -> NDArray[np.float64]:
-        found: NDArray[np.float64] = np.sum(
-            (_binomial(n, rates) @ region) * _binomial(m, rates), axis=1
-        )
-        return found
+    def chance(low: float, high: float, steps: int) -> NDArray[np.float64]:
+        first, second = _tables(n, low, high, steps)[0], _tables(m, low, high, steps)[1]
+        return np.asarray(np.einsum("ra,ra->r", first, second[:, starts]), dtype=np.float64)
 
-    coarse = np.linspace(0.0, 1.0, 201)
-    top = int(np.argmax(chance(coarse)))
-    fine = np.linspace(coarse[max(0, top - 1)], coarse[min(200, top + 1)], 101)
-    return float(chance(fine).max())
+    top = int(np.argmax(chance(0.0, 1.0, 201)))
+    around = chance(max(0, top - 1) / 200, min(200, top + 1) / 200, 101)
+    return float(around.max())
 
 
 @lru_cache(maxsize=64)
@@ -156,17 +159,21 @@ def _fisher_less(n: int, m: int) -> NDArray[np.float64]:
     return table
 
 
-def _binomial(n: int, rates: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Probability of every count of `n` trials for every rate, shape [rates, n + 1]."""
-    return _tables(n, rates.tobytes())
+@lru_cache(maxsize=256)
+def _tables(
+    n: int, low: float, high: float, steps: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """P(count = k) and P(count >= k) of `n` trials for rates from `low` to `high`.
 
-
-@lru_cache(maxsize=8)
-def _tables(n: int, packed: bytes) -> NDArray[np.float64]:
-    rates = np.frombuffer(packed)[:, None]
+    Shapes [steps, n + 1] and [steps, n + 2]: the last column is 0.
+    """
+    rates = np.linspace(low, high, steps)[:, None]
     counts = np.arange(n + 1)
     ways = np.array([_log_choose(n, k) for k in range(n + 1)])
     with np.errstate(divide="ignore", invalid="ignore"):
         ups = np.where(counts == 0, 0.0, counts * np.log(rates))
         downs = np.where(counts == n, 0.0, (n - counts) * np.log1p(-rates))
-    return np.asarray(np.exp(ways + ups + downs), dtype=np.float64)
+    chances = np.asarray(np.exp(ways + ups + downs), dtype=np.float64)
+    tails = np.zeros((steps, n + 2))
+    tails[:, :-1] = chances[:, ::-1].cumsum(axis=1)[:, ::-1]
+    return chances, tails
