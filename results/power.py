@@ -1,0 +1,88 @@
+"""How many trials it takes to tell two success rates apart, before running them.
+
+Normal approximations, good to a few percent from about 20 trials on: the arcsine formula for
+unrelated seeds, the variance of the discordant pairs for equal seeds. Two policies on equal seeds
+tend to succeed on the same ones; the correlation of their outcomes is what pairing gains from.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from statistics import NormalDist
+
+POWER = 0.8
+ALPHA = 0.05
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Trials a side that tell `base` from `other`; `paired` by correlation of the outcomes."""
+
+    base: float
+    other: float
+    unpaired: int
+    paired: dict[float, int]
+
+
+def trials_unpaired(base: float, other: float, power: float = POWER, alpha: float = ALPHA) -> int:
+    """Trials a side, each on seeds of its own, to tell the rates apart with probability `power`."""
+    _check(base, other)
+    gap = 2 * math.asin(math.sqrt(other)) - 2 * math.asin(math.sqrt(base))
+    return math.ceil(2 * (_z(power, alpha) / gap) ** 2)
+
+
+def trials_paired(
+    base: float, other: float, correlation: float, power: float = POWER, alpha: float = ALPHA
+) -> int:
+    """Common seeds needed if outcomes on one seed have this (phi) `correlation`."""
+    _check(base, other)
+    normal, gap = NormalDist(), other - base
+    apart = discordant(base, other, correlation)
+    spread = math.sqrt(max(0.0, apart - gap * gap))
+    reach = normal.inv_cdf(1 - alpha / 2) * math.sqrt(apart) + normal.inv_cdf(power) * spread
+    return math.ceil((reach / gap) ** 2)
+
+
+def power_paired(
+    base: float, other: float, correlation: float, seeds: int, alpha: float = ALPHA
+) -> float:
+    """Probability that McNemar's test on `seeds` common seeds tells the rates apart."""
+    normal, gap = NormalDist(), abs(other - base)
+    apart = discordant(base, other, correlation)
+    spread = math.sqrt(max(1e-12, apart - gap * gap))
+    need = normal.inv_cdf(1 - alpha / 2) * math.sqrt(apart)
+    return normal.cdf((gap * math.sqrt(seeds) - need) / spread)
+
+
+def discordant(base: float, other: float, correlation: float) -> float:
+    """Share of seeds on which only one of two succeeds; ValueError if no such pair of rates is."""
+    together = base * other + correlation * math.sqrt(base * (1 - base) * other * (1 - other))
+    if not max(0.0, base + other - 1) - 1e-12 <= together <= min(base, other) + 1e-12:
+        raise ValueError(f"rates of {base:.0%} and {other:.0%} cannot correlate at {correlation:g}")
+    return base + other - 2 * together
+
+
+def plan(
+    base: float, gap: float, correlations: Sequence[float] = (0.25, 0.5), power: float = POWER
+) -> Plan:
+    """What it takes to tell `base` from `base + gap`; impossible correlations are left out."""
+    other = base + gap
+    paired = {}
+    for correlation in correlations:
+        try:
+            paired[correlation] = trials_paired(base, other, correlation, power)
+        except ValueError:
+            continue
+    return Plan(base, other, trials_unpaired(base, other, power), paired)
+
+
+def _z(power: float, alpha: float) -> float:
+    normal = NormalDist()
+    return normal.inv_cdf(1 - alpha / 2) + normal.inv_cdf(power)
+
+
+def _check(base: float, other: float) -> None:
+    if not (0 <= base <= 1 and 0 <= other <= 1) or base == other:
+        raise ValueError(f"{base:g} and {other:g} are not two different rates between 0 and 1")
