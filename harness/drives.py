@@ -113,11 +113,6 @@ class Drives:
             for write in arm.velocity:
                 write(0.0)
 
-    @property
-    def columns(self) -> tuple[tuple[int, ...], ...]:
-        """Where the arm joints are in the qpos of left and right."""
-        return tuple(tuple(arm.columns) for arm in self._arms)
-
     def measured(self) -> Pair:
         """Measured joints [rad] of left and right."""
         left, right = (

@@ -8,9 +8,8 @@ It does not change when the world moves on.
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 from robospa.harness.motion import Trajectory
 from robospa.tasks.geometry import Pose
@@ -65,24 +64,22 @@ class PoseTable(Mapping[str, Pose]):
 class Layout:
     """What the rows and columns of a state mean: of one embodiment in one scene.
 
-    `tools` are, per arm, the row of the last link and the end-effector frame in it; `columns` the
-    arm joints' places in qpos.
+    `tools` are, per arm, the row of the last link and the end-effector frame in it.
     """
 
     tools: tuple[tuple[int, Pose], ...]
-    columns: tuple[tuple[int, ...], ...]
 
 
 class LiveSnapshot(Snapshot):
     """A `Snapshot` of a running world: the same values, computed when first asked for."""
 
-    __slots__ = ("_commanded", "_ends", "_layout", "_packed", "_qpos", "_rows", "_table")
+    __slots__ = ("_commanded", "_ends", "_layout", "_measure", "_packed", "_rows", "_table")
 
     _packed: bytes
     _rows: Mapping[str, int]
     _layout: Layout
     _commanded: tuple[Trajectory, int]
-    _qpos: tuple[Any, Any]
+    _measure: Callable[[], Pair]
     _table: PoseTable
     _ends: tuple[Pose, Pose]
 
@@ -93,17 +90,17 @@ class LiveSnapshot(Snapshot):
         rows: Mapping[str, int],
         layout: Layout,
         commanded: tuple[Trajectory, int],
-        qpos: tuple[Any, Any],
+        measure: Callable[[], Pair],
         contacts: tuple[Contact, ...],
     ) -> None:
-        """`commanded`: the trajectory and the row reached; `qpos` of both arms."""
+        """`commanded`: the trajectory and the row reached; `measure` gives the measured joints."""
         _time(self, time)
         _contacts(self, contacts)
         _packed(self, packed)
         _rows(self, rows)
         _layout(self, layout)
         _commanded(self, commanded)
-        _qpos(self, qpos)
+        _measure(self, measure)
 
     @property
     def poses(self) -> Mapping[str, Pose]:
@@ -148,19 +145,12 @@ class LiveSnapshot(Snapshot):
 
     @property
     def measured(self) -> Pair:
-        """Measured joints."""
-        left, right = (
-            tuple([values[c] for c in columns])
-            for values, columns in (
-                (qpos.tolist(), columns)
-                for qpos, columns in zip(self._qpos, self._layout.columns, strict=True)
-            )
-        )
-        return left, right
+        """Measured joints; RuntimeError if a poll's snapshot is asked after the world moved on."""
+        return self._measure()
 
 
 # Slots of a frozen class can only be filled from outside; their descriptors do so fastest.
-_time, _contacts, _packed, _rows, _layout, _commanded, _qpos = (
+_time, _contacts, _packed, _rows, _layout, _commanded, _measure = (
     getattr(cls, name).__set__
     for cls, name in (
         (Snapshot, "time"),
@@ -169,7 +159,7 @@ _time, _contacts, _packed, _rows, _layout, _commanded, _qpos = (
         (LiveSnapshot, "_rows"),
         (LiveSnapshot, "_layout"),
         (LiveSnapshot, "_commanded"),
-        (LiveSnapshot, "_qpos"),
+        (LiveSnapshot, "_measure"),
     )
 )
 

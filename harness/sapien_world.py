@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 
 from robospa.harness.actions import ActionReader
 from robospa.harness.drives import Drives
-from robospa.harness.live import Layout, LiveSnapshot, PoseTable, unpack
+from robospa.harness.live import Layout, LiveSnapshot, Pair, PoseTable, unpack
 from robospa.harness.motion import RATE, Trajectory, fixed_rate, rest_to_rest
 from robospa.harness.physics import Physics
 from robospa.harness.robots import embodiment as embodiment_named
@@ -89,8 +90,7 @@ class SapienWorld:
             tuple(
                 (physics.links[a][arm.last_link], arm.tool)
                 for a, arm in enumerate(self._embodiment.arms)
-            ),
-            self._drives.columns,
+            )
         )
         self._later = sorted(
             (math.ceil(item.appears_at * RATE - 1e-9), i)
@@ -162,7 +162,9 @@ class SapienWorld:
             drives.now = (path, done - 1)
             if self._later:
                 self._appear(physics)
-            if self._steps % POLL_STEPS == 0 and poll(self.snapshot()):
+            if self._steps % POLL_STEPS == 0 and poll(
+                self._snapshot(partial(self._measured_at, self._steps))
+            ):
                 drives.halt()
                 return done, True
         return done, False
@@ -171,17 +173,27 @@ class SapienWorld:
 
     def snapshot(self) -> Snapshot:
         """The state at this instant."""
+        self._loaded()
+        measured = self._drives.measured()
+        return self._snapshot(lambda: measured)
+
+    def _snapshot(self, measure: Callable[[], Pair]) -> Snapshot:
         physics = self._loaded()
-        left, right = physics.arms
         return LiveSnapshot(
             self._steps / RATE,
             physics.packed(),
             physics.rows,
             self._layout,
             self._drives.now,
-            (left.qpos, right.qpos),
+            measure,
             physics.contacts() if self._contacts else (),
         )
+
+    def _measured_at(self, steps: int) -> Pair:
+        """Measured joints for a poll: read only if asked for, because that costs microseconds."""
+        if steps != self._steps:
+            raise RuntimeError("a poll's measured joints were asked for after the world moved on")
+        return self._drives.measured()
 
     def observe(self, spec: PolicySpec) -> dict[str, Any]:
         """Images, state and poses that `spec` asks for; see `robospa.protocol.policy`.
