@@ -52,6 +52,8 @@ class Cell:
     trials: int
     successes: int
     values: Mapping[str, Estimate | None]
+    candidates: int = 0
+    """The n of ONTA; 0 where it does not apply or trials disagree on it."""
 
     @property
     def missing(self) -> int:
@@ -108,14 +110,15 @@ def score_cell(
     successes = sum(r.success for r in records)
     sr = wilson(successes, count) if count else None
     values: dict[str, Estimate | None] = {"sr": sr}
+    candidates = 0
     if category in SPATIAL:
-        candidates = {r.candidates for r in records}
-        fit = sr is not None and len(candidates) == 1 and min(candidates) > 1
-        values["onta"] = chance_corrected(sr, min(candidates)) if sr and fit else None
+        found = {r.candidates for r in records}
+        candidates = found.pop() if len(found) == 1 else 0
+        values["onta"] = chance_corrected(sr, candidates) if sr and candidates > 1 else None
     elif category in PROCEDURAL:
         shares = np.array([r.done / r.total if r.total else float(r.success) for r in records])
         values["ps"] = bootstrap_mean(shares, _seed(task, level)) if count else None
-    return Cell(task, level, category, listed, count, successes, values)
+    return Cell(task, level, category, listed, count, successes, values, candidates)
 
 
 def _join(parts: Sequence[Cell | Average]) -> Average:
@@ -172,8 +175,14 @@ def score(
     for (task, level), members in listed.items():
         found = [records[k] for k in members if k in records and finished(records[k])]
         cells[task, level] = score_cell(task, level, category.get(task, ""), len(members), found)
+    return combine(cells)
+
+
+def combine(cells: Mapping[tuple[str, int], Cell]) -> Scores:
+    """All averages above `cells`."""
     levels = tuple(sorted({level for _, level in cells}))
-    names = list(dict.fromkeys(task for task, _ in cells))
+    category = {task: cell.category for (task, _), cell in cells.items()}
+    names = list(category)
     tasks = {t: _join([cells[t, n] for n in levels if (t, n) in cells]) for t in names}
 
     def cell_or_mean(task: str, level: int) -> Cell | Average | None:
