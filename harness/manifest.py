@@ -21,6 +21,7 @@ from typing import Any
 from robospa.harness.store import replace_file
 from robospa.results.reading import MANIFEST, RunError, manifest_keys, read_manifest
 from robospa.results.records import TrialKey
+from robospa.tasks.scene import SUITE
 
 FORMAT = 1
 
@@ -39,6 +40,7 @@ class Manifest:
         """Plain JSON values."""
         return {
             "format": FORMAT,
+            "suite": SUITE,
             "settings": json.loads(json.dumps(self.settings)),
             "seed_hash": seed_hash(self.keys),
             "categories": dict(self.categories),

@@ -25,14 +25,15 @@ def rounded(value: float, digits: int = 1) -> float:
     The scaled double decides what is half, so -1.25 that is -1.2499... in binary becomes -1.2: as
     in the paper, which this reproduces where exact arithmetic and rounding of decimals do not.
     """
-    scale = 10**digits
+    scale = 10.0**digits
     return math.copysign(math.floor(abs(value) * scale + 0.5) / scale, value) + 0.0
 
 
 def is_tie(value: float, digits: int = 1) -> bool:
     """Whether `value` lies halfway between two printable numbers, but for binary noise."""
-    scaled = abs(value) * 10**digits
-    return abs(scaled - math.floor(scaled) - 0.5) < 1e-9
+    scaled = abs(value) * 10.0**digits
+    distance = abs(scaled - math.floor(scaled) - 0.5)
+    return distance < 1e-9
 
 
 def text(value: float, digits: int = 1) -> str:
