@@ -147,6 +147,26 @@ def paired_difference(only_first: int, only_second: int, trials: int, z: float =
     return Estimate(value, low, high, "Tango")
 
 
+def paired_sample_difference(gaps: Sample) -> Estimate:
+    """Mean of the differences of pairs: `gaps` has as many outcomes below 0 as above.
+
+    Tango's interval for success rates, the bootstrap for progress. Where no pair differs, the
+    interval is that of 0/1 outcomes, which vary the most.
+    """
+    reach = (len(gaps.counts) - 1) // 2
+    if gaps.shift != -reach * gaps.scale:
+        raise ValueError("differences of pairs reach as far below zero as above")
+    if reach > 1 and not gaps.constant:
+        return _percentile(gaps.value, draw([gaps], [1.0]), "bootstrap")
+    if 0 < abs(gaps.total - reach * gaps.trials) < reach * gaps.trials and reach > 1:
+        found = paired_difference(0, 0, gaps.trials)  # all differ by the same part of a whole
+        return replace(
+            _affine(found, reach * gaps.scale, gaps.value), method="Tango, as for equals"
+        )
+    found = paired_difference(gaps.counts[-1], gaps.counts[0], gaps.trials)
+    return _affine(found, reach * gaps.scale, 0.0)
+
+
 def bootstrap_mean(
     values: NDArray[np.float64], seed: int = 0, resamples: int = RESAMPLES
 ) -> Estimate:

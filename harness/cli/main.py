@@ -17,6 +17,7 @@ COMMANDS = {
     "check": "Test a policy server against the protocol.",
     "eval": "Evaluate the policy behind a URL.",
     "report": "Turn a run into tables, a figure and a page with its videos.",
+    "compare": "Compare two runs, or a run and published numbers; plan sample sizes.",
     "tasks": "List the tasks; show, draw or collect their scenes.",
     "seeds": "Make the lists of accepted seeds, or measure the expert.",
 }

@@ -1,0 +1,185 @@
+"""`robospa compare`: two runs, or a run and a published model; or how many trials it would take."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from robospa.results.compare import Comparison, Difference
+    from robospa.results.sides import Side
+
+GAPS = (0.02, 0.05, 0.1, 0.2)
+"""Differences of rates in the table of sample sizes."""
+
+
+class Metric(StrEnum):
+    """What is compared."""
+
+    sr = "sr"
+    onta = "onta"
+    ps = "ps"
+
+
+class Method(StrEnum):
+    """How intervals are made."""
+
+    wilson = "wilson"
+    exact = "exact"
+    jeffreys = "jeffreys"
+    bootstrap = "bootstrap"
+
+
+def compare(
+    first: Annotated[str, typer.Argument(help="folder of a run, or a published model")] = "",
+    second: Annotated[str, typer.Argument(help="what it is compared with")] = "",
+    metric: Annotated[Metric, typer.Option(help="what is compared")] = Metric.sr,
+    ci: Annotated[Method, typer.Option(help="intervals of single rates")] = Method.wilson,
+    variants: Annotated[bool, typer.Option(help="list all variants, not only those apart")] = False,
+    drops: Annotated[bool, typer.Option(help="what each side loses from level to level")] = False,
+    early: Annotated[
+        bool, typer.Option(help="who is ahead, valid at any time of unfinished runs")
+    ] = False,
+    power: Annotated[bool, typer.Option(help="trials it takes to tell rates apart")] = False,
+    base: Annotated[float, typer.Option(help="with --power: rate of the first")] = 0.2,
+    json: Annotated[Path | None, typer.Option(help="also write all of it as JSON")] = None,
+) -> None:
+    """Say what differs between two runs on the same seeds, or between a run and the paper."""
+    if power:
+        _print_power(base)
+        return
+    if not (first and second):
+        raise ValueError("compare needs two sides: folders of runs, or names of published models")
+    from robospa.results.compare import compare as differences
+    from robospa.results.compare import stop_early
+
+    one, two = _side(first, metric.value), _side(second, metric.value)
+    if one.name == two.name:
+        from dataclasses import replace
+
+        one, two = replace(one, name=first), replace(two, name=second)
+    if early:
+        verdict = stop_early(one, two)
+        who = {1: f"{one.name} is better", 2: f"{two.name} is better", 0: "undecided"}
+        print(
+            f"{who[verdict.better]} after {verdict.looked} of {verdict.pairs} pairs "
+            f"(e-value {verdict.evidence:.3g}); {verdict.note}"
+        )
+        return
+    found = differences(one, two, metric.value, ci.value)
+    _print(found, variants)
+    if drops:
+        _print_drops(one, two)
+    if json is not None:
+        from dataclasses import asdict
+        from json import dumps
+
+        json.write_text(dumps(asdict(found), indent=1) + "\n")
+
+
+def _side(name: str, metric: str) -> Side:
+    """A run's folder, or else a published model."""
+    from robospa.results.published import load
+    from robospa.results.reading import read_run
+    from robospa.results.sides import side_of_published, side_of_run
+
+    folder = Path(name)
+    if not folder.exists() and name in load().models:
+        return side_of_published(name, metric)
+    if not folder.exists():
+        models = ", ".join(load().models)
+        raise ValueError(f"{name} is neither a folder nor a published model ({models})")
+    return side_of_run(read_run(folder), metric=metric)
+
+
+def _print(found: Comparison, variants: bool) -> None:
+    from robospa.results.metrics import METRIC_NAMES
+    from robospa.results.significance import ALPHA
+
+    print(f"{METRIC_NAMES[found.metric]} of {found.first} minus {found.second}, percentage points")
+    for note in found.notes:
+        print(f"  {note}")
+    _table("averages", found.groups, found)
+    apart = [row for row in found.cells if row.q < ALPHA]
+    _table(
+        "variants" if variants else "variants told apart",
+        found.cells if variants else apart,
+        found,
+    )
+    raw = sum(row.p < ALPHA for row in found.cells)
+    print(
+        f"{len(apart)} of {len(found.cells)} variants differ at q < {ALPHA:g} (Benjamini and "
+        f"Hochberg); {raw} at p < {ALPHA:g}, where chance gives {ALPHA * len(found.cells):.0f}."
+    )
+    if found.groups:
+        print(f"Intervals of averages: {found.groups[-1].estimate.method}.")
+
+
+def _table(title: str, rows: Sequence[Difference], found: Comparison) -> None:
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    if not rows:
+        return
+    table = Table(title=title, title_justify="left", box=None, pad_edge=False)
+    heads = ("", "level", "first", "second", "difference [95 %]", "p", "q", "trials")
+    for head in (*heads, *(("only first", "only second") if found.paired else ())):
+        table.add_column(head, justify="left" if not head else "right", no_wrap=True)
+    for row in rows:
+        partly = f" ({row.variants} of {row.listed})" if row.variants < row.listed else ""
+        e = row.estimate
+        cells = [
+            f"{row.label}{partly}",
+            f"L{row.level}" if row.level else "mean",
+            f"{100 * row.first:z.1f}",
+            f"{100 * row.second:z.1f}",
+            f"{100 * e.value:+z.1f} [{100 * e.low:+z.1f}, {100 * e.high:+z.1f}]",
+            _chance(row.p),
+            _chance(row.q) if row.kind in ("variant", "category") else "",
+            str(row.trials),
+        ]
+        if found.paired:
+            cells += [str(row.only_first), str(row.only_second)]
+        table.add_row(*(Text(c) for c in cells))
+    console = Console()
+    (console if console.is_terminal else Console(width=130)).print(table, highlight=False)
+
+
+def _chance(p: float) -> str:
+    return f"{p:.3f}" if p >= 0.0005 else "<.001"
+
+
+def _print_drops(one: Side, two: Side) -> None:
+    from robospa.results.compare import drops
+
+    for side in (one, two):
+        print(f"{side.name} loses from level to level, percentage points")
+        for row in drops(side):
+            e = row.estimate
+            partly = f" ({row.variants} of {row.listed} tasks)" if row.variants < row.listed else ""
+            print(
+                f"  {row.label}{partly}: {100 * e.value:+z.1f} "
+                f"[{100 * e.low:+z.1f}, {100 * e.high:+z.1f}], p {_chance(row.p)}"
+            )
+
+
+def _print_power(base: float) -> None:
+    from robospa.results.power import POWER, plan
+
+    print(f"Trials a side to tell rates apart with probability {POWER:.0%}, first rate {base:.0%}")
+    print("Equal seeds: by the correlation (phi) of both policies' outcomes on one seed.")
+    for gap in GAPS:
+        if base + gap >= 1:
+            continue
+        needed = plan(base, gap)
+        paired = ", ".join(f"{n} if phi is {phi:g}" for phi, n in needed.paired.items())
+        print(
+            f"  {100 * gap:.0f} points: {needed.unpaired} on unrelated seeds; "
+            f"on equal seeds {paired or 'no such correlation is possible'}"
+        )
+    print("For a mean over k variants divide by k: that many trials a variant.")
