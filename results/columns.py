@@ -75,6 +75,23 @@ class Column:
             return rate(part.successes, part.trials)
         return self.estimate(metric, row, level)
 
+    def samples(self, row: str, level: int) -> tuple[list[Sample], list[float]]:
+        """Success counts of all variants below a row, and each one's share of its mean.
+
+        Empty where the column has no value of the row.
+        """
+        if self.value("sr", row, level) is None:
+            return [], []
+        members = load().members
+        categories = DIMENSIONS.get(row, METRIC_CATEGORIES["sr"])
+        samples, shares = [], []
+        for category in (row,) if row in members else categories:
+            for task in members[category]:
+                cell = self.scores.cells[task, level]
+                samples.append(rate(cell.successes, cell.trials))
+                shares.append(1 / len(members[category]))
+        return samples, [share / sum(shares) for share in shares]
+
     def missing(self, row: str, level: int) -> int:
         """Listed trials below this row that have no result."""
         part = self.part(row, level)
