@@ -70,7 +70,7 @@ def to_line(record: TrialRecord) -> str:
 
 def from_line(line: str) -> TrialRecord:
     """The record that `to_line` wrote; raises ValueError saying what is wrong with it."""
-    data = json.loads(line)
+    data = json.loads(line, object_pairs_hook=_without_repeats)
     if not isinstance(data, dict) or not isinstance(data.get("key"), dict):
         raise ValueError("not a trial record")
     known = {f.name for f in fields(TrialRecord)}
@@ -85,6 +85,16 @@ def from_line(line: str) -> TrialRecord:
     if record.end not in END_REASONS:
         raise ValueError(f"end {record.end!r} is none of {', '.join(END_REASONS)}")
     return record
+
+
+def _without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """A JSON object; one that says the same thing twice is refused: which one would be true?"""
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        names = [name for name, _ in pairs]
+        twice = next(name for name in names if names.count(name) > 1)
+        raise ValueError(f"the field {twice!r} is there twice")
+    return found
 
 
 def read_file(path: Path) -> list[TrialRecord]:
