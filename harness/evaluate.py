@@ -15,6 +15,7 @@ from typing import Any
 from robospa.harness.factory import is_url, load, open_policy
 from robospa.harness.manifest import Manifest, about_machine, check_folder, open_run
 from robospa.harness.progress import Progress
+from robospa.harness.queue import expected_work
 from robospa.harness.runner import RunAborted, Runner, RunOptions
 from robospa.harness.store import locked
 from robospa.harness.worker import WorkerConfig, describe
@@ -157,7 +158,8 @@ def evaluate(request: Request) -> None:
         open_run(folder, manifest, request.resume)
         known = read_records(folder)
         owed = [key for key in request.keys if not finished(known.get(key))]
-        with Progress(len(request.keys), len(request.keys) - len(owed)) as progress:
+        work = expected_work(owed, load(config.parts))
+        with Progress(len(request.keys), len(request.keys) - len(owed), work=work) as progress:
             Runner(config, owed, request.options, progress.add, progress.note).run()
 
 

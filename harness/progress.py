@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Mapping
 from types import TracebackType
 from typing import Any, TextIO
 
-from robospa.results.records import TrialRecord
+from robospa.results.records import TrialKey, TrialRecord
 
 EVERY = 15.0
 """Seconds between two plain lines."""
@@ -16,9 +17,13 @@ EVERY = 15.0
 class Tally:
     """Counts of what has come in, and the text that sums them up."""
 
-    def __init__(self, total: int, already: int) -> None:
+    def __init__(self, total: int, already: int, work: Mapping[TrialKey, float] | None) -> None:
+        """`work` is how much each trial still to run is expected to cost; None if all alike."""
         self.total = total
         self.already = already
+        self._work = work
+        self._whole = sum(work.values()) if work else float(total - already)
+        self._done = 0.0
         self.ran = 0
         self.successes = 0
         self.lost = 0
@@ -27,6 +32,7 @@ class Tally:
     def add(self, record: TrialRecord) -> None:
         """Count one finished or lost trial."""
         self.ran += 1
+        self._done += self._work.get(record.key, 0.0) if self._work else 1.0
         self.successes += record.success
         self.lost += record.end == "infrastructure"
 
@@ -40,13 +46,19 @@ class Tally:
         """Trials a second so far."""
         return self.ran / max(time.monotonic() - self.begun, 1e-9)
 
+    @property
+    def seconds_left(self) -> float:
+        """Estimate from the work that is done and left: the longest trials come first."""
+        spent = time.monotonic() - self.begun
+        return spent * (self._whole - self._done) / max(self._done, 1e-9)
+
     def text(self) -> str:
         """Success so far, speed and time left."""
         scored = self.ran - self.lost
         parts = [f"success {100 * self.successes / scored:.1f} %" if scored else "no result yet"]
         if self.ran:
             parts.append(f"{60 * self.rate:.1f} trials/min")
-            parts.append(f"{clock(self.left / self.rate)} left")
+            parts.append(f"{clock(self.seconds_left)} left")
         if self.lost:
             parts.append(f"{self.lost} lost")
         return ", ".join(parts)
@@ -62,8 +74,14 @@ def clock(seconds: float) -> str:
 class Progress:
     """Shows a `Tally`; use as a context manager."""
 
-    def __init__(self, total: int, already: int = 0, stream: TextIO | None = None) -> None:
-        self.tally = Tally(total, already)
+    def __init__(
+        self,
+        total: int,
+        already: int = 0,
+        stream: TextIO | None = None,
+        work: Mapping[TrialKey, float] | None = None,
+    ) -> None:
+        self.tally = Tally(total, already, work)
         self._stream = stream or sys.stderr
         self._bar: Any = None
         self._task: Any = None

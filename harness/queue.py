@@ -83,3 +83,11 @@ class TrialQueue:
     def settle(self) -> None:
         """One trial has its record."""
         self.unsettled -= 1
+
+
+def expected_work(
+    keys: Sequence[TrialKey], parts: Callable[[TrialKey], Any]
+) -> dict[TrialKey, float]:
+    """The most actions that each trial may take: what the time left is estimated from."""
+    queue = TrialQueue(keys, parts)
+    return {key: float(max(1, queue.facts(key).steps)) for key in keys}
