@@ -18,6 +18,7 @@ COMMANDS = {
     "eval": "Evaluate the policy behind a URL.",
     "report": "Turn a run into tables, a figure and a page with its videos.",
     "compare": "Compare two runs, or a run and published numbers; plan sample sizes.",
+    "lint": "Look for results that cannot be, in runs or in the paper.",
     "tasks": "List the tasks; show, draw or collect their scenes.",
     "seeds": "Make the lists of accepted seeds, or measure the expert.",
 }
