@@ -188,6 +188,8 @@ def run_column(run: Run, name: str | None = None) -> Column:
     data = load()
     policy = run.manifest.get("settings", {}).get("policy", {}).get("spec", {}).get("name", "")
     label = name or str(policy) or run.folder.name
+    if run.manifest.get("settings", {}).get("privileged"):
+        label += " (privileged)"
     keys = run.keys
     if not keys:
         raise TableError(f"the run {label} lists no trials; there is nothing to show")

@@ -17,6 +17,7 @@ COMMANDS = {
     "check": "Test a policy server against the protocol.",
     "eval": "Evaluate the policy behind a URL.",
     "report": "Turn a run into tables, a figure and a page with its videos.",
+    "paper": "Write the paper's tables, recomputed, and list what does not follow.",
     "compare": "Compare two runs, or a run and published numbers; plan sample sizes.",
     "lint": "Look for results that cannot be, in runs or in the paper.",
     "tasks": "List the tasks; show, draw or collect their scenes.",

@@ -1,0 +1,47 @@
+"""`robospa paper`: the paper's tables recomputed, with the printed values that do not follow."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def paper(
+    out: Annotated[Path, typer.Option(help="folder to write to")] = Path("paper"),
+    format: Annotated[str, typer.Option(help="md, tex, html, csv or all")] = "all",
+    table: Annotated[
+        list[str] | None, typer.Option(help="only this table (may be repeated); default all")
+    ] = None,
+    run: Annotated[
+        list[Path] | None, typer.Option(help="folder of a run to stand beside (may be repeated)")
+    ] = None,
+    mark: Annotated[
+        str, typer.Option(help="bold: tied (all not told from the best), highest or none")
+    ] = "tied",
+) -> None:
+    """Write every table of the paper, made from its per-task results.
+
+    Prints the main table and all printed values that cannot be reproduced.
+    """
+    from robospa.results.columns import check_columns, published_column, run_column
+    from robospa.results.errata import checks, errata
+    from robospa.results.published import load
+    from robospa.results.reading import read_run
+    from robospa.results.tables_all import FORMATS, make_tables, write_tables
+    from robospa.results.tables_terminal import show
+
+    endings = list(FORMATS) if format == "all" else [format]
+    if format != "all" and format not in FORMATS:
+        raise ValueError(f"no format is called {format!r}; there are {', '.join(FORMATS)} and all")
+    columns = [published_column(model) for model in load().models]
+    columns += [run_column(read_run(folder)) for folder in run or []]
+    check_columns(columns)
+    written = write_tables(make_tables(columns, table or None, mark), out, endings)
+    show(make_tables(columns, ["main"], mark)[0])
+    print()
+    print(f"{len(checks())} printed cells walked; {len(errata())} do not follow from the others:")
+    for number, check in enumerate(errata(), 1):
+        print(f"{number:3} {check}")
+    print(f"\n{len(written)} files in {out}")

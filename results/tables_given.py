@@ -1,0 +1,208 @@
+"""The paper's tables of intervals, embodiments and what else it gives, and the list of errata."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from robospa.results import aggregate
+from robospa.results.columns import Column, check_columns
+from robospa.results.errata import checks, errata
+from robospa.results.intervals import interval_of
+from robospa.results.metrics import DIMENSIONS
+from robospa.results.published import load, title
+from robospa.results.tables_grid import MISSING, Entry, Grid, Line
+from robospa.results.tables_paper import DASH, DIMENSION_NAMES
+
+INTERVAL_METHODS = (("bootstrap", "Stratified bootstrap"), ("wilson", "MOVER on Wilson limits"))
+
+
+def interval_table(columns: Sequence[Column]) -> Grid:
+    """Success at L5 with intervals by two methods; of published models also as printed."""
+    check_columns(columns)
+    data = load()
+    level, rows = int(data.intervals["level"]), (*DIMENSIONS, aggregate.OVERALL)
+    lines = []
+    for column in columns:
+        entries = [
+            _interval(column, row, level, method) for method, _ in INTERVAL_METHODS for row in rows
+        ]
+        lines.append(Line(column.title, tuple(entries)))
+        printed = data.intervals["rows"].get(column.published)
+        if printed:
+            given = [_with_ends(*(x / 100 for x in printed[row])) for row in rows]
+            blank = [Entry()] * len(rows)
+            lines.append(Line(f"{column.title}, as printed", (*given, *blank)))
+    heads = ("Fine-grained", "Long-horizon", "Overall") * len(INTERVAL_METHODS)
+    groups = tuple((name, len(rows)) for _, name in INTERVAL_METHODS)
+    notes = (
+        "The bootstrap resamples trials within every variant (10,000 times): the same tasks, other "
+        "seeds. MOVER combines Wilson limits of the single variants and needs no seed; it stays "
+        "honest where all trials of a variant fail.",
+        *_open_notes(columns, level),
+    )
+    name = "Success rate (SR) at L5 in percent with 95 % intervals"
+    return Grid("intervals", name, "Model", heads, tuple(lines), groups, notes)
+
+
+def _open_notes(columns: Sequence[Column], level: int) -> list[str]:
+    """What columns lack at `level`."""
+    notes = []
+    for column in columns:
+        if lacking := column.not_run(level):
+            notes.append(f"{column.title}: {lacking} tasks were not run at L{level}.")
+        if lost := column.missing(aggregate.OVERALL, level):
+            notes.append(f"{MISSING} {column.title}: {lost} trials at L{level} have no result.")
+    return notes
+
+
+def _interval(column: Column, row: str, level: int, method: str) -> Entry:
+    samples, shares = column.samples(row, level)
+    if not samples:
+        return DASH
+    found = interval_of(samples, shares, method)
+    value = column.value("sr", row, level) or 0.0
+    sign = MISSING if column.missing(row, level) else ""
+    return _with_ends(value / 100, found.low, found.high, sign)
+
+
+def _with_ends(value: float, low: float, high: float, sign: str = "") -> Entry:
+    shown = [aggregate.text(100 * x) for x in (value, low, high)]
+    text = f"{shown[0]} [{shown[1]}, {shown[2]}]"
+    return Entry(text, 100 * value, 100 * low, 100 * high, sign=sign)
+
+
+def embodiment_table(dimension: str, columns: Sequence[Column] = ()) -> Grid:
+    """One task a category on five robots; runs become further rows, each with its own robot."""
+    table, data = load().embodiments, load()
+    shorts = [s for s, t in table.tasks.items() if data.tasks[t].category in DIMENSIONS[dimension]]
+    levels = [int(name[1]) for name in table.columns]
+    lines = [
+        Line(
+            f"{table.model}, {table.names[robot]}",
+            tuple(Entry(aggregate.text(x, 0), x) for s in shorts for x in row[s]),
+        )
+        for robot, row in table.rows.items()
+    ]
+    for column in columns:
+        if column.published:
+            continue
+        robot = table.names.get(column.embodiment, column.embodiment)
+        entries = [_variant(column, table.tasks[s], n) for s in shorts for n in levels]
+        lines.append(Line(f"{column.title}, {robot}", tuple(entries)))
+    groups = tuple((short, len(levels)) for short in shorts)
+    names = "; ".join(f"{s} {data.tasks[table.tasks[s]].printed}" for s in shorts)
+    lost = any(entry.sign for line in lines for entry in line.entries)
+    notes = (f"{names}.", *((f"{MISSING} Some trials have no result.",) if lost else ()))
+    return Grid(
+        f"embodiments-{dimension}",
+        f"Success rate (SR) in percent by embodiment: {DIMENSION_NAMES[dimension]}",
+        "Model, embodiment",
+        table.columns * len(shorts),
+        tuple(lines),
+        groups,
+        notes,
+    )
+
+
+def _variant(column: Column, task: str, level: int) -> Entry:
+    value = column.value("sr", task, level)
+    if value is None:
+        return DASH
+    found = column.estimate("sr", task, level)
+    assert found is not None, "a value has an interval"
+    sign = MISSING if column.missing(task, level) else ""
+    text = aggregate.text(value, 0 if value == round(value) else 1)
+    return Entry(text, value, 100 * found.low, 100 * found.high, sign=sign)
+
+
+def _words(*texts: object) -> tuple[Entry, ...]:
+    return tuple(Entry(str(text)) for text in texts)
+
+
+def basic_table() -> Grid:
+    """Basic grounding tasks, which are no part of the 56."""
+    table = load().basic_grounding
+    lines = tuple(
+        Line(name, tuple(Entry(aggregate.text(x), x) for x in values))
+        for name, values in table["rows"].items()
+    )
+    name = "Success rate (SR) in percent on basic spatial tasks"
+    notes = ("Means over five tasks of 100 trials; the paper does not name the model.",)
+    return Grid("basic", name, "Task", tuple(table["columns"]), lines, notes=notes)
+
+
+def models_table() -> Grid:
+    """Size and training of the published models."""
+    lines = tuple(
+        Line(
+            title(model),
+            (
+                Entry(row["parameters"]),
+                Entry(str(row["gpus"]), row["gpus"]),
+                Entry(f"{row['hours']:g}", row["hours"]),
+                Entry(f"{row['gpu_hours']:g}", row["gpu_hours"]),
+            ),
+        )
+        for model, row in load().models.items()
+    )
+    heads = ("Parameters", "GPUs", "Hours", "GPU hours")
+    return Grid("models", "Model size and training per base task", "Model", heads, lines)
+
+
+def datasets_table() -> Grid:
+    """Data sets and benchmarks beside RoboSPA."""
+    table = load().datasets
+    given = ("categories", "tasks", "trajectories", "embodiments")
+    has = ("spatial_reasoning", "long_horizon", "step_level", "multi_difficulty", "scene_diversity")
+    lines, last = [], ""
+    for row in table["rows"]:
+        if row["kind"] != last:
+            last = row["kind"]
+            lines.append(
+                Line({"dataset": "Datasets", "benchmark": "Benchmarks"}[last], (), "section")
+            )
+        words = [row[key] or "–" for key in given] + ["yes" if row[key] else "no" for key in has]
+        lines.append(Line(row["name"], _words(*words)))
+    heads = (
+        *("Categories", "Tasks", "Trajectories", "Embodiments", "Spatial reasoning"),
+        *("Long-horizon", "Step-level", "Multi-difficulty", "Scene diversity"),
+    )
+    notes = (table["note"],)
+    name = "Robot manipulation datasets and benchmarks"
+    return Grid("datasets", name, "Name", heads, tuple(lines), notes=notes, words=True)
+
+
+def assets_table() -> Grid:
+    """Object categories and their variants."""
+    table = load().assets
+    rows = tuple(Line(name, (Entry(str(n), n),)) for name, n in table["rows"].items())
+    total = sum(table["rows"].values())
+    lines = (*rows, Line("Total", (Entry(str(total), total),), "average"))
+    name = f"Object categories ({len(rows)}) and variants of each"
+    return Grid("assets", name, "Asset", ("Variants",), lines)
+
+
+def errata_table() -> Grid:
+    """Every printed value that does not follow from the per-task tables."""
+    lines = tuple(
+        Line(
+            check.table,
+            _words(
+                check.row,
+                title(check.model),
+                check.column,
+                aggregate.text(check.printed, check.digits),
+                aggregate.text(check.recomputed, check.digits),
+                check.reason or "–",
+            ),
+        )
+        for check in errata()
+    )
+    derived = sum(check.derived for check in checks())
+    notes = (
+        f"{len(checks())} printed cells were walked, {derived} of them follow from others. "
+        "Interval ends count as reproduced within 0.1; all else to the printed digit.",
+    )
+    heads = ("Row", "Model", "Column", "Printed", "Recomputed", "Remark")
+    name = "Printed values that do not follow from the per-task tables"
+    return Grid("errata", name, "Table", heads, lines, notes=notes, words=True)

@@ -1,0 +1,140 @@
+"""A table as a value, and as Markdown and CSV.
+
+A `Grid` knows no metric and no model: labels, entries that are already text, marks and notes. What
+comes from outside (names of models) is escaped by every writer.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+PRINTED_OTHERWISE = "*"
+MISSING = "†"
+FIELDS = ("table", "section", "row", "group", "column", "text", "value", "low", "high", "best")
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One cell: its text, and for programs its value and interval in percent.
+
+    `best` marks it; `sign` (* or †) points to the notes.
+    """
+
+    text: str = ""
+    value: float | None = None
+    low: float | None = None
+    high: float | None = None
+    best: bool = False
+    sign: str = ""
+
+
+@dataclass(frozen=True)
+class Line:
+    """One row. Of a `section` only the label is shown; an `average` is set apart."""
+
+    label: str
+    entries: tuple[Entry, ...] = ()
+    kind: str = "row"
+
+
+@dataclass(frozen=True)
+class Grid:
+    """A table: `heads` name its columns; `groups` (title, width) span them, or are empty."""
+
+    name: str
+    title: str
+    corner: str
+    heads: tuple[str, ...]
+    lines: tuple[Line, ...]
+    groups: tuple[tuple[str, int], ...] = ()
+    notes: tuple[str, ...] = ()
+    words: bool = False
+    """Entries are words rather than numbers: set them flush left."""
+
+    def __post_init__(self) -> None:
+        if self.groups and sum(width for _, width in self.groups) != len(self.heads):
+            raise ValueError(f"the groups of table {self.name} do not span its columns")
+        for line in self.lines:
+            if line.kind != "section" and len(line.entries) != len(self.heads):
+                raise ValueError(f"row {line.label} of table {self.name} has the wrong length")
+
+    @property
+    def group_of(self) -> list[str]:
+        """The group's title of every column."""
+        names = [title for title, width in self.groups for _ in range(width)]
+        return names or [""] * len(self.heads)
+
+
+def plain(text: str) -> str:
+    """`text` on one line."""
+    return " ".join(text.split())
+
+
+def escape_markdown(text: str) -> str:
+    """`text` with what Markdown or HTML inside it would take for markup made harmless."""
+    return re.sub(r"([\\|*_`<>\[\]])", r"\\\1", plain(text))
+
+
+def to_markdown(grid: Grid) -> str:
+    """The table in Markdown, its title above and its notes below."""
+    names = [
+        f"{escape_markdown(group)} {escape_markdown(head)}".strip()
+        for group, head in zip(grid.group_of, grid.heads, strict=True)
+    ]
+    rule = "---" if grid.words else "---:"
+    lines = [
+        f"### {escape_markdown(grid.title)}",
+        "",
+        f"| {escape_markdown(grid.corner)} | " + " | ".join(names) + " |",
+        "|---|" + f"{rule}|" * len(names),
+    ]
+    for line in grid.lines:
+        label = escape_markdown(line.label)
+        shown = label if line.kind == "row" else f"*{label}*"
+        if line.kind == "section":
+            lines.append(f"| **{label}** | " + " | ".join([""] * len(names)) + " |")
+        else:
+            lines.append(f"| {shown} | " + " | ".join(map(_markdown_entry, line.entries)) + " |")
+    for note in grid.notes:
+        lines += ["", escape_markdown(note)]
+    return "\n".join(lines) + "\n"
+
+
+def _markdown_entry(entry: Entry) -> str:
+    text = escape_markdown(entry.text)
+    return (f"**{text}**" if entry.best else text) + escape_markdown(entry.sign)
+
+
+def to_csv(grids: Sequence[Grid]) -> str:
+    """All cells of `grids`, one a line, for programs: FIELDS, then the sign.
+
+    Values are not rounded. A text that a spreadsheet would run as a formula gets a quote before it.
+    """
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow((*FIELDS, "sign"))
+    for grid in grids:
+        section = ""
+        for line in grid.lines:
+            if line.kind == "section":
+                section = line.label
+                continue
+            for group, head, entry in zip(grid.group_of, grid.heads, line.entries, strict=True):
+                numbers = ("" if x is None else f"{x:.10g}" for x in _numbers(entry))
+                words = (grid.name, section, line.label, group, head, entry.text)
+                best = "best" if entry.best else ""
+                writer.writerow((*map(_no_formula, words), *numbers, best, entry.sign))
+    return out.getvalue()
+
+
+def _numbers(entry: Entry) -> tuple[float | None, float | None, float | None]:
+    return entry.value, entry.low, entry.high
+
+
+def _no_formula(text: str) -> str:
+    dangerous = text[:1] in "=+@\t\r" and text[:1] != ""
+    return "'" + text if dangerous else text
