@@ -29,10 +29,9 @@ def mcnemar_mid_p(only_first: int, only_second: int) -> float:
     count, fewer = only_first + only_second, min(only_first, only_second)
     if fewer < 0:
         raise ValueError(f"{only_first} and {only_second} are no counts")
-    chances = [
-        math.exp(_log_choose(count, k) - count * math.log(2)) if count else 1.0
-        for k in range(fewer + 1)
-    ]
+    if only_first == only_second:
+        return 1.0
+    chances = [math.exp(_log_choose(count, k) - count * math.log(2)) for k in range(fewer + 1)]
     return min(1.0, 2 * sum(chances) - chances[-1])
 
 

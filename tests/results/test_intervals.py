@@ -9,12 +9,23 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from robospa.results.bootstrap import Sample, rate
 from robospa.results.intervals import (
+    METHODS,
     Estimate,
+    below,
     bootstrap_mean,
+    bounded_mean,
     chance_corrected,
+    difference,
+    exact,
+    interval_of,
+    jeffreys,
     mean,
     mover,
+    over_tasks,
+    paired_difference,
+    paired_sample_difference,
     wilson,
 )
 
@@ -94,12 +105,145 @@ def test_the_bootstrap_is_repeatable_and_close_to_the_normal_interval() -> None:
     assert (found.low, found.high) == pytest.approx((0.5 - half, 0.5 + half), abs=0.006)
 
 
-def test_mover_covers_ninety_five_percent_of_mostly_impossible_tasks() -> None:
-    rates = np.array([0.0, 0.01, 0.02, 0.3])
-    generator = np.random.default_rng(0)
-    draws = generator.binomial(100, rates, size=(2000, 4))
-    hits = 0
-    for row in draws:
-        found = mean([wilson(int(k), 100) for k in row])
-        hits += found.low <= rates.mean() <= found.high
-    assert 0.93 <= hits / 2000 <= 0.99
+@pytest.mark.parametrize(
+    ("successes", "low", "high"),
+    [(0, 0.0, 3.62), (1, 0.03, 5.45), (3, 0.62, 8.52), (50, 39.8, 60.2)],
+)
+def test_exact_of_a_hundred(successes: int, low: float, high: float) -> None:
+    found = exact(successes, 100)
+    assert (100 * found.low, 100 * found.high) == pytest.approx((low, high), abs=0.05)
+
+
+def test_exact_at_zero_and_at_all_by_hand() -> None:
+    assert exact(0, 500).high == pytest.approx(1 - 0.025 ** (1 / 500))
+    assert exact(500, 500).low == pytest.approx(0.025 ** (1 / 500))
+    assert (exact(0, 500).low, exact(500, 500).high) == (0.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("successes", "low", "high"),
+    [(0, 0.0, 2.47), (1, 0.11, 4.58), (3, 0.85, 7.79), (100, 97.5, 100)],
+)
+def test_jeffreys_of_a_hundred(successes: int, low: float, high: float) -> None:
+    found = jeffreys(successes, 100)
+    assert (100 * found.low, 100 * found.high) == pytest.approx((low, high), abs=0.05)
+
+
+def test_none_of_a_hundred_is_below_three_percent() -> None:
+    assert below(100) == pytest.approx(1 - 0.05**0.01)
+    assert round(100 * below(100), 1) == 3.0
+    with pytest.raises(ValueError, match="no trials"):
+        below(0)
+
+
+def test_a_printed_mean_gets_the_interval_of_the_rate_that_varies_most() -> None:
+    found = bounded_mean(0.5, 100)
+    assert (found.low, found.high) == pytest.approx((wilson(50, 100).low, wilson(50, 100).high))
+
+
+def test_newcombes_difference_by_hand() -> None:
+    found = difference(wilson(56, 70), wilson(48, 80))
+    assert (found.low, found.high) == pytest.approx((0.0524, 0.3339), abs=0.0001)
+
+
+def test_the_difference_of_pairs_that_never_differ_by_hand() -> None:
+    found = paired_difference(0, 0, 100)
+    half = 1.96**2 / (100 + 1.96**2)
+    assert (found.value, found.low, found.high) == pytest.approx((0.0, -half, half), abs=1e-5)
+
+
+@pytest.mark.parametrize(("b", "c", "n"), [(12, 2, 50), (17, 9, 100), (1, 0, 100), (0, 3, 10)])
+def test_limits_of_a_paired_difference_are_where_the_score_reaches_two(
+    b: int, c: int, n: int
+) -> None:
+    found, mirrored = paired_difference(b, c, n), paired_difference(c, b, n)
+    assert found.low == pytest.approx(-mirrored.high, abs=1e-9)
+    assert found.low < found.value == (b - c) / n < found.high
+    for limit in (found.low, found.high):
+        shares = np.linspace(max(0.0, -limit), (1 - limit) / 2, 200_001)[1:-1]
+        with np.errstate(divide="ignore"):
+            fit = b * np.log(shares + limit) + c * np.log(shares)
+            fit += (n - b - c) * np.log(1 - 2 * shares - limit)
+        share = float(shares[np.argmax(fit)])
+        score = (b - c - n * limit) / math.sqrt(n * (2 * share + limit * (1 - limit)))
+        assert abs(score) == pytest.approx(1.96, abs=0.005)
+
+
+def test_a_paired_difference_excludes_zero_where_mcnemars_score_does() -> None:
+    assert paired_difference(20, 8, 100).low > 0  # 12 / sqrt(28) = 2.27
+    assert paired_difference(17, 9, 100).low < 0  # 8 / sqrt(26) = 1.57
+
+
+def test_impossible_pairs_are_refused() -> None:
+    with pytest.raises(ValueError, match="3 and 3 discordant of 4 pairs cannot be"):
+        paired_difference(3, 3, 4)
+
+
+def test_pairs_of_progress() -> None:
+    differs = Sample((5, 10, 60, 20, 5), 0.5, -1.0)
+    found = paired_sample_difference(differs)
+    assert found == paired_sample_difference(differs)
+    assert found.value == pytest.approx(0.05)
+    assert found.low < found.value < found.high
+    equal = paired_sample_difference(Sample((0, 0, 100, 0, 0), 0.5, -1.0))
+    assert equal.high == pytest.approx(paired_difference(0, 0, 100).high)
+    shifted = paired_sample_difference(Sample((0, 0, 0, 100, 0), 0.5, -1.0))
+    assert shifted.low < shifted.value == 0.5 < shifted.high
+    with pytest.raises(ValueError, match="as far below zero as above"):
+        paired_sample_difference(Sample((1, 1, 1), 1.0, 0.0))
+
+
+def test_every_method_says_what_it_did() -> None:
+    cells = [rate(1, 10), rate(5, 10)]
+    assert [interval_of(cells[:1], method=m).method for m in METHODS] == [
+        "Wilson",
+        "exact",
+        "Jeffreys",
+        "bootstrap",
+    ]
+    assert [interval_of(cells, method=m).method for m in METHODS] == [
+        "MOVER on Wilson",
+        "MOVER on exact",
+        "MOVER on Jeffreys",
+        "stratified bootstrap",
+    ]
+    assert mean([mean([wilson(1, 10)] * 2), wilson(3, 10)]).method == "MOVER on Wilson"
+    assert over_tasks([cells]).method == "bootstrap over tasks"
+
+
+def test_an_unknown_method_names_those_there_are() -> None:
+    with pytest.raises(ValueError, match="'wald'; there are wilson, exact, jeffreys, bootstrap"):
+        interval_of([rate(1, 2)], method="wald")
+
+
+def test_an_average_is_one_call_over_its_cells_or_means_of_means() -> None:
+    cells = [rate(k, 100) for k in (0, 7, 40, 90)]
+    flat = interval_of(cells, [1 / 2, 1 / 6, 1 / 6, 1 / 6])
+    nested = mean([wilson(0, 100), mean([wilson(k, 100) for k in (7, 40, 90)])])
+    assert (flat.low, flat.high) == pytest.approx((nested.low, nested.high))
+
+
+def test_onta_of_several_candidate_counts_is_a_weighted_sum() -> None:
+    found = interval_of([rate(30, 100, 2), rate(50, 100, 6)])
+    by_hand = mean([chance_corrected(wilson(30, 100), 2), chance_corrected(wilson(50, 100), 6)])
+    assert (found.value, found.low, found.high) == pytest.approx(
+        (by_hand.value, by_hand.low, by_hand.high)
+    )
+
+
+@pytest.mark.parametrize("method", METHODS[:3])
+@pytest.mark.parametrize("counts", [(100, 0, 0), (0, 0, 100)])
+def test_progress_that_never_varies_keeps_a_width(method: str, counts: tuple[int, ...]) -> None:
+    found = interval_of([Sample(counts, 0.5)], method=method)
+    assert found.high - found.low > 0.02
+    assert found.value in (found.low, found.high)
+    assert "where all are equal" in found.method
+
+
+def test_seeded_intervals_repeat_themselves() -> None:
+    cells = [Sample((60, 20, 20), 0.5), Sample((90, 5, 5), 0.5)]
+    for method in METHODS:
+        assert interval_of(cells, method=method, seed=4) == interval_of(
+            cells, method=method, seed=4
+        )
+    assert over_tasks([cells], 4) == over_tasks([cells], 4)
