@@ -26,7 +26,7 @@ from robospa.harness.world import Poll, RenderUnavailable, SceneUnstable, StepRe
 from robospa.protocol.policy import CameraSpec, PolicySpec
 from robospa.tasks.scene import Scene
 from robospa.tasks.shapes import ObjectModel
-from robospa.tasks.snapshot import Snapshot, snapshot_to_json
+from robospa.tasks.snapshot import Contact, Snapshot, snapshot_to_json
 
 if TYPE_CHECKING:
     from robospa.harness.cameras import Studio
@@ -242,6 +242,10 @@ class SapienWorld:
 
         self._studio = Studio()
         return self._studio
+
+    def contacts(self) -> tuple[Contact, ...]:
+        """What touches what at this instant."""
+        return self._loaded().contacts()
 
     def digest(self) -> str:
         """Hash of the exact state: poses, velocities, joints."""

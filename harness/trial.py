@@ -29,6 +29,7 @@ from robospa.results.records import TrialKey, TrialRecord
 from robospa.tasks.catalog import build_scene
 from robospa.tasks.catalog import task as find_task
 from robospa.tasks.events import Event, outcome
+from robospa.tasks.goals.hands import Hands
 from robospa.tasks.scene import Scene
 from robospa.tasks.snapshot import Snapshot
 from robospa.tasks.task import Task, Tracker
@@ -102,7 +103,10 @@ class _Run:
     parts: TrialParts
     recorder: Recorder | None
     watch: _Stopwatch = field(default_factory=_Stopwatch)
+    hands: Hands | None = None
     events: list[Event] = field(default_factory=list)
+    when: list[int] = field(default_factory=list)
+    """For every event the number of actions begun by then."""
     actions: list[NDArray[np.float32]] = field(default_factory=list)
     latencies: list[float] = field(default_factory=list)
     past: dict[int, dict[str, Any]] = field(default_factory=dict)
@@ -112,11 +116,24 @@ class _Run:
     first_problem: str = ""
 
     def poll(self, snapshot: Snapshot) -> bool:
-        new = self.watch.call("goal", self.parts.tracker.update, snapshot)
-        self.events.extend(new)
+        new = self.watch.call("goal", self._look, snapshot)
+        self.note(new)
         if self.recorder is not None:
             self.watch.call("recording", self.recorder.polled, self.world, snapshot.time)
         return any(event.kind in ("success", "failed") for event in new)
+
+    def _look(self, snapshot: Snapshot) -> tuple[Event, ...]:
+        """What the goal and the hands say of this instant."""
+        new = self.parts.tracker.update(snapshot)
+        if self.hands is not None:
+            tried = self.hands.update(snapshot)
+            return (*tried, *new) if tried else new
+        return new
+
+    def note(self, new: tuple[Event, ...]) -> None:
+        """Keep events, with the action during which they happened."""
+        self.events.extend(new)
+        self.when.extend([len(self.actions)] * len(new))
 
     def observation(self, spec: PolicySpec) -> dict[str, Any]:
         """What the policy asked for, at this instant."""
@@ -218,7 +235,7 @@ def _play(run: _Run, info: TrialInfo, limit: int) -> tuple[str, str]:
         run.watch.call("waiting", run.policy.reset, info)
         if run.recorder is not None:
             run.watch.call("recording", run.recorder.started, run.world)
-        run.events.extend(run.parts.tracker.start(run.world.snapshot()))
+        run.note(run.parts.tracker.start(run.world.snapshot()))
         if any(event.kind in ("success", "failed") for event in run.events):
             return _end_of(run), "the goal was decided before the first action"
         return _loop(run, limit), ""
@@ -230,6 +247,8 @@ def _diagnostics(run: _Run) -> dict[str, Any]:
     """What stands beside the result: the goal's own, and actions that were not done as asked."""
     own = getattr(run.parts.tracker, "diagnostics", None)
     found = dict(own()) if own is not None else {}
+    if run.hands is not None:
+        found["roles"] = run.hands.diagnostics()
     if run.unreachable:
         found["unreachable_actions"] = run.unreachable
         found["first_unreachable"] = run.first_problem
@@ -266,7 +285,12 @@ def run_trial(
         instruction=wanted.instruction,
         policy_seed=policy_seed,
     )
+    roles = getattr(tracker, "roles", None)
+    if roles:
+        run.hands = Hands(roles, wanted.scene, world.contacts)
     end, message = _play(run, info, level.steps)
+    if run.hands is not None:
+        run.note(run.hands.finish(world.snapshot().time))
     if recorder is not None:
         run.watch.call("recording", recorder.ended, world)
     reached = outcome(run.events, tracker.total)
@@ -291,7 +315,10 @@ def run_trial(
         wall_time=time.perf_counter() - begun,
         policy_seed=policy_seed,
         message=message,
-        events=tuple(asdict(event) for event in run.events),
+        events=tuple(
+            {**asdict(event), "step": step}
+            for event, step in zip(run.events, run.when, strict=True)
+        ),
         latency=_percentiles(run.latencies),
         timing=timing,
         diagnostics=_diagnostics(run),

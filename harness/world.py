@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from robospa.protocol.policy import CameraSpec, PolicySpec
 from robospa.tasks.scene import Scene
-from robospa.tasks.snapshot import Snapshot
+from robospa.tasks.snapshot import Contact, Snapshot
 
 Poll = Callable[[Snapshot], bool]
 """Called at 50 Hz of simulated time; returning True ends the action at once."""
@@ -73,6 +73,10 @@ class World(Protocol):
 
     def snapshot(self) -> Snapshot:
         """The state at this instant (contacts included if `load` was asked for them)."""
+        ...
+
+    def contacts(self) -> tuple[Contact, ...]:
+        """What touches what at this instant: for rare questions, whatever `load` was asked for."""
         ...
 
     def digest(self) -> str:

@@ -19,6 +19,8 @@ KINDS = (
     "grasped",  # a gripper closed on `object` and lifted it
     "dropped",  # a lifted `object` fell
     "cue_hidden",  # what has to be remembered is no longer visible
+    "closed",  # a gripper closed: `object` is what it touched (note "touching") or what was nearest
+    "approached",  # a gripper came near `object`, touching or not
 )
 
 

@@ -32,10 +32,12 @@ PLACED_WITHIN = 0.02
 class Expert:
     """Solves one trial from exact state. Not for comparison with learned policies."""
 
-    def __init__(self, scene: Scene, snapshot: Snapshot) -> None:
+    def __init__(
+        self, scene: Scene, snapshot: Snapshot, plan: tuple[Skill, ...] | None = None
+    ) -> None:
         self.workspace = Workspace(scene, embodiment(scene.embodiment), snapshot)
         self.trouble: list[str] = []
-        self._steps = self._run(task(scene.task).plan(scene))
+        self._steps = self._run(task(scene.task).plan(scene) if plan is None else plan)
         self._started = False
 
     def next(self, snapshot: Snapshot) -> NDArray[np.float32]:

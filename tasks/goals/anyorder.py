@@ -14,6 +14,7 @@ from robospa.tasks.events import Event
 from robospa.tasks.geometry import Pose, Vec3
 from robospa.tasks.goals.flags import Flags
 from robospa.tasks.goals.handling import Handling
+from robospa.tasks.goals.hands import Role
 from robospa.tasks.snapshot import Snapshot
 
 SLOW = 0.2
@@ -61,6 +62,11 @@ class Collect:
         self._last: dict[str, Vec3] = {}
         self._time = 0.0
         self._lost: set[str] = set()
+
+    @property
+    def roles(self) -> dict[str, Role]:
+        """Every object to collect."""
+        return {name: Role((i,)) for i, name in enumerate(self._names)}
 
     def start(self, snapshot: Snapshot) -> tuple[Event, ...]:
         """Nothing is collected yet."""

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from robospa.tasks.events import Event
 from robospa.tasks.goals.flags import Flags, both_open, closed_near
 from robospa.tasks.goals.handling import Handling
+from robospa.tasks.goals.hands import Role
 from robospa.tasks.goals.repeat import PressCounter
 from robospa.tasks.snapshot import Snapshot
 
@@ -59,6 +60,14 @@ class ClickAndPlace:
         self._flags = Flags(self.total)
         self._handling = Handling(part.name for part in subtasks if part is not None)
         self._out_of_order = 0
+
+    @property
+    def roles(self) -> dict[str, Role]:
+        """What is clicked, what is placed, and where to: the places themselves are distractors."""
+        parts = [(i, part) for i, part in enumerate(self._subtasks) if part is not None]
+        found = {part.target: Role() for _, part in parts}
+        found |= {part.name: Role((i,)) for i, part in parts}
+        return found | {self._counter.name: Role(tuple(self._clicks), pressed=True)}
 
     def start(self, snapshot: Snapshot) -> tuple[Event, ...]:
         """Placements that hold already, if any."""

@@ -12,8 +12,9 @@ from dataclasses import dataclass
 
 from robospa.tasks.events import Event
 from robospa.tasks.geometry import Vec3
-from robospa.tasks.goals.flags import Flags
+from robospa.tasks.goals.flags import Flags, closed_near
 from robospa.tasks.goals.handling import Handling
+from robospa.tasks.goals.hands import Role
 from robospa.tasks.snapshot import Snapshot
 
 STILL = 0.03
@@ -21,6 +22,10 @@ STILL = 0.03
 
 OPEN_REACH = 0.045
 """Horizontal distance [m] from its open place at which a cover is open."""
+
+
+HELD_RADIUS = 0.1
+"""A gripper that is not open and whose grasp centre is nearer [m] than this holds a cover."""
 
 
 @dataclass(frozen=True)
@@ -44,12 +49,17 @@ class UncoverInOrder:
         self._covers = tuple(covers)
         self._below = below
         self._flags = Flags(self.total)
-        self._handling = Handling((c.name for c in covers), radius=0.1)
+        self._handling = Handling((c.name for c in covers), radius=HELD_RADIUS)
         self._origins: tuple[Vec3, ...] = ()
         self._hidden_at: float | None = None
         self._motion = 0.0
         self._wrong_lifts = 0
         self._over = False
+
+    @property
+    def roles(self) -> dict[str, Role]:
+        """The covers."""
+        return {cover.name: Role((i,)) for i, cover in enumerate(self._covers)}
 
     def start(self, snapshot: Snapshot) -> tuple[Event, ...]:
         """Remember where the end effectors are."""
@@ -70,7 +80,10 @@ class UncoverInOrder:
         for i, cover in enumerate(self._covers):
             is_open = self._is_open(snapshot, cover)
             if i < stage and not is_open:
-                return (*events, self._fail(snapshot, cover.name, i, "opened cover moved away"))
+                return (
+                    *events,
+                    self._fail(snapshot, cover.name, i, self._why_moved(snapshot, cover)),
+                )
             if i > stage and is_open:
                 wrong = Event(snapshot.time, "wrong_order", cover.name, i)
                 return (*events, wrong, self._fail(snapshot, cover.name, i, "opened too early"))
@@ -85,6 +98,10 @@ class UncoverInOrder:
         x, y, z = snapshot.poses[cover.name].position
         px, py = cover.place
         return z < self._below and math.hypot(x - px, y - py) < OPEN_REACH
+
+    def _why_moved(self, snapshot: Snapshot, cover: Cover) -> str:
+        taken = closed_near(snapshot, snapshot.poses[cover.name].position, HELD_RADIUS)
+        return "opened cover taken again" if taken else "opened cover moved away"
 
     def _still(self, snapshot: Snapshot) -> tuple[Event, ...]:
         for origin, pose in zip(self._origins, snapshot.end_effector, strict=True):

@@ -14,6 +14,7 @@ from robospa.tasks.events import Event
 from robospa.tasks.geometry import Vec3
 from robospa.tasks.goals.flags import grasp_centre
 from robospa.tasks.goals.handling import Handling
+from robospa.tasks.goals.hands import Role
 from robospa.tasks.snapshot import GRIPPER_CLOSED, GRIPPER_OPEN, Snapshot
 
 CARRY_DISTANCE = 0.15
@@ -57,6 +58,11 @@ class PickTracker:
         self.needs_contacts = lift.touching
         self._names = names
         self._begin()
+
+    @property
+    def roles(self) -> dict[str, Role]:
+        """The target and what it may be mistaken for."""
+        return {name: Role((0,) if name == self.target else ()) for name in self._names}
 
     def _begin(self) -> None:
         self._handling = Handling(self._names, CARRY_DISTANCE)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from robospa.tasks.events import Event
 from robospa.tasks.geometry import Pose, Vec3
 from robospa.tasks.goals.flags import Flags, inside_box
+from robospa.tasks.goals.hands import Role
 from robospa.tasks.snapshot import Snapshot
 
 PRESS_BOX: Vec3 = (0.03, 0.03, 0.03)
@@ -72,6 +73,11 @@ class Repeat:
         self.total = times
         self.counter = counter
         self._flags = Flags(times)
+
+    @property
+    def roles(self) -> dict[str, Role]:
+        """The pressed object."""
+        return {self.counter.name: Role(tuple(range(self.total)), pressed=True)}
 
     def start(self, snapshot: Snapshot) -> tuple[Event, ...]:
         """Nothing is done yet."""

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from robospa.tasks.events import Event
 from robospa.tasks.goals.flags import Flags, both_open, closed_near
 from robospa.tasks.goals.handling import Handling
+from robospa.tasks.goals.hands import Role
 from robospa.tasks.snapshot import Snapshot
 
 HEIGHT_TOLERANCE = 0.02
@@ -41,6 +42,11 @@ class Stack:
         self._handling = Handling(order, radius=0.06)
         self._idle = 0
         self._out_of_order = 0
+
+    @property
+    def roles(self) -> dict[str, Role]:
+        """Every part."""
+        return {name: Role((i,)) for i, name in enumerate(self._order)}
 
     def start(self, snapshot: Snapshot) -> tuple[Event, ...]:
         """The bottom part counts as done."""
@@ -104,6 +110,11 @@ class Bring:
         self._height = 0.0
         self._flags = Flags(1)
         self._handling = Handling((name,), radius=0.06)
+
+    @property
+    def roles(self) -> dict[str, Role]:
+        """The object."""
+        return {self._name: Role((0,))}
 
     def start(self, snapshot: Snapshot) -> tuple[Event, ...]:
         """Remember the height at which the object rests."""

@@ -25,7 +25,7 @@ from robospa.results.records import TrialKey
 from robospa.tasks.events import Event
 from robospa.tasks.geometry import Pose
 from robospa.tasks.scene import Scene
-from robospa.tasks.snapshot import Snapshot
+from robospa.tasks.snapshot import Contact, Snapshot
 from robospa.tasks.task import Level, Task
 
 HERE = Pose((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
@@ -62,6 +62,9 @@ class FakeWorld:
 
     def snapshot(self) -> Snapshot:
         return Snapshot(0.02 * self.steps, {"sum": HERE}, (self.total, 1.0), (HERE, HERE))
+
+    def contacts(self) -> tuple[Contact, ...]:
+        return ()
 
     def digest(self) -> str:
         return hashlib.sha256(f"{self.seed}/{self.total}/{self.steps}".encode()).hexdigest()[:16]

@@ -1,0 +1,177 @@
+"""How well failure types are told: scripted mistakes in the simulator, labelled from their records.
+
+    python benchmarks/failure_labels.py [--seeds 5] [--tasks NAME,...] [--out FILE.json]
+
+Every kind of mistake (`robospa.baselines.mistakes`) runs on every task that gives occasion for it.
+A trial counts only if the script came off: the trial failed, and the expert that acts it out had
+no trouble of its own. Nothing is drawn. Trials end some actions after the script is over instead of
+at the task's limit, which changes no label and saves the time of standing still. Prints JSON and a
+table.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import platform
+import time
+from collections import Counter
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from robospa.baselines.mistakes import create
+from robospa.harness.sapien_world import SapienWorld
+from robospa.harness.trial import TrialParts, run_trial, task_parts
+from robospa.results.failures import NAMES, label
+from robospa.results.records import TrialKey
+from robospa.tasks.catalog import tasks
+
+FIRST_SEED = 920_000
+LEVELS = {"spatial": (2, 3, 5), "procedural": (1, 2, 3, 5)}
+SPATIAL = {
+    "neighbour": "target_grounding",
+    "beside": "no_contact_grasp",
+    "drops": "target_execution",
+    "hovers": "target_execution",
+    "nothing": "no_attempt",
+}
+PROCEDURAL = {
+    "beside": "manipulation",
+    "drops": "manipulation",
+    "repeats": "redundant_repetition",
+    "stops": "no_attempt",
+    "nothing": "no_attempt",
+    "swaps": "temporal_ordering",
+    "forgets": "memory",
+    "hasty": "temporal_ordering",
+}
+"""The label that each mistake should get."""
+
+
+@dataclass
+class Row:
+    """One mistake on one task."""
+
+    task: str
+    kind: str
+    expected: str
+    found: Counter[str] = field(default_factory=Counter)
+    not_acted: int = 0
+    wrong: list[str] = field(default_factory=list)
+
+    @property
+    def counted(self) -> int:
+        """Trials in which the script came off."""
+        return sum(self.found.values())
+
+    @property
+    def right(self) -> int:
+        """Trials labelled as scripted."""
+        return self.found[self.expected]
+
+
+def parts(key: TrialKey) -> TrialParts:
+    """The trial's parts with a limit that lies shortly after the script's end."""
+    found = task_parts(key)
+    level = found.task.levels[key.level]
+    short = replace(level, steps=min(level.steps, 40 + 40 * level.subtasks))
+    return replace(found, task=replace(found.task, levels={**found.task.levels, key.level: short}))
+
+
+def measure(world: SapienWorld, row: Row, level: int, seed: int) -> None:
+    """Run one trial and note its label."""
+    policy = create(row.kind)
+    key = TrialKey(row.task, level, seed)
+    record = run_trial(world, policy, key, policy_seed=0, parts=parts)
+    if not policy.applies:
+        return
+    if record.success or policy.trouble:
+        row.not_acted += 1
+        return
+    failure = label(record)
+    kind = failure.kind if failure else "none"
+    row.found[kind] += 1
+    if failure and kind != row.expected:
+        row.wrong.append(f"L{level} seed {seed}: {kind}, {failure.evidence}")
+
+
+def rows(names: list[str], seeds: int) -> list[Row]:
+    """All measured rows that had an occasion."""
+    world = SapienWorld(render=False)
+    found = []
+    for name in names:
+        task = tasks()[name]
+        for kind, expected in (SPATIAL if task.dimension == "spatial" else PROCEDURAL).items():
+            row = Row(name, kind, expected)
+            for level in LEVELS[task.dimension]:
+                for i in range(seeds):
+                    measure(world, row, level, FIRST_SEED + i)
+            if row.counted or row.not_acted:
+                found.append(row)
+                print(f"{name} {kind}: {row.right} of {row.counted}", *row.wrong, sep="\n  ")
+    world.close()
+    return found
+
+
+def table(found: list[Row]) -> str:
+    """The result as Markdown."""
+    lines = [
+        "| task | mistake | should be | labelled so | otherwise | not acted out |",
+        "|---|---|---|---|---|---|",
+    ]
+    for row in found:
+        other = ", ".join(
+            f"{count} {NAMES.get(kind, kind)}"
+            for kind, count in row.found.items()
+            if kind != row.expected
+        )
+        score = f"{row.right} of {row.counted}"
+        should = NAMES[row.expected]
+        lines.append(
+            f"| {row.task} | {row.kind} | {should} | {score} | {other} | {row.not_acted} |"
+        )
+    return "\n".join(lines)
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seeds", type=int, default=5, help="seeds a mistake, task and level")
+    parser.add_argument("--tasks", default=",".join(tasks()))
+    parser.add_argument("--out", type=Path)
+    options = parser.parse_args()
+    began = time.perf_counter()
+    found = rows(options.tasks.split(","), options.seeds)
+    counted, right = sum(r.counted for r in found), sum(r.right for r in found)
+    by_label: dict[str, dict[str, int]] = {}
+    for row in found:
+        cell = by_label.setdefault(row.expected, {"right": 0, "of": 0})
+        cell["right"] += row.right
+        cell["of"] += row.counted
+    result: dict[str, Any] = {
+        "benchmark": "failure_labels",
+        "accuracy": round(right / counted, 4),
+        "right": right,
+        "of": counted,
+        "not_acted_out": sum(r.not_acted for r in found),
+        "bar": 0.95,
+        "by_label": by_label,
+        "rows": [
+            {"task": r.task, "mistake": r.kind, "expected": r.expected, "found": dict(r.found)}
+            for r in found
+        ],
+        "wrong": [f"{r.task} {r.kind} {text}" for r in found for text in r.wrong],
+        "seconds": round(time.perf_counter() - began, 1),
+        "python": platform.python_version(),
+    }
+    text = json.dumps(result, indent=1)
+    print(text)
+    print(table(found))
+    if options.out:
+        options.out.write_text(text + "\n")
+        options.out.with_suffix(".md").write_text(table(found) + "\n")
+
+
+if __name__ == "__main__":
+    main()

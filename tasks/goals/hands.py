@@ -1,0 +1,184 @@
+"""What the grippers try: where they close, on what, and what they come near.
+
+Events for the failure analysis, never for success: a grasp that fails leaves no trace in a goal's
+own events. Looked at five or ten times a second, not at every poll, because grippers dwell where
+they try something. Contacts are asked for only while a gripper closes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+from robospa.tasks.events import Event
+from robospa.tasks.geometry import Vec3
+from robospa.tasks.goals.flags import grasp_centre
+from robospa.tasks.objects import object_model
+from robospa.tasks.scene import Scene
+from robospa.tasks.snapshot import ARMS, GRIPPER_CLOSED, Contact, Snapshot
+
+LOOK = 0.1
+"""Seconds between two looks at the grippers; at what they approach, every second time."""
+REOPENED = 0.3
+"""A gripper commanded wider than this can close anew."""
+CLOSING = 0.5
+"""Seconds after the command to close during which a touch belongs to it: fingers lag by 0.2 s."""
+AROUND = 0.15
+"""A gripper that closes farther [m] than this from everything closes on nothing."""
+NEAR, FAR = 0.055, 0.07
+"""Distance [m] from grasp centre to an object's box that is an approach, and that ends it."""
+
+TOUCHING, BESIDE, NOWHERE = "touching", "beside", "nothing near"
+"""Notes of `closed` events."""
+
+
+@dataclass(frozen=True)
+class Role:
+    """What a goal wants of an object: the subtasks that need it (none: a distractor).
+
+    A `pressed` object is touched with closed gripper: closing near it is no attempt to grasp.
+    """
+
+    subtasks: tuple[int, ...] = ()
+    pressed: bool = False
+
+
+@dataclass
+class _Arm:
+    """One gripper: whether it may close anew, and the closing under way."""
+
+    armed: bool = True
+    since: float = -1.0
+    nearest: str = ""
+    touched: dict[str, int] = field(default_factory=dict)
+    near: set[str] = field(default_factory=set)
+
+
+class Hands:
+    """Follows both grippers around the objects of `roles`.
+
+    `touching()` gives the contacts of this instant.
+    """
+
+    def __init__(
+        self,
+        roles: Mapping[str, Role],
+        scene: Scene,
+        touching: Callable[[], tuple[Contact, ...]],
+    ) -> None:
+        self._roles = dict(roles)
+        self._touching = touching
+        self._boxes = {name: _box(scene, name) for name in self._roles}
+        self._arms = (_Arm(), _Arm())
+        self._due = 0.0
+        self._looks = 0
+
+    def update(self, snapshot: Snapshot) -> tuple[Event, ...]:
+        """Closings that ended and approaches that began; looks only when it is due."""
+        if snapshot.time < self._due - 1e-9:
+            return ()
+        self._due = snapshot.time + LOOK
+        self._looks += 1
+        events: tuple[Event, ...] = ()
+        commanded = snapshot.gripper
+        for arm, state in enumerate(self._arms):
+            if state.since >= 0.0:
+                self._feel(arm, state)
+                if commanded[arm] > REOPENED or snapshot.time - state.since > CLOSING:
+                    events += self._closed(state, snapshot.time)
+            elif commanded[arm] < GRIPPER_CLOSED and state.armed:
+                state.armed, state.since, state.touched = False, snapshot.time, {}
+                state.nearest = self._nearest(snapshot, arm)
+            if commanded[arm] > REOPENED:
+                state.armed = True
+        if self._looks % 2:
+            for arm, state in enumerate(self._arms):
+                events += self._approaches(snapshot, arm, state)
+        return events
+
+    def finish(self, time: float) -> tuple[Event, ...]:
+        """The closings that the end of the trial at `time` [s] cut short, if they touched."""
+        events: tuple[Event, ...] = ()
+        for arm, state in enumerate(self._arms):
+            if state.since >= 0.0:
+                self._feel(arm, state)
+                if state.touched:
+                    events += self._closed(state, time)
+        return events
+
+    def diagnostics(self) -> dict[str, list[int]]:
+        """Subtasks by object, for whoever reads the events."""
+        return {name: list(role.subtasks) for name, role in self._roles.items()}
+
+    def _feel(self, arm: int, state: _Arm) -> None:
+        """Note which objects the gripper touches now."""
+        mine = f"{ARMS[arm]}_gripper"
+        for contact in self._touching():
+            if mine in (contact.first, contact.second):
+                name = contact.second if contact.first == mine else contact.first
+                if name in self._roles:
+                    state.touched[name] = state.touched.get(name, 0) + 1
+
+    def _closed(self, state: _Arm, time: float) -> tuple[Event, ...]:
+        """The closing is over: on what it was."""
+        state.since = -1.0
+        name, note = state.nearest, BESIDE if state.nearest else NOWHERE
+        if state.touched:
+            most = max(state.touched.values())
+            if state.touched.get(name, 0) < most:
+                name = next(n for n, count in state.touched.items() if count == most)
+            note = TOUCHING
+        if name and self._roles[name].pressed:
+            return ()
+        return (Event(time, "closed", name, self._index(name), note),)
+
+    def _nearest(self, snapshot: Snapshot, arm: int) -> str:
+        """The object whose box is nearest to the grasp centre; "" if none is near."""
+        centre = grasp_centre(snapshot.end_effector[arm])
+        best, found = AROUND, ""
+        for name in self._roles:
+            if name in snapshot.poses:
+                distance = self._distance(snapshot, name, centre)
+                if distance < best:
+                    best, found = distance, name
+        return found
+
+    def _approaches(self, snapshot: Snapshot, arm: int, state: _Arm) -> tuple[Event, ...]:
+        centre = grasp_centre(snapshot.end_effector[arm])
+        events: tuple[Event, ...] = ()
+        for name in self._roles:
+            if name not in snapshot.poses:
+                continue
+            distance = self._distance(snapshot, name, centre)
+            if distance < NEAR and name not in state.near:
+                state.near.add(name)
+                events += (Event(snapshot.time, "approached", name, self._index(name)),)
+            elif distance > FAR:
+                state.near.discard(name)
+        return events
+
+    def _distance(self, snapshot: Snapshot, name: str, point: Vec3) -> float:
+        """Distance [m] from `point` to the object's box; only a lower bound where it is large."""
+        pose = snapshot.poses[name]
+        middle, half = self._boxes[name]
+        x, y, z = pose.position
+        reach = half[0] + half[1] + half[2] + abs(middle)
+        away = math.sqrt((point[0] - x) ** 2 + (point[1] - y) ** 2 + (point[2] - z) ** 2)
+        if away - reach > AROUND:
+            return away - reach
+        a, b, c = pose.inverse().apply(point)
+        dx, dy = max(abs(a) - half[0], 0.0), max(abs(b) - half[1], 0.0)
+        return math.hypot(dx, dy, max(abs(c - middle) - half[2], 0.0))
+
+    def _index(self, name: str) -> int:
+        subtasks = self._roles[name].subtasks if name else ()
+        return subtasks[0] if subtasks else -1
+
+
+def _box(scene: Scene, name: str) -> tuple[float, Vec3]:
+    """Height [m] of the middle of an object's box in its own frame, and its half sizes."""
+    item = scene.object(name)
+    model = object_model(item.asset, item.params)
+    x, y, z = model.size
+    return model.bottom + z / 2, (x / 2, y / 2, z / 2)
