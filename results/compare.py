@@ -14,6 +14,7 @@ from itertools import pairwise
 
 from robospa.results.bootstrap import Sample
 from robospa.results.intervals import (
+    METHODS,
     Estimate,
     difference,
     interval_of,
@@ -202,19 +203,24 @@ def _estimate(cells: Sequence[_Cell], weights: Sequence[float], method: str) -> 
     return mover([paired_sample_difference(g) for g in gaps], weights)
 
 
+def _tested(method: str) -> str:
+    """The intervals that p-values come from: the bootstrap's can be points."""
+    return METHODS[0] if method == "bootstrap" else method
+
+
 def _variant_row(cell: _Cell, method: str) -> Difference:
     task, level = cell.variant
-    estimate = _estimate([cell], [1.0], method)
+    estimate, honest = (_estimate([cell], [1.0], m) for m in (method, _tested(method)))
     rates = cell.first.binary and cell.second.binary
     trials = cell.first.trials if cell.gap else cell.first.trials + cell.second.trials
     row = Difference(
         task, "variant", level, 1, 1, trials, cell.first.value, cell.second.value, estimate, 1.0
     )
     if cell.gap is None:
-        p = boschloo(cell.first, cell.second) if rates else p_of_interval(estimate)
+        p = boschloo(cell.first, cell.second) if rates else p_of_interval(honest)
         return replace(row, p=p)
     b, c = _discordant([cell])
-    p = mcnemar_mid_p(b, c) if rates else p_of_interval(estimate)
+    p = mcnemar_mid_p(b, c) if rates else p_of_interval(honest)
     return replace(row, p=p, only_first=b, only_second=c)
 
 
@@ -245,16 +251,16 @@ def _group_row(
     weights = weights_of([c.variant for c in cells], category)
     first = sum(w * c.first.value for w, c in zip(weights, cells, strict=True))
     second = sum(w * c.second.value for w, c in zip(weights, cells, strict=True))
-    estimate = _estimate(cells, weights, method)
+    estimate, honest = (_estimate(cells, weights, m) for m in (method, _tested(method)))
     paired = cells[0].gap is not None
     trials = sum(c.first.trials + (0 if paired else c.second.trials) for c in cells)
     row = (label, kind, level, len(cells), listed, trials, first, second, estimate)
     if not paired:
-        return Difference(*row, p_of_interval(estimate))
+        return Difference(*row, p_of_interval(honest))
     b, c = _discordant(cells)
     # One weight for every trial holds inside a category; above it only the interval is fair.
     pooled = kind == "category" and all(x.first.binary for x in cells)
-    p = mcnemar_mid_p(b, c) if pooled else p_of_interval(estimate)
+    p = mcnemar_mid_p(b, c) if pooled else p_of_interval(honest)
     return Difference(*row, p, b, c)
 
 

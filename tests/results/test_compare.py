@@ -1,0 +1,193 @@
+"""Comparisons of small runs that can be worked out by hand."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from run_by_hand import outcomes, record, write
+
+from robospa.results.compare import Comparison, Difference, compare, drops, stop_early
+from robospa.results.intervals import difference, paired_difference, wilson
+from robospa.results.records import TrialKey, TrialRecord
+from robospa.results.sides import CompareError, Side, side_of_published, side_of_run
+from robospa.results.significance import boschloo, mcnemar_mid_p
+
+SIZE, MUGS, BOTTLES = "Pick_Blocks_Size", "Pick_Mugs_Distance", "Put_Bottles_Dustbin"
+
+
+def side(folder: Path, records: list[TrialRecord], metric: str = "sr", **more: object) -> Side:
+    return side_of_run(write(folder, records, **more), metric=metric)  # type: ignore[arg-type]
+
+
+def group(found: Comparison, label: str, level: int) -> Difference:
+    return next(g for g in found.groups if (g.label, g.level) == (label, level))
+
+
+def test_a_paired_variant_by_hand(tmp_path: Path) -> None:
+    first = side(tmp_path / "a", outcomes(SIZE, 1, [1, 1, 1, 0, 0, 1]))
+    second = side(tmp_path / "b", outcomes(SIZE, 1, [1, 0, 0, 0, 1, 0]))
+    found = compare(first, second)
+    (cell,) = found.cells
+    assert found.paired
+    assert (cell.only_first, cell.only_second, cell.trials) == (3, 1, 6)
+    assert (cell.first, cell.second) == (pytest.approx(4 / 6), pytest.approx(2 / 6))
+    by_hand = paired_difference(3, 1, 6)
+    assert cell.estimate.value == pytest.approx(1 / 3)
+    assert (cell.estimate.low, cell.estimate.high) == pytest.approx((by_hand.low, by_hand.high))
+    assert cell.estimate.method == "Tango"
+    assert cell.p == cell.q == mcnemar_mid_p(3, 1)
+    assert compare(first, second) == found
+
+
+def test_averages_weigh_categories_the_same_and_say_how_they_were_made(tmp_path: Path) -> None:
+    one = outcomes(SIZE, 1, [1, 1]) + outcomes("Other", 1, [1, 0]) + outcomes(MUGS, 1, [1, 1])
+    two = outcomes(SIZE, 1, [0, 0]) + outcomes("Other", 1, [1, 0]) + outcomes(MUGS, 1, [1, 1])
+    found = compare(side(tmp_path / "a", one), side(tmp_path / "b", two))
+    assert group(found, "GAC", 1).estimate.value == pytest.approx(0.5)
+    assert group(found, "GAC", 1).p == mcnemar_mid_p(2, 0)
+    assert group(found, "overall", 1).estimate.value == pytest.approx(0.25)
+    assert group(found, "overall", 1).estimate.method == "MOVER on Tango"
+    again = compare(side(tmp_path / "c", one), side(tmp_path / "d", two), method="bootstrap")
+    assert group(again, "overall", 1).estimate.method == "stratified bootstrap"
+    assert group(again, "overall", 1).p == group(found, "overall", 1).p  # not from a point
+
+
+def test_runs_on_other_seeds_are_not_paired(tmp_path: Path) -> None:
+    one = outcomes(SIZE, 1, [1, 1, 0])
+    two = [replace(r, key=replace(r.key, seed=r.key.seed + 50)) for r in outcomes(SIZE, 1, [0, 0])]
+    found = compare(a := side(tmp_path / "a", one), b := side(tmp_path / "b", two))
+    (cell,) = found.cells
+    assert not found.paired
+    assert cell.only_first is None
+    assert cell.estimate == difference(wilson(2, 3), wilson(0, 2))
+    assert cell.p == boschloo(a.samples[SIZE, 1], b.samples[SIZE, 1])
+
+
+def test_a_run_against_the_paper(tmp_path: Path) -> None:
+    run = side(tmp_path / "a", outcomes(SIZE, 1, [1] * 9 + [0]))
+    found = compare(run, side_of_published("RDT"))
+    (cell,) = found.cells
+    assert not found.paired
+    assert (cell.first, cell.second) == (0.9, pytest.approx(0.03))
+    assert cell.q < 0.001
+    assert (group(found, "overall", 1).variants, group(found, "overall", 1).listed) == (1, 56)
+    assert any("Only 1 of 280 variants" in note for note in found.notes)
+
+
+def test_two_published_models() -> None:
+    found = compare(side_of_published("pi0.5"), side_of_published("X-VLA"))
+    assert found.first == "π0.5"
+    best = group(found, "overall", 5)
+    assert 100 * best.estimate.value == pytest.approx(22.25 - 19.87, abs=0.02)
+    assert best.variants == best.listed == 56
+    assert {g.q for g in found.groups if g.label == "MIP" and g.level == 5} == {1.0}
+
+
+def test_onta_is_the_difference_of_rates_on_its_own_scale(tmp_path: Path) -> None:
+    one = side(tmp_path / "a", outcomes(SIZE, 1, [1, 1, 0, 0]), "onta")
+    two = side(tmp_path / "b", outcomes(SIZE, 1, [0, 1, 0, 0]), "onta")
+    (cell,) = compare(one, two, "onta").cells
+    assert cell.estimate.value == pytest.approx(0.25 * 2)  # chance is one half
+    assert (cell.first, cell.second) == (pytest.approx(0.0), pytest.approx(-0.5))
+
+
+def test_progress_compares_shares_of_subtasks(tmp_path: Path) -> None:
+    one = [record(BOTTLES, 3, n, d, 3) for n, d in enumerate((3, 2, 1, 2))]
+    two = [record(BOTTLES, 3, n, d, 3) for n, d in enumerate((3, 1, 1, 0))]
+    found = compare(side(tmp_path / "a", one, "ps"), side(tmp_path / "b", two, "ps"), "ps")
+    (cell,) = found.cells
+    assert cell.estimate.value == pytest.approx((0 + 1 + 0 + 2) / 3 / 4)
+    assert (cell.only_first, cell.only_second) == (2, 0)
+    assert cell.estimate.method == "bootstrap"
+
+
+def test_lost_trials_are_left_out_in_pairs_and_counted(tmp_path: Path) -> None:
+    lost = record(SIZE, 1, 2, 0, end="infrastructure")
+    one = side(tmp_path / "a", [*outcomes(SIZE, 1, [1, 1]), lost])
+    two = side(tmp_path / "b", outcomes(SIZE, 1, [0, 1, 1]))
+    found = compare(one, two)
+    assert found.cells[0].trials == 2
+    assert any("1 listed trials have no result" in note for note in found.notes)
+
+
+def test_notes_tell_of_versions_and_of_policies_that_ignore_their_seed(tmp_path: Path) -> None:
+    about = [{"versions": {"robospa": v}, "code": "x"} for v in ("1", "2")]
+    blind = {"policy": {"spec": {"seeded": False}}}
+    one = side(tmp_path / "a", outcomes(SIZE, 1, [1]), about=about[0], settings=blind)
+    two = side(tmp_path / "b", outcomes(SIZE, 1, [1]), about=about[1])
+    notes = " ".join(compare(one, two).notes)
+    assert "different versions of robospa" in notes
+    assert "a ignores the policy seed" in notes
+
+
+def test_drops_between_levels(tmp_path: Path) -> None:
+    records = [r for n, k in ((1, 3), (2, 2), (3, 0)) for r in outcomes(SIZE, n, [1] * k + [0])]
+    found = {row.label: row for row in drops(side(tmp_path / "a", records))}
+    assert {"GAC L1-L2", "GAC L2-L3", "GAC L1-L3", "overall L1-L3"} <= set(found)
+    assert found["GAC L1-L2"].estimate.value == pytest.approx(3 / 4 - 2 / 3)
+    assert found["overall L1-L3"].estimate == replace(
+        difference(wilson(3, 4), wilson(0, 1)), method=found["overall L1-L3"].estimate.method
+    )
+
+
+def test_the_early_verdict_is_marked(tmp_path: Path) -> None:
+    one = side(tmp_path / "a", outcomes(SIZE, 1, [1] * 12))
+    two = side(tmp_path / "b", outcomes(SIZE, 1, [0] * 12))
+    found = stop_early(one, two)
+    assert (found.better, found.looked, found.pairs) == (1, 7, 12)
+    assert "no result to publish" in found.note
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"embodiment": "piper"}, "a mixes the embodiments aloha-agilex and piper"),
+        ({"mode": "random"}, "a mixes the scene modes clean and random"),
+        ({"split": "train"}, "a mixes the instruction splits heldout and train"),
+    ],
+)
+def test_a_run_that_mixes_settings_is_refused(
+    tmp_path: Path, change: dict[str, str], message: str
+) -> None:
+    one = record(SIZE, 1, 0, 1)
+    other = replace(one, key=replace(one.key, **change))  # type: ignore[arg-type]
+    with pytest.raises(CompareError, match=message):
+        side(tmp_path / "a", [one, other])
+
+
+def test_sides_of_different_embodiments_are_refused(tmp_path: Path) -> None:
+    one = record(SIZE, 1, 0, 1)
+    other = replace(one, key=TrialKey(SIZE, 1, 0, "piper"))
+    first, second = side(tmp_path / "a", [one]), side(tmp_path / "b", [other])
+    with pytest.raises(CompareError, match="a ran with embodiment aloha-agilex and b with piper"):
+        compare(first, second)
+    with pytest.raises(CompareError, match="embodiment piper and RDT with aloha-agilex"):
+        compare(second, side_of_published("RDT"))
+
+
+def test_other_scenes_under_one_seed_are_refused(tmp_path: Path) -> None:
+    one = record(SIZE, 1, 0, 1)
+    first = side(tmp_path / "a", [one])
+    second = side(tmp_path / "b", [replace(one, scene_digest="changed")])
+    with pytest.raises(CompareError, match="seed 0 of Pick_Blocks_Size L1 is another scene in b"):
+        compare(first, second)
+
+
+def test_what_cannot_be_compared_is_one_sentence(tmp_path: Path) -> None:
+    first = side(tmp_path / "a", outcomes(SIZE, 1, [1]))
+    second = side(tmp_path / "b", outcomes(MUGS, 1, [1]))
+    with pytest.raises(CompareError, match="no variant in common"):
+        compare(first, second)
+    with pytest.raises(CompareError, match="share no seed"):
+        stop_early(first, second)
+    with pytest.raises(CompareError, match="holds no result yet"):
+        side(tmp_path / "c", [record(SIZE, 1, 0, 0, end="infrastructure")])
+    with pytest.raises(CompareError, match="no published model is called 'pi9'; there are RDT"):
+        side_of_published("pi9")
+    with pytest.raises(CompareError, match="only the mean is known"):
+        side_of_published("RDT", "ps")
+    mixed = [record(SIZE, 1, 0, 1), record(SIZE, 1, 1, 1, candidates=5)]
+    with pytest.raises(CompareError, match="differ in their number of candidates"):
+        side(tmp_path / "d", mixed, "onta")
