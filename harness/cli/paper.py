@@ -23,9 +23,9 @@ def paper(
 ) -> None:
     """Write every table of the paper, made from its per-task results.
 
-    Prints the main table and all printed values that cannot be reproduced.
+    Prints the first of them (the main one) and all printed values that cannot be reproduced.
     """
-    from robospa.results.columns import check_columns, published_column, run_column
+    from robospa.results.columns import published_column, run_column
     from robospa.results.errata import checks, errata
     from robospa.results.published import load
     from robospa.results.reading import read_run
@@ -37,9 +37,9 @@ def paper(
         raise ValueError(f"no format is called {format!r}; there are {', '.join(FORMATS)} and all")
     columns = [published_column(model) for model in load().models]
     columns += [run_column(read_run(folder)) for folder in run or []]
-    check_columns(columns)
-    written = write_tables(make_tables(columns, table or None, mark), out, endings)
-    show(make_tables(columns, ["main"], mark)[0])
+    grids = make_tables(columns, table or None, mark)
+    written = write_tables(grids, out, endings)
+    show(grids[0])
     print()
     print(f"{len(checks())} printed cells walked; {len(errata())} do not follow from the others:")
     for number, check in enumerate(errata(), 1):

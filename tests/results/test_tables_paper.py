@@ -1,0 +1,212 @@
+"""The paper's tables from published models and runs; what is missing is shown, never averaged."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from robospa.results.columns import TableError, published_column, run_column
+from robospa.results.published import LEVELS, load
+from robospa.results.reading import Run
+from robospa.results.records import TrialKey, TrialRecord
+from robospa.results.tables_all import make_tables
+from robospa.results.tables_grid import Entry, Grid
+from robospa.results.tables_paper import summary_table, task_table
+
+DATA = load()
+
+
+def record(key: TrialKey, success: bool, done: int, total: int, candidates: int) -> TrialRecord:
+    return TrialRecord(
+        key=key,
+        category=DATA.tasks[key.task].category if key.task in DATA.tasks else "",
+        instruction="",
+        scene_digest="",
+        end="success" if success else "step_limit",
+        success=success,
+        done=done,
+        best=done,
+        total=total,
+        candidates=candidates,
+        steps=1,
+        physics_steps=1,
+        policy_calls=1,
+        digest="",
+        actions_digest="",
+        wall_time=1.0,
+    )
+
+
+def make_run(records: list[TrialRecord], name: str = "mine", **manifest: Any) -> Run:
+    settings = {"policy": {"spec": {"name": name}}, "privileged": False}
+    keys = tuple(r.key for r in records)
+    return Run(Path("run"), {"settings": settings, **manifest}, keys, {r.key: r for r in records})
+
+
+def full_run(model: str, trials: int = 100, **key: Any) -> list[TrialRecord]:
+    """Records with the success and progress that the paper prints for `model`."""
+    made = []
+    for task in DATA.tasks.values():
+        for level in LEVELS:
+            sr = DATA.value(model, "sr", task.name, level) or 0.0
+            ps = DATA.value(model, "ps", task.name, level)
+            count = task.counts[level - 1]
+            left = round((ps or 0.0) * trials * count / 100)
+            for n in range(trials):
+                done = min(count, left) if ps is not None else int(n < sr)
+                left -= done
+                made.append(
+                    record(
+                        TrialKey(task.name, level, n, **key),
+                        100 * n < sr * trials,
+                        done,
+                        count if ps is not None else 1,
+                        0 if ps is not None else count,
+                    )
+                )
+    return made
+
+
+def entry(grid: Grid, row: str, column: int) -> Entry:
+    return next(line for line in grid.lines if line.label == row).entries[column]
+
+
+def test_a_run_with_the_published_counts_prints_the_published_digits() -> None:
+    run = run_column(make_run(full_run("RDT"), name="again"))
+    for name in ("main", "onta", "sr-tasks", "onta-tasks", "ps-tasks"):
+        (grid,) = make_tables([published_column("RDT"), run], [name], mark="none")
+        for line in grid.lines:
+            half = len(line.entries) // 2
+            first, second = (
+                [e.text for e in part] for part in (line.entries[:half], line.entries[half:])
+            )
+            assert first == second, (name, line.label)
+
+
+def test_lost_trials_are_marked_with_the_range_they_leave_open() -> None:
+    records = full_run("RDT", trials=10)
+    place = next(n for n, r in enumerate(records) if r.key.task == "Pick_Blocks_Size")
+    records[place] = replace(records[place], end="infrastructure", success=False)
+    run = run_column(make_run(records))
+    grid = summary_table([run], "main", "sr", ("L1", "L5", "Drop"))
+    assert entry(grid, "Geometric Attribute Cognition", 0).sign == "†"
+    assert entry(grid, "Geometric Attribute Cognition", 1).sign == ""
+    assert entry(grid, "Overall average", 0).sign == "†"
+    assert any("GAC L1 lacks 1, SR between" in note for note in grid.notes)
+    assert any("10 trials a variant" in note for note in grid.notes)
+
+
+def test_a_task_that_was_not_run_leaves_all_averages_above_it_open() -> None:
+    records = [r for r in full_run("RDT", trials=2) if r.key.variant != ("Pick_Blocks_Size", 5)]
+    run = run_column(make_run(records))
+    grid = summary_table([published_column("RDT"), run], "main", "sr", ("L1", "L5", "Drop"))
+    for row in ("Geometric Attribute Cognition", "Overall average"):
+        assert [entry(grid, row, n).text == "–" for n in (3, 4, 5)] == [False, True, True]
+    assert entry(grid, "Spatial Distance Estimation", 4).text != "–"
+    assert any("1 of the 56 tasks were not run at L5" in note for note in grid.notes)
+    (intervals,) = make_tables([run], ["intervals"])
+    assert entry(intervals, "mine", 2).text == "–"
+    assert entry(intervals, "mine", 1).text != "–"
+
+
+def test_a_variant_that_lost_everything_is_no_zero() -> None:
+    records = [
+        replace(r, end="infrastructure") if r.key.variant == ("Pick_Seals_Multi_View", 1) else r
+        for r in full_run("RDT", trials=2)
+    ]
+    grid = task_table([run_column(make_run(records))], "sr-tasks", "sr")
+    assert entry(grid, "Pick Seals Multi View", 0).text == "–"
+
+
+def test_the_best_is_marked_in_every_model_that_cannot_be_told_from_it() -> None:
+    columns = [published_column(model) for model in DATA.models]
+    tied = summary_table(columns, "main", "sr", ("L1", "L5", "Drop"), "tied")
+    highest = summary_table(columns, "main", "sr", ("L1", "L5", "Drop"), "highest")
+
+    def marked(grid: Grid, row: str) -> list[int]:
+        line = next(x for x in grid.lines if x.label == row)
+        return [n for n, e in enumerate(line.entries) if e.best]
+
+    assert marked(highest, "Cross-View Reasoning") == [6, 7]
+    assert marked(tied, "Cross-View Reasoning") == [6, 7, 9, 10]
+    assert marked(highest, "Memory-Intensive Planning") == [1, 4, 6, 7, 10]
+    for line, other in zip(highest.lines, tied.lines, strict=True):
+        best = {n for n, e in enumerate(line.entries) if e.best}
+        assert best <= {n for n, e in enumerate(other.entries) if e.best}
+        assert not any(line.entries[n].best for n in range(2, len(line.entries), 3))  # no drop
+
+
+def test_one_model_alone_is_not_marked_as_best() -> None:
+    (grid,) = make_tables([published_column("RDT")], ["main"])
+    assert not any(e.best for line in grid.lines for e in line.entries)
+
+
+def test_a_run_on_another_robot_is_a_row_of_the_embodiment_tables_only() -> None:
+    run = run_column(make_run(full_run("RDT", trials=2, embodiment="ur5")))
+    columns = [published_column("RDT"), run]
+    (grid,) = make_tables(columns, ["embodiments-spatial"])
+    assert grid.lines[-1].label == "mine, UR5"
+    with pytest.raises(
+        TableError, match=r"RDT and mine .* embodiment differs \(aloha-agilex, ur5\)"
+    ):
+        make_tables(columns, ["main"])
+
+
+def test_other_suites_scenes_or_splits_are_refused() -> None:
+    base = full_run("RDT", trials=1)
+    other = full_run("RDT", trials=1, split="train")
+    mixed = full_run("RDT", trials=1, mode="randomized")
+    first = run_column(make_run(base, suite="robospa-1"), "a")
+    for second, what in (
+        (run_column(make_run(base, suite="robospa-2"), "b"), "suite"),
+        (run_column(make_run(other), "b"), "split"),
+        (run_column(make_run(mixed), "b"), "mode"),
+    ):
+        with pytest.raises(TableError, match=f"a and b cannot .* their {what} differs"):
+            make_tables([first, second], ["main"])
+
+
+def test_a_run_that_mixes_robots_is_refused() -> None:
+    records = [*full_run("RDT", trials=1), *full_run("RDT", trials=1, embodiment="piper")]
+    with pytest.raises(TableError, match=r"mine mixes embodiments \(aloha-agilex, piper\)"):
+        run_column(make_run(records))
+
+
+@pytest.mark.parametrize("key", [TrialKey("Juggle", 1, 0), TrialKey("Pick_Blocks_Size", 6, 0)])
+def test_unknown_variants_are_named(key: TrialKey) -> None:
+    with pytest.raises(TableError, match=f"{key.task} L{key.level}"):
+        run_column(make_run([record(key, True, 1, 1, 2)]))
+
+
+def test_other_mistakes_are_named() -> None:
+    with pytest.raises(TableError, match="lists no trials"):
+        run_column(make_run([]))
+    with pytest.raises(TableError, match="no published model is called 'pi1'; there are RDT"):
+        published_column("pi1")
+    with pytest.raises(TableError, match="two columns are called RDT"):
+        make_tables([published_column("RDT"), published_column("RDT")], ["main"])
+    with pytest.raises(TableError, match="no table is called 'mian'; there are main"):
+        make_tables([published_column("RDT")], ["mian"])
+    with pytest.raises(ValueError, match="no mark is called"):
+        make_tables([published_column("RDT")], ["main"], mark="bold")
+    with pytest.raises(TableError, match="at least one"):
+        make_tables([], ["main"])
+
+
+def test_a_privileged_policy_is_called_so() -> None:
+    run = make_run(full_run("RDT", trials=1))
+    settings = {**run.manifest["settings"], "privileged": True}
+    assert run_column(replace(run, manifest={"settings": settings})).title == "mine (privileged)"
+
+
+def test_values_that_do_not_follow_are_marked_and_the_printed_ones_told() -> None:
+    (main, ps) = make_tables(
+        [published_column("GO-1"), published_column("X-VLA")], ["main", "ps-tasks"]
+    )
+    assert entry(main, "Composite Action Coordination", 0).sign == "*"
+    assert any("CAC GO-1 L1 24.2" in note for note in main.notes)
+    assert entry(ps, "Click Open Place", 5).text == "15.0"
+    assert entry(ps, "Click Open Place", 5).sign == "*"

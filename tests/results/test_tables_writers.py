@@ -1,0 +1,186 @@
+"""Tables as Markdown, LaTeX, HTML and CSV: whole, and safe with any name from outside."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+import shutil
+import subprocess
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+
+from robospa.results.columns import published_column
+from robospa.results.published import load
+from robospa.results.tables_all import FORMATS, TABLES, make_tables, write_tables
+from robospa.results.tables_grid import Entry, Grid, Line, to_csv, to_markdown
+from robospa.results.tables_html import fragment, page
+from robospa.results.tables_latex import document, escape_latex, to_latex
+from robospa.results.tables_terminal import show
+
+EVIL = "=a|b_c & 100% <script>alert(1)</script> \\input{x} $#~^{} “é” 模型"
+SMALL = Grid(
+    "small",
+    f"Title {EVIL}",
+    "Model",
+    ("L1", "L5"),
+    (
+        Line("A section", kind="section"),
+        Line(EVIL, (Entry("12.5", 12.5, 10.0, 15.0, best=True), Entry("-1.2", -1.2, sign="*†"))),
+        Line("Average", (Entry("–"), Entry(EVIL)), "average"),
+    ),
+    groups=((EVIL, 2),),
+    notes=(f"note {EVIL}",),
+)
+
+
+@pytest.fixture(scope="module")
+def grids() -> list[Grid]:
+    return make_tables([published_column(model) for model in load().models])
+
+
+def test_every_table_of_the_paper_is_there(grids: list[Grid]) -> None:
+    assert [g.name for g in grids] == list(TABLES)
+    assert {g.name: len([x for x in g.lines if x.kind != "section"]) for g in grids} == {
+        "main": 13,
+        "onta": 6,
+        "ps": 6,
+        "intervals": 8,
+        "sr-tasks": 56,
+        "onta-tasks": 24,
+        "ps-tasks": 32,
+        "embodiments-spatial": 5,
+        "embodiments-procedural": 5,
+        "basic": 3,
+        "models": 4,
+        "datasets": 16,
+        "assets": 121,
+        "errata": 22,
+    }
+
+
+def latex_columns(line: str) -> int:
+    """Columns that a row of a tabular fills."""
+    spans = [int(n) for n in re.findall(r"\\multicolumn\{(\d+)\}", line)]
+    return len(re.findall(r"(?<!\\)&", line)) + 1 + sum(n - 1 for n in spans)
+
+
+def test_latex_is_balanced_and_every_row_fills_its_columns(grids: list[Grid]) -> None:
+    for grid in (*grids, SMALL):
+        text = to_latex(grid)
+        bare = re.sub(r"\\[\\{}]", "", text)
+        assert bare.count("{") == bare.count("}"), grid.name
+        begun, ended = (re.findall(rf"\\{word}\{{([a-z*]+)\}}", text) for word in ("begin", "end"))
+        assert begun == ended[::-1] == ["table*", "tabular"]
+        rows = [x for x in text.splitlines() if x.endswith(r"\\")]
+        assert {latex_columns(row) for row in rows} == {len(grid.heads) + 1}, grid.name
+        assert text.isascii(), grid.name
+
+
+@pytest.mark.skipif(shutil.which("pdflatex") is None, reason="needs pdflatex")
+def test_latex_compiles(grids: list[Grid], tmp_path: Path) -> None:
+    (tmp_path / "all.tex").write_text(document([*grids, SMALL]))
+    command = ["pdflatex", "-interaction=nonstopmode", "-halt-on-error", "all.tex"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stdout[-2000:]
+    assert "Overfull" not in done.stdout
+    assert "too large" not in done.stdout
+
+
+def test_what_latex_takes_for_commands_is_escaped() -> None:
+    assert escape_latex("a_b & 5%") == r"a\_b \& 5\%"
+    assert escape_latex(r"\input{x}") == r"\textbackslash{}input\{x\}"
+    assert escape_latex("π0.5 é 模") == r"$\pi_{0.5}$ e ?"
+    assert "$-1.2$" in to_latex(SMALL)
+
+
+def test_markdown_rows_have_equal_columns_and_no_markup_from_outside(grids: list[Grid]) -> None:
+    for grid in (*grids, SMALL):
+        text = to_markdown(grid)
+        rows = [x for x in text.splitlines() if x.startswith("|")]
+        assert {len(re.findall(r"(?<!\\)\|", row)) for row in rows} == {len(grid.heads) + 2}
+    text = to_markdown(SMALL)
+    assert "**12.5**" in text
+    assert "<script" not in text.replace("\\<script", "")
+
+
+class Tags(HTMLParser):
+    """Checks that tags nest and that every row of a table is equally wide."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.widths: list[int] = []
+        self.seen: set[str] = set()
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.seen.add(tag)
+        if tag == "tr":
+            self.widths.append(0)
+        if tag in ("td", "th"):
+            self.widths[-1] += int(dict(attrs).get("colspan") or 1)
+        if tag not in ("meta",):
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+
+def test_html_nests_and_takes_nothing_from_outside(grids: list[Grid]) -> None:
+    for grid in (*grids, SMALL):
+        reader = Tags()
+        reader.feed(fragment(grid))
+        assert reader.open == []
+        assert set(reader.widths) == {len(grid.heads) + 1}, grid.name
+        assert "script" not in reader.seen
+    whole = page([*grids, SMALL], EVIL)
+    assert "http" not in whole
+    assert 'class="best" title="95 %: 10.0 to 15.0"' in whole
+
+
+def test_csv_has_a_line_a_cell_with_unrounded_numbers(grids: list[Grid]) -> None:
+    rows = list(csv.DictReader(io.StringIO(to_csv(grids))))
+    assert len(rows) == sum(
+        len(line.entries) for grid in grids for line in grid.lines if line.kind != "section"
+    )
+    first = rows[0]
+    assert (first["table"], first["group"], first["column"]) == ("main", "RDT", "L1")
+    (cell,) = (
+        r
+        for r in rows
+        if r["table"] == "main"
+        and r["group"] == "RDT"
+        and r["column"] == "L5"
+        and r["row"].startswith("Geometric")
+    )
+    assert (cell["text"], cell["value"]) == ("4.8", "4.75")
+    small = list(csv.DictReader(io.StringIO(to_csv([SMALL]))))
+    assert small[0]["row"] == "'" + EVIL  # a spreadsheet does not run it
+    assert (small[0]["best"], small[1]["sign"], small[0]["section"]) == ("best", "*†", "A section")
+
+
+def test_tables_of_the_wrong_shape_are_refused() -> None:
+    with pytest.raises(ValueError, match="wrong length"):
+        Grid("x", "", "", ("a", "b"), (Line("r", (Entry("1"),)),))
+    with pytest.raises(ValueError, match="do not span"):
+        Grid("x", "", "", ("a", "b"), (), groups=(("g", 3),))
+
+
+def test_every_format_is_written(tmp_path: Path, grids: list[Grid]) -> None:
+    written = write_tables(grids[:2], tmp_path / "out", list(FORMATS))
+    assert {path.name for path in written} == {
+        *(f"tables.{ending}" for ending in FORMATS),
+        "main.tex",
+        "onta.tex",
+    }
+    assert all(path.read_text() for path in written)
+
+
+def test_the_terminal_gets_every_cell(
+    capsys: pytest.CaptureFixture[str], grids: list[Grid]
+) -> None:
+    show(grids[0])
+    out = capsys.readouterr().out
+    assert re.search(r"Overall average +16\.8 +6\.9 +9\.9 +25\.6\* +8\.8", out)
