@@ -1,0 +1,179 @@
+"""Each rule of lint finds what it is for, and nothing in a clean run."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from run_by_hand import outcomes, record, write
+
+from robospa.results.lint import (
+    Finding,
+    Row,
+    lint_published,
+    lint_run,
+    lint_runs,
+    lint_table,
+    run_rows,
+)
+from robospa.results.reading import RunError, read_run, to_line
+from robospa.results.records import TrialKey, TrialRecord
+
+SIZE, MUGS, BOTTLES = "Pick_Blocks_Size", "Pick_Mugs_Distance", "Put_Bottles_Dustbin"
+
+
+def rules(found: list[Finding]) -> list[str]:
+    return [f.rule for f in found]
+
+
+def linted(folder: Path, *records: TrialRecord, **more: Any) -> list[Finding]:
+    return lint_run(write(folder / "run", records, **more))
+
+
+def test_a_clean_run_has_no_findings(tmp_path: Path) -> None:
+    records = outcomes(SIZE, 1, [1, 0, 1]) + [record(BOTTLES, 2, n, 1, 2) for n in range(3)]
+    assert linted(tmp_path, *records) == []
+
+
+@pytest.mark.parametrize(
+    ("change", "rule"),
+    [
+        ({"wall_time": 0.001}, "too-fast"),
+        ({"physics_steps": 3}, "fewer-steps"),
+        ({"done": 5}, "progress-range"),
+        ({"done": 0}, "ps-below-sr"),
+        ({"end": "step_limit"}, "end-and-success"),
+        ({"candidates": 9}, "mixed-candidates"),
+        ({"total": 3, "done": 3}, "mixed-totals"),
+        ({"category": "SDE"}, "mixed-categories"),
+        ({"scene_digest": "scene Pick_Blocks_Size10"}, "same-scene"),
+        ({"actions_digest": "actions Pick_Blocks_Size10 1"}, "same-actions"),
+        ({"digest": "end Pick_Blocks_Size10 1 "}, "same-end-state"),
+    ],
+)
+def test_one_wrong_trial_is_found(tmp_path: Path, change: dict[str, Any], rule: str) -> None:
+    good, bad = outcomes(SIZE, 1, [1, 1])
+    found = linted(tmp_path, good, replace(bad, **change))
+    assert rules(found) == [rule]
+    assert "Pick_Blocks_Size" in str(found[0])
+
+
+def test_missing_trials_are_counted_and_named(tmp_path: Path) -> None:
+    lost = record(SIZE, 1, 1, 0, end="infrastructure")
+    owed = TrialKey(SIZE, 1, 2)
+    (found,) = linted(tmp_path, record(SIZE, 1, 0, 1), lost, also_listed=[owed])
+    assert found.rule == "missing"
+    assert found.text.startswith("2 of 3 trials have no result: Pick_Blocks_Size-L1-1-")
+
+
+def test_trials_listed_twice_or_not_at_all(tmp_path: Path) -> None:
+    first = record(SIZE, 1, 0, 1)
+    assert rules(linted(tmp_path / "a", first, also_listed=[first.key])) == ["listed-twice"]
+    run = write(tmp_path / "b", outcomes(SIZE, 1, [1, 0]))
+    assert rules(lint_run(replace(run, keys=run.keys[:1]))) == ["not-listed"]
+
+
+def test_unequal_numbers_of_trials(tmp_path: Path) -> None:
+    found = linted(tmp_path, *outcomes(SIZE, 1, [1, 0]), *outcomes(SIZE, 2, [1]))
+    assert rules(found) == ["unequal-trials"]
+
+
+@pytest.mark.parametrize("change", [{"embodiment": "piper"}, {"mode": "random"}])
+def test_mixed_suites(tmp_path: Path, change: dict[str, str]) -> None:
+    first, second = outcomes(SIZE, 1, [1, 0])
+    second = replace(second, key=replace(second.key, **change))  # type: ignore[arg-type]
+    (found,) = linted(tmp_path, first, second)
+    assert found.rule == "mixed-suites"
+    assert next(iter(change.values())) in found.text
+
+
+def test_variants_that_do_not_exist(tmp_path: Path) -> None:
+    run = write(tmp_path / "a", outcomes("Pick_Moon", 1, [1, 0]))
+    assert lint_run(run, {(SIZE, 1)})[0].text == "Pick_Moon L1 not among the benchmark's variants"
+
+
+def test_torn_and_repeated_records(tmp_path: Path) -> None:
+    records = outcomes(SIZE, 1, [1, 0])
+    run = write(tmp_path / "a", records)
+    again = tmp_path / "a" / "trials" / "0001.jsonl"
+    again.write_text(to_line(records[0]) + to_line(records[1])[:50])
+    assert rules(lint_run(run)) == ["torn-line", "recorded-twice"]
+
+
+def test_records_that_cannot_be_read_are_one_sentence(tmp_path: Path) -> None:
+    path = write(tmp_path / "a", outcomes(SIZE, 1, [1])).folder / "trials" / "0000.jsonl"
+    whole = path.read_text()
+    path.write_text(whole[:60] + "\n" + whole)
+    with pytest.raises(RunError, match=r"0000.jsonl, line 1: "):
+        read_run(tmp_path / "a")
+    path.write_text(whole.replace('"success":true', '"success":true,"success":false'))
+    with pytest.raises(RunError, match="line 1: the field 'success' is there twice"):
+        read_run(tmp_path / "a")
+
+
+def test_tasks_with_the_same_results(tmp_path: Path) -> None:
+    rows = [(1, [1, 1, 1, 0]), (2, [1, 1, 0, 0]), (3, [1, 0, 0, 0])]
+    records = [r for task in (SIZE, MUGS) for n, k in rows for r in outcomes(task, n, k)]
+    (found,) = linted(tmp_path, *records)
+    assert found.rule == "identical-rows"
+    assert "Pick_Blocks_Size and Pick_Mugs_Distance" in found.text
+
+
+def test_few_successes_may_agree_by_chance() -> None:
+    rows = [Row("m", task, (1, 2), (3.0, 0.0)) for task in "ab"]
+    assert lint_table(rows) == []
+
+
+def test_a_run_as_rows(tmp_path: Path) -> None:
+    run = write(tmp_path / "a", [record(BOTTLES, 2, n, n, 2) for n in range(3)])
+    (row,) = run_rows(run, "a")
+    assert (row.sr, row.ps, row.trials) == ((pytest.approx(100 / 3),), (50.0,), (3,))
+
+
+@pytest.mark.parametrize(
+    ("row", "rule"),
+    [
+        (Row("m", "t", (2,), (60.0,), ps=(50.0,)), "ps-below-sr"),
+        (Row("m", "t", (1,), (60.0,), ps=(61.0,), subtasks=(1,), trials=(100,)), "ps-is-sr"),
+        (
+            Row("m", "t", (2,), (10.0,), ps=(23.3,), subtasks=(2,), trials=(100,), printed=True),
+            "ps-not-a-share",
+        ),
+        (Row("m", "t", (2,), (10.5,), trials=(100,)), "sr-not-a-count"),
+        (Row("m", "t", (2,), (120.0,)), "range"),
+        (Row("m", "t", (4,), (22.0,), onta=(22.0,), candidates=(6,)), "onta-from-sr"),
+    ],
+)
+def test_numbers_that_cannot_be(row: Row, rule: str) -> None:
+    assert rules(lint_table([row])) == [rule]
+
+
+def test_a_third_of_the_trials_is_a_count_when_not_rounded() -> None:
+    assert lint_table([Row("m", "t", (1,), (100 / 3,), trials=(3,))]) == []
+    assert lint_table([Row("m", "t", (1,), (33.3,), trials=(3,), printed=True)]) == []
+
+
+def test_the_paper() -> None:
+    found = lint_published()
+    assert lint_published() == found
+    assert sorted(rules(found)) == sorted(
+        ["identical-rows"] * 2 + ["ps-not-a-share"] * 6 + ["onta-from-sr", "ps-is-sr"]
+    )
+    same = [f.text for f in found if f.rule == "identical-rows"]
+    assert [f.where for f in found if f.rule == "identical-rows"] == ["RDT", "RDT"]
+    assert same[0].startswith("Lift_Fan_Repeat and Place_Object_Scale_Click")
+    assert same[1].startswith("Rank_Blocks_Size and Click_Bell_Clockwise_Order")
+
+
+def test_runs_that_do_not_belong_in_one_table(tmp_path: Path) -> None:
+    one, two = (
+        write(tmp_path / name, [record(SIZE, 1, 0, 1)], about={"versions": {"robospa": name}})
+        for name in ("a", "b")
+    )
+    assert rules(lint_runs([one, two])) == ["mixed-versions"]
+    other = replace(record(SIZE, 1, 0, 1), key=TrialKey(SIZE, 1, 0, "piper"))
+    three = write(tmp_path / "c", [other], about={"versions": {"robospa": "a"}})
+    assert rules(lint_runs([one, three])) == ["mixed-suites"]
+    assert lint_runs([one, one]) == []
