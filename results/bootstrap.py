@@ -106,12 +106,12 @@ def _chances(counts: tuple[int, ...]) -> NDArray[np.float64]:
 
 
 @lru_cache(maxsize=1024)
-def _deck(counts: tuple[int, ...]) -> NDArray[np.uint16]:
+def _deck(counts: tuple[int, ...]) -> NDArray[np.unsignedinteger]:
     """The sum that belongs to each of GRID equally likely random numbers."""
     cumulated = np.rint(np.cumsum(_chances(counts)) * GRID).astype(np.int64)
     cumulated[-1] = GRID
-    sums = np.arange(len(cumulated), dtype=np.uint16)
-    deck: NDArray[np.uint16] = np.repeat(sums, np.diff(cumulated, prepend=0).clip(min=0))
+    sums = np.arange(len(cumulated), dtype=np.uint16 if len(cumulated) <= GRID else np.uint32)
+    deck: NDArray[np.unsignedinteger] = np.repeat(sums, np.diff(cumulated, prepend=0).clip(min=0))
     return deck
 
 

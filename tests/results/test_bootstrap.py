@@ -102,6 +102,12 @@ def test_a_variant_that_never_varies_is_drawn_as_it_is() -> None:
     assert drawn == pytest.approx(np.full(10_000, 1.0 - 0.5))
 
 
+def test_sums_beyond_sixteen_bits() -> None:
+    drawn = draw([rate(69_000, 70_000)], [1.0], resamples=2000)
+    assert drawn.mean() == pytest.approx(69 / 70, abs=1e-4)
+    assert drawn.std() == pytest.approx(math.sqrt(69 / 70 / 70 / 70_000), rel=0.1)
+
+
 def test_other_tasks_make_the_interval_of_the_paper_three_to_four_times_wider() -> None:
     data, members = load(), load().members
     groups = [
