@@ -98,11 +98,13 @@ def _film(record: TrialRecord, time: float) -> float | None:
 
 
 def _at_end(record: TrialRecord, kind: str, evidence: str) -> Failure:
-    """A failure that no event shows: placed at the last one, or at the end of the actions."""
+    """A failure that no event shows: the trial's last action is where it stands."""
     return Failure(kind, evidence, None, record.steps, None)
 
 
 def _idle(record: TrialRecord) -> str:
+    if "roles" not in record.diagnostics:
+        return "the record does not tell what the grippers tried: an older version wrote it"
     if record.done:
         return (
             f"{record.done} of {record.total} subtasks hold at the end; "

@@ -20,6 +20,7 @@ COMMANDS = {
     "paper": "Write the paper's tables, recomputed, and list what does not follow.",
     "compare": "Compare two runs, or a run and published numbers; plan sample sizes.",
     "lint": "Look for results that cannot be, in runs or in the paper.",
+    "failures": "Say why the failed trials of a run failed, and how it shows.",
     "tasks": "List the tasks; show, draw or collect their scenes.",
     "seeds": "Make the lists of accepted seeds, or measure the expert.",
 }

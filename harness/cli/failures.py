@@ -1,0 +1,34 @@
+"""`robospa failures`: why the failed trials of a run failed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def failures(
+    run: Annotated[Path, typer.Argument(help="folder of a run")],
+    by: Annotated[str, typer.Option(help="count by task, category or variant")] = "task",
+    trials: Annotated[
+        bool, typer.Option("--trials", help="list every failed trial with its evidence")
+    ] = False,
+    layout: Annotated[str, typer.Option("--format", help="markdown, csv or json")] = "markdown",
+) -> None:
+    """Print the types of failure in a run; docs/failures.md says how they are told."""
+    from robospa.results.failures import OURS, label
+    from robospa.results.failures_table import counts_table, trials_table
+    from robospa.results.reading import read_run
+
+    found = read_run(run)
+    records = list(found.records.values())
+    if trials:
+        print(trials_table(records, layout))
+        return
+    print(counts_table(records, by, layout))
+    if layout == "markdown":
+        types = [failure for record in records if (failure := label(record)) is not None]
+        print(f"\n{len(types)} failed trials of {len(found.keys)}, {len(found.missing)} missing")
+        if any(failure.kind in OURS for failure in types):
+            print("* not one of the paper's types")

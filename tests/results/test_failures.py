@@ -1,0 +1,294 @@
+"""Failure types from events written by hand: one rule a test."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import pytest
+
+from robospa.results.failures import KINDS, NAMES, distribution, label
+from robospa.results.failures_table import counts_table, trials_table
+from robospa.results.records import TrialKey, TrialRecord
+
+Row = tuple[Any, ...]
+PICK = {"target": [0], "other": []}
+TOWER = {"a": [0], "b": [1], "c": [2]}
+CLICKS = {"can": [0, 2], "bread": [1], "basket": []}
+
+
+def events(rows: Sequence[Row]) -> tuple[Mapping[str, Any], ...]:
+    """(time, kind, object, index, note) with defaults, as records hold them."""
+    found = []
+    for row in rows:
+        time, kind, name, index, note = (*row, *("", -1, "")[len(row) - 2 :])
+        found.append(
+            {"time": time, "kind": kind, "object": name, "index": index, "note": note, "step": 3}
+        )
+    return tuple(found)
+
+
+def failed(
+    category: str,
+    rows: Sequence[Row],
+    roles: Mapping[str, list[int]] | None = PICK,
+    end: str = "step_limit",
+    video: str = "",
+    done: int = 0,
+    seed: int = 1,
+) -> TrialRecord:
+    """A failed trial of a category with these events."""
+    return TrialRecord(
+        TrialKey(f"Task_{category}", 3, seed), category, "", "", end, False, done, done, 3, 3,
+        100, 5000, 10, "", "", 1.0,
+        events=events(rows),
+        diagnostics={} if roles is None else {"roles": roles},
+        video=video,
+    )  # fmt: skip
+
+
+def kind(record: TrialRecord) -> str:
+    found = label(record)
+    assert found is not None
+    return found.kind
+
+
+# -- what is no failure, and what needs no events ----------------------------------------------
+
+
+def test_a_lost_trial_is_no_failure_of_the_policy() -> None:
+    assert label(failed("GAC", [], end="infrastructure")) is None
+
+
+def test_a_success_has_no_type() -> None:
+    record = failed("GAC", [])
+    assert label(TrialRecord(**{**vars(record), "success": True, "end": "success"})) is None
+
+
+def test_an_answer_that_cannot_be_executed_has_its_own_type() -> None:
+    assert kind(failed("GAC", [], end="policy_error")) == "invalid_action"
+
+
+def test_nothing_tried() -> None:
+    found = label(failed("GAC", []))
+    assert found is not None
+    assert (found.kind, found.step, found.time, found.video_seconds) == (
+        "no_attempt",
+        100,
+        None,
+        None,
+    )
+
+
+def test_a_record_of_an_older_version_says_so() -> None:
+    found = label(failed("GAC", [], roles=None))
+    assert found is not None and "older version" in found.evidence
+
+
+# -- spatial -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("rows", "expected"),
+    [
+        ([(2, "closed", "other", -1, "touching")], "target_grounding"),
+        ([(2, "grasped", "other")], "target_grounding"),
+        ([(2, "closed", "target", 0, "touching")], "target_execution"),
+        ([(2, "grasped", "target"), (3, "dropped", "target")], "target_execution"),
+        ([(2, "closed", "target", 0, "beside")], "no_contact_grasp"),
+        ([(2, "closed", "other", -1, "beside")], "no_contact_grasp"),
+        ([(2, "approached", "target", 0)], "target_execution"),
+        ([(2, "approached", "other")], "target_grounding"),
+        ([(2, "wrong_object", "other")], "target_grounding"),
+        ([(2, "closed", "", -1, "nothing near")], "no_attempt"),
+        # a touch says more than a miss before it, and the first touch is the choice
+        (
+            [(2, "closed", "other", -1, "beside"), (4, "closed", "target", 0, "touching")],
+            "target_execution",
+        ),
+        (
+            [(2, "closed", "other", -1, "touching"), (4, "closed", "target", 0, "touching")],
+            "target_grounding",
+        ),
+    ],
+)
+def test_spatial_rules(rows: list[Row], expected: str) -> None:
+    assert kind(failed("CVR", rows)) == expected
+
+
+def test_of_a_drop_the_fall_is_the_evidence() -> None:
+    rows = [(2, "closed", "target", 0, "touching"), (5, "dropped", "target")]
+    found = label(failed("GAC", rows, video="videos/x.mp4"))
+    assert found is not None
+    assert (found.time, found.step, found.video_seconds) == (5.0, 3, 2.5)
+
+
+def test_without_a_video_there_is_no_moment_in_it() -> None:
+    found = label(failed("GAC", [(5, "grasped", "other")]))
+    assert found is not None and found.video_seconds is None
+
+
+# -- procedural --------------------------------------------------------------------------------
+
+BOTTOM = (0, "subtask_done", "a", 0)
+
+
+@pytest.mark.parametrize(
+    ("category", "roles", "rows", "expected"),
+    [
+        ("OCE", TOWER, [BOTTOM, (3, "closed", "b", 1, "beside")], "manipulation"),
+        ("OCE", TOWER, [BOTTOM, (3, "closed", "b", 1, "touching")], "manipulation"),
+        ("OCE", TOWER, [BOTTOM, (3, "grasped", "b"), (4, "dropped", "b")], "manipulation"),
+        ("OCE", TOWER, [BOTTOM, (3, "grasped", "b")], "manipulation"),
+        ("OCE", TOWER, [BOTTOM, (3, "grasped", "c")], "temporal_ordering"),
+        ("OCE", TOWER, [BOTTOM, (3, "grasped", "b"), (9, "grasped", "a")], "temporal_ordering"),
+        ("OFE", TOWER, [(3, "grasped", "c"), (4, "dropped", "c")], "manipulation"),
+        ("OCE", TOWER, [BOTTOM, (3, "subtask_done", "b", 1)], "no_attempt"),
+        (
+            "OCE",
+            TOWER,
+            [BOTTOM, (3, "subtask_done", "b", 1), (5, "grasped", "b")],
+            "redundant_repetition",
+        ),
+        # a miss does not make what comes next an error of order
+        (
+            "OCE",
+            TOWER,
+            [BOTTOM, (3, "closed", "b", 1, "beside"), (9, "grasped", "c")],
+            "manipulation",
+        ),
+        # an undone subtask: by a collapse, or because its object was taken again
+        (
+            "OCE",
+            TOWER,
+            [BOTTOM, (3, "subtask_done", "b", 1), (5, "subtask_undone", "b", 1)],
+            "manipulation",
+        ),
+        (
+            "OCE",
+            TOWER,
+            [
+                BOTTOM,
+                (3, "subtask_done", "b", 1),
+                (5, "subtask_undone", "b", 1),
+                (5.3, "closed", "b", 1, "touching"),
+                (5.4, "grasped", "b"),
+            ],
+            "redundant_repetition",
+        ),
+        ("MIP", TOWER, [(3, "cue_hidden"), (5, "grasped", "b")], "memory"),
+        ("MIP", TOWER, [(1, "failed", "", -1, "moved before")], "temporal_ordering"),
+        (
+            "MIP",
+            TOWER,
+            [(5, "wrong_order", "b", 1), (5, "failed", "b", 1, "opened too early")],
+            "memory",
+        ),
+        (
+            "MIP",
+            TOWER,
+            [
+                (5, "subtask_done", "a", 0),
+                (9, "closed", "a", 0, "touching"),
+                (9, "failed", "a", 0, "opened cover taken again"),
+            ],
+            "redundant_repetition",
+        ),
+        (
+            "MIP",
+            TOWER,
+            [(5, "subtask_done", "a", 0), (9, "failed", "a", 0, "opened cover moved away")],
+            "manipulation",
+        ),
+        ("CAC", CLICKS, [(2, "subtask_done", "can", 0), (3, "repeated", "can", 2)],
+         "redundant_repetition"),
+        (
+            "CAC",
+            CLICKS,
+            [(2, "subtask_done", "can", 0), (3, "wrong_order", "can", 2)],
+            "redundant_repetition",
+        ),
+        ("CAC", CLICKS, [(3, "wrong_order", "bread", 1)], "temporal_ordering"),
+        ("CAC", CLICKS, [(3, "closed", "basket", -1, "touching")], "target_grounding"),
+        # order is not enforced there: what was done badly weighs more
+        (
+            "CAC",
+            CLICKS,
+            [(3, "wrong_order", "can", 2), (6, "grasped", "bread"), (7, "dropped", "bread")],
+            "manipulation",
+        ),
+        ("RPF", {"stapler": [0, 1, 2]}, [(2, "approached", "stapler", 0)], "manipulation"),
+        (
+            "RPF",
+            {"stapler": [0, 1, 2]},
+            [(2, "approached", "stapler", 0), (3, "subtask_done", "stapler", 0)],
+            "no_attempt",
+        ),
+    ],
+)  # fmt: skip
+def test_procedural_rules(
+    category: str, roles: dict[str, list[int]], rows: list[Row], expected: str
+) -> None:
+    assert kind(failed(category, rows, roles)) == expected
+
+
+def test_a_mistake_that_was_put_right_is_not_the_root() -> None:
+    rows = [
+        BOTTOM,
+        (3, "grasped", "b"),
+        (4, "dropped", "b"),
+        (9, "subtask_done", "b", 1),
+        (12, "closed", "c", 2, "beside"),
+    ]
+    found = label(failed("OCE", rows, TOWER))
+    assert found is not None
+    assert (found.kind, found.time) == ("manipulation", 12.0)
+
+
+def test_a_harmless_repetition_is_forgiven_by_progress() -> None:
+    rows = [
+        (2, "subtask_done", "can", 0),
+        (3, "repeated", "can", 2),
+        (6, "subtask_done", "can", 2),
+        (9, "grasped", "bread"),
+        (10, "dropped", "bread"),
+    ]
+    assert kind(failed("CAC", rows, CLICKS)) == "manipulation"
+
+
+# -- counts ------------------------------------------------------------------------------------
+
+
+RUN = [
+    failed("GAC", [(2, "grasped", "other")], seed=1),
+    failed("GAC", [(2, "grasped", "other")], seed=2),
+    failed("GAC", [], seed=3),
+    failed("GAC", [], end="infrastructure", seed=4),
+    failed("OCE", [(2, "dropped", "b")], TOWER, seed=1),
+]
+
+
+def test_counts_leave_out_what_is_no_failure() -> None:
+    assert distribution(RUN, "category") == {
+        "GAC": {"target_grounding": 2, "no_attempt": 1},
+        "OCE": {"manipulation": 1},
+    }
+
+
+def test_another_grouping_is_refused() -> None:
+    with pytest.raises(ValueError, match="task, category, variant"):
+        distribution(RUN, "robot")
+
+
+def test_tables_agree_in_all_layouts() -> None:
+    assert json.loads(counts_table(RUN, "variant", "json"))["Task_OCE L3"] == {"manipulation": 1}
+    assert "Task_GAC,3,2,0,1" in counts_table(RUN, "task", "csv")
+    assert "| Task_GAC | 3 | 2 | 0 | 1 |" in counts_table(RUN, "task", "markdown")
+    assert len(json.loads(trials_table(RUN, "json"))) == 4
+    with pytest.raises(ValueError, match="no layout 'xml'"):
+        counts_table(RUN, "task", "xml")
+
+
+def test_every_kind_has_words() -> None:
+    assert set(NAMES) == set(KINDS)
