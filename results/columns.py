@@ -34,7 +34,8 @@ class Column:
     """A model's values in percent by metric and (row, level); None where something is missing.
 
     A row is a task, a category, a dimension or `overall`. `scores` has the same with intervals as
-    fractions. `suite` is "" where it is not known. `trials` is the most that any variant lists.
+    fractions. `suite` is "" where it is not known. `trials` is the most that any variant lists. A
+    `privileged` policy saw the exact state: it is shown, but competes with nobody.
     """
 
     title: str
@@ -46,6 +47,7 @@ class Column:
     split: str = ""
     trials: int = 0
     published: str = ""
+    privileged: bool = False
 
     def value(self, metric: str, row: str, level: int) -> float | None:
         """Percent, unrounded."""
@@ -188,8 +190,8 @@ def run_column(run: Run, name: str | None = None) -> Column:
     data = load()
     policy = run.manifest.get("settings", {}).get("policy", {}).get("spec", {}).get("name", "")
     label = name or str(policy) or run.folder.name
-    if run.manifest.get("settings", {}).get("privileged"):
-        label += " (privileged)"
+    privileged = bool(run.manifest.get("settings", {}).get("privileged"))
+    label += " (privileged)" * privileged
     keys = run.keys
     if not keys:
         raise TableError(f"the run {label} lists no trials; there is nothing to show")
@@ -215,6 +217,7 @@ def run_column(run: Run, name: str | None = None) -> Column:
         suite=str(run.manifest.get("suite", "")),
         split=keys[0].split,
         trials=max(cell.listed for cell in scores.cells.values()),
+        privileged=privileged,
     )
 
 

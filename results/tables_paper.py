@@ -135,6 +135,7 @@ def _best(
     if mark not in MARKS:
         raise ValueError(f"no mark is called {mark!r}; there are {', '.join(MARKS)}")
     places = [(row, level) for row in rows for level in levels]
+    columns = [c for c in columns if not c.privileged]
     if mark == "none" or len(columns) < 2:
         return {place: set() for place in places}
     if mark == "tied":
@@ -208,10 +209,7 @@ def _notes(
         if column.published:
             continue
         if column.trials != trials:
-            notes.append(
-                f"{column.title}: {column.trials} trials a variant at most, "
-                f"the published models {trials}."
-            )
+            notes.append(f"{column.title}: at most {column.trials} of {trials} trials a variant.")
         for level in levels:
             lacking = column.not_run(level)
             if lacking:

@@ -12,7 +12,7 @@ def show(grid: Grid) -> None:
     from rich.text import Text
 
     table = Table(title=grid.title, title_justify="left", box=None, pad_edge=False)
-    table.add_column(grid.corner)
+    table.add_column(grid.corner, no_wrap=True)
     last = ""
     for group, head in zip(grid.group_of, grid.heads, strict=True):
         name = f"{group}\n{head}" if group != last else f"\n{head}"
@@ -27,7 +27,7 @@ def show(grid: Grid) -> None:
         table.add_row(Text(line.label, style="italic" * (line.kind == "average")), *cells)
     console = Console()
     if not console.is_terminal:
-        console = Console(width=130)
+        console = Console(width=220)  # rows are only as long as they need
     console.print(table, highlight=False)
     for note in grid.notes:
         console.print(Text(note, style="dim"))

@@ -1,0 +1,77 @@
+"""`robospa paper` from the command line."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from robospa.harness.cli.main import main
+
+
+def run(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, str, str]:
+    with pytest.raises(SystemExit) as stop:
+        main(("paper", *words))
+    said = capsys.readouterr()
+    code = stop.value.code
+    return (code if isinstance(code, int) else 0), said.out, said.err
+
+
+def test_all_tables_are_written_and_the_errata_told(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    code, out, _ = run(capsys, "--out", str(tmp_path / "paper"))
+    assert code == 0
+    assert "Overall average" in out
+    assert "2747 printed cells walked; 22 do not follow" in out
+    assert "main, RRR, X-VLA, Drop: printed 28.2, recomputed 26.2" in out
+    names = {path.name for path in (tmp_path / "paper").iterdir()}
+    assert {"tables.md", "tables.tex", "tables.html", "tables.csv", "main.tex"} <= names
+
+
+def test_one_table_in_one_format(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    words = ("--out", str(tmp_path / "p"), "--table", "basic", "--format", "md")
+    code, out, _ = run(capsys, *words)
+    assert code == 0
+    assert "Color-Based Grounding" in out
+    assert [path.name for path in (tmp_path / "p").iterdir()] == ["tables.md"]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--format", "pdf"), "no format is called 'pdf'; there are md, tex, html, csv and all"),
+        (("--table", "mian"), "no table is called 'mian'; there are main,"),
+        (("--mark", "bold"), "no mark is called 'bold'; there are tied, highest, none"),
+        (("--run", "nowhere"), "nowhere is not a run"),
+    ],
+)
+def test_mistakes_are_one_sentence_and_write_nothing(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, words: tuple[str, ...], said: str
+) -> None:
+    code, out, err = run(capsys, "--out", str(tmp_path / "p"), *words)
+    assert (code, out) == (1, "")
+    assert said in err
+    assert len(err.splitlines()) == 1
+    assert not (tmp_path / "p").exists()
+
+
+def test_a_run_stands_beside_the_published(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    trials = {
+        "task": "Pick_Blocks_Size",
+        "level": 1,
+        "embodiment": "aloha-agilex",
+        "mode": "clean",
+        "split": "heldout",
+        "seeds": [100000],
+    }
+    folder = tmp_path / "run"
+    (folder / "trials").mkdir(parents=True)
+    settings = {"policy": {"spec": {"name": "mine"}}}
+    (folder / "run.json").write_text(json.dumps({"settings": settings, "trials": [trials]}))
+    code, out, _ = run(capsys, "--out", str(tmp_path / "p"), "--run", str(folder))
+    assert code == 0
+    assert "mine: 55 of the 56 tasks were not run at L1" in " ".join(out.split())
