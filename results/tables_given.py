@@ -11,7 +11,7 @@ from robospa.results.intervals import interval_of
 from robospa.results.metrics import DIMENSIONS
 from robospa.results.published import load, title
 from robospa.results.tables_grid import MISSING, Entry, Grid, Line
-from robospa.results.tables_paper import DASH, DIMENSION_NAMES
+from robospa.results.tables_paper import DASH, DIMENSION_NAMES, not_run_note
 
 INTERVAL_METHODS = (("bootstrap", "Stratified bootstrap"), ("wilson", "MOVER on Wilson limits"))
 
@@ -46,10 +46,9 @@ def interval_table(columns: Sequence[Column]) -> Grid:
 
 def _open_notes(columns: Sequence[Column], level: int) -> list[str]:
     """What columns lack at `level`."""
-    notes = []
+    notes: list[str] = []
     for column in columns:
-        if lacking := column.not_run(level):
-            notes.append(f"{column.title}: {lacking} tasks were not run at L{level}.")
+        notes += not_run_note(column, [level])
         if lost := column.missing(aggregate.OVERALL, level):
             notes.append(f"{MISSING} {column.title}: {lost} trials at L{level} have no result.")
     return notes

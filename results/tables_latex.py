@@ -81,7 +81,9 @@ def to_latex(grid: Grid) -> str:
             label = rf"\textit{{{label}}}"
         lines.append(" & ".join([label, *map(_entry, line.entries)]) + r" \\")
     lines += [r"\bottomrule", r"\end{tabular}}"]
-    lines += [rf"\par\smallskip{{\footnotesize {escape_latex(n)}\par}}" for n in grid.notes]
+    lines += [
+        rf"\par\smallskip{{\footnotesize\raggedright {escape_latex(n)}\par}}" for n in grid.notes
+    ]
     return "\n".join([*lines, r"\end{table*}", ""])
 
 

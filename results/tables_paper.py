@@ -210,18 +210,23 @@ def _notes(
             continue
         if column.trials != trials:
             notes.append(f"{column.title}: at most {column.trials} of {trials} trials a variant.")
-        for level in levels:
-            lacking = column.not_run(level)
-            if lacking:
-                total = len(load().tasks)
-                notes.append(
-                    f"{column.title}: {lacking} of the {total} tasks were not run at L{level}; "
-                    "averages over them stay open."
-                )
+        notes += not_run_note(column, levels)
         lost = [text for row in rows for level in levels if (text := _lost(column, row, level))]
         if lost:
             notes.append(f"{MISSING} {column.title}, trials without a result: {'; '.join(lost)}.")
     return tuple(notes)
+
+
+def not_run_note(column: Column, levels: Sequence[int]) -> list[str]:
+    """How many of the benchmark's tasks `column` lacks at `levels`, or nothing."""
+    lacking = [f"{n} at L{level}" for level in levels if (n := column.not_run(level))]
+    if not lacking:
+        return []
+    total = len(load().tasks)
+    return [
+        f"{column.title}: of {total} tasks {', '.join(lacking)} were not run; "
+        "averages over them stay open."
+    ]
 
 
 def _lost(column: Column, row: str, level: int) -> str:

@@ -74,4 +74,4 @@ def test_a_run_stands_beside_the_published(
     (folder / "run.json").write_text(json.dumps({"settings": settings, "trials": [trials]}))
     code, out, _ = run(capsys, "--out", str(tmp_path / "p"), "--run", str(folder))
     assert code == 0
-    assert "mine: 55 of the 56 tasks were not run at L1" in " ".join(out.split())
+    assert "mine: of 56 tasks 55 at L1, 56 at L5 were not run" in " ".join(out.split())

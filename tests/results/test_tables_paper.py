@@ -106,7 +106,7 @@ def test_a_task_that_was_not_run_leaves_all_averages_above_it_open() -> None:
     for row in ("Geometric Attribute Cognition", "Overall average"):
         assert [entry(grid, row, n).text == "–" for n in (3, 4, 5)] == [False, True, True]
     assert entry(grid, "Spatial Distance Estimation", 4).text != "–"
-    assert any("1 of the 56 tasks were not run at L5" in note for note in grid.notes)
+    assert any("of 56 tasks 1 at L5 were not run" in note for note in grid.notes)
     (intervals,) = make_tables([run], ["intervals"])
     assert entry(intervals, "mine", 2).text == "–"
     assert entry(intervals, "mine", 1).text != "–"
