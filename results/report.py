@@ -1,280 +1,152 @@
-"""A run's report: one folder that can be moved or served as it is.
+"""Reports of runs: one folder that can be moved or served as it is.
 
-report.md and report.json for other programs and for pasting, report.html with the tables, the
-figure, every trial and its video. Text from outside (instructions, messages of servers) is escaped.
+report.md and report.json for pasting and other programs, report.html with tables, figures, every
+trial and its video, `figures/` for papers. Runs that cannot stand in one table (other embodiments,
+scenes, suites) still get their trials and cards, and one sentence that says why there is no table.
 """
 
 from __future__ import annotations
 
 import json
-import os
-import shutil
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from robospa.results import tables
-from robospa.results.figure import draw
-from robospa.results.metrics import METRIC_NAMES, METRICS, Scores, score_run
+from robospa.results.columns import Column, TableError, check_columns, published_column, run_column
+from robospa.results.figures.draw import draw
+from robospa.results.figures.series import Drawing, Series
+from robospa.results.lint import lint_run, lint_runs
+from robospa.results.metrics import METRIC_NAMES, Scores, score_run
 from robospa.results.reading import Run, finished
-from robospa.results.records import TrialKey, TrialRecord
+from robospa.results.report_facts import about, ends, facts, names_of
+from robospa.results.report_page import FIGURES, page
+from robospa.results.report_tables import Shown, for_page, report_tables, write_files
+from robospa.results.tables import missing_lines, to_json
+from robospa.results.tables_grid import escape_markdown, to_markdown
 
-SHOWN_TRIALS = 2000
-"""More trials than this make a page that browsers choke on: failures go first, the rest is cut."""
-FILMS = "videos"
-END_NAMES = {
-    "success": "success",
-    "step_limit": "step limit",
-    "policy_error": "policy error",
-    "goal_lost": "goal lost",
-    "infrastructure": "missing",
-}
+TABLES = "tables"
+AVERAGES = (
+    "Values in percent. A category is the mean of its tasks; dimensions and the overall value are "
+    "means of categories. ONTA is 0 for guessing among the candidates."
+)
 
 
-def write_report(run: Run, folder: Path) -> Path:
-    """Write the report of `run` into `folder` and return it."""
-    folder.mkdir(parents=True, exist_ok=True)
-    scores = score_run(run)
-    known = [r for r in run.records.values() if finished(r)]
-    figures = draw(scores, known, folder)
-    data = {"run": about(run), **tables.to_json(scores), "ends": ends(run)}
-    (folder / "report.json").write_text(json.dumps(data, indent=1) + "\n")
-    (folder / "report.md").write_text(markdown(run, scores))
-    (folder / "report.html").write_text(html(run, scores, folder, figures))
+def write_report(
+    runs: Run | Sequence[Run], folder: Path, published: Sequence[str] = (), ci: str = "wilson"
+) -> Path:
+    """Write the report of one or several runs into `folder` and return it.
+
+    `published` names published models to stand beside them, `ci` is one of `intervals.METHODS`.
+    """
+    shown = [runs] if isinstance(runs, Run) else list(runs)
+    (folder / FIGURES).mkdir(parents=True, exist_ok=True)
+    names = names_of(shown)
+    columns, refused = columns_of(shown, names, published)
+    scores = dict(
+        zip(
+            [*names, *(c.title for c in columns[len(shown) :])],
+            (c.scores for c in columns),
+            strict=False,
+        )
+    ) or {name: score_run(run) for name, run in zip(names, shown, strict=True)}
+    drawings = draw_figures(shown, columns, folder / FIGURES)
+    tables = report_tables(columns) if columns else []
+    write_files(tables, folder / TABLES)
+    notes = {
+        "missing": missing(scores, names),
+        "findings": [*refused, *findings(shown)],
+        "method": method_notes(columns),
+    }
+    (folder / "report.md").write_text(markdown(shown, names, tables, notes), encoding="utf-8")
+    (folder / "report.json").write_text(json.dumps(to_data(shown, names, scores), indent=1) + "\n")
+    (folder / "report.html").write_text(
+        page(shown, names, scores, for_page(tables), drawings, notes, folder), encoding="utf-8"
+    )
     return folder
 
 
-def about(run: Run) -> dict[str, Any]:
-    """What was evaluated, with what, where: the facts of the manifest that a reader needs."""
-    manifest = run.manifest
-    settings = manifest.get("settings", {})
-    machine = manifest.get("about", {})
-    spec = settings.get("policy", {}).get("spec", {})
-    return {
-        "policy": spec.get("name", "unknown"),
-        "privileged": tables.is_privileged(run),
-        "seeded": bool(spec.get("seeded")),
-        "spec": spec,
-        "trials": len(run.keys),
-        "results": len(run.keys) - len(run.missing),
-        "missing": len(run.missing),
-        "settings": settings,
-        "seed_hash": manifest.get("seed_hash", ""),
-        "versions": machine.get("versions", {}),
-        "git": machine.get("git", {}),
-        "machine": machine.get("machine", {}),
-        "world": machine.get("world", {}),
-    }
+def columns_of(
+    runs: Sequence[Run], names: Sequence[str], published: Sequence[str]
+) -> tuple[list[Column], list[str]]:
+    """A column for every run and model, or none and the reason in a sentence."""
+    try:
+        columns = [run_column(run, name) for run, name in zip(runs, names, strict=True)]
+        columns += [published_column(model) for model in published]
+        check_columns(columns)
+    except TableError as error:
+        if published or len(runs) > 1:
+            raise
+        return [], [f"No tables: {error}."]
+    return columns, []
 
 
-def ends(run: Run) -> dict[str, int]:
-    """How many trials ended in which way; trials that were never run count as "not run"."""
-    counts: dict[str, int] = {}
-    for key in run.keys:
-        record = run.records.get(key)
-        name = "not run" if record is None else END_NAMES[record.end]
-        counts[name] = counts.get(name, 0) + 1
-    return dict(sorted(counts.items(), key=lambda item: -item[1]))
+def draw_figures(runs: Sequence[Run], columns: Sequence[Column], folder: Path) -> list[Drawing]:
+    """The figures of `columns`, of which the first belong to `runs`."""
+    series = []
+    for number, column in enumerate(columns):
+        known = runs[number].records.values() if number < len(runs) else ()
+        records = tuple(r for r in known if finished(r))
+        series.append(Series(column.title, column.scores, records, bool(column.published)))
+    return draw(series, folder) if series else []
 
 
-def latency(run: Run) -> dict[str, float]:
-    """Milliseconds that the policy took to answer: median and largest of the trials' p50, p99."""
-    found = [r.latency for r in run.records.values() if r.latency]
-    if not found:
-        return {}
-    middle = sorted(x["p50"] for x in found)[len(found) // 2]
-    return {"p50": middle, "p99": max(x["p99"] for x in found), "max": max(x["max"] for x in found)}
-
-
-def timing(run: Run) -> dict[str, float]:
-    """Share of the trials' wall time by purpose."""
-    total = sum(r.wall_time for r in run.records.values())
-    sums: dict[str, float] = {}
-    for record in run.records.values():
-        for name, seconds in record.timing.items():
-            sums[name] = sums.get(name, 0.0) + seconds
-    return (
-        {name: s / total for name, s in sorted(sums.items(), key=lambda p: -p[1])} if total else {}
-    )
-
-
-def facts(run: Run) -> list[tuple[str, str]]:
-    """The report's head, as name and text."""
-    info = about(run)
-    git = info["git"]
-    commit = (
-        f", commit {git['commit'][:12]}{' + changes' if git.get('dirty') else ''}" if git else ""
-    )
-    spent = latency(run)
-    world = info["world"]
-    found = [
-        ("policy", info["policy"] + (", privileged: sees the exact state" * info["privileged"])),
-        ("trials", f"{info['results']} of {info['trials']} with a result"),
-        ("ends", ", ".join(f"{count} {name}" for name, count in ends(run).items())),
-        ("list of trials", f"hash {info['seed_hash']}"),
-        ("software", f"robospa {info['versions'].get('robospa', '?')}{commit}"),
-        ("world", ", ".join(f"{k} {_line(v)}" for k, v in world.items() if v is not None)),
+def missing(scores: dict[str, Scores], names: Sequence[str]) -> list[str]:
+    """A sentence for every variant that lacks trials."""
+    return [
+        f"{name}: {line}" if len(names) > 1 else line
+        for name in names
+        for line in missing_lines(scores[name])
     ]
-    if spent:
-        text = (
-            f"median {spent['p50']:.1f} ms, p99 {spent['p99']:.1f} ms, most {spent['max']:.1f} ms"
-        )
-        found.append(("policy latency", text))
-    if timing(run):
-        parts = [f"{name} {100 * x:.0f} %" for name, x in timing(run).items() if x >= 0.005]
-        found.append(("time spent on", ", ".join(parts)))
-    return found
 
 
-def markdown(run: Run, scores: Scores) -> str:
-    """The report as Markdown."""
-    lines = [f"# {about(run)['policy']}", ""]
-    lines += [f"* {name}: {text}" for name, text in facts(run)]
-    for line in tables.missing_lines(scores):
-        lines.append(f"* **missing**: {line}")
-    for metric in shown_metrics(scores):
-        lines += ["", f"## {METRIC_NAMES[metric]}", "", tables.markdown_table(scores, metric)]
-    lines += ["", tables.NOTE, ""]
-    return "\n".join(lines)
+def findings(runs: Sequence[Run]) -> list[str]:
+    """What `robospa lint` finds in the runs."""
+    found = [f for run in runs for f in lint_run(run)]
+    found += lint_runs(runs) if len(runs) > 1 else []
+    return [str(f) for f in found]
 
 
-def shown_metrics(scores: Scores) -> list[str]:
-    """The metrics that any variant of the run has."""
-    present = {m for cell in scores.cells.values() for m in cell.values}
-    return [m for m in METRICS if m in present]
+def method_notes(columns: Sequence[Column]) -> list[str]:
+    """How values and intervals were made, in sentences, as the estimates themselves say."""
+    if not columns:
+        return []
+    made: dict[str, set[str]] = {}
+    for column in columns:
+        scores = column.scores
+        for cell in scores.cells.values():
+            for metric, estimate in cell.values.items():
+                if estimate is not None:
+                    made.setdefault(METRIC_NAMES[metric], set()).add(estimate.method)
+        for average in (*scores.categories.values(), *scores.overall.values()):
+            found = {e.method for e in average.values.values() if e is not None}
+            made.setdefault("averages", set()).update(found)
+    parts = [f"{name}: {' or '.join(sorted(m - {''}))}" for name, m in made.items() if m - {""}]
+    return [AVERAGES, "Methods of the 95 % intervals: " + "; ".join(parts) + "."]
 
 
-def html(run: Run, scores: Scores, folder: Path, figures: list[str]) -> str:
-    """The report as one page; videos are linked into `folder`."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    environment = Environment(
-        loader=PackageLoader("robospa.results", "."),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    trials = [trial_row(run, key, folder) for key in trial_order(run)[:SHOWN_TRIALS]]
-    return environment.get_template("report.html").render(
-        title=about(run)["policy"],
-        privileged=tables.is_privileged(run),
-        facts=facts(run),
-        missing=tables.missing_lines(scores),
-        metrics=[(m, METRIC_NAMES[m], table_rows(scores, m)) for m in shown_metrics(scores)],
-        levels=[tables.level_name(n) for n in (*scores.levels, 0)],
-        note=tables.NOTE,
-        figures=figures,
-        trials=trials,
-        films=[t for t in trials if t["video"]],
-        left_out=max(0, len(run.keys) - SHOWN_TRIALS),
-        ends=sorted({t["end"] for t in trials}),
-    )
+def markdown(
+    runs: Sequence[Run],
+    names: Sequence[str],
+    tables: Sequence[Shown],
+    notes: Mapping[str, Sequence[str]],
+) -> str:
+    """report.md: the cards, what is missing or odd, and all tables."""
+    lines = ["# " + escape_markdown(", ".join(names)), ""]
+    for run, name in zip(runs, names, strict=True):
+        lines += [f"## {escape_markdown(name)}", ""]
+        lines += [f"* {title}: {escape_markdown(text)}" for title, text in facts(run)] + [""]
+    for what in ("missing", "findings"):
+        lines += [f"* **{what}**: {escape_markdown(text)}" for text in notes[what]]
+    for table in tables:
+        lines += ["", to_markdown(table.grid)]
+    return "\n".join([*lines, "", " ".join(notes["method"]), ""])
 
 
-def table_rows(scores: Scores, metric: str) -> list[dict[str, Any]]:
-    """One table for the page."""
-    made = []
-    for row in tables.rows(scores):
-        if metric in tables.metrics_of(row):
-            cells = [_page_cell(part, metric) for _, part in row.parts]
-            made.append({"label": row.label, "kind": row.kind, "cells": cells})
-    return made
-
-
-def _page_cell(part: Any, metric: str) -> dict[str, Any]:
-    if part is None:
-        return {"value": "", "interval": "", "shade": 0, "missing": "", "count": ""}
-    estimate = part.values.get(metric)
-    text = tables.percent(estimate)
-    value, _, interval = text.partition(" ")
-    lost = f"{part.missing} missing: SR {100 * part.worst:.0f} to {100 * part.best:.0f}"
-    successes = getattr(part, "successes", None)
+def to_data(runs: Sequence[Run], names: Sequence[str], scores: dict[str, Scores]) -> dict[str, Any]:
+    """report.json: facts, scores and ends of every run."""
     return {
-        "value": value,
-        "interval": interval,
-        "shade": 0 if estimate is None else round(0.3 * max(0.0, min(1.0, estimate.value)), 3),
-        "missing": lost if part.missing else "",
-        "count": f"{successes} of {part.trials}"
-        if successes is not None
-        else f"{part.trials} trials",
+        "runs": [
+            {"name": name, "run": about(run), **to_json(scores[name]), "ends": ends(run)}
+            for name, run in zip(names, runs, strict=True)
+        ]
     }
-
-
-def trial_order(run: Run) -> list[TrialKey]:
-    """All trials in the run's order; if they are too many for a page, failures first."""
-    if len(run.keys) <= SHOWN_TRIALS:
-        return list(run.keys)
-
-    def good(key: TrialKey) -> bool:
-        record = run.records.get(key)
-        return record is not None and record.success
-
-    return sorted(run.keys, key=good)
-
-
-def trial_row(run: Run, key: TrialKey, folder: Path) -> dict[str, Any]:
-    """One line of the page's list of trials."""
-    record = run.records.get(key)
-    row: dict[str, Any] = {"task": key.task.replace("_", " "), "level": key.level, "seed": key.seed}
-    if record is None:
-        return {**row, **_NOT_RUN}
-    return {
-        **row,
-        "instruction": record.instruction,
-        "end": END_NAMES[record.end],
-        "good": record.success,
-        "progress": f"{record.done}/{record.total}",
-        "steps": record.steps,
-        "seconds": f"{record.wall_time:.1f}",
-        "message": record.message,
-        "events": [event_text(e) for e in record.events],
-        "digest": record.digest[:16],
-        "video": film(run, record, folder),
-    }
-
-
-_NOT_RUN: dict[str, Any] = {
-    "instruction": "",
-    "end": "not run",
-    "good": False,
-    "progress": "",
-    "steps": "",
-    "seconds": "",
-    "message": "",
-    "events": [],
-    "digest": "",
-    "video": "",
-}
-
-
-def event_text(event: Mapping[str, Any]) -> str:
-    """One event in a few words."""
-    parts = [f"{float(event.get('time', 0.0)):.2f} s", str(event.get("kind", "")).replace("_", " ")]
-    if int(event.get("index", -1)) >= 0:
-        parts.append(f"#{int(event['index']) + 1}")
-    parts += [str(event[name]) for name in ("object", "note") if event.get(name)]
-    return " ".join(parts)
-
-
-def film(run: Run, record: TrialRecord, folder: Path) -> str:
-    """Put the trial's video into `folder` and return its relative path ("" if there is none)."""
-    source = (run.folder / record.video).resolve()
-    inside = source.is_relative_to(run.folder.resolve())
-    if not record.video or not inside or not source.is_file():
-        return ""
-    target = folder / FILMS / source.name
-    target.parent.mkdir(exist_ok=True)
-    if not target.exists():
-        try:
-            os.link(source, target)
-        except OSError:
-            shutil.copyfile(source, target)
-    return f"{FILMS}/{source.name}"
-
-
-def _line(value: object) -> str:
-    """`value` as text without line breaks; of a mapping, its values."""
-    if isinstance(value, Mapping):
-        return " ".join(dict.fromkeys(_line(v) for v in value.values() if v is not None))
-    return " ".join(str(value).split())

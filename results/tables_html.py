@@ -81,6 +81,7 @@ def _entry(entry: Entry) -> str:
     hint = ""
     if entry.low is not None and entry.high is not None:
         hint = f' title="95 %: {entry.low:.1f} to {entry.high:.1f}"'
+        hint += f' data-interval="[{entry.low:z.1f}, {entry.high:z.1f}]"'
     sign = f"<sup>{_text(entry.sign)}</sup>" if entry.sign else ""
     return f"<td{kind}{hint}>{_text(entry.text)}{sign}</td>"
 

@@ -1,4 +1,4 @@
-"""`robospa report`: a run as tables, a figure and a page with its videos."""
+"""`robospa report`: runs as tables, figures and a page with every trial and its video."""
 
 from __future__ import annotations
 
@@ -9,15 +9,31 @@ import typer
 
 
 def report(
-    run: Annotated[Path, typer.Argument(help="folder of a run")],
-    out: Annotated[Path | None, typer.Option(help="where to write; default RUN/report")] = None,
+    run: Annotated[list[Path], typer.Argument(help="folders of runs, side by side")],
+    with_published: Annotated[
+        bool, typer.Option("--with-published", help="put the four published models beside them")
+    ] = False,
+    ci: Annotated[
+        str, typer.Option(help="95 % intervals: wilson, exact, jeffreys or bootstrap")
+    ] = "wilson",
+    out: Annotated[
+        Path | None, typer.Option(help="where to write; default RUN/report; several runs need it")
+    ] = None,
 ) -> None:
-    """Write report.md, report.json, report.html and the figure of a run."""
+    """Write report.html, report.md, report.json, tables and figures of one or several runs."""
+    from robospa.results.intervals import METHODS
+    from robospa.results.published import load
     from robospa.results.reading import read_run
     from robospa.results.report import write_report
     from robospa.results.tables import terminal
 
-    found = read_run(run)
-    folder = write_report(found, out or run / "report")
-    terminal(found)
+    if ci not in METHODS:
+        raise ValueError(f"no interval is called {ci!r}; there are {', '.join(METHODS)}")
+    if len(run) > 1 and out is None:
+        raise ValueError("a report of several runs belongs to none of them; say where with --out")
+    found = [read_run(folder) for folder in run]
+    published = list(load().models) if with_published else []
+    folder = write_report(found, out or run[0] / "report", published, ci)
+    for one in found:
+        terminal(one)
     print(f"Report: {folder / 'report.html'}")

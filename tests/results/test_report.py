@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -13,22 +14,24 @@ from robospa.results.intervals import Estimate, wilson
 from robospa.results.metrics import score_run
 from robospa.results.reading import Run, RunError, read_run, to_line
 from robospa.results.records import TrialKey, TrialRecord
-from robospa.results.report import event_text, write_report
+from robospa.results.report import write_report
+from robospa.results.report_trials import event_row
 
 EVIL = "<script>alert(1)</script>"
+CATEGORY_OF = {"Pick_Blocks_Size": "GAC", "Press_Stapler_Repeat": "RPF"}
 
 
 def record(task: str, level: int, seed: int, success: bool, **changes: object) -> TrialRecord:
     made = TrialRecord(
         key=TrialKey(task, level, seed),
-        category="GAC" if task == "Pick_It" else "RPF",
+        category="GAC" if task.startswith("Pick") else "RPF",
         instruction="take it",
         scene_digest="s",
         end="success" if success else "step_limit",
         success=success,
         done=int(success),
         best=int(success),
-        total=2 if task != "Pick_It" else 1,
+        total=1 if task.startswith("Pick") else 2,
         candidates=4,
         steps=10,
         physics_steps=500,
@@ -43,7 +46,7 @@ def record(task: str, level: int, seed: int, success: bool, **changes: object) -
 
 
 def make_run(folder: Path, records: list[TrialRecord], lost: int = 0) -> Run:
-    """A run on disk with `records`, and `lost` more listed trials of Pick_It level 1."""
+    """A run on disk with `records`, and `lost` more listed trials of the first variant."""
     rows = [
         {
             "task": r.key.task,
@@ -55,10 +58,10 @@ def make_run(folder: Path, records: list[TrialRecord], lost: int = 0) -> Run:
         }
         for r in records
     ]
-    extra = {**rows[0], "task": "Pick_It", "level": 1, "seeds": [900 + n for n in range(lost)]}
+    extra = {**rows[0], "seeds": [900 + n for n in range(lost)]}
     manifest = {
         "settings": {"policy": {"spec": {"name": f"model {EVIL}"}}, "privileged": False},
-        "categories": {"Pick_It": "GAC", "Press_It": "RPF"},
+        "categories": {**CATEGORY_OF, "Pick_It": "GAC", "Press_It": "RPF"},
         "trials": [*rows, extra],
         "about": {"versions": {"robospa": "1.0"}},
     }
@@ -71,29 +74,80 @@ def make_run(folder: Path, records: list[TrialRecord], lost: int = 0) -> Run:
 RECORDS = [record("Pick_It", 1, n, n < 3) for n in range(4)] + [
     record("Press_It", 2, n, False, done=1, message=EVIL) for n in range(2)
 ]
+KNOWN = [record("Pick_Blocks_Size", 1, n, n < 3, candidates=2) for n in range(4)] + [
+    record("Press_Stapler_Repeat", 2, n, False, done=1, message=EVIL, instruction=EVIL)
+    for n in range(2)
+]
+
+
+def trials_of(folder: Path) -> list[dict[str, Any]]:
+    """The list of trials that the page's script reads."""
+    page = (folder / "report.html").read_text()
+    text = page.split('<script type="application/json" id="data">')[1].split("</script>")[0]
+    return list(json.loads(text)["trials"])
 
 
 def test_the_report_holds_what_other_programs_need(tmp_path: Path) -> None:
-    folder = write_report(make_run(tmp_path / "run", RECORDS), tmp_path / "report")
-    data = json.loads((folder / "report.json").read_text())
-    cell = data["variants"]["Pick_It"]["L1"]
+    folder = write_report(make_run(tmp_path / "run", KNOWN), tmp_path / "report")
+    data = json.loads((folder / "report.json").read_text())["runs"][0]
+    cell = data["variants"]["Pick_Blocks_Size"]["L1"]
     assert (cell["trials"], cell["successes"], cell["missing"]) == (4, 3, 0)
     assert cell["sr"] == pytest.approx([0.75, wilson(3, 4).low, wilson(3, 4).high])
-    assert cell["onta"][0] == pytest.approx((0.75 - 0.25) / 0.75)
-    assert data["variants"]["Press_It"]["L2"]["ps"][0] == 0.5
+    assert cell["onta"][0] == pytest.approx((0.75 - 0.5) / 0.5)
+    assert data["variants"]["Press_Stapler_Repeat"]["L2"]["ps"][0] == 0.5
     assert data["ends"] == {"success": 3, "step limit": 3}
     assert data["overall"]["mean"]["sr"][0] == pytest.approx(0.375)
+    assert "sr-tasks" in (folder / "tables" / "tables.csv").read_text()
+    assert "| Pick Blocks Size | 75 |" in (folder / "report.md").read_text()
 
 
-def test_the_page_is_whole_and_escapes_what_comes_from_outside(tmp_path: Path) -> None:
-    folder = write_report(make_run(tmp_path / "run", RECORDS), tmp_path / "report")
+def test_text_from_outside_is_never_markup(tmp_path: Path) -> None:
+    folder = write_report(make_run(tmp_path / "run", KNOWN), tmp_path / "report")
     page = (folder / "report.html").read_text()
     assert EVIL not in page
     assert "&lt;script&gt;alert(1)&lt;/script&gt;" in page
-    assert page.count("<tr data-end=") == 6
-    assert "http" not in page  # nothing is loaded from elsewhere
-    assert (folder / "success.png").read_bytes()[:4] == b"\x89PNG"
-    assert (folder / "success.svg").exists()
+    assert trials_of(folder)[4]["message"] == EVIL
+    assert EVIL not in (folder / "report.md").read_text()
+
+
+def test_the_page_loads_nothing_from_elsewhere(tmp_path: Path) -> None:
+    folder = write_report(make_run(tmp_path / "run", KNOWN), tmp_path / "report")
+    page = (folder / "report.html").read_text()
+    assert "http" not in page.replace("http-equiv", "")
+    assert "@import" not in page
+    assert page.count("<svg") >= 4
+
+
+def test_every_trial_is_listed_with_its_failure_type(tmp_path: Path) -> None:
+    lost = replace(KNOWN[0], end="infrastructure", success=False)
+    run = make_run(tmp_path / "run", [lost, *KNOWN[1:]], lost=1)
+    found = trials_of(write_report(run, tmp_path / "report"))
+    assert [t["end"] for t in found] == [
+        "missing",
+        "success",
+        "success",
+        "step limit",
+        "step limit",
+        "step limit",
+        "not run",
+    ]
+    assert ["failure" in t for t in found] == [False, False, False, True, True, True, False]
+
+
+def test_several_runs_and_published_models_stand_side_by_side(tmp_path: Path) -> None:
+    runs = [make_run(tmp_path / name, KNOWN) for name in ("one", "two")]
+    folder = write_report(runs, tmp_path / "report", ["X-VLA"])
+    page = (folder / "report.html").read_text()
+    assert "(one)" in page
+    assert "(two)" in page
+    assert "X-VLA" in page
+    assert {t["run"] for t in trials_of(folder)} == {0, 1}
+
+
+def test_a_run_that_fits_no_table_says_why_and_keeps_its_trials(tmp_path: Path) -> None:
+    folder = write_report(make_run(tmp_path / "run", RECORDS), tmp_path / "report")
+    assert "No tables: " in (folder / "report.html").read_text()
+    assert len(trials_of(folder)) == 6
 
 
 def test_missing_trials_are_shown_with_the_worst_and_the_best_case(tmp_path: Path) -> None:
@@ -103,9 +157,9 @@ def test_missing_trials_are_shown_with_the_worst_and_the_best_case(tmp_path: Pat
         "Pick_It L1: 4 of 8 trials are missing; if all had failed SR would be 37.5, "
         "if all had succeeded 87.5"
     )
-    assert sentence in (folder / "report.md").read_text()
     assert sentence in (folder / "report.html").read_text()
-    assert json.loads((folder / "report.json").read_text())["overall"]["L1"]["missing"] == 4
+    data = json.loads((folder / "report.json").read_text())["runs"][0]
+    assert data["overall"]["L1"]["missing"] == 4
 
 
 def test_videos_are_put_into_the_report_and_nothing_else_is(tmp_path: Path) -> None:
@@ -121,16 +175,24 @@ def test_videos_are_put_into_the_report_and_nothing_else_is(tmp_path: Path) -> N
     (run.folder / "videos" / "a.mp4").write_bytes(b"film")
     folder = write_report(run, tmp_path / "report")
     assert [p.name for p in (folder / "videos").iterdir()] == ["a.mp4"]
-    page = (folder / "report.html").read_text()
-    assert page.count("<video") == 1
-    assert 'src="videos/a.mp4"' in page
+    assert [t.get("video") for t in trials_of(folder)] == ["videos/a.mp4", None, None]
+
+
+def test_a_video_of_a_trial_that_was_run_again_replaces_the_old_one(tmp_path: Path) -> None:
+    run = make_run(tmp_path / "run", [replace(RECORDS[0], video="videos/a.mp4")])
+    (run.folder / "videos").mkdir()
+    for content in (b"old", b"new"):
+        (run.folder / "videos" / "a.mp4").unlink(missing_ok=True)
+        (run.folder / "videos" / "a.mp4").write_bytes(content)
+        folder = write_report(run, tmp_path / "report")
+        assert (folder / "videos" / "a.mp4").read_bytes() == content
 
 
 def test_a_run_without_any_record_still_makes_a_report(tmp_path: Path) -> None:
-    run = make_run(tmp_path / "run", RECORDS[:1], lost=1)
+    run = make_run(tmp_path / "run", KNOWN[:1], lost=1)
     (run.folder / "trials" / "0000.jsonl").unlink()
     folder = write_report(read_run(run.folder), tmp_path / "report")
-    assert "not run" in (folder / "report.html").read_text()
+    assert [t["end"] for t in trials_of(folder)] == ["not run", "not run"]
 
 
 def test_a_folder_that_is_no_run_is_refused(tmp_path: Path) -> None:
@@ -160,4 +222,4 @@ def test_percent_has_no_negative_zero() -> None:
 
 def test_an_event_in_words() -> None:
     event = {"time": 1.5, "kind": "wrong_object", "object": "cup", "index": 1, "note": "lifted"}
-    assert event_text(event) == "1.50 s wrong object #2 cup lifted"
+    assert event_row(event) == [1.5, "wrong object", "#2 cup lifted"]

@@ -1,0 +1,76 @@
+"""Draws all figures that the given models and runs have data for, as SVG, PNG and PDF."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from robospa.results.failures import KINDS, NAMES, distribution
+from robospa.results.figures.failure_bars import draw_failures
+from robospa.results.figures.heat import draw_heat
+from robospa.results.figures.latency import draw_latency, has_latency
+from robospa.results.figures.levels import draw_levels
+from robospa.results.figures.progress import draw_progress
+from robospa.results.figures.radar import draw_radar
+from robospa.results.figures.series import (
+    Drawing,
+    Series,
+    percent_of,
+    save,
+    styled,
+    tasks_in_order,
+)
+
+CAPTIONS = {
+    "success": "Success rate by level for every category, with 95 % intervals; "
+    "the dotted line is guessing among the candidates.",
+    "radar": "Success rate of every category at levels 1 and 5; a gap has no result.",
+    "progress": "Progress score against success rate, a point a procedural variant: the higher "
+    "above the line, the further failed trials came.",
+    "latency": "Share of trials whose median, 95th and 99th percentile latency lies below a value.",
+}
+
+
+def draw(shown: Sequence[Series], folder: Path) -> list[Drawing]:
+    """Write the figures of `shown` into `folder`; a figure without data is left out.
+
+    Published models get heat maps only where no run is shown.
+    """
+    made: list[Drawing] = []
+    runs = [s for s in shown if has_latency(s)]
+    mapped = [s for s in shown if not s.published] or shown
+    with styled():
+        if any(s.scores.categories for s in shown):
+            save(draw_levels(shown), folder, "success")
+            made.append(Drawing("success", "Success against level", CAPTIONS["success"]))
+            save(draw_radar(shown), folder, "radar")
+            made.append(Drawing("radar", "Categories", CAPTIONS["radar"]))
+        if any(percent_of(c, "ps") is not None for s in shown for c in s.scores.cells.values()):
+            save(draw_progress(shown), folder, "progress")
+            made.append(Drawing("progress", "Progress against success", CAPTIONS["progress"]))
+        if runs:
+            save(draw_latency(runs), folder, "latency")
+            made.append(Drawing("latency", "Latency", CAPTIONS["latency"]))
+        for number, series in enumerate(shown, 1):
+            made += _own_figures(series, number if len(shown) > 1 else 0, series in mapped, folder)
+    return made
+
+
+def _own_figures(series: Series, number: int, mapped: bool, folder: Path) -> list[Drawing]:
+    """The figures that show one series only."""
+    made = []
+    ending = f"-{number}" if number else ""
+    of = f": {series.name}" if number else ""
+    found = distribution(series.records)
+    counts = {t: found[t] for t in tasks_in_order(series.scores) if t in found}
+    if counts:
+        name = f"failures{ending}"
+        save(draw_failures(counts, KINDS, NAMES), folder, name)
+        caption = "Share of every failure type among a task's failed trials, and their number."
+        made.append(Drawing(name, f"Failure types{of}", caption))
+    if series.scores.cells and mapped:
+        name = f"heat{ending}"
+        save(draw_heat(series), folder, name)
+        caption = "Success rate [%] of every task at every level; a hatched cell has no result."
+        made.append(Drawing(name, f"Tasks and levels{of}", caption))
+    return made

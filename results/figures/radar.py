@@ -1,0 +1,75 @@
+"""Two radars: the success rate of every category at the first and at the last level."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from robospa.results.figures.series import (
+    COLOURS,
+    DASHES,
+    GRID,
+    MARKERS,
+    Series,
+    legend_below,
+    new_figure,
+    percent_of,
+    series_handles,
+)
+from robospa.results.metrics import CATEGORIES
+
+LEVELS = (1, 5)
+
+
+def draw_radar(shown: Sequence[Series]) -> Any:
+    """The figure; a category without a result leaves a gap in its series' outline."""
+    figure = new_figure(2.15)
+    axes = figure.subplots(1, 2, subplot_kw={"projection": "polar"})
+    top = _top(shown)
+    for axis, level in zip(axes, LEVELS, strict=True):
+        _radar(axis, shown, level, top)
+    legend_below(figure, series_handles(shown))
+    return figure
+
+
+def _top(shown: Sequence[Series]) -> float:
+    """The outer ring [%]: the next 20 above the largest value, the same for both radars."""
+    values = [percent_of(s.scores.categories.get((c, n)), "sr") for s in shown for c in CATEGORIES
+              for n in LEVELS]  # fmt: skip
+    largest = max((v for v in values if v is not None), default=100.0)
+    return float(min(100, max(20, 20 * math.ceil(largest / 20))))
+
+
+def _radar(axis: Any, shown: Sequence[Series], level: int, top: float) -> None:
+    angles = [2 * math.pi * i / len(CATEGORIES) for i in range(len(CATEGORIES))]
+    some = False
+    for index, series in enumerate(shown):
+        values = [percent_of(series.scores.categories.get((c, level)), "sr") for c in CATEGORIES]
+        known = [math.nan if v is None else v for v in values]
+        some = some or any(v is not None for v in values)
+        colour = COLOURS[index % len(COLOURS)]
+        axis.plot(
+            [*angles, 0.0],
+            [*known, known[0]],
+            color=colour,
+            ls=DASHES[index % len(DASHES)],
+            marker=MARKERS[index % len(MARKERS)],
+            ms=2.4,
+            lw=1.0,
+            clip_on=False,
+        )
+        if None not in values:
+            axis.fill(angles, known, color=colour, alpha=0.07, lw=0)
+    axis.set_theta_zero_location("N")
+    axis.set_theta_direction(-1)
+    axis.set_xticks(angles, CATEGORIES)
+    axis.tick_params(axis="x", pad=-3)
+    axis.set_ylim(0, top)
+    rings = [top * k / 4 for k in (1, 2, 3, 4)] if top > 20 else [10.0, 20.0]
+    axis.set_yticks(rings, [*(f"{r:g}" for r in rings[:-1]), ""], fontsize=5)
+    axis.set_rlabel_position(18)
+    axis.spines["polar"].set_color(GRID)
+    name = f"L{level}" if some else f"L{level}: no results"
+    axis.text(-0.12, 1.04, name, transform=axis.transAxes, weight="bold")
+    axis.set_xlabel(f"SR, outer ring {top:g} %", fontsize=6)

@@ -1,0 +1,160 @@
+"""What figures are drawn from, and what all of them share: size, colours, files.
+
+Every figure is as wide as one column of a two-column paper and is read without colour too: series
+differ by marker and dash, stacked parts by hatching.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from robospa.results.metrics import CATEGORIES, Average, Cell, Scores
+from robospa.results.records import TrialRecord
+
+WIDTH = 3.4
+"""Width of a column [inch]."""
+INK = "#1c2430"
+"""Text and axes; the report's page puts its own text colour in its place."""
+GRID = "#d9dde3"
+"""Grid lines; replaced by the page likewise."""
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f7f7f")
+"""Okabe and Ito's palette, told apart with every common colour vision deficiency."""
+MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+DASHES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (1, 1)), (0, (3, 1, 1, 1)))
+FORMATS = ("svg", "png", "pdf")
+
+
+@dataclass(frozen=True)
+class Series:
+    """One run or published model. Published models have no `records`."""
+
+    name: str
+    scores: Scores
+    records: Sequence[TrialRecord] = ()
+    published: bool = False
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A figure on disk: `name` without ending, its title, and what it shows in a sentence."""
+
+    name: str
+    title: str
+    caption: str
+
+
+def percent_of(part: Cell | Average | None, metric: str) -> float | None:
+    """The value of `metric` in percent, None where there is no result."""
+    estimate = None if part is None else part.values.get(metric)
+    return None if estimate is None else 100 * estimate.value
+
+
+def tasks_in_order(scores: Scores) -> list[str]:
+    """All tasks, by category."""
+    category_of = {task: cell.category for (task, _), cell in scores.cells.items()}
+    return [t for c in (*CATEGORIES, "") for t in category_of if category_of[t] == c]
+
+
+def label_of(name: str, most: int = 28) -> str:
+    """`name` as Matplotlib is to print it: one line, no longer than `most`, no mathematics."""
+    text = "".join(c if c.isprintable() else " " for c in name)
+    text = text if len(text) <= most else text[: most - 1] + "…"
+    return text.replace("$", r"\$")
+
+
+@contextmanager
+def styled() -> Iterator[None]:
+    """Settings that every figure is drawn with; they make its files repeatable."""
+    import matplotlib
+
+    settings: dict[Any, Any] = {
+        "font.size": 7,
+        "axes.titlesize": 7,
+        "axes.labelsize": 7,
+        "xtick.labelsize": 6.5,
+        "ytick.labelsize": 6.5,
+        "legend.fontsize": 6.5,
+        "legend.frameon": False,
+        "text.color": INK,
+        "axes.edgecolor": INK,
+        "axes.labelcolor": INK,
+        "xtick.color": INK,
+        "ytick.color": INK,
+        "axes.linewidth": 0.6,
+        "xtick.major.width": 0.6,
+        "ytick.major.width": 0.6,
+        "grid.color": GRID,
+        "grid.linewidth": 0.5,
+        "hatch.linewidth": 0.5,
+        "lines.linewidth": 1.1,
+        "svg.hashsalt": "robospa",
+        "svg.fonttype": "path",
+        "pdf.fonttype": 42,
+    }
+    with matplotlib.rc_context(settings):
+        yield
+
+
+def new_figure(height: float, layout: str = "constrained") -> Any:
+    """An empty figure of one column's width, `height` [inch] high."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(WIDTH, height), layout=layout)  # type: ignore[arg-type,unused-ignore]
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def save(figure: Any, folder: Path, name: str) -> None:
+    """Write `figure` in all formats; the bytes depend on nothing but what it shows."""
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")  # one layout serves all formats
+    for ending in FORMATS:
+        dated: dict[str, Any] = {
+            "svg": {"Date": None},
+            "pdf": {"CreationDate": None},
+            "png": None,
+        }
+        path = folder / f"{name}.{ending}"
+        figure.savefig(path, dpi=300, metadata=dated[ending], transparent=ending == "svg")
+
+
+def plain(axis: Any, grid: str = "y") -> None:
+    """Frame on two sides only, and a grid behind the data."""
+    axis.grid(axis=grid)
+    axis.set_axisbelow(True)
+    axis.spines[["top", "right"]].set_visible(False)
+
+
+def legend_below(figure: Any, handles: Sequence[Any], columns: int = 3) -> None:
+    """The series' names under the panels, where they hide nothing."""
+    if handles:
+        figure.legend(
+            handles=handles,
+            loc="outside lower center",
+            ncols=min(columns, len(handles)),
+            handlelength=2.6,
+            columnspacing=1.2,
+        )
+
+
+def series_handles(shown: Sequence[Series]) -> list[Any]:
+    """A legend entry for every series."""
+    from matplotlib.lines import Line2D
+
+    return [
+        Line2D(
+            [],
+            [],
+            color=COLOURS[i % len(COLOURS)],
+            marker=MARKERS[i % len(MARKERS)],
+            ls=DASHES[i % len(DASHES)],
+            ms=3.2,
+            label=label_of(s.name),
+        )
+        for i, s in enumerate(shown)
+    ]

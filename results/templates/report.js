@@ -1,0 +1,249 @@
+"use strict";
+// Everything from outside reaches the page as text nodes only, never as markup.
+const data = JSON.parse(document.getElementById("data").textContent);
+const PAGE = 100;
+
+function make(name, properties = {}, ...children) {
+  const element = Object.assign(document.createElement(name), properties);
+  element.append(...children.filter((c) => c !== undefined && c !== ""));
+  return element;
+}
+const words = (text) => text.replaceAll("_", " ");
+const failureName = (trial) => (trial.failure ? data.kinds[trial.failure] || trial.failure : "");
+
+// Theme: the system's unless chosen.
+const themes = ["system", "light", "dark"];
+const themeButton = document.getElementById("theme");
+function setTheme(theme) {
+  document.documentElement.dataset.theme = theme;
+  themeButton.textContent = "theme: " + theme;
+  try { localStorage.setItem("robospa-theme", theme); } catch { /* not from disk in some browsers */ }
+}
+let stored = null;
+try { stored = localStorage.getItem("robospa-theme"); } catch { /* as above */ }
+setTheme(themes.includes(stored) ? stored : "system");
+themeButton.hidden = false;
+themeButton.addEventListener("click", () =>
+  setTheme(themes[(themes.indexOf(document.documentElement.dataset.theme) + 1) % themes.length]));
+
+// A trial in full: its video beside its events.
+function seek(video, seconds) {
+  const go = () => { video.currentTime = Math.min(seconds, video.duration || seconds); };
+  video.pause();
+  if (video.readyState >= 1) go();
+  else {
+    video.addEventListener("loadedmetadata", go, { once: true });
+    video.load();
+  }
+}
+
+function eventList(trial, video) {
+  const list = make("ul", { className: "events" });
+  const items = [];
+  for (const [time, kind, rest] of trial.events || []) {
+    const parts = [make("time", {}, time.toFixed(2) + " s"), make("span", {}, kind + (rest ? " " + rest : ""))];
+    const item = video ? make("button", { type: "button" }, ...parts) : make("div", {}, ...parts);
+    item.dataset.time = time;
+    if (video) {
+      item.title = "show this moment";
+      item.addEventListener("click", () => seek(video, time / data.speed));
+    }
+    items.push(item);
+    list.append(make("li", {}, item));
+  }
+  video?.addEventListener("timeupdate", () => {
+    let current = null;
+    for (const item of items) {
+      if (item.dataset.time / data.speed <= video.currentTime + 0.06) current = item;
+      item.removeAttribute("aria-current");
+    }
+    current?.setAttribute("aria-current", "true");
+  });
+  return list;
+}
+
+function detail(trial) {
+  let video = null;
+  if (trial.video) {
+    video = document.getElementById("film").content.firstElementChild.cloneNode(true);
+    video.src = encodeURI(trial.video).replaceAll("#", "%23").replaceAll("?", "%3F");
+    video.setAttribute("aria-label", "video of " + words(trial.task) + ", level " + trial.level);
+  }
+  const text = make("div", {});
+  if (trial.instruction) text.append(make("p", {}, "“" + trial.instruction + "”"));
+  if (trial.message) text.append(make("p", { className: "error" }, trial.message));
+  if (trial.failure) {
+    const why = make("p", {}, make("b", {}, failureName(trial)), ": " + (trial.why || ""));
+    if (trial.at != null) {
+      const when = ` (${trial.at.toFixed(2)} s)`;
+      const jump = video ? make("button", { type: "button", className: "jump" }, "show") : "";
+      if (video) jump.addEventListener("click", () => seek(video, trial.at / data.speed));
+      why.append(when + " ", jump);
+    }
+    text.append(why);
+  }
+  text.append(eventList(trial, video));
+  const small = [];
+  if (trial.total) small.push(`${trial.done} of ${trial.total} subtasks`);
+  if (trial.steps) small.push(trial.steps + " actions");
+  if (trial.seconds) small.push("wall time " + trial.seconds.toFixed(1) + " s");
+  if (trial.attempts) small.push(trial.attempts + " attempts");
+  if (trial.digest) small.push("final state " + trial.digest);
+  text.append(make("p", { className: "note" }, small.join(", ")));
+  return make("div", { className: video ? "trial filmed" : "trial" }, video || "", text);
+}
+
+// The list: filters, sorting, pages.
+const columns = [
+  ["run", (t) => data.names[t.run], "", data.names.length > 1],
+  ["task", (t) => words(t.task), "", true],
+  ["level", (t) => t.level, "num", true],
+  ["seed", (t) => t.seed, "num less", true],
+  ["outcome", (t) => t.end, "", true],
+  ["failure type", failureName, "", true],
+  ["done", (t) => (t.total ? t.done / t.total : -1), "num less", true],
+  ["steps", (t) => t.steps ?? -1, "num less", true],
+  ["time [s]", (t) => t.seconds ?? -1, "num less", true],
+].filter((c) => c[3]);
+const shownText = { done: (t) => (t.total ? t.done + "/" + t.total : ""), steps: (t) => t.steps ?? "",
+  "time [s]": (t) => t.seconds?.toFixed(1) ?? "" };
+const form = document.querySelector(".filters");
+const body = document.querySelector("#list tbody");
+const head = document.querySelector("#list thead tr");
+let order = { column: null, down: false };
+let start = 0;
+let chosen = data.trials;
+
+const haystacks = new Map();
+function haystack(trial) {
+  if (!haystacks.has(trial)) {
+    const parts = [data.names[trial.run], words(trial.task), trial.task, "L" + trial.level, trial.seed,
+      trial.end, failureName(trial), trial.why, trial.instruction, trial.message, trial.digest,
+      ...(trial.events || []).map((e) => e[1] + " " + e[2])];
+    haystacks.set(trial, parts.filter((p) => p != null).join("\n").toLowerCase());
+  }
+  return haystacks.get(trial);
+}
+
+function options(name, values, all = "all") {
+  const select = form.elements[name];
+  select.replaceChildren(make("option", { value: "" }, all),
+    ...values.map(([value, text]) => make("option", { value }, text)));
+  select.parentElement.hidden = values.length < 2;
+}
+const distinct = (get) => [...new Set(data.trials.map(get))].filter((v) => v !== undefined);
+options("run", data.names.map((name, i) => [i, name]));
+options("task", distinct((t) => t.task).map((t) => [t, words(t)]));
+options("level", distinct((t) => t.level).sort().map((n) => [n, "L" + n]));
+options("end", distinct((t) => t.end).sort().map((e) => [e, e]));
+options("failure", Object.keys(data.kinds).filter((k) => data.trials.some((t) => t.failure === k))
+  .map((k) => [k, data.kinds[k]]));
+form.elements.failure.parentElement.hidden = form.elements.failure.options.length < 2;
+form.elements.video.parentElement.hidden = !data.trials.some((t) => t.video);
+
+function filter() {
+  const want = Object.fromEntries(new FormData(form));
+  const terms = want.text.toLowerCase().split(/\s+/).filter(Boolean);
+  chosen = data.trials.filter((t) =>
+    (!want.run || String(t.run) === want.run) && (!want.task || t.task === want.task) &&
+    (!want.level || String(t.level) === want.level) && (!want.end || t.end === want.end) &&
+    (!want.failure || t.failure === want.failure) && (!want.video || t.video) &&
+    (!terms.length || terms.every((term) => haystack(t).includes(term))));
+  start = 0;
+  sort();
+}
+
+function sort() {
+  const column = columns.find((c) => c[0] === order.column);
+  if (column) {
+    const sign = order.down ? -1 : 1;
+    chosen = chosen.map((t) => [column[1](t), t]).sort(([a], [b]) =>
+      sign * (typeof a === "number" ? a - b : String(a).localeCompare(String(b)))).map((p) => p[1]);
+  }
+  for (const cell of head.children) {
+    cell.removeAttribute("aria-sort");
+    if (cell.dataset.name === order.column) cell.setAttribute("aria-sort", order.down ? "descending" : "ascending");
+  }
+  show();
+}
+
+function toggle(row, button, trial) {
+  const opened = row.classList.contains("open");
+  for (const other of body.querySelectorAll("tr.open")) {
+    other.classList.remove("open");
+    other.querySelector(".open").setAttribute("aria-expanded", "false");
+  }
+  body.querySelector("tr.detail")?.remove();
+  if (opened) return;
+  row.classList.add("open");
+  button.setAttribute("aria-expanded", "true");
+  row.after(make("tr", { className: "detail" }, make("td", { colSpan: columns.length }, detail(trial))));
+}
+
+function line(trial) {
+  const row = make("tr", { className: "row" });
+  const button = make("button", { type: "button", className: "open" + (trial.video ? " play" : "") }, words(trial.task));
+  button.setAttribute("aria-expanded", "false");
+  for (const [name, value, style] of columns) {
+    const text = (shownText[name] || value)(trial);
+    let content = String(text);
+    if (name === "task") content = button;
+    if (name === "outcome") {
+      const kind = trial.good ? " good" : ["missing", "not run"].includes(trial.end) ? " none" : "";
+      content = make("span", { className: "end" + kind }, trial.end);
+    }
+    row.append(make("td", { className: style }, content));
+  }
+  row.addEventListener("click", () => toggle(row, button, trial));
+  return row;
+}
+
+function show() {
+  body.replaceChildren(...chosen.slice(start, start + PAGE).map(line));
+  const last = Math.min(start + PAGE, chosen.length);
+  document.getElementById("count").textContent = chosen.length
+    ? `${start + 1}–${last} of ${chosen.length} trials` : "no trial matches";
+  document.getElementById("back").disabled = start === 0;
+  document.getElementById("next").disabled = last >= chosen.length;
+}
+
+for (const [name, , style] of columns) {
+  const button = make("button", { type: "button" }, name);
+  button.addEventListener("click", () => {
+    order = { column: name, down: order.column === name && !order.down };
+    start = 0;
+    sort();
+  });
+  const cell = make("th", { className: style, scope: "col" }, button);
+  cell.dataset.name = name;
+  head.append(cell);
+}
+form.addEventListener("input", filter);
+form.addEventListener("submit", (event) => event.preventDefault());
+form.addEventListener("reset", () => setTimeout(filter));
+document.getElementById("back").addEventListener("click", () => { start -= PAGE; show(); });
+document.getElementById("next").addEventListener("click", () => { start += PAGE; show(); });
+body.addEventListener("keydown", (event) => {
+  const step = { ArrowDown: 1, ArrowUp: -1 }[event.key];
+  const buttons = [...body.querySelectorAll("button.open")];
+  const here = buttons.indexOf(document.activeElement);
+  if (step && here >= 0 && buttons[here + step]) {
+    buttons[here + step].focus();
+    event.preventDefault();
+  }
+});
+for (const button of document.querySelectorAll(".of-kind")) {
+  button.addEventListener("click", () => {
+    form.reset();
+    form.elements.failure.value = button.dataset.kind;
+    setTimeout(filter);
+    document.getElementById("trials").scrollIntoView();
+  });
+}
+const films = document.querySelector(".films");
+for (const trial of data.trials.filter((t) => t.video).slice(0, films ? 6 : 0)) {
+  const title = `${words(trial.task)}, level ${trial.level}, seed ${trial.seed}`;
+  films.append(make("div", {}, make("h3", {}, title + ": ",
+    make("span", { className: "end" + (trial.good ? " good" : "") }, trial.end)), detail(trial)));
+}
+filter();

@@ -1,0 +1,121 @@
+"""Figures exist in every format, the same bytes each time, and show what they are given."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from robospa.results.columns import published_column
+from robospa.results.failures import KINDS
+from robospa.results.figures.draw import draw
+from robospa.results.figures.failure_bars import FILLS
+from robospa.results.figures.levels import chance_levels
+from robospa.results.figures.series import FORMATS, GRID, INK, Series, label_of
+from robospa.results.metrics import score
+from robospa.results.records import TrialKey, TrialRecord
+from robospa.results.report_page import inline_svg
+
+
+def published(model: str) -> Series:
+    return Series(model, published_column(model).scores, published=True)
+
+
+def trial(task: str, category: str, level: int, seed: int, success: bool) -> TrialRecord:
+    return TrialRecord(
+        key=TrialKey(task, level, seed),
+        category=category,
+        instruction="",
+        scene_digest="",
+        end="success" if success else "step_limit",
+        success=success,
+        done=level if success else level - 1,
+        best=level,
+        total=level,
+        candidates=3,
+        steps=9,
+        physics_steps=9,
+        policy_calls=1,
+        digest="",
+        actions_digest="",
+        wall_time=1.0,
+        latency={"p50": 4.0 + seed, "p95": 6.0, "p99": 9.0, "max": 9.0},
+    )
+
+
+def small_run(name: str = "mine") -> Series:
+    records = [
+        trial(task, category, level, seed, seed > level)
+        for task, category in (("Pick_Blocks_Size", "GAC"), ("Press_Stapler_Repeat", "RPF"))
+        for level in (1, 5)
+        for seed in range(4)
+    ]
+    by_key = {r.key: r for r in records}
+    return Series(name, score(by_key, by_key), tuple(records))
+
+
+def test_a_run_gets_all_figures_in_all_formats(tmp_path: Path) -> None:
+    made = [drawing.name for drawing in draw([small_run()], tmp_path)]
+    assert made == ["success", "radar", "progress", "latency", "failures", "heat"]
+    assert {p.name for p in tmp_path.iterdir()} == {f"{n}.{f}" for n in made for f in FORMATS}
+
+
+def test_published_models_have_no_latency_and_no_failures(tmp_path: Path) -> None:
+    made = [d.name for d in draw([published("RDT")], tmp_path)]
+    assert made == ["success", "radar", "progress", "heat"]
+
+
+def test_beside_a_run_published_models_get_no_heat_map(tmp_path: Path) -> None:
+    made = [d.name for d in draw([small_run(), published("RDT")], tmp_path)]
+    assert [n for n in made if n.startswith("heat")] == ["heat-1"]
+
+
+def test_the_same_data_make_the_same_bytes(tmp_path: Path) -> None:
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+        draw([small_run()], tmp_path / name)
+    for path in (tmp_path / "a").iterdir():
+        assert path.read_bytes() == (tmp_path / "b" / path.name).read_bytes(), path.name
+
+
+def test_a_series_without_any_result_draws_what_it_can(tmp_path: Path) -> None:
+    keys = [TrialKey("Pick_Blocks_Size", 2, 7)]
+    empty = Series("empty", score(keys, {}, {"Pick_Blocks_Size": "GAC"}))
+    assert [d.name for d in draw([empty], tmp_path)] == ["success", "radar", "heat"]
+
+
+def test_names_of_policies_are_no_mathematics(tmp_path: Path) -> None:
+    assert label_of("a$b$\n" + "x" * 40) == r"a\$b\$ " + "x" * 22 + "…"
+    draw([small_run(r"$\frac{a$ _^{")], tmp_path)
+
+
+def test_chance_comes_back_from_onta() -> None:
+    levels = chance_levels(published_column("RDT").scores)
+    assert levels["GAC", 1] == pytest.approx(50.0)
+    assert levels["RRR", 5] == pytest.approx(100 / 9)
+
+
+def test_every_failure_type_has_a_look_of_its_own() -> None:
+    assert len(set(FILLS)) == len(FILLS) >= len(KINDS)
+
+
+def test_a_figure_in_the_page_takes_its_colours_and_keeps_its_ids_apart(tmp_path: Path) -> None:
+    draw([small_run()], tmp_path)
+    svg = inline_svg((tmp_path / "success.svg").read_text(), "success", 'a "label"')
+    assert svg.startswith("<svg ")
+    assert INK not in svg
+    assert GRID not in svg
+    assert "http" not in svg
+    assert 'id="success-figure_1"' in svg
+    assert "a &#34;label&#34;" in svg
+
+
+def test_a_series_keeps_its_trials_order_free(tmp_path: Path) -> None:
+    one = small_run()
+    turned = replace(one, records=tuple(reversed(one.records)))
+    for name, series in (("a", one), ("b", turned)):
+        (tmp_path / name).mkdir()
+        draw([series], tmp_path / name)
+    for name in ("latency.svg", "failures.svg"):
+        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
