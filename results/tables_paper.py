@@ -8,6 +8,7 @@ value that does not follow from the per-task tables is a * with what was printed
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from robospa.results import aggregate
 from robospa.results.columns import METRIC_CATEGORIES, Column, check_columns
@@ -41,7 +42,7 @@ def summary_table(
     rows = _summary_rows(metric)
     levels = [int(head[1]) for head in heads if head != "Drop"]
     best = _best(columns, metric, [r for r, _ in rows if r], levels, mark)
-    wrong = _wrong(load_source(name))
+    wrong = _wrong(_source(name))
     lines = []
     for row, label in rows:
         if not row:
@@ -100,7 +101,7 @@ def task_table(columns: Sequence[Column], name: str, metric: str, mark: str = "t
     return Grid(name, title, "Task", heads * len(columns), tuple(lines), groups, notes)
 
 
-def load_source(name: str) -> str:
+def _source(name: str) -> str:
     """The label of the paper's table that the summary table `name` redraws."""
     data = load()
     return {"main": data.main, "onta": data.onta, "ps": data.ps}[name].source
@@ -178,7 +179,7 @@ def _number(value: float | None) -> Entry:
 
 
 def _signed(entry: Entry, sign: str) -> Entry:
-    return Entry(entry.text, entry.value, entry.low, entry.high, entry.best, entry.sign + sign)
+    return replace(entry, sign=entry.sign + sign)
 
 
 def _wrong(source: str) -> Mapping[tuple[str, str, str], Check]:
