@@ -138,26 +138,42 @@ def draw(
 
 
 def draw_over_tasks(
-    groups: Sequence[Sequence[Sample]], seed: int = 0, resamples: int = RESAMPLES
+    groups: Sequence[Sequence[Sample]],
+    seed: int = 0,
+    resamples: int = RESAMPLES,
+    against: Sequence[Sequence[Sample]] = (),
 ) -> NDArray[np.float64]:
-    """The mean over groups (categories) of the mean over tasks, resampling tasks, then episodes."""
+    """The mean over groups (categories) of the mean over tasks, resampling tasks, then episodes.
+
+    With `against`, of the same tasks, the difference: every resample has the same tasks of both.
+    """
     if not groups or not all(groups):
         raise ValueError("resampling tasks needs at least one task in every category")
+    if against and [len(g) for g in against] != [len(g) for g in groups]:
+        raise ValueError("a difference over tasks needs the same tasks on both sides")
     generator = np.random.default_rng([seed, 1])
     drawn = np.zeros(resamples)
-    rows = np.arange(resamples)
-    for group in groups:
-        random = generator.integers(0, GRID, size=(len(group), len(group), resamples), dtype="u2")
+    for number, group in enumerate(groups):
+        minus = against[number] if against else ()
         chosen = generator.integers(0, len(group), size=(len(group), resamples))
-        for place, choice in enumerate(chosen):
-            values = np.stack(
-                [
-                    s.shift + s.scale / s.trials * _deck(s.counts).take(random[place, n])
-                    for n, s in enumerate(group)
-                ]
-            )
-            drawn += values[choice, rows] / (len(group) * len(groups))
+        for choice in chosen:
+            values = np.zeros(resamples)
+            for place, sample in enumerate(group):
+                picked = np.flatnonzero(choice == place)
+                values[picked] += _values(sample, len(picked), generator)
+                if minus:
+                    values[picked] -= _values(minus[place], len(picked), generator)
+            drawn += values / (len(group) * len(groups))
     return drawn
+
+
+def _values(sample: Sample, resamples: int, generator: np.random.Generator) -> NDArray[np.float64]:
+    """Resampled values of one variant."""
+    if sample.constant:
+        return np.full(resamples, sample.value)
+    random = generator.integers(0, GRID, size=resamples, dtype=np.uint16)
+    step = sample.scale / sample.trials
+    return np.asarray(sample.shift + step * _deck(sample.counts).take(random), dtype=np.float64)
 
 
 def resample_episodes(

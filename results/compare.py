@@ -19,6 +19,7 @@ from robospa.results.intervals import (
     difference,
     interval_of,
     mover,
+    over_tasks,
     paired_sample_difference,
 )
 from robospa.results.records import TrialRecord
@@ -42,7 +43,8 @@ class Difference:
     """First minus second: of a variant, or the mean over `variants` of the `listed` variants.
 
     `level` 0 is the mean over levels. `only_first` and `only_second` count the pairs that one
-    alone won, None where nothing is paired. `q` is p corrected for all of its kind.
+    alone won, None where nothing is paired. `q` is p corrected for all of its kind. `over_tasks`
+    is how the difference would move with other tasks, where there are several at one level.
     """
 
     label: str
@@ -58,6 +60,7 @@ class Difference:
     only_first: int | None = None
     only_second: int | None = None
     q: float = 1.0
+    over_tasks: Estimate | None = None
 
 
 @dataclass(frozen=True)
@@ -255,13 +258,31 @@ def _group_row(
     paired = cells[0].gap is not None
     trials = sum(c.first.trials + (0 if paired else c.second.trials) for c in cells)
     row = (label, kind, level, len(cells), listed, trials, first, second, estimate)
+    other = _over_tasks(cells, category, honest) if level and len(cells) > 1 else None
     if not paired:
-        return Difference(*row, p_of_interval(honest))
+        return Difference(*row, p_of_interval(honest), over_tasks=other)
     b, c = _discordant(cells)
     # One weight for every trial holds inside a category; above it only the interval is fair.
     pooled = kind == "category" and all(x.first.binary for x in cells)
     p = mcnemar_mid_p(b, c) if pooled else p_of_interval(honest)
-    return Difference(*row, p, b, c)
+    return Difference(*row, p, b, c, over_tasks=other)
+
+
+def _over_tasks(
+    cells: Sequence[_Cell], category: Mapping[str, str], at_least: Estimate
+) -> Estimate:
+    """The same difference if tasks were drawn anew from what they were drawn from."""
+    groups: dict[str, list[_Cell]] = {}
+    for cell in cells:
+        groups.setdefault(category[cell.variant[0]], []).append(cell)
+    gaps = [[c.gap for c in group if c.gap is not None] for group in groups.values()]
+    if all(gaps):
+        return over_tasks(gaps, at_least=at_least)
+    return over_tasks(
+        [[c.first for c in group] for group in groups.values()],
+        against=[[c.second for c in group] for group in groups.values()],
+        at_least=at_least,
+    )
 
 
 def _member(

@@ -213,10 +213,31 @@ def interval_of(
     return mover(cells, shares)
 
 
-def over_tasks(groups: Sequence[Sequence[Sample]], seed: int = 0) -> Estimate:
-    """Mean over `groups` (categories) of the mean over tasks, as it would move with other tasks."""
-    value = sum(sum(s.value for s in group) / len(group) for group in groups) / len(groups)
-    return _percentile(value, draw_over_tasks(groups, seed), "bootstrap over tasks")
+def over_tasks(
+    groups: Sequence[Sequence[Sample]],
+    seed: int = 0,
+    against: Sequence[Sequence[Sample]] = (),
+    at_least: Estimate | None = None,
+) -> Estimate:
+    """Mean over `groups` (categories) of the mean over tasks, as it would move with other tasks.
+
+    With `against`, the difference of both on the same tasks. It moves no less than with other seeds
+    alone: `at_least` is that interval (without `against` by default MOVER's), so that tasks which
+    are all at 0 do not give a point.
+    """
+
+    def mean_of(side: Sequence[Sequence[Sample]]) -> float:
+        return sum(sum(s.value for s in group) / len(group) for group in side) / len(side)
+
+    draws = draw_over_tasks(groups, seed, against=against)
+    value = mean_of(groups) - (mean_of(against) if against else 0.0)
+    found = _percentile(value, draws, "bootstrap over tasks")
+    if at_least is None and not against:
+        shares = [1 / (len(groups) * len(group)) for group in groups for _ in group]
+        at_least = interval_of([s for group in groups for s in group], shares)
+    if at_least is None:
+        return found
+    return replace(found, low=min(found.low, at_least.low), high=max(found.high, at_least.high))
 
 
 _RATES: dict[str, Callable[[int, int], Estimate]] = {

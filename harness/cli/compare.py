@@ -116,7 +116,7 @@ def _print(found: Comparison, variants: bool) -> None:
         f"Hochberg); {raw} at p < {ALPHA:g}, where chance gives {ALPHA * len(found.cells):.0f}."
     )
     if found.groups:
-        print(f"Intervals of averages: {found.groups[-1].estimate.method}.")
+        print(f"Intervals of averages: {found.groups[-1].estimate.method}; other tasks: bootstrap.")
 
 
 def _table(title: str, rows: Sequence[Difference], found: Comparison) -> None:
@@ -127,8 +127,11 @@ def _table(title: str, rows: Sequence[Difference], found: Comparison) -> None:
     if not rows:
         return
     table = Table(title=title, title_justify="left", box=None, pad_edge=False)
-    heads = ("", "level", "first", "second", "difference [95 %]", "p", "q", "trials")
-    for head in (*heads, *(("only first", "only second") if found.paired else ())):
+    several = any(row.over_tasks for row in rows)
+    heads = ["", "level", "first", "second", "difference [95 %]", "p", "q", "trials"]
+    heads += ["other tasks"] * several
+    heads += ["only first", "only second"] * found.paired
+    for head in heads:
         table.add_column(head, justify="left" if not head else "right", no_wrap=True)
     for row in rows:
         partly = f" ({row.variants} of {row.listed})" if row.variants < row.listed else ""
@@ -143,6 +146,9 @@ def _table(title: str, rows: Sequence[Difference], found: Comparison) -> None:
             _chance(row.q) if row.kind in ("variant", "category") else "",
             str(row.trials),
         ]
+        if several:
+            o = row.over_tasks
+            cells.append(f"[{100 * o.low:+z.1f}, {100 * o.high:+z.1f}]" if o else "")
         if found.paired:
             cells += [str(row.only_first), str(row.only_second)]
         table.add_row(*(Text(c) for c in cells))

@@ -103,6 +103,20 @@ def test_progress_compares_shares_of_subtasks(tmp_path: Path) -> None:
     assert cell.estimate.method == "bootstrap"
 
 
+def test_other_tasks_move_a_difference_more(tmp_path: Path) -> None:
+    one = [*outcomes(SIZE, 1, [1] * 20), *outcomes("Other", 1, [1] * 2 + [0] * 18)]
+    two = [*outcomes(SIZE, 1, [0] * 20), *outcomes("Other", 1, [1] * 2 + [0] * 18)]
+    found = compare(side(tmp_path / "a", one), side(tmp_path / "b", two))
+    row = group(found, "GAC", 1)
+    assert row.over_tasks is not None
+    assert (row.over_tasks.low, row.over_tasks.high) == pytest.approx((0.0, 1.0), abs=1e-6)
+    assert row.estimate.low > 0.3
+    unpaired = compare(side_of_published("RDT"), side_of_published("GO-1"))
+    nothing = group(unpaired, "MIP", 5)
+    assert nothing.over_tasks is not None  # all at 0: as wide as over seeds, never a point
+    assert nothing.over_tasks.high == nothing.estimate.high > 0.01
+
+
 def test_lost_trials_are_left_out_in_pairs_and_counted(tmp_path: Path) -> None:
     lost = record(SIZE, 1, 2, 0, end="infrastructure")
     one = side(tmp_path / "a", [*outcomes(SIZE, 1, [1, 1]), lost])

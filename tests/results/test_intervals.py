@@ -247,3 +247,17 @@ def test_seeded_intervals_repeat_themselves() -> None:
             cells, method=method, seed=4
         )
     assert over_tasks([cells], 4) == over_tasks([cells], 4)
+
+
+def test_over_tasks_is_never_narrower_than_over_seeds() -> None:
+    nothing = [[rate(0, 100)] * 5]
+    assert over_tasks(nothing).high == pytest.approx(interval_of(nothing[0]).high)
+    spread = [[rate(10, 100), rate(90, 100)], [rate(40, 100)]]
+    found = over_tasks(spread)
+    seeds = interval_of([rate(10, 100), rate(90, 100), rate(40, 100)], [0.25, 0.25, 0.5])
+    assert found.low < seeds.low < seeds.high < found.high
+    same = over_tasks(spread, against=spread)
+    assert same.value == 0.0
+    assert same.low < 0 < same.high
+    with pytest.raises(ValueError, match="the same tasks on both sides"):
+        over_tasks(spread, against=spread[:1])
