@@ -210,7 +210,10 @@ def _notes(
         if column.published:
             continue
         if column.trials != trials:
-            notes.append(f"{column.title}: at most {column.trials} of {trials} trials a variant.")
+            notes.append(
+                f"{column.title}: up to {column.trials} trials a variant, "
+                f"the published models {trials}."
+            )
         notes += not_run_note(column, levels)
         lost = [text for row in rows for level in levels if (text := _lost(column, row, level))]
         if lost:

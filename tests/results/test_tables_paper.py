@@ -96,7 +96,7 @@ def test_lost_trials_are_marked_with_the_range_they_leave_open() -> None:
     assert entry(grid, "Geometric Attribute Cognition", 1).sign == ""
     assert entry(grid, "Overall average", 0).sign == "†"
     assert any("GAC L1 lacks 1, SR between" in note for note in grid.notes)
-    assert any("at most 10 of 100 trials a variant" in note for note in grid.notes)
+    assert any("up to 10 trials a variant" in note for note in grid.notes)
 
 
 def test_a_task_that_was_not_run_leaves_all_averages_above_it_open() -> None:
