@@ -113,15 +113,20 @@ def compare(first: Side, second: Side, metric: str = "sr", method: str = "wilson
 
 
 def stop_early(first: Side, second: Side) -> Verdict:
-    """Who wins by the paired e-value, pairs taken in the order of the first run's list."""
+    """Who wins by the paired e-value over all variants.
+
+    Pairs are taken in an order fixed by the list of trials: one of each variant, then the next of
+    each, so that no category is heard alone before the others.
+    """
     check_settings(first, second)
     pairs = []
     for variant, records in first.trials.items():
-        for seed in common_seeds(first, second, variant):
-            pairs.append((records[seed].success, second.trials[variant][seed].success))
+        for turn, seed in enumerate(sorted(common_seeds(first, second, variant))):
+            pair = (records[seed].success, second.trials[variant][seed].success)
+            pairs.append((turn, pair))
     if not pairs:
         raise CompareError(f"{first.name} and {second.name} share no seed: nothing is paired")
-    return decide(pairs)
+    return decide(pair for _, pair in sorted(pairs, key=lambda found: found[0]))
 
 
 def drops(side: Side) -> list[Difference]:

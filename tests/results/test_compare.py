@@ -154,6 +154,13 @@ def test_the_early_verdict_is_marked(tmp_path: Path) -> None:
     assert "no result to publish" in found.note
 
 
+def test_early_stopping_hears_every_variant_in_turn(tmp_path: Path) -> None:
+    one = outcomes(SIZE, 1, [1] * 30) + outcomes(MUGS, 1, [0] * 30)
+    two = outcomes(SIZE, 1, [0] * 30) + outcomes(MUGS, 1, [1] * 30)
+    found = stop_early(side(tmp_path / "a", one), side(tmp_path / "b", two))
+    assert (found.better, found.looked) == (0, 60)  # one variant each: nobody is better
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
