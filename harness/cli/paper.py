@@ -17,11 +17,12 @@ def paper(
     run: Annotated[
         list[Path] | None, typer.Option(help="folder of a run to stand beside (may be repeated)")
     ] = None,
+    figures: Annotated[bool, typer.Option(help="draw the figures too; takes a while")] = True,
     mark: Annotated[
         str, typer.Option(help="bold: tied (all not told from the best), highest or none")
     ] = "tied",
 ) -> None:
-    """Write every table of the paper, made from its per-task results.
+    """Write every table and figure of the paper, made from its per-task results.
 
     Prints the first of them (the main one) and all printed values that cannot be reproduced.
     """
@@ -35,13 +36,20 @@ def paper(
     endings = list(FORMATS) if format == "all" else [format]
     if format != "all" and format not in FORMATS:
         raise ValueError(f"no format is called {format!r}; there are {', '.join(FORMATS)} and all")
-    columns = [published_column(model) for model in load().models]
-    columns += [run_column(read_run(folder)) for folder in run or []]
-    grids = make_tables(columns, table or None, mark)
+    published = [published_column(model) for model in load().models]
+    runs = [read_run(folder) for folder in run or []]
+    added = [run_column(one) for one in runs]
+    grids = make_tables([*published, *added], table or None, mark)
     written = write_tables(grids, out, endings)
     show(grids[0])
     print()
     print(f"{len(checks())} printed cells walked; {len(errata())} do not follow from the others:")
     for number, check in enumerate(errata(), 1):
         print(f"{number:3} {check}")
-    print(f"\n{len(written)} files in {out}")
+    print(f"\n{len(written)} files of tables in {out}")
+    if figures and not table:
+        from robospa.results.report import draw_figures
+
+        (out / "figures").mkdir(exist_ok=True)
+        drawn = draw_figures(runs, [*added, *published], out / "figures")
+        print(f"{len(drawn)} figures in {out / 'figures'}")

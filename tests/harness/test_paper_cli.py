@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -21,7 +22,7 @@ def run(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, str, str]
 def test_all_tables_are_written_and_the_errata_told(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    code, out, _ = run(capsys, "--out", str(tmp_path / "paper"))
+    code, out, _ = run(capsys, "--out", str(tmp_path / "paper"), "--no-figures")
     assert code == 0
     assert "Overall average" in out
     assert "2747 printed cells walked; 22 do not follow" in out
@@ -36,6 +37,22 @@ def test_one_table_in_one_format(capsys: pytest.CaptureFixture[str], tmp_path: P
     assert code == 0
     assert "Color-Based Grounding" in out
     assert [path.name for path in (tmp_path / "p").iterdir()] == ["tables.md"]
+
+
+def test_figures_are_drawn_of_all_columns(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[tuple[list[str], Path]] = []
+
+    def draw(runs: Any, columns: Any, folder: Path) -> list[str]:
+        asked.append(([c.title for c in columns], folder))
+        return ["one"]
+
+    monkeypatch.setattr("robospa.results.report.draw_figures", draw)
+    code, out, _ = run(capsys, "--out", str(tmp_path / "p"), "--format", "csv")
+    assert code == 0
+    assert asked == [(["RDT", "GO-1", "π0.5", "X-VLA"], tmp_path / "p" / "figures")]
+    assert "1 figures in" in out
 
 
 @pytest.mark.parametrize(
@@ -72,6 +89,7 @@ def test_a_run_stands_beside_the_published(
     (folder / "trials").mkdir(parents=True)
     settings = {"policy": {"spec": {"name": "mine"}}}
     (folder / "run.json").write_text(json.dumps({"settings": settings, "trials": [trials]}))
-    code, out, _ = run(capsys, "--out", str(tmp_path / "p"), "--run", str(folder))
+    words = ("--out", str(tmp_path / "p"), "--run", str(folder), "--no-figures")
+    code, out, _ = run(capsys, *words)
     assert code == 0
     assert "mine: of 56 tasks 55 at L1, 56 at L5 were not run" in " ".join(out.split())
