@@ -29,6 +29,9 @@ AROUND = 0.15
 NEAR, FAR = 0.055, 0.07
 """Distance [m] from grasp centre to an object's box that is an approach, and that ends it."""
 
+AT_REST = 0.002
+"""An arm that moved less than this [m] between two looks has approached nothing."""
+
 TOUCHING, BESIDE, NOWHERE = "touching", "beside", "nothing near"
 """Notes of `closed` events."""
 
@@ -53,6 +56,7 @@ class _Arm:
     nearest: str = ""
     touched: dict[str, int] = field(default_factory=dict)
     near: set[str] = field(default_factory=set)
+    seen: Vec3 = (0.0, 0.0, 0.0)
 
 
 class Hands:
@@ -139,18 +143,23 @@ class Hands:
         best, found = AROUND, ""
         for name in self._roles:
             if name in snapshot.poses:
-                distance = self._distance(snapshot, name, centre)
+                distance = self._distance(snapshot, name, centre, AROUND)
                 if distance < best:
                     best, found = distance, name
         return found
 
     def _approaches(self, snapshot: Snapshot, arm: int, state: _Arm) -> tuple[Event, ...]:
-        centre = grasp_centre(snapshot.end_effector[arm])
+        """What a moving arm has come near to since the last look."""
+        pose = snapshot.end_effector[arm]
+        if math.dist(pose.position, state.seen) < AT_REST:
+            return ()
+        state.seen = pose.position
+        centre = grasp_centre(pose)
         events: tuple[Event, ...] = ()
         for name in self._roles:
             if name not in snapshot.poses:
                 continue
-            distance = self._distance(snapshot, name, centre)
+            distance = self._distance(snapshot, name, centre, FAR)
             if distance < NEAR and name not in state.near:
                 state.near.add(name)
                 events += (Event(snapshot.time, "approached", name, self._index(name)),)
@@ -158,15 +167,14 @@ class Hands:
                 state.near.discard(name)
         return events
 
-    def _distance(self, snapshot: Snapshot, name: str, point: Vec3) -> float:
-        """Distance [m] from `point` to the object's box; only a lower bound where it is large."""
+    def _distance(self, snapshot: Snapshot, name: str, point: Vec3, most: float) -> float:
+        """Distance [m] from `point` to the object's box; infinite where it is more than `most`."""
         pose = snapshot.poses[name]
-        middle, half = self._boxes[name]
+        middle, half, reach = self._boxes[name]
         x, y, z = pose.position
-        reach = half[0] + half[1] + half[2] + abs(middle)
-        away = math.sqrt((point[0] - x) ** 2 + (point[1] - y) ** 2 + (point[2] - z) ** 2)
-        if away - reach > AROUND:
-            return away - reach
+        dx, dy, dz = point[0] - x, point[1] - y, point[2] - z
+        if dx * dx + dy * dy + dz * dz > (reach + most) ** 2:
+            return math.inf
         a, b, c = pose.inverse().apply(point)
         dx, dy = max(abs(a) - half[0], 0.0), max(abs(b) - half[1], 0.0)
         return math.hypot(dx, dy, max(abs(c - middle) - half[2], 0.0))
@@ -176,9 +184,10 @@ class Hands:
         return subtasks[0] if subtasks else -1
 
 
-def _box(scene: Scene, name: str) -> tuple[float, Vec3]:
-    """Height [m] of the middle of an object's box in its own frame, and its half sizes."""
+def _box(scene: Scene, name: str) -> tuple[float, Vec3, float]:
+    """Height [m] of the middle of an object's box in its own frame, half sizes, farthest corner."""
     item = scene.object(name)
     model = object_model(item.asset, item.params)
     x, y, z = model.size
-    return model.bottom + z / 2, (x / 2, y / 2, z / 2)
+    middle = model.bottom + z / 2
+    return middle, (x / 2, y / 2, z / 2), math.hypot(x / 2, y / 2, abs(middle) + z / 2)
