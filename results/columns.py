@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from robospa.results import aggregate
 from robospa.results.bootstrap import Sample, rate
-from robospa.results.intervals import Estimate, bounded_mean, chance_corrected, wilson
+from robospa.results.intervals import METHODS, Estimate, bounded_mean, chance_corrected, wilson
 from robospa.results.metrics import DIMENSIONS, SPATIAL, Average, Cell, Scores, combine, score_run
 from robospa.results.published import LEVELS, Published, load, title
 from robospa.results.reading import Run
@@ -144,17 +144,19 @@ def published_cell(published: Published, model: str, task: str, level: int) -> C
     successes = round(sr * trials / 100)
     found = wilson(successes, trials)
     values: dict[str, Estimate | None] = {"sr": found}
+    samples = {"sr": rate(successes, trials)}
     if about.category in SPATIAL:
         values["onta"] = chance_corrected(found, count)
-        return Cell(task, level, about.category, trials, trials, successes, values, count)
+        samples["onta"] = rate(successes, trials, count)
+        return Cell(task, level, about.category, trials, trials, successes, values, count, samples)
     printed = published.value(model, "ps", task, level)
     assert printed is not None, f"no PS of {task}"
     progress = aggregate.exact_progress(printed, count, trials)
     values["ps"] = bounded_mean(progress / 100, trials)
-    return Cell(task, level, about.category, trials, trials, successes, values)
+    return Cell(task, level, about.category, trials, trials, successes, values, samples=samples)
 
 
-def published_column(model: str, name: str | None = None) -> Column:
+def published_column(model: str, name: str | None = None, ci: str = METHODS[0]) -> Column:
     """A published model, computed from its per-task tables.
 
     Where an average of progress falls exactly between two printable values, binary noise in the
@@ -176,7 +178,7 @@ def published_column(model: str, name: str | None = None) -> Column:
                 values["ps"][row, int(column[1])] = value + (1e-6 if shown > value else -1e-6)
     return Column(
         name or title(model),
-        combine(cells),
+        combine(cells, ci),
         values,
         data.embodiment,
         data.mode,
@@ -185,7 +187,7 @@ def published_column(model: str, name: str | None = None) -> Column:
     )
 
 
-def run_column(run: Run, name: str | None = None) -> Column:
+def run_column(run: Run, name: str | None = None, ci: str = METHODS[0]) -> Column:
     """A run as a column; TableError if it mixes what one column cannot hold, or fits no table."""
     data = load()
     policy = run.manifest.get("settings", {}).get("policy", {}).get("spec", {}).get("name", "")
@@ -207,7 +209,7 @@ def run_column(run: Run, name: str | None = None) -> Column:
             f"the run {label} has variants that the benchmark's tables do not know "
             f"({_names(unknown[:3])}{', ...' if len(unknown) > 3 else ''}); see `robospa tasks`"
         )
-    scores = score_run(run)
+    scores = score_run(run, ci)
     return Column(
         label,
         scores,

@@ -10,11 +10,20 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from robospa.results.intervals import Estimate, bootstrap_mean, chance_corrected, mean, wilson
+from robospa.results.bootstrap import Sample, progress, rate
+from robospa.results.intervals import (
+    METHODS,
+    Estimate,
+    bootstrap_mean,
+    chance_corrected,
+    interval_of,
+    mean,
+    wilson,
+)
 from robospa.results.reading import Run, finished
 from robospa.results.records import TrialKey, TrialRecord
 
@@ -38,6 +47,9 @@ METRICS = ("sr", "onta", "ps")
 METRIC_NAMES = {"sr": "SR", "onta": "ONTA", "ps": "PS"}
 
 
+Weighted = tuple[tuple[Sample, float], ...]
+
+
 @dataclass(frozen=True)
 class Cell:
     """One variant: `listed` trials, of which `trials` have a result and `successes` succeeded.
@@ -54,6 +66,8 @@ class Cell:
     values: Mapping[str, Estimate | None]
     candidates: int = 0
     """The n of ONTA; 0 where it does not apply or trials disagree on it."""
+    samples: Mapping[str, Sample] = field(default_factory=dict)
+    """What the metrics' intervals are made from; none of a published mean."""
 
     @property
     def missing(self) -> int:
@@ -83,6 +97,8 @@ class Average:
     values: Mapping[str, Estimate | None]
     worst: float
     best: float
+    samples: Mapping[str, Weighted] = field(default_factory=dict)
+    """By metric the samples of all variants below with their weights, where all are known."""
 
 
 @dataclass(frozen=True)
@@ -110,42 +126,85 @@ def score_cell(
     successes = sum(r.success for r in records)
     sr = wilson(successes, count) if count else None
     values: dict[str, Estimate | None] = {"sr": sr}
+    samples = {"sr": rate(successes, count)} if count else {}
     candidates = 0
     if category in SPATIAL:
         found = {r.candidates for r in records}
         candidates = found.pop() if len(found) == 1 else 0
-        values["onta"] = chance_corrected(sr, candidates) if sr and candidates > 1 else None
+        values["onta"] = None
+        if sr and candidates > 1:
+            values["onta"] = chance_corrected(sr, candidates)
+            samples["onta"] = rate(successes, count, candidates)
     elif category in PROCEDURAL:
         shares = np.array([r.done / r.total if r.total else float(r.success) for r in records])
         values["ps"] = bootstrap_mean(shares, _seed(task, level)) if count else None
-    return Cell(task, level, category, listed, count, successes, values, candidates)
+        if count:
+            done = [(r.done, r.total) if r.total else (int(r.success), 1) for r in records]
+            samples["ps"] = progress(done)
+    return Cell(task, level, category, listed, count, successes, values, candidates, samples)
 
 
-def _join(parts: Sequence[Cell | Average]) -> Average:
+def with_intervals(cell: Cell, ci: str) -> Cell:
+    """`cell` with the intervals that the method `ci` makes; Wilson's are there already."""
+    if ci == METHODS[0]:
+        return cell
+    made: dict[str, Estimate | None] = dict(cell.values)
+    for metric, sample in cell.samples.items():
+        known = made[metric]
+        if known is not None:
+            found = interval_of([sample], method=ci, seed=_seed(cell.task, cell.level))
+            made[metric] = replace(found, value=known.value)
+    return replace(cell, values=made)
+
+
+def _join(parts: Sequence[Cell | Average], ci: str = METHODS[0]) -> Average:
     """Mean of cells, or of averages, that all count the same.
 
     A metric has a mean only if every part that it applies to has a value: one variant without a
     single result leaves all averages above it open.
     """
     values: dict[str, Estimate | None] = {}
+    samples: dict[str, Weighted] = {}
     for metric in METRICS:
-        below = [p.values[metric] for p in parts if metric in p.values]
+        fit = [p for p in parts if metric in p.values]
+        below = [p.values[metric] for p in fit]
         known = [e for e in below if e is not None]
         if below:
-            values[metric] = mean(known) if len(known) == len(below) else None
+            samples[metric] = _flat(fit, metric)
+            joined = mean(known) if len(known) == len(below) else None
+            if ci == "bootstrap" and joined is not None and samples[metric]:
+                found, weights = zip(*samples[metric], strict=True)
+                joined = replace(interval_of(found, weights, ci), value=joined.value)
+            values[metric] = joined
     return Average(
         trials=sum(p.trials for p in parts),
         missing=sum(p.missing for p in parts),
         values=values,
         worst=float(np.mean([p.worst for p in parts])),
         best=float(np.mean([p.best for p in parts])),
+        samples=samples,
     )
+
+
+def _flat(parts: Sequence[Cell | Average], metric: str) -> Weighted:
+    """The samples of all variants below `parts`, which count the same; empty if one has none."""
+    flat: list[tuple[Sample, float]] = []
+    for part in parts:
+        if isinstance(part, Cell):
+            below: Weighted = ((part.samples[metric], 1.0),) if metric in part.samples else ()
+        else:
+            below = part.samples.get(metric, ())
+        if not below:
+            return ()
+        flat += [(sample, weight / len(parts)) for sample, weight in below]
+    return tuple(flat)
 
 
 def _by_level(
     groups: Mapping[str, Sequence[str]],
     levels: Sequence[int],
     find: Callable[[str, int], Cell | Average | None],
+    ci: str,
 ) -> dict[tuple[str, int], Average]:
     """Average of each group's members at every level, and at level 0 of what `find` gives there."""
     made: dict[tuple[str, int], Average] = {}
@@ -153,7 +212,7 @@ def _by_level(
         for level in (*levels, 0):
             parts = [p for m in members if (p := find(m, level)) is not None]
             if parts:
-                made[name, level] = _join(parts)
+                made[name, level] = _join(parts, ci)
     return made
 
 
@@ -161,8 +220,9 @@ def score(
     keys: Iterable[TrialKey],
     records: Mapping[TrialKey, TrialRecord],
     category_of: Mapping[str, str] | None = None,
+    ci: str = METHODS[0],
 ) -> Scores:
-    """All scores of the trials `keys` from their `records`.
+    """All scores of the trials `keys` from their `records`, with intervals by the method `ci`.
 
     `category_of` tells the category of tasks that may have no record yet.
     """
@@ -175,27 +235,31 @@ def score(
     for (task, level), members in listed.items():
         found = [records[k] for k in members if k in records and finished(records[k])]
         cells[task, level] = score_cell(task, level, category.get(task, ""), len(members), found)
-    return combine(cells)
+    return combine(cells, ci)
 
 
-def combine(cells: Mapping[tuple[str, int], Cell]) -> Scores:
-    """All averages above `cells`."""
+def combine(cells: Mapping[tuple[str, int], Cell], ci: str = METHODS[0]) -> Scores:
+    """All averages above `cells`, and their intervals by the method `ci` (`intervals.METHODS`).
+
+    Under `bootstrap` an average resamples the episodes of all variants below it, as the paper does.
+    """
+    cells = {place: with_intervals(cell, ci) for place, cell in cells.items()}
     levels = tuple(sorted({level for _, level in cells}))
     category = {task: cell.category for (task, _), cell in cells.items()}
     names = list(category)
-    tasks = {t: _join([cells[t, n] for n in levels if (t, n) in cells]) for t in names}
+    tasks = {t: _join([cells[t, n] for n in levels if (t, n) in cells], ci) for t in names}
 
     def cell_or_mean(task: str, level: int) -> Cell | Average | None:
         return cells.get((task, level)) if level else tasks[task]
 
     members_of = {c: [t for t in names if category.get(t) == c] for c in CATEGORIES}
-    categories = _by_level(members_of, levels, cell_or_mean)
-    dimensions = _by_level(DIMENSIONS, levels, lambda c, n: categories.get((c, n)))
-    everything = _by_level({"": CATEGORIES}, levels, lambda c, n: categories.get((c, n)))
+    categories = _by_level(members_of, levels, cell_or_mean, ci)
+    dimensions = _by_level(DIMENSIONS, levels, lambda c, n: categories.get((c, n)), ci)
+    everything = _by_level({"": CATEGORIES}, levels, lambda c, n: categories.get((c, n)), ci)
     overall = {level: average for (_, level), average in everything.items()}
     return Scores(cells, levels, tasks, categories, dimensions, overall)
 
 
-def score_run(run: Run) -> Scores:
-    """All scores of `run`."""
-    return score(run.keys, run.records, run.manifest.get("categories"))
+def score_run(run: Run, ci: str = METHODS[0]) -> Scores:
+    """All scores of `run`, with intervals by the method `ci`."""
+    return score(run.keys, run.records, run.manifest.get("categories"), ci)

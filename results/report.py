@@ -41,14 +41,14 @@ def write_report(
     shown = [runs] if isinstance(runs, Run) else list(runs)
     (folder / FIGURES).mkdir(parents=True, exist_ok=True)
     names = names_of(shown)
-    columns, refused = columns_of(shown, names, published)
+    columns, refused = columns_of(shown, names, published, ci)
     scores = dict(
         zip(
             [*names, *(c.title for c in columns[len(shown) :])],
             (c.scores for c in columns),
             strict=False,
         )
-    ) or {name: score_run(run) for name, run in zip(names, shown, strict=True)}
+    ) or {name: score_run(run, ci) for name, run in zip(names, shown, strict=True)}
     drawings = draw_figures(shown, columns, folder / FIGURES)
     tables = report_tables(columns) if columns else []
     write_files(tables, folder / TABLES)
@@ -66,12 +66,12 @@ def write_report(
 
 
 def columns_of(
-    runs: Sequence[Run], names: Sequence[str], published: Sequence[str]
+    runs: Sequence[Run], names: Sequence[str], published: Sequence[str], ci: str
 ) -> tuple[list[Column], list[str]]:
     """A column for every run and model, or none and the reason in a sentence."""
     try:
-        columns = [run_column(run, name) for run, name in zip(runs, names, strict=True)]
-        columns += [published_column(model) for model in published]
+        columns = [run_column(run, name, ci) for run, name in zip(runs, names, strict=True)]
+        columns += [published_column(model, ci=ci) for model in published]
         check_columns(columns)
     except TableError as error:
         if published or len(runs) > 1:

@@ -103,7 +103,7 @@ def for_page(tables: Sequence[Shown]) -> list[Mapping[str, Any]]:
     """Title, markup, whether it is folded, and notes too long to stand below it, of each table."""
     from markupsafe import Markup
 
-    made = []
+    made: list[Mapping[str, Any]] = []
     for table in tables:
         grid = table.grid
         long = [note for note in grid.notes if len(note) > LONG]

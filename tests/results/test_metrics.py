@@ -6,6 +6,8 @@ from dataclasses import replace
 
 import pytest
 
+from robospa.results.columns import published_column
+from robospa.results.intervals import METHODS
 from robospa.results.metrics import Scores, score
 from robospa.results.records import TrialKey, TrialRecord
 
@@ -106,3 +108,25 @@ def test_onta_is_open_where_candidate_counts_differ() -> None:
     second = replace(trial("A", "GAC", 1, 1), candidates=3)
     cell = scores([trial("A", "GAC", 0, 1), second]).cells["A", 1]
     assert cell.values["onta"] is None
+
+
+def test_intervals_by_the_chosen_method_leave_all_values_as_they_are() -> None:
+    columns = {ci: published_column("RDT", ci=ci).scores for ci in METHODS}
+    place = ("MIP", 5)
+    values = {ci: scores.categories[place].values["sr"] for ci, scores in columns.items()}
+    assert {e.value for e in values.values() if e} == {0.0}
+    assert {ci: e.method for ci, e in values.items() if e} == {
+        "wilson": "MOVER on Wilson",
+        "exact": "MOVER on exact",
+        "jeffreys": "MOVER on Jeffreys",
+        "bootstrap": "stratified bootstrap",
+    }
+    point = values["bootstrap"]
+    assert point and (point.low, point.high) == (0.0, 0.0)
+
+
+def test_the_bootstrap_of_an_average_is_the_papers() -> None:
+    found = published_column("RDT", ci="bootstrap").scores.overall[5].values["sr"]
+    assert found
+    assert 100 * found.low == pytest.approx(6.24, abs=0.06)
+    assert 100 * found.high == pytest.approx(7.53, abs=0.06)
