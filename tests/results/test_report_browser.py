@@ -1,0 +1,192 @@
+"""The report in a real browser: opened from disk, clicked, filtered, sorted, sought.
+
+Needs Chromium: run with `-m browser`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from devtools import Page, chromium
+from test_report import EVIL, make_run, record
+
+from robospa.results.report import write_report
+
+pytestmark = pytest.mark.browser
+
+EVENTS = (
+    {"time": 2.0, "kind": "grasped", "object": "object_1", "index": -1, "note": ""},
+    {"time": 4.0, "kind": "wrong_object", "object": "object_1", "index": -1, "note": EVIL},
+)
+COUNT = 130
+ROWS = "[...document.querySelectorAll('#list tr.row')].map(r => [...r.cells].map(c => c.innerText))"
+SHOWN = "document.getElementById('count').textContent"
+
+
+def write_film(path: Path, seconds: int) -> None:
+    """A film of grey frames, ten a second."""
+    import av
+
+    with av.open(str(path), "w") as file:
+        stream: Any = file.add_stream("libx264", rate=10)
+        stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
+        for number in range(10 * seconds):
+            image = np.full((48, 64, 3), 2 * number, np.uint8)
+            file.mux(stream.encode(av.VideoFrame.from_ndarray(image, format="rgb24")))
+        file.mux(stream.encode())
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """130 trials of two tasks, the second of them filmed; 30 failed."""
+    folder = tmp_path_factory.mktemp("browser")
+    records = [
+        record("Pick_Blocks_Size", 1, n, n >= 30, candidates=2, instruction=f"take {n} {EVIL}")
+        for n in range(COUNT - 10)
+    ]
+    records += [record("Press_Stapler_Repeat", 2, n, True, steps=n) for n in range(10)]
+    records[1] = replace(records[1], video="videos/a b#1.mp4", events=EVENTS)
+    run = make_run(folder / "run", records)
+    (folder / "run" / "videos").mkdir()
+    write_film(folder / "run" / "videos" / "a b#1.mp4", 6)
+    return write_report(run, folder / "report", ["RDT", "X-VLA"]) / "report.html"
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
+    with chromium(tmp_path_factory.mktemp("profile")) as page:
+        yield page
+
+
+@pytest.fixture
+def page(browser: Page, report: Path) -> Iterator[Page]:
+    """The report freshly opened; afterwards nothing may have gone wrong in it."""
+    browser.look(1200)
+    browser.open(report)
+    yield browser
+    assert browser.problems == []
+
+
+def choose(page: Page, name: str, value: str) -> None:
+    """Choose in a filter as a user does."""
+    page.run(
+        f"(() => {{ const e = document.querySelector('.filters').elements['{name}'];"
+        f"e.value = '{value}'; e.dispatchEvent(new Event('input', {{bubbles: true}})); }})()"
+    )
+
+
+def test_nothing_is_loaded_from_elsewhere(page: Page, report: Path) -> None:
+    page.wait("document.querySelector('.films video').readyState >= 1")
+    base = report.parent.resolve().as_uri()
+    assert [url for url in page.requested() if not url.startswith((base, "data:"))] == []
+
+
+def test_text_from_outside_stays_text(page: Page) -> None:
+    page.click("#list button.open")
+    assert EVIL in page.run("document.querySelector('tr.detail').innerText")
+    assert EVIL in page.run("document.querySelector('h1').innerText")
+    assert page.run("document.querySelectorAll('script').length") == 2
+
+
+def test_pages_of_the_list(page: Page) -> None:
+    assert page.run(SHOWN) == f"1–100 of {COUNT} trials"
+    assert page.run("document.getElementById('back').disabled")
+    page.click("#next")
+    assert page.run(SHOWN) == f"101–{COUNT} of {COUNT} trials"
+    assert len(page.run(ROWS)) == COUNT - 100
+    page.click("#back")
+    assert page.run(SHOWN) == f"1–100 of {COUNT} trials"
+
+
+def test_filters_work_together_and_are_cleared(page: Page) -> None:
+    choose(page, "end", "step limit")
+    assert page.run(SHOWN) == "1–30 of 30 trials"
+    choose(page, "failure", "target_grounding")
+    assert page.run(SHOWN) == "1–1 of 1 trials"
+    choose(page, "task", "Press_Stapler_Repeat")
+    assert page.run(SHOWN) == "no trial matches"
+    page.click("button[type=reset]")
+    page.wait(f"{SHOWN} === '1–100 of {COUNT} trials'")
+
+
+def test_text_search_needs_every_word(page: Page) -> None:
+    choose(page, "text", "TAKE 17 size")
+    assert [row[2] for row in page.run(ROWS)] == ["17", "117"]
+    choose(page, "text", "wrong object_1")
+    assert [row[2] for row in page.run(ROWS)] == ["1"]
+
+
+def test_a_failure_types_button_lists_its_trials(page: Page) -> None:
+    page.click(".of-kind[data-kind=target_grounding]")
+    page.wait(f"{SHOWN} === '1–1 of 1 trials'")
+    assert page.run(ROWS)[0][4] == "target grounding"
+
+
+def test_columns_sort_both_ways(page: Page) -> None:
+    choose(page, "level", "2")
+    steps = "#list th[data-name=steps] button"
+    page.click(steps)
+    assert [row[6] for row in page.run(ROWS)] == [str(n) for n in range(10)]
+    page.click(steps)
+    assert [row[6] for row in page.run(ROWS)] == [str(n) for n in reversed(range(10))]
+    assert page.run("document.querySelector('[data-name=steps]').ariaSort") == "descending"
+
+
+def test_the_keyboard_alone_opens_a_trial_and_moves_on(page: Page) -> None:
+    page.run("document.querySelector('#list button.open').focus()")
+    page.press("ArrowDown", 40)
+    page.press("Enter", 13, "\r")
+    assert page.run("document.activeElement.ariaExpanded") == "true"
+    assert page.run("document.querySelector('tr.open').rowIndex") == 2
+    page.press("Enter", 13, "\r")
+    assert page.run("document.querySelector('tr.detail')") is None
+
+
+@pytest.mark.parametrize("place", [".films", "tr.detail"])
+def test_an_event_seeks_the_video_to_its_moment(page: Page, place: str) -> None:
+    choose(page, "video", "yes")
+    page.click("#list button.open")
+    page.click(f"{place} .events li:nth-child(2) button")
+    film = f"document.querySelector('{place} video')"
+    page.wait(f"{film}.readyState >= 2 && !{film}.seeking")
+    assert page.run(f"{film}.currentTime") == pytest.approx(4.0 / 2)
+    page.wait(f"document.querySelector('{place} [aria-current=true]')?.dataset.time === '4'")
+    page.run(f"{film}.currentTime = 0")
+    page.wait(f"{film}.currentTime === 0 && !{film}.seeking")
+    page.click(f"{place} .jump")  # beside the failure's evidence
+    page.wait(f"{film}.currentTime === 2 && !{film}.seeking")
+
+
+@pytest.mark.parametrize("width", [1200, 390])
+@pytest.mark.parametrize("dark", [False, True])
+def test_both_themes_and_widths(page: Page, width: int, dark: bool) -> None:
+    page.look(width, dark=dark)
+    page.click("#list button.open")
+    for element in ("details", "tr.detail"):
+        page.run(f"document.querySelectorAll('{element}').forEach(e => {{ e.open = true; }})")
+    assert page.run("document.documentElement.scrollWidth") == width
+    ground = page.run("getComputedStyle(document.body).backgroundColor")
+    assert (ground == "rgb(255, 255, 255)") is not dark
+
+
+def test_the_theme_can_be_chosen(page: Page) -> None:
+    ground = "getComputedStyle(document.body).backgroundColor"
+    light = page.run(ground)
+    page.click("#theme")
+    assert page.run(ground) == light
+    page.click("#theme")
+    assert page.run(ground) != light
+    page.click("#theme")
+    assert page.run(ground) == light
+
+
+def test_intervals_are_shown_if_asked(page: Page) -> None:
+    after = "getComputedStyle(document.querySelector('td[data-interval]'), '::after').content"
+    assert page.run(after) == "none"
+    page.click("#intervals")
+    assert page.run(after).startswith('"[')
