@@ -134,12 +134,10 @@ class _Reader:
         name, touching = event["object"], event.get("note") == "touching"
         if touching:
             self._taken(event, "closed on")
-        elif name:
+        else:
             needs = self._aimed_at(name)
             self.tried.update(needs)
             self._add("manipulation", event, f"closed beside {name} and touched nothing", needs)
-        else:
-            self._add("manipulation", event, "closed on nothing", plain=False)
 
     def _aimed_at(self, name: str) -> tuple[int, ...]:
         """The open subtasks of the object beside which a gripper closed, else what was due."""

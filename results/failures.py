@@ -124,7 +124,7 @@ def _spatial(record: TrialRecord) -> Cause | None:
         kind, note = event["kind"], event.get("note", "")
         if kind == "grasped" or (kind == "closed" and note == "touching"):
             chosen = chosen or event
-        elif kind == "closed" and event["object"]:
+        elif kind == "closed":
             beside = beside or event
         elif kind == "dropped":
             lost = lost or event

@@ -25,14 +25,14 @@ REOPENED = 0.3
 CLOSING = 0.5
 """Seconds after the command to close during which a touch belongs to it: fingers lag by 0.2 s."""
 AROUND = 0.15
-"""A gripper that closes farther [m] than this from everything closes on nothing."""
+"""A gripper that closes farther [m] than this from everything tries nothing: no event."""
 NEAR, FAR = 0.055, 0.07
 """Distance [m] from grasp centre to an object's box that is an approach, and that ends it."""
 
 AT_REST = 0.002
 """An arm that moved less than this [m] between two looks has approached nothing."""
 
-TOUCHING, BESIDE, NOWHERE = "touching", "beside", "nothing near"
+TOUCHING, BESIDE = "touching", "beside"
 """Notes of `closed` events."""
 
 
@@ -127,13 +127,13 @@ class Hands:
     def _closed(self, state: _Arm, time: float) -> tuple[Event, ...]:
         """The closing is over: on what it was."""
         state.since = -1.0
-        name, note = state.nearest, BESIDE if state.nearest else NOWHERE
+        name, note = state.nearest, BESIDE
         if state.touched:
             most = max(state.touched.values())
             if state.touched.get(name, 0) < most:
                 name = next(n for n, count in state.touched.items() if count == most)
             note = TOUCHING
-        if name and self._roles[name].pressed:
+        if not name or self._roles[name].pressed:
             return ()
         return (Event(time, "closed", name, self._index(name), note),)
 
@@ -180,7 +180,7 @@ class Hands:
         return math.hypot(dx, dy, max(abs(c - middle) - half[2], 0.0))
 
     def _index(self, name: str) -> int:
-        subtasks = self._roles[name].subtasks if name else ()
+        subtasks = self._roles[name].subtasks
         return subtasks[0] if subtasks else -1
 
 

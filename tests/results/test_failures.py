@@ -101,7 +101,6 @@ def test_a_record_of_an_older_version_says_so() -> None:
         ([(2, "approached", "target", 0)], "target_execution"),
         ([(2, "approached", "other")], "target_grounding"),
         ([(2, "wrong_object", "other")], "target_grounding"),
-        ([(2, "closed", "", -1, "nothing near")], "no_attempt"),
         # a touch says more than a miss before it, and the first touch is the choice
         (
             [(2, "closed", "other", -1, "beside"), (4, "closed", "target", 0, "touching")],
