@@ -1,6 +1,6 @@
 """How well failure types are told: scripted mistakes in the simulator, labelled from their records.
 
-    python benchmarks/failure_labels.py [--seeds 5] [--tasks NAME,...] [--out FILE.json]
+    python benchmarks/failure_labels.py [--seeds 3] [--tasks NAME,...] [--out FILE.json]
 
 Every kind of mistake (`robospa.baselines.mistakes`) runs on every task that gives occasion for it.
 A trial counts only if the script came off: the trial failed, and the expert that acts it out had
@@ -137,7 +137,7 @@ def table(found: list[Row]) -> str:
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seeds", type=int, default=5, help="seeds a mistake, task and level")
+    parser.add_argument("--seeds", type=int, default=3, help="seeds a mistake, task and level")
     parser.add_argument("--tasks", default=",".join(tasks()))
     parser.add_argument("--out", type=Path)
     options = parser.parse_args()
@@ -158,7 +158,13 @@ def main() -> None:
         "bar": 0.95,
         "by_label": by_label,
         "rows": [
-            {"task": r.task, "mistake": r.kind, "expected": r.expected, "found": dict(r.found)}
+            {
+                "task": r.task,
+                "mistake": r.kind,
+                "expected": r.expected,
+                "found": dict(r.found),
+                "not_acted_out": r.not_acted,
+            }
             for r in found
         ],
         "wrong": [f"{r.task} {r.kind} {text}" for r in found for text in r.wrong],
