@@ -248,7 +248,7 @@ def _diagnostics(run: _Run) -> dict[str, Any]:
     own = getattr(run.parts.tracker, "diagnostics", None)
     found = dict(own()) if own is not None else {}
     if run.hands is not None:
-        found["roles"] = run.hands.diagnostics()
+        found.update(run.hands.diagnostics())
     if run.unreachable:
         found["unreachable_actions"] = run.unreachable
         found["first_unreachable"] = run.first_problem

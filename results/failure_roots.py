@@ -22,6 +22,8 @@ MEMORY = "MIP"
 """There a step out of turn means that what the cue showed is not known any more."""
 
 
+PRESSES = ("subtask_done", "wrong_order", "repeated")
+"""What a press can show as."""
 LATE = 1.0
 """A closing is reported up to this long [s] after what it did."""
 
@@ -86,6 +88,9 @@ class _Reader:
     ever: set[int] = field(default_factory=set)
     tried: set[int] = field(default_factory=set)
     undone: dict[int, float] = field(default_factory=dict)
+    pressed: tuple[str, ...] = ()
+    miss: _Mistake | None = None
+    """The last closing, if it was beside something."""
     worked: set[int] = field(default_factory=set)
     """Closings, by the identity of their events, that led to a lift."""
     progress: float = -1.0
@@ -93,6 +98,9 @@ class _Reader:
 
     def read(self, event: Happened) -> None:
         kind = str(event["kind"])
+        if event["object"] in self.pressed and kind in PRESSES and self.miss is not None:
+            self.mistakes.remove(self.miss)  # it only made the gripper ready to press
+            self.miss = None
         method = getattr(self, f"_{kind}", None)
         if method is not None:
             method(event)
@@ -131,6 +139,7 @@ class _Reader:
         self._taken(event, "lifted")
 
     def _closed(self, event: Happened) -> None:
+        self.miss = None
         name, touching = event["object"], event.get("note") == "touching"
         if touching:
             self._taken(event, "closed on")
@@ -138,6 +147,7 @@ class _Reader:
             needs = self._aimed_at(name)
             self.tried.update(needs)
             self._add("manipulation", event, f"closed beside {name} and touched nothing", needs)
+            self.miss = self.mistakes[-1]
 
     def _aimed_at(self, name: str) -> tuple[int, ...]:
         """The open subtasks of the object beside which a gripper closed, else what was due."""
@@ -156,7 +166,8 @@ class _Reader:
         early = self._out_of_turn(index)
         self.tried.add(index)
         if self._was_done(index, event["time"]) and index not in self.idle:
-            self.mistakes = [m for m in self.mistakes if not self._undoing(m, index, event["time"])]
+            for mistake in [m for m in self.mistakes if self._undoing(m, index, event["time"])]:
+                self.mistakes.remove(mistake)
             self._add("redundant_repetition", event, f"{did} {name} again, which was done")
         elif early:
             kind = "memory" if self.category == MEMORY else "temporal_ordering"
@@ -256,7 +267,13 @@ class _Reader:
 
 def root_of(record: TrialRecord) -> Cause | None:
     """Why a failed trial of a long-horizon task failed; None if nothing was tried."""
-    reader = _Reader(record.category, record.total, roles_of(record), worked=_worked(record.events))
+    reader = _Reader(
+        record.category,
+        record.total,
+        roles_of(record),
+        pressed=tuple(record.diagnostics.get("pressed", ())),
+        worked=_worked(record.events),
+    )
     for event in record.events:
         reader.read(event)
     return reader.root()

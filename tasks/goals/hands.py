@@ -111,9 +111,13 @@ class Hands:
                     events += self._closed(state, time)
         return events
 
-    def diagnostics(self) -> dict[str, list[int]]:
-        """Subtasks by object, for whoever reads the events."""
-        return {name: list(role.subtasks) for name, role in self._roles.items()}
+    def diagnostics(self) -> dict[str, object]:
+        """For whoever reads the events: subtasks by object, and which objects are pressed."""
+        roles = self._roles.items()
+        return {
+            "roles": {name: list(role.subtasks) for name, role in roles},
+            "pressed": [name for name, role in roles if role.pressed],
+        }
 
     def _feel(self, arm: int, state: _Arm) -> None:
         """Note which objects the gripper touches now."""

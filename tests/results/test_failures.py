@@ -256,6 +256,18 @@ def test_a_harmless_repetition_is_forgiven_by_progress() -> None:
     assert kind(failed("CAC", rows, CLICKS)) == "manipulation"
 
 
+def test_closing_for_a_press_is_no_failed_grasp() -> None:
+    rows = [
+        (1, "closed", "bread", 1, "beside"),
+        (2, "subtask_done", "can", 0),
+        (3, "repeated", "can", 2),
+    ]
+    record = failed("CAC", rows, CLICKS)
+    assert kind(record) == "manipulation"
+    told = {**record.diagnostics, "pressed": ["can"]}
+    assert kind(TrialRecord(**{**vars(record), "diagnostics": told})) == "redundant_repetition"
+
+
 # -- counts ------------------------------------------------------------------------------------
 
 

@@ -1,0 +1,65 @@
+"""`robospa failures`: counts, evidence, and what is refused."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+
+import pytest
+
+from robospa.harness.cli.main import main
+from robospa.results.reading import to_line
+from robospa.results.records import TrialKey, TrialRecord
+
+LIFT = {"time": 3.0, "kind": "grasped", "object": "b", "index": -1, "note": "", "step": 4}
+
+
+def record(seed: int, end: str) -> TrialRecord:
+    key = TrialKey("Pick_Blocks_Size", 2, seed)
+    return TrialRecord(
+        key, "GAC", "", "", end, end == "success", 0, 0, 1, 3, 9, 900, 1, "", "", 1.0,
+        events=(LIFT,), diagnostics={"roles": {"a": [0], "b": []}}, video="videos/x.mp4",
+    )  # fmt: skip
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    records = [record(1, "step_limit"), record(2, "success"), record(3, "infrastructure")]
+    (tmp_path / "trials").mkdir()
+    (tmp_path / "trials" / "0000.jsonl").write_text("".join(map(to_line, records)))
+    row = {k: v for k, v in asdict(records[0].key).items() if k != "seed"}
+    (tmp_path / "run.json").write_text(json.dumps({"trials": [{**row, "seeds": [1, 2, 3]}]}))
+    return tmp_path
+
+
+def printed(capsys: pytest.CaptureFixture[str], *words: str) -> str:
+    with pytest.raises(SystemExit) as end:
+        main(["failures", *words])
+    out, err = capsys.readouterr()
+    return out if end.value.code == 0 else err
+
+
+def test_counts(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = printed(capsys, str(folder))
+    assert "| Pick_Blocks_Size | 1 | 1 |" in out
+    assert "1 failed trials of 3, 1 missing" in out
+
+
+def test_every_failed_trial_with_its_evidence(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (row,) = json.loads(printed(capsys, str(folder), "--trials", "--format", "json"))
+    assert (row["seed"], row["type"], row["step"]) == (1, "target grounding", 4)
+    assert (row["time"], row["video_seconds"]) == (3.0, 1.5)
+    assert "took b" in row["evidence"]
+
+
+def test_a_folder_that_is_no_run_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert "is not a run" in printed(capsys, str(tmp_path))
+
+
+def test_an_unknown_grouping_is_refused(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert "not by 'robot'" in printed(capsys, str(folder), "--by", "robot")
