@@ -2,7 +2,8 @@
 
 Wilson for one rate, MOVER (Zou and Donner 2008) for a weighted sum of independent quantities from
 their own limits: both are closed formulas, need no seed and stay honest at 0 and at all of n, where
-the bootstrap collapses to a point. Progress is no 0/1 outcome: its mean takes a seeded bootstrap.
+the bootstrap collapses to a point. Progress is no 0/1 outcome: its mean takes a seeded bootstrap,
+with the limit of a rate where no episode differs from another.
 Every `Estimate` names the method that made it. Exact and Jeffreys intervals need SciPy.
 
 Except for `over_tasks`, all of them answer: the same tasks with other seeds.
@@ -17,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.results.bootstrap import RESAMPLES, Sample, draw, draw_over_tasks
+from robospa.results.bootstrap import Sample, draw, draw_over_tasks
 
 Z95 = 1.959963984540054
 """Two-sided 95 % quantile of the normal distribution."""
@@ -165,29 +166,6 @@ def paired_sample_difference(gaps: Sample) -> Estimate:
         )
     found = paired_difference(gaps.counts[-1], gaps.counts[0], gaps.trials)
     return _affine(found, reach * gaps.scale, 0.0)
-
-
-def bootstrap_mean(
-    values: NDArray[np.float64], seed: int = 0, resamples: int = RESAMPLES
-) -> Estimate:
-    """Mean of `values`, each in 0..1, with the percentile bootstrap over episodes.
-
-    Where all values are 0 (or all 1) the bootstrap knows nothing; then the mean is at most the
-    share of values above 0, whose Wilson limit holds (and likewise from above).
-    """
-    count = len(values)
-    if count == 0:
-        raise ValueError("a mean needs at least one value")
-    value = float(values.mean())
-    if np.all(values == 0) or np.all(values == 1):
-        return replace(wilson(round(count * value), count), method=BOUNDED)
-    generator = np.random.default_rng(seed)
-    distinct, counts = np.unique(values, return_counts=True)
-    draws = generator.multinomial(count, counts / count, size=resamples) @ distinct / count
-    return _percentile(value, draws, "bootstrap")
-
-
-BOUNDED = "bootstrap, Wilson where all are equal"
 
 
 def interval_of(

@@ -18,7 +18,6 @@ from robospa.results.bootstrap import Sample, progress, rate
 from robospa.results.intervals import (
     METHODS,
     Estimate,
-    bootstrap_mean,
     chance_corrected,
     interval_of,
     mean,
@@ -136,11 +135,11 @@ def score_cell(
             values["onta"] = chance_corrected(sr, candidates)
             samples["onta"] = rate(successes, count, candidates)
     elif category in PROCEDURAL:
-        shares = np.array([r.done / r.total if r.total else float(r.success) for r in records])
-        values["ps"] = bootstrap_mean(shares, _seed(task, level)) if count else None
+        values["ps"] = None
         if count:
             done = [(r.done, r.total) if r.total else (int(r.success), 1) for r in records]
             samples["ps"] = progress(done)
+            values["ps"] = interval_of([samples["ps"]], seed=_seed(task, level))
     return Cell(task, level, category, listed, count, successes, values, candidates, samples)
 
 

@@ -14,7 +14,6 @@ from robospa.results.intervals import (
     METHODS,
     Estimate,
     below,
-    bootstrap_mean,
     bounded_mean,
     chance_corrected,
     difference,
@@ -92,16 +91,16 @@ def test_the_papers_onta_example() -> None:
 
 
 def test_all_zero_progress_still_has_an_upper_limit() -> None:
-    found = bootstrap_mean(np.zeros(100))
+    found = interval_of([Sample((100, 0, 0), 0.5)])
     assert (found.value, found.low) == (0.0, 0.0)
     assert 100 * found.high == pytest.approx(3.70, abs=0.01)
 
 
 def test_the_bootstrap_is_repeatable_and_close_to_the_normal_interval() -> None:
-    values = np.tile([0.0, 0.5, 1.0, 0.5], 25)
-    found = bootstrap_mean(values, seed=3)
-    assert found == bootstrap_mean(values, seed=3)
-    half = 1.96 * values.std() / 10
+    values = Sample((25, 50, 25), 0.5)
+    found = interval_of([values], seed=3)
+    assert found == interval_of([values], seed=3)
+    half = 1.96 * math.sqrt(1 / 8) / 10
     assert (found.low, found.high) == pytest.approx((0.5 - half, 0.5 + half), abs=0.006)
 
 
