@@ -16,7 +16,7 @@ COMMANDS = {
     "serve": "Serve a policy by name or module:function.",
     "check": "Test a policy server against the protocol.",
     "eval": "Evaluate the policy behind a URL.",
-    "report": "Turn a run into tables, a figure and a page with its videos.",
+    "report": "Turn runs into tables, figures and a page with every trial and its video.",
     "paper": "Write the paper's tables, recomputed, and list what does not follow.",
     "compare": "Compare two runs, or a run and published numbers; plan sample sizes.",
     "lint": "Look for results that cannot be, in runs or in the paper.",
