@@ -171,13 +171,13 @@ def to_json(scores: Scores) -> dict[str, Any]:
     }
 
 
-def terminal(run: Run) -> None:
-    """Print the run's table on the terminal."""
+def terminal(run: Run, ci: str = "wilson") -> None:
+    """Print the run's table on the terminal, with intervals by the method `ci`."""
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
 
-    scores = score_run(run)
+    scores = score_run(run, ci)
     shown = rows(scores)
     if all(category_size(scores, row) < 2 for row in shown):
         shown = [row for row in shown if row.kind != "category"]  # they would repeat their task

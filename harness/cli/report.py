@@ -35,5 +35,5 @@ def report(
     published = list(load().models) if with_published else []
     folder = write_report(found, out or run[0] / "report", published, ci)
     for one in found:
-        terminal(one)
+        terminal(one, ci)
     print(f"Report: {folder / 'report.html'}")
