@@ -30,6 +30,7 @@ def evaluate(url: str, folder: Path, trials: int, workers: int) -> subprocess.Po
     """Start an evaluation of `trials` trials of one variant."""
     seeds = f"{FIRST_SEED}-{FIRST_SEED + trials - 1}"
     words = ["eval", url, "--tasks", "Pick_Blocks_Size", "--levels", "3", "--seeds", seeds]
+    words += ["--trials", str(trials)]
     words += ["--workers", str(workers), "--video", "none", "--out", str(folder)]
     return subprocess.Popen([*COMMAND, *words], stdout=subprocess.DEVNULL)
 
