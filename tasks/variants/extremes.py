@@ -145,13 +145,19 @@ def leaders(points: Array) -> tuple[NDArray[np.int64], Array]:
 
 
 def fits(spread: Spread, level: int, roles: NDArray[np.int64]) -> Fits:
-    """The rule of layouts in which place `roles[chain, e]` is the e-th of EXTREMES."""
+    """The rule of layouts in which place `roles[chain, e]` is the e-th of EXTREMES.
+
+    It must be so in the head image as well, where perspective could put another object outermost.
+    """
+    middle = TABLE_TOP + spread.tall / 2
 
     def rule(points: Array, wanted: Array, i: int) -> Mask:
         moved = points.copy()
         moved[:, i] = wanted
         place, lead = leaders(moved)
-        clear = ((place == roles) & (lead >= LEADS[level])).all(axis=1)
+        u, v = head_pixel(moved[..., 0], moved[..., 1], middle)
+        seen = leaders(np.stack([u, -v], axis=-1))[0]
+        clear = ((place == roles) & (seen == roles) & (lead >= LEADS[level])).all(axis=1)
         allowed = spread.allowed(wanted[:, 0], wanted[:, 1])
         return np.asarray(clear & allowed & spread.apart(points, wanted, i))
 
