@@ -8,31 +8,23 @@ is replaced. Which worker runs a trial, and when, does not enter the record.
 
 from __future__ import annotations
 
-import multiprocessing
-import signal
-import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from multiprocessing.connection import Connection, wait
 from pathlib import Path
-from typing import Any
 
+from robospa.harness.executor import Executor, Hand, Message
+from robospa.harness.executor import RunAborted as RunAborted
 from robospa.harness.factory import load
+from robospa.harness.local_workers import LocalExecutor
 from robospa.harness.queue import Pending, TrialQueue
 from robospa.harness.store import RecordWriter
 from robospa.harness.worker import LOGS, WorkerConfig
-from robospa.harness.worker import main as worker_main
 from robospa.results.reading import read_file
 from robospa.results.records import TrialKey, TrialRecord
 
 START_SECONDS = 120.0
 """A worker that is not ready by then is replaced."""
-
-
-class RunAborted(Exception):
-    """The run cannot go on; what is finished is kept, and the run can be resumed."""
 
 
 @dataclass(frozen=True)
@@ -49,12 +41,10 @@ class RunOptions:
 
 
 @dataclass
-class _Hand:
-    """One worker process as the driver sees it."""
+class _Seat:
+    """One worker and what the driver knows of it."""
 
-    process: Any
-    pipe: Connection
-    name: str
+    hand: Hand
     deadline: float
     file: Path | None = None
     work: Pending | None = None
@@ -63,7 +53,7 @@ class _Hand:
 
 @dataclass
 class Runner:
-    """Runs `keys` with the workers that `config` describes.
+    """Runs `keys` with workers of `executor`, by default processes here as `config` describes.
 
     `on_record` sees every settled trial, `on_note` one line for every mishap.
     """
@@ -73,11 +63,13 @@ class Runner:
     options: RunOptions = field(default_factory=RunOptions)
     on_record: Callable[[TrialRecord], None] = lambda record: None
     on_note: Callable[[str], None] = lambda text: None
+    executor: Executor | None = None
 
     def run(self) -> None:
         """Settle every trial. Raises RunAborted; on KeyboardInterrupt workers are killed first."""
         self._queue = TrialQueue(self.keys, load(self.config.parts))
-        self._hands: list[_Hand] = []
+        self._crew = self.executor or LocalExecutor(self.config, self.options.workers)
+        self._seats: list[_Seat] = []
         self._started = 0
         self._false_starts = 0
         self._lost_in_a_row = 0
@@ -96,74 +88,55 @@ class Runner:
 
     def _staff(self) -> None:
         """Replace workers that are gone, but never have more than there are trials left."""
-        wanted = min(self.options.workers, self._queue.unsettled)
-        while len(self._hands) < wanted:
-            self._hands.append(self._hire())
-
-    def _hire(self) -> _Hand:
-        spawn = multiprocessing.get_context("spawn")
-        name = f"worker-{self._started:03d}"
-        self._started += 1
-        ours, theirs = spawn.Pipe()
-        process = spawn.Process(
-            target=worker_main, args=(theirs, self.config, name), name=name, daemon=True
-        )
-        with _deaf():
-            process.start()
-        theirs.close()
-        return _Hand(process, ours, name, time.monotonic() + START_SECONDS)
+        wanted = min(self._crew.room(), self._queue.unsettled)
+        while len(self._seats) < wanted:
+            hand = self._crew.hire(f"worker-{self._started:03d}")
+            self._started += 1
+            self._seats.append(_Seat(hand, time.monotonic() + START_SECONDS))
 
     def _assign(self) -> None:
-        for hand in self._hands:
-            if hand.ready and hand.work is None:
+        for seat in self._seats:
+            if seat.ready and seat.work is None:
                 work = self._queue.take(time.monotonic())
                 if work is None:
                     return
-                hand.work = work
-                hand.deadline = time.monotonic() + self.options.trial_seconds
-                self._send(hand, ("run", work.key, work.attempt))
-
-    @staticmethod
-    def _send(hand: _Hand, message: tuple[Any, ...]) -> None:
-        try:
-            hand.pipe.send(message)
-        except OSError:
-            return  # it has just died: `_listen` notices and gives the trial back
+                seat.work = work
+                seat.deadline = time.monotonic() + self.options.trial_seconds
+                seat.hand.send(("run", work.key, work.attempt))
 
     def _listen(self) -> None:
         """Wait until a worker says something, dies, or a pause is over."""
-        sources = [s for h in self._hands for s in (h.pipe, h.process.sentinel)]
-        wait(sources, timeout=self._patience())
-        for hand in list(self._hands):
-            try:
-                while hand.pipe.poll():
-                    self._hear(hand, hand.pipe.recv())
-            except (EOFError, OSError):
-                pass  # closed: it is dying
-            if not hand.process.is_alive():
-                self._bury(hand, f"its worker died ({_exit_text(hand.process.exitcode)})")
+        self._crew.wait([seat.hand for seat in self._seats], self._patience())
+        for text in self._crew.news():
+            self.on_note(text)
+        for seat in list(self._seats):
+            gone = seat.hand.gone()  # asked first: what it said before it went is still heard
+            for message in seat.hand.messages():
+                self._hear(seat, message)
+            if gone is not None:
+                self._bury(seat, f"its worker died ({gone})")
 
     def _patience(self) -> float:
         """Seconds until something has to be looked at, at most half a second."""
         now = time.monotonic()
-        deadlines = [h.deadline for h in self._hands if h.work is not None or not h.ready]
-        idle = any(h.ready and h.work is None for h in self._hands)
+        deadlines = [s.deadline for s in self._seats if s.work is not None or not s.ready]
+        idle = any(s.ready and s.work is None for s in self._seats)
         if idle and (due := self._queue.next_due()) is not None:
             deadlines.append(due)
         return max(0.0, min([0.5, *(d - now for d in deadlines)]))
 
-    def _hear(self, hand: _Hand, message: tuple[Any, ...]) -> None:
+    def _hear(self, seat: _Seat, message: Message) -> None:
         if message[0] == "ready":
-            hand.ready, hand.file = True, message[1]
+            seat.ready, seat.file = True, message[1]
             self._false_starts = 0
         elif message[0] == "done":
-            hand.work = None
+            seat.work = None
             self._settle(message[1])
         elif message[0] == "fatal":
             raise RunAborted(message[1])
         else:
             _, _, text, retry = message
-            work, hand.work = hand.work, None
+            work, seat.work = seat.work, None
             if work is not None:
                 self._lose(work, text, retry)
 
@@ -192,65 +165,48 @@ class Runner:
                 f"{self._lost_in_a_row} trials in a row could not be run, the last because: {text}"
             )
 
-    def _bury(self, hand: _Hand, text: str) -> None:
+    def _bury(self, seat: _Seat, text: str) -> None:
         """Take back the trial of a dead worker, unless its record had reached the disk."""
-        self._hands.remove(hand)
-        hand.process.join()
-        hand.pipe.close()
-        if not hand.ready:
+        self._seats.remove(seat)
+        seat.hand.close()
+        if not seat.ready:
             self._false_starts += 1
             if self._false_starts >= 3:
-                log = self.config.folder / LOGS / f"{hand.name}.log"
+                log = self.config.folder / LOGS / f"{seat.hand.name}.log"
                 raise RunAborted(f"workers do not start; the last one's output is in {log}")
-        if hand.work is None:
+        if seat.work is None:
             return
-        written = read_file(hand.file) if hand.file is not None and hand.file.exists() else []
+        written = read_file(seat.file) if seat.file is not None and seat.file.exists() else []
         for record in written:
-            if record.key == hand.work.key:
+            if record.key == seat.work.key:
                 self._settle(record)
                 return
-        self._lose(hand.work, text, True)
+        self._lose(seat.work, text, True)
 
     def _check_deadlines(self) -> None:
         now = time.monotonic()
-        for hand in list(self._hands):
-            if (hand.work is not None or not hand.ready) and now > hand.deadline:
-                hand.process.kill()
-                hand.process.join()
-                limit = self.options.trial_seconds if hand.ready else START_SECONDS
-                self._bury(hand, f"its worker was stuck for {limit:g} s and was killed")
+        for seat in list(self._seats):
+            if not seat.ready and seat.hand.waiting():
+                seat.deadline = now + START_SECONDS
+            if (seat.work is not None or not seat.ready) and now > seat.deadline:
+                seat.hand.kill()
+                limit = self.options.trial_seconds if seat.ready else START_SECONDS
+                self._bury(seat, f"its worker was stuck for {limit:g} s and was killed")
 
     def _dismiss(self) -> None:
         """Let idle workers close their connections, for a moment."""
-        for hand in self._hands:
-            self._send(hand, ("stop",))
+        for seat in self._seats:
+            seat.hand.send(("stop",))
         until = time.monotonic() + 5.0
-        for hand in self._hands:
-            hand.process.join(max(0.0, until - time.monotonic()))
+        for seat in self._seats:
+            seat.hand.join(until - time.monotonic())
 
     def _kill_all(self) -> None:
-        for hand in self._hands:
-            if hand.process.is_alive():
-                hand.process.kill()
-            hand.process.join()
-            hand.pipe.close()
-
-
-@contextmanager
-def _deaf() -> Iterator[None]:
-    """Start processes that Ctrl-C does not reach, not even while they are starting."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
-
-
-def _exit_text(code: int | None) -> str:
-    return f"signal {-code}" if code is not None and code < 0 else f"exit code {code}"
+        for seat in self._seats:
+            if seat.hand.gone() is None:
+                seat.hand.kill()
+            seat.hand.close()
+        self._crew.close()
 
 
 def lost_record(key: TrialKey, message: str, attempts: int, queue: TrialQueue) -> TrialRecord:
