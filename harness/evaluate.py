@@ -13,12 +13,13 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from robospa.harness.factory import is_url, load
+from robospa.harness.locking import locked
 from robospa.harness.manifest import Manifest, about_machine, check_folder, open_run
 from robospa.harness.policies import Probed, probe_policies, warnings_of
 from robospa.harness.progress import Progress
 from robospa.harness.queue import expected_work
 from robospa.harness.runner import RunAborted, Runner, RunOptions
-from robospa.harness.store import locked
+from robospa.harness.store import tidy
 from robospa.harness.worker import WorkerConfig, describe
 from robospa.results.reading import finished, read_records
 from robospa.results.records import TrialKey
@@ -141,6 +142,7 @@ def evaluate(request: Request) -> None:
         expects={p.target: p.spec for p in policies.values() if is_url(p.target)},
     )
     with locked(folder):
+        tidy(folder)
         open_run(folder, manifest, request.resume)
         known = read_records(folder)
         owed = [key for key in request.keys if not finished(known.get(key))]

@@ -14,11 +14,13 @@ import subprocess
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from fnmatch import fnmatch
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from robospa.harness.store import replace_file
+from robospa.harness.locking import LOCK
+from robospa.harness.store import PART, replace_file
 from robospa.results.reading import MANIFEST, RunError, manifest_keys, read_manifest
 from robospa.results.records import TrialKey
 from robospa.tasks.scene import SUITE
@@ -171,8 +173,14 @@ def check_folder(folder: Path, resume: bool) -> None:
         raise RunError(f"there is no run in {folder} to resume; leave --resume out to start one")
     if folder.exists() and not folder.is_dir():
         raise RunError(f"{folder} is a file; choose another --out")
-    if not there and folder.exists() and any(p.name != ".lock" for p in folder.iterdir()):
+    if not there and folder.exists() and not _is_empty(folder):
         raise RunError(f"{folder} is neither empty nor a run; choose another --out")
+
+
+def _is_empty(folder: Path) -> bool:
+    """Whether nothing lies in `folder` but what a driver killed at its start leaves behind."""
+    names = {path.name for path in folder.iterdir()} - {LOCK}
+    return all(fnmatch(name, PART) for name in names)
 
 
 def open_run(folder: Path, manifest: Manifest, resume: bool) -> None:

@@ -18,26 +18,31 @@ from robospa.harness.executor import RunAborted as RunAborted
 from robospa.harness.factory import load
 from robospa.harness.local_workers import LocalExecutor
 from robospa.harness.queue import Pending, TrialQueue
-from robospa.harness.store import RecordWriter
+from robospa.harness.store import RecordWriter, StorageError
+from robospa.harness.watchdog import Watch
 from robospa.harness.worker import LOGS, WorkerConfig
 from robospa.results.reading import read_file
 from robospa.results.records import TrialKey, TrialRecord
 
 START_SECONDS = 120.0
 """A worker that is not ready by then is replaced."""
+STOPPED_SECONDS = 5.0
+"""The driver looks at its workers at least twice a second; if not, it was stopped itself."""
 
 
 @dataclass(frozen=True)
 class RunOptions:
     """How stubborn a run is. `trial_seconds` is the most one attempt may take before its worker is
-    killed; pauses before retries are `backoff` * 2^k seconds; after `give_up` trials lost in a row
-    the run stops, because the server is gone rather than a trial unlucky."""
+    killed, `stuck_seconds` the most without getting on though no policy is waited for; pauses
+    before retries are `backoff` * 2^k seconds; after `give_up` trials lost in a row the run stops,
+    because the server is gone rather than a trial unlucky."""
 
     workers: int = 1
     attempts: int = 3
     backoff: float = 2.0
     trial_seconds: float = 1800.0
     give_up: int = 5
+    stuck_seconds: float = 300.0
 
 
 @dataclass
@@ -49,6 +54,13 @@ class _Seat:
     file: Path | None = None
     work: Pending | None = None
     ready: bool = False
+    watch: Watch | None = None
+
+    def due(self) -> float:
+        """When it has to have got further; infinite while it has nothing to do."""
+        if self.ready and self.work is None:
+            return float("inf")
+        return self.deadline if self.watch is None else min(self.deadline, self.watch.deadline)
 
 
 @dataclass
@@ -74,6 +86,7 @@ class Runner:
         self._false_starts = 0
         self._lost_in_a_row = 0
         self._writer: RecordWriter | None = None
+        self._looked = time.monotonic()
         try:
             while self._queue.unsettled:
                 self._staff()
@@ -81,6 +94,8 @@ class Runner:
                 self._listen()
                 self._check_deadlines()
             self._dismiss()
+        except StorageError as error:
+            raise RunAborted(str(error)) from error
         finally:
             self._kill_all()
             if self._writer is not None:
@@ -101,7 +116,9 @@ class Runner:
                 if work is None:
                     return
                 seat.work = work
-                seat.deadline = time.monotonic() + self.options.trial_seconds
+                now = time.monotonic()
+                seat.deadline = now + self.options.trial_seconds
+                seat.watch = Watch(now, self.options.stuck_seconds)
                 seat.hand.send(("run", work.key, work.attempt))
 
     def _listen(self) -> None:
@@ -119,7 +136,7 @@ class Runner:
     def _patience(self) -> float:
         """Seconds until something has to be looked at, at most half a second."""
         now = time.monotonic()
-        deadlines = [s.deadline for s in self._seats if s.work is not None or not s.ready]
+        deadlines = [seat.due() for seat in self._seats]
         idle = any(s.ready and s.work is None for s in self._seats)
         if idle and (due := self._queue.next_due()) is not None:
             deadlines.append(due)
@@ -129,6 +146,9 @@ class Runner:
         if message[0] == "ready":
             seat.ready, seat.file = True, message[1]
             self._false_starts = 0
+        elif message[0] == "beat":
+            if seat.watch is not None:
+                seat.watch.heard(message, time.monotonic())
         elif message[0] == "done":
             seat.work = None
             self._settle(message[1])
@@ -185,13 +205,32 @@ class Runner:
 
     def _check_deadlines(self) -> None:
         now = time.monotonic()
+        self._forgive(now - self._looked)
+        self._looked = now
         for seat in list(self._seats):
             if not seat.ready and seat.hand.waiting():
                 seat.deadline = now + START_SECONDS
-            if (seat.work is not None or not seat.ready) and now > seat.deadline:
-                seat.hand.kill()
-                limit = self.options.trial_seconds if seat.ready else START_SECONDS
-                self._bury(seat, f"its worker was stuck for {limit:g} s and was killed")
+            if now <= seat.due():
+                continue
+            seat.hand.kill()
+            if not seat.ready:
+                text = f"its worker was not ready after {START_SECONDS:g} s and was killed"
+            elif now > seat.deadline:
+                text = f"its worker was stuck for {self.options.trial_seconds:g} s and was killed"
+            else:
+                text = (
+                    f"its worker did not get on for {self.options.stuck_seconds:g} s and was killed"
+                )
+            self._bury(seat, text)
+
+    def _forgive(self, gap: float) -> None:
+        """A driver that was stopped itself (Ctrl-Z, a machine put to sleep) blames nobody."""
+        if gap < STOPPED_SECONDS:
+            return
+        for seat in self._seats:
+            seat.deadline += gap
+            if seat.watch is not None:
+                seat.watch.forgive(gap)
 
     def _dismiss(self) -> None:
         """Let idle workers close their connections, for a moment."""

@@ -11,6 +11,7 @@ it.
 from __future__ import annotations
 
 import io
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -62,12 +63,13 @@ class VideoBuffer:
 
 
 class TrialRecorder:
-    """A `Recorder` of actions, and of a video if `video`."""
+    """A `Recorder` of actions, and of a video if `video`; `on_step` is told that time goes on."""
 
-    def __init__(self, video: bool = False) -> None:
+    def __init__(self, video: bool = False, on_step: Callable[[], None] = lambda: None) -> None:
         self._video = VideoBuffer() if video else None
         self._actions: list[NDArray[np.float32]] = []
         self._due = EVERY
+        self._on_step = on_step
 
     @property
     def actions(self) -> NDArray[np.float32]:
@@ -76,17 +78,20 @@ class TrialRecorder:
 
     def started(self, world: World) -> None:
         """Keep the first view."""
+        self._on_step()
         if self._video is not None:
             self._video.add(world.render(CAMERA))
 
     def polled(self, world: World, time: float) -> None:
         """Keep the view if the next frame is due."""
+        self._on_step()
         if self._video is not None and time >= self._due - 1e-6:
             self._due += EVERY
             self._video.add(world.render(CAMERA))
 
     def executed(self, world: World, action: NDArray[np.float32]) -> None:
         """Keep `action`."""
+        self._on_step()
         self._actions.append(action)
 
     def ended(self, world: World) -> None:

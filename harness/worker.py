@@ -3,13 +3,15 @@
 The driver sends ("run", key, attempt) or ("stop",); the worker answers ("ready", file), then per
 trial ("done", record) once the record is on disk, ("lost", key, message, retry) if it could not be
 run, or ("fatal", message) if no trial could ever be run. After a loss the world is rebuilt and the
-policy reconnected before the next trial, never within one. A worker whose driver has died ends at
-once.
+policy reconnected before the next trial, never within one. In between a thread sends ("beat",
+number, state): see `harness.watchdog`. A worker whose driver has died ends at once, even if it is
+stopped or stuck in native code (on Linux, where the kernel sees to it).
 """
 
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import faulthandler
 import multiprocessing
 import os
@@ -25,11 +27,13 @@ from typing import Any
 
 from robospa.harness.factory import load, open_policy
 from robospa.harness.policies import over_budget
-from robospa.harness.store import RecordWriter, write_actions
+from robospa.harness.store import RecordWriter, StorageError, storing, write_actions
+from robospa.harness.watchdog import Attended, Pulse
 from robospa.protocol.policy import PolicySpec
 from robospa.results.records import TrialKey, TrialRecord
 
 LOGS = "logs"
+PR_SET_PDEATHSIG = 1
 VIDEO = ("none", "failures", "first", "all")
 
 
@@ -69,9 +73,12 @@ class WorkerConfig:
 class Worker:
     """Runs trials; builds its world and policy when first needed and again after a loss."""
 
-    def __init__(self, config: WorkerConfig, writer: RecordWriter) -> None:
+    def __init__(
+        self, config: WorkerConfig, writer: RecordWriter, pulse: Pulse | None = None
+    ) -> None:
         self.config = config
         self.writer = writer
+        self.pulse = pulse or Pulse()
         self.parts: Callable[[TrialKey], Any] = load(config.parts)
         self._world: Any = None
         self._policy: Any = None
@@ -84,7 +91,7 @@ class Worker:
         from robospa.harness.video import TrialRecorder
 
         self._prepare(self.config.target(key.task))
-        recorder = TrialRecorder(video=self.config.filmed(key))
+        recorder = TrialRecorder(video=self.config.filmed(key), on_step=self.pulse.on)
         seed = policy_seed(key, self.config.run_seed)
         record = run_trial(
             self._world,
@@ -124,7 +131,9 @@ class Worker:
             options = dict(self.config.options)
             if target in self.config.expects:
                 options["expect"] = self.config.expects[target]
-            self._policy, self._target = open_policy(target, options), target
+            with self.pulse.policy(target):
+                opened = open_policy(target, options)
+            self._policy, self._target = Attended(opened, target, self.pulse), target
         elif self._stale:
             reconnect = getattr(self._policy, "reconnect", None)
             if reconnect is not None:
@@ -156,6 +165,9 @@ class Worker:
 
 def _die_with_driver() -> None:
     """End this process as soon as its parent is gone, however it went."""
+    if sys.platform == "linux":
+        # The thread below never runs if this process is stopped, or stuck holding the interpreter.
+        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, int(signal.SIGKILL), 0, 0, 0)
     parent = multiprocessing.parent_process()
     if parent is not None:
 
@@ -168,8 +180,9 @@ def _die_with_driver() -> None:
 
 def _log_to(path: Path) -> None:
     """Send whatever libraries print, and the stack of a crash, to a file instead of the screen."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
+    with storing(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
     os.dup2(file, sys.stdout.fileno())
     os.dup2(file, sys.stderr.fileno())
     faulthandler.enable()
@@ -192,20 +205,21 @@ def _attempt(worker: Worker, key: TrialKey, attempt: int) -> tuple[Any, ...]:
         return ("done", worker.run(key, attempt))
     except SceneUnstable as error:
         return ("lost", key, describe(error), False)
-    except (HandshakeError, UnknownName) as error:
+    except (HandshakeError, UnknownName, StorageError) as error:
         return ("fatal", describe(error))
     except Exception as error:  # the driver decides: retry, then report as missing
-        traceback.print_exc()
+        with contextlib.suppress(OSError):  # the log's disk may be full
+            traceback.print_exc()
         worker.recover()
         return ("lost", key, describe(error), not isinstance(error, ServerError) or error.retriable)
 
 
-def _serve(pipe: Connection, worker: Worker) -> None:
+def _serve(pipe: Connection, send: Callable[[Any], None], worker: Worker) -> None:
     while True:
         message = pipe.recv()
         if message[0] == "stop":
             return
-        pipe.send(_attempt(worker, *message[1:]))
+        send(_attempt(worker, *message[1:]))
 
 
 def main(pipe: Connection, config: WorkerConfig, name: str) -> None:
@@ -213,12 +227,24 @@ def main(pipe: Connection, config: WorkerConfig, name: str) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     _die_with_driver()
-    _log_to(config.folder / LOGS / f"{name}.log")
-    writer = RecordWriter(config.folder)
-    worker = Worker(config, writer)
-    pipe.send(("ready", writer.path))
+    speaking = threading.Lock()
+
+    def send(message: Any) -> None:
+        with speaking:
+            pipe.send(message)
+
     try:
-        _serve(pipe, worker)
+        _log_to(config.folder / LOGS / f"{name}.log")
+        writer = RecordWriter(config.folder)
+    except StorageError as error:
+        send(("fatal", describe(error)))
+        return
+    pulse = Pulse(send)
+    worker = Worker(config, writer, pulse)
+    pulse.start()
+    try:
+        send(("ready", writer.path))
+        _serve(pipe, send, worker)
     except (EOFError, BrokenPipeError):
         return
     finally:

@@ -124,7 +124,7 @@ DRIVER = """
 import sys
 from pathlib import Path
 from robospa.harness.runner import Runner, RunOptions
-from robospa.harness.store import locked
+from robospa.harness.locking import locked
 from robospa.harness.worker import WorkerConfig
 from robospa.results.reading import finished, read_records
 from robospa.results.records import TrialKey
