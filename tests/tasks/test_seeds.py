@@ -33,7 +33,7 @@ PENDING: dict[str, tuple[int, ...]] = {
     "Click_Bell_Open_Microwave_Place_Object": (2, 3, 4, 5),
     "Observe_Blocks_Move_Memory": (2, 3, 4, 5),
     "Observe_Objects_Click_Memory": (2, 3, 4, 5),
-    "Remember_Orientation_Restore": (1, 2, 3, 4, 5),
+    "Remember_Orientation_Restore": (2, 3, 4, 5),
     "Press_Stapler_Memory": (1, 2, 3, 4, 5),
     "Basic_Position_Mixed_Objects_B": (5,),
     "Basic_Ordinal_Blocks": (1, 2, 3, 4, 5),
