@@ -13,6 +13,10 @@ def evaluate(
         str | None,
         typer.Argument(help="a server's URL, such as ws://host:port, or a local policy's name"),
     ] = None,
+    more: Annotated[
+        list[str] | None,
+        typer.Option("--policy", help="another server of the same policy; may be repeated"),
+    ] = None,
     tasks: Annotated[
         str,
         typer.Option(
@@ -21,7 +25,9 @@ def evaluate(
     ] = "all",
     levels: Annotated[str, typer.Option(help="such as 1,3-5")] = "1-5",
     trials: Annotated[int, typer.Option(help="trials per variant")] = 100,
-    workers: Annotated[int, typer.Option(help="worker processes; 0 for one per core")] = 0,
+    workers: Annotated[
+        int, typer.Option(help="worker processes; 0 for as many as keep the cores busy")
+    ] = 0,
     out: Annotated[Path | None, typer.Option(help="folder of the run")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="go on with the run in --out")] = False,
     video: Annotated[
@@ -44,6 +50,10 @@ def evaluate(
     trial_timeout: Annotated[
         float, typer.Option(help="seconds for one trial before its worker is killed")
     ] = 1800.0,
+    stuck_timeout: Annotated[
+        float,
+        typer.Option(help="seconds without getting on, though not waiting for the policy"),
+    ] = 300.0,
     attempts: Annotated[int, typer.Option(help="times a trial is tried if it cannot be run")] = 3,
     backoff: Annotated[float, typer.Option(help="seconds before the first retry")] = 2.0,
     token: Annotated[
@@ -55,7 +65,7 @@ def evaluate(
     ] = None,
     policy_map: Annotated[
         Path | None,
-        typer.Option(help="JSON file with a URL for every base task, instead of one for all"),
+        typer.Option(help="JSON file with a URL for every base task, or a list of them"),
     ] = None,
     step_scale: Annotated[
         float,
@@ -73,7 +83,8 @@ def evaluate(
     from robospa.harness.cli import running, selection
 
     arguments = {k: v for k, v in locals().items() if k not in ("token", "running", "selection")}
-    if (policy is None) == (policy_map is None):
+    servers = running.all_servers(policy, more)
+    if bool(servers) == (policy_map is not None):
         raise selection.BadChoice("give either the policy or --policy-map")
     keys = selection.list_trials(
         selection.parse_tasks(tasks),
@@ -85,9 +96,9 @@ def evaluate(
         split=split,
     )
     request = running.make_request(
-        policy or str(policy_map),
+        servers or str(policy_map),
         keys,
-        running.run_folder(out, policy or (policy_map or Path()).stem, resume),
+        running.run_folder(out, servers[0] if servers else (policy_map or Path()).stem, resume),
         connection={
             "timeout": timeout,
             "first_timeout": first_timeout,
@@ -102,6 +113,7 @@ def evaluate(
         attempts=attempts,
         backoff=backoff,
         trial_seconds=trial_timeout,
+        stuck_seconds=stuck_timeout,
         video=video,
         control=control,
         run_seed=run_seed,

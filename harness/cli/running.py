@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 import time
 from collections.abc import Mapping, Sequence
@@ -15,7 +14,8 @@ from robospa.harness.cli.selection import BadChoice
 from robospa.harness.evaluate import Request, RunAborted, evaluate
 from robospa.harness.factory import is_url
 from robospa.harness.runner import RunOptions
-from robospa.harness.worker import VIDEO, WorkerConfig
+from robospa.harness.staffing import cores, most_workers
+from robospa.harness.worker import VIDEO, Targets, WorkerConfig
 from robospa.results.records import TrialKey
 
 CONTROLS = ("rest_to_rest", "fixed_rate")
@@ -32,20 +32,25 @@ def run_folder(out: Path | None, policy: str, resume: bool) -> Path:
     return Path("runs") / f"{safe}-{time.strftime('%Y%m%d-%H%M%S')}"
 
 
-def cores() -> int:
-    """Processor cores that this process may use."""
-    return len(os.sched_getaffinity(0))
+def all_servers(first: str | None, more: Sequence[str] | None) -> tuple[str, ...]:
+    """The policy's servers, each once named; raises BadChoice."""
+    servers = ([first] if first is not None else []) + list(more or ())
+    if twice := next((s for s in servers if servers.count(s) > 1), None):
+        raise BadChoice(f"{twice} is named twice; several workers share a server without that")
+    if len(servers) > 1 and (name := next((s for s in servers if not is_url(s)), None)):
+        raise BadChoice(f"{name!r} is no URL of a server: it cannot be one of several")
+    return tuple(servers)
 
 
 def make_request(
-    policy: str,
+    policy: Targets,
     keys: Sequence[TrialKey],
     folder: Path,
     *,
     connection: Mapping[str, float],
     token: str | None = None,
     client: Path | None = None,
-    policies: Mapping[str, str] | None = None,
+    policies: Mapping[str, Targets] | None = None,
     step_scale: float = 1.0,
     workers: int = 0,
     attempts: int = 3,
@@ -74,7 +79,9 @@ def make_request(
     if video != "none":
         import av  # noqa: F401  (fails now rather than after the first trial)
     connecting: dict[str, Any] = {}
-    urls = [t for t in dict.fromkeys((policies or {"": policy}).values()) if is_url(t)]
+    given = (policies or {"": policy}).values()
+    targets = [t for g in given for t in ((g,) if isinstance(g, str) else g)]
+    urls = [t for t in dict.fromkeys(targets) if is_url(t)]
     if urls:
         from robospa.protocol.channel import Timeouts
 
@@ -101,14 +108,21 @@ def make_request(
         config = _replace(config, world=world, world_arguments={})
     if parts is not None:
         config = _replace(config, parts=parts)
-    options = RunOptions(workers or cores(), attempts, backoff, trial_seconds)
+    options = RunOptions(
+        workers or cores(),
+        attempts,
+        backoff,
+        trial_seconds,
+        most=workers or most_workers(),
+        patience=connection["patience"],
+    )
     return Request(
         config, keys, options, _settings(keys), dict(arguments or {}), resume, connection["wait"]
     )
 
 
-def policy_map(file: Path, keys: Sequence[TrialKey]) -> dict[str, str]:
-    """The policy of every task of `keys`; raises RunError."""
+def policy_map(file: Path, keys: Sequence[TrialKey]) -> dict[str, Targets]:
+    """The policy, or the policies, of every task of `keys`; raises RunError."""
     from robospa.harness.policies import read_map
     from robospa.tasks.catalog import tasks
 
