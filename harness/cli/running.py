@@ -15,6 +15,7 @@ from robospa.harness.evaluate import Request, RunAborted, evaluate
 from robospa.harness.factory import is_url
 from robospa.harness.runner import RunOptions
 from robospa.harness.staffing import cores, most_workers
+from robospa.harness.watchdog import BEAT_SECONDS
 from robospa.harness.worker import VIDEO, Targets, WorkerConfig
 from robospa.results.records import TrialKey
 
@@ -56,6 +57,7 @@ def make_request(
     attempts: int = 3,
     backoff: float = 2.0,
     trial_seconds: float = 1800.0,
+    stuck_seconds: float = 300.0,
     video: str = "none",
     control: str = "rest_to_rest",
     run_seed: int = 0,
@@ -76,6 +78,8 @@ def make_request(
         raise BadChoice(f"--control {control!r} is none of {', '.join(CONTROLS)}")
     if workers < 0 or attempts < 1 or trial_seconds <= 0 or backoff < 0:
         raise BadChoice("--workers, --attempts, --backoff and --trial-timeout cannot be that small")
+    if stuck_seconds < 3 * BEAT_SECONDS:
+        raise BadChoice(f"--stuck-timeout cannot be less than {3 * BEAT_SECONDS:g} s")
     if video != "none":
         import av  # noqa: F401  (fails now rather than after the first trial)
     connecting: dict[str, Any] = {}
@@ -113,6 +117,7 @@ def make_request(
         attempts,
         backoff,
         trial_seconds,
+        stuck_seconds=stuck_seconds,
         most=workers or most_workers(),
         patience=connection["patience"],
     )
