@@ -34,7 +34,7 @@ PENDING: dict[str, tuple[int, ...]] = {
     "Observe_Blocks_Move_Memory": (2, 3, 4, 5),
     "Observe_Objects_Click_Memory": (2, 3, 4, 5),
     "Remember_Orientation_Restore": (2, 3, 4, 5),
-    "Press_Stapler_Memory": (1, 2, 3, 4, 5),
+    "Press_Stapler_Memory": (2, 3, 4, 5),
     "Basic_Position_Mixed_Objects_B": (5,),
     "Basic_Ordinal_Blocks": (1, 2, 3, 4, 5),
     "Basic_Ordinal_Cups": (1, 2, 3, 4, 5),
