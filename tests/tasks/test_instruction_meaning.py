@@ -11,11 +11,11 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pytest
+from scene_checks import targets_of
 
 from robospa.tasks import catalog
 from robospa.tasks.instructions import sentences, templates
@@ -306,77 +306,6 @@ def test_click_templates_name_the_steps_in_order(level: int) -> None:
 # From the words to the object
 
 
-def target_of(scene: Scene) -> str:
-    """The object that the facts of a spatial scene single out, from where the objects lie."""
-    facts, name = scene.facts, kind(scene.task.lower())
-    at = {o.name: np.array(o.pose.position) for o in scene.objects}
-    names = list(at)
-    if name == "pick_blocks_size":
-        size = {o.name: o.params["half"][0] for o in scene.objects}
-        return sorted(names, key=lambda n: -float(size[n]))[int(facts["size_rank"]) - 1]
-    if name == "pick_mixed_objects_distance_b":
-        origin = at[facts["reference"]]
-        far = {n: float(np.hypot(*(at[n] - origin)[:2])) for n in names if n != facts["reference"]}
-        return sorted(far, key=lambda n: -far[n])[int(facts["distance_rank"]) - 1]
-    if name == "pick_mixed_objects_multi_view_a":
-        right, front = {
-            "robot": ((1, 0), (0, 1)),
-            "opposite": ((-1, 0), (0, -1)),
-            "left": ((0, -1), (1, 0)),
-            "right": ((0, 1), (-1, 0)),
-        }[facts["viewpoint"]]
-        axis, sign = {
-            "leftmost": (right, -1),
-            "rightmost": (right, 1),
-            "frontmost": (front, 1),
-            "backmost": (front, -1),
-        }[facts["position"]]
-        return max(names, key=lambda n: sign * float(at[n][:2] @ np.array(axis)))
-    if name == "pick_mixed_objects_canonical_a":
-        rows = grouped({n: at[n][1] for n in names}, 0.041)
-        row = rows[0]
-        if scene.level > 1:
-            ordered = rows if facts["row_direction"] == "near_to_far" else rows[::-1]
-            row = ordered[int(facts["row"]) - 1]
-        line = sorted(row, key=lambda n: at[n][0])
-        ordered_line = line if facts["column_direction"] == "left_to_right" else line[::-1]
-        return ordered_line[int(facts["column"]) - 1]
-    return neighbour(scene, at)
-
-
-def grouped(values: Mapping[str, float], gap: float = 0.05) -> list[list[str]]:
-    """Names in groups of like value, smallest first; a step wider than `gap` starts a new group."""
-    names = sorted(values, key=lambda n: values[n])
-    groups = [[names[0]]]
-    for before, name in pairwise(names):
-        if values[name] - values[before] > gap:
-            groups.append([])
-        groups[-1].append(name)
-    return groups
-
-
-def neighbour(scene: Scene, at: Mapping[str, Any]) -> str:
-    """The bar next to the labelled one in the asked direction, found on the grid of bars."""
-    columns = grouped({n: p[0] for n, p in at.items()}, 0.03)
-    rows = grouped({n: p[1] for n, p in at.items()}, 0.03)
-    cell = {n: (c, r) for c, column in enumerate(columns) for n in column
-            for r, row in enumerate(rows) if n in row}  # fmt: skip
-    label = scene.facts["reference_label"].replace("center", "middle_middle")
-    parts = label.split("_")
-    depth = {"back": 0, "middle": 1, "front": len(rows) - 1}
-    side = {"left": 0, "middle": 1, "right": len(columns) - 1}
-    if len(parts) == 2:
-        origin = (side[parts[1]], depth[parts[0]])
-    else:
-        origin = (side[label], 0) if label in side else (0, depth[label])
-    assert cell[scene.facts["reference"]] == origin
-    step = {"left": (-1, 0), "right": (1, 0), "front": (0, 1), "back": (0, -1)}
-    moves = [step[part] for part in scene.facts["relation"].split("_")]
-    goal = tuple(o + sum(m[i] for m in moves) for i, o in enumerate(origin))
-    (found,) = [n for n, place in cell.items() if place == goal]
-    return found
-
-
 PLACED = [
     *("pick_blocks_size", "pick_mixed_objects_distance_b"),
     *(name.lower() for name in catalog.tasks() if catalog.task(name).category in KIND),
@@ -388,7 +317,7 @@ PLACED = [
 def test_facts_single_out_the_target(name: str, level: int) -> None:
     for seed in range(50 if name in READERS and name not in SLOW else 5):
         scene = catalog.build_scene(name, level, 100000 + seed)
-        assert target_of(scene) == scene.facts["target"], seed
+        assert targets_of(scene) == [scene.facts["target"]], seed
 
 
 def alternatives(scene: Scene) -> list[Scene]:

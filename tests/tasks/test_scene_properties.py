@@ -7,19 +7,18 @@ from __future__ import annotations
 
 import ast
 import itertools
-import math
 import os
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
-import numpy as np
 import pytest
+from scene_checks import misplaced, named, overlaps, sunk, unreachable, unseen
 
 from robospa.tasks import catalog
-from robospa.tasks.geometry import to_matrix
-from robospa.tasks.layouts import HEIGHT, WIDTH, head_pixel
-from robospa.tasks.objects import object_model
-from robospa.tasks.scene import TABLE_TOP, Scene, SceneObject
+from robospa.tasks.geometry import Pose
+from robospa.tasks.scene import Scene
 
 SCENES = int(os.environ.get("ROBOSPA_SCENES", "5"))
 FIRST_SEED = 510_000
@@ -27,9 +26,6 @@ FEW = 25
 """Scenes that are kept; of more than these only one is in memory at a time."""
 VARIANTS = [(name, level) for name in catalog.tasks() for level in catalog.LEVELS]
 ROOT = Path(__file__).resolve().parents[2]
-TOUCH = 5e-4
-"""Boxes may share this much [m]: what stands beside another thing is no overlap."""
-
 each_variant = pytest.mark.parametrize(("name", "level"), VARIANTS)
 
 
@@ -41,48 +37,6 @@ def _kept(name: str, level: int) -> tuple[Scene, ...]:
 def scenes(name: str, level: int) -> itertools.chain[Scene]:
     more = (catalog.build_scene(name, level, FIRST_SEED + k) for k in range(FEW, SCENES))
     return itertools.chain(_kept(name, level), more)
-
-
-def movable(scene: Scene) -> list[SceneObject]:
-    """What lies there from the start and can be moved."""
-    return [o for o in scene.objects if not o.fixed and o.appears_at is None]
-
-
-def corners(item: SceneObject) -> np.ndarray:
-    """(8, 3) corners [m] of the object's box in the world."""
-    model = object_model(item.asset, item.params)
-    x, y, z = model.size
-    signs = np.array(list(itertools.product((-0.5, 0.5), (-0.5, 0.5), (0.0, 1.0))))
-    local = signs * np.array([x, y, z]) + np.array([0.0, 0.0, model.bottom])
-    turned: np.ndarray = local @ to_matrix(item.pose.rotation).T + np.array(item.pose.position)
-    return turned
-
-
-def overlap(a: SceneObject, b: SceneObject) -> float:
-    """How deep [m] two objects are inside each other, 0 if apart.
-
-    As boxes, by the separating axes of both, and as upright cylinders: round things are no boxes.
-    """
-    one, other = corners(a), corners(b)
-    radii = sum(object_model(item.asset, item.params).radius for item in (a, b))
-    least = radii - math.dist(a.pose.position[:2], b.pose.position[:2])
-    for item in (a, b):
-        for axis in to_matrix(item.pose.rotation).T:
-            p, q = one @ axis, other @ axis
-            least = min(least, p.max() - q.min(), q.max() - p.min())
-    return max(0.0, least)
-
-
-def rests_in(a: SceneObject, b: SceneObject) -> bool:
-    """Whether one of the two starts inside or on the other, as things in a bin do."""
-    upper, lower = sorted((a, b), key=lambda item: -corners(item)[:, 2].min())
-    (left, near), (right, far) = (
-        corners(lower)[:, :2].min(axis=0),
-        corners(lower)[:, :2].max(axis=0),
-    )
-    x, y, _ = upper.pose.position
-    higher = corners(upper)[:, 2].min() > corners(lower)[:, 2].min() + 1e-3
-    return bool(higher and left < x < right and near < y < far)
 
 
 COUNTED = {"while len(drawn) < count - 1"}
@@ -101,31 +55,60 @@ def test_no_draw_is_repeated_without_a_bound(path: Path) -> None:
 
 @each_variant
 def test_movable_objects_do_not_overlap(name: str, level: int) -> None:
-    for scene in scenes(name, level):
-        for a, b in itertools.combinations(movable(scene), 2):
-            if rests_in(a, b):
-                continue
-            assert overlap(a, b) <= TOUCH, (scene.seed, a.name, a.asset, b.name, b.asset)
+    assert_nothing(overlaps, name, level)
 
 
 @each_variant
 def test_movable_objects_are_seen_by_the_head_camera(name: str, level: int) -> None:
-    for scene in scenes(name, level):
-        for item in movable(scene):
-            x, y, z = corners(item).mean(axis=0)
-            u, v = head_pixel(x, y, z)
-            assert 0 <= u < WIDTH and 0 <= v < HEIGHT, (scene.seed, item.name, item.asset)
+    assert_nothing(unseen, name, level)
 
 
 @each_variant
 def test_nothing_starts_below_the_table(name: str, level: int) -> None:
-    for scene in scenes(name, level):
-        for item in movable(scene):
-            lowest = corners(item)[:, 2].min()
-            assert lowest > TABLE_TOP - 1e-3, (scene.seed, item.name, item.asset)
+    assert_nothing(sunk, name, level)
 
 
 @each_variant
 def test_names_tell_nothing(name: str, level: int) -> None:
+    assert_nothing(named, name, level)
+
+
+@each_variant
+def test_everything_picked_is_in_reach(name: str, level: int) -> None:
+    for scene in itertools.islice(scenes(name, level), 1 if SCENES < FEW else None):
+        assert list(unreachable(scene)) == [], scene.seed
+
+
+@each_variant
+def test_the_facts_single_out_the_target(name: str, level: int) -> None:
+    assert_nothing(misplaced, name, level)
+
+
+def assert_nothing(rule: Callable[[Scene], Iterator[str]], name: str, level: int) -> None:
     for scene in scenes(name, level):
-        assert [o.name for o in scene.objects] == [f"object_{i}" for i in range(len(scene.objects))]
+        assert list(rule(scene)) == [], scene.seed
+
+
+def test_blocks_in_each_other_are_found() -> None:
+    scene = catalog.build_scene("Pick_Blocks_Size", 3, FIRST_SEED)
+    first, second, *others = scene.objects
+    x, y, z = first.pose.position
+    moved = replace(second, pose=Pose((x + 0.01, y, z), first.pose.rotation))
+    wrong = replace(scene, objects=(first, moved, *others))
+    assert len(list(overlaps(wrong))) == 1
+    assert list(overlaps(scene)) == []
+
+
+def test_a_block_far_away_is_out_of_view_and_of_reach() -> None:
+    scene = catalog.build_scene("Pick_Blocks_Size", 3, FIRST_SEED)
+    target = scene.object(str(scene.facts["target"]))
+    away = replace(target, pose=Pose((0.0, 0.9, target.pose.position[2]), target.pose.rotation))
+    wrong = replace(scene, objects=tuple(away if o is target else o for o in scene.objects))
+    assert len(list(unseen(wrong))) == len(list(unreachable(wrong))) == 1
+
+
+def test_another_rank_is_another_answer() -> None:
+    scene = catalog.build_scene("Pick_Blocks_Size", 3, FIRST_SEED)
+    rank = int(scene.facts["size_rank"])
+    wrong = replace(scene, facts={**scene.facts, "size_rank": rank + 1 if rank < 4 else 1})
+    assert len(list(misplaced(wrong))) == 1

@@ -1,0 +1,131 @@
+"""Look at thousands of scenes of every variant, without a simulator.
+
+    python scripts/check_scenes.py --scenes 10000 --out build/scenes.json [--tasks A,B] [--levels 1]
+
+Every scene is built once and all rules of `tests/tasks/scene_checks.py` are asked: no overlap, all
+in view, all in reach, one answer, neutral names. What was drawn for the question (ranks, rows,
+directions, colours, which object) is counted: `off` is how far the rarest or commonest value is
+from an even share. A variant that is in the file with as many scenes is not looked at again, so the
+command can be stopped and repeated. Ends with 1 if a rule is broken anywhere.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from collections import Counter
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+from rich.progress import track
+
+from robospa.tasks import catalog
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "tasks"))
+
+FIRST_SEED = 10_000_000
+"""Seeds that nothing was ever tuned on."""
+SHOWN = 5
+"""Broken scenes that are named, for each variant."""
+
+
+def look(name: str, level: int, scenes: int) -> dict[str, Any]:
+    """What was found in `scenes` scenes of one variant."""
+    from scene_checks import RULES, drawn
+
+    begun = time.process_time()
+    broken: Counter[str] = Counter()
+    examples: list[str] = []
+    values: dict[str, Counter[str]] = {}
+    refused = 0
+    for seed in range(FIRST_SEED, FIRST_SEED + scenes):
+        try:
+            scene = catalog.build_scene(name, level, seed)
+        except RuntimeError:  # LayoutError is one: the seed is not valid
+            refused += 1
+            continue
+        for key, value in drawn(scene).items():
+            values.setdefault(key, Counter())[str(value)] += 1
+        for rule, check in RULES.items():
+            for text in check(scene):
+                broken[rule] += 1
+                if len(examples) < SHOWN:
+                    examples.append(f"seed {seed}: {text}")
+    return {
+        "task": name,
+        "level": level,
+        "scenes": scenes,
+        "refused": refused,
+        "broken": dict(broken),
+        "examples": examples,
+        "drawn": {key: dict(sorted(counts.items())) for key, counts in values.items()},
+        "seconds": round(time.process_time() - begun, 1),
+    }
+
+
+def off(counts: dict[str, int]) -> float:
+    """How far the rarest or commonest value is from an even share, as a share of that."""
+    even = sum(counts.values()) / len(counts)
+    return max(abs(count - even) for count in counts.values()) / even
+
+
+def chosen(tasks: str, levels: str) -> list[tuple[str, int]]:
+    """The variants that the options name."""
+    names = [catalog.task(name).name for name in tasks.split(",") if name] or list(catalog.tasks())
+    return [(name, int(level)) for level in levels.split(",") for name in names]
+
+
+def main() -> int:
+    """Look at what is not in the file yet and sum up."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--scenes", type=int, default=10_000)
+    parser.add_argument("--tasks", default="")
+    parser.add_argument("--levels", default="1,2,3,4,5")
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--out", type=Path, default=Path("build/scenes.json"))
+    arguments = parser.parse_args()
+    known = json.loads(arguments.out.read_text()) if arguments.out.exists() else []
+    rows = {(r["task"], r["level"]): r for r in known if r["scenes"] >= arguments.scenes}
+    wanted = chosen(arguments.tasks, arguments.levels)
+    arguments.out.parent.mkdir(parents=True, exist_ok=True)
+    with ProcessPoolExecutor(arguments.workers, mp_context=get_context("spawn")) as pool:
+        jobs = [pool.submit(look, *v, arguments.scenes) for v in wanted if v not in rows]
+        for job in track(as_completed(jobs), total=len(jobs), description="variants"):
+            row = job.result()
+            rows[row["task"], row["level"]] = row
+            later = arguments.out.with_suffix(".tmp")
+            later.write_text("[\n" + ",\n".join(json.dumps(r) for r in rows.values()) + "\n]\n")
+            later.replace(arguments.out)
+    return summary([rows[v] for v in wanted])
+
+
+def summary(rows: list[dict[str, Any]]) -> int:
+    """Print what stands out; 1 if a rule is broken."""
+    total = sum(r["scenes"] for r in rows)
+    broken = [r for r in rows if r["broken"]]
+    for row in broken:
+        print(row["task"], row["level"], row["broken"], *row["examples"], sep="\n    ")
+    uneven = [
+        (off(counts), r["task"], r["level"], key, counts)
+        for r in rows
+        for key, counts in r["drawn"].items()
+    ]
+    print("\nfarthest from even shares:")
+    for share, *where, counts in sorted(uneven, key=lambda u: -u[0])[:20]:
+        print(f"{100 * share:6.1f} %", *where, counts if len(counts) < 9 else "")
+    refused = sum(r["refused"] for r in rows)
+    seconds = sum(r["seconds"] for r in rows)
+    print(
+        f"\n{total} scenes of {len(rows)} variants, {refused} seeds refused, "
+        f"{sum(sum(r['broken'].values()) for r in rows)} rules broken in {len(broken)} variants, "
+        f"{1000 * seconds / total:.2f} ms of CPU a scene"
+    )
+    return 1 if broken else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,275 @@
+"""What must hold of every scene, each rule as a function that returns what is wrong with it.
+
+The tests look at a few scenes of every variant, `scripts/check_scenes.py` at thousands. No
+simulator; nothing here asks the code that draws the scenes.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from robospa.harness.robots import embodiment
+from robospa.harness.robots.kinematics import chain_of, end_effector, inverse
+from robospa.harness.skills.grasping import LEANS, LEVEL, candidate_poses, grasps_now
+from robospa.harness.skills.workspace import Workspace
+from robospa.tasks import catalog
+from robospa.tasks.geometry import to_matrix
+from robospa.tasks.layouts import HEIGHT, WIDTH, head_pixel
+from robospa.tasks.objects import object_model
+from robospa.tasks.plan import Pick
+from robospa.tasks.scene import TABLE_TOP, Scene, SceneObject
+from robospa.tasks.snapshot import ARMS, Snapshot
+from robospa.tasks.variants import object_sets
+
+TOUCH = 5e-4
+"""Boxes may share this much [m]: what stands beside another thing is no overlap."""
+ROBOT = embodiment("aloha-agilex")
+FIRST_TRIES = 6
+"""Grasps tried before all the others: most objects are taken with one of the first."""
+
+SIGNS = np.array(list(itertools.product((-0.5, 0.5), (-0.5, 0.5), (0.0, 1.0))))
+
+
+def movable(scene: Scene) -> list[SceneObject]:
+    """What lies there from the start and can be moved."""
+    return [o for o in scene.objects if not o.fixed and o.appears_at is None]
+
+
+def corners(item: SceneObject) -> np.ndarray:
+    """(8, 3) corners [m] of the object's box in the world."""
+    model = object_model(item.asset, item.params)
+    local = SIGNS * np.array(model.size) + np.array([0.0, 0.0, model.bottom])
+    turned: np.ndarray = local @ to_matrix(item.pose.rotation).T + np.array(item.pose.position)
+    return turned
+
+
+def overlap(a: SceneObject, b: SceneObject) -> float:
+    """How deep [m] two objects are inside each other, 0 if apart.
+
+    As boxes, by the separating axes of both, and as upright cylinders: round things are no boxes.
+    """
+    radii = sum(object_model(item.asset, item.params).radius for item in (a, b))
+    least = radii - math.dist(a.pose.position[:2], b.pose.position[:2])
+    if least <= 0:
+        return 0.0
+    one, other = corners(a), corners(b)
+    for item in (a, b):
+        for axis in to_matrix(item.pose.rotation).T:
+            p, q = one @ axis, other @ axis
+            least = min(least, p.max() - q.min(), q.max() - p.min())
+    return max(0.0, float(least))
+
+
+def rests_in(a: SceneObject, b: SceneObject) -> bool:
+    """Whether one of the two starts inside or on the other, as things in a bin do."""
+    upper, lower = sorted((a, b), key=lambda item: -corners(item)[:, 2].min())
+    (left, near), (right, far) = (
+        corners(lower)[:, :2].min(axis=0),
+        corners(lower)[:, :2].max(axis=0),
+    )
+    x, y, _ = upper.pose.position
+    higher = corners(upper)[:, 2].min() > corners(lower)[:, 2].min() + 1e-3
+    return bool(higher and left < x < right and near < y < far)
+
+
+def overlaps(scene: Scene) -> Iterator[str]:
+    """Movable objects that are inside each other."""
+    for a, b in itertools.combinations(movable(scene), 2):
+        if overlap(a, b) > TOUCH and not rests_in(a, b):
+            yield f"{a.name} ({a.asset}) is in {b.name} ({b.asset})"
+
+
+def unseen(scene: Scene) -> Iterator[str]:
+    """Movable objects whose middle the head camera does not see."""
+    for item in movable(scene):
+        x, y, z = corners(item).mean(axis=0)
+        u, v = head_pixel(x, y, z)
+        if not (0 <= u < WIDTH and 0 <= v < HEIGHT):
+            yield f"{item.name} ({item.asset}) is out of view"
+
+
+def sunk(scene: Scene) -> Iterator[str]:
+    """Movable objects that start below the table's top."""
+    for item in movable(scene):
+        if corners(item)[:, 2].min() <= TABLE_TOP - 1e-3:
+            yield f"{item.name} ({item.asset}) is below the table's top"
+
+
+def named(scene: Scene) -> Iterator[str]:
+    """Names that are not numbers in the order of creation."""
+    names = [o.name for o in scene.objects]
+    if names != [f"object_{i}" for i in range(len(names))]:
+        yield f"objects are called {names}"
+
+
+def unreachable(scene: Scene) -> Iterator[str]:
+    """Objects whose first pick no grasp of the plan's arm reaches where they lie at the start."""
+    ws, seen = _at_start(scene), set()
+    for call in catalog.task(scene.task).plan(scene):
+        if isinstance(call, Pick) and call.object not in seen:
+            seen.add(call.object)
+            arms = (0, 1) if call.arm is None else (ARMS.index(call.arm),)
+            if call.object in ws.snapshot.poses and not _reached(ws, call.object, arms):
+                yield f"{call.object} ({scene.object(call.object).asset}) is out of reach"
+
+
+def _at_start(scene: Scene) -> Workspace:
+    """The scene as drawn, both arms at home with open grippers."""
+    left, right = (end_effector(chain_of(arm), arm.home) for arm in ROBOT.arms)
+    joints = (ROBOT.arms[0].home, ROBOT.arms[1].home)
+    poses = {o.name: o.pose for o in scene.objects if o.appears_at is None}
+    return Workspace(scene, ROBOT, Snapshot(0.0, poses, (1.0, 1.0), (left, right), joints))
+
+
+def _reached(ws: Workspace, name: str, arms: tuple[int, ...]) -> bool:
+    """Whether inverse kinematics finds joints of one of `arms` for a grasp of the object."""
+    body = ws.pose(name)
+    grasps = grasps_now(ws.models[name], body)
+    for leans in (LEVEL, LEANS):
+        for arm in sorted(arms, key=lambda k: (body.position[0] > 0) != (k == 1)):
+            reach = ws.robot.arms[arm].reach
+            poses = [c[0] for grasp in grasps for c in candidate_poses(grasp, reach, leans)]
+            for part in (poses[:FIRST_TRIES], poses[FIRST_TRIES:]):
+                if part and inverse(ws.chains[arm], part)[1].any():
+                    return True
+    return False
+
+
+def misplaced(scene: Scene) -> Iterator[str]:
+    """Whether the facts of a single-target scene single out another object, or none, or two."""
+    if "target" in scene.facts and (found := targets_of(scene)) != [scene.facts["target"]]:
+        yield f"the facts single out {found}, not {scene.facts['target']}"
+
+
+Answer = Callable[[Scene], list[str]]
+
+
+def targets_of(scene: Scene) -> list[str]:
+    """The objects that the facts of a single-target scene fit, from where and what objects are."""
+    facts = scene.facts
+    if "color" in facts:
+        return [o.name for o in scene.objects if color_of(o) == facts["color"]]
+    if "column" in facts:
+        return [_counted(scene)]
+    if "relation" in facts:
+        return _beside(scene)
+    if "extreme" in facts:
+        return [_extreme(scene)]
+    (key,) = (key for key in facts if key.endswith("_rank"))
+    values = _measures(scene, key)
+    ranked = sorted(values, key=lambda n: -values[n])
+    found = ranked[int(facts[key]) - 1]
+    return [n for n in ranked if abs(values[n] - values[found]) < 1e-6]
+
+
+def color_of(item: SceneObject) -> str:
+    """The word for an object's colour in the basic tasks."""
+    if item.asset == "block":
+        return object_sets.block_color(item)
+    return "brown" if item.asset == "bread" else str(item.params["tint"])
+
+
+def _measures(scene: Scene, key: str) -> dict[str, float]:
+    """What objects are ranked by, largest first."""
+    if key == "distance_rank":
+        reference = scene.object(str(scene.facts["reference"]))
+        x, y, _ = reference.pose.position
+        others = [o for o in scene.objects if o.name != reference.name]
+        return {o.name: math.dist((x, y), o.pose.position[:2]) for o in others}
+    halves = {o.name: o.params["half"] for o in scene.objects}
+    if key == "area_rank":
+        return {name: float(h[0] * h[1]) for name, h in halves.items()}
+    axis = {"size_rank": 0, "length_rank": 0, "height_rank": 2}[key]
+    return {name: float(h[axis]) for name, h in halves.items()}
+
+
+def _extreme(scene: Scene) -> str:
+    facts = scene.facts
+    right, front = {
+        "robot": ((1, 0), (0, 1)),
+        "opposite": ((-1, 0), (0, -1)),
+        "left": ((0, -1), (1, 0)),
+        "right": ((0, 1), (-1, 0)),
+    }[str(facts["viewpoint"])]
+    axis, sign = {
+        "leftmost": (right, -1),
+        "rightmost": (right, 1),
+        "frontmost": (front, 1),
+        "backmost": (front, -1),
+    }[str(facts["position"])]
+    at = {o.name: np.array(o.pose.position[:2]) for o in scene.objects}
+    return max(at, key=lambda n: sign * float(at[n] @ np.array(axis)))
+
+
+def _counted(scene: Scene) -> str:
+    """The object in the row and column that are asked for, in rows found by gaps in depth."""
+    facts = scene.facts
+    at = {o.name: o.pose.position for o in scene.objects}
+    rows = grouped({n: at[n][1] for n in at}, 0.041)
+    row = rows[0]
+    if scene.level > 1:
+        ordered = rows if facts["row_direction"] == "near_to_far" else rows[::-1]
+        row = ordered[int(facts["row"]) - 1]
+    line = sorted(row, key=lambda n: at[n][0])
+    ordered_line = line if facts["column_direction"] == "left_to_right" else line[::-1]
+    return ordered_line[int(facts["column"]) - 1]
+
+
+def grouped(values: Mapping[str, float], gap: float = 0.05) -> list[list[str]]:
+    """Names in groups of like value, smallest first; a step wider than `gap` starts a new group."""
+    names = sorted(values, key=lambda n: values[n])
+    groups = [[names[0]]]
+    for before, name in itertools.pairwise(names):
+        if values[name] - values[before] > gap:
+            groups.append([])
+        groups[-1].append(name)
+    return groups
+
+
+def _beside(scene: Scene) -> list[str]:
+    """The neighbour of the labelled object in the asked direction, on the grid of objects."""
+    at = {o.name: o.pose.position for o in scene.objects}
+    columns = grouped({n: p[0] for n, p in at.items()}, 0.03)
+    rows = grouped({n: p[1] for n, p in at.items()}, 0.03)
+    cell = {n: (c, r) for c, column in enumerate(columns) for n in column
+            for r, row in enumerate(rows) if n in row}  # fmt: skip
+    label = str(scene.facts["reference_label"]).replace("center", "middle_middle")
+    parts = label.split("_")
+    depth = {"back": 0, "middle": 1, "front": len(rows) - 1}
+    side = {"left": 0, "middle": 1, "right": len(columns) - 1}
+    if len(parts) == 2:
+        origin = (side[parts[1]], depth[parts[0]])
+    else:
+        origin = (side[label], 0) if label in side else (0, depth[label])
+    if cell[str(scene.facts["reference"])] != origin:
+        return []
+    step = {"left": (-1, 0), "right": (1, 0), "front": (0, 1), "back": (0, -1)}
+    moves = [step[part] for part in str(scene.facts["relation"]).split("_")]
+    goal = tuple(o + sum(m[i] for m in moves) for i, o in enumerate(origin))
+    return [n for n, place in cell.items() if place == goal]
+
+
+RULES: Mapping[str, Callable[[Scene], Iterator[str]]] = {
+    "overlap": overlaps,
+    "view": unseen,
+    "table": sunk,
+    "names": named,
+    "reach": unreachable,
+    "answer": misplaced,
+}
+
+
+def drawn(scene: Scene) -> dict[str, Any]:
+    """What was drawn for the question, by name of the fact: ranks, directions, counts, colours."""
+    facts = {k: v for k, v in scene.facts.items() if isinstance(v, str | int) and k != "reference"}
+    return {key: _word(scene, value) for key, value in facts.items()}
+
+
+def _word(scene: Scene, value: str | int) -> Any:
+    names = [o.name for o in scene.objects]
+    return names.index(str(value)) if value in names else value
