@@ -7,6 +7,7 @@ earlier run of the same folder.
 from __future__ import annotations
 
 import multiprocessing
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from multiprocessing.connection import Connection
@@ -16,8 +17,7 @@ from robospa.harness.factory import is_url, load
 from robospa.harness.locking import locked
 from robospa.harness.manifest import Manifest, about_machine, check_folder, open_run
 from robospa.harness.policies import Probed, probe_policies, warnings_of
-from robospa.harness.progress import Progress
-from robospa.harness.queue import expected_work
+from robospa.harness.progress import Progress, summary
 from robospa.harness.runner import RunAborted, Runner, RunOptions
 from robospa.harness.store import tidy
 from robospa.harness.worker import WorkerConfig, describe
@@ -111,18 +111,23 @@ def make_manifest(request: Request, policies: Mapping[str, Probed]) -> Manifest:
         "world": {"factory": config.world, **config.world_arguments},
     }
     about = about_machine(world)
-    about["policy"] = {"target": one.target, "hello": one.hello}
+    about["policy"] = _about_policy(one)
     if config.policies:
         settings["policies"] = {task: policy.settings() for task, policy in policies.items()}
-        about["policies"] = {
-            task: {"target": policy.target, "hello": policy.hello}
-            for task, policy in policies.items()
-        }
+        about["policies"] = {task: _about_policy(policy) for task, policy in policies.items()}
     about["arguments"] = dict(request.arguments)
     told = {task: getattr(part, "instruction", "") for task, part in found.items()}
     about["warnings"] = warnings_of(policies, told, config.step_scale)
     categories = {task: part.task.category for task, part in found.items()}
     return Manifest(settings, tuple(request.keys), about, categories)
+
+
+def _about_policy(policy: Probed) -> dict[str, Any]:
+    """Where it is and how it greeted; further servers of the same policy beside."""
+    told: dict[str, Any] = {"target": policy.target, "hello": policy.hello}
+    if policy.equals:
+        told["equals"] = [{"target": p.target, "hello": p.hello} for p in policy.equals]
+    return told
 
 
 def evaluate(request: Request) -> None:
@@ -139,18 +144,26 @@ def evaluate(request: Request) -> None:
     config = replace(
         request.config,
         samples=frozenset(first.values()),
-        expects={p.target: p.spec for p in policies.values() if is_url(p.target)},
+        expects={
+            p.target: p.spec
+            for policy in policies.values()
+            for p in (policy, *policy.equals)
+            if is_url(p.target)
+        },
     )
     with locked(folder):
         tidy(folder)
         open_run(folder, manifest, request.resume)
         known = read_records(folder)
         owed = [key for key in request.keys if not finished(known.get(key))]
-        work = expected_work(owed, load(config.parts))
-        with Progress(len(request.keys), len(request.keys) - len(owed), work=work) as progress:
+        with Progress(len(request.keys), len(request.keys) - len(owed)) as progress:
             for text in manifest.about["warnings"]:
                 progress.note(f"warning: {text}")
-            Runner(config, owed, request.options, progress.add, progress.note).run()
+            runner = Runner(config, owed, request.options, progress.add, progress.note)
+            runner.on_status = progress.show
+            runner.run()
+        for text in summary(runner.shares.overall(), runner.status(time.monotonic())):
+            progress.note(text)
 
 
 __all__ = ["Request", "RunAborted", "WorldBroken", "evaluate", "probe_world"]

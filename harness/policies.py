@@ -1,7 +1,8 @@
 """The policies of a run: one for all tasks, or one for each, looked at before anything is written.
 
 A map from base task to policy is a JSON file, {"Pick_Blocks_Size": "ws://gpu1:8000", ...}: the
-paper's protocol trains one checkpoint per base task, so one "model" is as many servers.
+paper's protocol trains one checkpoint per base task, so one "model" is as many servers. Where one
+server is not enough there may be a list of them; they have to be one as good as the other.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from robospa.results.reading import RunError
 from robospa.results.records import TrialKey
 
 if TYPE_CHECKING:
-    from robospa.harness.worker import WorkerConfig
+    from robospa.harness.worker import Targets, WorkerConfig
 
 NAMED = 3
 """How many tasks an error names before it only counts."""
@@ -26,11 +27,15 @@ NAMED = 3
 
 @dataclass(frozen=True)
 class Probed:
-    """A policy that has answered: `hello` is its greeting, or says that it runs in process."""
+    """A policy that has answered: `hello` is its greeting, or says that it runs in process.
+
+    `equals` are further servers that answered the same.
+    """
 
     target: str
     spec: PolicySpec
     hello: Mapping[str, Any]
+    equals: tuple[Probed, ...] = ()
 
     def settings(self) -> dict[str, Any]:
         """What of it decides a result; JSON values."""
@@ -41,8 +46,8 @@ class Probed:
         }
 
 
-def read_map(file: Path, wanted: Sequence[str], known: Collection[str]) -> dict[str, str]:
-    """The policy of every task in `wanted`, from the JSON `file`.
+def read_map(file: Path, wanted: Sequence[str], known: Collection[str]) -> dict[str, Targets]:
+    """The policy of every task in `wanted`, or its policies, from the JSON `file`.
 
     Raises RunError if the file is no such map, names a task that does not exist, or lacks one.
     """
@@ -50,10 +55,10 @@ def read_map(file: Path, wanted: Sequence[str], known: Collection[str]) -> dict[
         found = json.loads(file.read_text(), object_pairs_hook=_once)
     except (OSError, ValueError) as error:
         raise RunError(f"--policy-map {file} cannot be read: {error}") from error
-    if not isinstance(found, dict) or not all(v and isinstance(v, str) for v in found.values()):
+    if not isinstance(found, dict) or not all(map(_is_targets, found.values())):
         raise RunError(
             f"--policy-map {file} is no map from tasks to URLs: write "
-            '{"Pick_Blocks_Size": "ws://host:8000", ...}'
+            '{"Pick_Blocks_Size": "ws://host:8000", ...}, or a list of different URLs for a task'
         )
     if strange := [task for task in found if task not in known]:
         raise RunError(f"--policy-map {file} names tasks that do not exist: {_some(strange)}")
@@ -62,7 +67,14 @@ def read_map(file: Path, wanted: Sequence[str], known: Collection[str]) -> dict[
             f"--policy-map {file} has no policy for {_some(missing)}; add them or choose fewer "
             "--tasks"
         )
-    return {task: found[task] for task in wanted}
+    return {t: v if isinstance(v := found[t], str) else tuple(v) for t in wanted}
+
+
+def _is_targets(value: object) -> bool:
+    """Whether `value` is a URL or a list of different ones."""
+    if not isinstance(value, list):
+        return bool(value) and isinstance(value, str)
+    return all(v and isinstance(v, str) for v in value) and len(set(value)) == len(value) > 0
 
 
 def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
@@ -98,17 +110,47 @@ def probe_policies(
 ) -> dict[str, Probed]:
     """The policy of every task of `keys`, each server asked once.
 
-    Raises what connecting raises, and RunError if one does not drive the embodiment asked for.
+    Raises what connecting raises, and RunError if one does not drive the embodiment asked for or
+    if those of one task differ.
     """
     seen: dict[str, Probed] = {}
     found: dict[str, Probed] = {}
     for task in dict.fromkeys(key.task for key in keys):
-        target = config.target(task)
-        if target not in seen:
-            seen[target] = probe(target, config.options, wait)
-        found[task] = seen[target]
+        targets = config.targets(task)
+        for target in targets:
+            if target not in seen:
+                seen[target] = probe(target, config.options, wait)
+        found[task] = equals([seen[target] for target in targets], task if config.policies else "")
         check_fit(found[task].spec, [key for key in keys if key.task == task])
     return found
+
+
+def equals(servers: Sequence[Probed], task: str = "") -> Probed:
+    """The first of `servers` with the others beside; raises RunError if one differs from it."""
+    first, *others = servers
+    wanted = _flat(first.settings())
+    for other in others:
+        found = _flat(other.settings())
+        changes = [
+            f"{name} is {wanted.get(name, 'unset')!r} and {found.get(name, 'unset')!r}"
+            for name in sorted({*wanted, *found})
+            if wanted.get(name, "unset") != found.get(name, "unset")
+        ]
+        if changes:
+            where = f" of {task}" if task else ""
+            raise RunError(
+                f"the policy servers {first.target} and {other.target}{where} are not the same: "
+                f"{'; '.join(changes)}; start them alike, or use --policy-map to tell which task "
+                "each of them does"
+            )
+    return replace(first, equals=tuple(others))
+
+
+def _flat(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings by dotted name, without what may differ: how many observations one call holds."""
+    parts = {name: value for name, value in settings.items() if name != "spec"}
+    spec = {f"spec.{name}": v for name, v in settings["spec"].items() if name != "batch"}
+    return {**parts, **spec}
 
 
 def check_fit(spec: PolicySpec, keys: Sequence[TrialKey]) -> None:
@@ -137,6 +179,13 @@ def warnings_of(
         )
     budgets: dict[int, dict[str, str]] = {}
     for task, policy in policies.items():
+        for other in policy.equals:
+            first, second = policy.hello.get("server"), other.hello.get("server")
+            if first != second:
+                found.append(
+                    f"{policy.target} calls itself {first!r} and {other.target} {second!r}: make "
+                    "sure that both serve the same checkpoint"
+                )
         found += [str(text) for text in policy.hello.get("warnings", ())]
         budget = policy.hello.get("text_budget")
         if isinstance(budget, int):

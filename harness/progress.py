@@ -1,64 +1,71 @@
-"""What the user sees while a run goes on: a bar on a terminal, plain lines elsewhere."""
+"""What the user sees while a run goes on: a live view on a terminal, plain lines elsewhere."""
 
 from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Mapping
+from collections import deque
+from collections.abc import Mapping, Sequence
 from types import TracebackType
 from typing import Any, TextIO
 
-from robospa.results.records import TrialKey, TrialRecord
+from robospa.harness.servers import Server
+from robospa.harness.status import Status, server_text, shares_text
+from robospa.results.records import TrialRecord
 
 EVERY = 15.0
 """Seconds between two plain lines."""
+DETAILS = 120.0
+"""Seconds between two plain lines that say where the time goes."""
+REFRESH = 0.5
+"""Seconds between two pictures on a terminal."""
+RECENT = 64
+"""Trials over which the speed is measured."""
+ROWS = 8
+"""Servers that the live view lists; the busiest ones if there are more."""
 
 
 class Tally:
     """Counts of what has come in, and the text that sums them up."""
 
-    def __init__(self, total: int, already: int, work: Mapping[TrialKey, float] | None) -> None:
-        """`work` is how much each trial still to run is expected to cost; None if all alike."""
+    def __init__(self, total: int, already: int) -> None:
         self.total = total
         self.already = already
-        self._work = work
-        self._whole = sum(work.values()) if work else float(total - already)
-        self._done = 0.0
         self.ran = 0
         self.successes = 0
         self.lost = 0
-        self.begun = time.monotonic()
+        self._times = deque([time.monotonic()], maxlen=RECENT)
 
     def add(self, record: TrialRecord) -> None:
         """Count one finished or lost trial."""
         self.ran += 1
-        self._done += self._work.get(record.key, 0.0) if self._work else 1.0
         self.successes += record.success
         self.lost += record.end == "infrastructure"
+        self._times.append(time.monotonic())
+
+    @property
+    def done(self) -> int:
+        """Trials with a record."""
+        return self.already + self.ran
 
     @property
     def left(self) -> int:
         """Trials still to run."""
-        return self.total - self.already - self.ran
+        return self.total - self.done
 
     @property
     def rate(self) -> float:
-        """Trials a second so far."""
-        return self.ran / max(time.monotonic() - self.begun, 1e-9)
+        """Trials a second over the last ones; falls while none comes in."""
+        return (len(self._times) - 1) / max(time.monotonic() - self._times[0], 1e-9)
 
-    @property
-    def seconds_left(self) -> float:
-        """Estimate from the work that is done and left: the longest trials come first."""
-        spent = time.monotonic() - self.begun
-        return spent * (self._whole - self._done) / max(self._done, 1e-9)
-
-    def text(self) -> str:
+    def text(self, seconds_left: float | None = None) -> str:
         """Success so far, speed and time left."""
         scored = self.ran - self.lost
         parts = [f"success {100 * self.successes / scored:.1f} %" if scored else "no result yet"]
         if self.ran:
             parts.append(f"{60 * self.rate:.1f} trials/min")
-            parts.append(f"{clock(self.seconds_left)} left")
+        if self.left and seconds_left is not None:
+            parts.append(f"{clock(seconds_left)} left")
         if self.lost:
             parts.append(f"{self.lost} lost")
         return ", ".join(parts)
@@ -72,24 +79,19 @@ def clock(seconds: float) -> str:
 
 
 class Progress:
-    """Shows a `Tally`; use as a context manager."""
+    """Shows a `Tally` and the latest `Status`; use as a context manager."""
 
-    def __init__(
-        self,
-        total: int,
-        already: int = 0,
-        stream: TextIO | None = None,
-        work: Mapping[TrialKey, float] | None = None,
-    ) -> None:
-        self.tally = Tally(total, already, work)
+    def __init__(self, total: int, already: int = 0, stream: TextIO | None = None) -> None:
+        self.tally = Tally(total, already)
         self._stream = stream or sys.stderr
-        self._bar: Any = None
-        self._task: Any = None
-        self._last = 0.0
+        self._live: Any = None
+        self._status: Status | None = None
+        self._shown = self._line = self._detail = float("-inf")
 
     def __enter__(self) -> Progress:
+        self._detail = time.monotonic() - DETAILS + 2 * EVERY
         if self._stream.isatty():
-            self._start_bar()
+            self._start_live()
         else:
             self.note(f"{self.tally.left} trials to run, {self.tally.already} already done")
         return self
@@ -100,35 +102,113 @@ class Progress:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        if self._bar is not None:
-            self._bar.stop()
-
-    def _start_bar(self) -> None:
-        from rich.console import Console
-        from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
-        from rich.progress import Progress as Bar
-
-        columns = (BarColumn(bar_width=28), MofNCompleteColumn(), TextColumn("{task.description}"))
-        self._bar = Bar(*columns, console=Console(file=self._stream))
-        self._task = self._bar.add_task("starting", total=self.tally.total)
-        self._bar.update(self._task, completed=self.tally.already)
-        self._bar.start()
+        if self._live is not None:
+            self._live.update(self._picture(final=True), refresh=True)
+            self._live.stop()
+            self._live = None
 
     def add(self, record: TrialRecord) -> None:
-        """Count one trial and show it."""
+        """Count one trial."""
         self.tally.add(record)
-        done = self.tally.already + self.tally.ran
-        if self._bar is not None:
-            self._bar.update(self._task, completed=done, description=self.tally.text())
-            return
+
+    def show(self, status: Status) -> None:
+        """Show the counts and `status`, but not more often than anybody can read."""
+        self._status = status
         now = time.monotonic()
-        if self.tally.left == 0 or now - self._last >= EVERY:
-            self._last = now
-            self.note(f"{done}/{self.tally.total} trials, {self.tally.text()}")
+        if self._live is not None:
+            if now - self._shown >= REFRESH or self.tally.left == 0:
+                self._shown = now
+                self._live.update(self._picture(), refresh=True)
+        elif self.tally.ran and (now - self._line >= EVERY or self.tally.left == 0):
+            self._line = now
+            counted = f"{self.tally.done}/{self.tally.total} trials"
+            self.note(f"{counted}, {self.tally.text(status.left)}")
+            if now - self._detail >= DETAILS and self.tally.left:
+                self._detail = now
+                for text in details(status):
+                    self.note(f"  {text}")
 
     def note(self, text: str) -> None:
         """One line of news."""
-        if self._bar is not None:
-            self._bar.console.print(text, style="yellow", highlight=False)
+        if self._live is not None:
+            self._live.console.print(text, style="yellow", highlight=False, markup=False)
         else:
             print(text, file=self._stream, flush=True)
+
+    def _start_live(self) -> None:
+        from rich.console import Console
+        from rich.live import Live
+
+        console = Console(file=self._stream)
+        self._live = Live(self._picture(), console=console, auto_refresh=False)
+        self._live.start()
+
+    def _picture(self, final: bool = False) -> Any:
+        """What a terminal shows: bar and counts, where the time goes, the servers, who is slow."""
+        from rich.console import Group
+        from rich.progress_bar import ProgressBar
+        from rich.table import Table
+        from rich.text import Text
+
+        status, tally = self._status, self.tally
+        head = Table.grid(padding=(0, 1))
+        bar = ProgressBar(total=max(tally.total, 1), completed=tally.done, width=28)
+        said = tally.text(status.left if status is not None else None) if tally.ran else "starting"
+        head.add_row(bar, f"{tally.done}/{tally.total}", Text(said))
+        if status is None or final:
+            return head
+        busy = f"{status.running} of {status.workers} workers busy on {status.cores} cores"
+        shares = shares_text(status.shares)
+        lines: list[Any] = [head, Text(f"{busy}; {shares}" if shares else busy, style="dim")]
+        if status.servers:
+            lines.append(_table(status))
+        if status.verdict:
+            lines.append(Text(status.verdict, style="bold"))
+        return Group(*lines)
+
+
+def _table(status: Status) -> Any:
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=None, pad_edge=False, header_style="dim")
+    table.add_column("policy", overflow="ellipsis", no_wrap=True, max_width=40)
+    for name in ("workers", "trials"):
+        table.add_column(name, justify="right")
+    table.add_column("", no_wrap=True)
+    table.add_column("task", overflow="ellipsis", no_wrap=True, style="dim")
+    shown = _busiest(status.servers)
+    for server in shown:
+        told = Text(server_text(server, status.now), style="" if server.up else "yellow")
+        counts = (str(server.running), str(server.trials))
+        table.add_row(Text(server.target), *counts, told, Text(server.task))
+    if more := len(status.servers) - len(shown):
+        table.add_row(f"and {more} more", "", "", "", "")
+    return table
+
+
+def _busiest(servers: Sequence[Server]) -> list[Server]:
+    """At most ROWS of them, in their own order; those that are away first of all."""
+    if len(servers) <= ROWS:
+        return list(servers)
+    order = sorted(servers, key=lambda s: (s.up, -s.running, -s.trials))[:ROWS]
+    return [server for server in servers if server in order]
+
+
+def details(status: Status) -> list[str]:
+    """Lines that say where the time goes, what the servers do and who holds the others up."""
+    shares = shares_text(status.shares)
+    lines = [f"{status.workers} workers on {status.cores} cores; {shares}"] if shares else []
+    asked = [s for s in _busiest(status.servers) if s.trials or not s.up]
+    lines += [f"{s.target}: {s.trials} trials, {server_text(s, status.now)}" for s in asked]
+    return [*lines, status.verdict] if status.verdict else lines
+
+
+def summary(shares: Mapping[str, float], status: Status) -> list[str]:
+    """The same about a whole run, for its end."""
+    lines = [f"time: {shares_text(shares)}, with {status.workers} workers on {status.cores} cores"]
+    asked = [s for s in _busiest(status.servers) if s.trials]
+    many = len(asked) > 1
+    lines += [f"{s.target}: {f'{s.trials} trials, ' if many else ''}{server_text(s, status.now)}"
+              for s in asked if s.means]  # fmt: skip
+    return lines if shares else []

@@ -1,16 +1,16 @@
-"""The order of a run's trials: one base task after the other, the longest first.
+"""The trials of a run that still have to be done, by base task, the longest expected first.
 
-Trials of one base task stay together so that a server loads each checkpoint once; long ones go
-first so that no worker is left with a long one at the end. A retried trial goes before all others
-once its pause is over.
+What a trial is expected to take is its step limit until trials of its variant were measured in this
+run. Long trials go first so that no worker is left with one at the end. Which task is next is the
+scheduler's choice (`robospa.harness.scheduler`), because it depends on the servers.
 """
 
 from __future__ import annotations
 
 import heapq
-from collections import defaultdict, deque
+from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from robospa.results.records import TrialKey
@@ -34,16 +34,61 @@ class Facts:
     steps: int = 0
 
 
+class Costs:
+    """Expected seconds of a trial. `steps` is the step limit of a key's variant.
+
+    What was measured for a variant is averaged with one trial's worth of the guess from its step
+    limit, which is worth as many seconds a step as the run's trials have taken so far.
+    """
+
+    def __init__(self, steps: Callable[[TrialKey], int]) -> None:
+        self._steps = steps
+        self._measured: dict[tuple[str, int], tuple[float, int]] = {}
+        self._seconds = self._limits = 0.0
+
+    @property
+    def known(self) -> bool:
+        """Whether any trial was measured; until then `expect` only compares."""
+        return self._limits > 0
+
+    def learn(self, key: TrialKey, seconds: float) -> None:
+        """A trial of the variant of `key` took `seconds`."""
+        total, count = self._measured.get(key.variant, (0.0, 0))
+        self._measured[key.variant] = (total + seconds, count + 1)
+        self._seconds += seconds
+        self._limits += max(1, self._steps(key))
+
+    def expect(self, key: TrialKey) -> float:
+        """Seconds that a trial of the variant of `key` should take."""
+        a_step = self._seconds / self._limits if self.known else 1.0
+        total, count = self._measured.get(key.variant, (0.0, 0))
+        return (total + a_step * max(1, self._steps(key))) / (count + 1)
+
+
+@dataclass
+class _Group:
+    """What is left of one base task: fresh trials by level, retries by the time they are due."""
+
+    fresh: dict[int, deque[Pending]] = field(default_factory=dict)
+    retries: list[tuple[float, int, Pending]] = field(default_factory=list)
+
+    def due(self, now: float) -> bool:
+        return bool(self.fresh) or (bool(self.retries) and self.retries[0][0] <= now)
+
+
 class TrialQueue:
     """All trials of a run that are not settled yet. `parts` finds the task of a key."""
 
     def __init__(self, keys: Sequence[TrialKey], parts: Callable[[TrialKey], Any]) -> None:
         self._parts = parts
         self._facts: dict[tuple[str, int], Facts] = {}
-        self._fresh = deque(Pending(key) for key in self._ordered(keys))
-        self._retries: list[tuple[float, int, Pending]] = []
+        self._groups: dict[str, _Group] = {}
         self._count = 0
-        self.unsettled = len(self._fresh)
+        self.costs = Costs(lambda key: self.facts(key).steps)
+        self.unsettled = len(keys)
+        for key in sorted(keys):
+            levels = self._groups.setdefault(key.task, _Group()).fresh
+            levels.setdefault(key.level, deque()).append(Pending(key))
 
     def facts(self, key: TrialKey) -> Facts:
         """Facts of the variant of `key`; all empty if its task cannot be found."""
@@ -57,37 +102,51 @@ class TrialQueue:
             self._facts[key.variant] = found
         return self._facts[key.variant]
 
-    def _ordered(self, keys: Sequence[TrialKey]) -> list[TrialKey]:
-        cost: dict[str, int] = defaultdict(int)
-        for key in keys:
-            cost[key.task] += self.facts(key).steps
-        return sorted(
-            keys, key=lambda k: (-cost[k.task], k.task, -self.facts(k).steps, k.level, k.seed)
-        )
+    @property
+    def tasks(self) -> tuple[str, ...]:
+        """Every base task of the run."""
+        return tuple(self._groups)
 
-    def take(self, now: float) -> Pending | None:
-        """The next trial to run at time `now`; None if none is due."""
-        if self._retries and self._retries[0][0] <= now:
-            return heapq.heappop(self._retries)[2]
-        return self._fresh.popleft() if self._fresh else None
+    def due(self, now: float) -> dict[str, float]:
+        """Expected seconds of what waits, for every task that has something to run at `now`."""
+        return {task: self._left(group) for task, group in self._groups.items() if group.due(now)}
+
+    def waiting(self) -> tuple[str, ...]:
+        """Every base task that still has a trial to start, now or after its pause."""
+        return tuple(task for task, g in self._groups.items() if g.fresh or g.retries)
+
+    def left(self) -> float:
+        """Expected seconds of everything that waits."""
+        return sum(map(self._left, self._groups.values()))
+
+    def _left(self, group: _Group) -> float:
+        fresh = sum(len(line) * self.costs.expect(line[0].key) for line in group.fresh.values())
+        return fresh + sum(self.costs.expect(work.key) for _, _, work in group.retries)
+
+    def take(self, task: str, now: float) -> Pending | None:
+        """The next trial of `task`: a retry whose pause is over, or the longest; None if none."""
+        group = self._groups[task]
+        if group.retries and group.retries[0][0] <= now:
+            return heapq.heappop(group.retries)[2]
+        if not group.fresh:
+            return None
+        level = max(group.fresh, key=lambda n: (self.costs.expect(group.fresh[n][0].key), -n))
+        line = group.fresh[level]
+        work = line.popleft()
+        if not line:
+            del group.fresh[level]
+        return work
 
     def again(self, work: Pending, due: float) -> None:
-        """Run `work` once more, not before time `due`."""
+        """Run `work` (as it is: the caller counts attempts), not before time `due`."""
         self._count += 1
-        heapq.heappush(self._retries, (due, self._count, Pending(work.key, work.attempt + 1)))
+        heapq.heappush(self._groups[work.key.task].retries, (due, self._count, work))
 
-    def next_due(self) -> float | None:
-        """When the next retry is due; None if there is none."""
-        return self._retries[0][0] if self._retries else None
+    def next_due(self, now: float) -> float | None:
+        """When the next pause after `now` is over; None if nobody pauses."""
+        dues = [due for g in self._groups.values() for due, _, _ in g.retries if due > now]
+        return min(dues, default=None)
 
     def settle(self) -> None:
         """One trial has its record."""
         self.unsettled -= 1
-
-
-def expected_work(
-    keys: Sequence[TrialKey], parts: Callable[[TrialKey], Any]
-) -> dict[TrialKey, float]:
-    """The most actions that each trial may take: what the time left is estimated from."""
-    queue = TrialQueue(keys, parts)
-    return {key: float(max(1, queue.facts(key).steps)) for key in keys}

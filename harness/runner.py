@@ -15,9 +15,13 @@ from pathlib import Path
 
 from robospa.harness.executor import Executor, Hand, Message
 from robospa.harness.executor import RunAborted as RunAborted
-from robospa.harness.factory import load
+from robospa.harness.factory import is_url, load
 from robospa.harness.local_workers import LocalExecutor
-from robospa.harness.queue import Pending, TrialQueue
+from robospa.harness.queue import TrialQueue
+from robospa.harness.scheduler import Job, Scheduler
+from robospa.harness.servers import UNFIT
+from robospa.harness.staffing import Staffing
+from robospa.harness.status import Shares, Status
 from robospa.harness.store import RecordWriter, StorageError
 from robospa.harness.watchdog import Watch
 from robospa.harness.worker import LOGS, WorkerConfig
@@ -26,6 +30,7 @@ from robospa.results.records import TrialKey, TrialRecord
 
 START_SECONDS = 120.0
 """A worker that is not ready by then is replaced."""
+TELL_SECONDS = 0.25
 STOPPED_SECONDS = 5.0
 """The driver looks at its workers at least twice a second; if not, it was stopped itself."""
 
@@ -35,7 +40,9 @@ class RunOptions:
     """How stubborn a run is. `trial_seconds` is the most one attempt may take before its worker is
     killed, `stuck_seconds` the most without getting on though no policy is waited for; pauses
     before retries are `backoff` * 2^k seconds; after `give_up` trials lost in a row the run stops,
-    because the server is gone rather than a trial unlucky."""
+    because the server is gone rather than a trial unlucky. There may be `most` workers if `workers`
+    of them wait for their policies while cores idle. A server that is away beside others is tried
+    for `patience` seconds before that counts as an attempt at a trial."""
 
     workers: int = 1
     attempts: int = 3
@@ -43,6 +50,8 @@ class RunOptions:
     trial_seconds: float = 1800.0
     give_up: int = 5
     stuck_seconds: float = 300.0
+    most: int = 0
+    patience: float = 60.0
 
 
 @dataclass
@@ -52,13 +61,16 @@ class _Seat:
     hand: Hand
     deadline: float
     file: Path | None = None
-    work: Pending | None = None
+    job: Job | None = None
+    at: str = ""
+    """The policy that it is connected to."""
+    begun: float = 0.0
     ready: bool = False
     watch: Watch | None = None
 
     def due(self) -> float:
         """When it has to have got further; infinite while it has nothing to do."""
-        if self.ready and self.work is None:
+        if self.ready and self.job is None:
             return float("inf")
         return self.deadline if self.watch is None else min(self.deadline, self.watch.deadline)
 
@@ -67,7 +79,8 @@ class _Seat:
 class Runner:
     """Runs `keys` with workers of `executor`, by default processes here as `config` describes.
 
-    `on_record` sees every settled trial, `on_note` one line for every mishap.
+    `on_record` sees every settled trial, `on_note` one line for every mishap, `on_status` every now
+    and then how things are.
     """
 
     config: WorkerConfig
@@ -76,23 +89,36 @@ class Runner:
     on_record: Callable[[TrialRecord], None] = lambda record: None
     on_note: Callable[[str], None] = lambda text: None
     executor: Executor | None = None
+    on_status: Callable[[Status], None] = lambda status: None
 
     def run(self) -> None:
         """Settle every trial. Raises RunAborted; on KeyboardInterrupt workers are killed first."""
         self._queue = TrialQueue(self.keys, load(self.config.parts))
-        self._crew = self.executor or LocalExecutor(self.config, self.options.workers)
+        most = max(self.options.workers, self.options.most)
+        self._scheduler = Scheduler(
+            self._queue,
+            self.config.targets,
+            batches={target: spec.batch for target, spec in self.config.expects.items()},
+            pause=self.options.backoff,
+            patience=self.options.patience,
+        )
+        self._crew = self.executor or LocalExecutor(self.config, most)
+        self._staffing = Staffing(self.options.workers if self.executor is None else most, most)
+        self.shares = Shares()
         self._seats: list[_Seat] = []
         self._started = 0
         self._false_starts = 0
         self._lost_in_a_row = 0
         self._writer: RecordWriter | None = None
         self._looked = time.monotonic()
+        self._told = 0.0
         try:
             while self._queue.unsettled:
                 self._staff()
                 self._assign()
                 self._listen()
                 self._check_deadlines()
+                self._tell()
             self._dismiss()
         except StorageError as error:
             raise RunAborted(str(error)) from error
@@ -103,7 +129,8 @@ class Runner:
 
     def _staff(self) -> None:
         """Replace workers that are gone, but never have more than there are trials left."""
-        wanted = min(self._crew.room(), self._queue.unsettled)
+        wanted = self._crew.room() if self.executor is not None else self._staffing.wanted
+        wanted = min(wanted, self._queue.unsettled)
         while len(self._seats) < wanted:
             hand = self._crew.hire(f"worker-{self._started:03d}")
             self._started += 1
@@ -111,15 +138,15 @@ class Runner:
 
     def _assign(self) -> None:
         for seat in self._seats:
-            if seat.ready and seat.work is None:
-                work = self._queue.take(time.monotonic())
-                if work is None:
-                    return
-                seat.work = work
+            if seat.ready and seat.job is None:
                 now = time.monotonic()
+                job = self._scheduler.next(now, seat.at)
+                if job is None:
+                    return
+                seat.job, seat.at, seat.begun = job, job.target, now
                 seat.deadline = now + self.options.trial_seconds
                 seat.watch = Watch(now, self.options.stuck_seconds)
-                seat.hand.send(("run", work.key, work.attempt))
+                seat.hand.send(("run", job.work.key, job.work.attempt, job.target))
 
     def _listen(self) -> None:
         """Wait until a worker says something, dies, or a pause is over."""
@@ -137,8 +164,8 @@ class Runner:
         """Seconds until something has to be looked at, at most half a second."""
         now = time.monotonic()
         deadlines = [seat.due() for seat in self._seats]
-        idle = any(s.ready and s.work is None for s in self._seats)
-        if idle and (due := self._queue.next_due()) is not None:
+        idle = any(s.ready and s.job is None for s in self._seats)
+        if idle and (due := self._scheduler.next_time(now)) is not None:
             deadlines.append(due)
         return max(0.0, min([0.5, *(d - now for d in deadlines)]))
 
@@ -150,15 +177,28 @@ class Runner:
             if seat.watch is not None:
                 seat.watch.heard(message, time.monotonic())
         elif message[0] == "done":
-            seat.work = None
-            self._settle(message[1])
+            self._finish(seat, message[1])
         elif message[0] == "fatal":
             raise RunAborted(message[1])
         else:
-            _, _, text, retry = message
-            work, seat.work = seat.work, None
-            if work is not None:
-                self._lose(work, text, retry)
+            _, _, text, retry, fault = message
+            job, seat.job = seat.job, None
+            if job is not None:
+                self._lose(job, text, retry, fault)
+
+    def _finish(self, seat: _Seat, record: TrialRecord) -> None:
+        """The trial of `seat` has its record."""
+        job, seat.job = seat.job, None
+        if job is not None:
+            self._scheduler.done(job, record, time.monotonic() - seat.begun)
+        self.shares.add(record)
+        self._staffing.heard(record)
+        self._settle(record)
+        asked = [s for s in self._scheduler.servers.values() if s.running and is_url(s.target)]
+        if self.executor is None and (
+            more := self._staffing.review(all(s.saturated for s in asked))
+        ):
+            self.on_note(f"workers wait while cores idle: {more} more, {self._staffing.wanted} now")
 
     def _settle(self, record: TrialRecord) -> None:
         self._queue.settle()
@@ -166,12 +206,26 @@ class Runner:
             self._lost_in_a_row = 0
         self.on_record(record)
 
-    def _lose(self, work: Pending, text: str, retry: bool) -> None:
-        """Queue another attempt at `work`, or record it as missing."""
+    def _lose(self, job: Job, text: str, retry: bool, fault: str = "") -> None:
+        """Queue another attempt at the trial of `job`, or record it as missing."""
+        work, now = job.work, time.monotonic()
+        if fault == UNFIT and len(self._scheduler.servers) == 1:
+            raise RunAborted(text)
+        before = self._scheduler.servers[job.target].up
+        charged = self._scheduler.lost(job, now, fault, text)
+        if orphans := self._scheduler.orphans():
+            raise RunAborted(f"no policy server is left for {orphans[0]}: {text}")
+        if fault == UNFIT:
+            self.on_note(f"{job.target} takes part no more: {text}")
+        elif before and not self._scheduler.servers[job.target].up:
+            self.on_note(f"{job.target} is away ({text}); other trials run until it is back")
+        if not charged:
+            self._scheduler.again(job, now, charged)
+            return
         if retry and work.attempt < self.options.attempts:
             pause = self.options.backoff * 2.0 ** (work.attempt - 1)
             self.on_note(f"{work.key.slug}: {text}; trying again in {pause:g} s")
-            self._queue.again(work, time.monotonic() + pause)
+            self._scheduler.again(job, now + pause, charged)
             return
         self.on_note(f"{work.key.slug}: {text}; recorded as missing")
         if self._writer is None:
@@ -194,14 +248,14 @@ class Runner:
             if self._false_starts >= 3:
                 log = self.config.folder / LOGS / f"{seat.hand.name}.log"
                 raise RunAborted(f"workers do not start; the last one's output is in {log}")
-        if seat.work is None:
+        if seat.job is None:
             return
         written = read_file(seat.file) if seat.file is not None and seat.file.exists() else []
         for record in written:
-            if record.key == seat.work.key:
-                self._settle(record)
+            if record.key == seat.job.work.key:
+                self._finish(seat, record)
                 return
-        self._lose(seat.work, text, True)
+        self._lose(seat.job, text, True)
 
     def _check_deadlines(self) -> None:
         now = time.monotonic()
@@ -222,6 +276,30 @@ class Runner:
                     f"its worker did not get on for {self.options.stuck_seconds:g} s and was killed"
                 )
             self._bury(seat, text)
+
+    def _tell(self) -> None:
+        """Say how things are, a few times a second and at the end."""
+        now = time.monotonic()
+        if now - self._told >= TELL_SECONDS or not self._queue.unsettled:
+            self._told = now
+            self.on_status(self.status(now))
+
+    def status(self, now: float) -> Status:
+        """How things are at time `now`."""
+        costs, running = self._queue.costs, [s for s in self._seats if s.job is not None]
+        left = self._queue.left()
+        for seat in running:
+            assert seat.job is not None
+            left += max(0.0, costs.expect(seat.job.work.key) - (now - seat.begun))
+        return Status(
+            now,
+            workers=len(self._seats),
+            running=len(running),
+            cores=self._staffing.cores,
+            servers=tuple(self._scheduler.servers.values()),
+            shares=self.shares.now(),
+            left=left / max(1, len(self._seats)) if costs.known else None,
+        )
 
     def _forgive(self, gap: float) -> None:
         """A driver that was stopped itself (Ctrl-Z, a machine put to sleep) blames nobody."""

@@ -1,11 +1,12 @@
 """One worker process: one world, one policy connection, one trial at a time, one record file.
 
-The driver sends ("run", key, attempt) or ("stop",); the worker answers ("ready", file), then per
-trial ("done", record) once the record is on disk, ("lost", key, message, retry) if it could not be
-run, or ("fatal", message) if no trial could ever be run. After a loss the world is rebuilt and the
-policy reconnected before the next trial, never within one. In between a thread sends ("beat",
-number, state): see `harness.watchdog`. A worker whose driver has died ends at once, even if it is
-stopped or stuck in native code (on Linux, where the kernel sees to it).
+The driver sends ("run", key, attempt, policy) or ("stop",); the worker answers ("ready", file),
+then per trial ("done", record) once the record is on disk, ("lost", key, message, retry, fault) if
+it could not be run (`fault`: see `harness.servers`), or ("fatal", message) if no trial could ever
+be run. After a loss the world is rebuilt and the policy reconnected before the next trial, never
+within one. In between a thread sends ("beat", number, state): see `harness.watchdog`. A worker
+whose driver has died ends at once, even if it is stopped or stuck in native code (on Linux, where
+the kernel sees to it).
 """
 
 from __future__ import annotations
@@ -34,6 +35,8 @@ from robospa.results.records import TrialKey, TrialRecord
 
 LOGS = "logs"
 PR_SET_PDEATHSIG = 1
+Targets = str | tuple[str, ...]
+"""A policy's URL or name, or several that are one as good as the other."""
 VIDEO = ("none", "failures", "first", "all")
 
 
@@ -41,15 +44,15 @@ VIDEO = ("none", "failures", "first", "all")
 class WorkerConfig:
     """What a worker needs to know; picklable.
 
-    `policy` is a server's URL or a policy's name, unless `policies` has one for every task;
-    `options` go to the client, and `expects` has the spec that each of them must have. `world` and
-    `parts` are `module:function` paths of a world factory and of what finds a trial's scene and
-    goal. `video` is one of VIDEO; "first" films the trials in `samples`. `step_scale` multiplies
-    the step limits.
+    `policy` is a server's URL, several equal ones or a policy's name, unless `policies` has that
+    for every task; `options` go to the client, and `expects` has the spec that each of them must
+    have. `world` and `parts` are `module:function` paths of a world factory and of what finds a
+    trial's scene and goal. `video` is one of VIDEO; "first" films the trials in `samples`.
+    `step_scale` multiplies the step limits.
     """
 
     folder: Path
-    policy: str
+    policy: Targets
     options: Mapping[str, Any] = field(default_factory=dict)
     world: str = "robospa.harness.sapien_world:SapienWorld"
     world_arguments: Mapping[str, Any] = field(default_factory=dict)
@@ -57,13 +60,20 @@ class WorkerConfig:
     run_seed: int = 0
     video: str = "none"
     samples: frozenset[TrialKey] = frozenset()
-    policies: Mapping[str, str] = field(default_factory=dict)
+    policies: Mapping[str, Targets] = field(default_factory=dict)
     expects: Mapping[str, PolicySpec] = field(default_factory=dict)
     step_scale: float = 1.0
 
-    def target(self, task: str) -> str:
-        """The URL or name of the policy that does `task`."""
-        return self.policies[task] if self.policies else self.policy
+    def targets(self, task: str) -> tuple[str, ...]:
+        """URLs or names of the policies that can do `task`."""
+        found = self.policies[task] if self.policies else self.policy
+        return (found,) if isinstance(found, str) else tuple(found)
+
+    @property
+    def alone(self) -> bool:
+        """Whether there is one policy for all trials."""
+        found = self.policies.values() if self.policies else (self.policy,)
+        return len({t for f in found for t in ((f,) if isinstance(f, str) else f)}) == 1
 
     def filmed(self, key: TrialKey) -> bool:
         """Whether a video of `key` may be wanted."""
@@ -85,12 +95,12 @@ class Worker:
         self._target = ""
         self._stale = False
 
-    def run(self, key: TrialKey, attempt: int) -> TrialRecord:
-        """Run one trial and put its record, action trace and video on disk."""
+    def run(self, key: TrialKey, attempt: int, target: str) -> TrialRecord:
+        """Run one trial with the policy `target`; its record, trace and video are then on disk."""
         from robospa.harness.trial import policy_seed, run_trial
         from robospa.harness.video import TrialRecorder
 
-        self._prepare(self.config.target(key.task))
+        self._prepare(target)
         recorder = TrialRecorder(video=self.config.filmed(key), on_step=self.pulse.on)
         seed = policy_seed(key, self.config.run_seed)
         record = run_trial(
@@ -131,6 +141,9 @@ class Worker:
             options = dict(self.config.options)
             if target in self.config.expects:
                 options["expect"] = self.config.expects[target]
+            if "timeouts" in options and not self.config.alone:
+                # The driver has other work for this worker until the server is back.
+                options["timeouts"] = replace(options["timeouts"], wait=0.0)
             with self.pulse.policy(target):
                 opened = open_policy(target, options)
             self._policy, self._target = Attended(opened, target, self.pulse), target
@@ -195,23 +208,25 @@ def describe(error: BaseException) -> str:
     return text if text and module.startswith("robospa.") else f"{type(error).__name__}: {text}"
 
 
-def _attempt(worker: Worker, key: TrialKey, attempt: int) -> tuple[Any, ...]:
+def _attempt(worker: Worker, key: TrialKey, attempt: int, target: str) -> tuple[Any, ...]:
     """The message that tells how this attempt went. Errors are sorted here, once."""
     from robospa.harness.factory import UnknownName
+    from robospa.harness.servers import fault_of
     from robospa.harness.world import SceneUnstable
-    from robospa.protocol.errors import HandshakeError, ServerError
+    from robospa.protocol.errors import ServerError
 
     try:
-        return ("done", worker.run(key, attempt))
+        return ("done", worker.run(key, attempt, target))
     except SceneUnstable as error:
-        return ("lost", key, describe(error), False)
-    except (HandshakeError, UnknownName, StorageError) as error:
+        return ("lost", key, describe(error), False, "")
+    except (UnknownName, StorageError) as error:
         return ("fatal", describe(error))
     except Exception as error:  # the driver decides: retry, then report as missing
         with contextlib.suppress(OSError):  # the log's disk may be full
             traceback.print_exc()
         worker.recover()
-        return ("lost", key, describe(error), not isinstance(error, ServerError) or error.retriable)
+        retry = not isinstance(error, ServerError) or error.retriable
+        return ("lost", key, describe(error), retry, fault_of(error))
 
 
 def _serve(pipe: Connection, send: Callable[[Any], None], worker: Worker) -> None:

@@ -14,7 +14,8 @@ from robospa.harness.cli.selection import BadChoice
 from robospa.harness.evaluate import Request, RunAborted, evaluate
 from robospa.harness.factory import is_url
 from robospa.harness.runner import RunOptions
-from robospa.harness.staffing import cores, most_workers
+from robospa.harness.staffing import cores as cores
+from robospa.harness.staffing import most_workers
 from robospa.harness.watchdog import BEAT_SECONDS
 from robospa.harness.worker import VIDEO, Targets, WorkerConfig
 from robospa.results.records import TrialKey

@@ -12,7 +12,6 @@ from pathlib import Path
 
 import pytest
 
-from robospa.harness.queue import TrialQueue
 from robospa.harness.runner import RunAborted, Runner, RunOptions
 from robospa.harness.worker import WorkerConfig
 from robospa.results.reading import RunError, finished, read_file, read_records
@@ -168,25 +167,3 @@ def _count(folder: Path) -> int:
         return len(lines(folder))
     except RunError:
         return 0
-
-
-def test_long_tasks_go_first_and_stay_together() -> None:
-    trials = [TrialKey(task, 1, seed) for seed in (1, 2, 3) for task in ("Pick_A", "Press_B")]
-    trials += [TrialKey("Press_B", 2, 9)]
-    from run_fakes import parts
-
-    queue = TrialQueue(trials, parts)
-    order = [queue.take(0.0) for _ in trials]
-    assert [p.key.task for p in order if p] == ["Press_B"] * 4 + ["Pick_A"] * 3
-
-
-def test_a_retry_waits_for_its_time_and_then_goes_first() -> None:
-    from run_fakes import parts
-
-    queue = TrialQueue(keys(3), parts)
-    first = queue.take(0.0)
-    assert first is not None
-    queue.again(first, due=5.0)
-    second, third = queue.take(4.0), queue.take(6.0)
-    assert second is not None and third is not None
-    assert (second.key, third.key, third.attempt) == (keys()[1], first.key, 2)

@@ -1,0 +1,69 @@
+"""How many workers a run has: one per core, and more while the cores idle because workers wait.
+
+A worker that waits for its policy leaves its core idle. So after every round of trials (as many as
+there are workers) the driver looks at the share of time spent waiting: if what is left of the
+workers' time does not fill the cores, and the servers are not full, more workers come, at most
+twice as many at once. A full server ends it: more workers would only stand in its queue.
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from robospa.results.records import TrialRecord
+
+PER_CORE = 8
+"""Most workers for a core."""
+MEMORY = 0.75e9
+"""Bytes that a worker may need: simulator, renderer and one batch of images."""
+FULL = 0.9
+"""Share of the cores that counts as all of them."""
+
+
+def cores() -> int:
+    """Processor cores that this process may use."""
+    return len(os.sched_getaffinity(0))
+
+
+def most_workers() -> int:
+    """What cores and free memory allow; at least one per core."""
+    try:
+        lines = Path("/proc/meminfo").read_text().splitlines()
+        free = next(int(x.split()[1]) * 1024 for x in lines if x.startswith("MemAvailable:"))
+    except (OSError, StopIteration, ValueError):
+        return cores()
+    return max(cores(), min(PER_CORE * cores(), int(free / MEMORY)))
+
+
+@dataclass
+class Staffing:
+    """How many workers are wanted: `wanted` now, `most` ever, for `cores` cores."""
+
+    wanted: int
+    most: int
+    cores: int = field(default_factory=cores)
+    _seconds: float = 0.0
+    _waiting: float = 0.0
+    _heard: int = 0
+
+    def heard(self, record: TrialRecord) -> None:
+        """Count one trial that was run."""
+        self._seconds += record.wall_time
+        self._waiting += record.timing.get("waiting", 0.0)
+        self._heard += 1
+
+    def review(self, saturated: bool) -> int:
+        """How many more workers come now. `saturated`: no server has room for more."""
+        if self.wanted >= self.most or self._heard < self.wanted or self._seconds <= 0:
+            return 0
+        busy = self.wanted * (1.0 - min(1.0, self._waiting / self._seconds))
+        self._seconds = self._waiting = 0.0
+        self._heard = 0
+        if saturated or busy >= FULL * self.cores:
+            return 0
+        fitting = round(self.wanted * self.cores / max(busy, 1e-9))
+        before = self.wanted
+        self.wanted = min(self.most, 2 * before, max(before + 1, fitting))
+        return self.wanted - before
