@@ -20,6 +20,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from websockets.exceptions import ConnectionClosed, InvalidStatus, WebSocketException
+from websockets.frames import CloseCode
 from websockets.sync.client import ClientConnection
 from websockets.sync.client import connect as websocket_connect
 from websockets.typing import Subprotocol
@@ -32,6 +33,7 @@ from robospa.protocol.errors import (
     HandshakeError,
     TransportError,
     Unauthorized,
+    printable,
 )
 from robospa.protocol.memory import keep_freed_memory
 from robospa.protocol.messages import SUBPROTOCOL
@@ -81,7 +83,7 @@ class Channel:
         limits: Limits = DEFAULT_LIMITS,
         subprotocol: str | None = SUBPROTOCOL,
     ) -> None:
-        self.url = address.url
+        self.url, self._limit = address.url, limits.message
         keep_freed_memory()
         self._socket = _open(address, timeouts, limits, subprotocol)
         self.subprotocol: str | None = self._socket.subprotocol
@@ -118,8 +120,28 @@ class Channel:
 
     def _lost(self, when: str, error: Exception) -> TransportError:
         self.close()
-        reason = str(error) or type(error).__name__
-        return ConnectionLost(f"the connection to {self.url} ended {when}: {reason}")
+        return ConnectionLost(
+            f"the connection to {self.url} ended {when}: {why_closed(error, self._limit)}"
+        )
+
+
+def why_closed(error: Exception, limit: int) -> str:
+    """Why a connection ended, in words; `limit` is the most bytes that a message may have."""
+    if not isinstance(error, ConnectionClosed):
+        return str(error) or type(error).__name__
+    if error.sent is not None and error.rcvd_then_sent is not True:
+        if error.sent.code == CloseCode.MESSAGE_TOO_BIG:
+            return (
+                f"the server sent more than the {limit} bytes that a message may have; "
+                "is it a policy server?"
+            )
+        if error.sent.code in (CloseCode.PROTOCOL_ERROR, CloseCode.INVALID_DATA):
+            reason = printable(error.sent.reason)
+            return f"the server broke the rules of WebSocket ({reason}); is it a policy server?"
+    if error.rcvd is not None:
+        reason = f"{error.rcvd.code:d}: {printable(error.rcvd.reason) or 'no reason given'}"
+        return f"the server closed it ({reason}); look at its log"
+    return "it was cut off without a word; look at the server's log"
 
 
 def _open(
@@ -141,7 +163,8 @@ def _open(
             raise _refused(address, error) from error
         except TimeoutError as error:
             raise ConnectFailed(
-                f"{address.url} did not finish the handshake within {timeouts.connect:g} s"
+                f"{address.url} did not finish the handshake within {timeouts.connect:g} s; "
+                "look at the server's log"
             ) from error
         except (OSError, ValueError, EOFError, WebSocketException) as error:
             raise ConnectFailed(f"cannot connect to {address.url}: {error}") from error
@@ -210,7 +233,7 @@ def _is_loopback(host: str) -> bool:
 
 def _refused(address: Address, error: InvalidStatus) -> Exception:
     status = error.response.status_code
-    body = bytes(error.response.body or b"")[:300].decode("utf-8", "replace").strip()
+    body = printable(bytes(error.response.body or b"").decode("utf-8", "replace"))
     if status == HTTPStatus.UNAUTHORIZED:
         return Unauthorized(f"{address.url} refused the token: {body or status}")
     if status in (HTTPStatus.BAD_REQUEST, HTTPStatus.FORBIDDEN, HTTPStatus.UPGRADE_REQUIRED):

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.protocol.errors import DecodeError, PolicyAnswerError
+from robospa.protocol.codec import Limits
+from robospa.protocol.errors import DecodeError, HandshakeError, PolicyAnswerError
 from robospa.protocol.policy import Observation, PolicySpec
 
 
@@ -70,6 +71,18 @@ def _check_view(what: str, view: Any, spec: PolicySpec) -> None:
         state = view.get("state")
         if not isinstance(state, np.ndarray) or state.ndim != 1 or state.dtype != np.float32:
             raise DecodeError(f"{what}: 'state' must be a float32 array of one axis")
+
+
+def check_size(spec: PolicySpec, limits: Limits, url: str) -> None:
+    """Raises HandshakeError if the images that `spec` asks for fit into no message."""
+    sizes = [3 * camera.width * camera.height for camera in spec.cameras]
+    whole = sum(sizes) * (1 + len(spec.history)) if spec.image_codec == "raw" else 0
+    if whole > limits.message or max(sizes, default=0) > limits.array:
+        raise HandshakeError(
+            f"the server at {url} wants {max(whole, *sizes) / 1e6:.0f} MB of images in an "
+            f"observation, and a message may have {limits.message / 1e6:.0f} MB: ask for smaller "
+            "images"
+        )
 
 
 def compare_specs(expected: PolicySpec, found: PolicySpec) -> list[str]:

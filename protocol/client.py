@@ -9,6 +9,7 @@ server whose spec has changed meanwhile. Errors: see `robospa.protocol.errors`.
 
 from __future__ import annotations
 
+import math
 import ssl as ssl_module
 import time
 from collections.abc import Callable, Mapping
@@ -19,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.protocol.channel import Address, Channel, Timeouts
-from robospa.protocol.checks import check_chunk, compare_specs
+from robospa.protocol.checks import check_chunk, check_size, compare_specs
 from robospa.protocol.codec import DEFAULT_LIMITS, Limits
 from robospa.protocol.errors import (
     ConnectionLost,
@@ -29,6 +30,7 @@ from robospa.protocol.errors import (
     ServerError,
     SpecMismatch,
     TransportError,
+    printable,
 )
 from robospa.protocol.images import encode_images
 from robospa.protocol.messages import (
@@ -121,7 +123,8 @@ class RemotePolicy:
         timeout = self.timeouts.infer if self._warm else self.timeouts.first_infer
         start = time.perf_counter()
         answer, timing = self._session.infer(self._id(), observation, timeout)
-        self.last_timing = {**timing, "round_trip_ms": (time.perf_counter() - start) * 1e3}
+        told = {name: ms for name, ms in timing.items() if math.isfinite(ms)}
+        self.last_timing = {**told, "round_trip_ms": (time.perf_counter() - start) * 1e3}
         self._warm = True
         return check_chunk(answer, self.spec)
 
@@ -168,6 +171,7 @@ class _Session:
         self._channel, self._timeouts, self._limits = channel, timeouts, limits
         hello = self._receive(Hello, 0, timeouts.hello)
         self.spec = hello.spec
+        check_size(hello.spec, limits, channel.url)
         self.hello = {
             "dialect": "robospa.v1",
             "version": hello.version,
@@ -199,7 +203,8 @@ class _Session:
     def _receive(self, wanted: type[M], id: int, timeout: float) -> M:
         data = self._channel.receive(timeout, wanted.type)
         if isinstance(data, str):
-            raise self._violation(f"a text frame came instead of {wanted.type}: {data[:200]!r}")
+            said = printable(data, 200)
+            raise self._violation(f"a text frame came instead of {wanted.type}: {said!r}")
         try:
             message = unpack(data, self._limits)
         except DecodeError as error:
@@ -207,10 +212,12 @@ class _Session:
         if isinstance(message, Error) and message.id in (id, 0):
             if message.id == 0:
                 self.close()
-                raise ConnectionLost(f"the server gave up the connection: {message.message}")
+                reason = printable(message.message)
+                raise ConnectionLost(f"{self._channel.url} gave up the connection: {reason}")
             if message.code == BAD_ANSWER:
-                raise PolicyAnswerError(message.message)
-            raise ServerError(message.code, message.message, message.retriable)
+                raise PolicyAnswerError(printable(message.message))
+            url = self._channel.url
+            raise ServerError(message.code, message.message, message.retriable, url)
         if message.id != id:
             raise self._violation(f"answer {message.id} came to request {id}")
         if not isinstance(message, wanted):
@@ -219,7 +226,14 @@ class _Session:
 
     def _violation(self, reason: str) -> TransportError:
         self.close()
-        return ProtocolViolation(f"{self._channel.url} broke the protocol: {reason}")
+        return violation(self._channel.url, reason)
+
+
+def violation(url: str, reason: str) -> TransportError:
+    """The error for something that the protocol does not allow."""
+    return ProtocolViolation(
+        f"{url} broke the protocol: {reason}; robospa check tells what else it gets wrong"
+    )
 
 
 def connect(

@@ -343,7 +343,7 @@ class _Reader:
     def array(self, data: Any, name: Any, shape: Any) -> np.ndarray[Any, Any]:
         dtype = DTYPES.get(name) if isinstance(name, str) else None
         if dtype is None:
-            raise self.fail(f"array dtype {str(name)[:20]!r} is not one of {list(DTYPES)}")
+            raise self.fail(f"array dtype {str(name)[:20]!r} is no plain number")
         if not isinstance(data, memoryview):
             raise self.fail("array data is not binary")
         if not isinstance(shape, list) or not all(type(n) is int and n >= 0 for n in shape):

@@ -21,6 +21,20 @@ PolicyAnswerError ends the trial as a failure.
 
 from __future__ import annotations
 
+import re
+
+SHOWN = 300
+"""Characters of a server's own words that are repeated."""
+_COLOURS = re.compile(r"\x1b\[[0-?]*[ -/]*[@-~]|\x1b\][^\x07\x1b]*(?:\x07|\x1b\\)?")
+
+
+def printable(text: str, most: int = SHOWN) -> str:
+    """`text` from outside as one line that is safe on a terminal and in a record: without control
+    characters and colours, and with at most `most` characters."""
+    words = _COLOURS.sub("", text[: 8 * most])
+    line = " ".join("".join(c if c.isprintable() else " " for c in words).split())
+    return line if len(line) <= most else f"{line[: most - 3]}..."
+
 
 class WireError(Exception):
     """Base of every error of this package."""
@@ -73,10 +87,11 @@ class ProtocolViolation(TransportError):
 class ServerError(TransportError):
     """The server reported an error for one request; the connection stays usable."""
 
-    def __init__(self, code: str, message: str, retriable: bool) -> None:
-        super().__init__(f"the server reported {code}: {message}")
-        self.code = code
-        self.message = message
+    def __init__(self, code: str, message: str, retriable: bool, url: str = "") -> None:
+        """`url`: where a reader finds the log that tells more."""
+        self.code, self.message = printable(code, 60), printable(message)
+        where = f"; look at the log of {url}" if url else ""
+        super().__init__(f"the server reported {self.code}: {self.message}{where}")
         self.retriable = retriable
 
 

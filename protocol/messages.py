@@ -59,7 +59,7 @@ class Hello:
                 f"the server speaks robospa protocol {version} and this is {VERSION}: "
                 "install the same major version at both ends"
             )
-        return cls(id, version, fields.text("server", ""), PolicySpec.from_json(fields.raw("spec")))
+        return cls(id, version, fields.name("server", ""), PolicySpec.from_json(fields.raw("spec")))
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.protocol.errors import DecodeError
-from robospa.protocol.validate import Fields
+from robospa.protocol.validate import Fields, is_name
 
 CAMERAS = ("head", "left_wrist", "right_wrist", "front", "third")
 STATES = ("commanded", "measured", "none")
@@ -88,13 +88,15 @@ class PolicySpec:
         execute = fields.raw("execute", None)
         action_dim = fields.raw("action_dim", None)
         history = fields.items("history", ())
-        if not all(type(offset) is int and offset < 0 for offset in history):
-            raise DecodeError("spec: 'history' must be a list of negative whole numbers")
+        if len(history) > 64 or not all(type(n) is int and -10_000 <= n < 0 for n in history):
+            raise DecodeError(
+                "spec: 'history' must be a list of at most 64 negative whole numbers from -10000 up"
+            )
         embodiments = fields.items("embodiments", ())
-        if not all(type(name) is str for name in embodiments):
-            raise DecodeError("spec: 'embodiments' must be a list of text")
+        if not all(is_name(name) for name in embodiments):
+            raise DecodeError("spec: 'embodiments' must be a list of text that can be printed")
         return cls(
-            name=fields.text("name"),
+            name=fields.name("name"),
             cameras=cameras,
             state=fields.text("state", "commanded", STATES),
             action=fields.text("action", "joint", SPACES),

@@ -37,6 +37,13 @@ class Fields:
             raise self.refuse(name, f"one of {', '.join(choices)}", found)
         return found
 
+    def name(self, name: str, default: Any = MISSING) -> str:
+        """Text for people; see `is_name`."""
+        found = self.text(name, default)
+        if not is_name(found):
+            raise self.refuse(name, "printable text of at most 200 characters", found)
+        return found
+
     def whole(
         self, name: str, default: Any = MISSING, low: int = -(2**63), high: int = 2**63 - 1
     ) -> int:
@@ -62,6 +69,11 @@ class Fields:
         if not isinstance(found, Mapping) or not all(type(key) is str for key in found):
             raise self.refuse(name, "a map with text keys", found)
         return dict(found)
+
+
+def is_name(value: Any) -> bool:
+    """Whether `value` can stand in a table or on a terminal as it is."""
+    return type(value) is str and len(value) <= 200 and value.isprintable()
 
 
 def kind(value: Any) -> str:

@@ -32,6 +32,7 @@ from robospa.protocol.policy import CAMERAS, SPACES, STATES, CameraSpec, PolicyS
 
 IDS = st.integers(0, MAX_ID)
 TEXT = st.text(max_size=20)
+NAME = TEXT.filter(str.isprintable)
 JSON = st.recursive(
     st.none() | st.booleans() | st.integers(-(2**63), 2**63) | st.floats(allow_nan=False) | TEXT,
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(TEXT, inner, max_size=3),
@@ -40,7 +41,7 @@ JSON = st.recursive(
 JSON_MAP = st.dictionaries(TEXT, JSON, max_size=3)
 SPECS = st.builds(
     PolicySpec,
-    name=TEXT,
+    name=NAME,
     cameras=st.lists(
         st.builds(CameraSpec, st.sampled_from(CAMERAS), st.integers(1, 8192), st.integers(1, 8192)),
         unique_by=lambda camera: camera.name,
@@ -54,7 +55,7 @@ SPECS = st.builds(
     batch=st.integers(1, 4096),
     seeded=st.booleans(),
     privileged=st.booleans(),
-    embodiments=st.lists(TEXT, max_size=2).map(tuple),
+    embodiments=st.lists(NAME, max_size=2).map(tuple),
     action_dim=st.none() | st.integers(1, 256),
 )
 TRIALS = st.builds(
@@ -70,7 +71,7 @@ TRIALS = st.builds(
     extra=JSON_MAP,
 )
 MESSAGES = (
-    st.builds(Hello, IDS, st.just("1.7"), TEXT, SPECS)
+    st.builds(Hello, IDS, st.just("1.7"), NAME, SPECS)
     | st.builds(Reset, IDS, TRIALS)
     | st.builds(Ready, IDS)
     | st.builds(Error, IDS, TEXT, TEXT, st.booleans())
