@@ -30,6 +30,7 @@ from robospa.harness.factory import load, open_policy
 from robospa.harness.policies import over_budget
 from robospa.harness.store import RecordWriter, StorageError, storing, write_actions
 from robospa.harness.watchdog import Attended, Pulse
+from robospa.protocol.errors import printable
 from robospa.protocol.policy import PolicySpec
 from robospa.results.records import TrialKey, TrialRecord
 
@@ -37,6 +38,8 @@ LOGS = "logs"
 PR_SET_PDEATHSIG = 1
 Targets = str | tuple[str, ...]
 """A policy's URL or name, or several that are one as good as the other."""
+SENTENCE = 1000
+"""Characters that an error may have in a record."""
 VIDEO = ("none", "failures", "first", "all")
 
 
@@ -203,7 +206,7 @@ def _log_to(path: Path) -> None:
 
 def describe(error: BaseException) -> str:
     """One line about `error`, naming its class where the text alone would not be understood."""
-    text = " ".join(str(error).split())
+    text = printable(str(error), SENTENCE)
     module = type(error).__module__
     return text if text and module.startswith("robospa.") else f"{type(error).__name__}: {text}"
 

@@ -222,7 +222,7 @@ def terminal(run: Run, ci: str = "wilson") -> None:
         console = Console(width=130)  # a file is as wide as the table needs
     console.print(table, highlight=False)
     for line in missing_lines(scores):
-        console.print(line, style="yellow", highlight=False)
+        console.print(line, style="yellow", markup=False, highlight=False)
 
 
 def is_privileged(run: Run) -> bool:

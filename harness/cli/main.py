@@ -93,7 +93,7 @@ def _unloaded() -> None:
 def sentence(error: BaseException) -> str:
     """`error` in one line; its class only where the text was not written for users."""
     words = error.args[0] if isinstance(error, KeyError) and error.args else error
-    text = " ".join(str(words).split())
+    text = "".join(c for c in " ".join(str(words).split()) if c.isprintable())
     ours = type(error).__module__.startswith("robospa.")
     if isinstance(error, ModuleNotFoundError):
         extra = "report" if error.name in ("jinja2", "matplotlib", "scipy") else "sim"
