@@ -3,8 +3,9 @@
 A policy's numbers are rounded to it once, before they are executed and recorded, so what is
 executed, recorded, submitted and replayed is one and the same. 2^-16 is 0.0009 degrees or 15
 micrometres, far below what any encoder of such arms resolves; the bits below it are noise that
-would make up half of a submission. Rounding is exact in float32 (multiplying by a power of two, nearest
-whole number, ties to even), so it is the same on every machine, and rounding again changes nothing.
+would make up half of a submission. Rounding is exact in float32 (multiplying by a power of two,
+nearest whole number, ties to even), so it is the same on every machine, and rounding again changes
+nothing.
 """
 
 from __future__ import annotations
