@@ -1,87 +1,181 @@
-"""When the batcher waits: arithmetic on a clock that stands still."""
+"""When the batcher waits, by hand; and what becomes of calls that go wrong."""
 
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Sequence
 from typing import Any
 
 import pytest
+from virtual_time import run
 
-from robospa.protocol.batching import Batcher, _Pace, _Request
-
-
-async def nothing(observations: Any, sessions: Any) -> Any:
-    return []
+from robospa.protocol.batching import Batcher, QueueFull
+from robospa.protocol.pacing import KEPT, SLACK, Cost, Paces
 
 
 @pytest.fixture
-def batcher() -> Batcher:
-    """A model for 4 observations that takes 1 s and became free at t = 10 s."""
-    found = Batcher(nothing, size=4, queue=8)
-    found._duration, found._free = 1.0, 10.0
+def paces() -> Paces:
+    """A model that takes 1 s and became free at t = 10 s; session 2 pauses 0.1 s, always."""
+    found = Paces()
+    found.answered([9], 9.0, 10.0)
+    used(found, 2, 0.1)
     return found
 
 
-def waiting(batcher: Batcher, *sessions: int) -> None:
-    loop = asyncio.new_event_loop()
-    for session in sessions:
-        batcher._pending.append(_Request(session, {}, 10.0, loop.create_future()))
-    loop.close()
+def used(paces: Paces, session: int, pause: float, answered: float = 10.0) -> None:
+    """`session` was answered at `answered` and has paused `pause` [s] so far, each time."""
+    paces.arrived(session, 0.0)
+    pace = paces._sessions[session]
+    pace.pauses.extend([pause] * KEPT)
+    pace.answered = answered
 
 
-def test_a_lone_client_never_waits(batcher: Batcher) -> None:
-    waiting(batcher, 1)
-    assert batcher.wait_for(10.0) == 0
+def wait(paces: Paces, now: float = 10.0, *waiting: int, size: int = 4) -> float:
+    return paces.wait_for(now, waiting or (1,), 10.0, size)
 
 
-def test_a_session_that_is_due_soon_is_waited_for(batcher: Batcher) -> None:
-    waiting(batcher, 1)
-    batcher._paces[2] = _Pace(answered=10.0, pause=0.1)
-    assert batcher.wait_for(10.0) == pytest.approx(0.152)
+def test_a_session_that_is_due_soon_is_waited_for(paces: Paces) -> None:
+    assert wait(paces) == pytest.approx(0.1 + SLACK)
 
 
-def test_a_session_that_is_late_is_not_waited_for(batcher: Batcher) -> None:
-    waiting(batcher, 1)
-    batcher._paces[2] = _Pace(answered=9.0, pause=0.1)
-    assert batcher.wait_for(10.0) == 0
+def test_nobody_else_nothing_to_wait_for() -> None:
+    paces = Paces()
+    paces.answered([1], 9.0, 10.0)
+    assert wait(paces) == 0
 
 
-def test_a_session_in_a_long_simulation_is_not_waited_for(batcher: Batcher) -> None:
-    waiting(batcher, 1)
-    batcher._paces[2] = _Pace(answered=10.0, pause=5.0)
-    assert batcher.wait_for(10.0) == 0
+def test_who_is_late_is_not_waited_for(paces: Paces) -> None:
+    assert wait(paces, 10.2) == 0
 
 
-def test_a_wait_that_costs_more_than_it_brings_is_not_made(batcher: Batcher) -> None:
-    waiting(batcher, 1, 2, 3)
-    batcher._paces[4] = _Pace(answered=10.0, pause=0.4)
-    assert 4 / (1 + 0.602) < 3 / 1
-    assert batcher.wait_for(10.0) == 0
+def test_a_session_in_a_long_simulation_is_not_waited_for(paces: Paces) -> None:
+    paces.forget(2)
+    used(paces, 3, 5.0)
+    assert wait(paces) == 0
 
 
-def test_a_full_batch_goes_at_once(batcher: Batcher) -> None:
-    waiting(batcher, 1, 2, 3, 4)
-    batcher._paces[5] = _Pace(answered=10.0, pause=0.01)
-    assert batcher.wait_for(10.0) == 0
+def test_a_wait_that_costs_more_than_it_brings_is_not_made(paces: Paces) -> None:
+    paces.forget(2)
+    used(paces, 4, 0.4)
+    assert 4 / (1 + 0.4) < 3 / 1
+    assert wait(paces, 10.0, 1, 2, 3) == 0
 
 
-def test_a_resting_session_is_forgotten(batcher: Batcher) -> None:
-    waiting(batcher, 1)
-    batcher._paces[2] = _Pace(answered=10.0, pause=0.1)
-    batcher.forget(2)
-    assert batcher.wait_for(10.0) == 0
+def test_a_resting_session_is_forgotten(paces: Paces) -> None:
+    paces.forget(2)
+    assert wait(paces) == 0
 
 
-def test_without_a_measured_duration_nobody_waits() -> None:
-    batcher = Batcher(nothing, size=4, queue=8)
-    waiting(batcher, 1)
-    batcher._paces[2] = _Pace(answered=10.0, pause=0.1)
-    assert batcher.wait_for(10.0) == 0
+def test_without_a_measured_call_nobody_waits() -> None:
+    paces = Paces()
+    used(paces, 2, 0.1)
+    assert wait(paces) == 0
 
 
-def test_a_wrong_number_of_answers_is_an_error() -> None:
+def test_a_request_whose_first_bytes_are_here_is_waited_for(paces: Paces) -> None:
+    paces.forget(2)
+    paces.coming(5, 1.0)
+    paces.arrived(5, 1.02)
+    paces.coming(6, 10.0)
+    assert 0 < wait(paces, 10.001) < 0.01
+
+
+def test_who_sends_byte_by_byte_is_not_waited_for(paces: Paces) -> None:
+    paces.forget(2)
+    paces.coming(5, 1.0)
+    paces.arrived(5, 1.02)
+    paces.coming(6, 9.0)
+    assert wait(paces) == 0
+
+
+def test_a_model_that_gains_nothing_from_batches_is_not_waited_for(paces: Paces) -> None:
+    paces.cost = Cost()
+    for size in (1, 4, 2, 8):
+        paces.cost.add(size, 0.25 * size)
+    assert paces.cost(4) == pytest.approx(1.0)
+    assert wait(paces) == 0
+
+
+# ---------------------------------------------------------------- calls that go wrong
+
+
+async def _ask(batcher: Batcher, count: int) -> list[Any]:
+    asks = (batcher.infer(number, {"n": number}) for number in range(count))
+    return await asyncio.gather(*asks, return_exceptions=True)
+
+
+def batcher_of(answer: Any, queue: int = 64) -> Batcher:
+    async def call(observations: Sequence[Any], sessions: Sequence[int]) -> Sequence[Any]:
+        await asyncio.sleep(1)
+        found: Sequence[Any] = answer([o["n"] for o in observations])
+        return found
+
+    return Batcher(call, 8, queue)
+
+
+def test_too_few_answers_are_asked_for_again_one_by_one() -> None:
+    batcher = batcher_of(lambda numbers: numbers[:1])
+    assert [found[0] for found in run(_ask(batcher, 4))] == [0, 1, 2, 3]
+
+
+def test_no_answer_at_all_is_an_error_of_every_request() -> None:
+    found = run(_ask(batcher_of(lambda numbers: []), 3))
+    assert all("gave 0 answers to 1 request" in str(error) for error in found)
+
+
+def test_one_bad_sample_spares_the_others() -> None:
+    def answer(numbers: list[int]) -> list[int]:
+        if 2 in numbers:
+            raise RuntimeError("bad sample")
+        return numbers
+
+    found = run(_ask(batcher_of(answer), 4))
+    assert isinstance(found[2], RuntimeError)
+    assert [f[0] for n, f in enumerate(found) if n != 2] == [0, 1, 3]
+
+
+def test_a_client_that_goes_in_the_middle_of_a_batch_spares_the_others() -> None:
+    async def main() -> list[Any]:
+        batcher = batcher_of(lambda numbers: numbers)
+        tasks = [asyncio.create_task(batcher.infer(n, {"n": n})) for n in range(3)]
+        await asyncio.sleep(0.5)
+        tasks[1].cancel()
+        return await asyncio.gather(*tasks, return_exceptions=True)
+
+    first, gone, last = run(main())
+    assert (first[0], last[0]) == (0, 2)
+    assert isinstance(gone, asyncio.CancelledError)
+
+
+def test_a_client_that_goes_before_its_batch_is_not_computed() -> None:
+    seen: list[int] = []
+
     async def main() -> None:
-        with pytest.raises(ValueError, match="gave 0 answers to 1 request"):
-            await Batcher(nothing, size=4, queue=8).infer(1, {})
+        batcher = batcher_of(lambda numbers: seen.extend(numbers) or numbers)
+        first = asyncio.create_task(batcher.infer(0, {"n": 0}))
+        await asyncio.sleep(0.5)
+        second = asyncio.create_task(batcher.infer(1, {"n": 1}))
+        await asyncio.sleep(0.1)
+        second.cancel()
+        await first
+        await asyncio.sleep(3)
 
-    asyncio.run(main())
+    run(main())
+    assert seen == [0]
+
+
+def test_a_full_queue_is_said_at_once() -> None:
+    found = run(_ask(batcher_of(lambda numbers: numbers, queue=2), 4))
+    assert [isinstance(error, QueueFull) for error in found] == [False, False, True, True]
+
+
+def test_the_timing_tells_wait_call_and_batch() -> None:
+    found = run(_ask(Batcher(batcher_of(lambda numbers: numbers).call, 2, 64, _clock), 4))
+    times = [timing for _, timing in found]
+    assert [t["batch"] for t in times] == [2, 2, 2, 2]
+    assert times[0] == {"queue_ms": 0, "infer_ms": 1000, "batch": 2}
+    assert times[3]["queue_ms"] == pytest.approx(1000)
+
+
+def _clock() -> float:
+    return asyncio.get_running_loop().time()
