@@ -212,7 +212,7 @@ KINDS: dict[str, Callable[[Run, random.Random], bool]] = {
     "workers killed while writing": worker_killed_writing,
     "worker stopped": worker_stopped,
     "worker stuck in native code": worker_stuck,
-    "worker stopped, driver killed": orphan_stopped,
+    "worker stopped and driver killed": orphan_stopped,
     "server killed": server_killed,
     "disk full": disk_full,
     "file too large": file_too_large,
@@ -222,7 +222,7 @@ ENDS_DRIVER = (
     "driver killed",
     "driver terminated",
     "driver interrupted",
-    "worker stopped, driver killed",
+    "worker stopped and driver killed",
     "disk full",
     "file too large",
 )
