@@ -18,6 +18,7 @@ LOST = "missing at once"
 POLICY = "policy error"
 STOPS = "the run stops"
 UNHARMED = "no trial is touched"
+WAITED = "waited for, then missing"
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ from fault_cases import (
     STOPS,
     UNHARMED,
     UNREADABLE,
+    WAITED,
     Case,
     answers,
     array,
@@ -36,11 +37,15 @@ from run_fakes import SPEC
 from robospa.protocol.messages import Error, Hello, Ready
 
 SILENT = [
-    silent(
+    Case(
         "open",
         "accepts the connection and never finishes the handshake",
         "open",
-        "{url} did not finish the handshake within 0.4 s; look at the server's log",
+        do.silence,
+        WAITED,
+        "{url} is away ({url} did not finish the handshake within 0.4 s; look at the server's "
+        "log); other trials run until it is back",
+        True,
     ),
     silent(
         "greeting", "never says hello", "hello", f"{{url}} did not send hello within 0.4 s; {LATE}"

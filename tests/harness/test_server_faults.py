@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
-from fault_cases import LOST, POLICY, REPEATED, STOPS, UNHARMED, Case
+from fault_cases import LOST, POLICY, REPEATED, STOPS, UNHARMED, WAITED, Case
 from fault_server import ALWAYS, ONCE, SOUND, FaultyServer
 from fault_table import CASES
 from run_fakes import SPEC, FakePolicy, FakeWorld, parts
@@ -119,6 +119,9 @@ def test_a_fault_ends_as_it_should(case: Case, seen: Seen) -> None:
         assert told == [f"{case.seen(SAID)}; recorded as missing"] * 2
     elif case.end == UNHARMED:
         assert struck.end == "success"
+    elif case.end == WAITED:
+        assert struck.end == "success"
+        assert case.seen(SAID) in [as_printed(note, seen.urls[case.name]) for note in seen.notes]
     else:
         assert case.end == REPEATED
         assert struck.end == "success"
