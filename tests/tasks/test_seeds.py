@@ -10,7 +10,7 @@ from robospa.tasks.seeds import FIRST_SEED, PER_VARIANT, accepted, seed_list_has
 PENDING: dict[str, tuple[int, ...]] = {
     "Lift_Pot_Repeat": (3, 4, 5),
     "Lift_Fan_Repeat": (3, 4, 5),
-    "Click_Bell_Repeat": (2, 3, 4, 5),
+    "Click_Bell_Repeat": (3, 4, 5),
     "Move_Blocks_Apart": (2, 3, 4, 5),
     "Move_Playing_Cards_Away": (2, 3, 4, 5),
     "Place_Bowls_Plates": (2, 3, 4, 5),
