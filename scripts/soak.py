@@ -74,6 +74,8 @@ def soak(options: argparse.Namespace, base: Path) -> dict[str, object]:
                 found += check_run(trouble.run, reference)
             except Finding as finding:
                 found.append(f"run {rounds}: {finding}")
+            finally:
+                trouble.run.end()
             done += trouble.done
             resumed += trouble.run.starts - 1
             trials += options.trials
@@ -82,7 +84,6 @@ def soak(options: argparse.Namespace, base: Path) -> dict[str, object]:
                 f"{len(found)} findings, {time.monotonic() - begun:.0f} s",
                 flush=True,
             )
-            trouble.run.end()
             if found:
                 keep = Path(tempfile.mkdtemp(prefix="soak-finding-"))
                 shutil.copytree(trouble.run.folder, keep / "run")

@@ -11,7 +11,8 @@ import signal
 import subprocess
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 from soak_run import PATIENCE, Finding, Run, kill, wait_gone
 
@@ -54,13 +55,22 @@ def driver_stopped(run: Run, rng: random.Random) -> bool:
     """Ctrl-Z for longer than a worker may be silent, then on: nobody is to blame."""
     if not _in_flight(run) or run.driver is None:
         return False
+    with _held(run):
+        time.sleep(6.0)
+    return True
+
+
+@contextmanager
+def _held(run: Run) -> Iterator[None]:
+    assert run.driver is not None
     everybody = [run.driver.pid, *run.workers()]
     for pid in everybody:
         kill(pid, signal.SIGSTOP)
-    time.sleep(6.0)
-    for pid in everybody:
-        kill(pid, signal.SIGCONT)
-    return True
+    try:
+        yield
+    finally:
+        for pid in everybody:
+            kill(pid, signal.SIGCONT)
 
 
 def worker_killed(run: Run, rng: random.Random) -> bool:
@@ -169,11 +179,10 @@ def second_driver(run: Run, rng: random.Random) -> bool:
     if not _in_flight(run):
         return False
     words = [*run.words, "--resume"]
-    done = subprocess.run(
-        words, env=run.environment, capture_output=True, text=True, timeout=PATIENCE
-    )
-    if not run.alive():
-        return False
+    with _held(run):  # so that it is still there when the second one asks
+        done = subprocess.run(
+            words, env=run.environment, capture_output=True, text=True, timeout=PATIENCE
+        )
     if done.returncode != 1 or "is running the run" not in done.stderr:
         raise Finding(f"a second driver got in: {done.returncode} {done.stderr}")
     return True
@@ -257,8 +266,11 @@ class Trouble:
             time.sleep(self.rng.uniform(0.0, 4.0))  # also before there is anything
         else:
             lines = self.run.lines()
-            wanted = self.rng.randrange(1, 12)
+            wanted = self.rng.randrange(1, 9)
+            until = time.monotonic() + PATIENCE
             while self.run.alive() and self.run.lines() - lines < wanted:
+                if time.monotonic() > until:
+                    raise Finding(f"the run does not go on: {self.run.said()}")
                 time.sleep(0.005)
             time.sleep(self.rng.uniform(0.0, 0.3))
         if KINDS[kind](self.run, self.rng):
