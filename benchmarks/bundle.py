@@ -4,9 +4,10 @@
 
 Tasks, step limits and subtasks are the catalog's; seeds, records and actions are synthetic. Actions
 are rest-to-rest reaches of one arm after the other, about 25 actions each, answered in chunks of 50
-with the jitter of a learned policy on top: white noise of `--noise` rad on every number, whose
-lowest bits no method compresses. A fifth of the trials succeed, half way to the step limit on
-average; the others use it up. Prints sizes by kind of file and the time of level 1.
+with the jitter of a learned policy on top: white noise of `--noise` rad on every number, which no
+method compresses, rounded to the grid of executed actions. A fifth of the trials succeed, half way
+to the step limit on average; the others use it up. Prints sizes by kind of file and the time of
+level 1.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from robospa.harness.grid import on_grid
 from robospa.harness.manifest import about_machine, group_keys, seed_hash
 from robospa.harness.trial import policy_seed
 from robospa.leaderboard.packing import inputs_of, sizes_of, write_bundle
@@ -74,7 +76,7 @@ class Traces:
 
     def __call__(self, key: TrialKey) -> NDArray[np.float32]:
         seed = [int.from_bytes(hashlib.sha256(key.slug.encode()).digest()[:8], "big")]
-        return actions(np.random.default_rng(seed), self._steps[key], self._noise)
+        return on_grid(actions(np.random.default_rng(seed), self._steps[key], self._noise))
 
 
 def record(key: TrialKey, facts: Any, steps: int, success: bool, digest: str) -> TrialRecord:

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from robospa.harness.factory import load
+from robospa.harness.grid import PER_UNIT, is_on_grid
 from robospa.harness.manifest import changed_settings, group_keys, seed_hash
 from robospa.harness.store import action_path, read_actions
 from robospa.leaderboard import bundle as layout
@@ -89,7 +90,13 @@ def pack(
         note("writing the bundle")
 
         def trace(key: TrialKey) -> Trace:
-            return read_actions(action_path(homes[key], key))[0]
+            actions = read_actions(action_path(homes[key], key))[0]
+            if not is_on_grid(actions):
+                raise BundleError(
+                    f"{key.slug} has actions finer than 1/{PER_UNIT}, as runs of older versions "
+                    "have: run it again with this one"
+                )
+            return actions
 
         write_bundle(part, run, card, reference.suite, trace, films, practice)
         note("verifying what was packed")

@@ -1,15 +1,16 @@
-"""The action file of a variant: float32 arrays of its trials, arranged so that they compress.
+"""The action file of a variant: the arrays of its trials, arranged so that they compress.
 
     8 bytes   magic
     uint32    trials, then the columns of an action
     uint32    actions of each trial
     4 planes  the differences from action to action, most significant bytes first
 
-All little-endian. Every float becomes an integer in the same order, of which the difference to the
-action before is kept, small ones of either sign as small numbers; column by column through all
-trials, first all first bytes, then all second ones and so on. Deflate finds little in the first
-planes and cannot shrink the last: those are noise. The same bits come back. The length of the file
-follows from its head, so nothing is allocated that the file does not hold.
+All little-endian. Executed actions lie on the grid of `harness.grid`, so every number is a whole
+number of its steps; nothing finer can be written down, and the same float32 bits come back. Of each
+the difference to the action before is kept, small ones of either sign as small numbers; column by
+column through all trials, first all first bytes, then all second ones and so on. Deflate finds
+little in the first two planes and much noise in the last. The length of the file follows from its
+head, so nothing is allocated that the file does not hold.
 """
 
 from __future__ import annotations
@@ -21,22 +22,23 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from robospa.harness.grid import FURTHEST, PER_UNIT, is_on_grid
 from robospa.leaderboard.bundle import BundleError
 
-MAGIC = b"rspa-a1\n"
+MAGIC = b"rspa-a2\n"
 HEAD = struct.Struct("<8sII")
 WIDEST = 64
 """Columns of an action, at most."""
-ONE, TOP, SIGN = np.uint32(1), np.uint32(31), np.uint32(0x80000000)
+ONE, TOP = np.uint32(1), np.uint32(31)
 
 Trace = NDArray[np.float32]
 Words = NDArray[np.uint32]
 
 
 def encode(traces: Sequence[Trace]) -> bytes:
-    """The file of `traces`, each (actions, D) with one D for all; ValueError if they differ in D.
+    """The file of `traces`, each (actions, D) with one D for all.
 
-    A trace without actions may have any D.
+    A trace without actions may have any D. ValueError if they differ in D or leave the grid.
     """
     widths = {t.shape[1] for t in traces if len(t)}
     if len(widths) > 1:
@@ -44,7 +46,7 @@ def encode(traces: Sequence[Trace]) -> bytes:
     width = widths.pop() if widths else 0
     head = HEAD.pack(MAGIC, len(traces), width)
     lengths = np.array([len(t) for t in traces], "<u4").tobytes()
-    words = [_differences(np.ascontiguousarray(t, "<f4").view("<u4")) for t in traces if len(t)]
+    words = [_differences(t) for t in traces if len(t)]
     columns = np.concatenate(words).T if words else np.zeros((0, 0), "<u4")
     planes = columns.astype(">u4", order="C").reshape(-1).view(np.uint8).reshape(-1, 4).T
     return head + lengths + np.ascontiguousarray(planes).tobytes()
@@ -74,25 +76,33 @@ def decode(data: bytes, what: str) -> list[Trace]:
             f"{len(data)} bytes, not {start + 4 * count}"
         )
     planes = np.frombuffer(data, np.uint8, 4 * count, start).reshape(4, count)
-    steps = np.empty((count, 4), np.uint8)
-    for place, plane in enumerate(planes):
-        steps[:, 3 - place] = plane
-    table = steps.view("<u4").reshape(width, -1)
+    table = _joined(planes).reshape(width, -1)
     table = (table >> ONE) ^ -(table & ONE)
     ends = [0, *np.cumsum(lengths).tolist()]
     for first, last in pairwise(ends):
         if count and last > first:
             own = table[:, first:last]
-            own[:, 0] += SIGN
             np.cumsum(own, axis=1, dtype=np.uint32, out=own)
-    table ^= ((table >> TOP) - ONE) | SIGN
-    floats = np.ascontiguousarray(table.T).view(np.float32)
+    steps = np.ascontiguousarray(table.T).view(np.int32)
+    if count and not -FURTHEST * PER_UNIT <= steps.min() <= steps.max() <= FURTHEST * PER_UNIT:
+        raise BundleError(f"{what} has an action with a number beyond {FURTHEST}")
+    floats = steps.astype(np.float32)
+    floats /= np.float32(PER_UNIT)
     return [floats[a:b] for a, b in pairwise(ends)]
 
 
-def _differences(bits: Words) -> Words:
-    """(T, D) bit patterns of floats to zigzag differences of integers in the floats' order."""
-    ordered = bits ^ (-(bits >> TOP) | SIGN)
-    ordered[1:] -= ordered[:-1].copy()
-    ordered[0] -= SIGN
-    return (ordered << ONE) ^ -(ordered >> TOP)
+def _joined(planes: NDArray[np.uint8]) -> Words:
+    """The words whose first, second, third and last bytes are in the four `planes`."""
+    words = np.empty((planes.shape[1], 4), np.uint8)
+    for place, plane in enumerate(planes):
+        words[:, 3 - place] = plane
+    return words.view("<u4")
+
+
+def _differences(trace: Trace) -> Words:
+    """Zigzag differences of the whole numbers of grid steps in `trace` (T, D)."""
+    if not is_on_grid(trace):
+        raise ValueError(f"an action is finer than 1/{PER_UNIT} or beyond {FURTHEST}")
+    steps = (trace * np.float32(PER_UNIT)).astype(np.int32).view(np.uint32)
+    steps[1:] -= steps[:-1].copy()
+    return (steps << ONE) ^ -(steps >> TOP)

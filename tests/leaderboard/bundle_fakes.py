@@ -11,6 +11,7 @@ from typing import Any
 
 sys.path.append(str(Path(__file__).parents[1] / "harness"))
 
+import pytest
 from run_fakes import LIMIT, FakePolicy, FakeWorld, parts
 
 from robospa.harness.manifest import Manifest, about_machine, write_manifest
@@ -19,8 +20,9 @@ from robospa.harness.trial import policy_seed, run_trial
 from robospa.harness.video import TrialRecorder
 from robospa.harness.world import Poll, StepResult
 from robospa.leaderboard import bundle as layout
+from robospa.leaderboard.bundle import BundleError, Limits
 from robospa.leaderboard.reference import Reference, facts_of
-from robospa.leaderboard.verify import seed_lists
+from robospa.leaderboard.verify import seed_lists, verify
 from robospa.results.records import TrialKey
 
 PICK, PRESS = "Pick_Blocks_Size", "Press_Stapler_Repeat"
@@ -191,6 +193,29 @@ def relist(files: Files, keys: Sequence[TrialKey]) -> None:
     manifest = json.loads(files[layout.MANIFEST])
     manifest["inputs"] = layout.inputs_hash(run, json.loads(files[layout.SEEDS]))
     files[layout.MANIFEST] = layout.canonical(manifest)
+
+
+ACTIONS = layout.actions_name(PICK, 1)
+
+
+def refused(path: Path, limits: Limits | None = None) -> str:
+    """The one sentence with which the bundle at `path` is refused."""
+    with pytest.raises(BundleError) as caught:
+        verify(path, REFERENCE, limits=limits)
+    text = str(caught.value)
+    assert text and "\n" not in text and len(text) < 400
+    return text
+
+
+def edit(files: Files, name: str, change: Callable[[Any], Any]) -> None:
+    data = json.loads(files[name])
+    files[name] = layout.canonical(change(data) or data)
+
+
+def edit_row(files: Files, place: int, change: Callable[[Any], None]) -> None:
+    rows = rows_of(files)
+    change(rows[place])
+    put_rows(files, rows)
 
 
 __all__ = ["LIMIT"]

@@ -106,12 +106,13 @@ def test_outcomes_forged_with_all_hashes_are_caught(
 def test_actions_of_another_task_forged_with_all_hashes_are_caught(
     files: Files, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    from robospa.harness.grid import on_grid
     from robospa.harness.trial import actions_digest
     from robospa.leaderboard.rows import trace_hash
     from robospa.leaderboard.traces import decode, encode
 
     name = layout.actions_name(PRESS, 1)
-    traces = [0.5 * trace for trace in decode(files[name], name)]
+    traces = [on_grid(0.5 * trace) for trace in decode(files[name], name)]
     files[name] = encode(traces)
     rows = rows_of(files)
     own = [
