@@ -190,7 +190,8 @@ class Runner:
         """The trial of `seat` has its record."""
         job, seat.job = seat.job, None
         if job is not None:
-            self._scheduler.done(job, record, time.monotonic() - seat.begun)
+            now = time.monotonic()
+            self._scheduler.done(job, record, now, now - seat.begun)
         self.shares.add(record)
         self._staffing.heard(record)
         self._settle(record)

@@ -68,7 +68,7 @@ class Scheduler:
         server = max(there, key=lambda s: pulls[s.target])
         work = self.queue.take(self._task(server, due), now)
         assert work is not None
-        server.begin(work.key.task)
+        server.begin(work.key.task, now)
         return Job(work, server.target)
 
     def _pull(self, server: Server, due: Mapping[str, float], now: float) -> float:
@@ -79,14 +79,14 @@ class Scheduler:
             if task in server.tasks
         }
         work = sum(due[task] / count for task, count in sharing.items())
-        return work / ((server.running + 1) * self._waited(server))
+        return work / ((server.running + 1) * self._wait(server, now))
 
-    def _waited(self, server: Server) -> float:
+    def _wait(self, server: Server, now: float) -> float:
         """What one worker adds to the wait there; that of an average server where unknown."""
-        if server.waited is not None:
-            return max(server.waited, 1e-3)
-        known = [max(s.waited, 1e-3) for s in self.servers.values() if s.waited is not None]
-        return sum(known) / len(known) if known else 1.0
+        if (known := server.wait(now)) is not None:
+            return max(known, 1e-3)
+        others = [max(w, 1e-3) for s in self.servers.values() if (w := s.wait(now)) is not None]
+        return sum(others) / len(others) if others else 1.0
 
     def _task(self, server: Server, due: Mapping[str, float]) -> str:
         """The base task that `server` goes on with or turns to."""
@@ -97,9 +97,9 @@ class Scheduler:
         free = [task for task in mine if task not in held]
         return max(free or mine, key=lambda task: due[task])
 
-    def done(self, job: Job, record: TrialRecord, seconds: float) -> None:
-        """`job` has its record, after `seconds`."""
-        self.servers[job.target].finish(record)
+    def done(self, job: Job, record: TrialRecord, now: float, seconds: float) -> None:
+        """`job` has its record at time `now`, after `seconds`."""
+        self.servers[job.target].finish(record, now)
         self.queue.costs.learn(record.key, seconds)
 
     def lost(self, job: Job, now: float, fault: str = "", text: str = "") -> bool:

@@ -1,8 +1,10 @@
 """What the driver knows of one policy server: its load, its speed, whether it is there.
 
 `waited` is the wait of a worker for one answer [ms], divided by the workers that shared the server
-at that time: with one more worker, each of n + 1 is expected to wait `waited` * (n + 1). A server
-that lost its line is left alone for a growing pause; then one worker tries it before others follow.
+at that time: with one more worker, each of n + 1 is expected to wait `waited` * (n + 1). Of a
+server where nobody is any more this is believed less and less, so that it is asked again some day.
+A server that lost its line is left alone for a growing pause; then one worker tries it before
+others follow.
 """
 
 from __future__ import annotations
@@ -15,6 +17,7 @@ from robospa.results.records import TrialRecord
 UNREACHED, BROKEN, UNFIT = "unreached", "broken", "unfit"
 """Faults of a server: nobody listens; the line ended in a trial; it is another one than before."""
 SMOOTHING = 0.3  # weight of the newest trial in the running means
+FORGOTTEN = 30.0  # [s] after which the wait at a server without workers counts half
 LONGEST_PAUSE = 30.0  # [s] between two attempts at a server that is away
 MEASURES = ("p50", "queue", "infer", "batch")
 """What of a record's `latency` is averaged per server; the last three only if the server tells."""
@@ -42,6 +45,8 @@ class Server:
     retired: str = ""
     """Why it takes part no more."""
     waited: float | None = None
+    left: float = 0.0
+    """When the last worker left."""
     means: dict[str, float] = field(default_factory=dict)
     fastest: float = float("inf")
     """Smallest median answer time of a trial [ms]."""
@@ -57,15 +62,16 @@ class Server:
         """Whether it answered when it was last asked."""
         return not self.failures and not self.retired
 
-    def begin(self, task: str) -> None:
+    def begin(self, task: str, now: float) -> None:
         """A trial of `task` is sent there."""
+        self.waited = self.wait(now)
         self.switches += self.task not in ("", task)
         self.task = task
         self.running += 1
 
-    def finish(self, record: TrialRecord) -> None:
+    def finish(self, record: TrialRecord, now: float) -> None:
         """A trial there has its record."""
-        sharing, self.running = max(1, self.running), self.running - 1
+        sharing, self.running, self.left = max(1, self.running), self.running - 1, now
         self.trials += 1
         self.failures = 0
         if not record.latency:
@@ -74,6 +80,12 @@ class Server:
         middle = record.latency["p50"]
         self.fastest = min(self.fastest, middle)
         self.waited = mean(self.waited, middle / sharing)
+
+    def wait(self, now: float) -> float | None:
+        """What one worker adds to the wait there [ms], as far as that is still believed."""
+        if self.waited is None or self.running:
+            return self.waited
+        return float(self.waited * 0.5 ** ((now - self.left) / FORGOTTEN))
 
     def fail(self, now: float, pause: float) -> None:
         """It cannot be reached or its line broke; `pause` is the first pause [s]."""

@@ -35,6 +35,9 @@ from robospa.tasks.scene import Scene
 from robospa.tasks.snapshot import Snapshot
 from robospa.tasks.task import Task, Tracker
 
+SERVER_TIMES = {"queue": "queue_ms", "infer": "infer_ms", "batch": "batch"}
+"""Entries of a record's `latency` that come from the server, and what the wire calls them."""
+
 
 class Recorder(Protocol):
     """Looks on while a trial runs."""
@@ -110,6 +113,8 @@ class _Run:
     """For every event the number of actions begun by then."""
     actions: list[NDArray[np.float32]] = field(default_factory=list)
     latencies: list[float] = field(default_factory=list)
+    told: list[Mapping[str, float]] = field(default_factory=list)
+    """What the policy's server said of the time of every answer."""
     past: dict[int, dict[str, Any]] = field(default_factory=dict)
     physics_steps: int = 0
     physics_seconds: float = 0.0
@@ -169,6 +174,7 @@ class _Run:
         begun = time.perf_counter()
         answer = self.watch.call("waiting", self.policy.infer, observation)
         self.latencies.append(1000.0 * (time.perf_counter() - begun))
+        self.told.append(getattr(self.policy, "last_timing", {}))
         return on_grid(check_chunk(answer, spec))
 
     def execute(self, action: NDArray[np.float32], space: str) -> bool:
@@ -216,11 +222,18 @@ def _end_of(run: _Run) -> str:
     return "goal_lost" if reached.failed else "step_limit"
 
 
-def _percentiles(latencies: list[float]) -> dict[str, float]:
+def _answer_times(latencies: list[float], told: list[Mapping[str, float]]) -> dict[str, float]:
+    """Percentiles as the client saw them, and means of what the server told, if it did [ms]."""
     if not latencies:
         return {}
     p50, p95, p99 = (float(v) for v in np.percentile(latencies, [50, 95, 99]))
-    return {"p50": p50, "p95": p95, "p99": p99, "max": max(latencies)}
+    found = {"p50": p50, "p95": p95, "p99": p99, "max": max(latencies)}
+    for name, entry in SERVER_TIMES.items():
+        values = [timing.get(entry) for timing in told]
+        usable = [v for v in values if isinstance(v, (int, float)) and 0.0 <= v < 1e9]
+        if usable:
+            found[name] = sum(usable) / len(usable)
+    return found
 
 
 def actions_digest(actions: list[NDArray[np.float32]]) -> str:
@@ -323,7 +336,7 @@ def run_trial(
             {**asdict(event), "step": step}
             for event, step in zip(run.events, run.when, strict=True)
         ),
-        latency=_percentiles(run.latencies),
+        latency=_answer_times(run.latencies, run.told),
         timing=timing,
         diagnostics=_diagnostics(run),
     )

@@ -76,12 +76,21 @@ def ends(run: Run) -> dict[str, int]:
 
 
 def latency(run: Run) -> dict[str, float]:
-    """Milliseconds that the policy took to answer: median and largest of the trials' p50, p99."""
+    """Milliseconds that the policy took to answer: median and largest of the trials' p50, p99.
+
+    Where its server told them, also the means of `queue`, `infer` and of the size of a `batch`.
+    """
     found = [r.latency for r in run.records.values() if r.latency]
     if not found:
         return {}
     middle = sorted(x["p50"] for x in found)[len(found) // 2]
-    return {"p50": middle, "p99": max(x["p99"] for x in found), "max": max(x["max"] for x in found)}
+    told = {
+        name: sum(values) / len(values)
+        for name in ("queue", "infer", "batch")
+        if (values := [x[name] for x in found if name in x])
+    }
+    worst = {name: max(x[name] for x in found) for name in ("p99", "max")}
+    return {"p50": middle, **worst, **told}
 
 
 def timing(run: Run) -> dict[str, float]:
@@ -142,7 +151,12 @@ def _latency(run: Run) -> str:
     spent = latency(run)
     if not spent:
         return ""
-    return f"median {spent['p50']:.1f} ms, p99 {spent['p99']:.1f} ms, most {spent['max']:.1f} ms"
+    text = f"median {spent['p50']:.1f} ms, p99 {spent['p99']:.1f} ms, most {spent['max']:.1f} ms"
+    if "queue" in spent and "infer" in spent:
+        text += f"; {spent['infer']:.1f} ms in the model, {spent['queue']:.1f} ms in its queue"
+    if spent.get("batch", 1.0) > 1.0:
+        text += f"; {spent['batch']:.1f} observations a call"
+    return text
 
 
 def _repeats(run: Run) -> str:
