@@ -18,6 +18,8 @@ from robospa.harness.locking import locked
 from robospa.harness.manifest import Manifest, about_machine, check_folder, open_run
 from robospa.harness.policies import Probed, probe_policies, warnings_of
 from robospa.harness.progress import Progress, summary
+from robospa.harness.ray_bridge import RaySettings
+from robospa.harness.ray_executor import far_away, joined
 from robospa.harness.runner import RunAborted, Runner, RunOptions
 from robospa.harness.store import tidy
 from robospa.harness.worker import WorkerConfig, describe
@@ -42,6 +44,8 @@ class Request:
     arguments: Mapping[str, Any] = field(default_factory=dict)
     resume: bool = False
     wait: float = 0.0
+    ray: RaySettings | None = None
+    """Where the workers are, if not on this machine."""
 
 
 class WorldBroken(Exception):
@@ -96,8 +100,7 @@ def make_manifest(request: Request, policies: Mapping[str, Probed]) -> Manifest:
     """The run's manifest, with the policy of every task; the world is built once to describe it."""
     config = request.config
     specs = [policy.spec for policy in policies.values()]
-    drawn = any(spec.cameras for spec in specs) or config.video != "none"
-    world = probe_world(config, drawn)
+    world = probe_world(config, _renders(config, policies))
     parts = load(config.parts)
     first = {key.task: key for key in reversed(list(request.keys))}
     found = {task: parts(key) for task, key in first.items()}
@@ -120,6 +123,11 @@ def make_manifest(request: Request, policies: Mapping[str, Probed]) -> Manifest:
     about["warnings"] = warnings_of(policies, told, config.step_scale)
     categories = {task: part.task.category for task, part in found.items()}
     return Manifest(settings, tuple(request.keys), about, categories)
+
+
+def _renders(config: WorkerConfig, policies: Mapping[str, Probed]) -> bool:
+    """Whether any picture will be asked for."""
+    return config.video != "none" or any(p.spec.cameras for p in policies.values())
 
 
 def _about_policy(policy: Probed) -> dict[str, Any]:
@@ -151,15 +159,16 @@ def evaluate(request: Request) -> None:
             if is_url(p.target)
         },
     )
-    with locked(folder):
+    with joined(request.ray, config, _renders(config, policies)) as executor, locked(folder):
         tidy(folder)
         open_run(folder, manifest, request.resume)
         known = read_records(folder)
         owed = [key for key in request.keys if not finished(known.get(key))]
         with Progress(len(request.keys), len(request.keys) - len(owed)) as progress:
-            for text in manifest.about["warnings"]:
+            for text in [*manifest.about["warnings"], *far_away(executor, config)]:
                 progress.note(f"warning: {text}")
             runner = Runner(config, owed, request.options, progress.add, progress.note)
+            runner.executor = executor
             runner.on_status = progress.show
             runner.run()
         for text in summary(runner.shares.overall(), runner.status(time.monotonic())):

@@ -179,7 +179,7 @@ class Worker:
                 shut()
 
 
-def _die_with_driver() -> None:
+def die_with_driver() -> None:
     """End this process as soon as its parent is gone, however it went."""
     if sys.platform == "linux":
         # The thread below never runs if this process is stopped, or stuck holding the interpreter.
@@ -244,7 +244,7 @@ def main(pipe: Connection, config: WorkerConfig, name: str) -> None:
     """Entry point of a worker process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    _die_with_driver()
+    die_with_driver()
     speaking = threading.Lock()
 
     def send(message: Any) -> None:

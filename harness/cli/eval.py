@@ -71,6 +71,21 @@ def evaluate(
         float,
         typer.Option(help="multiplies the official step limits; 1 is the benchmark"),
     ] = 1.0,
+    executor: Annotated[
+        str, typer.Option(help="where the workers are: local (here) or ray (a Ray cluster)")
+    ] = "local",
+    address: Annotated[
+        str | None,
+        typer.Option(
+            help="Ray cluster: auto, local (one for this run), HOST:PORT, ray://HOST:PORT"
+        ),
+    ] = None,
+    cpus_per_worker: Annotated[
+        float, typer.Option(help="with ray: CPUs of its node that a worker takes")
+    ] = 1.0,
+    gpus_per_worker: Annotated[
+        float, typer.Option(help="with ray: GPUs, only taken by runs that render; such as 0.1")
+    ] = 0.0,
     world: Annotated[str | None, typer.Option(hidden=True)] = None,
     parts: Annotated[str | None, typer.Option(hidden=True)] = None,
 ) -> None:
@@ -121,6 +136,9 @@ def evaluate(
         parts=parts,
         resume=resume,
         arguments=_plain(arguments),
+    )
+    request = running.on_executor(
+        request, executor, address, workers, cpus_per_worker, gpus_per_worker
     )
     running.run_and_show(request)
 

@@ -127,6 +127,25 @@ def make_request(
     )
 
 
+def on_executor(
+    request: Request, executor: str, address: str | None, workers: int, cpus: float, gpus: float
+) -> Request:
+    """`request` with its workers on a Ray cluster if `executor` says so; raises BadChoice."""
+    from dataclasses import replace
+
+    if executor not in ("local", "ray"):
+        raise BadChoice(f"--executor {executor!r} is neither local nor ray")
+    if executor == "local":
+        if address is not None:
+            raise BadChoice("--address goes with --executor ray")
+        return request
+    if cpus <= 0 or gpus < 0:
+        raise BadChoice("a worker takes more than 0 CPUs and no less than 0 GPUs")
+    from robospa.harness.ray_bridge import RaySettings
+
+    return replace(request, ray=RaySettings(address or "auto", workers, cpus, gpus))
+
+
 def policy_map(file: Path, keys: Sequence[TrialKey]) -> dict[str, Targets]:
     """The policy, or the policies, of every task of `keys`; raises RunError."""
     from robospa.harness.policies import read_map
