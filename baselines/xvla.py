@@ -20,7 +20,6 @@ from robospa.baselines.model import (
     Chunk,
     ModelMissing,
     ModelPolicy,
-    check_horizon,
     import_code,
     import_torch,
 )
@@ -29,54 +28,27 @@ from robospa.baselines.pixels import pictures
 from robospa.baselines.poses import Style
 from robospa.protocol.options import option
 from robospa.protocol.policy import CameraSpec, PolicySpec
-from robospa.protocol.rot6d import LAYOUTS, ORDERS
+from robospa.protocol.xvla import Conventions
 
-VIEWS = ("head", "left_wrist", "right_wrist")
-"""Our cameras in the order of the model's views."""
 CHECKOUT = "a checkout of X-VLA"
 
 
 @dataclass(frozen=True)
-class Options:
-    """How X-VLA is loaded and fed; the conventions are those of the client `xvla+http`."""
+class Options(Conventions):
+    """How X-VLA is loaded; the conventions are those of the client `xvla+http`."""
 
     checkpoint: str = option("", "folder or hub name of the model and its processor")
     code: str | None = option(None, "checkout of X-VLA, or set PYTHONPATH")
     device: str = option("cuda", "device of the model")
     batch: int = option(8, "observations in one call of the model, at most")
-    space: str = option("ee6d", "what the model answers", ("ee6d", "joint"))
-    domain_id: int = option(6, "the soft prompt, 0 to 29; 6 is the released RoboTwin checkpoint's")
-    steps: int = option(10, "denoising steps")
-    quaternions: str = option(
-        "xyzw", "how RoboTwin's w x y z are read: `xyzw` repeats the official slip", ORDERS
-    )
-    rotation: str = option("interleaved", "order of the six rotation numbers", LAYOUTS)
-    colors: str = option("rgb", "order of an image's channels", ("rgb", "bgr"))
-    cameras: str = option("head,left_wrist,right_wrist", "our cameras to show, in this order")
-    proprio: str = option(
-        "commanded",
-        "after the first query: the last command executed, or what the robot measures",
-        ("commanded", "measured"),
-    )
-    closed_above: float = option(0.7, "a gripper number above this closes the gripper")
-    horizon: int = option(30, "actions in a chunk, at most")
-    execute: int | None = option(None, "actions executed before the next query; none for all")
 
     def __post_init__(self) -> None:
         """ValueError for options that cannot be."""
-        check_horizon(self.horizon, self.execute)
+        super().__post_init__()
         if not self.checkpoint:
             raise ValueError("option checkpoint is needed: a folder or a hub name")
-        if self.batch < 1 or self.steps < 1 or not 0 <= self.domain_id < 30:
-            raise ValueError("options batch and steps are at least 1, domain_id is 0 to 29")
-        wrong = [name for name in self.views if name not in VIEWS]
-        if wrong or len(set(self.views)) != len(self.views) or not self.views:
-            raise ValueError(f"option cameras={self.cameras!r}: one to three of {', '.join(VIEWS)}")
-
-    @property
-    def views(self) -> tuple[str, ...]:
-        """Cameras in the order of the model's views."""
-        return tuple(name for name in self.cameras.split(",") if name)
+        if self.batch < 1:
+            raise ValueError("option batch: at least 1 is needed")
 
 
 class Xvla(ModelPolicy):

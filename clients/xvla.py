@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.clients.chunks import check_horizon, turned
+from robospa.clients.chunks import turned
 from robospa.clients.guess import explained
 from robospa.clients.http import JsonServer
 from robospa.clients.json_arrays import chunk_of, dumps
@@ -31,20 +31,12 @@ from robospa.clients.text import check_budget
 from robospa.protocol.errors import PolicyAnswerError, ProtocolViolation, ServerError
 from robospa.protocol.options import option, plain_options
 from robospa.protocol.policy import CameraSpec, Observation, PolicySpec, TrialInfo
-from robospa.protocol.rot6d import (
-    ARM,
-    LAYOUTS,
-    ORDERS,
-    closed_to_open,
-    ee6d_to_actions,
-    poses_to_ee6d,
-)
+from robospa.protocol.rot6d import ARM, closed_to_open, ee6d_to_actions, poses_to_ee6d
+from robospa.protocol.xvla import Conventions
 
 if TYPE_CHECKING:
     from robospa.clients import Line
 
-VIEWS = ("head", "left_wrist", "right_wrist")
-"""Our cameras in the order of image0, image1, image2."""
 WARNINGS = (
     "whether a checkpoint was trained with red and blue swapped is invisible on the wire: if it "
     "sees nothing, try `colors=bgr`",
@@ -59,26 +51,9 @@ SILENT = (
 
 
 @dataclass(frozen=True)
-class Options:
+class Options(Conventions):
     """What X-VLA's server does not say."""
 
-    space: str = option("ee6d", "what the model answers", ("ee6d", "joint"))
-    domain_id: int = option(6, "the soft prompt, 0 to 29")
-    steps: int = option(10, "denoising steps")
-    quaternions: str = option(
-        "xyzw", "how RoboTwin's w x y z are read: `xyzw` repeats the official slip", ORDERS
-    )
-    rotation: str = option("interleaved", "order of the six rotation numbers", LAYOUTS)
-    colors: str = option("rgb", "order of an image's channels", ("rgb", "bgr"))
-    cameras: str = option("head,left_wrist,right_wrist", "our cameras to send, in this order")
-    proprio: str = option(
-        "commanded",
-        "after the first query: the last command executed, or what the robot measures",
-        ("commanded", "measured"),
-    )
-    closed_above: float = option(
-        0.7, "a gripper number of the 20 above this closes the gripper, any other opens it"
-    )
     joint_grippers: str = option(
         "open",
         "what 1 means in a gripper number of `space=joint`, sent and answered, which are then "
@@ -94,25 +69,11 @@ class Options:
     text_budget: int | None = option(
         50, "tokens of text that the model's processor keeps; the rest is cut off in silence"
     )
-    horizon: int = option(30, "actions in a chunk, at most")
-    execute: int | None = option(None, "actions executed before the next query; none for all")
 
     def __post_init__(self) -> None:
         """ValueError for options that cannot be."""
-        if not 0 <= self.domain_id < 30:
-            raise ValueError(f"option domain_id={self.domain_id} is not one of 0 to 29")
-        if self.steps < 1:
-            raise ValueError(f"option steps={self.steps}: at least one is needed")
-        check_horizon(self.horizon, self.execute)
+        super().__post_init__()
         check_budget(self.text_budget)
-        wrong = [name for name in self.views if name not in VIEWS]
-        if wrong or len(set(self.views)) != len(self.views) or not self.views:
-            raise ValueError(f"option cameras={self.cameras!r}: one to three of {', '.join(VIEWS)}")
-
-    @property
-    def views(self) -> tuple[str, ...]:
-        """Cameras in the order of image0, image1, image2."""
-        return tuple(name for name in self.cameras.split(",") if name)
 
 
 def to_ee6d(poses: NDArray[np.floating[Any]], options: Options) -> NDArray[np.float64]:
