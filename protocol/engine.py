@@ -40,6 +40,9 @@ class PolicySession(Protocol):
 
     async def end(self, outcome: Mapping[str, Any]) -> None: ...
 
+    def coming(self) -> None:
+        """The first bytes of a request are here."""
+
     def close(self) -> None: ...
 
 
@@ -106,6 +109,9 @@ class _OwnSession:
     def __init__(self, engine: Engine, policy: Policy, keep: bool) -> None:
         self._engine, self._policy, self._keep = engine, policy, keep
 
+    def coming(self) -> None:
+        return None
+
     async def reset(self, trial: TrialInfo) -> None:
         await self._engine.run(self._policy.reset, trial)
 
@@ -134,6 +140,9 @@ class _SharedSession:
 
     def __init__(self, engine: Engine, policy: Any, batcher: Batcher, number: int) -> None:
         self._engine, self._policy, self._batcher, self._number = engine, policy, batcher, number
+
+    def coming(self) -> None:
+        self._batcher.coming(self._number)
 
     async def reset(self, trial: TrialInfo) -> None:
         self._batcher.forget(self._number)

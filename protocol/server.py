@@ -33,6 +33,7 @@ from websockets.typing import Subprotocol
 
 from robospa.protocol.channel import SOCKET_BUFFER
 from robospa.protocol.codec import DEFAULT_LIMITS, Limits
+from robospa.protocol.door import Door, Guarded, keep_alive
 from robospa.protocol.engine import Engine, PolicyFactory
 from robospa.protocol.memory import keep_freed_memory
 from robospa.protocol.messages import SUBPROTOCOL
@@ -44,19 +45,28 @@ if TYPE_CHECKING:
     from typing_extensions import Self
 
 log = logging.getLogger("robospa.server")
+QUIET = logging.getLogger("robospa.server.websockets")
+"""What the library has to say of strangers, with tracebacks; ours is one line each."""
+QUIET.setLevel(logging.CRITICAL)
+LAST_WORDS = 0.1
+"""[s] in which a session whose connection is gone may end by itself."""
 
 
 @dataclass(frozen=True)
 class ServerOptions:
     """Bounds of one server. `idle`: seconds of silence after which a connection is closed.
-    `patience`: seconds that a new connection waits for a free place. `queue`: requests that may
-    wait. `threads`: how many threads call policies (more than one only if they allow it)."""
+    `patience`: seconds that a new connection waits for a free place. `message`: seconds within
+    which a message has to be whole and an answer read. `handshakes`: connections that may be
+    entering at once. `queue`: requests that may wait. `threads`: how many threads call policies
+    (more than one only if they allow it)."""
 
-    max_connections: int = 64
+    max_connections: int = 256
     queue: int = 256
     threads: int = 1
     idle: float = 3600.0
     patience: float = 2.0
+    message: float = 60.0
+    handshakes: int = 128
     name: str = "robospa"
     limits: Limits = field(default_factory=lambda: DEFAULT_LIMITS)
 
@@ -83,11 +93,13 @@ class PolicyServer:
             queue=self._options.queue,
         )
         self._host, self._port, self._token, self._ssl = host, port, token, ssl
-        self._places = min(
-            self._options.max_connections,
-            self._engine.max_sessions or self._options.max_connections,
+        most = self._options.max_connections
+        self._door = Door(
+            min(most, self._engine.max_sessions or most),
+            patience=self._options.patience,
+            handshakes=self._options.handshakes,
+            message=self._options.message,
         )
-        self._taken = 0
         self._server: Server | None = None
 
     @property
@@ -108,6 +120,9 @@ class PolicyServer:
             origins=[None],
             select_subprotocol=_select,
             process_request=self._admit,
+            create_connection=self._door.connection,
+            server_header=None,
+            logger=QUIET,
             compression=None,
             max_size=self._options.limits.message,
             max_queue=2,  # frames that may wait while one request is served
@@ -118,6 +133,7 @@ class PolicyServer:
         )
         for listener in self._server.sockets:
             _tune(listener)
+        self._door.start()
         return self
 
     async def __aexit__(
@@ -130,6 +146,7 @@ class PolicyServer:
         self._server.close()
         with contextlib.suppress(TimeoutError):
             await within(1, self._server.wait_closed())
+        self._door.stop()
         self._engine.close()
 
     async def _admit(self, connection: ServerConnection, request: Request) -> Response | None:
@@ -137,48 +154,50 @@ class PolicyServer:
         if request.path == "/healthz":
             return connection.respond(HTTPStatus.OK, "OK\n")
         if not _authorized(self._token, request):
+            self._door.tell("a client was refused: its token is missing or wrong")
             return connection.respond(HTTPStatus.UNAUTHORIZED, "missing or wrong token\n")
         offered = ",".join(request.headers.get_all("Sec-WebSocket-Protocol"))
         names = [name.strip() for name in offered.split(",")]
         if SUBPROTOCOL not in names and any(name.startswith("robospa.") for name in names):
-            text = f"this server speaks {SUBPROTOCOL}, not {offered}\n"
+            text = f"this server speaks {SUBPROTOCOL}, not {offered[:100]}\n"
             return connection.respond(HTTPStatus.BAD_REQUEST, text)
-        if not await self._place():
-            text = f"all {self._places} places of this server are taken\n"
+        if "Upgrade" not in request.headers:
+            text = "a policy server, for WebSocket connections only (RoboSPA)\n"
+            return connection.respond(HTTPStatus.UPGRADE_REQUIRED, text)
+        assert isinstance(connection, Guarded)
+        if not await self._door.seat(connection):
+            text = f"all {self._door.places} places of this server are taken\n"
             return connection.respond(HTTPStatus.SERVICE_UNAVAILABLE, text)
         return None
 
-    async def _place(self) -> bool:
-        """Wait a little for a free place: a client that reconnects may be faster than the news
-        that its old connection is gone."""
-        clock = asyncio.get_running_loop().time
-        give_up = clock() + self._options.patience
-        while self._taken >= self._places:
-            if clock() >= give_up:
-                return False
-            await asyncio.sleep(0.01)
-        return True
-
     async def _handle(self, connection: ServerConnection) -> None:
-        if self._taken >= self._places:
-            return await connection.close(1013, "all places of this server are taken")
-        self._taken += 1
+        assert isinstance(connection, Guarded)
+        self._door.entered(connection)
+        talk = asyncio.ensure_future(self._converse(connection))
+        gone = asyncio.ensure_future(connection.wait_closed())
         try:
-            await self._converse(connection)
+            # A model that hangs must not keep the place of a client that has gone.
+            await asyncio.wait((talk, gone), return_when=asyncio.FIRST_COMPLETED)
+            await asyncio.wait((talk,), timeout=0 if talk.done() else LAST_WORDS)
+            if talk.done():
+                await talk
         except ConnectionClosed:
             pass
         except TimeoutError:
             log.warning("closing a connection that was silent for %g s", self._options.idle)
         finally:
-            self._taken -= 1
+            talk.cancel()
+            gone.cancel()
+            self._door.left(connection)
 
-    async def _converse(self, connection: ServerConnection) -> None:
+    async def _converse(self, connection: Guarded) -> None:
         options, ours = self._options, connection.subprotocol == SUBPROTOCOL
         try:
             policy = await self._engine.open()
         except Exception as error:
             log.exception("no policy could be made for a new connection")
             return await refuse(connection, ours, error)
+        connection.on_begin = policy.coming
         try:
             session = Session(
                 connection, policy, self._engine.spec, options.name, options.limits, options.idle
@@ -206,7 +225,7 @@ def _tune(listener: socket.socket) -> None:
     client whose machine is gone."""
     for option in (socket.SO_RCVBUF, socket.SO_SNDBUF):
         listener.setsockopt(socket.SOL_SOCKET, option, SOCKET_BUFFER)
-    listener.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+    keep_alive(listener)
 
 
 def serve(

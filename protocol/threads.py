@@ -57,6 +57,9 @@ class PolicyThreads:
                 result, error = call(*args), None
             except Exception as failure:
                 result, error = None, failure
+            except BaseException as failure:  # SystemExit must end neither thread nor server
+                text = f"the policy raised {type(failure).__name__}: {failure}"
+                result, error = None, RuntimeError(text)
             del job, call, args  # an idle thread must not keep the last observation alive
             if loop is not None and future is not None:
                 with contextlib.suppress(RuntimeError):  # the loop is gone: nobody waits
