@@ -143,15 +143,19 @@ def connect(
     """
     target, module, chosen = _prepare(url, options)
     line = Line(target, timeouts or Timeouts(), limits, token, ssl)
+    known = expect is not None
 
     def opened() -> ClientSession:
+        nonlocal known
         try:
             session: ClientSession = module.open_session(line, chosen)
+            known = True
             return session
         except Unauthorized:
             raise
         except (HandshakeError, TransportError) as error:
-            if isinstance(error.__cause__, ConnectionRefusedError):
+            # Once it has spoken this dialect, trouble is trouble and no sign of another one.
+            if known or isinstance(error.__cause__, ConnectionRefusedError):
                 raise
             raise explained(error, line) from error.__cause__
 

@@ -33,8 +33,10 @@ def as_chunk(value: Any) -> Any:
     Anything else is returned as it is, and refused by the check that follows every answer.
     """
     try:
-        array = np.array(value, dtype=np.float64)
+        array = np.asarray(value)
     except (TypeError, ValueError, OverflowError):
+        return value
+    if array.dtype.kind not in "iuf":  # texts, truth values, objects: numpy would make numbers
         return value
     with np.errstate(over="ignore"):
         return array.astype(np.float32)

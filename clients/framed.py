@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 from robospa.clients.msgpack_arrays import Form, pack, unpack
 from robospa.clients.openpi import websocket_address
 from robospa.protocol.channel import Channel
-from robospa.protocol.errors import DecodeError, ProtocolViolation, TransportError
+from robospa.protocol.client import violation
+from robospa.protocol.errors import DecodeError, TransportError, printable
 
 if TYPE_CHECKING:
     from robospa.clients import Line
@@ -32,7 +33,7 @@ class Frames:
         """The next message; raises CallTimeout, ConnectionLost, ProtocolViolation."""
         data = self._channel.receive(timeout, what)
         if isinstance(data, str):
-            raise self.violation(f"a text frame came instead of {what}: {data[:200]!r}")
+            raise self.violation(f"a text frame came instead of {what}: {printable(data, 200)!r}")
         try:
             value = unpack(data, self._limits)
         except DecodeError as error:
@@ -44,7 +45,7 @@ class Frames:
     def violation(self, reason: str) -> TransportError:
         """The error for an answer that the protocol does not allow; closes the connection."""
         self.close()
-        return ProtocolViolation(f"{self.url} broke the protocol: {reason}")
+        return violation(self.url, printable(reason))
 
     def close(self) -> None:
         """Close; harmless when closed already."""

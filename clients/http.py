@@ -10,8 +10,10 @@ from __future__ import annotations
 import contextlib
 import http.client
 import json
+import select
 import socket
 import ssl as ssl_module
+import threading
 import time
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
@@ -24,6 +26,7 @@ from robospa.protocol.errors import (
     ProtocolViolation,
     ServerError,
     Unauthorized,
+    printable,
 )
 
 if TYPE_CHECKING:
@@ -94,15 +97,16 @@ class JsonServer:
 
     def request(self, method: str, path: str, body: bytes | None, timeout: float) -> Any:
         """One request; see `post`."""
+        until = time.monotonic() + timeout
         try:
-            status, reason, data = self._exchange(method, path, body, timeout)
+            status, reason, data = self._exchange(method, path, body, until)
         except STALE as error:
             if self._fresh:
                 raise self._lost(error) from error
             self._connection.close()
             self._connect(0.0)
             try:
-                status, reason, data = self._exchange(method, path, body, timeout)
+                status, reason, data = self._exchange(method, path, body, until)
             except (OSError, http.client.HTTPException) as again:
                 raise self._failed(again, path, timeout) from again
         except (OSError, http.client.HTTPException) as error:
@@ -111,7 +115,8 @@ class JsonServer:
         if status in (http.HTTPStatus.UNAUTHORIZED, http.HTTPStatus.FORBIDDEN):
             raise Unauthorized(f"{self.url}{path} refused the request: {_shown(data) or reason}")
         if status != http.HTTPStatus.OK:
-            raise ServerError(f"HTTP {status}", _shown(data) or reason, retriable=status >= 500)
+            said = _shown(data) or reason
+            raise ServerError(f"HTTP {status}", said, status >= 500, f"{self.url}{path}")
         return self._decoded(path, data)
 
     def close(self) -> None:
@@ -135,18 +140,37 @@ class JsonServer:
                 raise ConnectFailed(f"cannot connect to {self.url}: {error}") from error
 
     def _exchange(
-        self, method: str, path: str, body: bytes | None, timeout: float
+        self, method: str, path: str, body: bytes | None, until: float
     ) -> tuple[int, str, bytes]:
+        """Status, reason and body, all of it before `until` on the monotonic clock."""
         if self._connection.sock is None:
             self._connect(0.0)
-        self._connection.sock.settimeout(timeout)
-        self._connection.request(method, path, body, self._headers)
-        response = self._connection.getresponse()
-        data = response.read(MAX_ANSWER + 1)
-        if len(data) > MAX_ANSWER:
+        sock = self._connection.sock
+        if left_over(sock):
             self.close()
-            raise ProtocolViolation(f"{self.url}{path} answered more than {MAX_ANSWER} bytes")
-        return response.status, response.reason, data
+            raise ProtocolViolation(f"{self.url} sent what nobody asked for")
+        left = max(until - time.monotonic(), 1e-3)
+        sock.settimeout(left)
+        # A time limit of a socket is that of a single byte: a server that sends one now and then
+        # would never be late.
+        alarm = threading.Timer(left, _shut, (sock,))
+        alarm.daemon = True
+        alarm.start()
+        try:
+            self._connection.request(method, path, body, self._headers)
+            response = self._connection.getresponse()
+            if (response.length or 0) <= MAX_ANSWER:
+                data = response.read(MAX_ANSWER + 1)
+                if len(data) <= MAX_ANSWER:
+                    return response.status, response.reason, data
+        except (OSError, http.client.HTTPException) as error:
+            if time.monotonic() >= until:
+                raise TimeoutError from error
+            raise
+        finally:
+            alarm.cancel()
+        self.close()
+        raise ProtocolViolation(f"{self.url}{path} answered more than {MAX_ANSWER} bytes")
 
     def _failed(self, error: Exception, path: str, timeout: float) -> Exception:
         if isinstance(error, TimeoutError | socket.timeout):
@@ -170,6 +194,24 @@ class JsonServer:
             raise ProtocolViolation(f"{self.url}{path} did not answer JSON: {error}") from error
 
 
+def left_over(sock: socket.socket) -> bool:
+    """Whether something has come over `sock` that was not read yet. That it is closed is none."""
+    if isinstance(sock, ssl_module.SSLSocket):
+        return sock.pending() > 0
+    if not select.select([sock], [], [], 0)[0]:
+        return False
+    try:
+        return bool(sock.recv(1, socket.MSG_PEEK))
+    except OSError:
+        return False
+
+
+def _shut(sock: socket.socket) -> None:
+    """End a connection that another thread waits for."""
+    with contextlib.suppress(OSError):
+        sock.shutdown(socket.SHUT_RDWR)
+
+
 def _shown(data: bytes) -> str:
     """A server's complaint in one line."""
     text = data.decode("utf-8", "replace").strip()
@@ -179,4 +221,4 @@ def _shown(data: bytes) -> str:
         value = text
     if isinstance(value, Mapping):
         value = value.get("error", value.get("detail", value.get("message", value)))
-    return " ".join(str(value).split())[:SHOWN]
+    return printable(str(value), SHOWN)

@@ -24,6 +24,7 @@ import numpy as np
 
 from robospa.clients.chunks import as_chunk, check_horizon
 from robospa.clients.guess import explained
+from robospa.clients.http import left_over
 from robospa.clients.json_arrays import array_of
 from robospa.protocol.errors import (
     CallTimeout,
@@ -32,6 +33,7 @@ from robospa.protocol.errors import (
     EncodeError,
     ProtocolViolation,
     ServerError,
+    printable,
 )
 from robospa.protocol.options import option, plain_options
 from robospa.protocol.policy import Observation, PolicySpec, TrialInfo
@@ -194,6 +196,9 @@ class Wire:
         return self._result(method, answer)
 
     def _exchange(self, sock: socket.socket, text: bytes, deadline: float) -> bytes:
+        if left_over(sock):
+            self.close()
+            raise ProtocolViolation(f"{self.url} sent what nobody asked for")
         sock.settimeout(max(deadline - time.monotonic(), 1e-3))
         # One piece: the server reads the length with a single call and would tear a split one.
         sock.sendall(len(text).to_bytes(4, "big") + text)
@@ -214,8 +219,8 @@ class Wire:
             raise ProtocolViolation(f"{self.url} did not answer JSON: {error}") from error
         if isinstance(value, Mapping) and "error" in value:
             self.close()  # so does the server
-            text = " ".join(str(value["error"]).split())[:SHOWN]
-            failure = ServerError("an error", f"{text} (in {method})", True)
+            text = printable(str(value["error"]), SHOWN - 60)
+            failure = ServerError("an error", f"{text} (in {method})", True, self.url)
             failure.add_note(str(value.get("traceback", "")))
             raise failure
         if not isinstance(value, Mapping) or "res" not in value:

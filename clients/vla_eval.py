@@ -157,13 +157,12 @@ class Session:
         if not isinstance(body, Mapping):
             raise self._frames.violation("its answer is no message of vla-eval")
         if kind == "error":
-            text = " ".join(str(body.get("error", "no reason given")).split())[:500]
+            text = str(body.get("error", "no reason given"))
             late = answer.get("seq") != number
             if late:  # of `episode_start`: this observation's own answer is still to come
                 self.close()
-            raise ServerError(
-                "an error" if not late else "an error of an earlier message", text, True
-            )
+            what = "an error" if not late else "an error of an earlier message"
+            raise ServerError(what, text, True, self._frames.url)
         if answer.get("seq") != number:
             raise self._frames.violation(f"answer {answer.get('seq')} came to message {number}")
         if kind != wanted:

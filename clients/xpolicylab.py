@@ -218,8 +218,8 @@ class Session:
         if answer.get("message_id") != name:
             raise self._frames.violation(f"answer {answer.get('message_id')!r} came to {name!r}")
         if answer["message_type"] == "error":
-            text = " ".join(str(body.get("message", "no reason given")).split())[:500]
-            raise ServerError(str(body.get("code", "an error")), text, True)
+            text = str(body.get("message", "no reason given"))
+            raise ServerError(str(body.get("code", "an error")), text, True, self._frames.url)
         if answer["message_type"] != wanted:
             raise self._frames.violation(f"{answer['message_type']} came where {wanted} was due")
         return body

@@ -114,6 +114,14 @@ class Channel:
         except (ConnectionClosed, OSError) as error:
             raise self._lost(f"while waiting for {what}", error) from error
 
+    def has_more(self) -> bool:
+        """Whether a message has come that was not received yet; it is dropped."""
+        try:
+            self._socket.recv(0)
+        except (TimeoutError, ConnectionClosed):
+            return False
+        return True
+
     def close(self) -> None:
         """Close; harmless when closed already."""
         self._socket.close()

@@ -71,6 +71,9 @@ class OpenPiSession:
     def infer(
         self, id: int, observation: Observation, timeout: float
     ) -> tuple[Any, Mapping[str, float]]:
+        if self._channel.has_more():
+            self.close()
+            raise ProtocolViolation(f"{self._channel.url} sent what nobody asked for")
         self._channel.send(encode(to_openpi(observation, self._options), self._limits))
         answer = self._receive(timeout, "actions")
         actions = answer.get("actions")
@@ -90,7 +93,7 @@ class OpenPiSession:
         if isinstance(data, str):
             self.close()
             lines = data.strip().splitlines() or ["no text"]
-            error = ServerError("openpi", lines[-1][:500], True)
+            error = ServerError("openpi", lines[-1], True, self._channel.url)
             error.add_note(data)
             raise error
         try:

@@ -234,8 +234,10 @@ def test_a_full_server_is_not_another_dialect(scheme: str) -> None:
     """It is tried again: a worker that reconnects may be faster than the end of its old one."""
     with ServerThread(Zeros()) as server:
         url = server.url.replace("ws://", f"{scheme}://")
-        with connect(server.url, timeouts=QUICK), pytest.raises(ConnectFailed, match="taken"):
-            connect(url, timeouts=QUICK)
+        with connect(server.url, timeouts=QUICK) as first:
+            first.reset(TRIAL)
+            with pytest.raises(ConnectFailed, match="taken"):
+                connect(url, timeouts=QUICK)
 
 
 def test_our_own_server_is_recognised() -> None:
