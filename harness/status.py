@@ -98,9 +98,9 @@ class Status:
         full = [s for s in asked if s.saturated]
         if asked and len(full) == len(asked):
             who = "the policy server is" if len(asked) == 1 else "the policy servers are"
-            return f"{who} the bottleneck: workers wait for answers {waiting:.0%} of their time"
+            return f"{who} the bottleneck: workers wait {100 * waiting:.0f} % of their time"
         return (
-            f"nobody is at the limit: workers wait {waiting:.0%} of their time and leave cores "
+            f"nobody is at the limit: workers wait {100 * waiting:.0f} % of their time and leave cores "
             "idle, the servers could answer more of them"
         )
 

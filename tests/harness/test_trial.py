@@ -166,3 +166,20 @@ def test_the_recorder_keeps_every_executed_action() -> None:
     recorder = TrialRecorder()
     run_trial(FakeWorld(), FakePolicy(), KEY, policy_seed=0, recorder=recorder, parts=parts)
     assert recorder.actions.shape == (5, 14)
+
+
+def test_what_the_server_tells_of_its_times_is_kept_as_means() -> None:
+    class Telling(FakePolicy):
+        def infer(self, observation: object) -> np.ndarray:
+            number = float(len(self.seen))
+            self.last_timing = {"queue_ms": number, "infer_ms": 5.0, "batch": float("nan")}
+            return super().infer(observation)
+
+    record = play(Telling())  # three calls
+    assert record.policy_calls == 3
+    assert set(record.latency) == {"p50", "p95", "p99", "max", "queue", "infer"}
+    assert (record.latency["queue"], record.latency["infer"]) == (1.0, 5.0)
+
+
+def test_a_policy_that_tells_no_times_has_its_percentiles_only() -> None:
+    assert set(play(FakePolicy()).latency) == {"p50", "p95", "p99", "max"}
