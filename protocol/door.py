@@ -3,7 +3,7 @@
 The network is not trusted. Everything that a client can make last or grow has a bound here, and a
 client that oversteps one loses its own connection and nothing else:
 
-    handshake not finished     dropped after `ServerOptions.patience` + 10 s; of more than
+    handshake not finished     dropped after `ServerOptions.handshake` seconds; of more than
                                `handshakes` under way the oldest is dropped
     no place left              a connection that never asked anything gives its place to a newer
                                one; if there is none, HTTP 503 after `patience`

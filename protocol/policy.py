@@ -154,12 +154,12 @@ class TrialInfo:
         """The trial in a decoded map; unknown fields are ignored. Raises DecodeError."""
         fields = Fields("trial", value)
         return cls(
-            task=fields.text("task"),
+            task=fields.identifier("task"),
             level=fields.whole("level", low=0),
             seed=fields.whole("seed", low=0, high=2**64 - 1),
-            embodiment=fields.text("embodiment"),
-            mode=fields.text("mode"),
-            split=fields.text("split"),
+            embodiment=fields.identifier("embodiment"),
+            mode=fields.identifier("mode"),
+            split=fields.identifier("split"),
             instruction=fields.text("instruction"),
             policy_seed=fields.whole("policy_seed", 0, 0, 2**64 - 1),
             extra=fields.map("extra", {}),

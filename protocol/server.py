@@ -57,8 +57,8 @@ class ServerOptions:
     """Bounds of one server. `idle`: seconds of silence after which a connection is closed.
     `patience`: seconds that a new connection waits for a free place. `message`: seconds within
     which a message has to be whole and an answer read. `handshakes`: connections that may be
-    entering at once. `queue`: requests that may wait. `threads`: how many threads call policies
-    (more than one only if they allow it)."""
+    entering at once, within `handshake` seconds. `queue`: requests that may wait. `threads`: how
+    many threads call policies (more than one only if they allow it)."""
 
     max_connections: int = 256
     queue: int = 256
@@ -67,6 +67,7 @@ class ServerOptions:
     patience: float = 2.0
     message: float = 60.0
     handshakes: int = 128
+    handshake: float = 10.0
     name: str = "robospa"
     limits: Limits = field(default_factory=lambda: DEFAULT_LIMITS)
 
@@ -128,7 +129,7 @@ class PolicyServer:
             max_queue=2,  # frames that may wait while one request is served
             write_limit=2**20,
             ping_interval=None,
-            open_timeout=10 + self._options.patience,
+            open_timeout=self._options.handshake + self._options.patience,
             close_timeout=1,
         )
         for listener in self._server.sockets:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import Any
 
 from robospa.protocol.errors import DecodeError
 
 MISSING: Any = object()
+IDENTIFIER = re.compile(r"(?:[A-Za-z0-9_+-][A-Za-z0-9_.+-]{0,127})?")
 
 
 class Fields:
@@ -42,6 +44,14 @@ class Fields:
         found = self.text(name, default)
         if not is_name(found):
             raise self.refuse(name, "printable text of at most 200 characters", found)
+        return found
+
+    def identifier(self, name: str) -> str:
+        """Text that is safe as part of a file's name; may be empty."""
+        found = self.text(name)
+        if not IDENTIFIER.fullmatch(found):
+            wanted = "at most 128 letters, digits and _ - . +, and not begin with a dot"
+            raise DecodeError(f"{self.what}: {name!r} must be {wanted}, not {found[:40]!r}")
         return found
 
     def whole(
