@@ -1,0 +1,395 @@
+"""The server and the network: whatever a client does, it harms only itself.
+
+Everybody is on loopback. Every test ends with a real client that is served.
+"""
+
+from __future__ import annotations
+
+import base64
+import logging
+import os
+import socket
+import struct
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from wire_helpers import QUICK, TRIAL, Recall, ask, observation, raw, until
+
+from robospa.protocol.client import connect
+from robospa.protocol.codec import encode
+from robospa.protocol.door import FRAMES
+from robospa.protocol.errors import ConnectionLost, TransportError
+from robospa.protocol.messages import Error, Infer, Ready, Reset, pack
+from robospa.protocol.server import ServerOptions, ServerThread
+
+KEY = base64.b64encode(b"0123456789abcdef").decode()
+HANDSHAKE = (
+    "GET / HTTP/1.1\r\nHost: x\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+    f"Sec-WebSocket-Key: {KEY}\r\nSec-WebSocket-Version: 13\r\n"
+    "Sec-WebSocket-Protocol: robospa.v1\r\n\r\n"
+).encode()
+HURRIED = ServerOptions(message=0.2, patience=2.0)
+
+
+def frame(payload: bytes, opcode: int = 2, fin: bool = True, size: int | None = None) -> bytes:
+    """A client's frame (mask of zeros); `size`: what it claims to hold."""
+    length = len(payload) if size is None else size
+    first = (0x80 if fin else 0) | opcode
+    if length < 126:
+        head = struct.pack(">BB", first, 0x80 | length)
+    else:
+        head = struct.pack(">BBQ", first, 0x80 | 127, length)
+    return head + bytes(4) + payload
+
+
+@pytest.fixture
+def dial() -> Iterator[Callable[..., socket.socket]]:
+    """Plain sockets to a server, closed with the test; `data` is sent at once."""
+    with ExitStack() as stack:
+
+        def dialled(server: ServerThread, data: bytes = b"") -> socket.socket:
+            port = int(server.url.rsplit(":", 1)[1])
+            sock = stack.enter_context(socket.create_connection(("127.0.0.1", port), 20))
+            sock.sendall(data)
+            return sock
+
+        yield dialled
+
+
+def ended(sock: socket.socket) -> bytes:
+    """What came until the server closed."""
+    parts = []
+    try:
+        while part := sock.recv(65536):
+            parts.append(part)
+    except ConnectionError:
+        pass
+    return b"".join(parts)
+
+
+def served(server: ServerThread, token: str | None = None) -> bool:
+    """Whether a real client gets its answer."""
+    with connect(server.url, token, QUICK) as remote:
+        remote.reset(TRIAL)
+        return bool(remote.infer(observation(3))[0, 0] == 3)
+
+
+def greeted(dial: Any, server: ServerThread) -> socket.socket:
+    """A socket past the handshake and the hello."""
+    sock: socket.socket = dial(server, HANDSHAKE)
+    while b"hello" not in sock.recv(65536):
+        pass
+    return sock
+
+
+@pytest.mark.parametrize(
+    ("request_", "status"),
+    [
+        (b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03\r\n\r\n", b""),
+        (bytes(range(256)) * 40, b""),
+        (b"GET / HTTP/1.1\r\nHost: x\r\n\r\n", b"426"),
+        (b"GET /../../etc/passwd HTTP/1.1\r\nHost: x\r\n\r\n", b"426"),
+        (b"POST / HTTP/1.1\r\nHost: x\r\nContent-Length: 99999999999\r\n\r\n", b""),
+        (b"GET /" + b"a" * 100_000 + b" HTTP/1.1\r\n\r\n", b""),
+        (b"GET / HTTP/1.1\r\n" + b"X-Long: " + b"a" * 100_000 + b"\r\n\r\n", b""),
+        (b"GET / HTTP/1.1\r\n" + b"X-Many: 1\r\n" * 5_000 + b"\r\n", b""),
+        (HANDSHAKE.replace(b"13", b"7"), b"400"),
+        (HANDSHAKE.replace(KEY.encode(), b"short"), b"400"),
+        (HANDSHAKE.replace(b"robospa.v1", b"robospa.v7"), b"400"),
+    ],
+)
+def test_what_is_no_handshake_is_refused(
+    start: Any, dial: Any, request_: bytes, status: bytes
+) -> None:
+    server = start(policy_factory=Recall)
+    sock = dial(server)
+    try:
+        sock.sendall(request_)
+        said = ended(sock)
+    except ConnectionError:  # refused before it had said all
+        said = b""
+    assert status in said.split(b"\r\n")[0]
+    assert b"Traceback" not in said and b"python" not in said.lower() and b"root:" not in said
+    assert served(server)
+
+
+def test_strangers_learn_nothing_and_are_refused_first(start: Any, dial: Any) -> None:
+    server = start(policy_factory=Recall, token="s3cret")
+    said = [
+        ended(dial(server, request))
+        for request in (
+            HANDSHAKE,
+            HANDSHAKE.replace(b"\r\n\r\n", b"\r\nAuthorization: Bearer s3cre\r\n\r\n"),
+            HANDSHAKE.replace(b"\r\n\r\n", b"\r\nAuthorization: Bearer \xff\xfe\r\n\r\n"),
+            HANDSHAKE.replace(b"\r\n\r\n", b"\r\nAuthorization: Bearer s3cret" * 2 + b"\r\n\r\n"),
+            HANDSHAKE.replace(b"robospa.v1", b"robospa.v9"),
+            b"GET /anything HTTP/1.1\r\nHost: x\r\n\r\n",
+        )
+    ]
+    answers = {tuple(ln for ln in s.split(b"\r\n") if not ln.startswith(b"Date")) for s in said}
+    assert len(answers) == 1, "every refusal is the same"
+    assert said[0].startswith(b"HTTP/1.1 401") and b"s3cret" not in said[0]
+    assert b"Server:" not in said[0] and b"robospa.v1" not in said[0]
+    assert served(server, "s3cret")
+
+
+def test_a_handshake_that_is_never_finished_ends(start: Any, dial: Any) -> None:
+    server = start(policy_factory=Recall, options=ServerOptions(handshake=0.2, patience=0.1))
+    slow = [dial(server), dial(server, HANDSHAKE[:40])]
+    assert [ended(sock) for sock in slow] == [b"", b""]
+    assert served(server)
+
+
+def test_of_many_handshakes_the_oldest_are_dropped(start: Any, dial: Any) -> None:
+    server = start(policy_factory=Recall, options=ServerOptions(handshakes=10))
+    idle = [dial(server) for _ in range(30)]
+    assert served(server)
+    assert ended(idle[0]) == b""
+
+
+def test_a_thousand_idle_connections(start: Any, dial: Any) -> None:
+    """Half of them say nothing at all, half finish the handshake and then say nothing."""
+    half = 500 if _may_open(2500) else 100
+    server = start(policy_factory=Recall, options=ServerOptions(max_connections=64))
+    idle = [dial(server) for _ in range(half)] + [dial(server, HANDSHAKE) for _ in range(half)]
+    assert served(server)
+    assert len(server._server._door._open) <= 64 + 128 + half
+    assert len(idle) == 2 * half
+
+
+def _may_open(files: int) -> bool:
+    import resource
+
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if soft < files <= hard:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (files, hard))
+    return hard >= files
+
+
+def test_without_file_descriptors_it_waits_and_says_so(
+    start: Any, dial: Any, caplog: pytest.LogCaptureFixture
+) -> None:
+    import resource
+
+    server = start(policy_factory=Recall)
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    first = dial(server)
+    spare = max(int(name) for name in os.listdir("/proc/self/fd")) + 1
+    late = socket.socket()  # made before, connected after nothing is left
+    resource.setrlimit(resource.RLIMIT_NOFILE, (spare, hard))
+    try:
+        held = []
+        while True:
+            try:
+                held.append(os.dup(0))
+            except OSError:
+                break
+        late.connect(first.getpeername())
+        until(lambda: "cannot be accepted" in caplog.text)
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+        for number in held:
+            os.close(number)
+        late.close()
+    assert "ulimit -n" in caplog.text
+    assert served(server)
+
+
+def test_one_byte_a_second(start: Any, dial: Any) -> None:
+    server = start(policy_factory=Recall, options=HURRIED)
+    sock = greeted(dial, server)
+    message = frame(pack(Reset(1, TRIAL)))
+    sock.sendall(message[:3])
+    assert served(server)
+    ended(sock)  # comes back because the server gives up
+
+
+def test_one_fragment_and_then_nothing(start: Any, dial: Any) -> None:
+    server = start(policy_factory=Recall, options=HURRIED)
+    sock = greeted(dial, server)
+    sock.sendall(frame(b"abc", fin=False))
+    ended(sock)
+    assert served(server)
+
+
+def test_a_long_inference_is_no_slow_client(start: Any) -> None:
+    class Slow(Recall):
+        def infer(self, seen: Any) -> Any:
+            import time
+
+            time.sleep(0.3)
+            return super().infer(seen)
+
+    server = start(policy_factory=Slow, options=HURRIED)
+    channel = raw(server.url)
+    channel.send(pack(Reset(1, TRIAL)))
+    for id in range(2, 5):  # more than the server reads ahead
+        channel.send(pack(Infer(id, observation(id))))
+    for _ in range(4):
+        channel.receive(10, "answer")
+    channel.close()
+
+
+def test_who_never_reads_its_answers_is_not_read_either(start: Any, dial: Any) -> None:
+    server = start(policy_factory=Recall, options=HURRIED)
+    sock = greeted(dial, server)
+    sock.settimeout(0.05)
+    pings = b"".join(frame(b"x" * 125, 9) for _ in range(2000)) + frame(encode({"id": 0}))
+    sent = 0
+    try:
+        for _ in range(300):
+            sent += sock.send(frame(pack(Reset(sent + 1, TRIAL))) + pings)
+    except (TimeoutError, ConnectionError):
+        pass
+    assert sent < 100_000_000
+    sock.settimeout(20)
+    assert served(server)
+    ended(sock)
+
+
+@pytest.mark.parametrize("opcode", [0, 9, 10])
+def test_floods_of_small_frames_end_the_connection(start: Any, dial: Any, opcode: int) -> None:
+    server = start(policy_factory=Recall)
+    sock = greeted(dial, server)
+    opening = frame(b"a", fin=False) if opcode == 0 else b""
+    try:
+        sock.sendall(opening + frame(b"", opcode, fin=opcode != 0) * (FRAMES + 10))
+        ended(sock)
+    except ConnectionError:
+        pass
+    assert served(server)
+
+
+@pytest.mark.parametrize("claim", [2**63 - 1, 2**40, 65 * 2**20])
+def test_a_frame_that_claims_too_much_allocates_nothing(start: Any, dial: Any, claim: int) -> None:
+    import tracemalloc
+
+    server = start(policy_factory=Recall)
+    sock = greeted(dial, server)
+    tracemalloc.start()
+    try:
+        sock.sendall(frame(b"start", size=claim))
+        said = ended(sock)
+        assert tracemalloc.get_traced_memory()[1] < 4_000_000
+    finally:
+        tracemalloc.stop()
+    assert struct.pack(">H", 1009) in said
+    assert served(server)
+
+
+@pytest.mark.parametrize(
+    ("data", "code"),
+    [
+        (frame(b"\x91" * 100_000 + b"\xc0"), 1007),
+        (frame(b"\xdf\xff\xff\xff\xff" + b"\x81" * 60), 1007),
+        (frame(b"hello", 1), 1003),
+        (frame(b"\xff\xfe", 1), 1007),
+        (frame(b"x", 3), 1002),
+        (frame(b"x" * 200, 9), 1002),
+        (b"\x82\x05plain", 1002),
+    ],
+)
+def test_frames_that_are_no_message_are_told_why(
+    start: Any, dial: Any, data: bytes, code: int
+) -> None:
+    server = start(policy_factory=Recall)
+    sock = greeted(dial, server)
+    sock.sendall(data)
+    assert struct.pack(">H", code) in ended(sock)
+    assert served(server)
+
+
+@pytest.mark.parametrize("cut", [1, 5, 30])
+def test_a_message_that_is_cut_off_frees_the_place(start: Any, dial: Any, cut: int) -> None:
+    server = start(Recall())  # one place
+    sock = greeted(dial, server)
+    sock.sendall(frame(pack(Reset(1, TRIAL)))[:-cut])
+    sock.close()
+    assert served(server)
+
+
+def test_a_model_that_hangs_does_not_keep_the_places_of_those_who_left(start: Any) -> None:
+    import threading
+
+    hung = threading.Event()
+
+    class Hangs(Recall):
+        spec = replace(Recall().spec, batch=1)
+
+        def infer_batch(self, seen: Any, sessions: Any) -> Any:
+            hung.wait(20)
+            return [self.infer(one) for one in seen]
+
+    server = start(Hangs(), options=ServerOptions(max_connections=2))
+    for _ in range(4):
+        channel = raw(server.url)
+        channel.send(pack(Reset(1, TRIAL)))
+        channel.send(pack(Infer(2, observation())))
+        channel.close()
+    until(lambda: not server._server._door._seated)
+    hung.set()
+    assert served(server)
+
+
+def test_a_policy_that_wants_to_exit_does_not(start: Any) -> None:
+    class Exits(Recall):
+        def infer(self, seen: Any) -> Any:
+            raise SystemExit("out of memory")
+
+    channel = raw(start(Exits()).url)
+    assert isinstance(ask(channel, pack(Reset(1, TRIAL))), Ready)
+    answer = ask(channel, pack(Infer(2, observation())))
+    assert isinstance(answer, Error) and "SystemExit: out of memory" in answer.message
+    assert isinstance(ask(channel, pack(Reset(3, TRIAL))), Ready)
+    channel.close()
+
+
+@pytest.mark.parametrize(
+    "name", ["../../etc/passwd", "a/b", "a\\b", "..", ".x", "a\x00b", "a" * 500]
+)
+@pytest.mark.parametrize("field", ["task", "embodiment", "mode", "split"])
+def test_names_that_could_be_paths_are_refused(start: Any, name: str, field: str) -> None:
+    policy = Recall()
+    channel = raw(start(policy).url)
+    answer = ask(channel, pack(Reset(1, replace(TRIAL, **{field: name}))))
+    assert isinstance(answer, Error) and answer.code == "bad_message"
+    assert field in answer.message and len(answer.message) < 300
+    assert not policy.trials
+    channel.close()
+
+
+def test_who_never_asks_gives_way(start: Any, caplog: pytest.LogCaptureFixture) -> None:
+    server = start(policy_factory=Recall, options=ServerOptions(max_connections=2))
+    busy = connect(server.url, timeouts=QUICK)
+    busy.reset(TRIAL)
+    idle = raw(server.url)
+    assert served(server)
+    with pytest.raises(ConnectionLost):
+        idle.receive(10, "nothing")
+    busy.infer(observation())
+    busy.close()
+    assert "its place is needed" in caplog.text
+
+
+def test_a_crowd_that_asks_keeps_its_places(start: Any) -> None:
+    options = ServerOptions(max_connections=2, patience=1.3)
+    server = start(policy_factory=Recall, options=options)
+    with connect(server.url, timeouts=QUICK) as one, connect(server.url, timeouts=QUICK) as two:
+        one.reset(TRIAL)
+        two.reset(TRIAL)
+        with pytest.raises(TransportError, match="all 2 places"):
+            connect(server.url, timeouts=QUICK)
+
+
+def test_the_log_is_one_line_a_fault(
+    start: Any, dial: Any, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level(logging.INFO)
+    server = start(policy_factory=Recall, token="s3cret")
+    for _ in range(20):
+        ended(dial(server, HANDSHAKE))
+        ended(dial(server, b"nonsense\r\n\r\n"))
+    assert caplog.text.count("\n") == 1 and "token is missing or wrong" in caplog.text
