@@ -35,6 +35,7 @@ from robospa.protocol.errors import (
 from robospa.protocol.images import encode_images
 from robospa.protocol.messages import (
     BAD_ANSWER,
+    BUSY,
     SUBPROTOCOL,
     Actions,
     End,
@@ -55,6 +56,8 @@ if TYPE_CHECKING:
     from typing_extensions import Self
 
 M = TypeVar("M", bound=Message)
+FIRST_PAUSE, LONGEST_PAUSE = 0.02, 1.0
+"""[s] between two requests to a server that is busy."""
 
 
 class ClientSession(Protocol):
@@ -122,11 +125,24 @@ class RemotePolicy:
             observation = encode_images(observation)
         timeout = self.timeouts.infer if self._warm else self.timeouts.first_infer
         start = time.perf_counter()
-        answer, timing = self._session.infer(self._id(), observation, timeout)
+        answer, timing = self._asked(observation, timeout)
         told = {name: ms for name, ms in timing.items() if math.isfinite(ms)}
         self.last_timing = {**told, "round_trip_ms": (time.perf_counter() - start) * 1e3}
         self._warm = True
         return check_chunk(answer, self.spec)
+
+    def _asked(self, observation: Observation, timeout: float) -> tuple[Any, Mapping[str, float]]:
+        """The answer. A server that is busy is asked again, with growing pauses, for `timeout` s:
+        the trial goes on, and the simulator waits for the model."""
+        give_up, pause = time.monotonic() + timeout, FIRST_PAUSE
+        while True:
+            try:
+                return self._session.infer(self._id(), observation, timeout)
+            except ServerError as error:
+                if error.code != BUSY or time.monotonic() + pause > give_up:
+                    raise
+            time.sleep(pause)
+            pause = min(2 * pause, LONGEST_PAUSE)
 
     def end(self, outcome: Mapping[str, Any] | None = None) -> None:
         """Tell the server how the trial ended (JSON values); optional."""

@@ -162,9 +162,8 @@ def test_one_bad_sample_spares_the_others(start: Any) -> None:
         remote.close()
 
 
-def test_too_many_waiting_requests_are_refused(start: Any) -> None:
-    policy = Together(size=1)
-    server = start(policy, options=ServerOptions(queue=1))
+def crowd(server: ServerThread, policy: Together, third: Any) -> tuple[list[Any], Any]:
+    """One request in the model, one waiting, and `third`(remote) with a queue that is full."""
     remotes = [connect(server.url, timeouts=QUICK) for _ in range(3)]
     for remote in remotes:
         remote.reset(TRIAL)
@@ -173,13 +172,44 @@ def test_too_many_waiting_requests_are_refused(start: Any) -> None:
         assert policy.started.wait(10)
         second = pool.submit(remotes[1].infer, observation(1))
         until(lambda: len(server._server._engine._batcher._pending) == 1)
-        with pytest.raises(ServerError, match="busy") as caught:
-            remotes[2].infer(observation(2))
-        assert caught.value.retriable
+        found = third(pool, remotes[2])
         policy.open.set()
-        assert [first.result(10)[0, 0], second.result(10)[0, 0]] == [0, 1]
+        answers = [first.result(10)[0, 0], second.result(10)[0, 0]]
+        if hasattr(found, "result"):
+            found = found.result(10)
     for remote in remotes:
         remote.close()
+    return answers, found
+
+
+def test_too_many_waiting_requests_are_refused(start: Any) -> None:
+    def third(pool: Any, remote: Any) -> Any:
+        remote.timeouts = replace(QUICK, first_infer=0.1)
+        with pytest.raises(ServerError, match="busy") as caught:
+            remote.infer(observation(2))
+        return caught.value
+
+    policy = Together(size=1)
+    answers, error = crowd(start(policy, options=ServerOptions(queue=1)), policy, third)
+    assert answers == [0, 1]
+    assert (error.code, error.retriable) == ("busy", True)
+
+
+def test_a_busy_server_is_waited_for_within_the_trial(
+    start: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    refused = threading.Event()
+    monkeypatch.setattr("robospa.protocol.client.time.sleep", lambda s: refused.set())
+
+    def third(pool: Any, remote: Any) -> Any:
+        asked = pool.submit(remote.infer, observation(2))
+        assert refused.wait(10)
+        return asked
+
+    policy = Together(size=1)
+    answers, chunk = crowd(start(policy, options=ServerOptions(queue=1)), policy, third)
+    assert answers == [0, 1]
+    assert chunk[0, 0] == 2
 
 
 def test_a_batch_policy_is_told_which_session_resets_and_ends(start: Any) -> None:
