@@ -10,19 +10,16 @@ that other environment; prints one line a check and ends with 1 if one fails.
 
 from __future__ import annotations
 
-import json
-import subprocess
 import sys
-import tempfile
+from hashlib import sha256
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+from original_servers import QUICK, TRIAL, Original, observation, run_checks
 
 from robospa.clients import connect
 from robospa.protocol.channel import Timeouts
 from robospa.protocol.errors import ServerError, WireError
-from robospa.protocol.policy import TrialInfo
 
 SERVER = """
 import hashlib, json, sys
@@ -70,51 +67,14 @@ async def main():
 
 anyio.run(main)
 """
-QUICK = Timeouts(wait=20, connect=20, hello=20, reset=20, first_infer=20, infer=20, end=20)
-TRIAL = TrialInfo("Pick_Blocks_Size", 1, 100_000, "aloha-agilex", "clean", "heldout", "pick", 1)
-
-
-class Original:
-    """A server of vla-eval in its own Python; `chunk_size` 0 for whole chunks."""
-
-    def __init__(self, python: str, script: Path, chunk_size: int, *more: str) -> None:
-        self._process = subprocess.Popen(
-            [python, str(script), str(chunk_size), *more],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            text=True,
-        )
-        self.url = f"vla-eval://127.0.0.1:{self.line()['port']}"
-
-    def line(self) -> Any:
-        """The next thing that the server reports."""
-        assert self._process.stdout is not None
-        return json.loads(self._process.stdout.readline())
-
-    def __enter__(self) -> Original:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._process.kill()
-        self._process.wait()
-
-
-def observation(step: int, text: str = "pick the red block") -> dict[str, Any]:
-    random = np.random.default_rng(step)
-    names = ("head", "left_wrist", "right_wrist")
-    return {
-        "images": {name: random.integers(0, 256, (240, 320, 3), np.uint8) for name in names},
-        "state": random.normal(size=14).astype(np.float32),
-        "ee": np.zeros((2, 8), np.float32),
-        "instruction": text,
-        "step": step,
-    }
+SCHEME = "vla-eval"
 
 
 def whole_chunks(python: str, script: Path) -> str:
-    from hashlib import sha256
-
-    with Original(python, script, 0) as server, connect(server.url, timeouts=QUICK) as policy:
+    with (
+        Original(python, script, SCHEME, "0") as server,
+        connect(server.url, timeouts=QUICK) as policy,
+    ):
         assert policy.hello["server"].startswith("Echo "), policy.hello
         policy.reset(TRIAL)
         seen = observation(0)
@@ -133,7 +93,10 @@ def whole_chunks(python: str, script: Path) -> str:
 
 
 def single_actions(python: str, script: Path) -> str:
-    with Original(python, script, 4) as server, connect(server.url, timeouts=QUICK) as policy:
+    with (
+        Original(python, script, SCHEME, "4") as server,
+        connect(server.url, timeouts=QUICK) as policy,
+    ):
         policy.reset(TRIAL)
         first = observation(0)
         answers = [policy.infer(observation(step)) for step in range(4)]
@@ -146,7 +109,7 @@ def single_actions(python: str, script: Path) -> str:
 
 def failures(python: str, script: Path) -> str:
     with (
-        Original(python, script, 0, "broken") as server,
+        Original(python, script, SCHEME, "0", "broken") as server,
         connect(server.url, timeouts=QUICK) as policy,
     ):
         policy.reset(TRIAL)
@@ -171,7 +134,7 @@ def failures(python: str, script: Path) -> str:
 
 
 def wrong_dialect(python: str, script: Path) -> str:
-    with Original(python, script, 0) as server:
+    with Original(python, script, SCHEME, "0") as server:
         for scheme in ("openpi", "go1+http", "xpolicylab"):
             try:
                 connect(server.url.replace("vla-eval", scheme), timeouts=Timeouts(hello=2))
@@ -182,23 +145,5 @@ def wrong_dialect(python: str, script: Path) -> str:
     return "spoken to in another dialect, it is recognised"
 
 
-def main() -> int:
-    """Run every check against the Python given on the command line."""
-    if len(sys.argv) != 2:
-        print(__doc__)
-        return 2
-    failed = 0
-    with tempfile.TemporaryDirectory() as folder:
-        script = Path(folder) / "server.py"
-        script.write_text(SERVER)
-        for check in (whole_chunks, single_actions, failures, wrong_dialect):
-            try:
-                print(f"ok      {check.__name__}: {check(sys.argv[1], script)}")
-            except (AssertionError, WireError) as error:
-                failed += 1
-                print(f"FAILED  {check.__name__}: {error}")
-    return 1 if failed else 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(run_checks(SERVER, (whole_chunks, single_actions, failures, wrong_dialect), __doc__))

@@ -13,19 +13,15 @@ line a check and ends with 1 if one fails.
 from __future__ import annotations
 
 import hashlib
-import json
-import subprocess
 import sys
-import tempfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from original_servers import CAMERAS, QUICK, TRIAL, Original, observation, run_checks
 
 from robospa.clients import connect
-from robospa.protocol.channel import Timeouts
-from robospa.protocol.errors import HandshakeError, ServerError, WireError
-from robospa.protocol.policy import TrialInfo
+from robospa.protocol.errors import HandshakeError, ServerError
 
 SERVER = """
 import asyncio, hashlib, json, socket, sys, traceback
@@ -107,44 +103,6 @@ else:
             await asyncio.Future()
     asyncio.run(main())
 """
-QUICK = Timeouts(wait=20, connect=20, hello=20, reset=20, first_infer=20, infer=20, end=20)
-TRIAL = TrialInfo("Pick_Blocks_Size", 1, 100_000, "aloha-agilex", "clean", "heldout", "pick", 1)
-CAMERAS = ("head", "left_wrist", "right_wrist")
-
-
-class Server:
-    """A server of `kind` in another Python."""
-
-    def __init__(self, python: str, script: Path, kind: str, scheme: str) -> None:
-        self._process = subprocess.Popen(
-            [python, str(script), kind], stdout=subprocess.PIPE, text=True
-        )
-        self.url = f"{scheme}://127.0.0.1:{self.line()['port']}"
-
-    def line(self) -> Any:
-        """The next thing that the server reports."""
-        assert self._process.stdout is not None
-        return json.loads(self._process.stdout.readline())
-
-    def __enter__(self) -> Server:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._process.kill()
-        self._process.wait()
-
-
-def observation() -> dict[str, Any]:
-    random = np.random.default_rng(0)
-    ee = random.normal(size=(2, 8)).astype(np.float32)
-    ee[:, 3:7] /= np.linalg.norm(ee[:, 3:7], axis=1, keepdims=True)
-    return {
-        "images": {name: random.integers(0, 256, (240, 320, 3), np.uint8) for name in CAMERAS},
-        "state": random.normal(size=14).astype(np.float32),
-        "ee": ee,
-        "instruction": "pick the “red” block",
-        "step": 0,
-    }
 
 
 def told(array: Any) -> list[Any]:
@@ -154,7 +112,7 @@ def told(array: Any) -> list[Any]:
 
 
 def go1(python: str, script: Path) -> str:
-    with Server(python, script, "go1", "go1+http") as server:
+    with Original(python, script, "go1+http", "go1") as server:
         seen = observation()
         with connect(server.url, timeouts=QUICK) as policy:
             policy.reset(TRIAL)
@@ -172,7 +130,7 @@ def go1(python: str, script: Path) -> str:
 
 
 def xvla(python: str, script: Path) -> str:
-    with Server(python, script, "xvla", "xvla+http") as server:
+    with Original(python, script, "xvla+http", "xvla") as server:
         seen = observation()
         with connect(server.url, timeouts=QUICK) as policy:
             policy.reset(TRIAL)
@@ -209,7 +167,7 @@ def wrong(url: str, name: str) -> str:
 
 
 def xpolicylab(python: str, script: Path) -> str:
-    with Server(python, script, "xpolicylab", "xpolicylab") as server:
+    with Original(python, script, "xpolicylab", "xpolicylab") as server:
         seen = observation()
         with connect(server.url, timeouts=QUICK) as policy:
             policy.reset(TRIAL)
@@ -227,23 +185,5 @@ def xpolicylab(python: str, script: Path) -> str:
         return "msgpack-numpy reads every array bit for bit, and is read"
 
 
-def main() -> int:
-    """Run every check against the Python given on the command line."""
-    if len(sys.argv) != 2:
-        print(__doc__)
-        return 2
-    failed = 0
-    with tempfile.TemporaryDirectory() as folder:
-        script = Path(folder) / "server.py"
-        script.write_text(SERVER)
-        for check in (go1, xvla, xpolicylab):
-            try:
-                print(f"ok      {check.__name__}: {check(sys.argv[1], script)}")
-            except (AssertionError, WireError) as error:
-                failed += 1
-                print(f"FAILED  {check.__name__}: {type(error).__name__}: {error}")
-    return 1 if failed else 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(run_checks(SERVER, (go1, xvla, xpolicylab), __doc__))
