@@ -10,6 +10,7 @@ from __future__ import annotations
 import gc
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -42,6 +43,8 @@ FIELDS = {"format", "suite", "robospa", "practice", "inputs", "chain", "seeds", 
 LISTING = ("unequal-trials", "missing")
 """Lint rules about how many trials there are, which `check_seeds` decides."""
 MOVIE = b"ftyp"
+THREADS = 4
+"""Action files that are looked at together; each may take 64 MB unpacked, and as much decoded."""
 
 
 @dataclass(frozen=True)
@@ -283,17 +286,30 @@ def _variants(records: Mapping[TrialKey, TrialRecord]) -> Iterator[list[TrialRec
 def _check_actions(
     files: _Files, records: Mapping[TrialKey, TrialRecord], traces: Mapping[TrialKey, str]
 ) -> None:
-    """BundleError unless every stored array has its row's and record's hash."""
-    for found in _variants(records):
-        name = layout.actions_name(*found[0].key.variant)
-        stored = decode(files.read(name), name)
-        if len(stored) != len(found):
-            raise BundleError(f"{name} holds {len(stored)} trials, not {len(found)}")
-        for record, trace in zip(found, stored, strict=True):
-            digest = trace_hash(trace)
-            if digest != traces[record.key]:
-                raise BundleError(f"{name}: {record.key.slug} has other actions than its row says")
-            check_trace(record, len(trace), digest)
+    """BundleError unless every stored array has its row's and record's hash.
+
+    Unpacking and hashing take most of the time and leave Python alone, so threads share them.
+    """
+    pool = ThreadPoolExecutor(THREADS)
+    try:
+        for _ in pool.map(lambda found: _check_variant(files, found, traces), _variants(records)):
+            pass  # the first that fails, in their order, raises here
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def _check_variant(
+    files: _Files, found: Sequence[TrialRecord], traces: Mapping[TrialKey, str]
+) -> None:
+    name = layout.actions_name(*found[0].key.variant)
+    stored = decode(files.read(name), name)
+    if len(stored) != len(found):
+        raise BundleError(f"{name} holds {len(stored)} trials, not {len(found)}")
+    for record, trace in zip(found, stored, strict=True):
+        digest = trace_hash(trace)
+        if digest != traces[record.key]:
+            raise BundleError(f"{name}: {record.key.slug} has other actions than its row says")
+        check_trace(record, len(trace), digest)
 
 
 def read_traces(valid: Valid, wanted: Sequence[TrialKey]) -> dict[TrialKey, Trace]:
