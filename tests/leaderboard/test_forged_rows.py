@@ -88,7 +88,8 @@ def test_a_duplicated_trial(files: Files, tmp_path: Path) -> None:
 def test_a_duplicated_trial_in_the_list(files: Files, tmp_path: Path) -> None:
     keys = sorted(TrialKey(**row["record"]["key"]) for row in rows_of(files))
     relist(files, [*keys[:3], keys[2], *keys[4:]])
-    assert "more than once" in refused(zip_up(tmp_path / "b.zip", seal(files)))
+    text = refused(zip_up(tmp_path / "b.zip", seal(files)))
+    assert "more than once" in text or "twice" in text
 
 
 def test_seeds_outside_the_list(files: Files, tmp_path: Path) -> None:
@@ -119,7 +120,7 @@ def test_a_task_left_out(files: Files, tmp_path: Path) -> None:
 def test_a_task_that_does_not_exist(files: Files, tmp_path: Path) -> None:
     rows = rows_of(files)
     for row in rows:
-        row["record"]["key"]["task"] = "Easy_Task"
+        row["record"]["key"]["task"] = "Easy_" + row["record"]["key"]["task"]
     relist(files, [TrialKey(**row["record"]["key"]) for row in rows])
     assert "no variant with a list of seeds" in refused(zip_up(tmp_path / "b.zip", seal(files)))
 
