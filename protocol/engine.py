@@ -18,6 +18,7 @@ then it need not be thread-safe.
 from __future__ import annotations
 
 import itertools
+import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol, TypeVar
@@ -67,6 +68,7 @@ class Engine:
         self._batched = policy is not None and hasattr(policy, "infer_batch")
         self.max_sessions = None if self._factory is not None or self._batched else 1
         self._threads = PolicyThreads(threads)
+        self._alone = threading.Lock()
         self._numbers = itertools.count(1)
         self._batcher = Batcher(self._infer_batch, self.spec.batch, queue)
 
@@ -81,11 +83,11 @@ class Engine:
             assert self._shared is not None
             if self._batched:
                 return _SharedSession(self, self._shared, self._batcher, number)
-            return _OwnSession(self, self._shared, keep=True)
+            return _OwnSession(self, self._shared, self._alone, keep=True)
         policy, self._spare = self._spare, None
         if policy is None:
             policy = await self.run(self._factory)
-        return _OwnSession(self, policy, keep=False)
+        return _OwnSession(self, policy, threading.Lock(), keep=False)
 
     def post(self, call: Callable[..., object], *args: Any) -> None:
         """The same without waiting: a hanging model must not hold up a closing connection."""
@@ -104,19 +106,24 @@ class Engine:
 
 
 class _OwnSession:
-    """A policy object of its own."""
+    """A policy object of its own. `alone`: held while it is called, because a client may leave,
+    and the next one or `close` come, while a call is under way in another thread."""
 
-    def __init__(self, engine: Engine, policy: Policy, keep: bool) -> None:
-        self._engine, self._policy, self._keep = engine, policy, keep
+    def __init__(self, engine: Engine, policy: Policy, alone: threading.Lock, keep: bool) -> None:
+        self._engine, self._policy, self._alone, self._keep = engine, policy, alone, keep
 
     def coming(self) -> None:
         return None
 
     async def reset(self, trial: TrialInfo) -> None:
-        await self._engine.run(self._policy.reset, trial)
+        await self._engine.run(self._call, self._policy.reset, trial)
 
     async def infer(self, observation: Observation) -> Answer:
-        return await self._engine.run(self._timed, time.perf_counter(), observation)
+        return await self._engine.run(self._call, self._timed, time.perf_counter(), observation)
+
+    def _call(self, method: Callable[..., T], *args: Any) -> T:
+        with self._alone:
+            return method(*args)
 
     def _timed(self, asked: float, observation: Observation) -> Answer:
         start = time.perf_counter()
@@ -128,11 +135,11 @@ class _OwnSession:
     async def end(self, outcome: Mapping[str, Any]) -> None:
         method = getattr(self._policy, "end", None)
         if method is not None:
-            await self._engine.run(method, outcome)
+            await self._engine.run(self._call, method, outcome)
 
     def close(self) -> None:
         if not self._keep and hasattr(self._policy, "close"):
-            self._engine.post(self._policy.close)
+            self._engine.post(self._call, self._policy.close)
 
 
 class _SharedSession:
