@@ -1,0 +1,62 @@
+"""Level 3 in the real simulator: an honest claim is reproduced, an inflated one is caught.
+
+Expert-checked hidden seeds, real bundles, policies behind real servers.
+"""
+
+from __future__ import annotations
+
+from copy import deepcopy
+from pathlib import Path
+
+import pytest
+from bundle_fakes import CARD
+from shadow import HORIZON, Shadow
+
+from robospa.harness.cli.running import make_request
+from robospa.harness.evaluate import evaluate
+from robospa.leaderboard.hidden import draw_block, read_block, write_block
+from robospa.leaderboard.packing import pack
+from robospa.leaderboard.reference import shipped
+from robospa.leaderboard.reproduce import check_policy, compare, hidden_keys
+from robospa.protocol.server import ServerThread
+from robospa.results.reading import Run, read_run
+from robospa.results.records import TrialKey
+from robospa.tasks.seeds import accepted
+
+pytestmark = pytest.mark.sim
+TASK, LEVEL, TRIALS = "Pick_Blocks_Size", 1, 5
+LIMITS = {"timeout": 60.0, "first_timeout": 60.0, "wait": 0.0, "patience": 5.0}
+
+
+def run(folder: Path, keys: list[TrialKey], clumsy: bool) -> Run:
+    """The run of the shadow, served over the wire."""
+    with ServerThread(policy_factory=lambda: Shadow(clumsy)) as server:
+        evaluate(make_request(server.url, keys, folder, connection=LIMITS, workers=1))
+    return read_run(folder)
+
+
+def test_a_claim_is_reproduced_and_an_inflated_one_is_caught(tmp_path: Path) -> None:
+    reference, card = shipped(), deepcopy(CARD)
+    card["actions"]["chunk"] = HORIZON
+    claimed = [TrialKey(TASK, LEVEL, seed) for seed in accepted(TASK, LEVEL)[:TRIALS]]
+    assert sum(r.success for r in run(tmp_path / "run", claimed, False).records.values()) == TRIALS
+    valid = pack(
+        [tmp_path / "run"], card, tmp_path / "b.zip", reference, practice=True, videos=False
+    ).valid
+
+    drawn = draw_block([(TASK, LEVEL)], TRIALS)
+    write_block(drawn, tmp_path / "block.json")
+    block = read_block(tmp_path / "block.json", drawn.commitment)
+    keys = hidden_keys(valid, block, reference)
+
+    with ServerThread(policy_factory=Shadow) as server:
+        request = make_request(server.url, keys, tmp_path / "x", connection=LIMITS)
+        check_policy(valid, request)
+    honest = compare(valid, run(tmp_path / "honest", keys, False), keys, block)
+    assert honest.holds
+    assert honest.overall.fresh == TRIALS
+
+    inflated = compare(valid, run(tmp_path / "inflated", keys, True), keys, block)
+    assert not inflated.holds
+    assert inflated.overall.fresh == 0
+    assert inflated.overall.p == pytest.approx(2 / 252)
