@@ -24,7 +24,7 @@ from robospa.leaderboard import bundle as layout
 from robospa.leaderboard.archive import Archive
 from robospa.leaderboard.bundle import MEGA, BundleError
 from robospa.leaderboard.card import LINK, check_card, read_card
-from robospa.leaderboard.strict import parse_map
+from robospa.leaderboard.strict import is_hash, parse_map
 from robospa.leaderboard.verify import Valid
 from robospa.results.failures import NAMES, distribution
 from robospa.results.reading import Run
@@ -41,6 +41,7 @@ KEPT = {
     "scores.json": layout.SCORES,
 }
 """File in the folder -> file in the bundle."""
+COUNT = re.compile(r"[1-9][0-9]{0,11}")
 LEVELS = ("valid", "replayed", "reproduced")
 SLUG = re.compile(r"[a-z0-9][a-z0-9-]{0,63}")
 VIDEO = re.compile(r"videos/[A-Za-z0-9_-]{1,200}\.mp4")
@@ -58,6 +59,15 @@ class Submission:
     evidence: Mapping[str, Any]
     failures: Mapping[str, Mapping[str, int]]
     films: Sequence[Mapping[str, Any]]
+
+
+@dataclass(frozen=True)
+class Announced:
+    """What was handed in: where the bundle is, how many bytes it has, and its hash."""
+
+    address: str
+    size: int
+    bundle: str
 
 
 def slug_of(name: str) -> str:
@@ -116,12 +126,23 @@ def _asked(folder: Path, valid: Valid) -> str:
         raise BundleError(f"{folder / ASKED} is not the bundle's model card")
     if BUNDLE not in there:
         return ""
-    lines = _bytes(folder / BUNDLE, str(folder)).decode(errors="replace").split()
-    if len(lines) != 3 or not LINK.fullmatch(lines[0]):
-        raise BundleError(f"{folder / BUNDLE} is not three lines: https address, bytes, hash")
-    if lines[1:] != [str(valid.path.stat().st_size), valid.manifest["bundle"]]:
+    announced = read_announced(folder)
+    if (announced.size, announced.bundle) != (valid.path.stat().st_size, valid.manifest["bundle"]):
         raise BundleError(f"{folder / BUNDLE} has the size or the hash of another bundle")
-    return lines[0]
+    return announced.address
+
+
+def read_announced(folder: Path) -> Announced:
+    """What `bundle.txt` in `folder` says; BundleError if it is none."""
+    path = folder / BUNDLE
+    lines = _bytes(path, str(folder)).decode(errors="replace").split()
+    if len(lines) != 3 or not LINK.fullmatch(lines[0]) or not COUNT.fullmatch(lines[1]):
+        raise BundleError(f"{path} is not three lines: https address, bytes, hash")
+    if not is_hash(lines[2]):
+        raise BundleError(f"{path} has no bundle hash of 64 hexadecimal digits")
+    if int(lines[1]) > layout.Limits().packed:
+        raise BundleError(f"{path} announces more than {layout.Limits().packed} bytes")
+    return Announced(lines[0], int(lines[1]), lines[2])
 
 
 def waiting(home: Path) -> list[str]:
