@@ -157,9 +157,9 @@ class Progress:
         head.add_row(bar, f"{tally.done}/{tally.total}", Text(said))
         if status is None or final:
             return head
-        busy = f"{status.running} of {status.workers} workers busy on {status.cores} cores"
         shares = shares_text(status.shares)
-        lines: list[Any] = [head, Text(f"{busy}; {shares}" if shares else busy, style="dim")]
+        told = f"{status.staff}; {shares}" if shares else status.staff
+        lines: list[Any] = [head, Text(told, style="dim")]
         if status.servers:
             lines.append(_table(status))
         if status.verdict:
@@ -198,7 +198,7 @@ def _busiest(servers: Sequence[Server]) -> list[Server]:
 def details(status: Status) -> list[str]:
     """Lines that say where the time goes, what the servers do and who holds the others up."""
     shares = shares_text(status.shares)
-    lines = [f"{status.workers} workers on {status.cores} cores; {shares}"] if shares else []
+    lines = [f"{status.staff}; {shares}"] if shares else []
     asked = [s for s in _busiest(status.servers) if s.trials or not s.up]
     lines += [f"{s.target}: {s.trials} trials, {server_text(s, status.now)}" for s in asked]
     return [*lines, status.verdict] if status.verdict else lines

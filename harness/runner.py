@@ -287,7 +287,8 @@ class Runner:
 
     def status(self, now: float) -> Status:
         """How things are at time `now`."""
-        costs, running = self._queue.costs, [s for s in self._seats if s.job is not None]
+        costs, ready = self._queue.costs, [s for s in self._seats if s.ready]
+        running = [s for s in ready if s.job is not None]
         left = self._queue.left()
         for seat in running:
             assert seat.job is not None
@@ -296,10 +297,11 @@ class Runner:
             now,
             workers=len(self._seats),
             running=len(running),
-            cores=self._staffing.cores,
+            starting=len(self._seats) - len(ready),
+            cores=self._staffing.cores if self.executor is None else self._crew.room(),
             servers=tuple(self._scheduler.servers.values()),
             shares=self.shares.now(),
-            left=left / max(1, len(self._seats)) if costs.known else None,
+            left=left / max(1, len(ready)) if costs.known else None,
         )
 
     def _forgive(self, gap: float) -> None:

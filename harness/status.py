@@ -10,6 +10,7 @@ from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from robospa.harness.factory import is_url
 from robospa.harness.servers import Server
 from robospa.harness.staffing import FULL
 from robospa.results.records import TrialRecord
@@ -72,8 +73,8 @@ def _shares(seconds: Mapping[str, float]) -> dict[str, float]:
 
 @dataclass(frozen=True)
 class Status:
-    """A run at one instant. `left`: seconds, None if nothing is known yet; `away`: seconds until
-    each server that is away is tried again."""
+    """A run at one instant: of `workers` workers `starting` are not ready yet and `running` have a
+    trial. `left`: seconds, None if nothing is known yet."""
 
     now: float
     workers: int
@@ -82,6 +83,7 @@ class Status:
     servers: Sequence[Server] = ()
     shares: Mapping[str, float] = field(default_factory=dict)
     left: float | None = None
+    starting: int = 0
 
     @property
     def verdict(self) -> str:
@@ -89,20 +91,30 @@ class Status:
         if not self.shares:
             return ""
         waiting = self.shares.get("waiting", 0.0)
-        busy = self.workers * (1.0 - waiting)
+        if not any(is_url(s.target) for s in self.servers):
+            waiting = 0.0  # a policy in the worker's own process takes its core as well
+        busy = (self.workers - self.starting) * (1.0 - waiting)
         asked = [s for s in self.servers if s.running and s.means]
         if away := [s for s in self.servers if not s.up and not s.retired]:
-            return f"{_some(len(away))} away; workers go to the others and try again"
+            others = "" if len(away) == len(self.servers) else "; the others get its workers"
+            return f"{_some(len(away))} away{others}"
         if busy >= FULL * self.cores:
             return f"the simulators are the bottleneck: they fill {_cores(self.cores)}"
         full = [s for s in asked if s.saturated]
         if asked and len(full) == len(asked):
             who = "the policy server is" if len(asked) == 1 else "the policy servers are"
             return f"{who} the bottleneck: workers wait {100 * waiting:.0f} % of their time"
-        return (
-            f"nobody is at the limit: workers wait {100 * waiting:.0f} % of their time and leave cores "
-            "idle, the servers could answer more of them"
-        )
+        told = f"they wait {100 * waiting:.0f} % of their time"
+        return f"room for more workers: {told}, no queue is long"
+
+    @property
+    def staff(self) -> str:
+        """`8 workers on 4 cores`, and how many of them do nothing yet."""
+        text = f"{self.workers} workers on {self.cores} cores"
+        if self.starting:
+            return f"{text}, {self.starting} starting"
+        idle = self.workers - self.running
+        return f"{text}, {idle} idle" if idle else text
 
 
 def _some(count: int) -> str:

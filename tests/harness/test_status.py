@@ -59,10 +59,10 @@ def test_a_server_whose_queue_is_longer_than_its_model_is_the_bottleneck() -> No
     assert "wait 90 % of their time" in status(0.9, full).verdict
 
 
-def test_idle_cores_and_idle_servers_are_nobodys_bottleneck() -> None:
-    assert "nobody is at the limit" in status(0.9, server(queue=1.0, infer=100.0)).verdict
+def test_idle_cores_and_idle_servers_have_room_for_more_workers() -> None:
+    assert "room for more workers" in status(0.9, server(queue=1.0, infer=100.0)).verdict
     mixed = status(0.9, server(queue=1.0, infer=100.0), server(queue=900.0, infer=100.0))
-    assert "nobody is at the limit" in mixed.verdict
+    assert "room for more workers" in mixed.verdict
 
 
 def test_a_server_that_tells_nothing_is_full_when_it_answers_slower_than_it_could() -> None:
@@ -80,7 +80,10 @@ def test_before_the_first_trial_there_is_nothing_to_say() -> None:
 def test_servers_that_are_away_are_said_first() -> None:
     away = server()
     away.fail(0.0, 2.0)
-    assert status(0.3, away, server()).verdict.startswith("a policy server is away")
+    assert status(0.3, away, server()).verdict == (
+        "a policy server is away; the others get its workers"
+    )
+    assert status(0.3, away).verdict == "a policy server is away"
     assert server_text(away, 0.5) == "away, next try in 2 s"
     assert server_text(away, 3.0) == "away, being tried"
 
@@ -105,3 +108,9 @@ def test_the_pause_of_a_server_grows_but_not_with_every_worker_that_fails_with_i
         now = away.back
     assert pauses == [2.0, 4.0, 8.0, 16.0, 30.0, 30.0]
     assert away.since == 0.0
+
+
+def test_workers_that_start_or_idle_are_named() -> None:
+    assert Status(0.0, 4, 4, 2).staff == "4 workers on 2 cores"
+    assert Status(0.0, 4, 3, 2).staff == "4 workers on 2 cores, 1 idle"
+    assert Status(0.0, 4, 2, 2, starting=2).staff == "4 workers on 2 cores, 2 starting"
