@@ -2,7 +2,7 @@
 
 `check(url)` talks to the server as a harness would, plus the ways in which harnesses and servers
 are known to fail each other: a wrong version, a request out of turn, an error followed by a reset,
-two trials at once, a connection that goes away and comes back. It costs the server about ten calls
+two trials at once, a connection that goes away and comes back. It costs the server some forty calls
 of its model. A server that speaks openpi's dialect gets the checks that make sense there.
 """
 
@@ -10,10 +10,13 @@ from __future__ import annotations
 
 import ssl as ssl_module
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from robospa.protocol.channel import Address, Channel, Timeouts
 from robospa.protocol.checks import compare_specs
@@ -60,6 +63,10 @@ class _Skip(Exception):
 
 
 OURS = "robospa.v1"
+EXACT = "the policy needs the exact state, which only a simulator can give"
+ASKED, SESSIONS = 6, 4
+CLOSE = 1e-2
+"""How far actions of a seeded policy may be off in another batch: half precision."""
 POSE = np.array([0, 0, 1, 1, 0, 0, 0, 1], np.float32)
 """An end effector 1 m up, not turned, open."""
 
@@ -193,15 +200,28 @@ def _reset(target: _Target) -> str:
 
 def _infer(target: _Target) -> str:
     if target.spec.privileged:
-        raise _Skip("the policy needs the exact state, which only a simulator can give")
+        raise _Skip(EXACT)
     with target.connect() as policy:
         policy.reset(TRIAL)
         chunk = policy.infer(synthetic_observation(target.spec))
-        first = policy.last_timing["round_trip_ms"]
         policy.infer(synthetic_observation(target.spec, step=len(chunk)))
-        then = policy.last_timing["round_trip_ms"]
         policy.end({"success": False, "end": "step_limit"})
-    return f"float32 {chunk.shape}, finite; {first:.1f} ms, then {then:.1f} ms"
+    return f"float32 {chunk.shape}, finite, numbers from {chunk.min():.3g} to {chunk.max():.3g}"
+
+
+def _latency(target: _Target) -> str:
+    if target.spec.privileged:
+        raise _Skip(EXACT)
+    with target.connect() as policy:
+        policy.reset(TRIAL)
+        taken, told = [], []
+        for step in range(ASKED):
+            policy.infer(synthetic_observation(target.spec, step))
+            taken.append(policy.last_timing["round_trip_ms"])
+            told.append(policy.last_timing.get("infer_ms", float("nan")))
+    model = f", {np.median(told[1:]):.1f} ms of it in the model" if np.isfinite(told).all() else ""
+    middle = f"then {np.median(taken[1:]):.1f} ms (at most {max(taken[1:]):.1f})"
+    return f"first answer {taken[0]:.1f} ms, {middle}{model}"
 
 
 def _order(target: _Target) -> str:
@@ -249,7 +269,7 @@ def _unknown_fields(target: _Target) -> str:
 
 def _two_sessions(target: _Target) -> str:
     if target.spec.privileged:
-        raise _Skip("the policy needs the exact state, which only a simulator can give")
+        raise _Skip(EXACT)
     with target.connect() as first:
         try:
             second = target.connect()
@@ -267,7 +287,7 @@ def _determinism(target: _Target) -> str:
     if not target.spec.seeded:
         raise _Skip("the server does not promise repeatable answers (spec.seeded is false)")
     if target.spec.privileged:
-        raise _Skip("the policy needs the exact state, which only a simulator can give")
+        raise _Skip(EXACT)
     chunks = []
     for _ in range(2):
         with target.connect() as policy:
@@ -276,6 +296,39 @@ def _determinism(target: _Target) -> str:
     same = all(np.array_equal(a, b) for a, b in zip(*chunks, strict=True))
     assert same, "the same policy seed and observations gave other actions"
     return "the same policy seed and observations give the same actions"
+
+
+def _concurrent(target: _Target) -> str:
+    """Several sessions at once get what each would get alone."""
+    if target.spec.privileged:
+        raise _Skip(EXACT)
+    with ExitStack() as stack:
+        policies = [stack.enter_context(target.connect())]
+        try:
+            policies += [stack.enter_context(target.connect()) for _ in range(SESSIONS - 1)]
+        except TransportError as error:
+            raise _Skip(f"one connection at a time: {error}") from error
+        alone = [_episode(policy, target.spec, n) for n, policy in enumerate(policies)]
+        pool = stack.enter_context(ThreadPoolExecutor(SESSIONS))
+        jobs = [pool.submit(_episode, p, target.spec, n) for n, p in enumerate(policies)]
+        together = [job.result() for job in jobs]
+        batch = max(policy.last_timing.get("batch", 1.0) for policy in policies)
+    text = f"{SESSIONS} trials at once are answered, up to {batch:g} in one call"
+    if not target.spec.seeded:
+        return text
+    pairs = list(zip(alone, together, strict=True))
+    assert all(a.shape == b.shape for a, b in pairs), "in company chunks have other lengths"
+    off = max(float(np.abs(a - b).max()) for a, b in pairs)
+    assert off <= CLOSE, f"in company actions differ by up to {off:.3g}: are sessions mixed up?"
+    same = "the same to the bit" if off == 0 else f"the same but for {off:.1g}"
+    return f"{text}; {same} as alone"
+
+
+def _episode(policy: RemotePolicy, spec: PolicySpec, number: int) -> NDArray[np.float32]:
+    """The chunks of a short trial of its own."""
+    policy.reset(replace(TRIAL, seed=TRIAL.seed + number, policy_seed=number))
+    seen = [synthetic_observation(spec, step, seed=10 * number + step) for step in range(3)]
+    return np.concatenate([policy.infer(one) for one in seen])
 
 
 def _reconnect(target: _Target) -> str:
@@ -312,10 +365,12 @@ CHECKS: dict[str, Callable[[_Target], str]] = {
     "foreign version refused": _subprotocol,
     "reset acknowledged": _reset,
     "actions": _infer,
+    "latency": _latency,
     "requests in order": _order,
     "error, then recovery": _bad_observation,
     "unknown fields": _unknown_fields,
     "two sessions": _two_sessions,
+    "concurrent sessions": _concurrent,
     "determinism": _determinism,
     "reconnect": _reconnect,
     "garbage": _garbage,

@@ -1,9 +1,10 @@
 """`robospa check URL`: is this policy server fit to be evaluated?
 
-Three looks: the protocol (`robospa.protocol.conformance`), the first actions
-(`robospa.harness.first_actions`), and with --demo the replay of a demonstration
-(`robospa.harness.replay_check`). Exit code 1 if a check of the protocol failed, or if the replay
-names a mistake; hints and a replay that does not fit are only told.
+Four looks: the protocol (`robospa.protocol.conformance`), the first actions
+(`robospa.harness.first_actions`), a real trial done twice (`robospa.harness.real_trials`), and with
+--demo the replay of a demonstration (`robospa.harness.replay_check`). Exit code 1 if a check of the
+protocol or a real trial failed, or if the replay names a mistake; hints and a replay that does not
+fit are only told.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from robospa.harness.replay_check import Findings
     from robospa.protocol.client import RemotePolicy
 
+MARKS = {True: "[green]ok[/]", False: "[red]FAILED[/]", None: "[dim]n/a[/]"}
 SHOWN = 6
 """Mistakes in the table of the replay, beside the policy as it is."""
 
@@ -58,6 +60,9 @@ def check(
         str | None, typer.Option(help="What to tell it in the demonstration, if the file does not.")
     ] = None,
     points: Annotated[int, typer.Option(help="Frames of the demonstration to ask it at.")] = 8,
+    trials: Annotated[
+        int, typer.Option(min=0, help="How often to run a real trial, if there is a simulator.")
+    ] = 2,
 ) -> None:
     """Talk to a policy server in every way that an evaluation will, and say what it gets wrong."""
     from rich.console import Console
@@ -91,18 +96,25 @@ def check(
     results = run_checks(bare, token, timeouts=limits, connector=None if own else opened)
     table = Table("check", "", "seen", box=None)
     for result in results:
-        mark = {True: "[green]ok[/]", False: "[red]FAILED[/]", None: "[dim]n/a[/]"}[result.passed]
-        table.add_row(result.name, mark, escape(result.detail))
+        table.add_row(result.name, MARKS[result.passed], escape(result.detail))
     console = Console()
     failed = [result.name for result in results if result.passed is False]
     if "handshake" not in failed and "actions" not in failed:
         table.add_row("first actions", *_first_actions(opened))
+    count = len(results)
+    if not failed and trials:
+        from robospa.harness.real_trials import real_trials
+
+        for tried in real_trials(opened, trials):
+            count += 1
+            table.add_row(tried.name, MARKS[tried.passed], escape(tried.detail))
+            failed += [tried.name] if tried.passed is False else []
     console.print(table)
     if "handshake" not in failed:
         for warning in _warnings(opened):
             console.print(f"[yellow]note[/] {escape(warning)}")
     if failed:
-        console.print(f"{escape(url)} failed {len(failed)} of {len(results)} checks.", style="red")
+        console.print(f"{escape(url)} failed {len(failed)} of {count} checks.", style="red")
         raise typer.Exit(1)
     if episode is not None:
         from robospa.harness.replay_check import replay
