@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from robospa.results import aggregate
 from robospa.results.bootstrap import Sample, rate
@@ -25,6 +26,7 @@ from robospa.results.metrics import (
 )
 from robospa.results.published import LEVELS, Published, load, title
 from robospa.results.reading import Run
+from robospa.results.tables_grid import MISSING
 
 METRIC_CATEGORIES = {
     "sr": (*DIMENSIONS["spatial"], *DIMENSIONS["procedural"]),
@@ -107,6 +109,15 @@ class Column:
         """Listed trials below this row that have no result."""
         part = self.part(row, level)
         return 0 if part is None else part.missing
+
+    def lacks(self, metric: str, row: str, level: int) -> dict[str, Any]:
+        """What an entry of a table says of missing trials."""
+        part = self.part(row, level)
+        if part is None or not part.missing:
+            return {}
+        ends = part.bounds(metric)
+        bounds = None if ends is None else (100 * ends[0], 100 * ends[1])
+        return {"sign": MISSING, "missing": part.missing, "bounds": bounds}
 
     @property
     def covers_benchmark(self) -> bool:

@@ -22,6 +22,7 @@ from robospa.results.intervals import (
     over_tasks,
     paired_sample_difference,
 )
+from robospa.results.metrics import CATEGORIES
 from robospa.results.records import TrialRecord
 from robospa.results.sequential import Verdict, decide
 from robospa.results.sides import (
@@ -32,6 +33,7 @@ from robospa.results.sides import (
     check_settings,
     collections,
     common_seeds,
+    extremes,
     sample_of,
     weights_of,
 )
@@ -108,7 +110,28 @@ def compare(first: Side, second: Side, metric: str = "sr", method: str = "wilson
         _corrected(rows),
         _corrected([g for g in groups if g.kind == "category"])
         + tuple(replace(g, q=g.p) for g in groups if g.kind != "category"),
-        tuple(_notes(first, second, common, wanted, paired)),
+        tuple(_notes(first, second, common, wanted, paired))
+        + (tuple(_worst_and_best(first, second, category)) if metric != "onta" else ()),
+    )
+
+
+def over_levels(
+    first: Side, second: Side, metric: str = "sr", method: str = "wilson"
+) -> tuple[Difference, ...]:
+    """The differences of single tasks, each the mean over the levels that both sides have."""
+    check_settings(first, second)
+    common = [v for v in first.samples if v in second.samples]
+    paired = all(common_seeds(first, second, v) for v in common)
+    category = {**second.category, **first.category}
+    cells: dict[str, list[_Cell]] = {}
+    for variant in common:
+        cell = _cell(first, second, variant, metric, paired)
+        cells.setdefault(variant[0], []).append(cell)
+    return _corrected(
+        [
+            _group_row(task, "task", 0, own, len(own), category, method)
+            for task, own in cells.items()
+        ]
     )
 
 
@@ -268,7 +291,7 @@ def _group_row(
         return Difference(*row, p_of_interval(honest), over_tasks=other)
     b, c = _discordant(cells)
     # One weight for every trial holds inside a category; above it only the interval is fair.
-    pooled = kind == "category" and all(x.first.binary for x in cells)
+    pooled = kind in ("task", "category") and all(x.first.binary for x in cells)
     p = mcnemar_mid_p(b, c) if pooled else p_of_interval(honest)
     return Difference(*row, p, b, c, over_tasks=other)
 
@@ -299,6 +322,28 @@ def _member(
 def _corrected(rows: Sequence[Difference]) -> tuple[Difference, ...]:
     qs = benjamini_hochberg([row.p for row in rows])
     return tuple(replace(row, q=q) for row, q in zip(rows, qs, strict=True))
+
+
+def _worst_and_best(first: Side, second: Side, category: Mapping[str, str]) -> list[str]:
+    """What missing trials could make of the mean over all variants that both list."""
+    both = [v for v in first.listed if v in second.listed and category.get(v[0]) in CATEGORIES]
+    lacking = [
+        sum(side.listed[v] for v in both)
+        - sum(side.samples[v].trials for v in both if v in side.samples)
+        for side in (first, second)
+    ]
+    if not both or not any(lacking):
+        return []
+    names = replace(first, category=category), replace(second, category=category)
+    (low, high), (other_low, other_high) = (extremes(side, both) for side in names)
+    counts = " and ".join(
+        f"{side.name} lacks {n}" for side, n in zip((first, second), lacking, strict=True) if n
+    )
+    return [
+        f"{counts} of the trials that both list: over these the difference is "
+        f"{100 * (low - other_high):+.1f} in the worst and {100 * (high - other_low):+.1f} in the "
+        f"best case for {first.name}."
+    ]
 
 
 def _notes(

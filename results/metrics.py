@@ -53,6 +53,7 @@ METRIC_NAMES = {"sr": "SR", "onta": "ONTA", "ps": "PS"}
 
 
 Weighted = tuple[tuple[Sample, float], ...]
+Range = tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -89,6 +90,22 @@ class Cell:
         """Success rate if every missing trial were a success."""
         return (self.successes + self.missing) / self.listed if self.listed else 1.0
 
+    def bounds(self, metric: str) -> Range | None:
+        """`metric` if every missing trial had achieved nothing, and if every one all; None where
+        it does not apply or cannot be known."""
+        if metric not in self.values:
+            return None
+        if metric == "onta":
+            if (n := self.candidates) < 2:
+                return None
+            return (self.worst * n - 1) / (n - 1), (self.best * n - 1) / (n - 1)
+        if metric == "ps":
+            known = self.values["ps"]
+            held = known.value * self.trials if known is not None else 0.0
+            whole = max(self.listed, 1)
+            return held / whole, (held + self.missing) / whole
+        return self.worst, self.best
+
 
 @dataclass(frozen=True)
 class Average:
@@ -104,6 +121,12 @@ class Average:
     best: float
     samples: Mapping[str, Weighted] = field(default_factory=dict)
     """By metric the samples of all variants below with their weights, where all are known."""
+    ranges: Mapping[str, Range] = field(default_factory=dict)
+    """By metric between which values the missing trials leave it, where that is known."""
+
+    def bounds(self, metric: str) -> Range | None:
+        """`metric` in the worst and the best case; see `Cell.bounds`."""
+        return self.ranges.get(metric)
 
 
 @dataclass(frozen=True)
@@ -170,8 +193,13 @@ def _join(parts: Sequence[Cell | Average], ci: str = METHODS[0]) -> Average:
     """
     values: dict[str, Estimate | None] = {}
     samples: dict[str, Weighted] = {}
+    ranges: dict[str, Range] = {}
     for metric in METRICS:
         fit = [p for p in parts if metric in p.values]
+        ends = [span for p in fit if (span := p.bounds(metric)) is not None]
+        if fit and len(ends) == len(fit):
+            low, high = np.mean(ends, axis=0)
+            ranges[metric] = (float(low), float(high))
         below = [p.values[metric] for p in fit]
         known = [e for e in below if e is not None]
         if below:
@@ -188,6 +216,7 @@ def _join(parts: Sequence[Cell | Average], ci: str = METHODS[0]) -> Average:
         worst=float(np.mean([p.worst for p in parts])),
         best=float(np.mean([p.best for p in parts])),
         samples=samples,
+        ranges=ranges,
     )
 
 

@@ -22,7 +22,7 @@ from robospa.results.reading import Run, finished
 from robospa.results.report_facts import about, ends, facts, names_of
 from robospa.results.report_page import FIGURES, page
 from robospa.results.report_tables import Shown, for_page, report_tables, write_files
-from robospa.results.tables import missing_lines, to_json
+from robospa.results.tables import loss_lines, missing_lines, to_json
 from robospa.results.tables_grid import escape_markdown, to_markdown
 
 TABLES = "tables"
@@ -87,7 +87,7 @@ def gather(runs: Sequence[Run], published: Sequence[str] = (), ci: str = "wilson
     ) or {name: score_run(run, ci) for name, run in zip(names, runs, strict=True)}
     tables = report_tables(columns) if columns else []
     notes = {
-        "missing": missing(scores, names),
+        "missing": missing(scores, names) + losses(runs, names),
         "findings": [*refused, *findings(runs)],
         "method": method_notes(columns),
     }
@@ -130,6 +130,15 @@ def missing(scores: dict[str, Scores], names: Sequence[str]) -> list[str]:
         f"{name}: {line}" if len(names) > 1 else line
         for name in names
         for line in missing_lines(scores[name])
+    ]
+
+
+def losses(runs: Sequence[Run], names: Sequence[str]) -> list[str]:
+    """Why trials are missing."""
+    return [
+        f"{name}: {line}" if len(names) > 1 else line
+        for name, run in zip(names, runs, strict=True)
+        for line in loss_lines(run)
     ]
 
 

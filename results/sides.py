@@ -117,6 +117,19 @@ def common_seeds(first: Side, second: Side, variant: Variant) -> list[int]:
     return [seed for seed in first.trials.get(variant, {}) if seed in other]
 
 
+def extremes(side: Side, variants: Sequence[Variant]) -> tuple[float, float]:
+    """Mean success rate or progress over `variants` if all that `side` lists and has no result of
+    had achieved nothing, and if it had achieved everything."""
+    low = high = 0.0
+    for variant, share in zip(variants, weights_of(variants, side.category), strict=True):
+        sample, listed = side.samples.get(variant), side.listed[variant]
+        held = sample.value * sample.trials if sample is not None else 0.0
+        missing = listed - (sample.trials if sample is not None else 0)
+        low += share * held / listed
+        high += share * (held + missing) / listed
+    return low, high
+
+
 def check_settings(first: Side, second: Side) -> None:
     """Raises CompareError if the two were asked different things."""
     for what, a, b in zip(

@@ -20,6 +20,8 @@ from robospa.results.metrics import (
     score_run,
 )
 from robospa.results.reading import Run
+from robospa.results.report_facts import ends
+from robospa.results.tables_grid import MISSING
 
 NOTE = (
     "Values in percent with 95 % intervals: Wilson for success rates (SR) of single variants and "
@@ -149,6 +151,20 @@ def missing_lines(scores: Scores) -> list[str]:
     ]
 
 
+def loss_lines(run: Run, most: int = 5) -> list[str]:
+    """Why trials are missing, one sentence a reason, the most frequent first."""
+    reasons: dict[str, int] = {}
+    for key in run.missing:
+        record = run.records.get(key)
+        reason = "not run yet" if record is None else record.message or "no reason was recorded"
+        reasons[reason] = reasons.get(reason, 0) + 1
+    common = sorted(reasons.items(), key=lambda item: -item[1])
+    lines = [f"missing {count}: {reason}" for reason, count in common[:most]]
+    if rest := common[most:]:
+        lines.append(f"missing {sum(n for _, n in rest)}: for {len(rest)} other reasons")
+    return lines
+
+
 def to_json(scores: Scores) -> dict[str, Any]:
     """All scores as JSON values; rates are fractions."""
 
@@ -156,10 +172,10 @@ def to_json(scores: Scores) -> dict[str, Any]:
         data: dict[str, Any] = {"trials": item.trials, "missing": item.missing}
         if isinstance(item, Cell):
             data["successes"] = item.successes
-        if item.missing:
-            data["sr_bounds"] = [item.worst, item.best]
         for metric, found in item.values.items():
             data[metric] = None if found is None else list(_all(found))
+            if item.missing and (ends := item.bounds(metric)) is not None:
+                data[f"{metric}_bounds"] = list(ends)
         return data
 
     def table(pairs: Iterable[tuple[tuple[str, int], Cell | Average]]) -> dict[str, Any]:
@@ -204,7 +220,7 @@ def terminal(run: Run, ci: str = "wilson") -> None:
             table.add_section()
             last = row.kind
         mean = dict(row.parts)[0]
-        cells = [short(p.values.get("sr")) if p else "" for n, p in row.parts if n]
+        cells = [_level_cell(p) for n, p in row.parts if n]
         tail = ["", "", "", ""]
         if mean is not None:
             lost = f" -{mean.missing}" if mean.missing else ""
@@ -221,8 +237,23 @@ def terminal(run: Run, ci: str = "wilson") -> None:
     if not console.is_terminal:
         console = Console(width=130)  # a file is as wide as the table needs
     console.print(table, highlight=False)
-    for line in missing_lines(scores):
-        console.print(line, style="yellow", markup=False, highlight=False)
+    console.print(_ends_line(run), style="dim", markup=False, highlight=False, soft_wrap=True)
+    for line in [*missing_lines(scores), *loss_lines(run)]:
+        console.print(line, style="yellow", markup=False, highlight=False, soft_wrap=True)
+
+
+def _level_cell(part: Cell | Average | None) -> str:
+    """A success rate, marked if trials are missing below it."""
+    if part is None:
+        return ""
+    return short(part.values.get("sr")) + MISSING * bool(part.missing)
+
+
+def _ends_line(run: Run) -> str:
+    """How the trials ended: what is no result, and what a policy could not do, is never hidden."""
+    counts = ", ".join(f"{count} {name}" for name, count in ends(run).items())
+    note = f" ({MISSING} lacks trials)" if run.missing else ""
+    return f"{len(run.keys)} trials: {counts}{note}"
 
 
 def is_privileged(run: Run) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from robospa.results import aggregate
 from robospa.results.columns import Column, check_columns
@@ -50,7 +51,12 @@ def _open_notes(columns: Sequence[Column], level: int) -> list[str]:
     for column in columns:
         notes += not_run_note(column, [level])
         if lost := column.missing(aggregate.OVERALL, level):
-            notes.append(f"{MISSING} {column.title}: {lost} trials at L{level} have no result.")
+            part = column.part(aggregate.OVERALL, level)
+            low, high = (100 * end for end in (part and part.bounds("sr")) or (0.0, 1.0))
+            notes.append(
+                f"{MISSING} {column.title}: {lost} trials at L{level} have no result; over what is "
+                f"listed SR lies between {aggregate.text(low)} and {aggregate.text(high)}."
+            )
     return notes
 
 
@@ -60,8 +66,8 @@ def _interval(column: Column, row: str, level: int, method: str) -> Entry:
         return DASH
     found = interval_of(samples, shares, method)
     value = column.value("sr", row, level) or 0.0
-    sign = MISSING if column.missing(row, level) else ""
-    return _with_ends(value / 100, found.low, found.high, sign)
+    entry = _with_ends(value / 100, found.low, found.high)
+    return replace(entry, **column.lacks("sr", row, level))
 
 
 def _with_ends(value: float, low: float, high: float, sign: str = "") -> Entry:
@@ -109,9 +115,9 @@ def _variant(column: Column, task: str, level: int) -> Entry:
         return DASH
     found = column.estimate("sr", task, level)
     assert found is not None, "a value has an interval"
-    sign = MISSING if column.missing(task, level) else ""
     text = aggregate.text(value, 0 if value == round(value) else 1)
-    return Entry(text, value, 100 * found.low, 100 * found.high, sign=sign)
+    ends = (100 * found.low, 100 * found.high)
+    return Entry(text, value, *ends, **column.lacks("sr", task, level))
 
 
 def _words(*texts: object) -> tuple[Entry, ...]:

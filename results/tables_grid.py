@@ -15,6 +15,8 @@ from dataclasses import dataclass
 PRINTED_OTHERWISE = "*"
 MISSING = "†"
 FIELDS = ("table", "section", "row", "group", "column", "text", "value", "low", "high", "best")
+LACKS = ("sign", "missing", "worst_case", "best_case")
+"""Further columns: the mark, and what trials without a result leave open."""
 
 
 @dataclass(frozen=True)
@@ -30,6 +32,9 @@ class Entry:
     high: float | None = None
     best: bool = False
     sign: str = ""
+    missing: int = 0
+    bounds: tuple[float, float] | None = None
+    """Between which values [percent] the `missing` trials leave it, where that is known."""
 
 
 @dataclass(frozen=True)
@@ -110,13 +115,13 @@ def _markdown_entry(entry: Entry) -> str:
 
 
 def to_csv(grids: Sequence[Grid]) -> str:
-    """All cells of `grids`, one a line, for programs: FIELDS, then the sign.
+    """All cells of `grids`, one a line, for programs: FIELDS, then LACKS.
 
     Values are not rounded. A text that a spreadsheet would run as a formula gets a quote before it.
     """
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
-    writer.writerow((*FIELDS, "sign"))
+    writer.writerow((*FIELDS, *LACKS))
     for grid in grids:
         section = ""
         for line in grid.lines:
@@ -127,7 +132,9 @@ def to_csv(grids: Sequence[Grid]) -> str:
                 numbers = ("" if x is None else f"{x:.10g}" for x in _numbers(entry))
                 words = (grid.name, section, line.label, group, head, entry.text)
                 best = "best" if entry.best else ""
-                writer.writerow((*map(_no_formula, words), *numbers, best, entry.sign))
+                lacks = (entry.missing or "", *(f"{x:.10g}" for x in entry.bounds or ()))
+                row = (*map(_no_formula, words), *numbers, best, entry.sign, *lacks)
+                writer.writerow((*row, *[""] * (len(FIELDS) + len(LACKS) - len(row))))
     return out.getvalue()
 
 

@@ -80,7 +80,10 @@ def _entry(entry: Entry) -> str:
     kind = ' class="best"' if entry.best else ""
     hint = ""
     if entry.low is not None and entry.high is not None:
-        hint = f' title="95 %: {entry.low:.1f} to {entry.high:.1f}"'
+        lacks = f"; {entry.missing} trials missing" if entry.missing else ""
+        if lacks and entry.bounds is not None:
+            lacks += f", so between {entry.bounds[0]:z.1f} and {entry.bounds[1]:z.1f}"
+        hint = f' title="95 %: {entry.low:.1f} to {entry.high:.1f}{lacks}"'
         hint += f' data-interval="[{entry.low:z.1f}, {entry.high:z.1f}]"'
     sign = f"<sup>{_text(entry.sign)}</sup>" if entry.sign else ""
     return f"<td{kind}{hint}>{_text(entry.text)}{sign}</td>"

@@ -170,7 +170,7 @@ def _value(column: Column, metric: str, row: str, level: int, best: bool) -> Ent
         100 * found.low if found else None,
         100 * found.high if found else None,
         best,
-        MISSING if column.missing(row, level) else "",
+        **column.lacks(metric, row, level),
     )
 
 
@@ -215,7 +215,8 @@ def _notes(
                 f"the published models {trials}."
             )
         notes += not_run_note(column, levels)
-        lost = [text for row in rows for level in levels if (text := _lost(column, row, level))]
+        places = [(row, level) for row in rows for level in levels]
+        lost = [text for place in places if (text := _lost(column, metric, *place))]
         if lost:
             notes.append(f"{MISSING} {column.title}, trials without a result: {'; '.join(lost)}.")
     return tuple(notes)
@@ -233,10 +234,13 @@ def not_run_note(column: Column, levels: Sequence[int]) -> list[str]:
     ]
 
 
-def _lost(column: Column, row: str, level: int) -> str:
+def _lost(column: Column, metric: str, row: str, level: int) -> str:
     part = column.part(row, level)
-    if part is None or not part.missing:
+    if part is None or not part.missing or not (metric in part.values or not part.trials):
         return ""
     name = load().tasks[row].printed if row in load().tasks else row
-    low, high = aggregate.text(100 * part.worst), aggregate.text(100 * part.best)
-    return f"{name} L{level} lacks {part.missing}, SR between {low} and {high}"
+    ends = part.bounds(metric)
+    if ends is None:
+        return f"{name} L{level} lacks {part.missing}"
+    low, high = (aggregate.text(100 * end) for end in ends)
+    return f"{name} L{level} lacks {part.missing}, {METRIC_NAMES[metric]} between {low} and {high}"

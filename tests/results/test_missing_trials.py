@@ -1,0 +1,131 @@
+"""A trial that could not be run is a third thing beside success and failure, in every output."""
+
+from __future__ import annotations
+
+import csv
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from run_by_hand import outcomes, record, write
+
+from robospa.results.compare import compare
+from robospa.results.metrics import score_run
+from robospa.results.reading import Run
+from robospa.results.records import TrialKey, TrialRecord
+from robospa.results.report import write_report
+from robospa.results.sides import side_of_run
+from robospa.results.tables import loss_lines, terminal, to_json
+
+PICK, PUT = "Pick_Blocks_Size", "Put_Bottles_Dustbin"
+WHY = "ws://gpu:8000 did not send actions within 120 s"
+
+
+def lost(task: str, level: int, seed: int, why: str = WHY) -> TrialRecord:
+    return replace(record(task, level, seed, 0), end="infrastructure", message=why, attempts=3)
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    """Of 8 listed trials of a spatial variant 6 have a result, of 8 of a procedural one 6."""
+    records = [*outcomes(PICK, 1, [1, 1, 1, 0, 1, 1]), lost(PICK, 1, 6), lost(PICK, 1, 7)]
+    records += [record(PUT, 1, seed, 1 + seed % 2, 2) for seed in range(6)]
+    never = [TrialKey(PUT, 1, 6), TrialKey(PUT, 1, 7)]
+    return write(tmp_path_factory.mktemp("missing") / "run", records, never)
+
+
+def test_rates_are_of_results_and_bounds_of_all_that_is_listed(run: Run) -> None:
+    scores = score_run(run)
+    pick, put = scores.cells[PICK, 1], scores.cells[PUT, 1]
+    assert pick.values["sr"] is not None and pick.values["sr"].value == pytest.approx(5 / 6)
+    assert pick.bounds("sr") == (5 / 8, 7 / 8)
+    assert pick.bounds("onta") == (2 * 5 / 8 - 1, 2 * 7 / 8 - 1)  # two candidates
+    assert pick.bounds("ps") is None
+    assert put.bounds("ps") == pytest.approx((4.5 / 8, 6.5 / 8))
+    overall = scores.overall[1]
+    assert overall.missing == 4
+    assert overall.bounds("sr") == pytest.approx(((5 / 8 + 3 / 8) / 2, (7 / 8 + 5 / 8) / 2))
+
+
+def test_a_policy_error_is_a_failure_and_a_loss_is_none(tmp_path: Path) -> None:
+    records = [record(PICK, 1, 0, 1), replace(record(PICK, 1, 1, 0), end="policy_error")]
+    cell = score_run(write(tmp_path / "run", [*records, lost(PICK, 1, 2)])).cells[PICK, 1]
+    assert (cell.trials, cell.successes, cell.missing) == (2, 1, 1)
+
+
+def test_json_has_counts_and_bounds_of_every_metric(run: Run) -> None:
+    found = to_json(score_run(run))["variants"]
+    assert found[PICK]["L1"]["missing"] == 2
+    assert found[PICK]["L1"]["sr_bounds"] == [0.625, 0.875]
+    assert found[PICK]["L1"]["onta_bounds"] == [0.25, 0.75]
+    assert found[PUT]["L1"]["ps_bounds"] == [0.5625, 0.8125]
+
+
+def test_the_terminal_marks_incomplete_variants_and_says_why(
+    run: Run, capsys: pytest.CaptureFixture[str]
+) -> None:
+    terminal(run)
+    text = capsys.readouterr().out
+    assert "83.3†" in text and "50.0†" in text
+    assert "16 trials: 8 success, 4 step limit, 2 missing, 2 not run († lacks trials)" in text
+    assert "if all had failed SR would be 62.5, if all had succeeded 87.5" in text
+    assert f"missing 2: {WHY}" in text
+    assert "missing 2: not run yet" in text
+
+
+def test_what_a_server_said_is_no_markup(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bad = lost(PICK, 1, 1, "the server reported [/x]: [red]")
+    terminal(write(tmp_path / "run", [record(PICK, 1, 0, 1), bad]))
+    assert "missing 1: the server reported [/x]: [red]" in capsys.readouterr().out
+
+
+def test_many_reasons_are_summed_up(tmp_path: Path) -> None:
+    records = [lost(PICK, 1, seed, f"reason {seed}") for seed in range(9)]
+    lines = loss_lines(write(tmp_path / "run", [*records, record(PICK, 1, 9, 1)]))
+    assert len(lines) == 6
+    assert lines[-1] == "missing 4: for 4 other reasons"
+
+
+def test_every_table_of_a_report_names_what_is_missing(run: Run, tmp_path: Path) -> None:
+    folder = write_report(run, tmp_path / "report")
+    markdown = (folder / "report.md").read_text()
+    assert "Pick Blocks Size L1 lacks 2, SR between 62.5 and 87.5" in markdown
+    assert "Pick Blocks Size L1 lacks 2, ONTA between 25.0 and 75.0" in markdown
+    assert "Put Bottles Dustbin L1 lacks 2, PS between 56.3 and 81.3" in markdown
+    assert "ends: 8 success, 4 step limit, 2 missing, 2 not run" in markdown
+    assert "did not send actions within 120 s" in markdown
+    latex = (folder / "tables" / "sr-tasks.tex").read_text()
+    assert r"83.3$^{\dagger}$" in latex and "lacks 2, SR between 62.5 and 87.5" in latex
+    page = (folder / "report.html").read_text()
+    assert "2 trials missing, so between 62.5 and 87.5" in page
+    assert "4 of 16 trials are missing" in page
+    data = json.loads((folder / "report.json").read_text())["runs"][0]
+    assert data["ends"] == {"success": 8, "step limit": 4, "missing": 2, "not run": 2}
+
+
+def test_the_csv_has_them_as_numbers(run: Run, tmp_path: Path) -> None:
+    text = (write_report(run, tmp_path / "report") / "tables" / "tables.csv").read_text()
+    rows = {(r["table"], r["row"]): r for r in csv.DictReader(text.splitlines())}
+    found = rows["sr-tasks", "Pick Blocks Size"]
+    assert [found[n] for n in ("sign", "missing", "worst_case", "best_case")] == [
+        "†",
+        "2",
+        "62.5",
+        "87.5",
+    ]
+    assert rows["ps-tasks", "Put Bottles Dustbin"]["worst_case"] == "56.25"
+
+
+def test_a_comparison_knows_its_worst_and_best_case(run: Run, tmp_path: Path) -> None:
+    records = outcomes(PICK, 1, [0] * 8) + [record(PUT, 1, seed, 1, 2) for seed in range(8)]
+    other = write(tmp_path / "other", records)
+    found = compare(side_of_run(run, "mine"), side_of_run(other, "other"))
+    assert (
+        "mine lacks 4 of the trials that both list: over these the difference is +50.0 in the "
+        "worst and +75.0 in the best case for mine." in found.notes
+    )
+    whole = compare(side_of_run(other, "other"), side_of_run(other, "again"))
+    assert not any("lacks" in note for note in whole.notes)
