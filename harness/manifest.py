@@ -195,10 +195,10 @@ def open_run(folder: Path, manifest: Manifest, resume: bool) -> None:
         return
     old = read_manifest(folder)
     new = manifest.to_json()
-    changes = changed_settings(old["settings"], new["settings"])
+    changes = changed_settings(old.get("settings", {}), new["settings"])
     changes += _list_changes(manifest_keys(old), manifest.keys)
     for part in ("versions", "code"):
-        before, now = old["about"].get(part), new["about"].get(part)
+        before, now = old.get("about", {}).get(part), new["about"].get(part)
         changes += changed_settings({part: before}, {part: now})
     if changes:
         raise RunError(

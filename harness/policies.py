@@ -7,7 +7,6 @@ server is not enough there may be a list of them; they have to be one as good as
 
 from __future__ import annotations
 
-import json
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,6 +16,7 @@ from robospa.harness.factory import open_policy
 from robospa.protocol.policy import PolicySpec
 from robospa.results.reading import RunError
 from robospa.results.records import TrialKey
+from robospa.results.strangers import parse
 
 if TYPE_CHECKING:
     from robospa.harness.worker import Targets, WorkerConfig
@@ -52,7 +52,7 @@ def read_map(file: Path, wanted: Sequence[str], known: Collection[str]) -> dict[
     Raises RunError if the file is no such map, names a task that does not exist, or lacks one.
     """
     try:
-        found = json.loads(file.read_text(), object_pairs_hook=_once)
+        found = parse(file.read_text())
     except (OSError, ValueError) as error:
         raise RunError(f"--policy-map {file} cannot be read: {error}") from error
     if not isinstance(found, dict) or not all(map(_is_targets, found.values())):
@@ -75,13 +75,6 @@ def _is_targets(value: object) -> bool:
     if not isinstance(value, list):
         return bool(value) and isinstance(value, str)
     return all(v and isinstance(v, str) for v in value) and len(set(value)) == len(value) > 0
-
-
-def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    names = [name for name, _ in pairs]
-    if twice := [name for name in dict.fromkeys(names) if names.count(name) > 1]:
-        raise ValueError(f"{twice[0]!r} is named twice")
-    return dict(pairs)
 
 
 def _some(names: Sequence[str]) -> str:

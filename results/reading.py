@@ -3,6 +3,7 @@
 A line that was torn off at the end of a file (the writer was killed) is dropped: that trial is owed
 again. Anything else that is not a record is refused, naming file and line. Two records of one trial
 must agree on everything that a repeatable world decides; if not, that is a `RepeatabilityError`.
+A run may come from strangers: names become paths, so they are plain; see `results.strangers`.
 """
 
 from __future__ import annotations
@@ -13,7 +14,8 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from robospa.results.records import END_REASONS, TrialKey, TrialRecord
+from robospa.results.records import TrialKey, TrialRecord
+from robospa.results.strangers import check_key, check_record, parse
 
 TRIALS = "trials"
 """Folder inside a run that holds the record files."""
@@ -34,6 +36,11 @@ DECIDED = (
 )
 """Fields that have to be equal in every record of one trial."""
 FIELDS = frozenset(f.name for f in fields(TrialRecord))
+FORMAT = 1
+"""Version of a run's folder. A newer one is refused."""
+MOST_RECORDS = 2**30
+MOST_MANIFEST = 2**26
+"""Bytes of a file of records and of `run.json`, at most: more is read of neither."""
 
 
 class RunError(Exception):
@@ -71,7 +78,7 @@ def to_line(record: TrialRecord) -> str:
 
 def from_line(line: str) -> TrialRecord:
     """The record that `to_line` wrote; raises ValueError saying what is wrong with it."""
-    return from_data(json.loads(line, object_pairs_hook=_without_repeats))
+    return from_data(parse(line))
 
 
 def from_data(data: Any) -> TrialRecord:
@@ -80,34 +87,19 @@ def from_data(data: Any) -> TrialRecord:
         raise ValueError("not a trial record")
     unknown = sorted(set(data) - FIELDS)
     if unknown:
-        raise ValueError(f"unknown fields {', '.join(unknown)}: written by a newer version?")
+        raise ValueError(f"unknown fields {', '.join(unknown)[:200]}: written by a newer version?")
     try:
         key = TrialKey(**data.pop("key"))
         record = TrialRecord(key=key, **{**data, "events": tuple(data.get("events", ()))})
     except TypeError as error:
         raise ValueError(f"not a trial record: {error}") from error
-    if record.end not in END_REASONS:
-        raise ValueError(f"end {record.end!r} is none of {', '.join(END_REASONS)}")
+    check_record(record)
     return record
-
-
-def _without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """A JSON object; one that says the same thing twice is refused: which one would be true?"""
-    found = dict(pairs)
-    if len(found) < len(pairs):
-        names = [name for name, _ in pairs]
-        twice = next(name for name in names if names.count(name) > 1)
-        raise ValueError(f"the field {twice!r} is there twice")
-    return found
 
 
 def read_file(path: Path) -> list[TrialRecord]:
     """All whole records of one file, in order; raises RunError at the first corrupt line."""
-    try:
-        text = path.read_bytes()
-    except OSError as error:
-        raise RunError(f"cannot read {path}: {error.strerror}") from error
-    lines = text.split(b"\n")
+    lines = read_bytes(path, MOST_RECORDS).split(b"\n")
     whole = lines[:-1]  # what follows the last newline was torn off, or is empty
     records = []
     for number, raw in enumerate(whole, 1):
@@ -116,6 +108,16 @@ def read_file(path: Path) -> list[TrialRecord]:
         except ValueError as error:
             raise RunError(f"{path}, line {number}: {error}") from error
     return records
+
+
+def read_bytes(path: Path, most: int) -> bytes:
+    """All of `path`; raises RunError if it cannot be read or has more than `most` bytes."""
+    try:
+        if path.stat().st_size > most:
+            raise RunError(f"cannot read {path}: it has more than {most} bytes")
+        return path.read_bytes()
+    except OSError as error:
+        raise RunError(f"cannot read {path}: {error.strerror}") from error
 
 
 def differences(first: TrialRecord, second: TrialRecord) -> list[str]:
@@ -159,31 +161,38 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     if not path.exists():
         raise RunError(f"{folder} is not a run: it has no {MANIFEST}")
     try:
-        data = json.loads(path.read_text())
-    except (OSError, ValueError) as error:
+        data = parse(read_bytes(path, MOST_MANIFEST).decode())
+    except ValueError as error:
         raise RunError(f"cannot read {path}: {error}") from error
     if not isinstance(data, dict) or not isinstance(data.get("trials"), list):
         raise RunError(f"{path} is no run manifest: it has no list of trials")
+    version = data.get("format", FORMAT)
+    if type(version) is not int or version > FORMAT:
+        raise RunError(
+            f"{path} has format {str(version)[:20]}, and this robospa reads up to {FORMAT}: "
+            "use the version that wrote it or a newer one"
+        )
+    for name in ("settings", "about", "categories"):
+        if not isinstance(data.get(name, {}), dict):
+            raise RunError(f"{path} is no run manifest: its {name} are no map")
     return data
 
 
 def manifest_keys(manifest: Mapping[str, Any]) -> tuple[TrialKey, ...]:
     """The trials that a manifest lists; raises RunError if one of them is malformed."""
+    keys: list[TrialKey] = []
     try:
-        return tuple(
-            TrialKey(
-                str(row["task"]),
-                int(row["level"]),
-                int(seed),
-                str(row["embodiment"]),
-                str(row["mode"]),
-                str(row["split"]),
-            )
-            for row in manifest["trials"]
-            for seed in row["seeds"]
-        )
+        for row in manifest["trials"]:
+            names = (row["task"], row["level"], row["embodiment"], row["mode"], row["split"])
+            task, level, embodiment, mode, split = names
+            if not isinstance(row["seeds"], list):
+                raise ValueError("its seeds are no list")
+            for seed in row["seeds"]:
+                keys.append(TrialKey(task, level, seed, embodiment, mode, split))
+                check_key(keys[-1])
     except (KeyError, TypeError, ValueError) as error:
         raise RunError(f"the manifest's list of trials is malformed: {error!r}") from error
+    return tuple(keys)
 
 
 def read_run(folder: Path) -> Run:

@@ -156,12 +156,11 @@ def policy_map(file: Path, keys: Sequence[TrialKey]) -> dict[str, Targets]:
 
 def client_options(url: str, file: Path | None) -> dict[str, Any]:
     """The options of the JSON `file`, checked together with those of the URL; raises BadChoice."""
-    import json
-
     from robospa.clients import check_options
+    from robospa.results.strangers import parse
 
     try:
-        given = json.loads(file.read_text()) if file is not None else {}
+        given = parse(file.read_text()) if file is not None else {}
         if not isinstance(given, dict):
             raise ValueError("it is no JSON map")
         check_options(url, given)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from robospa.results.metrics import BASIC, CATEGORIES, DIMENSIONS
 from robospa.results.records import TrialKey
+from robospa.results.strangers import MOST, parse
 
 SPLITS = ("heldout", "train")
 GROUPS = {"all": CATEGORIES, **DIMENSIONS, "basic": BASIC}
@@ -79,13 +79,14 @@ def parse_seeds(text: str | None) -> Seeds:
         numbers = parse_numbers(text, "--seeds")
         return lambda task, level: numbers
     try:
-        data = json.loads(Path(text).read_text())
+        data = parse(Path(text).read_text())
     except (OSError, ValueError) as error:
         raise BadChoice(f"cannot read the seeds in {text}: {error}") from error
 
     def look_up(task: str, level: int) -> Sequence[int]:
-        found = data if isinstance(data, list) else data.get(task, {}).get(str(level))
-        if not isinstance(found, list) or not all(type(n) is int and n >= 0 for n in found):
+        levels = data.get(task) if isinstance(data, dict) else {str(level): data}
+        found = levels.get(str(level)) if isinstance(levels, dict) else None
+        if not isinstance(found, list) or not all(type(n) is int and 0 <= n <= MOST for n in found):
             raise BadChoice(f"{text} has no list of seeds for {task} level {level}")
         return found
 

@@ -47,7 +47,7 @@ def test_a_map_is_cut_to_the_tasks_of_the_run(tmp_path: Path) -> None:
     ("value", "reason"),
     [
         ("{", "cannot be read"),
-        ('{"Pick_A": "ws://a", "Pick_A": "ws://b"}', "'Pick_A' is named twice"),
+        ('{"Pick_A": "ws://a", "Pick_A": "ws://b"}', "'Pick_A' is there twice"),
         ([], "no map from tasks to URLs"),
         ({"Pick_A": 3}, "no map from tasks to URLs"),
         ({"Pick_A": ""}, "no map from tasks to URLs"),
