@@ -8,6 +8,7 @@
     actions/TASK-L1.bin      the actions of a variant's trials
     videos/TRIAL.mp4         the announced sample, one trial a base task
     report/scores.json       scores, and the tables as our reporter makes them
+    report/outcomes.json     success and progress of every trial, a character each
     report/tables.csv, .md
 
 Names are matched against this list, sizes are bounded before a byte is read, and nothing in a
@@ -31,6 +32,7 @@ RUN = "run.json"
 SEEDS = "seeds.json"
 RECORDS = "records.jsonl"
 SCORES = "report/scores.json"
+OUTCOMES = "report/outcomes.json"
 TABLES = {"csv": "report/tables.csv", "md": "report/tables.md"}
 
 MEGA = 1024 * 1024
@@ -38,7 +40,7 @@ _TASK = r"[A-Za-z0-9_]{1,64}"
 KINDS: tuple[tuple[re.Pattern[str], int], ...] = (
     (re.compile(r"manifest\.json|model\.json"), MEGA),
     (re.compile(r"run\.json|seeds\.json"), 16 * MEGA),
-    (re.compile(r"report/(scores\.json|tables\.csv|tables\.md)"), 16 * MEGA),
+    (re.compile(r"report/(scores\.json|outcomes\.json|tables\.csv|tables\.md)"), 16 * MEGA),
     (re.compile(r"records\.jsonl"), 1024 * MEGA),
     (re.compile(rf"actions/{_TASK}-L[1-5]\.bin"), 64 * MEGA),
     (re.compile(rf"videos/{_TASK}-L[1-5]-[0-9]{{1,20}}-[a-z0-9-]{{1,80}}\.mp4"), 16 * MEGA),

@@ -33,6 +33,7 @@ from robospa.leaderboard.claims import (
     check_settings,
     spec_of,
 )
+from robospa.leaderboard.outcomes import outcomes_of
 from robospa.leaderboard.reference import Reference
 from robospa.leaderboard.rows import Row, trace_hash, write_rows
 from robospa.leaderboard.sampling import announced
@@ -223,6 +224,7 @@ def write_bundle(
         add(layout.SEEDS, layout.canonical(lists))
         add(layout.CARD, layout.canonical(card))
         add(layout.SCORES, layout.canonical(scores_of(run)))
+        add(layout.OUTCOMES, layout.canonical(outcomes_of(run)))
         for ending, table in tables_of(run).items():
             add(layout.TABLES[ending], table)
         manifest: dict[str, Any] = {

@@ -1,7 +1,8 @@
 """The leaderboard as a folder of static pages that open from disk: no server, nothing loaded.
 
 `index.html` has all values as JSON and one table with views, filters and ranks; every model has a
-page with its tables, figures, failure types and films, made by the code of `robospa report`. Names
+page with its tables, figures, failure types and films, made by the code of `robospa report`. Two
+submissions on equal seeds are compared by a script that is loaded when they are chosen. Names
 and texts are escaped by Jinja or become text nodes. Refuses to write into a folder of other things.
 """
 
@@ -21,6 +22,7 @@ from typing import Any
 from robospa.harness.store import replace_file
 from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.entries import BADGES, Entry, all_entries, page_values
+from robospa.leaderboard.pairs import pairs_of, write_pairs
 from robospa.leaderboard.submission import read_submissions, waiting
 from robospa.results.failures import KINDS, NAMES, SIMULATED_PER_FILM
 from robospa.results.figures.draw import draw
@@ -65,6 +67,7 @@ def write_site(entries: Sequence[Entry], out: Path, note: Note = lambda text: No
     for number, entry in enumerate(entries, 1):
         note(f"{entry.name} ({number} of {len(entries)})")
         write_model(entry, out / "models" / entry.slug)
+    write_pairs(pairs_of(entries), out, note)
     replace_file(out / "index.html", index_page(entries).encode())
     return out / "index.html"
 
@@ -81,6 +84,7 @@ def index_page(entries: Sequence[Entry]) -> str:
             "rows": row_data(),
             "badges": BADGES,
             "training": TRAINING,
+            "pairs": [f"{one.slug}/{two.slug}" for one, two in pairs_of(entries)],
             "critical": critical_values(min(COMPARISONS, max(100, len(entries)))),
         },
     )

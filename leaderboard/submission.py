@@ -1,12 +1,12 @@
 """What the leaderboard keeps of a bundle: one small folder a submission, without actions and rows.
 
     model.toml, bundle.txt    as handed in: the card; a bundle's address, size and hash
-    manifest.json, model.json, run.json, scores.json    as in the bundle
+    manifest.json, model.json, run.json, scores.json, outcomes.json    as in the bundle
     evidence.json    what `robospa submit verify` and `reproduce` wrote, and where the bundle is
     trials.json      failure types by task, and the filmed trials
     videos/          the announced sample
 
-The bundle's hash covers its files' hashes, so the four files of a folder are held against it
+The bundle's hash covers its files' hashes, so those files of a folder are held against it
 again, and all averages are computed anew. Refused: anything else, in one sentence.
 """
 
@@ -39,6 +39,7 @@ KEPT = {
     layout.CARD: layout.CARD,
     layout.RUN: layout.RUN,
     "scores.json": layout.SCORES,
+    "outcomes.json": layout.OUTCOMES,
 }
 """File in the folder -> file in the bundle."""
 COUNT = re.compile(r"[1-9][0-9]{0,11}")
@@ -56,6 +57,7 @@ class Submission:
     card: Mapping[str, Any]
     run: Mapping[str, Any]
     scores: Mapping[str, Any]
+    outcomes: Mapping[str, Any]
     evidence: Mapping[str, Any]
     failures: Mapping[str, Mapping[str, int]]
     films: Sequence[Mapping[str, Any]]
@@ -186,6 +188,7 @@ def read_submission(folder: Path) -> Submission:
         parts[layout.CARD],
         parts[layout.RUN],
         parts["scores.json"],
+        parts["outcomes.json"],
         parts[EVIDENCE],
         failures,
         films,

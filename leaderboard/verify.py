@@ -29,6 +29,7 @@ from robospa.leaderboard.claims import (
     check_settings,
     check_trace,
 )
+from robospa.leaderboard.outcomes import outcomes_of
 from robospa.leaderboard.reference import Reference
 from robospa.leaderboard.rows import read_rows, trace_hash
 from robospa.leaderboard.sampling import announced
@@ -188,7 +189,7 @@ def _check_files(archive: Archive, listed: Any) -> None:
     for name, about in listed.items():
         if about["size"] != archive.sizes[name]:
             raise BundleError(f"{name} was changed: its size is not the manifest's")
-    needed = (layout.CARD, layout.RUN, layout.SEEDS, layout.RECORDS, layout.SCORES)
+    needed = (layout.CARD, layout.RUN, layout.SEEDS, layout.RECORDS, layout.SCORES, layout.OUTCOMES)
     for name in (*needed, *layout.TABLES.values()):
         if name not in listed:
             raise BundleError(f"the bundle has no {name}")
@@ -351,6 +352,8 @@ def _check_scores(files: _Files, run: Run, manifest: Mapping[str, Any]) -> bool:
     where = compare_scores(scores_of(run), given)
     if where:
         raise BundleError(f"{layout.SCORES} is not what the records give: {where}")
+    if parse(files.read(layout.OUTCOMES), layout.OUTCOMES) != outcomes_of(run):
+        raise BundleError(f"{layout.OUTCOMES} is not what the records give")
     texts = {ending: files.read(name) for ending, name in layout.TABLES.items()}
     if manifest["robospa"] != own_version():
         return False

@@ -190,6 +190,32 @@ function curve(sides, metric) {
   });
   return chart(rowName(row) + " by level [%]", 340, 280, parts);
 }
+const HOW = {
+  paired: "Paired: both ran the same seeds, and every trial is held against the other's of the same scene. The difference is first minus second with its 95 % interval; won alone counts the trials in which only the first, only the second did better. Shaded: better by more than chance explains (q < 0.05: McNemar's test or the interval, corrected for the number of tasks or categories).",
+  apart: "The difference is first minus second with its 95 % interval on unrelated seeds. Shaded: better by more than chance explains, corrected for the number of rows shown.",
+  wait: "Loading the trials of both on equal seeds.",
+  lost: "The trials of both on equal seeds could not be loaded: differences are those of unrelated seeds.",
+};
+const loaded = new Map(); // "first/second" -> paired differences by metric, row, level
+function pairLoaded(key, rows) { loaded.set(key, rows); compare(); }
+// Paired differences of two models, turned so that `a` is first; null if there are none (yet).
+function pairOf(a, b) {
+  const key = data.pairs.find((k) => k === `${a.id}/${b.id}` || k === `${b.id}/${a.id}`);
+  if (!key) return { how: "apart", at: () => null };
+  if (!loaded.has(key)) {
+    loaded.set(key, null);
+    const script = make("script", { src: `pairs/${key}.js` });
+    script.addEventListener("error", () => { loaded.set(key, {}); compare(); });
+    document.head.append(script);
+  }
+  const found = loaded.get(key);
+  if (!found || !Object.keys(found).length) return { how: found ? "lost" : "wait", at: () => null };
+  const turned = key !== `${a.id}/${b.id}`;
+  return { how: "paired", at: (metric, row, level) => {
+    const v = found[metric]?.[row]?.[level];
+    return !v || !turned ? v : [-v[0], -v[2], -v[1], v[4], v[3], v[5]];
+  } };
+}
 function compare() {
   const sides = [pair.elements.one.value, pair.elements.two.value].map((id) => data.models.find((m) => m.id === id));
   const metric = pair.elements.metric.value;
@@ -197,19 +223,23 @@ function compare() {
   document.getElementById("unlike").hidden = alike(...sides);
   document.querySelector(".charts").replaceChildren(radar(sides, metric, level), curve(sides, metric));
   const rows = ROWS.filter((r) => hasRow(metric, r) && (data.rows[r].kind !== "task" || pair.elements.tasks.checked));
+  const pairing = pairOf(...sides);
+  document.getElementById("how").textContent = HOW[pairing.how];
   const names = sides.map((m, n) => make("span", {}, make("span", { className: "key" + (n ? " two" : "") }), m.name));
   const title = (content) => make("th", { scope: "col", className: "num" }, content);
-  document.querySelector("#sides thead tr").replaceChildren(make("th", { scope: "col", className: "name" }, ""), ...names.map(title), title("difference"));
+  document.querySelector("#sides thead tr").replaceChildren(make("th", { scope: "col", className: "name" }, ""), ...names.map(title), title("difference"),
+    ...(pairing.how === "paired" ? [title("won alone")] : []));
   document.querySelector("#sides tbody").replaceChildren(...rows.map((r) => {
     const values = sides.map((m) => value(m, { metric, row: r, level }));
     const both = values.every(Boolean);
+    const d = both ? pairing.at(metric, r, level) || difference(...values) : null;
     const line = make("tr", { className: ["task", pair.elements.tasks.checked ? "" : "category"].includes(data.rows[r].kind) ? "" : "part" }, make("th", { scope: "row", className: "name" }, rowName(r)));
     values.forEach((v, n) => {
-      const won = both && isBetter(v, values[1 - n], rows.length);
+      const won = d && d.length > 3 ? d[5] < 0.05 && (n ? d[0] < 0 : d[0] > 0) : both && isBetter(v, values[1 - n], rows.length);
       line.append(make("td", { className: "num" + (won ? " best" : "") }, v ? percent(v[0]) : "–", v ? make("small", {}, interval(v)) : ""));
     });
-    const d = both ? difference(...values) : null;
     line.append(make("td", { className: "num" }, d ? (d[0] > 0 ? "+" : "") + percent(d[0]) : "–", d ? make("small", {}, interval(d)) : ""));
+    if (pairing.how === "paired") line.append(make("td", { className: "num" }, d?.length > 3 ? `${d[3]} : ${d[4]}` : "–", d?.length > 3 ? make("small", {}, `q = ${d[5]}`) : ""));
     return line;
   }));
 }

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from bundle_fakes import CARD, REFERENCE, make_run
+from bundle_fakes import CARD, REFERENCE, Weak, make_run
+from run_fakes import FakePolicy
 
 from robospa.leaderboard.bundle import canonical
 from robospa.leaderboard.entries import Entry, published_entries
@@ -37,15 +38,23 @@ REPRODUCED: dict[str, Any] = {
 }
 
 
-def make_valid(folder: Path, **card: Any) -> Valid:
-    """A valid bundle in `folder`, its card changed by `card`."""
-    run = make_run(folder / "run")
+def make_valid(folder: Path, policy: FakePolicy | None = None, **card: Any) -> Valid:
+    """A valid bundle in `folder` of what `policy` did, its card changed by `card`."""
+    run = make_run(folder / "run", policy=policy)
     return pack([run], {**CARD, **card}, folder / "bundle.zip", REFERENCE, note=str).valid
 
 
 def make_submission(folder: Path, home: Path, *evidence: dict[str, Any], **card: Any) -> Path:
     """A submission below `home`."""
     return add(make_valid(folder, **card), evidence, home, address="https://example.org/bundle.zip")
+
+
+class Weaker(Weak):
+    """Fails at seeds that end in 2, too."""
+
+    def infer(self, observation: Any) -> Any:
+        assert self.trial is not None
+        return super().infer(observation) * (self.trial.seed % 10 != 2)
 
 
 def many_entries(count: int) -> list[Entry]:

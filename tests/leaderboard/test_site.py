@@ -193,7 +193,8 @@ def test_what_was_handed_in_has_to_fit_the_bundle(tmp_path: Path) -> None:
     folder.mkdir(parents=True)
     (folder / "model.toml").write_text(CARD_TEXT)
     for text, refusal in (
-        ("https://example.org/b.zip 5 abc", "another bundle"),
+        ("https://example.org/b.zip 5 abc", "64 hexadecimal digits"),
+        (f"https://example.org/b.zip 5 {64 * '0'}", "another bundle"),
         ("javascript:alert(1) 5 abc", "not three lines"),
     ):
         (folder / "bundle.txt").write_text(text.replace(" ", "\n"))

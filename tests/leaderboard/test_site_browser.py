@@ -11,15 +11,19 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from site_fakes import REPLAYED, make_submission, many_entries
+from site_fakes import REPLAYED, Weaker, make_submission, many_entries
 
 sys.path.append(str(Path(__file__).parents[1] / "results"))
 
 from devtools import Page, chromium
 
-from robospa.leaderboard.entries import entry_of
+from robospa.leaderboard.entries import entry_of, published_entries
+from robospa.leaderboard.pairs import pairs_of, write_pairs
 from robospa.leaderboard.site import index_page, write_model
-from robospa.leaderboard.submission import read_submission
+from robospa.leaderboard.submission import read_submission, read_submissions
+from robospa.results.compare import over_levels
+from robospa.results.reading import read_run
+from robospa.results.sides import side_of_run
 
 pytestmark = pytest.mark.browser
 
@@ -39,6 +43,18 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "index.html").write_text(index_page(entries))
     kept = make_submission(folder, folder / "home", {"replayed": REPLAYED})
     write_model(entry_of(read_submission(kept)), folder / "models" / "fake-1")
+    return folder / "index.html"
+
+
+@pytest.fixture(scope="module")
+def pair(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A site with two submissions on equal seeds."""
+    folder = tmp_path_factory.mktemp("pair")
+    make_submission(folder / "one", folder / "home", name="Fake 1")
+    make_submission(folder / "two", folder / "home", name="Fake 2", policy=Weaker())
+    entries = [entry_of(found) for found in read_submissions(folder / "home")]
+    (folder / "index.html").write_text(index_page([*entries, *published_entries()]))
+    write_pairs(pairs_of(entries), folder, str)
     return folder / "index.html"
 
 
@@ -151,6 +167,54 @@ def test_two_models_side_by_side(page: Page) -> None:
     assert page.run("document.getElementById('unlike').hidden")
     choose(page, "pair", "two", "model-1")
     assert not page.run("document.getElementById('unlike').hidden")
+
+
+HOW = "document.getElementById('how').textContent"
+FIRST = (
+    "[...[...document.querySelectorAll('#sides tbody tr')]."
+    ".find(r => r.innerText.startsWith('Pick Blocks S'))"
+    ".cells].slice(1).map(c => c.innerText.split('\\n'))"
+)
+
+
+def test_models_on_equal_seeds_are_paired(page: Page, pair: Path) -> None:
+    """Fake 2 fails at one more seed of four: 25 points, five trials, in every direction."""
+    page.open(pair)
+    choose(page, "pair", "tasks", "on")
+    choose(page, "pair", "one", "fake-1")
+    choose(page, "pair", "two", "fake-2")
+    page.wait(f"{HOW}.startsWith('Paired')")
+    one, two, gap, alone = page.run(FIRST)
+    assert (one[0], two[0], gap[0], alone[0]) == ("75.0", "50.0", "+25.0", "5 : 0")
+    sides = [side_of_run(read_run(pair.parent / name / "run")) for name in ("one", "two")]
+    (right,) = over_levels(*sides)
+    low, high = (float(text) for text in gap[1].strip("[]").split(","))
+    assert (low, high) == pytest.approx(
+        (100 * right.estimate.low, 100 * right.estimate.high), abs=0.06
+    )
+    assert float(alone[1].removeprefix("q = ")) == pytest.approx(right.q, rel=0.05)
+    choose(page, "pair", "one", "fake-2")
+    choose(page, "pair", "two", "fake-1")
+    assert [cell[0] for cell in page.run(FIRST)] == ["50.0", "75.0", "-25.0", "0 : 5"]
+    choose(page, "pair", "two", "x-vla")
+    assert "unrelated seeds" in page.run(HOW)
+    assert len(page.run(FIRST)) == 3
+    base = pair.parent.resolve().as_uri()
+    assert [url for url in page.requested() if not url.startswith((base, "data:"))] == []
+
+
+def test_a_pair_that_is_missing_is_said_to_be(page: Page, pair: Path) -> None:
+    script = pair.parent / "pairs" / "fake-1" / "fake-2.js"
+    text = script.read_text()
+    script.unlink()
+    page.open(pair)
+    choose(page, "pair", "tasks", "on")
+    choose(page, "pair", "one", "fake-1")
+    choose(page, "pair", "two", "fake-2")
+    page.wait(f"{HOW}.includes('could not be loaded')")
+    assert page.run(FIRST)[2][0] == "+25.0"
+    script.write_text(text)
+    page.problems[:] = [p for p in page.problems if "ERR_FILE_NOT_FOUND" not in p]
 
 
 @pytest.mark.parametrize("width", [1200, 390])

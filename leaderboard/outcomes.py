@@ -1,0 +1,122 @@
+"""The outcome of every single trial of a bundle, small enough to keep: what pairing models needs.
+
+    "TASK/LEVEL": {"candidates", "total", "success": "0110...", "done": "0231..."}
+
+One character a trial, in the order of the seeds. Two models that ran the same seeds of one suite
+are held against each other scene by scene, by the code of `robospa compare`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from robospa.leaderboard.bundle import BundleError
+from robospa.results.compare import Difference, compare, over_levels
+from robospa.results.metrics import METRICS
+from robospa.results.reading import Run
+from robospa.results.records import TrialKey, TrialRecord
+from robospa.results.sides import COMPARED, CompareError, Side, Variant, sample_of
+
+DIGITS = "0123456789abcdefghijklmnopqrstuvwxyz"
+FIELDS = {"candidates", "total", "success", "done"}
+PLACE = re.compile(r"([A-Za-z0-9_]{1,64})/([1-5])")
+Rows = dict[str, dict[str, list[float | None]]]
+
+
+def outcomes_of(run: Run) -> dict[str, dict[str, Any]]:
+    """The outcomes of a complete run."""
+    found: dict[str, dict[str, Any]] = {}
+    for key in sorted(run.keys):
+        record = run.records[key]
+        own = found.setdefault(
+            f"{key.task}/{key.level}",
+            {"candidates": record.candidates, "total": record.total, "success": "", "done": ""},
+        )
+        own["success"] += "1" if record.success else "0"
+        own["done"] += DIGITS[record.done]
+    return found
+
+
+def side_of(
+    name: str, outcomes: Mapping[str, Any], keys: Sequence[TrialKey], categories: Mapping[str, str]
+) -> Side:
+    """One side of a comparison, from the `outcomes` of the trials `keys`; BundleError if they do
+    not fit each other."""
+    seeds: dict[Variant, list[TrialKey]] = {}
+    for key in sorted(keys):
+        seeds.setdefault(key.variant, []).append(key)
+    if set(outcomes) != {f"{task}/{level}" for task, level in seeds}:
+        raise BundleError(f"{name[:80]!a}: the outcomes are of other variants than the run")
+    trials: dict[Variant, dict[int, TrialRecord]] = {}
+    for (task, level), own in seeds.items():
+        part = _checked(outcomes[f"{task}/{level}"], len(own), f"{name[:80]!a}, {task} L{level}")
+        trials[task, level] = {
+            key.seed: _record(key, categories[task], part, place) for place, key in enumerate(own)
+        }
+    first = keys[0]
+    setting = (first.embodiment, first.mode, first.split)
+    listed = {variant: len(own) for variant, own in seeds.items()}
+    return Side(name, setting, dict(categories), {}, trials, listed, {})
+
+
+def _checked(part: Any, count: int, where: str) -> Mapping[str, Any]:
+    """The outcomes of a variant, if they are of `count` trials."""
+    if not isinstance(part, dict) or set(part) != FIELDS:
+        raise BundleError(f"{where}: the outcomes have other fields than {sorted(FIELDS)}")
+    good, done, total = part["success"], part["done"], part["total"]
+    numbers = type(total) is int and type(part["candidates"]) is int and 0 < total < len(DIGITS)
+    texts = isinstance(good, str) and isinstance(done, str)
+    if not (numbers and texts and len(good) == len(done) == count):
+        raise BundleError(f"{where}: the outcomes are not of {count} trials")
+    if set(good) - set("01") or set(done) - set(DIGITS[: total + 1]):
+        raise BundleError(f"{where}: the outcomes hold what no trial can have")
+    return part
+
+
+def _record(key: TrialKey, category: str, part: Mapping[str, Any], place: int) -> TrialRecord:
+    """As much of a trial's record as a comparison looks at. One suite, one seed: one scene."""
+    done, good = DIGITS.index(part["done"][place]), part["success"][place] == "1"
+    counts = (done, done, part["total"], part["candidates"], 0, 0, 0)
+    end = "success" if good else "step_limit"
+    return TrialRecord(key, category, "", "", end, good, *counts, "", "", 0.0)
+
+
+def paired(first: Side, second: Side) -> dict[str, Rows]:
+    """Differences in percent on equal seeds, by metric, row and level (0: over levels).
+
+    Each is [difference, low, high, pairs that only the first, only the second did better in, q].
+    A metric that they cannot be paired in is left out.
+    """
+    made: dict[str, Rows] = {}
+    for metric in METRICS:
+        try:
+            one, two = _measured(first, metric), _measured(second, metric)
+            found = compare(one, two, metric)
+            rows = [*found.cells, *found.groups, *over_levels(one, two, metric)]
+        except CompareError:
+            continue
+        if found.paired:
+            made[metric] = {}
+            for row in rows:
+                made[metric].setdefault(row.label, {})[str(row.level)] = _shown(row)
+    return made
+
+
+def _measured(side: Side, metric: str) -> Side:
+    """`side` with its samples by `metric`."""
+    samples = {
+        v: sample_of(list(found.values()), metric, f"{v[0]} L{v[1]}")
+        for v, found in side.trials.items()
+        if side.category[v[0]] in COMPARED[metric]
+    }
+    return Side(
+        side.name, side.setting, side.category, samples, side.trials, side.listed, side.versions
+    )
+
+
+def _shown(row: Difference) -> list[float | None]:
+    found = row.estimate
+    numbers = [round(100 * x, 2) for x in (found.value, found.low, found.high)]
+    return [*numbers, row.only_first, row.only_second, float(f"{row.q:.2g}")]
