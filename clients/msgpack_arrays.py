@@ -65,10 +65,64 @@ def pack(value: Any, form: Form, limits: Limits) -> bytes:
     return data
 
 
+def check_structure(data: bytes, limits: Limits) -> None:
+    """Raises DecodeError unless everything that `data` announces is there and within `limits`.
+
+    msgpack itself allocates by announced counts: a few kilobytes of lists in lists would cost it
+    gigabytes.
+    """
+    position, announced, left = 0, 0, [1]
+    while left:
+        if left[-1] == 0:
+            left.pop()
+            continue
+        left[-1] -= 1
+        if position >= len(data):
+            raise DecodeError("the message ends in the middle of a value")
+        tag = data[position]
+        position += 1
+        if tag in _COUNTED or 0x80 <= tag < 0xA0:
+            width, each = _COUNTED.get(tag, (0, 1 if tag >= 0x90 else 2))
+            count = int.from_bytes(data[position : position + width]) if width else tag & 0x0F
+            position += width
+            count *= each
+            if count > len(data) - position:
+                raise DecodeError(f"{count} members announced, {len(data) - position} bytes left")
+            left.append(count)
+            announced += count
+            if announced > limits.items or len(left) > limits.depth + 1:
+                raise DecodeError(
+                    f"more than {limits.items} items, or nested deeper than {limits.depth} levels"
+                )
+        elif tag in _SIZED:
+            width = _SIZED[tag]
+            position += width + int.from_bytes(data[position : position + width])
+        elif 0xA0 <= tag < 0xC0:
+            position += tag & 0x1F
+        else:
+            position += _FIXED.get(tag, 0)
+    if position > len(data):
+        raise DecodeError("the message ends in the middle of a value")
+
+
+_COUNTED = {0xDC: (2, 1), 0xDD: (4, 1), 0xDE: (2, 2), 0xDF: (4, 2)}
+"""Tag of a list or map -> bytes of its count, values of each member."""
+_SIZED = {0xC4: 1, 0xC5: 2, 0xC6: 4, 0xD9: 1, 0xDA: 2, 0xDB: 4}
+_FIXED = {
+    **dict.fromkeys((0xCC, 0xD0), 1),
+    **dict.fromkeys((0xCD, 0xD1), 2),
+    **dict.fromkeys((0xCA, 0xCE, 0xD2), 4),
+    **dict.fromkeys((0xCB, 0xCF, 0xD3), 8),
+    **{0xD4 + power: 1 + 2**power for power in range(5)},
+}
+"""Tag -> bytes that follow."""
+
+
 def unpack(data: bytes, limits: Limits) -> Any:
     """The value of one message; raises DecodeError."""
     if len(data) > limits.message:
         raise DecodeError(f"message of {len(data)} bytes is over the limit of {limits.message}")
+    check_structure(data, limits)
     try:
         return msgpack.unpackb(
             data,
