@@ -25,9 +25,10 @@ import numpy as np
 from robospa.clients.chunks import WIDTHS, as_chunk, check_horizon, turned
 from robospa.clients.framed import Frames
 from robospa.clients.msgpack_arrays import text_form
-from robospa.protocol.errors import HandshakeError, ServerError
+from robospa.protocol.errors import HandshakeError, ServerError, printable
 from robospa.protocol.options import option, plain_options
 from robospa.protocol.policy import CameraSpec, Observation, PolicySpec, TrialInfo
+from robospa.protocol.validate import as_said
 
 if TYPE_CHECKING:
     from robospa.clients import Line
@@ -102,14 +103,14 @@ class Session:
         if theirs != PROTOCOL:
             self.close()
             raise HandshakeError(
-                f"{line.target.url} speaks version {theirs!r} of vla-eval's protocol, "
+                f"{line.target.url} speaks version {str(theirs)[:40]} of vla-eval's protocol, "
                 f"not {PROTOCOL}"
             )
         name = str(greeting.get("model_server", ""))
-        said = {key: _plain(greeting[key]) for key in SAID if key in greeting}
+        said = {key: as_said(greeting[key]) for key in SAID if key in greeting}
         self.hello: dict[str, Any] = {
             "dialect": "vla-eval",
-            "server": f"{name} {greeting.get('harness_version', '')}".strip(),
+            "server": printable(f"{name} {greeting.get('harness_version', '')}", 200),
             "said": said,
             "spec": self.spec.to_json(),
             "options": plain_options(options),
@@ -188,17 +189,6 @@ def _doubts(said: Mapping[str, Any], options: Options) -> list[str]:
         f"the server announces {total} numbers an action ({told}), but {options.space} actions "
         f"have {WIDTHS[options.space]}"
     ]
-
-
-def _plain(value: Any) -> Any:
-    """JSON values out of a greeting."""
-    if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    if isinstance(value, np.ndarray):
-        return value.tolist()
-    return value if isinstance(value, str | int | float | bool | None) else str(value)
 
 
 def open_session(line: Line, options: Options) -> Session:

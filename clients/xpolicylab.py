@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from robospa.clients.chunks import as_chunk, check_horizon, turned
 from robospa.clients.framed import Frames
 from robospa.clients.msgpack_arrays import binary_form
-from robospa.protocol.errors import PolicyAnswerError, ServerError
+from robospa.protocol.errors import PolicyAnswerError, ServerError, printable
 from robospa.protocol.options import option, plain_options
 from robospa.protocol.policy import Observation, PolicySpec, TrialInfo
 from robospa.protocol.rot6d import quaternion_to_matrix
@@ -157,7 +157,7 @@ class Session:
         greeting = self._call(0, "hello", "hello_ack", {}, line.timeouts.hello)
         self.hello: dict[str, Any] = {
             "dialect": "xpolicylab",
-            "server": str(greeting.get("server", "")),
+            "server": printable(str(greeting.get("server", "")), 200),
             "spec": self.spec.to_json(),
             "options": plain_options(options),
             "warnings": list(WARNINGS),

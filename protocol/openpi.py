@@ -26,6 +26,7 @@ from robospa.protocol.channel import Channel, Timeouts
 from robospa.protocol.codec import Limits, decode, encode
 from robospa.protocol.errors import DecodeError, EncodeError, ProtocolViolation, ServerError
 from robospa.protocol.policy import Observation, PolicySpec, TrialInfo
+from robospa.protocol.validate import as_said
 
 CAMERA_NAMES = {
     "head": "cam_high",
@@ -61,7 +62,7 @@ class OpenPiSession:
         self.spec = options.spec
         self.hello = {
             "dialect": "openpi",
-            "metadata": _plain(metadata),
+            "metadata": as_said(metadata),
             "spec": self.spec.to_json(),
         }
 
@@ -113,17 +114,6 @@ def _timing(answer: Mapping[str, Any]) -> dict[str, float]:
         if isinstance(times, dict) and isinstance(times.get("infer_ms"), (int, float)):
             return {"infer_ms": float(times["infer_ms"])}
     return {}
-
-
-def _plain(value: Any) -> Any:
-    """Arrays in metadata as lists, so that it can be written as JSON."""
-    if isinstance(value, np.ndarray):
-        return value.tolist()
-    if isinstance(value, dict):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, list):
-        return [_plain(item) for item in value]
-    return value if value is None or isinstance(value, (bool, int, float, str)) else repr(value)
 
 
 def to_openpi(observation: Observation, options: OpenPiOptions) -> dict[str, Any]:

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import json
+import math
 import re
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from robospa.protocol.errors import DecodeError
 
 MISSING: Any = object()
+TOLD = 2**16
+"""Characters of a server's words about itself that a run keeps."""
 IDENTIFIER = re.compile(r"(?:[A-Za-z0-9_+-][A-Za-z0-9_.+-]{0,127})?")
 
 
@@ -84,6 +90,26 @@ class Fields:
 def is_name(value: Any) -> bool:
     """Whether `value` can stand in a table or on a terminal as it is."""
     return type(value) is str and len(value) <= 200 and value.isprintable()
+
+
+def as_said(value: Any, most: int = TOLD) -> Any:
+    """What a server says about itself as JSON values, for the record of a run: arrays as lists,
+    numbers that JSON has not as text; more than `most` characters of it are left out."""
+    found = _plain(value)
+    size = len(json.dumps(found))
+    return found if size <= most else f"left out: {size} characters"
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)
+    return value if value is None or isinstance(value, (bool, int, float, str)) else repr(value)
 
 
 def kind(value: Any) -> str:

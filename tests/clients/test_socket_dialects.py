@@ -361,3 +361,16 @@ def test_arrays_that_cannot_be_are_refused(broken: Any) -> None:
         pytest.raises(ProtocolViolation, match="cannot be read"),
     ):
         policy.infer(observation())
+
+
+# ---------------------------------------------------------------- what servers say of themselves
+
+
+def test_what_a_server_says_of_itself_can_be_kept() -> None:
+    from robospa.protocol.validate import as_said
+
+    said = {"mean": np.array([1.5, np.nan]), b"x": {1: (np.inf, None)}, "odd": object}
+    kept = as_said(said)
+    assert kept["mean"] == [1.5, "nan"]
+    assert kept["b'x'"] == {"1": ["inf", None]}
+    assert as_said({"weights": np.zeros(10**5)}).startswith("left out: ")
