@@ -1,0 +1,289 @@
+"""A whole run against a batching model of 100 ms + 2 ms a sample: how near to the limit it comes.
+
+    python benchmarks/throughput.py [--workers 8] [--json [FILE]]
+
+Driver, workers, wire, server and batching are the real ones. The model sleeps (a GPU that works
+leaves the processor alone), the world burns processor time: as much an answer as the case says. The
+limits are measured in the same run: of the model by calling full batches one after the other, of
+the cores by the same run with a model that answers at once. Throughput is what the server counts
+over `--seconds` once all workers run; then the run is ended.
+
+With n workers, no batch can be larger than n and none is full while a worker simulates. `closed`
+is the throughput that n workers in step could have at most: n / (one call with n + their
+simulation on these cores). It says how much of a gap is arithmetic.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from common import Result, Row, argument_parser, finish, line
+from numpy.typing import NDArray
+
+from robospa.harness.runner import Runner, RunOptions
+from robospa.harness.staffing import cores, most_workers
+from robospa.harness.status import Status
+from robospa.harness.trial import TrialParts
+from robospa.harness.worker import WorkerConfig
+from robospa.harness.world import Poll, StepResult
+from robospa.protocol.policy import PolicySpec, TrialInfo
+from robospa.protocol.server import ServerThread
+from robospa.results.records import TrialKey
+from robospa.tasks.events import Event
+from robospa.tasks.geometry import Pose
+from robospa.tasks.scene import Scene
+from robospa.tasks.snapshot import Contact, Snapshot
+from robospa.tasks.task import Level, Task
+
+BASE, ITEM, BATCH = 0.100, 0.002, 8
+CALLS = 10
+"""Answers that one trial takes."""
+HERE = Pose((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
+
+
+class Model:
+    """Answers with one action each; counts when it answered how many."""
+
+    def __init__(self, base: float, item: float) -> None:
+        self.spec = PolicySpec("simulated", cameras=(), horizon=1, batch=BATCH)
+        self.base, self.item = base, item
+        self.calls: list[tuple[float, int]] = []
+
+    def reset(self, trial: TrialInfo) -> None:
+        """Nothing is remembered."""
+
+    def infer(self, observation: Mapping[str, Any]) -> NDArray[np.float32]:
+        """One sample alone."""
+        return self.infer_batch([observation], [0])[0]
+
+    def infer_batch(
+        self, observations: Sequence[Mapping[str, Any]], sessions: Sequence[int]
+    ) -> list[NDArray[np.float32]]:
+        """Takes as long as it says."""
+        if self.base:
+            time.sleep(self.base + self.item * len(observations))
+        self.calls.append((time.monotonic(), len(observations)))
+        return [np.zeros((1, 14), np.float32) for _ in observations]
+
+
+class World:
+    """Burns `busy` seconds of the processor an action and does nothing else."""
+
+    def __init__(self, busy: float) -> None:
+        self.busy, self.steps = busy, 0
+
+    def load(self, scene: Scene, contacts: bool = False) -> None:
+        """A new trial."""
+        self.steps = 0
+
+    def step(self, action: NDArray[np.float32], space: str, poll: Poll) -> StepResult:
+        """One action."""
+        until = time.thread_time() + self.busy
+        while time.thread_time() < until:
+            pass
+        self.steps += 1
+        return StepResult(1, poll(self.snapshot()))
+
+    def observe(self, spec: PolicySpec) -> dict[str, Any]:
+        """Joints only."""
+        return {"images": {}, "state": np.zeros(14, np.float32)}
+
+    def snapshot(self) -> Snapshot:
+        """Nothing to see."""
+        return Snapshot(0.02 * self.steps, {"block": HERE}, (0.0, 0.0), (HERE, HERE))
+
+    def contacts(self) -> tuple[Contact, ...]:
+        """None."""
+        return ()
+
+    def digest(self) -> str:
+        """All trials end alike."""
+        return str(self.steps)
+
+    def info(self) -> Mapping[str, Any]:
+        """For the manifest."""
+        return {"simulator": "busy loop"}
+
+    def close(self) -> None:
+        """Nothing to free."""
+
+
+class Never:
+    """A goal that is never met: every trial takes all of its steps."""
+
+    needs_contacts = False
+    total = 1
+
+    def start(self, snapshot: Snapshot) -> tuple[Event, ...]:
+        """Not met."""
+        return ()
+
+    def update(self, snapshot: Snapshot) -> tuple[Event, ...]:
+        """Not met."""
+        return ()
+
+
+def _unused(*_: Any) -> Any:
+    raise AssertionError("the task is never drawn")
+
+
+def parts(key: TrialKey) -> TrialParts:
+    """A trial of CALLS steps."""
+    levels = {1: Level(candidates=1, subtasks=1, steps=CALLS)}
+    task = Task(key.task, "GAC", levels, _unused, _unused, _unused, _unused, "busy", "busy")
+    scene = Scene(key.task, key.level, key.seed, key.embodiment, key.mode, (), {})
+    return TrialParts(scene, task, Never(), "wait")
+
+
+@dataclass
+class Served:
+    """A model in a process of its own."""
+
+    process: subprocess.Popen[str]
+    url: str
+    limit: float
+
+    def calls(self) -> list[tuple[float, int]]:
+        """Ends it: when it answered how many."""
+        out, _ = self.process.communicate("\n", timeout=60)
+        return [(when, count) for when, count in json.loads(out)]
+
+
+@contextlib.contextmanager
+def serving(base: float, item: float) -> Iterator[Served]:
+    """The model, its limit measured before anybody asks."""
+    words = [sys.executable, __file__, "--serve", str(base), str(item)]
+    process = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    try:
+        assert process.stdout is not None
+        url, limit = process.stdout.readline().split()
+        yield Served(process, url, float(limit))
+    finally:
+        process.kill()
+        process.wait()
+
+
+def serve(base: float, item: float) -> None:
+    """The process of `serving`."""
+    model = Model(base, item)
+    begun, rounds = time.perf_counter(), 20
+    for _ in range(rounds):
+        model.infer_batch([{}] * BATCH, [0] * BATCH)
+    limit = BATCH * rounds / (time.perf_counter() - begun)
+    model.calls.clear()
+    with ServerThread(model) as server:
+        print(server.url, limit, flush=True)
+        sys.stdin.readline()
+    print(json.dumps(model.calls))
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What a run did: answers a second, samples a call, workers at its end, the model's limit."""
+
+    rate: float
+    batch: float
+    workers: int
+    model: float
+
+
+class Enough(Exception):
+    """It was measured for long enough."""
+
+
+@dataclass
+class Window:
+    """Since when the same workers have been running; ends the run after `seconds` of that."""
+
+    seconds: float
+    workers: int = 0
+    begun: float = 0.0
+
+    def look(self, status: Status) -> None:
+        """Called by the driver."""
+        if status.starting or status.workers != self.workers or not status.shares:
+            self.workers, self.begun = status.workers, status.now
+        elif status.now - self.begun > self.seconds:
+            raise Enough
+
+
+def measure(busy: float, workers: int, seconds: float, base: float, item: float) -> Seen:
+    """One run; `workers` 0 for as many as the driver finds right."""
+    keys = [TrialKey("Busy", 1, seed) for seed in range(20_000)]
+    window = Window(seconds)
+    with tempfile.TemporaryDirectory() as folder, serving(base, item) as served:
+        config = WorkerConfig(
+            Path(folder), served.url, world="throughput:World",
+            world_arguments={"busy": busy}, parts="throughput:parts",
+            expects={served.url: Model(base, item).spec},
+        )  # fmt: skip
+        options = RunOptions(workers or cores(), most=workers or most_workers())
+        runner = Runner(config, keys, options, on_status=window.look)
+        with contextlib.suppress(Enough):
+            runner.run()
+        until = time.monotonic()
+        calls = [c for c in served.calls() if window.begun <= c[0] <= until - 0.5]
+    answers = sum(size for _, size in calls[1:])
+    rate = answers / (calls[-1][0] - calls[0][0])
+    return Seen(rate, answers / (len(calls) - 1), window.workers, served.limit)
+
+
+def case(name: str, busy: float, workers: int, seconds: float, bar: float | None) -> Row:
+    """A run beside both limits."""
+    few = cores()
+    alone = measure(busy, few, seconds, 0.0, 0.0)
+    seen = measure(busy, workers, seconds, BASE, ITEM)
+    limit, who = min((seen.model, "model"), (alone.rate, "cores"))
+    together = seen.workers / (BASE + ITEM * min(BATCH, seen.workers) + busy * seen.workers / few)
+    note = (
+        f"{seen.rate:.1f} answers/s with {seen.workers} workers, {seen.batch:.1f} samples a call; "
+        f"the model alone gives {seen.model:.1f}, {few} cores alone {alone.rate:.1f}: the {who} "
+        f"bind{'s' if who == 'model' else ''}"
+    )
+    if workers:
+        note += f"; {workers} workers in step could have {min(limit, together):.1f}"
+    return Row(name, round(seen.rate / limit, 3), "of the limit", at_least=bar, note=note)
+
+
+def main() -> None:
+    """Measure and print."""
+    if sys.argv[1:2] == ["--serve"]:
+        return serve(float(sys.argv[2]), float(sys.argv[3]))
+    parser = argument_parser(__doc__)
+    parser.add_argument("--workers", type=int, default=8)
+    parser.add_argument("--seconds", type=float, default=8.0, help="for which each run is measured")
+    options = parser.parse_args()
+    n = options.workers
+    cases = (
+        (f"{n} workers, 1 ms of simulation an answer", 0.001, n, 0.9),
+        (f"{n} workers, 150 ms of simulation an answer", 0.150, n, 0.9),
+        (f"{n} workers, 30 ms: model and cores alike", 0.030, n, None),
+        ("workers by default, 1 ms of simulation", 0.001, 0, 0.9),
+        ("workers by default, 30 ms", 0.030, 0, 0.9),
+    )
+    rows = []
+    for name, busy, workers, bar in cases:
+        rows.append(case(name, busy, workers, options.seconds, bar))
+        print(line(rows[-1]), file=sys.stderr, flush=True)
+    text = (
+        "The model takes 100 ms and 2 ms a sample, at most 8 at once. Driver, workers, wire, "
+        "server and batching are the real ones; the simulation is a busy loop, so that either "
+        "side can be made the scarcer one. Where both are equally scarce, 8 workers cannot keep "
+        "both busy: while they simulate, the model has nothing to do. More workers than fit into "
+        "a batch can, and the driver adds them by itself."
+    )
+    finish(Result("throughput", "A run against a slow model", tuple(rows), text=text), options)
+
+
+if __name__ == "__main__":
+    main()
