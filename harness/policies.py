@@ -79,7 +79,7 @@ def _is_targets(value: object) -> bool:
 
 def _some(names: Sequence[str]) -> str:
     more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
-    return ", ".join(names[:NAMED]) + more
+    return ", ".join(name[:80] for name in names[:NAMED]) + more
 
 
 def probe(target: str, given: Mapping[str, Any], wait: float = 0.0) -> Probed:

@@ -11,13 +11,16 @@ from __future__ import annotations
 import contextlib
 import errno
 import fcntl
+import math
 import os
+import re
 import time
 import zipfile
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +30,8 @@ from robospa.results.records import TrialKey, TrialRecord
 
 ACTIONS = "actions"
 VIDEOS = "videos"
+MOST_TRACE = 2**28
+"""Bytes of a trial's actions, at most."""
 PART = ".*.part"
 """What a file is called while it is being written."""
 ORPHAN_SECONDS = 10.0
@@ -201,9 +206,37 @@ def write_actions(folder: Path, key: TrialKey, actions: NDArray[np.float32], spa
 
 def read_actions(path: Path) -> tuple[NDArray[np.float32], str]:
     """(actions (steps, D), action space) of a trace; raises RunError if it is none."""
-    broken = (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error)
     try:
-        with np.load(path, allow_pickle=False) as data:
-            return np.asarray(data["actions"], dtype=np.float32), str(data["space"])
-    except broken as error:
+        with zipfile.ZipFile(path) as archive:
+            actions = _member(archive, "actions.npy")
+            space = _member(archive, "space.npy")
+    except _BROKEN as error:
         raise RunError(f"{path} is no action trace: {error}") from error
+    if actions.ndim != 2 or actions.dtype.kind != "f" or space.ndim or space.dtype.kind != "U":
+        raise RunError(f"{path} is no action trace: it has other arrays")
+    return np.asarray(actions, dtype=np.float32), str(space)
+
+
+_BROKEN = (OSError, ValueError, KeyError, EOFError, RuntimeError, zipfile.BadZipFile, zlib.error)
+
+
+def _member(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
+    """An array of an .npz file; its data is there before anything of its announced size is made."""
+    with archive.open(name) as file:
+        data = file.read(MOST_TRACE + 1)
+    if len(data) > MOST_TRACE:
+        raise ValueError(f"{name} has more than {MOST_TRACE} bytes")
+    found = re.fullmatch(_HEADER, data[10:128].rstrip(b" \n\x00").split(b"\n")[0].rstrip())
+    if not data.startswith(b"\x93NUMPY\x01\x00") or found is None:
+        raise ValueError(f"{name} is no plain array")
+    dtype = np.dtype(found[1].decode())
+    shape = tuple(int(n) for n in found[2].decode().split(",") if n.strip())
+    start = 10 + int.from_bytes(data[8:10], "little")
+    if math.prod(shape) * dtype.itemsize != len(data) - start:
+        raise ValueError(f"{name} announces another size than it has")
+    return np.frombuffer(data, dtype, offset=start).reshape(shape)
+
+
+_HEADER = (
+    rb"\{'descr': '(<[fU][0-9]{1,4})', 'fortran_order': False, 'shape': \(([0-9, ]{0,40})\), \}"
+)

@@ -37,7 +37,8 @@ class Archive:
         try:
             self._zip = zipfile.ZipFile(path)
         except BROKEN as error:
-            raise BundleError(f"{path.name} is not a zip file that can be read: {error}") from None
+            why = str(error)[:120]
+            raise BundleError(f"{path.name} is not a zip file that can be read: {why}") from None
         try:
             self.sizes = _check_entries(self._zip, self.limits)
         except BundleError:
@@ -63,7 +64,7 @@ class Archive:
             with self._zip.open(name) as file:
                 data = file.read(self.sizes[name] + 1)
         except BROKEN as error:
-            raise BundleError(f"{name} cannot be unpacked: {error}") from None
+            raise BundleError(f"{name} cannot be unpacked: {str(error)[:120]}") from None
         if len(data) != self.sizes[name]:
             raise BundleError(f"{name} does not unpack to the size that it announces")
         return data
@@ -88,7 +89,7 @@ class Archive:
                     digest.update(line)
                     yield line[:-1]
         except BROKEN as error:
-            raise BundleError(f"{name} cannot be unpacked: {error}") from None
+            raise BundleError(f"{name} cannot be unpacked: {str(error)[:120]}") from None
 
 
 def _check_frame(path: Path, limits: Limits) -> None:

@@ -88,9 +88,9 @@ def _read(name: str, value: Any, hint: Any) -> Any:
     for kind in (k for k in allowed if k is not type(None)):
         try:
             return _convert(value, kind)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             continue
-    raise ValueError(f"option {name}={value!r} is not a {_type_name(hint)}")
+    raise ValueError(f"option {name}={str(value)[:80]!r} is not a {_type_name(hint)}")
 
 
 def _convert(value: Any, kind: Any) -> Any:

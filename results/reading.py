@@ -92,7 +92,7 @@ def from_data(data: Any) -> TrialRecord:
         key = TrialKey(**data.pop("key"))
         record = TrialRecord(key=key, **{**data, "events": tuple(data.get("events", ()))})
     except TypeError as error:
-        raise ValueError(f"not a trial record: {error}") from error
+        raise ValueError(f"not a trial record: {str(error)[:200]}") from error
     check_record(record)
     return record
 
@@ -191,7 +191,9 @@ def manifest_keys(manifest: Mapping[str, Any]) -> tuple[TrialKey, ...]:
                 keys.append(TrialKey(task, level, seed, embodiment, mode, split))
                 check_key(keys[-1])
     except (KeyError, TypeError, ValueError) as error:
-        raise RunError(f"the manifest's list of trials is malformed: {error!r}") from error
+        raise RunError(
+            f"the manifest's list of trials is malformed: {repr(error)[:200]}"
+        ) from error
     return tuple(keys)
 
 

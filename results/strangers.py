@@ -48,6 +48,8 @@ def parse(text: str) -> Any:
         value = json.loads(text, object_pairs_hook=_without_repeats)
     except RecursionError:
         raise ValueError("it is nested without end") from None
+    except ValueError as error:
+        raise ValueError(str(error)[:200]) from None
     if "\\u" in text or "\\U" in text:  # half a character: no file and no terminal takes it
         try:
             json.dumps(value, ensure_ascii=False).encode()

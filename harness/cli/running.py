@@ -166,7 +166,7 @@ def client_options(url: str, file: Path | None) -> dict[str, Any]:
         check_options(url, given)
     except (OSError, ValueError) as error:
         where = f"--client {file}: " if file is not None else ""
-        raise BadChoice(f"{where}{error}") from error
+        raise BadChoice(f"{where}{str(error)[:300]}") from error
     return given
 
 
