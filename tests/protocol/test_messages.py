@@ -33,6 +33,7 @@ from robospa.protocol.policy import CAMERAS, SPACES, STATES, CameraSpec, PolicyS
 IDS = st.integers(0, MAX_ID)
 TEXT = st.text(max_size=20)
 NAME = TEXT.filter(str.isprintable)
+WORD = st.from_regex(r"[A-Za-z0-9_+-][A-Za-z0-9_.+-]{0,20}|", fullmatch=True)
 JSON = st.recursive(
     st.none() | st.booleans() | st.integers(-(2**63), 2**63) | st.floats(allow_nan=False) | TEXT,
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(TEXT, inner, max_size=3),
@@ -60,12 +61,12 @@ SPECS = st.builds(
 )
 TRIALS = st.builds(
     TrialInfo,
-    task=TEXT,
+    task=WORD,
     level=st.integers(0, 9),
     seed=st.integers(0, 2**64 - 1),
-    embodiment=TEXT,
-    mode=TEXT,
-    split=TEXT,
+    embodiment=WORD,
+    mode=WORD,
+    split=WORD,
     instruction=TEXT,
     policy_seed=st.integers(0, 2**64 - 1),
     extra=JSON_MAP,

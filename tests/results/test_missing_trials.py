@@ -35,6 +35,11 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
     return write(tmp_path_factory.mktemp("missing") / "run", records, never)
 
 
+@pytest.fixture(scope="module")
+def report(run: Run) -> Path:
+    return write_report(run, run.folder / "report")
+
+
 def test_rates_are_of_results_and_bounds_of_all_that_is_listed(run: Run) -> None:
     scores = score_run(run)
     pick, put = scores.cells[PICK, 1], scores.cells[PUT, 1]
@@ -89,25 +94,24 @@ def test_many_reasons_are_summed_up(tmp_path: Path) -> None:
     assert lines[-1] == "missing 4: for 4 other reasons"
 
 
-def test_every_table_of_a_report_names_what_is_missing(run: Run, tmp_path: Path) -> None:
-    folder = write_report(run, tmp_path / "report")
-    markdown = (folder / "report.md").read_text()
+def test_every_table_of_a_report_names_what_is_missing(report: Path) -> None:
+    markdown = (report / "report.md").read_text()
     assert "Pick Blocks Size L1 lacks 2, SR between 62.5 and 87.5" in markdown
     assert "Pick Blocks Size L1 lacks 2, ONTA between 25.0 and 75.0" in markdown
     assert "Put Bottles Dustbin L1 lacks 2, PS between 56.3 and 81.3" in markdown
     assert "ends: 8 success, 4 step limit, 2 missing, 2 not run" in markdown
     assert "did not send actions within 120 s" in markdown
-    latex = (folder / "tables" / "sr-tasks.tex").read_text()
+    latex = (report / "tables" / "sr-tasks.tex").read_text()
     assert r"83.3$^{\dagger}$" in latex and "lacks 2, SR between 62.5 and 87.5" in latex
-    page = (folder / "report.html").read_text()
+    page = (report / "report.html").read_text()
     assert "2 trials missing, so between 62.5 and 87.5" in page
     assert "4 of 16 trials are missing" in page
-    data = json.loads((folder / "report.json").read_text())["runs"][0]
+    data = json.loads((report / "report.json").read_text())["runs"][0]
     assert data["ends"] == {"success": 8, "step limit": 4, "missing": 2, "not run": 2}
 
 
-def test_the_csv_has_them_as_numbers(run: Run, tmp_path: Path) -> None:
-    text = (write_report(run, tmp_path / "report") / "tables" / "tables.csv").read_text()
+def test_the_csv_has_them_as_numbers(report: Path) -> None:
+    text = (report / "tables" / "tables.csv").read_text()
     rows = {(r["table"], r["row"]): r for r in csv.DictReader(text.splitlines())}
     found = rows["sr-tasks", "Pick Blocks Size"]
     assert [found[n] for n in ("sign", "missing", "worst_case", "best_case")] == [
