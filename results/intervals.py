@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -148,6 +149,7 @@ def paired_difference(only_first: int, only_second: int, trials: int, z: float =
     return Estimate(value, low, high, "Tango")
 
 
+@lru_cache(maxsize=4096)
 def paired_sample_difference(gaps: Sample) -> Estimate:
     """Mean of the differences of pairs: `gaps` has as many outcomes below 0 as above.
 
