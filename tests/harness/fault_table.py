@@ -32,6 +32,7 @@ from fault_cases import (
     silent,
     spoiled,
 )
+from fault_server import ONES
 from run_fakes import SPEC
 
 from robospa.protocol.messages import Error, Hello, Ready
@@ -172,6 +173,14 @@ ACTIONS = [
     ),
 ]
 FRAMES = [
+    Case(
+        "times",
+        "says that its answer took NaN and infinite milliseconds",
+        "first",
+        do.chunk(ONES, infer_ms=np.nan, queue_ms=np.inf),
+        UNHARMED,
+        "",
+    ),
     sends(
         "object",
         "answers an array of Python objects",
