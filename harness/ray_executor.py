@@ -274,9 +274,12 @@ def check_address(address: str) -> None:
 
 
 def _explained(text: str) -> str:
+    """What Ray says, with what helps."""
     if "Could not find any running Ray instance" in text:
         return (
             "no Ray cluster runs on this machine; `ray start --head` starts one, "
             "--address local makes one for this run only"
         )
+    if any(hint in text for hint in ("uthenticat", "Failed to connect", "connection timeout")):
+        text += "; if the cluster asks for a token, set RAY_AUTH_MODE=token here"
     return text
