@@ -48,6 +48,9 @@ def serve(
         Path | None,
         typer.Option(help="TLS private key (PEM)"),
     ] = None,
+    connections: Annotated[
+        int, typer.Option(min=1, help="clients that may be served at once; others wait or go")
+    ] = 256,
 ) -> None:
     """Serve a policy until interrupted.
 
@@ -63,7 +66,7 @@ def serve(
     make = policy_factory(policy)
     if show_options:
         return _show(policy, make)
-    served = _served(policy, make, {**_from_file(options), **_pairs(option or [])})
+    served = _served(policy, make, {**_from_file(options), **_pairs(option or [])}, connections)
     tls = None
     if certificate is not None:
         import ssl
@@ -91,7 +94,9 @@ def options_class(make: Any) -> Any:
     return found if dataclasses.is_dataclass(found) else None
 
 
-def _served(policy: str, make: Any, given: dict[str, Any]) -> dict[str, Any]:
+def _served(
+    policy: str, make: Any, given: dict[str, Any], connections: int = 256
+) -> dict[str, Any]:
     """What the server is to run: a shared policy, or a factory of one per connection."""
     from functools import partial
 
@@ -105,7 +110,10 @@ def _served(policy: str, make: Any, given: dict[str, Any]) -> dict[str, Any]:
             factory()  # one that fails should do so before anybody connects
         except TypeError as error:
             raise BadOptions(f"{policy} cannot be made: {error}") from error
-        return {"policy_factory": factory}
+        return {
+            "policy_factory": factory,
+            "options": ServerOptions(max_connections=connections),
+        }
     try:
         chosen = read_options(kind, given)
     except ValueError as error:
@@ -115,7 +123,8 @@ def _served(policy: str, make: Any, given: dict[str, Any]) -> dict[str, Any]:
     name = " ".join(["robospa", _version(), policy, *_told(chosen)])
     return {
         "policy_factory" if callable(made) else "policy": made,
-        "options": ServerOptions(name=name),  # reaches every client, and so a run's manifest
+        # The name reaches every client, and so a run's manifest.
+        "options": ServerOptions(name=name, max_connections=connections),
     }
 
 
