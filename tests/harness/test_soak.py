@@ -38,7 +38,7 @@ def test_damaged_files_are_read_or_refused(readers: Any) -> None:
     module, made = readers
     few = {"bundle": 10, "run": 10}
     for name in made.targets:
-        found = module.fuzz(made, [name], 1, 60.0, few.get(name, 200))
+        found = module.fuzz(made, [name], 1, 60.0, few.get(name, 120))
         assert found["ends"][name].get("read", 0) > 0
 
 
