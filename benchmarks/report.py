@@ -19,7 +19,7 @@ ORDER = (
     "step",
     "batching",
     "physics",
-    "setup",
+    "loading",
     "rendering",
     "scenes",
     "throughput",
