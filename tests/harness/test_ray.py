@@ -79,6 +79,11 @@ def test_a_worker_that_fits_on_no_node_is_refused(
     assert not (tmp_path / "run").exists()
 
 
+def test_the_slurm_example_is_valid_shell() -> None:
+    script = Path(__file__).parents[2] / "docs" / "examples" / "slurm_ray.sh"
+    assert subprocess.run(["bash", "-n", script], capture_output=True).stderr == b""
+
+
 def test_a_node_with_other_versions_is_named() -> None:
     assert ray_node.misfit(ray_node.versions()) == ""
     assert ray_node.misfit({"numpy": "0.1"}).endswith("instead of 0.1")
