@@ -1,12 +1,12 @@
 """How full the batches of a model get: our server and vla-eval's, side by side.
 
-    python benchmarks/batching.py [--requests 40] [--rounds 3] [--json]
+    python benchmarks/batching.py [--requests 120] [--rounds 2] [--json]
 
 The model takes 50 ms for up to eight observations. Eight clients, each a process of its own, send a
 full observation (691 KB), wait for the answer, pause 5 to 15 ms as a simulator would between
 two queries at its fastest, and ask again. Nothing is tuned on either side: our server has no knob,
 vla-eval's keeps its default wait of 10 ms. Sides take turns; the first batches of a round, while
-clients arrive one by one, count as well.
+clients arrive one by one, and the last, when some have finished, count as well.
 """
 
 from __future__ import annotations
@@ -93,8 +93,8 @@ def measure(requests: int, rounds: int) -> Result:
 def main() -> None:
     """Measure and print."""
     parser = argument_parser(__doc__)
-    parser.add_argument("--requests", type=int, default=40)
-    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--requests", type=int, default=120)
+    parser.add_argument("--rounds", type=int, default=2)
     options = parser.parse_args()
     finish(measure(options.requests, options.rounds), options)
 
