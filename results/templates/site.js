@@ -61,7 +61,8 @@ function columnsOf() {
     ...LEVELS.map((n) => at("L" + n, "sr", "overall", n, "success rate, overall"))];
 }
 const ABOUT = [["badge", (m) => data.badges[m.badge], (m) => -Object.keys(data.badges).indexOf(m.badge)], ["embodiment", (m) => m.embodiment],
-  ["scenes", (m) => m.mode], ["training", (m) => data.training[m.training]], ["size", (m) => m.parameters, (m) => m.count]];
+  ["scenes", (m) => m.mode], ["training", (m) => data.training[m.training]], ["size", (m) => m.parameters, (m) => m.count]]
+  .filter(([name, text]) => !["embodiment", "scenes"].includes(name) || new Set(data.models.map(text)).size > 1);
 
 // The table.
 const head = document.querySelector("#board thead tr");
@@ -233,13 +234,15 @@ function compare() {
     const values = sides.map((m) => value(m, { metric, row: r, level }));
     const both = values.every(Boolean);
     const d = both ? pairing.at(metric, r, level) || difference(...values) : null;
-    const line = make("tr", { className: ["task", pair.elements.tasks.checked ? "" : "category"].includes(data.rows[r].kind) ? "" : "part" }, make("th", { scope: "row", className: "name" }, rowName(r)));
+    const line = make("tr", { className: ["task", pair.elements.tasks.checked ? "" : "category"].includes(data.rows[r].kind) ? "" : "part" },
+      data.rows[r].kind === "category" ? make("th", { scope: "row", className: "name", title: rowName(r) }, r, make("small", {}, rowName(r).slice(r.length)))
+        : make("th", { scope: "row", className: "name" }, rowName(r)));
     values.forEach((v, n) => {
       const won = d && d.length > 3 ? d[5] < 0.05 && (n ? d[0] < 0 : d[0] > 0) : both && isBetter(v, values[1 - n], rows.length);
       line.append(make("td", { className: "num" + (won ? " best" : "") }, v ? percent(v[0]) : "–", v ? make("small", {}, interval(v)) : ""));
     });
     line.append(make("td", { className: "num" }, d ? (d[0] > 0 ? "+" : "") + percent(d[0]) : "–", d ? make("small", {}, interval(d)) : ""));
-    if (pairing.how === "paired") line.append(make("td", { className: "num" }, d?.length > 3 ? `${d[3]} : ${d[4]}` : "–", d?.length > 3 ? make("small", {}, `q = ${d[5]}`) : ""));
+    if (pairing.how === "paired") line.append(make("td", { className: "num" }, d?.length > 3 ? `${d[3]} : ${d[4]}` : "–", d?.length > 3 ? make("small", {}, d[5] < 1e-4 ? "q < 0.0001" : `q = ${d[5]}`) : ""));
     return line;
   }));
 }

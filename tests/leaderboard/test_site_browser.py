@@ -171,7 +171,7 @@ def test_two_models_side_by_side(page: Page) -> None:
 
 HOW = "document.getElementById('how').textContent"
 FIRST = (
-    "[...[...document.querySelectorAll('#sides tbody tr')]."
+    "[...[...document.querySelectorAll('#sides tbody tr')]"
     ".find(r => r.innerText.startsWith('Pick Blocks S'))"
     ".cells].slice(1).map(c => c.innerText.split('\\n'))"
 )
