@@ -19,6 +19,7 @@ from robospa.results.figures.series import FORMATS, Drawing, Series
 from robospa.results.lint import lint_run, lint_runs
 from robospa.results.metrics import METRIC_NAMES, Scores, score_run
 from robospa.results.reading import Run, finished
+from robospa.results.records import TrialRecord
 from robospa.results.report_facts import about, ends, facts, names_of
 from robospa.results.report_page import FIGURES, page
 from robospa.results.report_tables import Shown, for_page, report_tables, write_files
@@ -118,9 +119,13 @@ def draw_figures(
     """The figures of `columns`, of which the first belong to `runs`."""
     series = []
     for number, column in enumerate(columns):
-        known = runs[number].records.values() if number < len(runs) else ()
-        records = tuple(r for r in known if finished(r))
-        series.append(Series(column.title, column.scores, records, bool(column.published)))
+        name = column.title
+        records: tuple[TrialRecord, ...] = ()
+        if number < len(runs):
+            run = runs[number]
+            records = tuple(r for r in run.records.values() if finished(r))
+            name += f" ({len(run.missing)} of {len(run.keys)} missing)" * bool(run.missing)
+        series.append(Series(name, column.scores, records, bool(column.published)))
     return draw(series, folder, formats) if series else []
 
 

@@ -106,6 +106,8 @@ def test_every_table_of_a_report_names_what_is_missing(report: Path) -> None:
     page = (report / "report.html").read_text()
     assert "2 trials missing, so between 62.5 and 87.5" in page
     assert "4 of 16 trials are missing" in page
+    drawn = [path.read_text() for path in (report / "figures").glob("*.svg")]
+    assert any("(4 of 16 missing)" in text for text in drawn)
     data = json.loads((report / "report.json").read_text())["runs"][0]
     assert data["ends"] == {"success": 8, "step limit": 4, "missing": 2, "not run": 2}
 
