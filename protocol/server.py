@@ -217,7 +217,7 @@ def _authorized(token: str | None, request: Request) -> bool:
         return True
     headers = request.headers.get_all("Authorization")
     kind, _, given = (headers[0] if len(headers) == 1 else "").partition(" ")
-    same = hmac.compare_digest(given.strip().encode(), token.encode())
+    same = hmac.compare_digest(given.strip().encode(errors="surrogateescape"), token.encode())
     return same and kind.lower() in ("bearer", "api-key")
 
 
