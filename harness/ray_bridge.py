@@ -38,6 +38,8 @@ HEAR_SECONDS = 5.0
 """A worker with nothing of weight to say is heard this often."""
 NODES_SECONDS = 600.0
 """How long a run waits for a node if it has lost them all."""
+BUSY_SECONDS = 60.0
+"""A worker that Ray gives no CPUs for so long is worth a line."""
 BAD_STARTS = 3
 """After so many failed starts on it a node is left out."""
 
@@ -60,6 +62,9 @@ class _Place:
     name: str
     node: str
     actor: Any
+    since: float
+    begun: bool = False
+    """Whether Ray has started it."""
     heard: bool = False
     """Whether its worker has been ready."""
 
@@ -85,6 +90,8 @@ class Bridge:
         self._unfit: dict[str, str] = {}
         self._room = -1
         self._bare_since: float | None = None
+        self._busy = False
+        self._looked = 0.0
 
     def run(self) -> None:
         """Until the driver says stop."""
@@ -93,21 +100,24 @@ class Bridge:
             self._pipe.send(("trouble", self._too_small()))
             return
         self._pipe.send(("connected", sorted(set(self._nodes.values()))))
-        looked = time.monotonic()
-        while True:
-            wait([self._pipe, self._ear], timeout=LOOK_SECONDS)
-            while self._pipe.poll():
-                message = self._pipe.recv()
-                if message[0] == "stop":
-                    return
-                self._obey(message)
-            while self._ear.poll():
-                self._ear.recv_bytes()
-                self._answered(*self._answers.get())
-            if time.monotonic() - looked >= LOOK_SECONDS:
-                self._look()
-                looked = time.monotonic()
-            self._settle_in()
+        while self.step(LOOK_SECONDS):
+            pass
+
+    def step(self, seconds: float) -> bool:
+        """Do what has come up, or comes up within `seconds`; False once the driver says stop."""
+        wait([self._pipe, self._ear], timeout=seconds)
+        while self._pipe.poll():
+            message = self._pipe.recv()
+            if message[0] == "stop":
+                return False
+            self._obey(message)
+        while self._ear.poll():
+            self._ear.recv_bytes()
+            self._answered(*self._answers.get())
+        if time.monotonic() - self._looked >= LOOK_SECONDS:
+            self._look()
+        self._settle_in()
+        return True
 
     def close(self) -> None:
         """End all actors that are left."""
@@ -118,6 +128,7 @@ class Bridge:
 
     def _look(self) -> None:
         """Count the nodes and what fits on them."""
+        self._looked = time.monotonic()
         alive = [node for node in self._ray.nodes() if node["Alive"]]
         self._nodes = {node["NodeID"]: node["NodeManagerAddress"] for node in alive}
         self._slots = {
@@ -131,6 +142,7 @@ class Bridge:
             self._room = room
             self._pipe.send(("room", room))
         self._endure()
+        self._mind_others()
 
     def _fits(self, resources: Mapping[str, float]) -> int:
         """How many workers a node with `resources` holds."""
@@ -154,6 +166,15 @@ class Bridge:
         elif now - self._bare_since > NODES_SECONDS:
             text = f"for {NODES_SECONDS:g} s no node of the Ray cluster has had room for a worker"
             self._pipe.send(("trouble", text))
+
+    def _mind_others(self) -> None:
+        """Say once if other users of the cluster have the CPUs."""
+        late = time.monotonic() - BUSY_SECONDS
+        stuck = [p for p in self._places.values() if not p.begun and p.since < late]
+        if stuck and not self._busy:
+            text = f"{len(stuck)} workers wait for CPUs that other jobs of the Ray cluster use"
+            self._pipe.send(("news", text))
+        self._busy = bool(stuck)
 
     def _too_small(self) -> str:
         asked = f"{self._wish.cpus:g} CPUs"
@@ -206,7 +227,7 @@ class Bridge:
             max_concurrency=4,
             scheduling_strategy=there,
         ).remote()
-        place = self._places[name] = _Place(name, node, actor)
+        place = self._places[name] = _Place(name, node, actor, time.monotonic())
         self._await(place, "begun", actor.begin.remote(self._wanted, pack(self._config, name)))
 
     def _await(self, place: _Place, what: str, reference: Any) -> None:
@@ -227,6 +248,7 @@ class Bridge:
             self._heard(place, pickle.loads(answer))
 
     def _begun(self, place: _Place, how: str, text: str) -> None:
+        place.begun = True
         if how == "placed":
             self._pipe.send(("placed", place.name))
             self._await(place, "heard", place.actor.hear.remote(HEAR_SECONDS))
