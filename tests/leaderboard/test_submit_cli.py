@@ -99,6 +99,31 @@ def test_hidden_seeds_run_against_a_server(packed: Path) -> None:
     assert evidence["commitment"] == block.commitment
 
 
+class Worse(Weak):
+    """The same spec, without a single success."""
+
+    def infer(self, observation):  # type: ignore[no-untyped-def]
+        return 0 * super().infer(observation)
+
+
+def test_inflated_numbers_are_not_reproduced(packed: Path, tmp_path: Path) -> None:
+    """6 of 8 claimed, 0 of 16 afresh: p = 2 (4/220)^2, C(4, 3) of C(12, 3) for each level."""
+    bundle = tmp_path / "b.zip"
+    more = ["--practice", "--no-videos", *FAKES]
+    submit("pack", packed / "run", "--model", packed / "model.toml", "-o", bundle, *more)
+    hidden = tuple(FIRST + n for n in range(8))
+    block = Block({(PICK, 1): hidden, (PICK, 2): hidden}, "ab" * 32)
+    write_block(block, tmp_path / "block.json")
+    told = ["--block", tmp_path / "block.json", "--commitment", block.commitment]
+    with ServerThread(policy_factory=Worse) as server:
+        words = [bundle, server.url, *told, "--out", tmp_path / "fresh", "--practice", *FAKES]
+        done = submit("reproduce", *words, "--evidence", tmp_path / "hidden.json")
+    assert done.returncode == 1
+    assert "NOT REPRODUCED: 0 of 16 fresh trials succeeded" in done.stdout
+    evidence = json.loads((tmp_path / "hidden.json").read_text())["reproduced"]
+    assert evidence["overall"]["p"] == pytest.approx(2 * (4 / 220) ** 2)
+
+
 def test_another_server_than_the_bundles_is_refused(packed: Path, tmp_path: Path) -> None:
     from run_fakes import FakePolicy, other
 
