@@ -236,7 +236,8 @@ def wait_gone(pids: list[int]) -> None:
     for pid in pids:
         while command_of(pid):
             if time.monotonic() > until:
-                raise Finding(f"process {pid} outlives its driver: {command_of(pid)[:200]}")
+                kill(pid, signal.SIGKILL)
+                raise Finding(f"process {pid} outlives its driver")
             time.sleep(0.02)
 
 
