@@ -65,6 +65,7 @@ class _Seat:
     at: str = ""
     """The policy that it is connected to."""
     begun: float = 0.0
+    trials: int = 0
     ready: bool = False
     watch: Watch | None = None
 
@@ -191,14 +192,21 @@ class Runner:
         job, seat.job = seat.job, None
         if job is not None:
             now = time.monotonic()
-            self._scheduler.done(job, record, now, now - seat.begun)
+            # A worker's first trial waits until its world and connection are there.
+            seconds = now - seat.begun if seat.trials else record.wall_time
+            seat.trials += 1
+            self._scheduler.done(job, record, now, seconds)
         self.shares.add(record)
         self._staffing.heard(record)
         self._settle(record)
-        asked = [s for s in self._scheduler.servers.values() if s.running and is_url(s.target)]
-        if self.executor is None and (
-            more := self._staffing.review(all(s.saturated for s in asked))
-        ):
+        if self.executor is None and self._queue.unsettled > 2 * self._staffing.wanted:
+            self._grow(seat.at)
+
+    def _grow(self, at: str) -> None:
+        """More workers if those that are there wait for servers that have room, as at `at`."""
+        servers = self._scheduler.servers.values()
+        asked = [s for s in servers if is_url(s.target) and (s.running or s.target == at)]
+        if more := self._staffing.review(all(s.saturated for s in asked)):
             self.on_note(f"workers wait while cores idle: {more} more, {self._staffing.wanted} now")
 
     def _settle(self, record: TrialRecord) -> None:

@@ -19,9 +19,12 @@ from numpy.typing import NDArray
 from run_fakes import SPEC, FakePolicy
 
 from robospa.harness.cli.main import main
+from robospa.harness.runner import Runner, RunOptions
+from robospa.harness.worker import WorkerConfig
 from robospa.protocol.policy import TrialInfo
 from robospa.protocol.server import ServerThread
-from robospa.results.reading import read_file, read_run
+from robospa.results.reading import read_file, read_records, read_run
+from robospa.results.records import TrialKey
 
 HERE = str(Path(__file__).parent)
 TASKS = ("Pick_Blocks_Size", "Pick_Blocks_Height", "Pick_Cans_Relational")
@@ -168,3 +171,17 @@ def test_lists_of_servers_that_cannot_be(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], more: list[str], sentence: str
 ) -> None:
     assert sentence in refused(words(tmp_path / "run", *more), capsys)
+
+
+def test_workers_come_while_others_wait_and_the_server_has_room(tmp_path: Path) -> None:
+    notes: list[str] = []
+    keys = [TrialKey("Pick_Fake", 1, 100000 + n) for n in range(30)]
+    with Site(delay=0.05) as site:
+        config = WorkerConfig(
+            tmp_path, site.url, world="run_fakes:FakeWorld", parts="run_fakes:parts"
+        )
+        runner = Runner(config, keys, RunOptions(workers=1, most=2), on_note=notes.append)
+        runner.run()
+    assert notes == ["workers wait while cores idle: 1 more, 2 now"]
+    assert sorted(read_records(tmp_path)) == keys
+    assert runner.shares.overall()["waiting"] > 0.5
