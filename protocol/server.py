@@ -186,6 +186,8 @@ class PolicyServer:
             pass
         except TimeoutError:
             log.warning("closing a connection that was silent for %g s", self._options.idle)
+        except Exception:
+            log.exception("the session with %s failed", connection.client)
         finally:
             talk.cancel()
             gone.cancel()

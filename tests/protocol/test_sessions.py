@@ -233,3 +233,16 @@ def test_a_batch_policy_is_told_which_session_resets_and_ends(start: Any) -> Non
     assert policy.gone.wait(10)
     assert [name for name, _ in policy.log] == ["reset", "end"]
     assert len({session for _, session in policy.log}) == 1
+
+
+def test_a_session_that_fails_is_in_the_log(
+    start: Any, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def broken(session: Any) -> None:
+        raise ZeroDivisionError("a mistake of ours")
+
+    monkeypatch.setattr("robospa.protocol.session.Session.run", broken)
+    server = start(policy_factory=Recall)
+    with pytest.raises(ConnectionLost):
+        connect(server.url, timeouts=QUICK)
+    assert "the session with 127.0.0.1" in caplog.text and "a mistake of ours" in caplog.text
