@@ -100,13 +100,15 @@ class Server:
     def saturated(self) -> bool:
         """Whether more workers would only wait longer.
 
-        A request that waits longer than a whole call of the model takes finds others before it. A
-        server that tells no times is taken for full when it answers slower than it once did.
+        A request that waits longer than a whole call of the model takes finds others before it; so
+        does one that waits for half a call where calls are full. A server that tells no times is
+        taken for full when it answers slower than it once did.
         """
         if not self.means:
             return False
         if "queue" in self.means and "infer" in self.means:
-            return self.means["queue"] > self.means["infer"]
+            full = self.batch > 1 and self.means.get("batch", 0.0) > 0.9 * self.batch
+            return self.means["queue"] > self.means["infer"] * (0.5 if full else 1.0)
         return self.means["p50"] > 1.5 * self.fastest
 
 

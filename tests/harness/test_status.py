@@ -65,6 +65,15 @@ def test_idle_cores_and_idle_servers_have_room_for_more_workers() -> None:
     assert "room for more workers" in mixed.verdict
 
 
+def test_a_server_with_full_batches_is_full_before_its_queue_is_long() -> None:
+    told = server(queue=70.0, infer=116.0, batch=7.9)
+    assert not told.saturated
+    told.batch = 8
+    assert told.saturated
+    told.means["queue"] = 10.0  # full, but idle between its calls
+    assert not told.saturated
+
+
 def test_a_server_that_tells_nothing_is_full_when_it_answers_slower_than_it_could() -> None:
     slow = server(p50=400.0)
     slow.fastest = 100.0
