@@ -51,4 +51,4 @@ lock: ## Renew both lock files from pyproject.toml (LOCK=--upgrade for newer ver
 		-o requirements-dev.lock
 
 clean: ## Forget the environment, caches and build output; runs/ stays
-	rm -rf .venv .venv-models build .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	rm -rf .venv .venv-models .venv-peers build .mypy_cache .ruff_cache .pytest_cache .hypothesis

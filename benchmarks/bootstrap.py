@@ -1,18 +1,16 @@
 """Time of the statistics: the paper's bootstrap for four models, marks of its tables, intervals.
 
-    python benchmarks/bootstrap.py [--repeat 5]
+    python benchmarks/bootstrap.py [--repeat 5] [--json]
 
 The bootstrap is measured against resampling every episode, for the same cells and resamples.
 """
 
 from __future__ import annotations
 
-import argparse
-import platform
 import time
 from collections.abc import Callable
 
-import numpy as np
+from common import Result, Row, argument_parser, finish
 
 from robospa.results import bootstrap, significance
 from robospa.results.bootstrap import RESAMPLES, Sample, draw, rate, resample_episodes
@@ -35,10 +33,11 @@ def seconds(work: Callable[[], object], repeat: int) -> tuple[float, float]:
 
 
 def main() -> None:
-    """Print one line a measurement."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    """Measure and print."""
+    parser = argument_parser(__doc__)
     parser.add_argument("--repeat", type=int, default=5)
-    repeat = parser.parse_args().repeat
+    options = parser.parse_args()
+    repeat = options.repeat
     data = load()
     models: dict[str, list[Sample]] = {
         model: [
@@ -51,8 +50,7 @@ def main() -> None:
     count = len(next(iter(models.values())))
     share = [1 / count] * count
     table = [list(row) for row in zip(*models.values(), strict=True)]
-    print(f"{platform.machine()}, Python {platform.python_version()}, numpy {np.__version__}")
-    size = f"{len(models)} models x {count} variants"
+    size = f"{len(models)} models x {count} variants x {RESAMPLES:,}"
 
     def fast() -> None:
         for samples in models.values():
@@ -63,16 +61,21 @@ def main() -> None:
             resample_episodes(samples, share, resamples=RESAMPLES // 100)
 
     first, best = seconds(fast, repeat)
-    print(f"bootstrap, {size} x {RESAMPLES}: first {first:.3f} s, then {best:.3f} s")
     part = seconds(slow, 1)[1]
-    print(f"the same by episodes: {100 * part:.0f} s (measured on {RESAMPLES // 100} resamples)")
+    rows = [
+        Row(f"the paper's bootstrap: {size}", round(best, 3), "s", at_most=0.5,
+            note=f"the first time {first:.3f} s"),
+        Row("the same episode by episode", round(100 * part, 1), "s",
+            note=f"from {RESAMPLES // 100} resamples"),
+    ]  # fmt: skip
     for method in METHODS:
         first, best = seconds(lambda m=method: [interval_of([s], method=m) for s in table[0]], 1)
-        print(
-            f"{method}, {len(models)} cells: first {1e3 * first:.2f} ms, then {1e3 * best:.2f} ms"
-        )
+        note = f"the first time {1e3 * first:.2f} ms"
+        rows.append(Row(f"{method}, {len(models)} cells", round(1e3 * best, 2), "ms", note=note))
     first, best = seconds(lambda: significance.separable(table), repeat)
-    print(f"marks of the best in {count} rows: first {first:.3f} s, then {best:.3f} s")
+    note = f"the first time {first:.3f} s"
+    rows.append(Row(f"marks of the best in {count} rows", round(best, 4), "s", note=note))
+    finish(Result("bootstrap", "Statistics", tuple(rows)), options)
 
 
 if __name__ == "__main__":

@@ -1,24 +1,21 @@
 """How well failure types are told: scripted mistakes in the simulator, labelled from their records.
 
-    python benchmarks/failure_labels.py [--seeds 3] [--tasks NAME,...] [--out FILE.json]
+    python benchmarks/failure_labels.py [--seeds 3] [--tasks NAME,...] [--json]
 
 Every kind of mistake (`robospa.baselines.mistakes`) runs on every task that gives occasion for it.
 A trial counts only if the script came off: the trial failed, and the expert that acts it out had
 no trouble of its own. Nothing is drawn. Trials end some actions after the script is over instead of
-at the task's limit, which changes no label and saves the time of standing still. Prints JSON and a
-table.
+at the task's limit, which changes no label and saves the time of standing still.
 """
 
 from __future__ import annotations
 
-import argparse
-import json
-import platform
 import time
 from collections import Counter
 from dataclasses import dataclass, field, replace
-from pathlib import Path
-from typing import Any
+
+from common import Result, argument_parser, finish
+from common import Row as Figure
 
 from robospa.baselines.mistakes import create
 from robospa.harness.sapien_world import SapienWorld
@@ -136,10 +133,9 @@ def table(found: list[Row]) -> str:
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argument_parser(__doc__)
     parser.add_argument("--seeds", type=int, default=3, help="seeds a mistake, task and level")
     parser.add_argument("--tasks", default=",".join(tasks()))
-    parser.add_argument("--out", type=Path)
     options = parser.parse_args()
     began = time.perf_counter()
     found = rows(options.tasks.split(","), options.seeds)
@@ -149,34 +145,27 @@ def main() -> None:
         cell = by_label.setdefault(row.expected, {"right": 0, "of": 0})
         cell["right"] += row.right
         cell["of"] += row.counted
-    result: dict[str, Any] = {
-        "benchmark": "failure_labels",
-        "accuracy": round(right / counted, 4),
-        "right": right,
-        "of": counted,
-        "not_acted_out": sum(r.not_acted for r in found),
-        "bar": 0.95,
-        "by_label": by_label,
-        "rows": [
-            {
-                "task": r.task,
-                "mistake": r.kind,
-                "expected": r.expected,
-                "found": dict(r.found),
-                "not_acted_out": r.not_acted,
-            }
-            for r in found
-        ],
-        "wrong": [f"{r.task} {r.kind} {text}" for r in found for text in r.wrong],
-        "seconds": round(time.perf_counter() - began, 1),
-        "python": platform.python_version(),
-    }
-    text = json.dumps(result, indent=1)
-    print(text)
     print(table(found))
-    if options.out:
-        options.out.write_text(text + "\n")
-        options.out.with_suffix(".md").write_text(table(found) + "\n")
+    idle = sum(r.not_acted for r in found)
+    figures = [
+        Figure("labelled as scripted", round(100 * right / counted, 2), "%", at_least=95,
+            note=f"{right} of {counted}; {idle} scripts did not come off")
+    ]  # fmt: skip
+    figures += [
+        Figure(NAMES[kind], round(100 * cell["right"] / max(1, cell["of"]), 1), "%",
+            note=f"{cell['right']} of {cell['of']}")
+        for kind, cell in by_label.items()
+    ]  # fmt: skip
+    wrong = [f"{r.task} {r.kind} {text}" for r in found for text in r.wrong]
+    result = Result(
+        "failure_labels",
+        "Failure types of scripted mistakes",
+        tuple(figures),
+        text="Every kind of mistake on every task that gives occasion for it.",
+        circumstances=f"{time.perf_counter() - began:.0f} s",
+        data={"wrong": wrong},
+    )
+    finish(result, options)
 
 
 if __name__ == "__main__":

@@ -1,26 +1,24 @@
 """Parallel efficiency: `robospa eval` with 1, 2, ... workers against one server of a still policy.
 
-    python benchmarks/parallel.py [--workers 1,2] [--trials 12] [--out FILE]
+    python benchmarks/parallel.py [--workers 1,2] [--trials 12] [--json]
 
 Nothing is drawn and the policy costs nothing, so the simulator is the bottleneck. For every number
 of workers the run is done with `--trials` and with three times as many trials: the difference is
 free of the time that processes take to start. Efficiency is the rate per worker beside that of one
 worker; where the cores share caches or clock, `alone` (as many independent runs of one worker at
-once) says how much of the loss is the machine's. Prints JSON.
+once) says how much of the loss is the machine's.
 """
 
 from __future__ import annotations
 
-import argparse
-import json
-import os
-import platform
 import re
 import subprocess
 import sys
 import tempfile
 import time
 from pathlib import Path
+
+from common import Result, Row, argument_parser, finish
 
 COMMAND = [sys.executable, "-c", "from robospa.harness.cli.main import main; main()"]
 FIRST_SEED = 100_000
@@ -57,10 +55,9 @@ def rate(url: str, scratch: Path, trials: int, workers: int, runs: int = 1) -> f
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argument_parser(__doc__)
     parser.add_argument("--workers", default="1,2")
     parser.add_argument("--trials", type=int, default=12)
-    parser.add_argument("--out", type=Path)
     options = parser.parse_args()
     counts = [int(w) for w in options.workers.split(",")]
     server = subprocess.Popen(
@@ -83,19 +80,20 @@ def main() -> None:
         server.terminate()
         server.wait(10)
     one = rates[min(counts)] / min(counts)
-    result = {
-        "benchmark": "parallel",
-        "trials_per_second": {str(n): round(r, 3) for n, r in rates.items()},
-        "efficiency": {str(n): round(r / n / one, 3) for n, r in rates.items()},
-        "alone_trials_per_second": round(alone, 3),
-        "over_alone": round(rates[most] / alone, 3),
-        "bar": 0.9,
-        "machine": {"cores": os.cpu_count(), "python": platform.python_version()},
-    }
-    text = json.dumps(result, indent=2)
-    print(text)
-    if options.out:
-        options.out.write_text(text + "\n")
+    rows = [
+        Row(f"{n} workers, of {n} times one worker", round(rates[n] / n / one, 3), at_least=0.9)
+        for n in counts
+        if n > min(counts)
+    ]
+    rows.append(
+        Row(f"{most} workers beside {most} independent runs at once", round(rates[most] / alone, 3))
+    )
+    rows += [Row(f"{n} workers", round(rates[n], 2), "trials/s") for n in counts]
+    text = (
+        "The driver and the server share the cores with the workers; runs that know nothing of "
+        "each other say what the cores themselves give."
+    )
+    finish(Result("parallel", "Parallel efficiency", tuple(rows), text=text), options)
 
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@ import subprocess
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1] / ".venv-peers"
@@ -35,6 +36,7 @@ class Peer:
     trouble: str = ""
 
 
+@cache
 def environment(name: str) -> Peer:
     """The peer's environment, made if it is missing."""
     folder = ROOT / name.replace(" ", "_").replace("'", "")
