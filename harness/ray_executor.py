@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import importlib.util
 import multiprocessing
+import os
 import socket
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from multiprocessing.connection import wait
-from pathlib import PurePosixPath
+from pathlib import Path, PurePosixPath
 from urllib.parse import urlsplit
 
 from robospa.harness.executor import Hand, Message, RunAborted
@@ -29,6 +30,10 @@ from robospa.results.records import TrialRecord
 CONNECT_SECONDS = 60.0
 KNOCK_SECONDS = 5.0
 CLOSE_SECONDS = 15.0
+NONE_HERE = (
+    "no Ray cluster runs on this machine; `ray start --head` starts one, "
+    "--address local makes one for this run only"
+)
 
 
 class NoCluster(Exception):
@@ -258,28 +263,49 @@ def check_address(address: str) -> None:
     """Raises NoCluster if Ray is not installed or nothing listens at `address`."""
     if importlib.util.find_spec("ray") is None:
         raise NoCluster("Ray is not installed; `pip install 'robospa[ray]'` adds it")
-    if address in ("auto", "local"):
+    if address == "local":
+        return
+    if address == "auto":
+        last = _last_cluster()
+        if last and (why := _deaf_at(last)):
+            raise NoCluster(f"{NONE_HERE} (the last one was at {last}: {why})")
         return
     host, _, port = address.removeprefix("ray://").rpartition(":")
     if not host or not port.isdigit():
         raise NoCluster(
             f"--address {address!r} is none of auto, local, HOST:PORT and ray://HOST:PORT"
         )
+    if why := _deaf_at(address):
+        raise NoCluster(
+            f"no Ray cluster answers at {address} ({why}); `ray start --head` starts one"
+        )
+
+
+def _last_cluster() -> str:
+    """Where `auto` looks: Ray writes it down here and waits for minutes if that is outdated."""
+    written = Path(os.environ.get("RAY_TMPDIR", "/tmp")) / "ray" / "ray_current_cluster"
+    try:
+        return os.environ.get("RAY_ADDRESS") or written.read_text().strip()
+    except OSError:
+        return ""
+
+
+def _deaf_at(address: str) -> str:
+    """Why nobody can be reached at `address`; empty if somebody listens, or it is none."""
+    host, _, port = address.removeprefix("ray://").rpartition(":")
+    if not host or not port.isdigit():
+        return ""
     try:
         socket.create_connection((host, int(port)), timeout=KNOCK_SECONDS).close()
     except (OSError, OverflowError) as error:
-        raise NoCluster(
-            f"no Ray cluster answers at {address} ({error}); `ray start --head` starts one"
-        ) from error
+        return str(error)
+    return ""
 
 
 def _explained(text: str) -> str:
     """What Ray says, with what helps."""
     if "Could not find any running Ray instance" in text:
-        return (
-            "no Ray cluster runs on this machine; `ray start --head` starts one, "
-            "--address local makes one for this run only"
-        )
+        return NONE_HERE
     if any(hint in text for hint in ("uthenticat", "Failed to connect", "connection timeout")):
         text += "; if the cluster asks for a token, set RAY_AUTH_MODE=token here"
     return text

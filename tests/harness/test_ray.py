@@ -70,6 +70,17 @@ def test_an_address_without_a_cluster_is_told_at_once(address: str, text: str) -
         check_address(address)
 
 
+def test_a_cluster_that_is_no_more_is_told_at_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "ray").mkdir()
+    (tmp_path / "ray" / "ray_current_cluster").write_text("127.0.0.1:1")
+    monkeypatch.delenv("RAY_ADDRESS", raising=False)
+    monkeypatch.setenv("RAY_TMPDIR", str(tmp_path))
+    with pytest.raises(NoCluster, match=r"no Ray cluster runs .* last one was at 127.0.0.1:1"):
+        check_address("auto")
+
+
 def test_a_worker_that_fits_on_no_node_is_refused(
     tmp_path: Path, home: tuple[Any, Any, Path]
 ) -> None:
