@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from sapien import physx
 
 from robospa.harness.robots.embodiment import Arm, Embodiment, Joint
-from robospa.tasks.geometry import Pose, Quat, axis_rotation, look_rotation, multiply
+from robospa.tasks.geometry import Pose, Quat, Vec3, axis_rotation, look_rotation, multiply
 from robospa.tasks.shapes import Box, Cylinder, Geometry, ObjectModel, Shape, Sphere
 
 Array = NDArray[np.float64]
@@ -179,6 +179,11 @@ def _link_inertia(arm: Arm, link: str, mass: float) -> tuple[Any, Array]:
     that what a robot looks like does not change how it moves.
     """
     carried = [j.origin.position for j in (*arm.joints, *arm.fingers) if j.parent == link]
+    return _block_around(tuple(carried), mass)
+
+
+@lru_cache(maxsize=256)
+def _block_around(carried: tuple[Vec3, ...], mass: float) -> tuple[Any, Array]:
     points = np.array([(0.0, 0.0, 0.0), *carried])
     low, high = points.min(axis=0) - LINK_MARGIN, points.max(axis=0) + LINK_MARGIN
     x, y, z = high - low
@@ -186,6 +191,7 @@ def _link_inertia(arm: Arm, link: str, mass: float) -> tuple[Any, Array]:
     return sapien.Pose((low + high) / 2), inertia
 
 
+@lru_cache(maxsize=256)
 def _joint_frames(joint: Joint) -> tuple[Any, Any]:
     """Poses of the joint in parent and child; SAPIEN's joints move about or along their x axis."""
     axis = np.asarray(joint.axis, dtype=float)

@@ -70,7 +70,10 @@ def profile(change: float) -> tuple[Array, Array]:
     if count == 0:
         return np.empty(0), np.empty(0)
     total = duration(change)
-    time = np.linspace(0.0, total, count) if count > 1 else np.array([total])
+    time = np.arange(float(count))
+    if count > 1:
+        time *= total / (count - 1)  # as numpy.linspace does, without its checks
+    time[-1] = total
     peak = min(MAX_VELOCITY, math.sqrt(change * MAX_ACCELERATION))
     ramp = peak / MAX_ACCELERATION
     left = total - time
@@ -91,19 +94,16 @@ def profile(change: float) -> tuple[Array, Array]:
 def limit_opening(commanded: Array, drive: float) -> Array:
     """Gripper drive targets (n,) that follow `commanded` (n,) from `drive`, opening no faster
     than OPENING_LEAD per step. Closing is not limited."""
-    if len(commanded) == 0 or np.diff(commanded, prepend=drive).max() <= OPENING_LEAD + 1e-12:
+    if len(commanded) == 0 or (
+        commanded[0] - drive <= OPENING_LEAD + 1e-12
+        and (commanded[1:] - commanded[:-1]).max(initial=0.0) <= OPENING_LEAD + 1e-12
+    ):
         return commanded
     out = np.empty_like(commanded)
     for i, value in enumerate(commanded):
         drive = min(float(value), drive + OPENING_LEAD)
         out[i] = drive
     return out
-
-
-def _padded(values: Array, count: int) -> Array:
-    """`values` (n, ...) with the last row repeated up to `count` rows."""
-    missing = count - len(values)
-    return values if missing <= 0 else np.concatenate([values, np.repeat(values[-1:], missing, 0)])
 
 
 def _arm_steps(change: float, gripper_change: float) -> int:
@@ -121,25 +121,30 @@ def rest_to_rest(
     move waits for the other (its gripper, if it moves, takes HOLD_STEPS); if nothing moves, both
     hold for HOLD_STEPS.
     """
-    change = np.abs(goal - start).max(axis=1)
-    steps = [_arm_steps(change[a], gripper_goal[a] - gripper[a]) for a in range(2)]
+    turn = goal - start
+    change = np.abs(turn).max(axis=1).tolist()
+    pull = (gripper_goal - gripper).tolist()
+    steps = [_arm_steps(change[a], pull[a]) for a in range(2)]
     count = max(steps) or HOLD_STEPS
-    joints, velocities, commanded, drives = [], [], [], []
+    joints, velocities = np.empty((2, count, turn.shape[1])), np.empty((2, count, turn.shape[1]))
+    commanded, drives = np.empty((2, count)), np.empty((2, count))
     for a in range(2):
-        fraction, rate = profile(float(change[a]))
-        if len(fraction) == 0:  # at rest, or closer than one step: the target is taken at once
-            fraction, rate = np.ones(1), np.zeros(1)
-        line = start[a] + fraction[:, None] * (goal[a] - start[a])
-        line[-1] = goal[a]
+        fraction, rate = profile(change[a])
+        last = len(fraction) - 1
+        if last < 0:  # at rest, or closer than one step: the target is taken at once
+            last, fraction, rate = 0, np.ones(1), np.zeros(1)
+        joints[a, :last] = start[a] + fraction[:last, None] * turn[a]
+        joints[a, last:] = goal[a]
+        velocities[a, : last + 1] = rate[:, None] * turn[a]
+        velocities[a, last + 1 :] = velocities[a, last]
         n = steps[a] or count
-        grip = gripper[a] + np.arange(1, n + 1) / n * (gripper_goal[a] - gripper[a])
-        grip[-1] = gripper_goal[a]
-        grip = _padded(grip, count)
-        joints.append(_padded(line, count))
-        velocities.append(_padded(rate[:, None] * (goal[a] - start[a]), count))
-        commanded.append(grip)
-        drives.append(limit_opening(grip, float(drive[a])))
-    return Trajectory(np.stack(joints), np.stack(velocities), np.stack(drives), np.stack(commanded))
+        if pull[a]:
+            commanded[a, :n] = gripper[a] + np.arange(1, n + 1) / n * pull[a]
+        else:
+            commanded[a, :n] = gripper[a]
+        commanded[a, n - 1 :] = gripper_goal[a]
+        drives[a] = limit_opening(commanded[a], float(drive[a]))
+    return Trajectory(joints, velocities, drives, commanded)
 
 
 def fixed_rate(

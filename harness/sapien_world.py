@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -163,9 +162,7 @@ class SapienWorld:
             if self._later:
                 self._appear(physics)
             if self._steps % POLL_STEPS == 0 and poll(
-                self._snapshot(
-                    partial(self._measured_at, self._steps), partial(self._touching_at, self._steps)
-                )
+                self._snapshot(self._measured_at, self._touching_at)
             ):
                 drives.halt()
                 return done, True
@@ -178,14 +175,14 @@ class SapienWorld:
         self._loaded()
         measured = self._drives.measured()
         touching = self._touching_at(self._steps)
-        return self._snapshot(lambda: measured, lambda: touching)
+        return self._snapshot(lambda steps: measured, lambda steps: touching)
 
     def _snapshot(
-        self, measure: Callable[[], Pair], touching: Callable[[], tuple[Contact, ...]]
+        self, measure: Callable[[int], Pair], touching: Callable[[int], tuple[Contact, ...]]
     ) -> Snapshot:
         physics = self._loaded()
         return LiveSnapshot(
-            self._steps / RATE,
+            self._steps,
             physics.packed(),
             physics.rows,
             self._layout,

@@ -39,8 +39,9 @@ def settle(physics: Physics, where: str) -> None:
         for _ in range(WINDOW):
             physics.step()
         after = _state(physics, names)
-        restless = mover(names, before, after) or restless
-        quiet = 0 if mover(names, before, after) else quiet + 1
+        moved = mover(names, before, after)
+        restless = moved or restless
+        quiet = 0 if moved else quiet + 1
         before = after
         if quiet == QUIET_WINDOWS:
             break

@@ -91,8 +91,11 @@ class _Stopwatch:
         try:
             return work(*args)
         finally:
-            spent = time.perf_counter() - begun
-            self.seconds[purpose] = self.seconds.get(purpose, 0.0) + spent
+            self.add(purpose, begun)
+
+    def add(self, purpose: str, begun: float) -> None:
+        """The time since `begun` on the clock."""
+        self.seconds[purpose] = self.seconds.get(purpose, 0.0) + time.perf_counter() - begun
 
     def sum(self, *purposes: str) -> float:
         return sum(self.seconds.get(purpose, 0.0) for purpose in purposes)
@@ -122,10 +125,14 @@ class _Run:
     first_problem: str = ""
 
     def poll(self, snapshot: Snapshot) -> bool:
-        new = self.watch.call("goal", self._look, snapshot)
-        self.note(new)
+        begun = time.perf_counter()
+        new = self._look(snapshot)
+        self.watch.add("goal", begun)
         if self.recorder is not None:
             self.watch.call("recording", self.recorder.polled, self.world, snapshot.time)
+        if not new:
+            return False
+        self.note(new)
         return any(event.kind in ("success", "failed") for event in new)
 
     def _look(self, snapshot: Snapshot) -> tuple[Event, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -52,6 +52,15 @@ class Snapshot:
     def height(self, name: str) -> float:
         """Height [m] of the origin of the object called `name`."""
         return self.poses[name].position[2]
+
+    def heights(self, names: Iterable[str]) -> list[float | None]:
+        """Heights [m] of several objects; None for one that does not exist at this instant."""
+        poses = self.poses
+        return [poses[name].position[2] if name in poses else None for name in names]
+
+    def position(self, name: str) -> Vec3:
+        """Position [m] of the origin of the object called `name`."""
+        return self.poses[name].position
 
     def gripper_contacts(self, name: str) -> list[Contact]:
         """Contacts between any gripper and the object called `name`."""

@@ -71,22 +71,23 @@ class Collect:
     def start(self, snapshot: Snapshot) -> tuple[Event, ...]:
         """Nothing is collected yet."""
         self._handling.start(snapshot)
-        self._remember(snapshot)
+        self._time, self._last = snapshot.time, self._places(snapshot)
         return ()
 
     def update(self, snapshot: Snapshot) -> tuple[Event, ...]:
         """Changes of the flags, drops; success once every object is in."""
         events = self._handling.update(snapshot)
         elapsed = max(snapshot.time - self._time, 1e-6)
-        for i, name in enumerate(self._names):
-            here = snapshot.poses[name].position
+        held, places = self._flags.held, self._places(snapshot)
+        for i, (name, here) in enumerate(places.items()):
             inside = self._container.inside(here)
-            if inside and not self._flags.held[i]:
+            if inside and not held[i]:
                 inside = math.dist(here, self._last[name]) < SLOW * elapsed
             elif not inside and here[2] < self._lost_below and self._is_lost(name, here):
                 events += (Event(snapshot.time, "dropped", name, i, "out of reach"),)
-            events += self._flags.set(i, inside, snapshot.time, name)
-        self._remember(snapshot)
+            if inside != held[i]:
+                events += self._flags.set(i, inside, snapshot.time, name)
+        self._time, self._last = snapshot.time, places
         return (*events, Event(snapshot.time, "success")) if self._flags.all else events
 
     def _is_lost(self, name: str, here: Vec3) -> bool:
@@ -96,9 +97,8 @@ class Collect:
         self._lost.add(name)
         return True
 
-    def _remember(self, snapshot: Snapshot) -> None:
-        self._time = snapshot.time
-        self._last = {name: snapshot.poses[name].position for name in self._names}
+    def _places(self, snapshot: Snapshot) -> dict[str, Vec3]:
+        return {name: snapshot.position(name) for name in self._names}
 
     def diagnostics(self) -> dict[str, float]:
         """`idle_progress` (none), objects `lost` beside the container, and `drops`."""

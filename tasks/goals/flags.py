@@ -35,7 +35,8 @@ class Flags:
 
 def both_open(snapshot: Snapshot) -> bool:
     """Whether both grippers are commanded open."""
-    return snapshot.gripper[0] > GRIPPER_OPEN and snapshot.gripper[1] > GRIPPER_OPEN
+    left, right = snapshot.gripper
+    return left > GRIPPER_OPEN and right > GRIPPER_OPEN
 
 
 def grasp_centre(end_effector: Pose) -> Vec3:
@@ -56,8 +57,8 @@ def closed_near(snapshot: Snapshot, point: Vec3, radius: float) -> bool:
 
 def holding_arm(snapshot: Snapshot, point: Vec3, radius: float) -> int | None:
     """The arm (0 left, 1 right) whose gripper is not open and within `radius` [m] of `point`."""
-    for arm in (0, 1):
-        if snapshot.gripper[arm] <= GRIPPER_OPEN:
+    for arm, opening in enumerate(snapshot.gripper):
+        if opening <= GRIPPER_OPEN:
             x, y, z = grasp_centre(snapshot.end_effector[arm])
             dx, dy, dz = x - point[0], y - point[1], z - point[2]
             if dx * dx + dy * dy + dz * dz < radius * radius:

@@ -59,34 +59,34 @@ class Handling:
         self._may_fall = may_fall
         self._lifted: dict[str, _Hold] = {}
         self._rest: dict[str, float] = {}
-        self._last: dict[str, tuple[float, float]] = {}
+        self._heights: list[float | None] = [None] * len(self._names)
+        self._time = 0.0
         self.drops = 0
 
     def start(self, snapshot: Snapshot) -> None:
         """Take the heights at rest from the settled scene (else from the first update)."""
-        for name in self._names:
-            if name in snapshot.poses:
-                z = snapshot.poses[name].position[2]
-                self._rest[name], self._last[name] = z, (snapshot.time, z)
+        self._heights, self._time = snapshot.heights(self._names), snapshot.time
+        for name, z in zip(self._names, self._heights, strict=True):
+            if z is not None:
+                self._rest[name] = z
 
     def update(self, snapshot: Snapshot) -> tuple[Event, ...]:
         """`grasped` and `dropped` events of this instant."""
+        before, then = self._heights, self._time
+        heights = self._heights = snapshot.heights(self._names)
+        time = self._time = snapshot.time
         events: tuple[Event, ...] = ()
-        time = snapshot.time
-        poses = snapshot.poses
-        for name in self._names:
-            if name not in poses:
-                continue
-            z = snapshot.height(name)
-            before_time, before = self._last.get(name, (time - 0.02, z))
-            self._last[name] = (time, z)
-            self._rest.setdefault(name, z)
-            if name not in self._lifted:
-                if z != before:
-                    events += self._raised(snapshot, name, poses[name].position)
-            else:
-                speed = (before - z) / max(time - before_time, 1e-6)
-                events += self._carried(snapshot, name, poses[name].position, speed)
+        if heights == before and not self._lifted:
+            return events
+        for name, z, last in zip(self._names, heights, before, strict=True):
+            if z is None or last is None:
+                if z is not None:
+                    self._rest.setdefault(name, z)
+            elif name in self._lifted:
+                speed = (last - z) / max(time - then, 1e-6)
+                events += self._carried(snapshot, name, snapshot.position(name), speed)
+            elif z != last:
+                events += self._raised(snapshot, name, snapshot.position(name))
         return events
 
     def _raised(self, snapshot: Snapshot, name: str, at: Vec3) -> tuple[Event, ...]:

@@ -86,10 +86,10 @@ class PickTracker:
         if self._done:
             return ()
         events = self._handling.update(snapshot)
-        steady = True
+        steady, most = True, self.lift.steady
         for name, start in zip(self.others, self._heights, strict=True):
             rise = snapshot.height(name) - start
-            if self.lift.steady is not None and abs(rise) > self.lift.steady:
+            if most is not None and abs(rise) > most:
                 steady = False
             if rise > WRONG and name not in self._wrong:
                 self._wrong.add(name)
@@ -107,7 +107,7 @@ class PickTracker:
     def _held(self, snapshot: Snapshot) -> bool:
         """Whether a gripper carries the target, as far as this task looks."""
         opening = GRIPPER_CLOSED if self.lift.closed else GRIPPER_OPEN
-        if not carried(snapshot, snapshot.poses[self.target].position, opening):
+        if not carried(snapshot, snapshot.position(self.target), opening):
             return False
         return not self.lift.touching or bool(snapshot.gripper_contacts(self.target))
 

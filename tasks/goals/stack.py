@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 from robospa.tasks.events import Event
+from robospa.tasks.geometry import Vec3
 from robospa.tasks.goals.flags import Flags, both_open, closed_near
 from robospa.tasks.goals.handling import Handling
 from robospa.tasks.goals.hands import Role
@@ -71,26 +72,27 @@ class Stack:
     def update(self, snapshot: Snapshot) -> tuple[Event, ...]:
         """Changes of the flags; success once all hold and both grippers are open."""
         events = self._handling.update(snapshot)
-        time, poses, held = snapshot.time, snapshot.poses, self._flags.held
-        bottom = poses[self._order[0]].position[2]
+        time, held = snapshot.time, self._flags.held
+        places = [snapshot.position(name) for name in self._order]
         for i in range(1, self.total):
             name = self._order[i]
-            now = self._in_place(snapshot, i, bottom)
-            if now and not held[i] and closed_near(snapshot, poses[name].position, HELD_RADIUS):
+            now = self._in_place(places, i)
+            if now and not held[i] and closed_near(snapshot, places[i], HELD_RADIUS):
                 now = False
             if now and not held[i] and not held[i - 1] and i not in self._flags.order:
                 self._out_of_order += 1
                 events += (Event(time, "wrong_order", name, i),)
-            events += self._flags.set(i, now, time, name)
+            if now != held[i]:
+                events += self._flags.set(i, now, time, name)
         if self._flags.all and both_open(snapshot):
             events += (Event(time, "success"),)
         return events
 
-    def _in_place(self, snapshot: Snapshot, i: int, bottom: float) -> bool:
-        x, y, z = snapshot.poses[self._order[i]].position
-        below = snapshot.poses[self._order[i - 1]].position
+    def _in_place(self, places: list[Vec3], i: int) -> bool:
+        x, y, z = places[i]
+        below = places[i - 1]
         return (
-            abs(z - bottom - self._rises[i]) <= self._within
+            abs(z - places[0][2] - self._rises[i]) <= self._within
             and abs(x - below[0]) < SIDE_TOLERANCE
             and abs(y - below[1]) < SIDE_TOLERANCE
         )
@@ -138,7 +140,7 @@ class Bring:
     def update(self, snapshot: Snapshot) -> tuple[Event, ...]:
         """Done and success at once when the object lies in the region, released."""
         events = self._handling.update(snapshot)
-        x, y, z = snapshot.poses[self._name].position
+        x, y, z = snapshot.position(self._name)
         there = (
             self._x[0] < x < self._x[1]
             and self._y[0] < y < self._y[1]

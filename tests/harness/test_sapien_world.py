@@ -175,6 +175,15 @@ def test_the_privileged_state_is_the_snapshot(world: SapienWorld) -> None:
     assert snapshot_from_json(seen).poses == dict(world.snapshot().poses)
 
 
+def test_short_cuts_of_a_snapshot_say_what_its_poses_say(world: SapienWorld) -> None:
+    world.load(two_blocks())
+    seen = world.snapshot()
+    names = list(seen.poses)
+    assert [seen.position(name) for name in names] == [seen.poses[n].position for n in names]
+    assert seen.heights([*names, "later"]) == [*(seen.height(name) for name in names), None]
+    assert all(seen.height(name) == seen.poses[name].position[2] for name in names)
+
+
 def test_a_snapshot_stays_as_it_was_when_the_world_moves_on(world: SapienWorld) -> None:
     from robospa.tasks.snapshot import snapshot_to_json
 

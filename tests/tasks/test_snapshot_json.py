@@ -37,3 +37,8 @@ def test_contacts_stay_with_goals() -> None:
 def test_something_else_is_refused() -> None:
     with pytest.raises(KeyError):
         snapshot_from_json({"time": 0.0})
+
+
+def test_heights_of_several_objects_name_those_that_do_not_exist_yet() -> None:
+    assert SNAPSHOT.heights(("one", "later")) == [0.3, None]
+    assert SNAPSHOT.position("one") == (0.1, 0.2, 0.3)
