@@ -37,9 +37,16 @@ class LayoutError(RuntimeError):
 
 def head_pixel(x: Array, y: Array, z: Array | float) -> tuple[Array, Array]:
     """Pixel (u to the right, v down) of points [m] in the head camera's 320x240 image."""
-    dx, dy, dz = x - EYE[0], y - EYE[1], z - EYE[2]
-    depth = 0.6 * dy - 0.8 * dz
-    return WIDTH / 2 + FOCAL * dx / depth, HEIGHT / 2 - FOCAL * (0.8 * dy + 0.6 * dz) / depth
+    return _column(x, y, z), _row(y, z)
+
+
+def _column(x: Array, y: Array, z: Array | float) -> Array:
+    return WIDTH / 2 + FOCAL * (x - EYE[0]) / (0.6 * (y - EYE[1]) - 0.8 * (z - EYE[2]))
+
+
+def _row(y: Array, z: Array | float) -> Array:
+    dy, dz = y - EYE[1], z - EYE[2]
+    return HEIGHT / 2 - FOCAL * (0.8 * dy + 0.6 * dz) / (0.6 * dy - 0.8 * dz)
 
 
 def in_head_view(
@@ -55,10 +62,8 @@ def in_head_view(
     height that stays free on each side.
     """
     low, high = TABLE_TOP, TABLE_TOP + height
-    left = head_pixel(x - radius, y, high)[0]
-    right = head_pixel(x + radius, y, high)[0]
-    top = head_pixel(x, y + radius, high)[1]
-    bottom = head_pixel(x, y - radius, low)[1]
+    left, right = _column(x - radius, y, high), _column(x + radius, y, high)
+    top, bottom = _row(y + radius, high), _row(y - radius, low)
     free_x, free_y = margin[0] * WIDTH, margin[1] * HEIGHT
     inside: Mask = (
         (left >= free_x) & (right <= WIDTH - free_x) & (top >= free_y) & (bottom <= HEIGHT - free_y)
@@ -138,10 +143,12 @@ def _place(
     for i, limits in enumerate(apart):
         squares = [limits[j] ** 2 for j in range(i)]
         for px, py, ok in zip(x[i], y[i], usable[i], strict=True):
-            if ok and all(
-                (px - qx) ** 2 + (py - qy) ** 2 >= limit
-                for (qx, qy), limit in zip(points, squares, strict=True)
-            ):
+            if not ok:
+                continue
+            for (qx, qy), limit in zip(points, squares, strict=True):
+                if (px - qx) ** 2 + (py - qy) ** 2 < limit:
+                    break
+            else:
                 points.append((px, py))
                 break
         else:

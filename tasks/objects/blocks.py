@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import random
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -26,6 +29,7 @@ BLOCK_COLORS: Mapping[str, Color] = {
     "black": (0.1, 0.1, 0.1),
 }
 """The official colours of box primitives."""
+_KNOWN = np.array(list(BLOCK_COLORS.values()))
 
 
 def _triple(value: Sequence[float], what: str) -> Vec3:
@@ -41,17 +45,24 @@ def block(look: int, params: Mapping[str, Any]) -> ObjectModel:
     color = _triple(params.get("color", BLOCK_COLORS[names[look]]), "color")
     if min(half) <= 0:
         raise ValueError(f"block half sizes must be positive, not {list(half)}")
-    gaps = [float(np.linalg.norm(np.subtract(color, BLOCK_COLORS[n]))) for n in names]
-    word = names[int(np.argmin(gaps))]
+    gaps = [math.sqrt(float(d.dot(d))) for d in _KNOWN - color]
+    word = names[gaps.index(min(gaps))]
     phrases = (
         f"{word} block", f"{word} box", f"block that is {word}", f"{word} building block",
         f"{word}-coloured block", f"block painted {word}", f"block with {word} sides",
     )  # fmt: skip
+    shape = solid(Box(half), color, roughness=0.6)
+    return replace(_plain_block(half), shapes=(shape,), phrases=phrases)
+
+
+@lru_cache(maxsize=1024)
+def _plain_block(half: Vec3) -> ObjectModel:
+    """A block of that size: what does not depend on its colour, which is new in many a scene."""
     return model(
         "block",
-        [solid(Box(half), color, roughness=0.6)],
+        [solid(Box(half), (1.0, 1.0, 1.0), roughness=0.6)],
         "block",
-        phrases,
+        (),
         _block_grasps(half),
         press=(0.0, 0.0, half[2]),
         support=(0.0, 0.0, half[2]),
@@ -108,7 +119,7 @@ def rubikscube(look: int, params: Mapping[str, Any]) -> ObjectModel:
             patch = m.flat(tile, 2 * h + 0.0004, (u, v))
         else:
             at = ((u, -lift), (u, lift), (lift, u), (-lift, u))[side - 1]
-            facing = (-np.pi / 2, np.pi / 2, 0.0, np.pi)[side - 1]
+            facing = (-math.pi / 2, math.pi / 2, 0.0, math.pi)[side - 1]
             patch = m.upright(tile, (at[0], at[1], h + v), facing)
         patches.setdefault(name, []).append(patch)
     parts: list[Shape] = [solid(Box((h, h, h)), srgb(body), (0.0, 0.0, h), roughness=0.4)]
@@ -118,7 +129,7 @@ def rubikscube(look: int, params: Mapping[str, Any]) -> ObjectModel:
         parts,
         "Rubik's cube",
         phrases,
-        [across((0.0, 0.0, h), 2 * h, 0.0), across((0.0, 0.0, h), 2 * h, np.pi / 2)],
+        [across((0.0, 0.0, h), 2 * h, 0.0), across((0.0, 0.0, h), 2 * h, math.pi / 2)],
         mass=0.06,
         support=(0.0, 0.0, 2 * h),
     )
