@@ -57,10 +57,10 @@ class Options:
         """The same as the translation wants it."""
         try:
             extra = json.loads(self.extra)
-        except ValueError:
+        except (ValueError, RecursionError):
             extra = None
         if not isinstance(extra, dict):
-            raise ValueError(f"option extra={self.extra!r} is not a JSON map")
+            raise ValueError(f"option extra={self.extra[:80]!r} is not a JSON map")
         spec = PolicySpec(
             name="openpi",
             cameras=tuple(CameraSpec(name) for name in self.cameras.split(",") if name),

@@ -322,6 +322,7 @@ def fuzz(
                 raise
             number += 1
         signal.alarm(0)
+        print(f"{name}: {number} inputs, {dict(ends[name])}", file=sys.stderr, flush=True)
     return {
         "seed": seed,
         "executions": {name: count.total() for name, count in ends.items()},
