@@ -190,6 +190,15 @@ def test_actions_that_are_missing(files: Files, tmp_path: Path) -> None:
     assert f"has no {ACTIONS}" in refused(zip_up(tmp_path / "c.zip", seal(files)))
 
 
+def test_outcomes_that_the_records_do_not_have(files: Files, tmp_path: Path) -> None:
+    def change(outcomes: Any) -> None:
+        outcomes[f"{PICK}/1"]["success"] = "1111"
+
+    edit(files, layout.OUTCOMES, change)
+    text = refused(zip_up(tmp_path / "b.zip", seal(files)))
+    assert text == "report/outcomes.json is not what the records give"
+
+
 def test_edited_tables(files: Files, tmp_path: Path) -> None:
     files["report/tables.csv"] = files["report/tables.csv"].replace(b"75", b"99")
     assert "tables.csv is not what the records give" in refused(
