@@ -113,6 +113,14 @@ def test_the_room_is_what_fits_and_grows_with_the_cluster(ray: FakeRay) -> None:
     assert Rig(ray, RaySettings(workers=3)).told() == [("room", 3)]
 
 
+@pytest.mark.parametrize(
+    ("has", "room"),
+    [({"CPU": 8.0, "GPU": 1.0}, 8), ({"CPU": 32.0, "GPU": 1.0}, 10), ({"CPU": 32.0}, 0)],
+)
+def test_a_share_of_a_gpu_counts_too(ray: FakeRay, has: dict[str, float], room: int) -> None:
+    assert Rig(ray, RaySettings(gpus=0.1)).bridge._fits(has) == room
+
+
 def test_workers_go_where_most_is_free(ray: FakeRay) -> None:
     rig = Rig(ray, RaySettings())
     for name in "abcde":
