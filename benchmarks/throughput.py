@@ -16,6 +16,7 @@ simulation on these cores). It says how much of a gap is arithmetic.
 from __future__ import annotations
 
 import contextlib
+import functools
 import json
 import subprocess
 import sys
@@ -238,10 +239,16 @@ def measure(busy: float, workers: int, seconds: float, base: float, item: float)
     return Seen(rate, answers / (len(calls) - 1), window.workers, served.limit)
 
 
+@functools.cache
+def cores_alone(busy: float, seconds: float) -> Seen:
+    """A worker a core and a model that answers at once."""
+    return measure(busy, cores(), seconds, 0.0, 0.0)
+
+
 def case(name: str, busy: float, workers: int, seconds: float, bar: float | None) -> Row:
     """A run beside both limits."""
     few = cores()
-    alone = measure(busy, few, seconds, 0.0, 0.0)
+    alone = cores_alone(busy, seconds)
     seen = measure(busy, workers, seconds, BASE, ITEM)
     limit, who = min((seen.model, "model"), (alone.rate, "cores"))
     together = seen.workers / (BASE + ITEM * min(BATCH, seen.workers) + busy * seen.workers / few)
