@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from robospa.results.records import TrialKey, TrialRecord
-from robospa.results.strangers import check_key, check_record, parse
+from robospa.results.strangers import check_key, check_manifest, check_record, parse
 
 TRIALS = "trials"
 """Folder inside a run that holds the record files."""
@@ -172,9 +172,10 @@ def read_manifest(folder: Path) -> dict[str, Any]:
             f"{path} has format {str(version)[:20]}, and this robospa reads up to {FORMAT}: "
             "use the version that wrote it or a newer one"
         )
-    for name in ("settings", "about", "categories"):
-        if not isinstance(data.get(name, {}), dict):
-            raise RunError(f"{path} is no run manifest: its {name} are no map")
+    try:
+        check_manifest(data)
+    except ValueError as error:
+        raise RunError(f"{path} is no run manifest: {error}") from error
     return data
 
 

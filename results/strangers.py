@@ -13,6 +13,32 @@ from typing import Any
 
 from robospa.results.records import END_REASONS, TrialKey, TrialRecord
 
+MANIFEST_MAPS = (
+    "settings",
+    "settings.policy",
+    "settings.policy.spec",
+    "settings.policies",
+    "settings.world",
+    "about",
+    "about.policy",
+    "about.policies",
+    "about.versions",
+    "about.machine",
+    "about.world",
+    "about.git",
+    "about.arguments",
+    "categories",
+)
+"""Parts of a run's manifest that are maps; every one after the ones that it is in."""
+MANIFEST_VALUES: dict[str, tuple[type, ...]] = {
+    "suite": (str,),
+    "seed_hash": (str,),
+    "settings.policy.spec.name": (str,),
+    "settings.step_scale": (int, float),
+    "settings.privileged": (bool,),
+    "about.code": (str,),
+    "about.warnings": (list,),
+}
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,99}")
 """Names that become parts of paths."""
 MOST = 2**53
@@ -66,6 +92,29 @@ def _without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         twice = next(name for name, _ in pairs if name in seen or seen.add(name))  # type: ignore[func-returns-value]
         raise ValueError(f"the field {twice[:80]!r} is there twice")
     return found
+
+
+def check_manifest(manifest: Mapping[str, Any]) -> None:
+    """ValueError, naming the part, if one that is there is not of its kind."""
+    for path in MANIFEST_MAPS:
+        _at(manifest, path, (dict,), "map")
+    for path, kinds in MANIFEST_VALUES.items():
+        _at(manifest, path, kinds, "value of its kind")
+    for category in manifest.get("categories", {}).values():
+        if not isinstance(category, str):
+            raise ValueError("categories are not all text")
+    if not _is_number(manifest.get("settings", {}).get("step_scale", 1.0)):
+        raise ValueError("settings.step_scale is no number")
+
+
+def _at(manifest: Mapping[str, Any], path: str, kinds: tuple[type, ...], what: str) -> None:
+    value: Any = manifest
+    for name in path.split("."):
+        if name not in value:
+            return
+        value = value[name]
+    if type(value) not in kinds:
+        raise ValueError(f"{path} is no {what}")
 
 
 def check_key(key: TrialKey) -> None:

@@ -32,7 +32,7 @@ def edit(folder: Path, **changes: Any) -> None:
         ({"about": {"code": "a", "versions": {"numpy": "1"}}}, "versions.numpy: '1' -> '2'"),
         ({"about": {}}, "code"),
         ({"settings": {"run_seed": 7}}, "run_seed: 7 -> 0"),
-        ({"settings": [1]}, "its settings are no map"),
+        ({"settings": [1]}, "settings is no map"),
         ({"trials": []}, f"trials: {len(KEYS)} new and 0 gone"),
         ({"trials": 3}, "it has no list of trials"),
         ({"trials": [{"task": "A"}]}, "list of trials is malformed: KeyError"),
