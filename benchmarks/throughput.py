@@ -47,7 +47,7 @@ from robospa.tasks.snapshot import Contact, Snapshot
 from robospa.tasks.task import Level, Task
 
 BASE, ITEM, BATCH = 0.100, 0.002, 8
-CALLS = 10
+CALLS = 25
 """Answers that one trial takes."""
 HERE = Pose((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
 
@@ -283,7 +283,8 @@ def main() -> None:
         rows.append(case(name, busy, workers, options.seconds, bar))
         print(line(rows[-1]), file=sys.stderr, flush=True)
     text = (
-        "The model takes 100 ms and 2 ms a sample, at most 8 at once. Driver, workers, wire, "
+        "The model takes 100 ms and 2 ms a sample, at most 8 at once; a trial takes "
+        f"{CALLS} answers, and between two trials a worker misses a call. Driver, workers, wire, "
         "server and batching are the real ones; the simulation is a busy loop, so that either "
         "side can be made the scarcer one. Where both are equally scarce, 8 workers cannot keep "
         "both busy: while they simulate, the model has nothing to do. More workers than fit into "
