@@ -77,13 +77,14 @@ def scattered_blocks(
         mx, my = ground.middle
         usable = (np.abs(x) >= ground.off_middle) & (np.hypot(x - mx, y - my) >= ground.free)
         usable &= in_head_view(x, y, reach, height, (0.0, 0.0))
-        pool = np.stack([x, y], axis=1)[usable]
-        layouts = pool[rng.integers(len(pool), size=(LAYOUTS, count))]
+        x, y = x[usable], y[usable]
+        drawn = rng.integers(len(x), size=(LAYOUTS, count)).T
+        xs, ys = x[drawn], y[drawn]  # a row a block, a column a layout
         for i, j in pairs:
-            delta = layouts[:, i] - layouts[:, j]
-            layouts = layouts[delta[:, 0] ** 2 + delta[:, 1] ** 2 >= gaps(i, j) ** 2]
-        for layout in layouts:
-            points = [(float(px), float(py)) for px, py in layout]
+            free = (xs[i] - xs[j]) ** 2 + (ys[i] - ys[j]) ** 2 >= gaps(i, j) ** 2
+            xs, ys = xs[:, free], ys[:, free]
+        for px, py in zip(xs.T.tolist(), ys.T.tolist(), strict=True):
+            points = list(zip(px, py, strict=True))
             if accept(points):
                 return points
     raise LayoutError(f"no free layout of {count} blocks in {POOLS * LAYOUTS} draws; skip the seed")
