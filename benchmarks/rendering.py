@@ -138,12 +138,13 @@ def measure(rounds: int) -> Result:
         Row("triangles of both arms", float(arm_triangles()), ""),
     ]  # fmt: skip
     renderer = worlds["observation"].info()["renderer"]
+    drawn = f"{renderer['name']}, {renderer['version']}"
     return Result(
         "rendering",
         "Observations",
         tuple(rows),
         text=TEXT,
-        circumstances=f"medians of {rounds} rounds; sides take turns; drawn by {renderer}",
+        circumstances=f"medians of {rounds} rounds; sides take turns; drawn by {drawn}",
         data={"triangles": triangles, "renderer": renderer},
     )
 
