@@ -221,7 +221,7 @@ class Window:
 def measure(busy: float, workers: int, seconds: float, base: float, item: float) -> Seen:
     """One run; `workers` 0 for as many as the driver finds right."""
     keys = [TrialKey("Busy", 1, seed) for seed in range(20_000)]
-    window = Window(seconds)
+    window = Window(seconds if workers else 3 * seconds)  # growing takes whole rounds of trials
     with tempfile.TemporaryDirectory() as folder, serving(base, item) as served:
         config = WorkerConfig(
             Path(folder), served.url, world="throughput:World",
