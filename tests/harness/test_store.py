@@ -128,7 +128,7 @@ def test_a_result_outranks_a_loss(tmp_path: Path, order: tuple[int, int]) -> Non
 
 def test_replace_file_leaves_nothing_behind_when_it_fails(tmp_path: Path) -> None:
     (tmp_path / "x").mkdir()
-    with pytest.raises(StorageError, match="cannot write .*x: Is a directory"):
+    with pytest.raises(StorageError, match=r"cannot write .*x: Is a directory"):
         replace_file(tmp_path / "x", b"data")
     assert [p.name for p in tmp_path.iterdir()] == ["x"]
 
