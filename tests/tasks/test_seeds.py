@@ -35,8 +35,6 @@ PENDING: dict[str, tuple[int, ...]] = {
     "Observe_Objects_Click_Memory": (2, 3, 4, 5),
     "Remember_Orientation_Restore": (2, 3, 4, 5),
     "Press_Stapler_Memory": (2, 3, 4, 5),
-    "Basic_Ordinal_Mixed_Objects_A": (4, 5),
-    "Basic_Ordinal_Mixed_Objects_B": (1, 2, 3, 4, 5),
 }
 """Levels whose list is still to be made with `robospa seeds`; an entry that has one fails."""
 
