@@ -16,7 +16,7 @@ PENDING: dict[str, tuple[int, ...]] = {
     "Place_Bowls_Plates": (3, 4, 5),
     "Separate_Fries_Bread": (3, 4, 5),
     "Rank_Blocks_Height": (3, 4, 5),
-    "Rank_Blocks_Color": (2, 3, 4, 5),
+    "Rank_Blocks_Color": (3, 4, 5),
     "Rank_Blocks_Size": (2, 3, 4, 5),
     "Hit_Blocks_Hammer_Order": (2, 3, 4, 5),
     "Click_Objects_Order": (2, 3, 4, 5),
