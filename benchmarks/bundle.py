@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.harness.grid import on_grid
-from robospa.harness.manifest import about_machine, group_keys, seed_hash
+from robospa.harness.running.manifest import about_machine, group_keys, seed_hash
 from robospa.harness.trial import policy_seed
 from robospa.leaderboard.packing import inputs_of, sizes_of, write_bundle
 from robospa.leaderboard.reference import WORLD, Reference, shipped

@@ -18,7 +18,7 @@ from common import Result, argument_parser, finish
 from common import Row as Figure
 
 from robospa.baselines.mistakes import create
-from robospa.harness.sapien_world import SapienWorld
+from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.harness.trial import TrialParts, run_trial, task_parts
 from robospa.results.failures import NAMES, label
 from robospa.results.records import TrialKey

@@ -17,10 +17,10 @@ from typing import Any
 
 from common import Result, Row, argument_parser, finish
 
-from robospa.harness import bodies, sapien_world
 from robospa.harness.factory import policy_factory
-from robospa.harness.sapien_world import SapienWorld
 from robospa.harness.seeds import ORACLE
+from robospa.harness.sim import bodies, sapien_world
+from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.harness.trial import run_trial
 from robospa.harness.world import SceneUnstable
 from robospa.results.records import TrialKey

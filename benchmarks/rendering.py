@@ -24,7 +24,7 @@ from common import Result, Row, argument_parser, finish
 from physics import table_of_blocks
 
 from robospa.harness.robots import embodiment
-from robospa.harness.sapien_world import SapienWorld
+from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.protocol.policy import PolicySpec
 from robospa.tasks.objects import assets, object_model
 from robospa.tasks.shapes import Mesh, Shape

@@ -40,7 +40,7 @@ def picture_frames() -> tuple[Any, str]:
     try:
         from physics import table_of_blocks
 
-        from robospa.harness.sapien_world import SapienWorld
+        from robospa.harness.sim.sapien_world import SapienWorld
         from robospa.protocol.policy import PolicySpec
 
         world = SapienWorld(render=True)

@@ -31,11 +31,11 @@ import numpy as np
 from common import Result, Row, argument_parser, finish, line
 from numpy.typing import NDArray
 
-from robospa.harness.runner import Runner, RunOptions
-from robospa.harness.staffing import cores, most_workers
-from robospa.harness.status import Status
+from robospa.harness.running.runner import Runner, RunOptions
+from robospa.harness.running.staffing import cores, most_workers
+from robospa.harness.running.status import Status
+from robospa.harness.running.worker import WorkerConfig
 from robospa.harness.trial import TrialParts
-from robospa.harness.worker import WorkerConfig
 from robospa.harness.world import Poll, StepResult
 from robospa.protocol.policy import PolicySpec, TrialInfo
 from robospa.protocol.server import ServerThread

@@ -80,7 +80,7 @@ def check_simulator() -> str:
 
 def check_device() -> str:
     """There is a Vulkan device, with a driver that SAPIEN starts on; raises VulkanError if not."""
-    from robospa.harness.vulkan import OLDEST_MESA, VulkanError, devices
+    from robospa.harness.sim.vulkan import OLDEST_MESA, VulkanError, devices
 
     found = devices()
     usable = [device for device in found if not device.too_old]
@@ -118,7 +118,7 @@ def check_picture() -> str:
     """A red cube is red in the picture; raises RuntimeError if not."""
     import sapien
 
-    from robospa.harness.shaders import shader_folder
+    from robospa.harness.sim.shaders import shader_folder
 
     began = time.perf_counter()
     system = sapien.render.RenderSystem()

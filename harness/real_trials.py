@@ -76,7 +76,7 @@ def real_trials(
 
 
 def _world() -> Any:
-    from robospa.harness.sapien_world import SapienWorld
+    from robospa.harness.sim.sapien_world import SapienWorld
 
     return SapienWorld()
 

@@ -41,7 +41,7 @@ _WORKER: list[tuple[World, Policy]] = []
 
 def _start() -> None:
     from robospa.harness.factory import policy_factory
-    from robospa.harness.sapien_world import SapienWorld
+    from robospa.harness.sim.sapien_world import SapienWorld
 
     _WORKER.append((SapienWorld(render=False), policy_factory(ORACLE)()))
 

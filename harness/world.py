@@ -1,6 +1,6 @@
 """The interface of a world: the only thing that knows the simulator.
 
-`SapienWorld` (`robospa.harness.sapien_world`) is the first implementation.
+`SapienWorld` (`robospa.harness.sim.sapien_world`) is the first implementation.
 """
 
 from __future__ import annotations

@@ -18,8 +18,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from robospa.harness.running.store import replace_file
 from robospa.harness.seeds import Sweep
-from robospa.harness.store import replace_file
 from robospa.leaderboard.bundle import MEGA, BundleError, canonical, sha256
 from robospa.leaderboard.strict import parse_map
 from robospa.tasks.scene import SUITE

@@ -21,8 +21,8 @@ from typing import Any
 
 from robospa.harness.factory import load
 from robospa.harness.grid import PER_UNIT, is_on_grid
-from robospa.harness.manifest import changed_settings, group_keys, seed_hash
-from robospa.harness.store import action_path, read_actions
+from robospa.harness.running.manifest import changed_settings, group_keys, seed_hash
+from robospa.harness.running.store import action_path, read_actions
 from robospa.leaderboard import bundle as layout
 from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.card import check_card
@@ -278,8 +278,8 @@ def _films(
 
 def _film(world: Any, run: Run, key: TrialKey, reference: Reference, home: Path) -> bytes:
     """A video of `key`, played from its recorded actions; BundleError if it ends differently."""
-    from robospa.harness.rerun import rerun
-    from robospa.harness.video import TrialRecorder
+    from robospa.harness.pictures.video import TrialRecorder
+    from robospa.harness.replays.rerun import rerun
 
     record = run.records[key]
     actions, _ = read_actions(action_path(home, key))

@@ -14,7 +14,7 @@ from robospa.harness.factory import load
 from robospa.results.records import TrialKey
 from robospa.tasks.scene import SUITE
 
-WORLD = "robospa.harness.sapien_world:SapienWorld"
+WORLD = "robospa.harness.sim.sapien_world:SapienWorld"
 PARTS = "robospa.harness.trial:task_parts"
 LEVELS = (1, 2, 3, 4, 5)
 

@@ -16,7 +16,7 @@ from multiprocessing import get_context
 from typing import Any
 
 from robospa.harness.factory import load
-from robospa.harness.manifest import about_machine, changed_settings
+from robospa.harness.running.manifest import about_machine, changed_settings
 from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.claims import spec_of
 from robospa.leaderboard.reference import Reference
@@ -175,7 +175,7 @@ def _start(world: str, parts: str) -> None:
 
 def _again(claimed: TrialRecord, trace: Trace, space: str) -> Replayed:
     """Play one trial again and compare."""
-    from robospa.harness.rerun import rerun
+    from robospa.harness.replays.rerun import rerun
 
     world, parts = _WORLD
     try:

@@ -11,9 +11,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from robospa.harness.evaluate import Request
-from robospa.harness.manifest import changed_settings
-from robospa.harness.policies import probe_policies
+from robospa.harness.running.evaluate import Request
+from robospa.harness.running.manifest import changed_settings
+from robospa.harness.running.policies import probe_policies
 from robospa.leaderboard.agreement import Agreement, Counts, agreement, holm, power
 from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.claims import spec_of

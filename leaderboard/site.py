@@ -19,7 +19,7 @@ from pathlib import Path
 from statistics import NormalDist
 from typing import Any
 
-from robospa.harness.store import replace_file
+from robospa.harness.running.store import replace_file
 from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.entries import BADGES, Entry, all_entries, page_values
 from robospa.leaderboard.pairs import pairs_of, write_pairs

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from robospa.harness.manifest import seed_hash
+from robospa.harness.running.manifest import seed_hash
 from robospa.leaderboard import bundle as layout
 from robospa.leaderboard.archive import Archive
 from robospa.leaderboard.bundle import BundleError, Limits

@@ -32,9 +32,9 @@ import numpy as np
 
 from robospa.harness.cli.running import client_options
 from robospa.harness.cli.selection import BadChoice, parse_seeds
-from robospa.harness.manifest import changed_settings, seed_hash
-from robospa.harness.policies import read_map
-from robospa.harness.store import read_actions, write_actions
+from robospa.harness.running.manifest import changed_settings, seed_hash
+from robospa.harness.running.policies import read_map
+from robospa.harness.running.store import read_actions, write_actions
 from robospa.leaderboard import bundle as layout
 from robospa.leaderboard.archive import Archive
 from robospa.leaderboard.bundle import BundleError, canonical

@@ -16,7 +16,7 @@ from contextlib import contextmanager
 
 from soak_run import PATIENCE, Finding, Run, kill, wait_gone
 
-from robospa.harness.store import ACTIONS, PART
+from robospa.harness.running.store import ACTIONS, PART
 
 
 def _signal_driver(run: Run, number: int, code: int) -> bool:

@@ -14,7 +14,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from robospa.harness.store import ACTIONS, PART, action_path, read_actions
+from robospa.harness.running.store import ACTIONS, PART, action_path, read_actions
 from robospa.harness.trial import actions_digest
 from robospa.results.reading import TRIALS, finished, read_file, read_run
 from robospa.results.records import TrialKey, TrialRecord

@@ -21,8 +21,8 @@ from robospa.clients import check_options
 from robospa.harness.cli.main import COMMANDS, NAMES
 from robospa.harness.cli.selection import parse_tasks
 from robospa.harness.cli.serve import options_class
-from robospa.harness.episodes import Episode, write_episode
 from robospa.harness.factory import load
+from robospa.harness.replays.episodes import Episode, write_episode
 from robospa.protocol.options import option_table, read_options, url_options
 from robospa.protocol.policy import CAMERAS
 

@@ -84,8 +84,8 @@ def test_an_entry_that_is_no_task_is_refused(
 @pytest.mark.parametrize("level", [1, 3, 5])
 def test_the_expert_solves_it_in_the_simulator(installed: Path, level: int) -> None:
     from robospa.harness.factory import policy_factory
-    from robospa.harness.sapien_world import SapienWorld
     from robospa.harness.seeds import ORACLE, attempt
+    from robospa.harness.sim.sapien_world import SapienWorld
 
     world, expert = SapienWorld(render=False), policy_factory(ORACLE)()
     for seed in (500_000, 500_001):

@@ -1,10 +1,10 @@
 """`robospa check URL`: is this policy server fit to be evaluated?
 
 Four looks: the protocol (`robospa.protocol.conformance`), the first actions
-(`robospa.harness.first_actions`), a real trial done twice (`robospa.harness.real_trials`), and with
---demo the replay of a demonstration (`robospa.harness.replay_check`). Exit code 1 if a check of the
-protocol or a real trial failed, or if the replay names a mistake; hints and a replay that does not
-fit are only told.
+(`robospa.harness.replays.first_actions`), a real trial done twice (`robospa.harness.real_trials`),
+and with --demo the replay of a demonstration (`robospa.harness.replays.replay_check`). Exit code 1
+if a check of the protocol or a real trial failed, or if the replay names a mistake; hints and a
+replay that does not fit are only told.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import typer
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from robospa.harness.replay_check import Findings
+    from robospa.harness.replays.replay_check import Findings
     from robospa.protocol.client import RemotePolicy
 
 MARKS = {True: "[green]ok[/]", False: "[red]FAILED[/]", None: "[dim]n/a[/]"}
@@ -81,7 +81,7 @@ def check(
     options = client_options(url, client)
     episode = None
     if demo is not None:
-        from robospa.harness.episodes import EpisodeError, read_episode
+        from robospa.harness.replays.episodes import EpisodeError, read_episode
 
         episode = read_episode(demo, instruction)  # before the server is troubled
         if not episode.instruction:
@@ -117,7 +117,7 @@ def check(
         console.print(f"{escape(url)} failed {len(failed)} of {count} checks.", style="red")
         raise typer.Exit(1)
     if episode is not None:
-        from robospa.harness.replay_check import replay
+        from robospa.harness.replays.replay_check import replay
 
         with opened() as policy:
             findings = replay(policy, episode, points)
@@ -131,7 +131,7 @@ def _first_actions(opened: Any) -> tuple[str, str]:
     """Mark and text of the row about the first actions."""
     from rich.markup import escape
 
-    from robospa.harness.first_actions import hints
+    from robospa.harness.replays.first_actions import hints
     from robospa.protocol.errors import WireError
 
     try:

@@ -32,8 +32,8 @@ def record(
         parse_seeds,
         parse_tasks,
     )
-    from robospa.harness.episodes import EpisodeRecorder, require, write_episode
     from robospa.harness.factory import open_policy
+    from robospa.harness.replays.episodes import EpisodeRecorder, require, write_episode
     from robospa.harness.trial import policy_seed, run_trial
     from robospa.results.records import TrialKey
 
@@ -48,7 +48,7 @@ def record(
     path = out or Path(f"{key.task}-L{key.level}-{key.seed}.hdf5")
     if path.exists():
         raise BadChoice(f"{path} exists already; choose another --out")
-    from robospa.harness.sapien_world import SapienWorld
+    from robospa.harness.sim.sapien_world import SapienWorld
 
     recorder, world = EpisodeRecorder(), SapienWorld()
     try:

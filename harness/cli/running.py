@@ -11,13 +11,13 @@ from typing import Any
 import typer
 
 from robospa.harness.cli.selection import BadChoice
-from robospa.harness.evaluate import Request, RunAborted, evaluate
 from robospa.harness.factory import is_url
-from robospa.harness.runner import RunOptions
-from robospa.harness.staffing import cores as cores
-from robospa.harness.staffing import most_workers
-from robospa.harness.watchdog import BEAT_SECONDS
-from robospa.harness.worker import VIDEO, Targets, WorkerConfig
+from robospa.harness.running.evaluate import Request, RunAborted, evaluate
+from robospa.harness.running.runner import RunOptions
+from robospa.harness.running.staffing import cores as cores
+from robospa.harness.running.staffing import most_workers
+from robospa.harness.running.watchdog import BEAT_SECONDS
+from robospa.harness.running.worker import VIDEO, Targets, WorkerConfig
 from robospa.results.records import TrialKey
 
 CONTROLS = ("rest_to_rest", "fixed_rate")
@@ -141,14 +141,14 @@ def on_executor(
         return request
     if cpus <= 0 or gpus < 0:
         raise BadChoice("a worker takes more than 0 CPUs and no less than 0 GPUs")
-    from robospa.harness.ray_bridge import RaySettings
+    from robospa.harness.running.ray_bridge import RaySettings
 
     return replace(request, ray=RaySettings(address or "auto", workers, cpus, gpus))
 
 
 def policy_map(file: Path, keys: Sequence[TrialKey]) -> dict[str, Targets]:
     """The policy, or the policies, of every task of `keys`; raises RunError."""
-    from robospa.harness.policies import read_map
+    from robospa.harness.running.policies import read_map
     from robospa.tasks.catalog import tasks
 
     return read_map(file, list(dict.fromkeys(key.task for key in keys)), tasks())

@@ -161,7 +161,7 @@ def reproduce(
 ) -> None:
     """Run hidden seeds against the submitter's server and test exactly whether they agree."""
     from robospa.harness.cli import running
-    from robospa.harness.evaluate import evaluate
+    from robospa.harness.running.evaluate import evaluate
     from robospa.results.reading import read_run
 
     reference = _reach("reference:shipped")(world, parts)
@@ -196,7 +196,7 @@ def reproduce(
 def _replayed(valid: Any, challenge: str, fraction: float, workers: int, reference: Any) -> Any:
     """The replayed sample, with a bar while it is made."""
     from robospa.harness.cli.running import cores
-    from robospa.harness.progress import Progress
+    from robospa.harness.running.progress import Progress
 
     count = _reach("sampling:sample_size")(fraction, len(valid.keys))
     with Progress(count) as progress:
@@ -213,6 +213,6 @@ def _replayed(valid: Any, challenge: str, fraction: float, workers: int, referen
 def _write(path: Path, found: dict[str, Any]) -> None:
     import json
 
-    from robospa.harness.store import replace_file
+    from robospa.harness.running.store import replace_file
 
     replace_file(path, (json.dumps(found, indent=1) + "\n").encode())

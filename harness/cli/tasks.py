@@ -189,8 +189,8 @@ def _object_line(item: Any) -> str:
 
 
 def _draw(console: Console, scene: Scene, camera: str, size: tuple[int, int], path: Path) -> None:
-    from robospa.harness import gallery
-    from robospa.harness.sapien_world import SapienWorld
+    from robospa.harness.pictures import gallery
+    from robospa.harness.sim.sapien_world import SapienWorld
     from robospa.harness.world import RenderUnavailable, SceneUnstable
 
     world = SapienWorld()
@@ -211,8 +211,8 @@ def _draw(console: Console, scene: Scene, camera: str, size: tuple[int, int], pa
 def _gallery(console: Console, name: str | None, seed: int, split: str, path: Path) -> None:
     from rich.progress import track
 
-    from robospa.harness import gallery
-    from robospa.harness.sapien_world import SapienWorld
+    from robospa.harness.pictures import gallery
+    from robospa.harness.sim.sapien_world import SapienWorld
     from robospa.harness.world import RenderUnavailable, SceneUnstable
     from robospa.tasks.catalog import tasks as all_tasks
     from robospa.tasks.instructions import instruction

@@ -96,7 +96,7 @@ def test_the_spec_says_which_mistake_it_is() -> None:
     ],
 )
 def test_a_scripted_mistake_is_labelled_as_scripted(kind: str, name: str, expected: str) -> None:
-    from robospa.harness.sapien_world import SapienWorld
+    from robospa.harness.sim.sapien_world import SapienWorld
     from robospa.harness.trial import run_trial
 
     world, policy = SapienWorld(render=False), create(kind)

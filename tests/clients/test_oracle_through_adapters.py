@@ -192,7 +192,7 @@ def trial(
     name: str, more: str = "", spoil: Callable[[Any], Any] = lambda answer: answer
 ) -> TrialRecord:
     """One trial of the oracle behind `name`; `spoil` changes what its server answers."""
-    from robospa.harness.sapien_world import SapienWorld
+    from robospa.harness.sim.sapien_world import SapienWorld
     from robospa.harness.trial import run_trial
 
     make, convention, query = SERVERS[name]

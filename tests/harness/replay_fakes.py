@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.harness.episodes import Episode
+from robospa.harness.replays.episodes import Episode
 from robospa.protocol.policy import CameraSpec, PolicySpec, TrialInfo
 from robospa.tasks.geometry import axis_rotation
 

@@ -12,8 +12,8 @@ from hypothesis.extra.numpy import arrays
 from run_fakes import FakePolicy, FakeWorld, parts
 
 from robospa.harness.grid import PER_UNIT, is_on_grid, on_grid
+from robospa.harness.pictures.video import TrialRecorder
 from robospa.harness.trial import actions_digest, run_trial
-from robospa.harness.video import TrialRecorder
 from robospa.harness.world import Poll, StepResult
 from robospa.results.records import TrialKey
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from run_fakes import LIMIT, SPEC, FakePolicy, FakeWorld, NanPolicy, parts
 
+from robospa.harness.pictures.video import TrialRecorder
 from robospa.harness.trial import policy_seed, run_trial
-from robospa.harness.video import TrialRecorder
 from robospa.harness.world import Poll, SceneUnstable, StepResult
 from robospa.results.records import TrialKey, TrialRecord
 

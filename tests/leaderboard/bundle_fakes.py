@@ -14,10 +14,10 @@ sys.path.append(str(Path(__file__).parents[1] / "harness"))
 import pytest
 from run_fakes import LIMIT, FakePolicy, FakeWorld, parts
 
-from robospa.harness.manifest import Manifest, about_machine, write_manifest
-from robospa.harness.store import RecordWriter, write_actions
+from robospa.harness.pictures.video import TrialRecorder
+from robospa.harness.running.manifest import Manifest, about_machine, write_manifest
+from robospa.harness.running.store import RecordWriter, write_actions
 from robospa.harness.trial import policy_seed, run_trial
-from robospa.harness.video import TrialRecorder
 from robospa.harness.world import Poll, StepResult
 from robospa.leaderboard import bundle as layout
 from robospa.leaderboard.bundle import BundleError, Limits
@@ -184,7 +184,7 @@ def seal(files: Files, **changes: Any) -> Files:
 
 def relist(files: Files, keys: Sequence[TrialKey]) -> None:
     """Say that the run lists `keys`."""
-    from robospa.harness.manifest import group_keys, seed_hash
+    from robospa.harness.running.manifest import group_keys, seed_hash
 
     run = json.loads(files[layout.RUN])
     run["trials"], run["seed_hash"] = group_keys(keys), seed_hash(keys)

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from robospa.baselines.oracle import Oracle
-from robospa.harness.sapien_world import SapienWorld
+from robospa.harness.pictures.video import TrialRecorder
+from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.harness.trial import run_trial
-from robospa.harness.video import TrialRecorder
 from robospa.protocol.policy import PolicySpec, TrialInfo
 from robospa.results.records import TrialKey
 

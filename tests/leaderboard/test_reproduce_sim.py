@@ -13,7 +13,7 @@ from bundle_fakes import CARD
 from shadow import HORIZON, Shadow
 
 from robospa.harness.cli.running import make_request
-from robospa.harness.evaluate import evaluate
+from robospa.harness.running.evaluate import evaluate
 from robospa.leaderboard.hidden import draw_block, read_block, write_block
 from robospa.leaderboard.packing import pack
 from robospa.leaderboard.reference import shipped

@@ -20,7 +20,7 @@ pytestmark = pytest.mark.sim
 
 def test_a_real_run_replays_to_the_bit(tmp_path: Path) -> None:
     from robospa.harness.cli.running import make_request
-    from robospa.harness.evaluate import evaluate
+    from robospa.harness.running.evaluate import evaluate
     from robospa.tasks.seeds import accepted
 
     seeds = accepted("Pick_Blocks_Size", 1)[:2]

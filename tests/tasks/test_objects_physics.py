@@ -39,7 +39,7 @@ def on_the_ground(model: ObjectModel, above: float = 0.0) -> tuple[Any, Any]:
     import sapien
     from sapien import physx
 
-    from robospa.harness.bodies import dynamic_body, ground_body
+    from robospa.harness.sim.bodies import dynamic_body, ground_body
 
     scene = sapien.Scene([physx.PhysxCpuSystem()])
     scene.set_timestep(1 / 250)
@@ -72,7 +72,7 @@ def floating_gripper(scene: Any, grasp: Grasp, centre: Vec3, opening: float) -> 
     import sapien
     from sapien.wrapper.articulation_builder import ArticulationBuilder
 
-    from robospa.harness.bodies import attach_collisions, material
+    from robospa.harness.sim.bodies import attach_collisions, material
 
     approach, closing = np.array(grasp.approach), np.array(grasp.closing)
     builder = ArticulationBuilder()

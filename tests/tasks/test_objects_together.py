@@ -22,14 +22,14 @@ class Bench:
         import sapien
         from sapien import physx
 
-        from robospa.harness.bodies import ground_body
+        from robospa.harness.sim.bodies import ground_body
 
         self.scene: Any = sapien.Scene([physx.PhysxCpuSystem()])
         self.scene.set_timestep(1 / 250)
         self.scene.add_entity(ground_body("ground"))
 
     def put(self, model: ObjectModel, pose: Pose, fixed: bool = False) -> Any:
-        from robospa.harness.bodies import dynamic_body
+        from robospa.harness.sim.bodies import dynamic_body
 
         entity, _ = dynamic_body(model, model.asset, pose, fixed)
         self.scene.add_entity(entity)

@@ -1,0 +1,1 @@
+"""Demonstrations: recording, reading, replaying them, and what a replay tells of conventions."""

@@ -1,0 +1,310 @@
+"""Recorded demonstrations: read the official HDF5 files and ours, write ours.
+
+One layout for both, that of RoboTwin and RoboSPA (`data/episode<i>.hdf5`), so that what `robospa
+record` writes can be trained on with the official converters:
+
+    observation/head_camera/rgb     (T,) JPEG of each frame; left_camera, right_camera: the wrists
+    joint_action/vector             (T, 14) commands: 6 left joints [rad], gripper, the right
+    endpose/left_endpose            (T, 7) x y z qw qx qy qz, world frame; right_endpose
+    endpose/left_gripper            (T,) commanded, 0 closed to 1 open; right_gripper
+
+The action of frame t is the command of frame t + 1. Red and blue are exchanged inside the JPEGs
+(they were coded from RGB as if it were BGR) and put right here. Our files have two things more:
+`joint_action/measured` (T, 14), and as attributes of the file `instruction`, `task`, `level`,
+`seed`, `embodiment`, `mode` and `split`. Needs h5py and Pillow: `pip install 'robospa[demos]'`.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robospa.harness.running.store import replace_file
+from robospa.harness.world import World
+from robospa.protocol.errors import DecodeError
+from robospa.protocol.images import decode_jpeg
+from robospa.protocol.policy import CameraSpec, PolicySpec
+
+Array = NDArray[np.float64]
+Picture = NDArray[np.uint8]
+
+VIEWS = {
+    "head": "observation/head_camera/rgb",
+    "left_wrist": "observation/left_camera/rgb",
+    "right_wrist": "observation/right_camera/rgb",
+    "front": "observation/front_camera/rgb",
+    "third": "third_view_rgb",
+}
+"""Our cameras and where their frames are."""
+ABOUT = ("task", "level", "seed", "embodiment", "mode", "split")
+MOST_FRAMES = 20_000
+QUALITY = 95
+"""Of a written JPEG: OpenCV's default, which the official recordings have."""
+EVERY = 15
+"""Physics steps (of 1/250 s) from one recorded frame to the next."""
+RATE = 250
+
+
+class EpisodeError(Exception):
+    """A file is no demonstration that can be read, or lacks something; the message says what."""
+
+
+@dataclass(frozen=True)
+class Episode:
+    """A demonstration of T frames.
+
+    `commanded` and `measured` float64 (T, D) as in an observation's `state`, `measured` None where
+    it was not recorded; `ee` float64 (T, 2, 8) as in an observation; `frames` per camera T JPEGs
+    (bytes, official colours) or arrays uint8 (H, W, 3) RGB; `about` what is known of the trial.
+    """
+
+    name: str
+    commanded: Array
+    ee: Array
+    frames: Mapping[str, Any]
+    instruction: str = ""
+    measured: Array | None = None
+    about: Mapping[str, Any] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return len(self.commanded)
+
+    def picture(self, camera: CameraSpec, t: int) -> Picture:
+        """Frame `t` uint8 (height, width, 3) RGB in the size that `camera` asks for."""
+        if camera.name not in self.frames:
+            known = ", ".join(self.frames) or "none"
+            raise EpisodeError(
+                f"the policy wants camera {camera.name!r}, and {self.name} has only {known}"
+            )
+        frame = self.frames[camera.name][t]
+        if isinstance(frame, bytes):
+            try:
+                frame = decode_jpeg(frame)[..., ::-1]
+            except DecodeError as error:
+                raise EpisodeError(
+                    f"{self.name}: frame {t} of camera {camera.name} cannot be read: {error}"
+                ) from error
+        if frame.shape[:2] != (camera.height, camera.width):
+            pillow = _pillow()
+            small = pillow.fromarray(np.ascontiguousarray(frame))
+            frame = np.asarray(small.resize((camera.width, camera.height)))
+        return np.ascontiguousarray(frame)
+
+    def observation(self, spec: PolicySpec, t: int) -> dict[str, Any]:
+        """What a policy with `spec` is shown at frame `t`; `step` is t. Raises EpisodeError."""
+        seen: dict[str, Any] = self._view(spec, t)
+        seen["instruction"], seen["step"] = self.instruction, t
+        if spec.history:
+            seen["history"] = {
+                offset: self._view(spec, max(t + offset, 0)) for offset in spec.history
+            }
+        return seen
+
+    def _view(self, spec: PolicySpec, t: int) -> dict[str, Any]:
+        view: dict[str, Any] = {
+            "images": {camera.name: self.picture(camera, t) for camera in spec.cameras},
+            "ee": self.ee[t].astype(np.float32),
+        }
+        if spec.state != "none":
+            use = self.measured if spec.state == "measured" else self.commanded
+            if use is None:
+                raise EpisodeError(
+                    f"the policy wants measured joints, and {self.name} has commanded ones only: "
+                    "use one made with `robospa record`"
+                )
+            view["state"] = use[t].astype(np.float32)
+        return view
+
+
+def read_episode(path: Path, instruction: str | None = None) -> Episode:
+    """The demonstration in `path`; `instruction` replaces the recorded one.
+
+    Official files do not hold their instruction: it is taken from `../instructions/<name>.json`.
+    Raises EpisodeError, in one sentence, for whatever cannot be read.
+    """
+    h5py = _h5py()
+    if not path.is_file():
+        raise EpisodeError(f"there is no file {path}")
+    try:
+        with h5py.File(path, "r") as file:
+            return _read(file, path, instruction)
+    except EpisodeError:
+        raise
+    except (OSError, LookupError, ValueError, TypeError, AttributeError, RuntimeError) as error:
+        why = " ".join(str(error).split(" (")[-1].strip(")").split())
+        raise EpisodeError(f"{path} cannot be read as an HDF5 demonstration: {why}") from error
+
+
+def _read(file: Any, path: Path, instruction: str | None) -> Episode:
+    name = path.name
+    commanded = _numbers(file, "joint_action/vector", name)
+    length, width = commanded.shape
+    if not 2 <= length <= MOST_FRAMES or width not in (14, 16):
+        raise EpisodeError(
+            f"{name}: joint_action/vector is {commanded.shape}; expected 2 to {MOST_FRAMES} frames "
+            "of 14 numbers (16 for two 7-joint arms)"
+        )
+    arms = []
+    for side in ("left", "right"):
+        pose = _numbers(file, f"endpose/{side}_endpose", name)
+        grip = _numbers(file, f"endpose/{side}_gripper", name).reshape(-1, 1)
+        if pose.shape != (length, 7) or grip.shape != (length, 1):
+            raise EpisodeError(f"{name}: endpose/{side}_* is not 7 and 1 numbers a frame")
+        arms.append(np.hstack([pose, grip]))
+    measured = None
+    if "joint_action/measured" in file:
+        measured = _numbers(file, "joint_action/measured", name)
+        if measured.shape != commanded.shape:
+            raise EpisodeError(f"{name}: joint_action/measured does not fit joint_action/vector")
+    frames = {view: _frames(file[at], at, name, length) for view, at in VIEWS.items() if at in file}
+    about = {key: _plain(file.attrs[key]) for key in ABOUT if key in file.attrs}
+    if not about and len(path.resolve().parents) > 2:  # <task>/<configuration>/data/episode0.hdf5
+        about = {"task": path.resolve().parents[2].name}
+    told = instruction or str(_plain(file.attrs.get("instruction", ""))) or _beside(path)
+    return Episode(name, commanded, np.stack(arms, axis=1), frames, told, measured, about)
+
+
+def _numbers(file: Any, at: str, name: str) -> Array:
+    if at not in file or not hasattr(file[at], "dtype"):
+        raise EpisodeError(f"{name} has no {at}: it is not in the layout of RoboTwin 2.0")
+    found = file[at]
+    if found.size > 64 * MOST_FRAMES:
+        raise EpisodeError(f"{name}: {at} has {found.size} numbers, which is too many")
+    values = np.asarray(found[()], dtype=float)
+    if not np.isfinite(values).all():
+        raise EpisodeError(f"{name}: {at} has numbers that are not finite")
+    return values if values.ndim > 1 else values.reshape(-1, 1)
+
+
+def _frames(found: Any, at: str, name: str, length: int) -> list[Any]:
+    if not hasattr(found, "dtype"):
+        raise EpisodeError(f"{name}: {at} is a group, not frames")
+    if found.shape[:1] != (length,):
+        raise EpisodeError(f"{name}: {at} has {found.shape[0]} frames, not {length}")
+    if found.ndim == 4 and found.dtype == np.uint8 and found.shape[3] == 3:
+        return [np.asarray(found[t]) for t in range(length)]
+    if found.ndim != 1 or found.dtype.kind not in "SO":
+        raise EpisodeError(f"{name}: {at} holds neither JPEGs nor RGB frames")
+    return [bytes(frame) for frame in found[()]]
+
+
+def _plain(value: Any) -> Any:
+    """An attribute as a JSON value."""
+    if isinstance(value, bytes):
+        return value.decode("utf-8", "replace")
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def _beside(path: Path) -> str:
+    """The first training instruction that official data keep beside an episode, or nothing."""
+    at = path.resolve().parent.parent / "instructions" / f"{path.stem}.json"
+    with suppress(OSError, ValueError, LookupError, TypeError, AttributeError):
+        return str(json.loads(at.read_text())["seen"][0])
+    return ""
+
+
+def write_episode(path: Path, episode: Episode) -> None:
+    """Write `episode`, frames as JPEG, at once or not at all."""
+    h5py = _h5py()
+    stream = io.BytesIO()
+    with h5py.File(stream, "w") as file:
+        file.attrs["instruction"] = episode.instruction
+        for key, value in episode.about.items():
+            file.attrs[key] = value
+        half = episode.commanded.shape[1] // 2
+        file["joint_action/vector"] = episode.commanded
+        for arm, side in enumerate(("left", "right")):
+            part = episode.commanded[:, arm * half : (arm + 1) * half]
+            file[f"joint_action/{side}_arm"] = part[:, :-1]
+            file[f"joint_action/{side}_gripper"] = part[:, -1]
+            file[f"endpose/{side}_endpose"] = episode.ee[:, arm, :7]
+            file[f"endpose/{side}_gripper"] = episode.ee[:, arm, 7]
+        if episode.measured is not None:
+            file["joint_action/measured"] = episode.measured
+        for camera, frames in episode.frames.items():
+            file[VIEWS[camera]] = np.array([to_jpeg(f) for f in frames], dtype="S")
+    replace_file(path, stream.getvalue())
+
+
+def to_jpeg(frame: Any) -> bytes:
+    """uint8 (H, W, 3) RGB as official recordings keep it; bytes stay what they are."""
+    if isinstance(frame, bytes):
+        return frame
+    stream = io.BytesIO()
+    swapped = np.ascontiguousarray(frame[..., ::-1])
+    _pillow().fromarray(swapped).save(stream, "JPEG", quality=QUALITY)
+    return stream.getvalue()
+
+
+class EpisodeRecorder:
+    """A `Recorder` (`robospa.harness.trial`) that keeps a frame every 15 physics steps."""
+
+    def __init__(self, cameras: tuple[str, ...] = ("head", "left_wrist", "right_wrist")) -> None:
+        specs = tuple(CameraSpec(name) for name in cameras)
+        self._looks = PolicySpec("recorder", specs)
+        self._blind = PolicySpec("recorder", (), state="measured")
+        self._rows: list[tuple[Array, Array, Array]] = []
+        self._frames: dict[str, list[bytes]] = {name: [] for name in cameras}
+
+    def started(self, world: World) -> None:
+        """Keep the first frame."""
+        self._keep(world)
+
+    def polled(self, world: World, time: float) -> None:
+        """Keep the frame if it is due."""
+        if round(time * RATE) % EVERY == 0:
+            self._keep(world)
+
+    def executed(self, world: World, action: NDArray[np.float32]) -> None:
+        """Nothing: commands are read from the robot, as officially."""
+
+    def ended(self, world: World) -> None:
+        """Keep the last frame."""
+        self._keep(world)
+
+    def _keep(self, world: World) -> None:
+        seen = world.observe(self._looks)
+        measured = world.observe(self._blind)["state"]
+        rows = (seen["state"], measured, seen["ee"])
+        self._rows.append(tuple(np.asarray(row, dtype=float) for row in rows))  # type: ignore[arg-type]
+        for name, frames in self._frames.items():
+            frames.append(to_jpeg(seen["images"][name]))
+
+    def episode(self, name: str, instruction: str, about: Mapping[str, Any]) -> Episode:
+        """What was recorded."""
+        commanded, measured, ee = (np.stack(rows) for rows in zip(*self._rows, strict=True))
+        return Episode(name, commanded, ee, self._frames, instruction, measured, about)
+
+
+def require() -> None:
+    """Raises EpisodeError, saying what to install, if demonstrations cannot be read or written."""
+    _h5py()
+    _pillow()
+
+
+def _h5py() -> Any:
+    try:
+        import h5py
+    except ImportError as error:
+        raise EpisodeError(
+            "demonstrations need h5py, which is not installed: pip install 'robospa[demos]'"
+        ) from error
+    return h5py
+
+
+def _pillow() -> Any:
+    try:
+        from PIL import Image
+    except ImportError as error:
+        raise EpisodeError(
+            "demonstrations need Pillow, which is not installed: pip install 'robospa[demos]'"
+        ) from error
+    return Image

@@ -1,0 +1,306 @@
+"""The replay check: is a policy nearer to a recorded demonstration if its conventions are changed?
+
+A policy is shown frames of a demonstration and answers chunks; what the demonstrator commanded next
+is known. A policy that has learned from such data comes close. If it does not, the usual mistakes
+are undone one by one (`replay_parts`, `replay_views`), and one that brings it much closer, at
+nearly every frame, is most likely the mistake. Success in a simulator cannot tell them apart.
+
+A wrong convention is named only if undoing it takes away most of the error: noise and a mediocre
+policy do not look like that. A policy that fits nothing gets no name, but is said not to fit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from robospa.harness.replays.episodes import Episode, EpisodeError
+from robospa.harness.replays.replay_cases import UNITS, Array, Case, errors, groups, score
+from robospa.harness.replays.replay_parts import PARTS, Part, fitted, product
+from robospa.harness.replays.replay_views import VIEWS, View
+from robospa.protocol.policy import Policy, PolicySpec, TrialInfo
+
+POINTS = 8
+"""Frames at which the policy is asked."""
+GAIN = 0.65
+"""A mistake is named only if undoing it takes away this share of the error."""
+LEAST = 0.05
+"""Nor if it takes away less than this much of it: then there is nothing to explain."""
+AGREE = 0.75
+"""Nor if it helps at a smaller share of the frames at which it makes a difference."""
+FELT = 0.02
+"""A difference of the error at one frame that is worth counting."""
+EXPLAINED = 0.3
+"""An error that leaves nothing to look for."""
+FITS = 1.0
+"""An error of this size or less is what a policy that has learned the data makes."""
+BETTER = 0.8
+"""To have learned anything, its error must be this much below that of holding still."""
+LEARNED = 0.6
+"""With its mistake undone, a policy must be this much below holding still to have learned much."""
+KINDS = ("fits", "mistaken", "unclear")
+
+
+@dataclass(frozen=True)
+class Guess:
+    """Mistakes that may have been made together, and what is left once they are undone.
+
+    `errors` (G,): the mean over all frames of each group's error; `score` sums them up. `helped`:
+    of the frames at which undoing the mistakes made a difference, the share at which it helped.
+    `still` is what holding still would score against the same record.
+    """
+
+    parts: tuple[Part, ...]
+    view: View | None
+    errors: Array
+    score: float
+    helped: float
+    still: float
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of the mistakes."""
+        shown = (self.view.name,) if self.view is not None else ()
+        return (*shown, *(part.name for part in self.parts))
+
+    @property
+    def label(self) -> str:
+        """The names in one line."""
+        return " + ".join(self.names) or "as it is"
+
+    @property
+    def phrase(self) -> str:
+        """What goes after "it looks as if"."""
+        shown = (self.view.phrase,) if self.view is not None else ()
+        return " and ".join((*shown, *(part.phrase for part in self.parts)))
+
+
+@dataclass(frozen=True)
+class Findings:
+    """The outcome. `kind` is one of KINDS; `best` is the guess to believe if it is "mistaken".
+
+    `groups` names the errors; `base` is the policy as it is, `still` one that would not move,
+    `guesses` all single mistakes, the best first. `untried` says what could not be looked at.
+    """
+
+    kind: str
+    groups: tuple[str, ...]
+    base: Guess
+    still: Guess
+    guesses: tuple[Guess, ...]
+    best: Guess | None
+    sentence: str
+    frames: tuple[int, ...]
+    untried: tuple[str, ...] = ()
+
+    def told(self, guess: Guess) -> list[str]:
+        """The errors of `guess` with their units."""
+        names = [name.split()[1] for name in self.groups]
+        return [f"{e:.3f} {UNITS[n]}".strip() for e, n in zip(guess.errors, names, strict=True)]
+
+
+def replay(policy: Policy, episode: Episode, points: int = POINTS) -> Findings:
+    """Ask `policy` at `points` frames of `episode` and look for the mistake that explains it best.
+
+    Raises EpisodeError if the two do not go together, and whatever the policy raises.
+    """
+    spec = policy.spec
+    if spec.privileged:
+        raise EpisodeError(
+            f"the policy {spec.name!r} needs the exact state, which a demonstration does not hold"
+        )
+    frames = _frames(len(episode), spec, points)
+    plain = [_case(policy, episode, t, None) for t in frames]
+    cases = [case for case in plain if case is not None]
+    shown: dict[str, list[Case]] = {}
+    untried = [] if episode.measured is not None else ["measured joints: not in this file"]
+    for view in (view for view in VIEWS if _shown(spec, view)):
+        answers = [_case(policy, episode, t, view) for t in frames]
+        known = [case for case in answers if case is not None]
+        if len(known) == len(cases):
+            shown[view.name] = known
+    return judge(cases, shown, tuple(frames), tuple(untried))
+
+
+def _frames(length: int, spec: PolicySpec, points: int) -> list[int]:
+    """Frames spread over the episode, with half a second or more after the last."""
+    if points < 1:
+        raise EpisodeError("--points must be at least 1")
+    last = max(0, length - 1 - min(spec.execute or spec.horizon, max(8, length // 5)))
+    chosen = np.linspace(0, last, min(points, last + 1))
+    return list(dict.fromkeys(round(float(t)) for t in chosen))
+
+
+def _case(policy: Policy, episode: Episode, t: int, view: View | None) -> Case | None:
+    """The answer at frame `t`, seen as `view` undoes it; None if there is nothing to undo."""
+    spec = policy.spec
+    seen: Any = episode.observation(spec, t)
+    if view is not None:
+        measured = None if episode.measured is None else episode.measured[t]
+        changed = view.undo(seen, {"measured": measured})
+        if changed is None:
+            return None
+        seen = changed
+    policy.reset(_trial(episode))
+    chunk = np.asarray(policy.infer(seen), dtype=float)
+    chunk = chunk[: spec.execute] if spec.execute else chunk
+    joint = spec.action == "joint"
+    track = episode.commanded if joint else episode.ee.reshape(len(episode), 16)
+    wanted = track[t + 1 : t + 1 + len(chunk)]
+    given = chunk[: len(wanted)]
+    if given.shape != wanted.shape:
+        raise EpisodeError(
+            f"the policy answers {chunk.shape[1]} numbers an action, and {episode.name} has "
+            f"{track.shape[1]} of that kind"
+        )
+    if spec.action == "delta_ee":
+        given = absolute(given, track[t])
+    measured = episode.measured if joint else None
+    return Case("joint" if joint else "ee", given, wanted, track[t], track, t, measured)
+
+
+def _shown(spec: PolicySpec, view: View) -> bool:
+    """Whether the policy is shown what `view` changes."""
+    poses = spec.action != "joint"
+    return {
+        "images": bool(spec.cameras),
+        "state": spec.state != "none",
+        "poses": poses,
+        "robot": poses or spec.state != "none",
+    }[view.touches]
+
+
+def _trial(episode: Episode) -> TrialInfo:
+    about = episode.about
+    return TrialInfo(
+        task=str(about.get("task", "")) or "Pick_Blocks_Size",
+        level=int(about.get("level", 1)),
+        seed=int(about.get("seed", 0)),
+        embodiment=str(about.get("embodiment", "aloha-agilex")),
+        mode=str(about.get("mode", "clean")),
+        split=str(about.get("split", "train")),
+        instruction=episode.instruction,
+    )
+
+
+def absolute(chunk: Array, now: Array) -> Array:
+    """`delta_ee` actions (K, 16) as the poses (K, 16) they lead to from `now` (16,)."""
+    poses = np.empty_like(chunk)
+    for arm in (0, 8):
+        place, turn = now[arm : arm + 3], now[arm + 3 : arm + 7]
+        for row, out in zip(chunk[:, arm : arm + 8], poses[:, arm : arm + 8], strict=True):
+            shift = product(product(turn, np.concatenate([[0.0], row[:3]])), turn * [1, -1, -1, -1])
+            place = place + shift[1:]
+            turn = product(turn, row[3:7])
+            turn = turn / max(float(np.linalg.norm(turn)), 1e-9)
+            out[:] = [*place, *turn, row[7]]
+    return poses
+
+
+# ---------------------------------------------------------------- judging
+
+
+def judge(
+    cases: Sequence[Case],
+    shown: dict[str, list[Case]],
+    frames: tuple[int, ...] = (),
+    untried: tuple[str, ...] = (),
+    gain: float = GAIN,
+) -> Findings:
+    """What explains `cases`, the answers as they are; `shown` has those to every View by name."""
+    before = [score(case) for case in cases]
+    base = _guess((), None, cases, before)
+    still = _guess((), None, [_held(case) for case in cases], before)
+    parts = [*PARTS, *fitted(cases)]
+    views = [view for view in VIEWS if view.name in shown]
+    singles = list(_tried(cases, None, parts, before, 1))
+    singles += [_guess((), view, shown[view.name], before) for view in views]
+    guesses = sorted((g for g in singles if g is not None), key=lambda g: g.score)
+    more: list[Guess] = []
+    if min(guess.score for guess in (base, *guesses)) > EXPLAINED:  # perhaps two at once
+        more += _tried(cases, None, parts, before, 2)
+        for view in views:
+            more += _tried(shown[view.name], view, [*PARTS, *fitted(shown[view.name])], before, 1)
+    fits = base.score <= FITS and base.score <= BETTER * still.score
+    best = _simplest([g for g in (*guesses, *more) if _convincing(g, base, gain)])
+    kind = "mistaken" if best is not None else "fits" if fits else "unclear"
+    sentence = _sentence(kind, base, still, best)
+    names = tuple(groups(cases[0].space))
+    return Findings(kind, names, base, still, tuple(guesses), best, sentence, frames, untried)
+
+
+def _tried(
+    cases: Sequence[Case],
+    view: View | None,
+    parts: Iterable[Part],
+    before: Sequence[float],
+    size: int,
+) -> Iterator[Guess]:
+    """Every choice of `size` parts of different families, undone in the order of `parts`."""
+    for chosen in combinations(parts, size):
+        if len({part.family for part in chosen}) < size:
+            continue
+        undone: list[Case] = []
+        for case in cases:
+            now: Case | None = case
+            for part in chosen:
+                now = part.undo(now) if now is not None else None
+            if now is not None:
+                undone.append(now)
+        if len(undone) == len(cases):
+            yield _guess(chosen, view, undone, before)
+
+
+def _guess(
+    parts: tuple[Part, ...], view: View | None, cases: Sequence[Case], before: Sequence[float]
+) -> Guess:
+    each = np.array([errors(case) for case in cases])
+    after = [score(case) for case in cases]
+    change = np.subtract(before, after)
+    felt = change[np.abs(change) > FELT]
+    helped = (felt > 0).mean() if len(felt) else 0.0
+    held = float(np.mean([score(_held(case)) for case in cases]))
+    return Guess(parts, view, each.mean(axis=0), float(np.mean(after)), float(helped), held)
+
+
+def _held(case: Case) -> Case:
+    """The same with a policy that does not move."""
+    return replace(case, given=np.tile(case.now, (len(case.wanted), 1)))
+
+
+def _simplest(guesses: Sequence[Guess]) -> Guess | None:
+    """The best guess, or one almost as good with fewer mistakes."""
+    if not guesses:
+        return None
+    least = min(guess.score for guess in guesses)
+    good = [guess for guess in guesses if guess.score <= 1.15 * least + 0.02]
+    return min(good, key=lambda guess: (len(guess.names), guess.score))
+
+
+def _convincing(guess: Guess, base: Guess, gain: float) -> bool:
+    if guess.still > FELT and guess.score > LEARNED * guess.still:
+        return False
+    won = base.score - guess.score
+    return won >= max(gain * base.score, LEAST) and guess.helped >= AGREE
+
+
+def _sentence(kind: str, base: Guess, still: Guess, best: Guess | None) -> str:
+    if best is not None:
+        return (
+            f"It looks as if {best.phrase}: undoing that takes the error from {base.score:.2f} to "
+            f"{best.score:.2f}."
+        )
+    if kind == "fits":
+        return (
+            f"It fits the demonstration: error {base.score:.2f}, where 1 is good and holding still "
+            f"has {still.score:.2f}; no change of conventions does much better."
+        )
+    return (
+        f"It does not fit the demonstration (error {base.score:.2f}, holding still "
+        f"{still.score:.2f}), and no mistake known here explains that: it may not have learned "
+        "this task, or not be told what it was trained to be told."
+    )

@@ -1,0 +1,127 @@
+"""Mistakes in what a policy is shown, each as something to undo: the policy is then asked again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from robospa.harness.replays.replay_cases import Array
+
+
+@dataclass(frozen=True)
+class View:
+    """One mistake in what a policy is shown. `undo` gives the observation that it may have been
+    trained on, or None where that cannot be told; `extra` has what else is known of the frame.
+    `touches` is what it changes: a policy that is not shown that need not be asked again."""
+
+    name: str
+    phrase: str
+    touches: str
+    undo: Callable[[Mapping[str, Any], Mapping[str, Any]], Mapping[str, Any] | None]
+
+
+def _images(change: Callable[[str, Any], Any]) -> Any:
+    """Changes every image, those of history as well."""
+
+    def undo(seen: Mapping[str, Any], extra: Mapping[str, Any]) -> Mapping[str, Any] | None:
+        return _each(seen, lambda view: {"images": change_all(view["images"])})
+
+    def change_all(images: Mapping[str, Any]) -> Mapping[str, Any]:
+        return {name: change(name, image) for name, image in images.items()}
+
+    return undo
+
+
+def _each(seen: Mapping[str, Any], change: Callable[[Mapping[str, Any]], Any]) -> dict[str, Any]:
+    turned = {**seen, **change(seen)}
+    if "history" in seen:
+        turned["history"] = {o: {**v, **change(v)} for o, v in seen["history"].items()}
+    return turned
+
+
+def _wrists(seen: Mapping[str, Any], extra: Mapping[str, Any]) -> Mapping[str, Any] | None:
+    other = {"left_wrist": "right_wrist", "right_wrist": "left_wrist"}
+    if not set(other) <= set(seen["images"]):
+        return None
+    return _each(
+        seen,
+        lambda view: {"images": {n: view["images"][other.get(n, n)] for n in view["images"]}},
+    )
+
+
+def _state(change: Callable[[Array], Array], poses: Callable[[Array], Array] | None = None) -> Any:
+    """Changes the joints shown, and the poses."""
+
+    def undo(seen: Mapping[str, Any], extra: Mapping[str, Any]) -> Mapping[str, Any] | None:
+        def changed(view: Mapping[str, Any]) -> dict[str, Any]:
+            new: dict[str, Any] = {}
+            if "state" in view:
+                rows = np.asarray(view["state"], float).reshape(2, -1)
+                new["state"] = change(rows).reshape(-1).astype(np.float32)
+            if poses is not None and "ee" in view:
+                new["ee"] = poses(np.asarray(view["ee"], float)).astype(np.float32)
+            return new
+
+        return _each(seen, changed)
+
+    return undo
+
+
+def _hands(rows: Array) -> Array:
+    return np.hstack([rows[:, :-1], 1 - rows[:, -1:]])
+
+
+def _shown_measured(seen: Mapping[str, Any], extra: Mapping[str, Any]) -> Mapping[str, Any] | None:
+    if "state" not in seen or extra.get("measured") is None:
+        return None
+    return {**seen, "state": np.asarray(extra["measured"], np.float32)}
+
+
+VIEWS: tuple[View, ...] = (
+    View("wrist images swapped", "left and right wrist images are swapped", "images", _wrists),
+    View(
+        "blue for red",
+        "it was trained on images with red and blue swapped",
+        "images",
+        _images(lambda name, image: np.ascontiguousarray(image[..., ::-1])),
+    ),
+    View(
+        "images upside down",
+        "it was trained on images turned by 180 degrees",
+        "images",
+        _images(lambda name, image: np.ascontiguousarray(image[::-1, ::-1])),
+    ),
+    View(
+        "arms of the state swapped",
+        "it expects the right arm first in the state",
+        "robot",
+        _state(lambda rows: rows[::-1], lambda rows: rows[::-1]),
+    ),
+    View(
+        "grippers of the state inverted",
+        "1 is a closed gripper in the state that it expects",
+        "robot",
+        _state(_hands, _hands),
+    ),
+    View(
+        "state in degrees",
+        "it expects the state in degrees",
+        "state",
+        _state(lambda rows: np.hstack([np.degrees(rows[:, :-1]), rows[:, -1:]])),
+    ),
+    View(
+        "quaternions of the state x y z w",
+        "it expects quaternions x y z w in the state",
+        "poses",
+        _state(lambda rows: rows, lambda rows: rows[:, [0, 1, 2, 4, 5, 6, 3, 7]]),
+    ),
+    View(
+        "measured state",
+        "it expects the measured joints, not the commanded ones",
+        "state",
+        _shown_measured,
+    ),
+)

@@ -1,0 +1,1 @@
+"""A run: the driver, its scheduler and workers, and what they write."""

@@ -1,0 +1,178 @@
+"""One evaluation from start to finish: look at the policy and the world, fix the trials, run them.
+
+Nothing is written before the policy has answered, the world has been built and the settings fit an
+earlier run of the same folder.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from multiprocessing.connection import Connection
+from typing import Any
+
+from robospa.harness.factory import is_url, load
+from robospa.harness.running.locking import locked
+from robospa.harness.running.manifest import Manifest, about_machine, check_folder, open_run
+from robospa.harness.running.policies import Probed, probe_policies, warnings_of
+from robospa.harness.running.progress import Progress, summary
+from robospa.harness.running.ray_bridge import RaySettings
+from robospa.harness.running.ray_executor import far_away, joined
+from robospa.harness.running.runner import RunAborted, Runner, RunOptions
+from robospa.harness.running.store import tidy
+from robospa.harness.running.worker import WorkerConfig, describe
+from robospa.results.reading import finished, read_records
+from robospa.results.records import TrialKey
+
+PROBE_SECONDS = 120.0
+
+
+@dataclass(frozen=True)
+class Request:
+    """What to evaluate: `keys` with the policy and world of `config`, as `options` say.
+
+    `settings` decide the result beside the policy's spec; `arguments` are only kept. `wait`: how
+    long the policy's server may take to come up at the start [s].
+    """
+
+    config: WorkerConfig
+    keys: Sequence[TrialKey]
+    options: RunOptions = field(default_factory=RunOptions)
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    arguments: Mapping[str, Any] = field(default_factory=dict)
+    resume: bool = False
+    wait: float = 0.0
+    ray: RaySettings | None = None
+    """Where the workers are, if not on this machine."""
+
+
+class WorldBroken(Exception):
+    """No world can be built on this machine."""
+
+
+def _probe_world(pipe: Connection, factory: str, arguments: dict[str, Any]) -> None:
+    try:
+        world = load(factory)(**arguments)
+        pipe.send((dict(world.info()), ""))
+        world.close()
+    except Exception as error:
+        pipe.send(({}, describe(error)))
+
+
+def probe_world(config: WorkerConfig, render: bool) -> dict[str, Any]:
+    """What a world says about itself, built once in a process of its own.
+
+    Raises WorldBroken: better now than in every trial.
+    """
+    spawn = multiprocessing.get_context("spawn")
+    ours, theirs = spawn.Pipe()
+    arguments = dict(config.world_arguments)
+    if render and "render" in arguments:
+        arguments["render"] = True
+    child = spawn.Process(target=_probe_world, args=(theirs, config.world, arguments), daemon=True)
+    child.start()
+    theirs.close()
+    try:
+        if not ours.poll(PROBE_SECONDS):
+            raise WorldBroken(f"the world was not ready after {PROBE_SECONDS:g} s")
+        info, trouble = ours.recv()
+    except EOFError as error:
+        child.join()
+        raise WorldBroken(
+            f"the simulator crashed while starting (exit code {child.exitcode}); "
+            "`robospa doctor` says what is missing"
+        ) from error
+    finally:
+        child.join(5.0)
+        child.kill()
+        child.join()
+        ours.close()
+    if trouble:
+        raise WorldBroken(
+            f"no world can be built: {trouble}; `robospa doctor` says what is missing"
+        )
+    return dict(info)
+
+
+def make_manifest(request: Request, policies: Mapping[str, Probed]) -> Manifest:
+    """The run's manifest, with the policy of every task; the world is built once to describe it."""
+    config = request.config
+    specs = [policy.spec for policy in policies.values()]
+    world = probe_world(config, _renders(config, policies))
+    parts = load(config.parts)
+    first = {key.task: key for key in reversed(list(request.keys))}
+    found = {task: parts(key) for task, key in first.items()}
+    one = next(iter(policies.values()))
+    settings = {
+        **request.settings,
+        "policy": one.settings(),
+        "privileged": any(spec.privileged for spec in specs),
+        "run_seed": config.run_seed,
+        "step_scale": config.step_scale,
+        "world": {"factory": config.world, **config.world_arguments},
+    }
+    about = about_machine(world)
+    about["policy"] = _about_policy(one)
+    if config.policies:
+        settings["policies"] = {task: policy.settings() for task, policy in policies.items()}
+        about["policies"] = {task: _about_policy(policy) for task, policy in policies.items()}
+    about["arguments"] = dict(request.arguments)
+    told = {task: getattr(part, "instruction", "") for task, part in found.items()}
+    about["warnings"] = warnings_of(policies, told, config.step_scale)
+    categories = {task: part.task.category for task, part in found.items()}
+    return Manifest(settings, tuple(request.keys), about, categories)
+
+
+def _renders(config: WorkerConfig, policies: Mapping[str, Probed]) -> bool:
+    """Whether any picture will be asked for."""
+    return config.video != "none" or any(p.spec.cameras for p in policies.values())
+
+
+def _about_policy(policy: Probed) -> dict[str, Any]:
+    """Where it is and how it greeted; further servers of the same policy beside."""
+    told: dict[str, Any] = {"target": policy.target, "hello": policy.hello}
+    if policy.equals:
+        told["equals"] = [{"target": p.target, "hello": p.hello} for p in policy.equals]
+    return told
+
+
+def evaluate(request: Request) -> None:
+    """Run every listed trial of `request` that has no result yet.
+
+    Raises what the policy's connection raises, RunError, WorldBroken and RunAborted; on
+    KeyboardInterrupt the run stays resumable.
+    """
+    folder = request.config.folder
+    check_folder(folder, request.resume)
+    policies = probe_policies(request.config, request.keys, request.wait)
+    manifest = make_manifest(request, policies)
+    first = {key.task: key for key in reversed(list(request.keys))}
+    config = replace(
+        request.config,
+        samples=frozenset(first.values()),
+        expects={
+            p.target: p.spec
+            for policy in policies.values()
+            for p in (policy, *policy.equals)
+            if is_url(p.target)
+        },
+    )
+    with joined(request.ray, config, _renders(config, policies)) as executor, locked(folder):
+        tidy(folder)
+        open_run(folder, manifest, request.resume)
+        known = read_records(folder)
+        owed = [key for key in request.keys if not finished(known.get(key))]
+        with Progress(len(request.keys), len(request.keys) - len(owed)) as progress:
+            for text in [*manifest.about["warnings"], *far_away(executor, config)]:
+                progress.note(f"warning: {text}")
+            runner = Runner(config, owed, request.options, progress.add, progress.note)
+            runner.executor = executor
+            runner.on_status = progress.show
+            runner.run()
+        for text in summary(runner.shares.overall(), runner.status(time.monotonic())):
+            progress.note(text)
+
+
+__all__ = ["Request", "RunAborted", "WorldBroken", "evaluate", "probe_world"]

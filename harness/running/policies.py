@@ -1,0 +1,205 @@
+"""The policies of a run: one for all tasks, or one for each, looked at before anything is written.
+
+A map from base task to policy is a JSON file, {"Pick_Blocks_Size": "ws://gpu1:8000", ...}: the
+paper's protocol trains one checkpoint per base task, so one "model" is as many servers. Where one
+server is not enough there may be a list of them; they have to be one as good as the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from robospa.harness.factory import open_policy
+from robospa.protocol.policy import PolicySpec
+from robospa.results.reading import RunError
+from robospa.results.records import TrialKey
+from robospa.results.strangers import parse
+
+if TYPE_CHECKING:
+    from robospa.harness.running.worker import Targets, WorkerConfig
+
+NAMED = 3
+"""How many tasks an error names before it only counts."""
+
+
+@dataclass(frozen=True)
+class Probed:
+    """A policy that has answered: `hello` is its greeting, or says that it runs in process.
+
+    `equals` are further servers that answered the same.
+    """
+
+    target: str
+    spec: PolicySpec
+    hello: Mapping[str, Any]
+    equals: tuple[Probed, ...] = ()
+
+    def settings(self) -> dict[str, Any]:
+        """What of it decides a result; JSON values."""
+        return {
+            "spec": self.spec.to_json(),
+            "dialect": self.hello.get("dialect"),
+            "options": self.hello.get("options", {}),
+        }
+
+
+def read_map(file: Path, wanted: Sequence[str], known: Collection[str]) -> dict[str, Targets]:
+    """The policy of every task in `wanted`, or its policies, from the JSON `file`.
+
+    Raises RunError if the file is no such map, names a task that does not exist, or lacks one.
+    """
+    try:
+        found = parse(file.read_text())
+    except (OSError, ValueError) as error:
+        raise RunError(f"--policy-map {file} cannot be read: {error}") from error
+    if not isinstance(found, dict) or not all(map(_is_targets, found.values())):
+        raise RunError(
+            f"--policy-map {file} is no map from tasks to URLs: write "
+            '{"Pick_Blocks_Size": "ws://host:8000", ...}, or a list of different URLs for a task'
+        )
+    if strange := [task for task in found if task not in known]:
+        raise RunError(f"--policy-map {file} names tasks that do not exist: {_some(strange)}")
+    if missing := [task for task in wanted if task not in found]:
+        raise RunError(
+            f"--policy-map {file} has no policy for {_some(missing)}; add them or choose fewer "
+            "--tasks"
+        )
+    return {t: v if isinstance(v := found[t], str) else tuple(v) for t in wanted}
+
+
+def _is_targets(value: object) -> bool:
+    """Whether `value` is a URL or a list of different ones."""
+    if not isinstance(value, list):
+        return bool(value) and isinstance(value, str)
+    return all(v and isinstance(v, str) for v in value) and len(set(value)) == len(value) > 0
+
+
+def _some(names: Sequence[str]) -> str:
+    more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+    return ", ".join(name[:80] for name in names[:NAMED]) + more
+
+
+def probe(target: str, given: Mapping[str, Any], wait: float = 0.0) -> Probed:
+    """The policy at `target`, after at most `wait` s of nobody listening.
+
+    Raises what connecting raises.
+    """
+    options = dict(given)
+    if "timeouts" in options:
+        options["timeouts"] = replace(options["timeouts"], wait=wait)
+    policy = open_policy(target, options)
+    hello = dict(getattr(policy, "hello", None) or {"dialect": "in process"})
+    close = getattr(policy, "close", None)
+    if close is not None:
+        close()
+    return Probed(target, policy.spec, hello)
+
+
+def probe_policies(
+    config: WorkerConfig, keys: Sequence[TrialKey], wait: float = 0.0
+) -> dict[str, Probed]:
+    """The policy of every task of `keys`, each server asked once.
+
+    Raises what connecting raises, and RunError if one does not drive the embodiment asked for or
+    if those of one task differ.
+    """
+    seen: dict[str, Probed] = {}
+    found: dict[str, Probed] = {}
+    for task in dict.fromkeys(key.task for key in keys):
+        targets = config.targets(task)
+        for target in targets:
+            if target not in seen:
+                seen[target] = probe(target, config.options, wait)
+        found[task] = equals([seen[target] for target in targets], task if config.policies else "")
+        check_fit(found[task].spec, [key for key in keys if key.task == task])
+    return found
+
+
+def equals(servers: Sequence[Probed], task: str = "") -> Probed:
+    """The first of `servers` with the others beside; raises RunError if one differs from it."""
+    first, *others = servers
+    wanted = _flat(first.settings())
+    for other in others:
+        found = _flat(other.settings())
+        changes = [
+            f"{name} is {wanted.get(name, 'unset')!r} and {found.get(name, 'unset')!r}"
+            for name in sorted({*wanted, *found})
+            if wanted.get(name, "unset") != found.get(name, "unset")
+        ]
+        if changes:
+            where = f" of {task}" if task else ""
+            raise RunError(
+                f"the policy servers {first.target} and {other.target}{where} are not the same: "
+                f"{'; '.join(changes)}; start them alike, or use --policy-map to tell which task "
+                "each of them does"
+            )
+    return replace(first, equals=tuple(others))
+
+
+def _flat(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings by dotted name, without what may differ: how many observations one call holds."""
+    parts = {name: value for name, value in settings.items() if name != "spec"}
+    spec = {f"spec.{name}": v for name, v in settings["spec"].items() if name != "batch"}
+    return {**parts, **spec}
+
+
+def check_fit(spec: PolicySpec, keys: Sequence[TrialKey]) -> None:
+    """Raises RunError if the policy does not drive the embodiment that is asked for."""
+    wanted = sorted({key.embodiment for key in keys})
+    missing = [name for name in wanted if spec.embodiments and name not in spec.embodiments]
+    if missing:
+        raise RunError(
+            f"the policy {spec.name!r} drives {', '.join(spec.embodiments)}, not {missing[0]}; "
+            "choose another --embodiment"
+        )
+
+
+def warnings_of(
+    policies: Mapping[str, Probed], instructions: Mapping[str, str], step_scale: float
+) -> list[str]:
+    """Everything that a user should know before the first trial, once each.
+
+    `instructions` has one of every task.
+    """
+    found: list[str] = []
+    if step_scale != 1:
+        found.append(
+            f"step limits are {step_scale:g} times the official ones: these numbers do not stand "
+            "beside those of other runs"
+        )
+    budgets: dict[int, dict[str, str]] = {}
+    for task, policy in policies.items():
+        for other in policy.equals:
+            first, second = policy.hello.get("server"), other.hello.get("server")
+            if first != second:
+                found.append(
+                    f"{policy.target} calls itself {first!r} and {other.target} {second!r}: make "
+                    "sure that both serve the same checkpoint"
+                )
+        found += [str(text) for text in policy.hello.get("warnings", ())]
+        budget = policy.hello.get("text_budget")
+        if isinstance(budget, int):
+            budgets.setdefault(budget, {})[task] = instructions.get(task, "")
+    if budgets:
+        from robospa.clients.text import budget_warning
+
+        found += [
+            text
+            for budget, told in budgets.items()
+            if (text := budget_warning(budget, told)) is not None
+        ]
+    return list(dict.fromkeys(found))
+
+
+def over_budget(hello: Mapping[str, Any] | None, instruction: str) -> dict[str, int] | None:
+    """What a trial's record keeps if its instruction was too long for the model to read whole."""
+    budget = (hello or {}).get("text_budget")
+    if not isinstance(budget, int):
+        return None
+    from robospa.clients.text import least_tokens
+
+    count = least_tokens(instruction)
+    return {"instruction_tokens": count, "text_budget": budget} if count > budget else None

@@ -1,0 +1,214 @@
+"""What the user sees while a run goes on: a live view on a terminal, plain lines elsewhere."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections import deque
+from collections.abc import Mapping, Sequence
+from types import TracebackType
+from typing import Any, TextIO
+
+from robospa.harness.running.servers import Server
+from robospa.harness.running.status import Status, server_text, shares_text
+from robospa.results.records import TrialRecord
+
+EVERY = 15.0
+"""Seconds between two plain lines."""
+DETAILS = 120.0
+"""Seconds between two plain lines that say where the time goes."""
+REFRESH = 0.5
+"""Seconds between two pictures on a terminal."""
+RECENT = 64
+"""Trials over which the speed is measured."""
+ROWS = 8
+"""Servers that the live view lists; the busiest ones if there are more."""
+
+
+class Tally:
+    """Counts of what has come in, and the text that sums them up."""
+
+    def __init__(self, total: int, already: int) -> None:
+        self.total = total
+        self.already = already
+        self.ran = 0
+        self.successes = 0
+        self.lost = 0
+        self._times = deque([time.monotonic()], maxlen=RECENT)
+
+    def add(self, record: TrialRecord) -> None:
+        """Count one finished or lost trial."""
+        self.ran += 1
+        self.successes += record.success
+        self.lost += record.end == "infrastructure"
+        self._times.append(time.monotonic())
+
+    @property
+    def done(self) -> int:
+        """Trials with a record."""
+        return self.already + self.ran
+
+    @property
+    def left(self) -> int:
+        """Trials still to run."""
+        return self.total - self.done
+
+    @property
+    def rate(self) -> float:
+        """Trials a second over the last ones; falls while none comes in."""
+        return (len(self._times) - 1) / max(time.monotonic() - self._times[0], 1e-9)
+
+    def text(self, seconds_left: float | None = None) -> str:
+        """Success so far, speed and time left."""
+        scored = self.ran - self.lost
+        parts = [f"success {100 * self.successes / scored:.1f} %" if scored else "no result yet"]
+        if self.ran:
+            parts.append(f"{60 * self.rate:.1f} trials/min")
+        if self.left and seconds_left is not None:
+            parts.append(f"{clock(seconds_left)} left")
+        if self.lost:
+            parts.append(f"{self.lost} lost")
+        return ", ".join(parts)
+
+
+def clock(seconds: float) -> str:
+    """`seconds` as 1:02:03 or 2:03."""
+    hours, rest = divmod(round(seconds), 3600)
+    minutes, secs = divmod(rest, 60)
+    return f"{hours}:{minutes:02d}:{secs:02d}" if hours else f"{minutes}:{secs:02d}"
+
+
+class Progress:
+    """Shows a `Tally` and the latest `Status`; use as a context manager."""
+
+    def __init__(self, total: int, already: int = 0, stream: TextIO | None = None) -> None:
+        self.tally = Tally(total, already)
+        self._stream = stream or sys.stderr
+        self._live: Any = None
+        self._status: Status | None = None
+        self._shown = self._line = self._detail = float("-inf")
+
+    def __enter__(self) -> Progress:
+        self._detail = time.monotonic() - DETAILS + 2 * EVERY
+        if self._stream.isatty():
+            self._start_live()
+        else:
+            self.note(f"{self.tally.left} trials to run, {self.tally.already} already done")
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if self._live is not None:
+            self._live.update(self._picture(final=True), refresh=True)
+            self._live.stop()
+            self._live = None
+
+    def add(self, record: TrialRecord) -> None:
+        """Count one trial."""
+        self.tally.add(record)
+
+    def show(self, status: Status) -> None:
+        """Show the counts and `status`, but not more often than anybody can read."""
+        self._status = status
+        now = time.monotonic()
+        if self._live is not None:
+            if now - self._shown >= REFRESH or self.tally.left == 0:
+                self._shown = now
+                self._live.update(self._picture(), refresh=True)
+        elif self.tally.ran and (now - self._line >= EVERY or self.tally.left == 0):
+            self._line = now
+            counted = f"{self.tally.done}/{self.tally.total} trials"
+            self.note(f"{counted}, {self.tally.text(status.left)}")
+            if now - self._detail >= DETAILS and self.tally.left:
+                self._detail = now
+                for text in details(status):
+                    self.note(f"  {text}")
+
+    def note(self, text: str) -> None:
+        """One line of news."""
+        if self._live is not None:
+            self._live.console.print(text, style="yellow", highlight=False, markup=False)
+        else:
+            print(text, file=self._stream, flush=True)
+
+    def _start_live(self) -> None:
+        from rich.console import Console
+        from rich.live import Live
+
+        console = Console(file=self._stream)
+        self._live = Live(self._picture(), console=console, auto_refresh=False)
+        self._live.start()
+
+    def _picture(self, final: bool = False) -> Any:
+        """What a terminal shows: bar and counts, where the time goes, the servers, who is slow."""
+        from rich.console import Group
+        from rich.progress_bar import ProgressBar
+        from rich.table import Table
+        from rich.text import Text
+
+        status, tally = self._status, self.tally
+        head = Table.grid(padding=(0, 1))
+        bar = ProgressBar(total=max(tally.total, 1), completed=tally.done, width=28)
+        said = tally.text(status.left if status is not None else None) if tally.ran else "starting"
+        head.add_row(bar, f"{tally.done}/{tally.total}", Text(said))
+        if status is None or final:
+            return head
+        shares = shares_text(status.shares)
+        told = f"{status.staff}; {shares}" if shares else status.staff
+        lines: list[Any] = [head, Text(told, style="dim")]
+        if status.servers:
+            lines.append(_table(status))
+        if status.verdict:
+            lines.append(Text(status.verdict, style="bold"))
+        return Group(*lines)
+
+
+def _table(status: Status) -> Any:
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=None, pad_edge=False, header_style="dim")
+    table.add_column("policy", overflow="ellipsis", no_wrap=True, max_width=40)
+    for name in ("workers", "trials"):
+        table.add_column(name, justify="right")
+    table.add_column("", no_wrap=True)
+    table.add_column("task", overflow="ellipsis", no_wrap=True, style="dim")
+    shown = _busiest(status.servers)
+    for server in shown:
+        told = Text(server_text(server, status.now), style="" if server.up else "yellow")
+        counts = (str(server.running), str(server.trials))
+        table.add_row(Text(server.target), *counts, told, Text(server.task))
+    if more := len(status.servers) - len(shown):
+        table.add_row(f"and {more} more", "", "", "", "")
+    return table
+
+
+def _busiest(servers: Sequence[Server]) -> list[Server]:
+    """At most ROWS of them, in their own order; those that are away first of all."""
+    if len(servers) <= ROWS:
+        return list(servers)
+    order = sorted(servers, key=lambda s: (s.up, -s.running, -s.trials))[:ROWS]
+    return [server for server in servers if server in order]
+
+
+def details(status: Status) -> list[str]:
+    """Lines that say where the time goes, what the servers do and who holds the others up."""
+    shares = shares_text(status.shares)
+    lines = [f"{status.staff}; {shares}"] if shares else []
+    asked = [s for s in _busiest(status.servers) if s.trials or not s.up]
+    lines += [f"{s.target}: {s.trials} trials, {server_text(s, status.now)}" for s in asked]
+    return [*lines, status.verdict] if status.verdict else lines
+
+
+def summary(shares: Mapping[str, float], status: Status) -> list[str]:
+    """The same about a whole run, for its end."""
+    lines = [f"time: {shares_text(shares)}, with {status.workers} workers on {status.cores} cores"]
+    asked = [s for s in _busiest(status.servers) if s.trials]
+    many = len(asked) > 1
+    lines += [f"{s.target}: {f'{s.trials} trials, ' if many else ''}{server_text(s, status.now)}"
+              for s in asked if s.means]  # fmt: skip
+    return lines if shares else []

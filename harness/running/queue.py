@@ -1,0 +1,152 @@
+"""The trials of a run that still have to be done, by base task, the longest expected first.
+
+What a trial is expected to take is its step limit until trials of its variant were measured in this
+run. Long trials go first so that no worker is left with one at the end. Which task is next is the
+scheduler's choice (`robospa.harness.running.scheduler`), because it depends on the servers.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from robospa.results.records import TrialKey
+
+
+@dataclass(frozen=True)
+class Pending:
+    """A trial waiting to be run for the `attempt`-th time."""
+
+    key: TrialKey
+    attempt: int = 1
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What is known of a variant before any of its trials has run."""
+
+    category: str = ""
+    candidates: int = 0
+    subtasks: int = 0
+    steps: int = 0
+
+
+class Costs:
+    """Expected seconds of a trial. `steps` is the step limit of a key's variant.
+
+    What was measured for a variant is averaged with one trial's worth of the guess from its step
+    limit, which is worth as many seconds a step as the run's trials have taken so far.
+    """
+
+    def __init__(self, steps: Callable[[TrialKey], int]) -> None:
+        self._steps = steps
+        self._measured: dict[tuple[str, int], tuple[float, int]] = {}
+        self._seconds = self._limits = 0.0
+
+    @property
+    def known(self) -> bool:
+        """Whether any trial was measured; until then `expect` only compares."""
+        return self._limits > 0
+
+    def learn(self, key: TrialKey, seconds: float) -> None:
+        """A trial of the variant of `key` took `seconds`."""
+        total, count = self._measured.get(key.variant, (0.0, 0))
+        self._measured[key.variant] = (total + seconds, count + 1)
+        self._seconds += seconds
+        self._limits += max(1, self._steps(key))
+
+    def expect(self, key: TrialKey) -> float:
+        """Seconds that a trial of the variant of `key` should take."""
+        a_step = self._seconds / self._limits if self.known else 1.0
+        total, count = self._measured.get(key.variant, (0.0, 0))
+        return (total + a_step * max(1, self._steps(key))) / (count + 1)
+
+
+@dataclass
+class _Group:
+    """What is left of one base task: fresh trials by level, retries by the time they are due."""
+
+    fresh: dict[int, deque[Pending]] = field(default_factory=dict)
+    retries: list[tuple[float, int, Pending]] = field(default_factory=list)
+
+    def due(self, now: float) -> bool:
+        return bool(self.fresh) or (bool(self.retries) and self.retries[0][0] <= now)
+
+
+class TrialQueue:
+    """All trials of a run that are not settled yet. `parts` finds the task of a key."""
+
+    def __init__(self, keys: Sequence[TrialKey], parts: Callable[[TrialKey], Any]) -> None:
+        self._parts = parts
+        self._facts: dict[tuple[str, int], Facts] = {}
+        self._groups: dict[str, _Group] = {}
+        self._count = 0
+        self.costs = Costs(lambda key: self.facts(key).steps)
+        self.unsettled = len(keys)
+        for key in sorted(keys):
+            levels = self._groups.setdefault(key.task, _Group()).fresh
+            levels.setdefault(key.level, deque()).append(Pending(key))
+
+    def facts(self, key: TrialKey) -> Facts:
+        """Facts of the variant of `key`; all empty if its task cannot be found."""
+        if key.variant not in self._facts:
+            try:
+                task = self._parts(key).task
+                level = task.levels[key.level]
+                found = Facts(task.category, level.candidates, level.subtasks, level.steps)
+            except Exception:  # the worker will meet the same error and report it
+                found = Facts()
+            self._facts[key.variant] = found
+        return self._facts[key.variant]
+
+    @property
+    def tasks(self) -> tuple[str, ...]:
+        """Every base task of the run."""
+        return tuple(self._groups)
+
+    def due(self, now: float) -> dict[str, float]:
+        """Expected seconds of what waits, for every task that has something to run at `now`."""
+        return {task: self._left(group) for task, group in self._groups.items() if group.due(now)}
+
+    def waiting(self) -> tuple[str, ...]:
+        """Every base task that still has a trial to start, now or after its pause."""
+        return tuple(task for task, g in self._groups.items() if g.fresh or g.retries)
+
+    def left(self) -> float:
+        """Expected seconds of everything that waits."""
+        return sum(map(self._left, self._groups.values()))
+
+    def _left(self, group: _Group) -> float:
+        fresh = sum(len(line) * self.costs.expect(line[0].key) for line in group.fresh.values())
+        return fresh + sum(self.costs.expect(work.key) for _, _, work in group.retries)
+
+    def take(self, task: str, now: float) -> Pending | None:
+        """The next trial of `task`: a retry whose pause is over, or the longest; None if none."""
+        group = self._groups[task]
+        if group.retries and group.retries[0][0] <= now:
+            return heapq.heappop(group.retries)[2]
+        if not group.fresh:
+            return None
+        level = max(group.fresh, key=lambda n: (self.costs.expect(group.fresh[n][0].key), -n))
+        line = group.fresh[level]
+        work = line.popleft()
+        if not line:
+            del group.fresh[level]
+        return work
+
+    def again(self, work: Pending, due: float) -> None:
+        """Run `work` (as it is: the caller counts attempts), not before time `due`."""
+        self._count += 1
+        heapq.heappush(self._groups[work.key.task].retries, (due, self._count, work))
+
+    def next_due(self, now: float) -> float | None:
+        """When the next pause after `now` is over; None if nobody pauses."""
+        dues = [due for g in self._groups.values() for due, _, _ in g.retries if due > now]
+        return min(dues, default=None)
+
+    def settle(self) -> None:
+        """One trial has its record."""
+        self.unsettled -= 1

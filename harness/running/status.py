@@ -1,0 +1,155 @@
+"""How a run is doing, as values and in words: where the time goes, what each server does, who holds
+the others up.
+
+The driver makes a `Status` from what it knows; `harness.progress` shows it.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from robospa.harness.factory import is_url
+from robospa.harness.running.servers import Server
+from robospa.harness.running.staffing import FULL
+from robospa.results.records import TrialRecord
+
+RECENT = 200
+"""Trials whose shares of time are shown while a run goes on."""
+PURPOSES = {
+    "physics": ("physics", "goal"),
+    "rendering": ("rendering",),
+    "waiting": ("waiting",),
+    "scenes": ("loading",),
+}
+"""What is shown, and the entries of a record's `timing` that belong to it; the rest is "other"."""
+
+
+@dataclass
+class Shares:
+    """Where the time of the last trials went, and of all."""
+
+    recent: deque[Mapping[str, float]] = field(default_factory=lambda: deque(maxlen=RECENT))
+    whole: dict[str, float] = field(default_factory=dict)
+
+    def add(self, record: TrialRecord) -> None:
+        """Count one trial that was run."""
+        spent = split(record)
+        self.recent.append(spent)
+        self.whole = _sum((self.whole, spent))
+
+    def now(self) -> dict[str, float]:
+        """Shares of the last trials; empty before the first."""
+        return _shares(_sum(self.recent))
+
+    def overall(self) -> dict[str, float]:
+        """Shares of all trials."""
+        return _shares(self.whole)
+
+
+def split(record: TrialRecord) -> dict[str, float]:
+    """Seconds of one trial by what is shown."""
+    spent = {
+        name: sum(record.timing.get(part, 0.0) for part in parts)
+        for name, parts in PURPOSES.items()
+    }
+    spent["other"] = max(0.0, record.wall_time - sum(spent.values()))
+    return spent
+
+
+def _sum(parts: Iterable[Mapping[str, float]]) -> dict[str, float]:
+    total: dict[str, float] = {}
+    for part in parts:
+        for name, seconds in part.items():
+            total[name] = total.get(name, 0.0) + seconds
+    return total
+
+
+def _shares(seconds: Mapping[str, float]) -> dict[str, float]:
+    total = sum(seconds.values())
+    return {name: s / total for name, s in seconds.items()} if total > 0 else {}
+
+
+@dataclass(frozen=True)
+class Status:
+    """A run at one instant: of `workers` workers `starting` are not ready yet and `running` have a
+    trial. `left`: seconds, None if nothing is known yet."""
+
+    now: float
+    workers: int
+    running: int
+    cores: int
+    servers: Sequence[Server] = ()
+    shares: Mapping[str, float] = field(default_factory=dict)
+    left: float | None = None
+    starting: int = 0
+
+    @property
+    def verdict(self) -> str:
+        """Who holds the others up, in words; empty before the first trial."""
+        if not self.shares:
+            return ""
+        waiting = self.shares.get("waiting", 0.0)
+        if not any(is_url(s.target) for s in self.servers):
+            waiting = 0.0  # a policy in the worker's own process takes its core as well
+        busy = (self.workers - self.starting) * (1.0 - waiting)
+        asked = [s for s in self.servers if s.running and s.means]
+        if away := [s for s in self.servers if not s.up and not s.retired]:
+            others = "" if len(away) == len(self.servers) else "; the others get its workers"
+            return f"{_some(len(away))} away{others}"
+        if busy >= FULL * self.cores:
+            return f"the simulators are the bottleneck: they fill {_cores(self.cores)}"
+        full = [s for s in asked if s.saturated]
+        if asked and len(full) == len(asked):
+            who = "the policy server is" if len(asked) == 1 else "the policy servers are"
+            return f"{who} the bottleneck: workers wait {100 * waiting:.0f} % of their time"
+        told = f"they wait {100 * waiting:.0f} % of their time"
+        return f"room for more workers: {told}, no queue is long"
+
+    @property
+    def staff(self) -> str:
+        """`8 workers on 4 cores`, and how many of them do nothing yet."""
+        text = f"{self.workers} workers on {self.cores} cores"
+        if self.starting:
+            return f"{text}, {self.starting} starting"
+        idle = self.workers - self.running
+        return f"{text}, {idle} idle" if idle else text
+
+
+def _some(count: int) -> str:
+    return "a policy server is" if count == 1 else f"{count} policy servers are"
+
+
+def _cores(count: int) -> str:
+    return "the only core" if count == 1 else f"all {count} cores"
+
+
+def shares_text(shares: Mapping[str, float]) -> str:
+    """`physics 45 %, rendering 20 %, waiting 30 %`: what takes at least one per cent."""
+    return ", ".join(f"{name} {100 * s:.0f} %" for name, s in shares.items() if s >= 0.005)
+
+
+def server_text(server: Server, now: float) -> str:
+    """Answer time, queue and batch of one server, or that it is away."""
+    if server.retired:
+        return f"left out: {server.retired}"
+    if server.failures:
+        pause = server.back - now
+        return f"away, next try in {pause:.0f} s" if pause > 0 else "away, being tried"
+    if not server.means:
+        return "no answer measured yet"
+    parts = [f"answers in {_ms(server.means['p50'])}"]
+    if "queue" in server.means:
+        parts.append(f"queue {_ms(server.means['queue'])}")
+    if "batch" in server.means and server.batch > 1:
+        parts.append(f"batch {server.means['batch']:.1f} of {server.batch}")
+    return ", ".join(parts)
+
+
+def _ms(value: float) -> str:
+    return f"{value:.1f} ms" if value < 10 else f"{value:.0f} ms" if value < 1e4 else _s(value)
+
+
+def _s(value: float) -> str:
+    return f"{value / 1000:.0f} s"

@@ -1,0 +1,1 @@
+"""The simulator: SAPIEN worlds, bodies, drives, cameras, and what drawing needs."""

@@ -1,0 +1,247 @@
+"""What cameras see: a scene that is only drawn, posed like the physics when the picture is taken.
+
+Drawing has its own scene, without physics: a world that never looks pays nothing, and looking
+cannot change a trial. Robot, table, lights and cameras stay from trial to trial (they hold no
+state); objects are those of the trial. Rasterised with SAPIEN's default shader, on any Vulkan
+device, Mesa's software one included.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robospa.harness.robots.embodiment import Embodiment
+from robospa.harness.sim import furniture
+from robospa.harness.sim.shaders import shader_folder
+from robospa.harness.world import RenderUnavailable
+from robospa.protocol.policy import CameraSpec
+from robospa.tasks.geometry import Pose
+from robospa.tasks.scene import Scene
+from robospa.tasks.shapes import Hinge, ObjectModel
+from robospa.tasks.snapshot import ARMS
+
+Links = Sequence[Mapping[str, Pose]]
+"""World pose of every link of the left and of the right arm."""
+
+AMBIENT = (0.5, 0.5, 0.5)
+SUN_DIRECTION, SUN_COLOR = (0.0, 0.5, -1.0), (0.5, 0.5, 0.5)
+LAMPS, LAMP_COLOR = ((1.0, 0.0, 1.8), (-1.0, 0.0, 1.8)), (1.0, 1.0, 1.0)
+SHADOW_SIZE = 1024
+"""[px] of the shadow map: 2 mm on the table."""
+NEAR, FAR = 0.1, 100.0
+WRIST_NEAR = 0.01
+"""[m]: the fingers are nearer to the wrist cameras than the official near plane."""
+WRISTS = {f"{arm}_wrist": i for i, arm in enumerate(ARMS)}
+LARGEST = 4096
+"""[px] of an image's width or height."""
+ADVICE = "run `robospa doctor` to see what is missing"
+
+
+def open_render_system() -> Any:
+    """A SAPIEN render system; RenderUnavailable, with the reason, where there is no device."""
+    try:
+        import sapien
+
+        return sapien.render.RenderSystem()
+    except (ImportError, RuntimeError) as error:
+        raise RenderUnavailable(f"cannot draw on this machine ({error}); {ADVICE}") from error
+
+
+class Studio:
+    """The drawn scene of one world. Raises RenderUnavailable if nothing can be drawn here."""
+
+    def __init__(self) -> None:
+        self._system = open_render_system()
+        import sapien
+
+        self._scene: Any = sapien.Scene([self._system])
+        self._cameras: dict[tuple[str, int, int], Any] = {}
+        self._robot: list[dict[str, Any]] = []
+        self._objects: dict[str, Any] = {}
+        self._parts: dict[str, tuple[Any, Hinge]] = {}
+        self._loaded: Scene | None = None
+        self._embodiment: Embodiment | None = None
+        self._stand: Any = None
+        self._light()
+        self._table = self._draw(furniture.table(), "table")
+        self._draw(furniture.wall(), "wall")
+        self._draw(furniture.floor(), "floor")
+
+    def _light(self) -> None:
+        """The official lights, with shadows from the directional one."""
+        self._scene.set_ambient_light(AMBIENT)
+        self._scene.add_directional_light(
+            SUN_DIRECTION,
+            SUN_COLOR,
+            shadow=True,
+            position=[0.0, 0.0, 1.5],
+            shadow_scale=1.0,
+            shadow_near=-2.0,
+            shadow_far=4.0,
+            shadow_map_size=SHADOW_SIZE,
+        )
+        for position in LAMPS:
+            self._scene.add_point_light(position, LAMP_COLOR)
+
+    def _draw(self, shapes: Sequence[Any], name: str) -> Any:
+        """An entity in the drawn scene; None if none of the shapes is visual."""
+        from robospa.harness.sim.looks import render_body
+
+        entity = render_body(shapes, name)
+        if entity is not None:
+            self._scene.add_entity(entity)
+        return entity
+
+    def arrange(
+        self,
+        scene: Scene,
+        embodiment: Embodiment,
+        model: Callable[[str, Mapping[str, Any]], ObjectModel],
+    ) -> None:
+        """Take the objects of `scene` and the robot; costs nothing if they are here already."""
+        if self._embodiment is not embodiment:
+            self._set_robot(embodiment)
+        if self._loaded is not scene:
+            for entity in (*self._objects.values(), *(part for part, _ in self._parts.values())):
+                if entity is not None:
+                    self._scene.remove_entity(entity)
+            self._objects, self._parts = {}, {}
+            self._loaded = scene
+            self._model = model
+            self._place(self._table, Pose((*scene.table_shift, 0.0)))
+
+    def _set_robot(self, embodiment: Embodiment) -> None:
+        old = [e for links in self._robot for e in links.values()]
+        for entity in [*old, *([self._stand] if self._stand else [])]:
+            self._scene.remove_entity(entity)
+        drawn = (
+            {link: self._draw(arm.shapes[link], f"{name} {link}") for link in arm.links}
+            for name, arm in zip(ARMS, embodiment.arms, strict=True)
+        )
+        self._robot = [{k: v for k, v in links.items() if v is not None} for links in drawn]
+        self._stand = self._draw(embodiment.body, "stand")
+        self._cameras = {}
+        self._embodiment = embodiment
+
+    def pictures(
+        self,
+        cameras: Sequence[CameraSpec],
+        links: Links,
+        poses: Mapping[str, Pose],
+        hinges: Mapping[str, float] = MappingProxyType({}),
+    ) -> list[NDArray[np.uint8]]:
+        """One RGB image (height, width, 3) per camera, of the links and objects as posed.
+
+        Doors and lids stand at their angle [rad] in `hinges`, closed if that is not given.
+
+        Objects that are not in `poses` do not exist yet and are not drawn. ValueError for a camera
+        that this robot does not have, or a size that no image can have.
+        """
+        for entities, here in zip(self._robot, links, strict=True):
+            for link, entity in entities.items():
+                self._place(entity, here[link])
+        for name, pose in poses.items():
+            if name not in self._objects:
+                self._objects[name] = self._new_object(name)
+            if self._objects[name] is not None:
+                self._place(self._objects[name], pose)
+            if name in self._parts:
+                part, hinge = self._parts[name]
+                self._place(part, pose * hinge.turned(hinges.get(name, 0.0)))
+        found = [self._camera(spec, links) for spec in cameras]
+        self._scene.update_render()
+        images = []
+        for camera in found:
+            camera.take_picture()
+            images.append(_rgb(camera.get_picture("Color")))
+        return images
+
+    def _new_object(self, name: str) -> Any:
+        assert self._loaded is not None
+        item = self._loaded.object(name)
+        model = self._model(item.asset, item.params)
+        if model.hinge is not None:
+            self._parts[name] = (self._draw(model.hinge.shapes, f"{name} part"), model.hinge)
+        return self._draw(model.shapes, name)
+
+    @staticmethod
+    def _place(entity: Any, pose: Pose) -> None:
+        from robospa.harness.sim.bodies import to_sapien
+
+        entity.pose = to_sapien(pose)
+
+    def _camera(self, spec: CameraSpec, links: Links) -> Any:
+        """The camera of `spec`, made on first use and put where it is now."""
+        import sapien
+
+        assert self._embodiment is not None
+        pose, fov, near = camera_view(self._embodiment, spec.name, links)
+        key = (spec.name, spec.width, spec.height)
+        if key not in self._cameras:
+            if not (0 < spec.width <= LARGEST and 0 < spec.height <= LARGEST):
+                raise ValueError(
+                    f"camera {spec.name!r} cannot be {spec.width}x{spec.height}; "
+                    f"sizes are 1 to {LARGEST}"
+                )
+            camera = sapien.render.RenderCameraComponent(spec.width, spec.height, shader_folder())
+            camera.set_fovy(fov, compute_x=True)
+            camera.near, camera.far = near, FAR
+            entity = sapien.Entity()
+            entity.add_component(camera)
+            self._scene.add_entity(entity)
+            self._cameras[key] = camera
+        camera = self._cameras[key]
+        self._place(camera.entity, pose)
+        return camera
+
+    def device(self) -> Mapping[str, str]:
+        """Name of the device that draws, its driver and the driver's version."""
+        from robospa.harness.sim.vulkan import VulkanError, devices
+
+        name = str(self._system.device.name)
+        try:
+            found = [device for device in devices() if device.name == name]
+        except VulkanError:
+            found = []
+        return found[0].to_json() if found else {"name": name, "driver": "", "version": ""}
+
+    def close(self) -> None:
+        """Free what was drawn."""
+        self._cameras, self._objects, self._parts, self._robot = {}, {}, {}, []
+        self._table = self._stand = None
+        self._scene.clear()
+
+
+def camera_view(embodiment: Embodiment, name: str, links: Links) -> tuple[Pose, float, float]:
+    """World pose (x forward, z up), vertical field of view [rad] and near plane [m] of a camera.
+
+    ValueError, listing the cameras there are, for a name that this robot does not have.
+    """
+    if name in WRISTS:
+        arm = embodiment.arms[WRISTS[name]]
+        return links[WRISTS[name]][arm.last_link] * arm.camera, embodiment.wrist_fov, WRIST_NEAR
+    if name in embodiment.cameras:
+        fixed = embodiment.cameras[name]
+        return fixed.pose, fixed.fov, NEAR
+    known = ", ".join([*embodiment.cameras, *WRISTS])
+    raise ValueError(f"{embodiment.name} has no camera {name!r}; it has {known}")
+
+
+def focal_length(height: int, fov: float) -> float:
+    """Focal length [px] of square pixels for an image `height` px high."""
+    return height / 2 / math.tan(fov / 2)
+
+
+def _rgb(picture: Any) -> NDArray[np.uint8]:
+    """uint8 (height, width, 3) of SAPIEN's float colours 0..1."""
+    colors = np.asarray(picture)[..., :3]
+    if colors.dtype == np.uint8:
+        return np.ascontiguousarray(colors)
+    levels: NDArray[np.uint8] = (np.clip(colors, 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
+    return levels

@@ -1,0 +1,233 @@
+"""Snapshots that cost little to take: what a goal does not look at is never computed.
+
+A poll happens every five physics steps and most goals look at one object or two. So a live snapshot
+keeps the simulator's packed state, which SAPIEN copies in one call, and unpacks from it on demand.
+It does not change when the world moves on.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+from robospa.harness.sim.motion import RATE, Trajectory
+from robospa.tasks.geometry import Pose, Quat, Vec3, multiply, rotate
+from robospa.tasks.snapshot import Contact, Snapshot
+
+FLOATS = 7
+"""Numbers of a pose in SAPIEN's packed form: qw qx qy qz, x y z, float32."""
+_POSE = struct.Struct(f"<{FLOATS}f")
+_Z = FLOATS - 1  # a pose ends in its z
+
+NO_HINGES: Mapping[str, float] = MappingProxyType({})
+Pair = tuple[tuple[float, ...], tuple[float, ...]]
+_put = object.__setattr__
+_new = object.__new__
+_position, _rotation = (getattr(Pose, name).__set__ for name in ("position", "rotation"))
+
+
+def _pose(position: Vec3, rotation: Quat) -> Pose:
+    """A `Pose`, made in half the time: polls make thousands."""
+    pose = _new(Pose)
+    _position(pose, position)
+    _rotation(pose, rotation)
+    return pose
+
+
+def unpack(packed: bytes, row: int) -> Pose:
+    """The pose of one entity of a packed state."""
+    qw, qx, qy, qz, x, y, z = _POSE.unpack_from(packed, _POSE.size * row)
+    return _pose((x, y, z), (qw, qx, qy, qz))
+
+
+class PoseTable(Mapping[str, Pose]):
+    """Poses by object name over a packed state; a `Pose` is made only when it is asked for."""
+
+    __slots__ = ("_made", "_packed", "_rows")
+
+    def __init__(self, packed: bytes, rows: Mapping[str, int]) -> None:
+        self._packed = packed
+        self._rows = rows
+        self._made: dict[str, Pose] = {}
+
+    def __getitem__(self, name: str) -> Pose:
+        pose = self._made.get(name)
+        if pose is None:
+            pose = self._made[name] = unpack(self._packed, self._rows[name])
+        return pose
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._rows)
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._rows
+
+    def __repr__(self) -> str:
+        return repr(dict(self))
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """What the rows and columns of a state mean: of one embodiment in one scene.
+
+    `tools` are, per arm, the row of the last link and the end-effector frame in it.
+    """
+
+    tools: tuple[tuple[int, Pose], ...]
+
+
+class LiveSnapshot(Snapshot):
+    """A `Snapshot` of a running world: the same values, computed when first asked for."""
+
+    __slots__ = (
+        "_commanded",
+        "_ends",
+        "_floats",
+        "_grippers",
+        "_layout",
+        "_measure",
+        "_packed",
+        "_points",
+        "_rows",
+        "_steps",
+        "_table",
+        "_touching",
+    )
+
+    _packed: bytes
+    _floats: memoryview
+    _rows: Mapping[str, int]
+    _layout: Layout
+    _commanded: tuple[Trajectory, int]
+    _steps: int
+    _measure: Callable[[int], Pair]
+    _touching: Callable[[int], tuple[Contact, ...]]
+    _grippers: tuple[float, float]
+    _points: tuple[Contact, ...]
+    _table: PoseTable
+    _ends: tuple[Pose, Pose]
+
+    def __init__(
+        self,
+        steps: int,
+        packed: bytes,
+        rows: Mapping[str, int],
+        layout: Layout,
+        commanded: tuple[Trajectory, int],
+        measure: Callable[[int], Pair],
+        touching: Callable[[int], tuple[Contact, ...]],
+        hinges: Mapping[str, float] = NO_HINGES,
+    ) -> None:
+        """`steps` of physics have been taken; `commanded`: the trajectory and the row reached;
+        `measure` and `touching` give the measured joints and the contacts after so many steps."""
+        _time(self, steps / RATE)
+        _steps(self, steps)
+        _touching(self, touching)
+        _hinges(self, hinges)
+        _packed(self, packed)
+        _floats(self, memoryview(packed).cast("f"))
+        _rows(self, rows)
+        _layout(self, layout)
+        _commanded(self, commanded)
+        _measure(self, measure)
+
+    @property
+    def poses(self) -> Mapping[str, Pose]:
+        """Poses of the objects that exist."""
+        try:
+            return self._table
+        except AttributeError:
+            table = PoseTable(self._packed, self._rows)
+            _put(self, "_table", table)
+            return table
+
+    def height(self, name: str) -> float:
+        """Height [m] of the object's origin: goals ask for it of every object at every poll."""
+        z: float = self._floats[FLOATS * self._rows[name] + _Z]
+        return z
+
+    def heights(self, names: Iterable[str]) -> list[float | None]:
+        """Heights [m] of several; None for one that does not exist yet."""
+        floats, rows = self._floats, self._rows
+        return [floats[FLOATS * rows[name] + _Z] if name in rows else None for name in names]
+
+    def position(self, name: str) -> Vec3:
+        """Position [m] of the object's origin, without the rest of its pose."""
+        at = FLOATS * self._rows[name] + 4
+        floats = self._floats
+        return (floats[at], floats[at + 1], floats[at + 2])
+
+    @property
+    def gripper(self) -> tuple[float, float]:
+        """Commanded grippers."""
+        try:
+            return self._grippers
+        except AttributeError:
+            path, row = self._commanded
+            left, right = path.commanded[:, row].tolist()
+            _put(self, "_grippers", (left, right))
+            return left, right
+
+    @property
+    def end_effector(self) -> tuple[Pose, Pose]:
+        """Measured end-effector frames."""
+        try:
+            return self._ends
+        except AttributeError:
+            left, right = self._layout.tools
+            ends = (self._tool(*left), self._tool(*right))
+            _put(self, "_ends", ends)
+            return ends
+
+    def _tool(self, row: int, tool: Pose) -> Pose:
+        """`unpack(packed, row) * tool`, with the quaternion whose w is not negative."""
+        qw, qx, qy, qz, px, py, pz = _POSE.unpack_from(self._packed, _POSE.size * row)
+        x, y, z = rotate((qw, qx, qy, qz), tool.position)
+        w, a, b, c = multiply((qw, qx, qy, qz), tool.rotation)
+        turn = (w, a, b, c) if w >= 0.0 else (-w, -a, -b, -c)
+        return _pose((px + x, py + y, pz + z), turn)
+
+    @property
+    def joints(self) -> Pair:
+        """Commanded joints."""
+        path, row = self._commanded
+        left, right = path.joints[:, row].tolist()
+        return tuple(left), tuple(right)
+
+    @property
+    def contacts(self) -> tuple[Contact, ...]:
+        """Contacts; RuntimeError if a poll's are first asked for after the world moved on."""
+        try:
+            return self._points
+        except AttributeError:
+            points = self._touching(self._steps)
+            _put(self, "_points", points)
+            return points
+
+    @property
+    def measured(self) -> Pair:
+        """Measured joints; RuntimeError if a poll's snapshot is asked after the world moved on."""
+        return self._measure(self._steps)
+
+
+# Slots of a frozen class can only be filled from outside; their descriptors do so fastest.
+_time, _steps, _touching, _hinges, _packed, _floats, _rows, _layout, _commanded, _measure = (
+    getattr(cls, name).__set__
+    for cls, name in (
+        (Snapshot, "time"),
+        (LiveSnapshot, "_steps"),
+        (LiveSnapshot, "_touching"),
+        (Snapshot, "hinges"),
+        (LiveSnapshot, "_packed"),
+        (LiveSnapshot, "_floats"),
+        (LiveSnapshot, "_rows"),
+        (LiveSnapshot, "_layout"),
+        (LiveSnapshot, "_commanded"),
+        (LiveSnapshot, "_measure"),
+    )
+)

@@ -1,0 +1,132 @@
+"""One trial's physics: a fresh SAPIEN scene with table, robot and objects, and its exact state.
+
+Nothing is carried from one instance to the next, so a trial does not depend on what ran before it
+in the same process. There is no render system in here (drawing happens in another scene), and
+bodies are created in an order that follows from the trial alone.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import sapien
+from numpy.typing import NDArray
+from sapien import physx
+
+from robospa.harness.robots.embodiment import Embodiment
+from robospa.harness.sim import bodies, furniture
+from robospa.harness.sim.live import NO_HINGES
+from robospa.harness.sim.motion import RATE
+from robospa.tasks.geometry import Pose
+from robospa.tasks.shapes import ObjectModel
+from robospa.tasks.snapshot import ARMS, Contact
+
+Array = NDArray[np.float64]
+
+FURNITURE = ("ground", "table", "wall")
+
+
+class Physics:
+    """The physics of one trial; `step` is SAPIEN's own."""
+
+    def __init__(self, embodiment: Embodiment, table_at: tuple[float, float]) -> None:
+        self.system: Any = physx.PhysxCpuSystem()
+        self.system.timestep = 1.0 / RATE
+        self.scene: Any = sapien.Scene([self.system])
+        self.step = self.system.step
+        self._pack = self.scene.pack_poses
+        self.links: list[dict[str, int]] = []
+        self.rows: dict[str, int] = {}
+        self.components: dict[str, Any] = {}
+        self._moving: dict[str, Any] = {}
+        self._hinged: dict[str, Any] = {}
+        self._add(bodies.ground_body("ground"))
+        x, y = table_at
+        self._add(bodies.static_body(furniture.table(), "table", Pose((x, y, 0.0))))
+        self._add(bodies.static_body(furniture.wall(), "wall", Pose()))
+        self.arms: list[Any] = []
+        for name, arm in zip(ARMS, embodiment.arms, strict=True):
+            first = len(self.scene.entities)
+            self.arms.append(bodies.build_arm(self.scene, embodiment, arm, name))
+            self.links.append({link: first + i for i, link in enumerate(arm.links)})
+
+    def _add(self, entity: Any) -> int:
+        """Put an entity into the scene; its row in the packed state."""
+        self.scene.add_entity(entity)
+        return len(self.scene.entities) - 1
+
+    def add_object(self, name: str, model: ObjectModel, pose: Pose, fixed: bool) -> None:
+        """Create an object at `pose`; it exists from the next physics step on."""
+        if model.hinge is not None:
+            self._add_hinged(name, model, pose, fixed)
+            return
+        entity, component = bodies.dynamic_body(model, name, pose, fixed)
+        self.rows = {**self.rows, name: self._add(entity)}  # snapshots keep the table they saw
+        self.components[name] = component
+        if not fixed:
+            self._moving[name] = component
+
+    def _add_hinged(self, name: str, model: ObjectModel, pose: Pose, fixed: bool) -> None:
+        """The body's row comes first, that of its part right after it."""
+        body, part, articulation = bodies.hinged_body(model, name, pose, fixed)
+        self.rows = {**self.rows, name: self._add(body)}
+        self._add(part)
+        self.components[name] = body.components[0]
+        self._hinged[name] = articulation
+
+    def hinges(self) -> Mapping[str, float]:
+        """Angle [rad] of every hinged part, by the name of its object."""
+        if not self._hinged:
+            return NO_HINGES
+        return {name: float(one.qpos[0]) for name, one in self._hinged.items()}
+
+    def packed(self) -> bytes:
+        """Poses of all entities, as `robospa.harness.sim.live` unpacks them."""
+        return self._pack()  # type: ignore[no-any-return]
+
+    def contacts(self) -> tuple[Contact, ...]:
+        """Every point at which two bodies push on each other, except of objects on furniture.
+
+        In a fixed order: the simulator's own order is that of its memory.
+        """
+        found: list[tuple[str, str, tuple[float, float, float]]] = []
+        for contact in self.system.get_contacts():
+            one, other = (body.name for body in contact.bodies)
+            if other < one:
+                one, other = other, one
+            if (one in FURNITURE and other in self.rows) or (
+                other in FURNITURE and one in self.rows
+            ):
+                continue
+            if one == other:  # a part on its own body
+                continue
+            for point in contact.points:
+                if any(point.impulse.tolist()):
+                    x, y, z = point.position.tolist()
+                    found.append((one, other, (x, y, z)))
+        return tuple([Contact(*pair) for pair in sorted(found)])
+
+    def moving(self) -> dict[str, Any]:
+        """Components of the objects that can move, by name."""
+        return self._moving
+
+    def digest(self) -> str:
+        """Hash of poses, velocities and joints: of their very bytes, in a fixed order."""
+        state = hashlib.sha256(self.scene.pack_poses())
+        for name, component in self._moving.items():
+            state.update(name.encode())
+            state.update(component.linear_velocity.tobytes())
+            state.update(component.angular_velocity.tobytes())
+        for arm in (*self.arms, *self._hinged.values()):
+            state.update(arm.qpos.tobytes())
+            state.update(arm.qvel.tobytes())
+        return state.hexdigest()
+
+    def close(self) -> None:
+        """Let go of the simulator's scene."""
+        self.scene.clear()
+        self.arms, self.components, self._moving = [], {}, {}
+        self._hinged = {}

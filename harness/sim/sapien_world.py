@@ -1,0 +1,301 @@
+"""The world on SAPIEN: CPU PhysX at 250 Hz, official action timing, images only when asked for.
+
+A trial gets a fresh physics scene; what it draws with (`robospa.harness.sim.cameras`) is made on
+the first image and holds no physical state. All drive targets of an action are computed before its
+first physics step, and between two polls there is nothing but SAPIEN's own calls.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robospa.harness.actions import ActionReader
+from robospa.harness.robots import embodiment as embodiment_named
+from robospa.harness.sim.drives import Drives
+from robospa.harness.sim.live import Layout, LiveSnapshot, Pair, PoseTable, unpack
+from robospa.harness.sim.motion import RATE, Trajectory, fixed_rate, rest_to_rest
+from robospa.harness.sim.physics import Physics
+from robospa.harness.sim.settling import settle
+from robospa.harness.world import Poll, RenderUnavailable, SceneUnstable, StepResult
+from robospa.protocol.policy import CameraSpec, PolicySpec
+from robospa.tasks.scene import Scene
+from robospa.tasks.shapes import ObjectModel
+from robospa.tasks.snapshot import Contact, Snapshot, snapshot_to_json
+
+if TYPE_CHECKING:
+    from robospa.harness.sim.cameras import Studio
+
+Models = Callable[[str, Mapping[str, Any]], ObjectModel]
+
+POLL_STEPS = 5
+"""Physics steps between two polls (50 Hz)."""
+CONTROLS = ("rest_to_rest", "fixed_rate")
+
+
+class SapienWorld:
+    """A `robospa.harness.world.World`.
+
+    `render`: False never draws, True opens the renderer at once (and fails at once where there is
+    none), None opens it when the first image is asked for. `control`: "rest_to_rest" is the
+    official timing; "fixed_rate" lets every action last `action_steps` physics steps. `models`
+    makes an object's shapes from asset name and parameters.
+    """
+
+    def __init__(
+        self,
+        render: bool | None = None,
+        control: str = "rest_to_rest",
+        action_steps: int = 10,
+        models: Models | None = None,
+    ) -> None:
+        if control not in CONTROLS:
+            raise ValueError(f"no control {control!r}; there are {' and '.join(CONTROLS)}")
+        if action_steps < 1:
+            raise ValueError(f"action_steps is {action_steps}; it must be at least 1")
+        self._render = render
+        self._control = control
+        self._action_steps = action_steps
+        self._models = models
+        self._physics: Physics | None = None
+        self._studio: Studio | None = None
+        self._readers: dict[str, ActionReader] = {}
+        if render:
+            self._open_studio()
+
+    # -- loading ------------------------------------------------------------------------------
+
+    def load(self, scene: Scene, contacts: bool = False) -> None:
+        """Build `scene` afresh, put the arms at home with open grippers, let everything settle.
+
+        Time is 0 afterwards. Raises SceneUnstable, naming the object that still moves after one
+        second or has left the table; ValueError for an unknown asset or embodiment.
+        """
+        self._drop_physics()
+        self._embodiment = embodiment_named(scene.embodiment)
+        if scene.embodiment not in self._readers:
+            self._readers[scene.embodiment] = ActionReader(self._embodiment)
+        self._reader = self._readers[scene.embodiment]
+        self._scene = scene
+        self._contacts = contacts
+        self._steps = 0
+        physics = self._physics = Physics(self._embodiment, scene.table_shift)
+        self._drives = Drives(self._embodiment, physics.arms)
+        self._layout = Layout(
+            tuple(
+                (physics.links[a][arm.last_link], arm.tool)
+                for a, arm in enumerate(self._embodiment.arms)
+            )
+        )
+        self._later = sorted(
+            (math.ceil(item.appears_at * RATE - 1e-9), i)
+            for i, item in enumerate(scene.objects)
+            if item.appears_at is not None
+        )
+        for i, item in enumerate(scene.objects):
+            if item.appears_at is None:
+                self._create(physics, i)
+        try:
+            settle(physics, f"{scene.task} level {scene.level} seed {scene.seed}")
+        except SceneUnstable:
+            self._drop_physics()
+            raise
+        self._appear(physics)
+
+    def _create(self, physics: Physics, index: int) -> None:
+        """Object `index` of the scene comes into existence."""
+        item = self._scene.objects[index]
+        model = self._model(item.asset, item.params)
+        physics.add_object(item.name, model, item.pose, item.fixed)
+
+    def _model(self, asset: str, params: Mapping[str, Any]) -> ObjectModel:
+        if self._models is None:
+            from robospa.tasks.objects import object_model
+
+            self._models = object_model
+        return self._models(asset, params)
+
+    def _appear(self, physics: Physics) -> None:
+        """Create the objects whose time has come."""
+        while self._later and self._later[0][0] <= self._steps:
+            self._create(physics, self._later.pop(0)[1])
+
+    # -- acting -------------------------------------------------------------------------------
+
+    def step(self, action: NDArray[np.float32], space: str, poll: Poll) -> StepResult:
+        """Execute one action; see `robospa.harness.actions` for what is clipped and refused.
+
+        `poll` gets a snapshot whenever simulated time passes a multiple of POLL_STEPS steps; if it
+        returns True the arms are told to stay where they were told to be, and the action ends.
+        """
+        physics = self._loaded()
+        drives = self._drives
+        goals = self._reader.goals(action, space, drives.joints)
+        change = (drives.joints, goals.joints, drives.gripper, goals.gripper, drives.opening)
+        if self._control == "rest_to_rest":
+            path = rest_to_rest(*change)
+        else:
+            path = fixed_rate(*change, self._action_steps)
+        done, stopped = self._follow(physics, path, poll)
+        return StepResult(done, stopped, goals.problems)
+
+    def _follow(self, physics: Physics, path: Trajectory, poll: Poll) -> tuple[int, bool]:
+        """Drive along `path`; physics steps taken and whether `poll` ended it."""
+        drives = self._drives
+        writers, table = drives.program(path)
+        total, done, step = len(path), 0, physics.step
+        while done < total:
+            upto = min(total, done + POLL_STEPS - self._steps % POLL_STEPS)
+            if self._later:
+                upto = min(upto, done + self._later[0][0] - self._steps)
+            for row in table[done:upto].tolist():
+                for write, value in zip(writers, row, strict=True):
+                    write(value)
+                step()
+            self._steps += upto - done
+            done = upto
+            drives.now = (path, done - 1)
+            if self._later:
+                self._appear(physics)
+            if self._steps % POLL_STEPS == 0 and poll(
+                self._snapshot(self._measured_at, self._touching_at)
+            ):
+                drives.halt()
+                return done, True
+        return done, False
+
+    # -- looking ------------------------------------------------------------------------------
+
+    def snapshot(self) -> Snapshot:
+        """The state at this instant."""
+        self._loaded()
+        measured = self._drives.measured()
+        touching = self._touching_at(self._steps)
+        return self._snapshot(lambda steps: measured, lambda steps: touching)
+
+    def _snapshot(
+        self, measure: Callable[[int], Pair], touching: Callable[[int], tuple[Contact, ...]]
+    ) -> Snapshot:
+        physics = self._loaded()
+        return LiveSnapshot(
+            self._steps,
+            physics.packed(),
+            physics.rows,
+            self._layout,
+            self._drives.now,
+            measure,
+            touching,
+            physics.hinges(),
+        )
+
+    def _measured_at(self, steps: int) -> Pair:
+        """Measured joints for a poll: read only if asked for, because that costs microseconds."""
+        if steps != self._steps:
+            raise RuntimeError("a poll's measured joints were asked for after the world moved on")
+        return self._drives.measured()
+
+    def _touching_at(self, steps: int) -> tuple[Contact, ...]:
+        """Contacts for a poll, likewise; none if `load` was not asked for them."""
+        if steps != self._steps:
+            raise RuntimeError("a poll's contacts were asked for after the world moved on")
+        return self._loaded().contacts() if self._contacts else ()
+
+    def observe(self, spec: PolicySpec) -> dict[str, Any]:
+        """Images, state and poses that `spec` asks for; see `robospa.protocol.policy`.
+
+        `state` is left out if the spec wants none, `privileged` unless it wants it. The caller adds
+        instruction, step and history.
+        """
+        snapshot = self.snapshot()
+        images = self._pictures(spec.cameras)
+        out: dict[str, Any] = {
+            "images": {c.name: image for c, image in zip(spec.cameras, images, strict=True)}
+        }
+        if spec.state != "none":
+            out["state"] = self._drives.state(spec.state == "measured")
+        out["ee"] = np.array(
+            [
+                [*snapshot.end_effector[a].position, *snapshot.end_effector[a].rotation, grip]
+                for a, grip in enumerate(snapshot.gripper)
+            ],
+            dtype=np.float32,
+        )
+        if spec.privileged:
+            out["privileged"] = snapshot_to_json(snapshot)
+        return out
+
+    def render(self, camera: CameraSpec) -> NDArray[np.uint8]:
+        """One RGB image (height, width, 3); RenderUnavailable where nothing can be drawn."""
+        return self._pictures((camera,))[0]
+
+    def _pictures(self, cameras: Sequence[CameraSpec]) -> list[NDArray[np.uint8]]:
+        if not cameras:
+            return []
+        physics = self._loaded()
+        studio = self._studio or self._open_studio()
+        studio.arrange(self._scene, self._embodiment, self._model)
+        packed = physics.packed()
+        links = [
+            {link: unpack(packed, row) for link, row in rows.items()} for rows in physics.links
+        ]
+        poses = PoseTable(packed, physics.rows)
+        return studio.pictures(cameras, links, poses, physics.hinges())
+
+    def _open_studio(self) -> Studio:
+        if self._render is False:
+            raise RenderUnavailable("this world was made with render=False and draws no images")
+        from robospa.harness.sim.cameras import Studio
+
+        self._studio = Studio()
+        return self._studio
+
+    def contacts(self) -> tuple[Contact, ...]:
+        """What touches what at this instant."""
+        return self._loaded().contacts()
+
+    def digest(self) -> str:
+        """Hash of the exact state: poses, velocities, joints."""
+        return self._loaded().digest()
+
+    def info(self) -> Mapping[str, Any]:
+        """Simulator, versions, control, and the render device if it is open."""
+        renderer: Mapping[str, str] | None = None
+        if self._studio:
+            renderer = self._studio.device()
+        return {
+            "simulator": "sapien",
+            **versions(),
+            "backend": "physx-cpu",
+            "physics_hz": RATE,
+            "control": self._control,
+            **({"action_steps": self._action_steps} if self._control == "fixed_rate" else {}),
+            "renderer": renderer,
+        }
+
+    def close(self) -> None:
+        """Free the scenes; the world cannot be used afterwards until it loads again."""
+        self._drop_physics()
+        if self._studio:
+            self._studio.close()
+            self._studio = None
+
+    def _drop_physics(self) -> None:
+        if self._physics:
+            self._physics.close()
+            self._physics = None
+
+    def _loaded(self) -> Physics:
+        if self._physics is None:
+            raise RuntimeError("no scene is loaded; call load(scene) first")
+        return self._physics
+
+
+def versions() -> dict[str, str]:
+    """Versions of SAPIEN and PhysX."""
+    import sapien
+
+    return {"sapien": str(sapien.__version__), "physx": str(sapien.physx.version())}

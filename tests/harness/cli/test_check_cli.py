@@ -1,0 +1,123 @@
+"""`robospa check` from the outside: hints about first actions, and the replay of a file."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from replay_fakes import CHUNK, SPEC, Learned, episode, grippers, joints
+
+from robospa.harness.cli.main import main
+from robospa.harness.replays.episodes import write_episode
+from robospa.harness.replays.first_actions import hints
+from robospa.protocol.server import ServerThread
+
+MADE = episode()
+
+
+@pytest.fixture
+def demo(tmp_path: Path) -> Path:
+    path = tmp_path / "episode.hdf5"
+    write_episode(path, MADE)
+    return path
+
+
+def check(
+    words: list[str], make: Any, capsys: pytest.CaptureFixture[str], monkeypatch: Any
+) -> tuple[int, str, str]:
+    monkeypatch.setenv("COLUMNS", "200")
+    with ServerThread(policy_factory=make) as server, pytest.raises(SystemExit) as end:
+        main(["check", server.url, "--trials", "0", *words])
+    out, err = capsys.readouterr()
+    return int(end.value.code or 0), out, err
+
+
+def test_a_right_policy_passes(
+    demo: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    code, out, _ = check(["--demo", str(demo)], lambda: Learned(MADE), capsys, monkeypatch)
+    assert code == 0 and "It fits the demonstration" in out and "can be evaluated" in out
+
+
+def test_a_wrong_one_fails_with_the_mistake_in_a_sentence_and_a_table(
+    demo: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def make() -> Learned:
+        return Learned(MADE, grippers(lambda g: 1 - g))
+
+    code, out, _ = check(["--demo", str(demo), "--points", "5"], make, capsys, monkeypatch)
+    assert code == 1
+    assert "It looks as if 1 is a closed gripper in its actions" in out
+    assert "left gripper" in out and "as it is" in out and "can be evaluated" not in out
+
+
+def test_a_file_that_cannot_be_read_is_one_sentence_before_the_server_is_asked(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "no.hdf5").write_text("no")
+    with pytest.raises(SystemExit) as end:
+        main(["check", "ws://127.0.0.1:9", "--demo", str(tmp_path / "no.hdf5")])
+    out, err = capsys.readouterr()
+    assert end.value.code == 1 and not out
+    assert err.count("\n") == 1 and "cannot be read as an HDF5 demonstration" in err
+
+
+def test_a_file_without_instruction_asks_for_one(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_episode(tmp_path / "a.hdf5", replace(MADE, instruction=""))
+    with pytest.raises(SystemExit):
+        main(["check", "ws://127.0.0.1:9", "--demo", str(tmp_path / "a.hdf5")])
+    assert "--instruction" in capsys.readouterr().err
+
+
+class Begins(Learned):
+    """Answers a chunk that begins near the state it is shown, in conventions of its own."""
+
+    def infer(self, observation: Any) -> Any:
+        now = np.asarray(observation["state"], float)
+        chunk = np.tile(now, (CHUNK, 1)) + 0.01 * np.arange(CHUNK)[:, None]
+        return self.answer(chunk, now).astype(np.float32)
+
+
+FIRST = {
+    "named first": (lambda c, now: c[:, [*range(7, 14), *range(7)]], "right arm first"),
+    "degrees": (joints(np.degrees), "degrees"),
+    "closed for open": (grippers(lambda g: 1 - g), "1 is a closed gripper"),
+    "differences": (lambda c, now: c - now, "differences"),
+    "metres": (grippers(lambda g: 0.08 * g), "openings in metres"),
+    "-1..1": (grippers(lambda g: -g), "gripper numbers run from"),
+    "nowhere": (lambda c, now: 2.5 + 0 * c, "at once"),
+}
+
+
+@pytest.mark.parametrize("what", FIRST)
+def test_first_actions_hint_at(what: str) -> None:
+    change, told = FIRST[what]
+    found, _ = hints(Begins(MADE, change))
+    assert told in "; ".join(found), found
+
+
+def test_first_actions_of_a_right_policy_raise_no_hint() -> None:
+    found, seen = hints(Begins(MADE))
+    assert found == [] and "from the state" in seen
+
+
+def test_a_model_that_always_closes_is_not_accused_of_inverted_grippers() -> None:
+    found, _ = hints(Begins(MADE, grippers(lambda g: 0 * g)))
+    assert "closed gripper" not in "; ".join(found)
+
+
+def test_hints_do_not_fail_a_server(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    code, out, _ = check([], lambda: Begins(MADE, FIRST["metres"][0]), capsys, monkeypatch)
+    assert code == 0 and "openings in metres" in out
+
+
+def test_policies_without_joints_are_left_alone() -> None:
+    found, seen = hints(Learned(MADE, spec=replace(SPEC, state="none")))
+    assert found == [] and "not shown" in seen

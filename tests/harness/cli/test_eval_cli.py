@@ -1,0 +1,214 @@
+"""`robospa eval` from the outside: a real server on loopback, real processes, a fake world."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from run_fakes import FakePolicy, NanPolicy, SlowPolicy
+
+from robospa.harness.cli.main import main
+from robospa.protocol.server import ServerThread
+from robospa.results.reading import finished, read_file, read_run
+from robospa.results.records import TrialRecord
+
+HERE = str(Path(__file__).parents[1])
+ROBOSPA = [sys.executable, "-m", "robospa.harness.cli.main"]
+
+
+def command(url: str, out: Path, *more: str, trials: int = 4) -> list[str]:
+    fakes = ["--world", "run_fakes:FakeWorld", "--parts", "run_fakes:parts"]
+    what = ["--tasks", "Pick_Blocks_Size", "--levels", "1-2", "--trials", str(trials)]
+    seeds = ["--seeds", f"100000-{100000 + trials - 1}", "--backoff", "0.05", "--workers", "2"]
+    return [*ROBOSPA, "eval", url, *what, *seeds, *fakes, "--out", str(out), *more]
+
+
+def start(words: list[str]) -> subprocess.Popen[str]:
+    """In a process group of its own, so that Ctrl-C can reach all of it as in a terminal."""
+    environment = {**os.environ, "PYTHONPATH": HERE, "NO_COLOR": "1"}
+    return subprocess.Popen(
+        words,
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+
+
+def run(words: list[str]) -> tuple[int, str, str]:
+    process = start(words)
+    out, err = process.communicate(timeout=120)
+    return process.returncode, out, err
+
+
+def lines(folder: Path) -> list[TrialRecord]:
+    return [r for path in sorted((folder / "trials").glob("*.jsonl")) for r in read_file(path)]
+
+
+def wait_for_records(folder: Path, count: int, process: subprocess.Popen[str]) -> None:
+    while len(lines(folder)) < count:
+        assert process.poll() is None, process.communicate()
+        time.sleep(0.01)
+
+
+def test_a_server_is_evaluated_and_reported(tmp_path: Path) -> None:
+    with ServerThread(policy_factory=FakePolicy) as server:
+        code, out, err = run(command(server.url, tmp_path / "run"))
+    assert code == 0, err
+    assert "Pick Blocks Size" in out
+    found = read_run(tmp_path / "run")
+    assert len(found.records) == 8
+    assert not found.missing
+    assert all(r.success and r.attempts == 1 for r in found.records.values())
+    assert found.manifest["settings"]["policy"]["spec"]["name"] == "fake"
+    assert found.manifest["about"]["policy"]["target"] == server.url
+    assert [p.name for p in (tmp_path / "run").glob("*.part")] == []
+
+
+def test_a_nonsense_answer_is_the_policys_failure(tmp_path: Path) -> None:
+    with ServerThread(policy_factory=NanPolicy) as server:
+        code, _, err = run(command(server.url, tmp_path / "run", trials=1))
+    assert code == 0, err
+    records = lines(tmp_path / "run")
+    assert [r.end for r in records] == ["policy_error"] * 2
+    assert "action 1" in records[0].message
+
+
+def test_a_server_that_is_too_slow_leaves_trials_missing(tmp_path: Path) -> None:
+    class Asleep(FakePolicy):
+        def infer(self, observation: Mapping[str, Any]) -> NDArray[np.float32]:
+            time.sleep(0.5)
+            return super().infer(observation)
+
+    with ServerThread(policy_factory=Asleep) as server:
+        more = ["--first-timeout", "0.1", "--attempts", "2"]
+        code, out, err = run(command(server.url, tmp_path / "run", *more, trials=1))
+    assert code == 1
+    assert "2 of 2 trials could not be run and are missing" in err
+    assert "missing" in out
+    assert [(r.end, r.attempts) for r in lines(tmp_path / "run")] == [("infrastructure", 2)] * 2
+
+
+def test_a_server_that_goes_away_and_comes_back_costs_nothing(tmp_path: Path) -> None:
+    server = ServerThread(policy_factory=SlowPolicy).start()
+    port = int(server.url.rpartition(":")[2])
+    process = start(command(server.url, tmp_path / "run", "--attempts", "9", trials=20))
+    wait_for_records(tmp_path / "run", 3, process)
+    server.stop()
+    with ServerThread(policy_factory=FakePolicy, port=port):
+        _, err = process.communicate(timeout=120)
+    assert process.returncode == 0, err
+    assert "trying again" in err
+    found = read_run(tmp_path / "run")
+    assert len(lines(tmp_path / "run")) == len(found.keys) == 40
+    assert all(r.success for r in found.records.values())
+
+
+def test_ctrl_c_leaves_a_run_that_can_be_resumed(tmp_path: Path) -> None:
+    with ServerThread(policy_factory=SlowPolicy) as server:
+        words = command(server.url, tmp_path / "run", trials=15)
+        process = start(words)
+        wait_for_records(tmp_path / "run", 3, process)
+        os.killpg(process.pid, signal.SIGINT)
+        _, err = process.communicate(timeout=60)
+        assert process.returncode == 130
+        assert "--resume" in err
+        assert "Traceback" not in err
+        before = read_run(tmp_path / "run")
+        assert 0 < len(before.missing) < 30
+
+        code, _, err = run(words)
+        assert code == 1
+        assert "already holds a run" in err
+
+        code, _, err = run([*words, "--split", "train", "--resume"])
+        assert code == 1
+        assert "split" in err and "trials: 30 new and 30 gone" in err
+
+        code, _, err = run([*words, "--resume"])
+    assert code == 0, err
+    records = lines(tmp_path / "run")
+    assert len(records) == len({r.key for r in records}) == 30
+    assert all(finished(r) for r in records)
+
+
+def test_resuming_with_another_policy_is_refused(tmp_path: Path) -> None:
+    with ServerThread(policy_factory=FakePolicy) as server:
+        run(command(server.url, tmp_path / "run", trials=1))
+    code, _, err = run(command("run_fakes:other", tmp_path / "run", "--resume", trials=1))
+    assert code == 1
+    assert "policy.spec.name: 'fake' -> 'other'" in err
+
+
+def test_a_torn_line_is_owed_again(tmp_path: Path) -> None:
+    words = command("run_fakes:FakePolicy", tmp_path / "run", "--workers", "1", trials=2)
+    assert run(words)[0] == 0
+    path = next((tmp_path / "run" / "trials").glob("*.jsonl"))
+    path.write_bytes(path.read_bytes()[:-20])
+    assert len(read_run(tmp_path / "run").missing) == 1
+    assert run([*words, "--resume"])[0] == 0
+    assert not read_run(tmp_path / "run").missing
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (["ws://127.0.0.1:9"], "127.0.0.1:9"),
+        (["nobody"], "no policy 'nobody'"),
+        (["run_fakes:FakePolicy", "--levels", "6"], "no level 6"),
+        (["run_fakes:FakePolicy", "--levels", "x"], "neither a number nor a range"),
+        (["run_fakes:FakePolicy", "--tasks", "Pick_Block_Size"], "did you mean Pick_Blocks_Size"),
+        (["run_fakes:FakePolicy", "--seeds", "nowhere.json"], "neither a file nor a list"),
+        (["run_fakes:FakePolicy", "--trials", "9"], "has 4 seeds, not 9"),
+        (["run_fakes:FakePolicy", "--video", "some"], "none of none, failures, first, all"),
+        (["run_fakes:FakePolicy", "--split", "test"], "heldout and train"),
+        (["run_fakes:FakePolicy", "--world", "run_fakes:Broken"], "robospa doctor"),
+        (["run_fakes:FakePolicy", "--embodiment", "nobot"], "drives only-me, not nobot"),
+    ],
+)
+def test_every_refusal_is_one_sentence_and_writes_nothing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], words: list[str], sentence: str
+) -> None:
+    out = tmp_path / "run"
+    if words[-1] == "nobot":
+        words = ["run_fakes:picky", *words[1:]]
+    with pytest.raises(SystemExit) as exit_code:
+        main(command(words[0], out, *words[1:])[len(ROBOSPA) :])
+    err = capsys.readouterr().err
+    assert exit_code.value.code == 1
+    assert sentence in err
+    assert len(err.strip().splitlines()) == 1
+    assert not out.exists()
+
+
+def test_seeds_from_a_file(tmp_path: Path) -> None:
+    path = tmp_path / "seeds.json"
+    path.write_text(json.dumps({"Pick_Blocks_Size": {"1": [7], "2": [9]}}))
+    words = command("run_fakes:FakePolicy", tmp_path / "run", "--seeds", str(path), trials=1)
+    code, _, err = run(words)
+    assert code == 0, err
+    assert sorted((r.key.level, r.key.seed) for r in lines(tmp_path / "run")) == [(1, 7), (2, 9)]
+
+
+def test_help_is_instant_because_nothing_heavy_is_imported() -> None:
+    code = (
+        "import sys; from robospa.harness.cli.main import main\n"
+        "try: main(['--help'])\n"
+        "except SystemExit: pass\n"
+        "heavy = {'numpy', 'sapien', 'matplotlib', 'scipy', 'websockets', 'rich.console'}\n"
+        "sys.exit(', '.join(heavy & set(sys.modules)) or 0)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr
+    assert "eval" in done.stdout

@@ -1,0 +1,210 @@
+"""`robospa serve`: options are typed, checked and listed; models are shared, others are not."""
+
+from __future__ import annotations
+
+import json
+import threading
+import tomllib
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from robospa.clients import connect
+from robospa.harness.cli import main as cli
+from robospa.harness.cli import serve as command
+from robospa.harness.factory import load
+from robospa.protocol.options import option, option_table
+from robospa.protocol.policy import PolicySpec, TrialInfo
+from robospa.protocol.server import ServerThread
+
+ROOT = Path(__file__).resolve().parents[3]
+MODELS = ("rdt", "lerobot", "go1", "xvla", "openpi")
+TRIAL = TrialInfo("t", 1, 1, "aloha-agilex", "clean", "heldout", "lift it")
+SEEN = {"step": 0, "instruction": "lift it", "images": {}, "state": np.zeros(14, np.float32)}
+
+
+@dataclass(frozen=True)
+class Options:
+    """Of the model below."""
+
+    path: str = option("", "where it is")
+    rows: int = option(2, "actions in a chunk")
+
+    def __post_init__(self) -> None:
+        if not self.path:
+            raise ValueError("option path is needed")
+
+
+class Model:
+    """A model that all connections share."""
+
+    made = 0
+
+    def __init__(self, options: Options) -> None:
+        Model.made += 1
+        self.options = options
+        self.spec = PolicySpec("model", cameras=(), horizon=9)
+
+    def reset(self, trial: TrialInfo) -> None:
+        """Nothing to do."""
+
+    def infer(self, observation: Any) -> Any:
+        return self.infer_batch([observation], [0])[0]
+
+    def infer_batch(self, observations: Sequence[Any], sessions: Sequence[int]) -> list[Any]:
+        return [np.zeros((self.options.rows, 14), np.float32) for _ in observations]
+
+
+def create(options: Options) -> Model:
+    return Model(options)
+
+
+def untyped(number: str = "1") -> Model:
+    return Model(Options("x", int(number)))
+
+
+@pytest.fixture
+def served(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
+    """What the command hands to the server, which is not started."""
+    found: dict[str, Any] = {}
+    monkeypatch.setattr("robospa.protocol.server.serve", lambda **given: found.update(given))
+    return found
+
+
+def run(*words: str) -> None:
+    with pytest.raises(SystemExit) as stop:
+        cli.main(["serve", *words])
+    assert not stop.value.code
+
+
+def fails(capsys: pytest.CaptureFixture[str], *words: str) -> str:
+    with pytest.raises(SystemExit) as stop:
+        cli.main(["serve", *words])
+    assert stop.value.code
+    return capsys.readouterr().err
+
+
+def test_options_are_typed_and_the_model_is_made_once(served: dict[str, Any]) -> None:
+    run(f"{__name__}:create", "--option", "path=here", "--option", "rows=5")
+    assert served["policy"].options == Options("here", 5)
+    assert "policy_factory" not in served
+
+
+def test_clients_are_told_the_options(served: dict[str, Any]) -> None:
+    run(f"{__name__}:create", "--option", "path=here", "--option", "rows=2")
+    name = served["options"].name
+    assert name.startswith("robospa ") and name.endswith(f"{__name__}:create path=here")
+    with (
+        ServerThread(served["policy"], options=served["options"]) as server,
+        connect(server.url) as policy,
+    ):
+        assert policy.hello["server"] == name
+
+
+def test_options_come_from_a_file_and_the_command_line_wins(
+    served: dict[str, Any], tmp_path: Path
+) -> None:
+    file = tmp_path / "options.json"
+    file.write_text(json.dumps({"path": "there", "rows": 3}))
+    run(f"{__name__}:create", "--options", str(file), "--option", "rows=4")
+    assert served["policy"].options == Options("there", 4)
+
+
+def test_a_plain_function_makes_one_policy_per_connection(served: dict[str, Any]) -> None:
+    run(f"{__name__}:untyped", "--arg", "number=3")
+    made = Model.made
+    assert served["policy_factory"]().options.rows == 3
+    assert Model.made == made + 1
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["create"], "option path is needed"),
+        (["create", "--option", "pth=x"], "no option 'pth'; known are path, rows"),
+        (["create", "--option", "path=x", "--option", "rows=many"], "is not a whole number"),
+        (["create", "--option", "path"], "not NAME=VALUE"),
+        (["create", "--option", "path=a", "--option", "path=b"], "given twice"),
+        (["untyped", "--option", "rows=1"], "unexpected keyword argument 'rows'"),
+    ],
+)
+def test_options_that_cannot_be_are_named(
+    capsys: pytest.CaptureFixture[str], words: list[str], says: str
+) -> None:
+    assert says in fails(capsys, f"{__name__}:{words[0]}", *words[1:])
+
+
+def test_a_broken_options_file_is_named(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    file = tmp_path / "options.json"
+    file.write_text("{")
+    assert "is no JSON" in fails(capsys, f"{__name__}:create", "--options", str(file))
+    file.write_text("[]")
+    assert "one JSON object" in fails(capsys, f"{__name__}:create", "--options", str(file))
+
+
+def test_options_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
+    run(f"{__name__}:create", "--show-options")
+    assert capsys.readouterr().out.splitlines() == [
+        "path  where it is [text; default needed]",
+        "rows  actions in a chunk [whole number; default 2]",
+    ]
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_every_shipped_server_has_typed_documented_options(name: str) -> None:
+    make = load(f"robospa.baselines.{name}:create")
+    rows = option_table(command.options_class(make))
+    assert rows and all(row.help for row in rows)
+    page = (ROOT / "docs" / "serving.md").read_text()
+    assert [row.name for row in rows if f"`{row.name}`" not in page] == []
+
+
+def test_every_shipped_server_is_an_entry_point() -> None:
+    points = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["entry-points"]
+    listed = points["robospa.policies"]
+    assert {name: listed.get(name) for name in MODELS} == {
+        name: f"robospa.baselines.{name}:create" for name in MODELS
+    }
+
+
+def test_the_example_with_options_is_served_as_printed(
+    served: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source = (ROOT / "docs" / "examples" / "my_model.py").read_text()
+    page = (ROOT / "docs" / "adding-a-policy.md").read_text()
+    assert source.split("\n\n\n", 1)[1].strip() in page
+    np.savez(tmp_path / "weights.npz", mean=np.linspace(0, 1, 14))
+    monkeypatch.syspath_prepend(ROOT / "docs" / "examples")
+    run("my_model:create", f"--option=checkpoint={tmp_path / 'weights.npz'}", "--option=rows=4")
+    chunks = []
+    with ServerThread(served["policy"]) as server, connect(server.url) as policy:
+        for seed in (1, 1, 2):
+            policy.reset(replace(TRIAL, policy_seed=seed))
+            image = np.zeros((240, 320, 3), np.uint8)
+            chunks.append(policy.infer({**SEEN, "images": {"head": image}}))
+    assert chunks[0].shape == (4, 14)
+    assert np.array_equal(chunks[0], chunks[1])
+    assert not np.array_equal(chunks[0], chunks[2])
+
+
+def test_a_shared_model_answers_two_connections() -> None:
+    start = threading.Barrier(2, timeout=20)
+    chunks: list[Any] = []
+
+    def ask(url: str) -> None:
+        with connect(url) as policy:
+            policy.reset(TRIAL)
+            start.wait()
+            chunks.append(policy.infer(SEEN))
+
+    with ServerThread(Model(Options("x", 2))) as server:
+        threads = [threading.Thread(target=ask, args=(server.url,)) for _ in range(2)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join(30)
+    assert [chunk.shape for chunk in chunks] == [(2, 14)] * 2

@@ -1,0 +1,51 @@
+"""The page of all tasks: up to date with the catalog, and right in what it says of the levels."""
+
+from __future__ import annotations
+
+from itertools import zip_longest
+from pathlib import Path
+
+import pytest
+
+from robospa.harness.pictures import task_page
+from robospa.tasks.catalog import tasks
+
+ROOT = Path(__file__).resolve().parents[3]
+
+
+def test_the_page_is_what_the_catalog_says() -> None:
+    written = (ROOT / task_page.PAGE).read_text().splitlines()
+    expected = task_page.page().splitlines()
+    differ = [a for a, b in zip_longest(written, expected) if a != b]
+    assert differ == [], "run `python -m robospa.harness.pictures.task_page`"
+
+
+def test_every_task_has_its_picture_and_they_are_small() -> None:
+    folder = ROOT / task_page.PICTURES
+    assert {p.name for p in folder.iterdir()} == {
+        task_page.picture_name(task) for task in tasks().values()
+    }
+    assert sum(p.stat().st_size for p in folder.iterdir()) < 2_000_000
+
+
+@pytest.mark.parametrize(
+    ("values", "text"),
+    [([150] * 5, "150"), ([2, 3, 4, 5, 6], "2 to 6"), ([1, 2, 2, 3, 3], "1, 2, 2, 3, 3")],
+)
+def test_values_of_five_levels_in_words(values: list[int], text: str) -> None:
+    assert task_page.per_level(values) == text
+
+
+def test_a_row_says_what_comes_with_which_level() -> None:
+    line = task_page.row(tasks()["Click_Can_Place_Items"])
+    assert "T 1 to 5<br>limit 200, 400, 600, 800, 1000" in line
+    assert "objects 1, 3, 3, 5, 5: bread (from level 2), bread basket (from level 2), can," in line
+    assert "pad (from level 4), pill bottle (from level 4)" in line
+    assert line.count("|") == 5
+
+
+def test_a_row_says_what_is_drawn() -> None:
+    line = task_page.row(tasks()["Pick_Mixed_Objects_Canonical_A"])
+    assert (
+        "drawn: column, column direction, row (from level 2), row direction (from level 2)" in line
+    )

@@ -1,0 +1,64 @@
+"""What `robospa record` writes is a demonstration that can be replayed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from robospa.harness.cli.main import main
+from robospa.harness.factory import policy_names
+from robospa.harness.replays.episodes import Episode, read_episode
+from robospa.harness.replays.replay_check import replay
+from robospa.protocol.policy import DEFAULT_CAMERAS, PolicySpec, TrialInfo
+
+pytestmark = [
+    pytest.mark.sim,
+    pytest.mark.skipif("oracle" not in policy_names(), reason="robospa is not installed"),
+]
+
+
+class ByHeart:
+    """Knows the episode; `inverted` has 1 for a closed gripper."""
+
+    spec = PolicySpec("by-heart")
+
+    def __init__(self, made: Episode, inverted: bool) -> None:
+        self.made, self.inverted = made, inverted
+
+    def reset(self, trial: TrialInfo) -> None:
+        assert trial.task == "Pick_Blocks_Size" and trial.instruction
+
+    def infer(self, observation: Mapping[str, Any]) -> Any:
+        t = observation["step"]
+        chunk = self.made.commanded[t + 1 : t + 51].astype(np.float32)
+        if self.inverted:
+            chunk[:, [6, 13]] = 1 - chunk[:, [6, 13]]
+        return chunk
+
+
+def test_a_recorded_trial_is_a_demonstration(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "demo.hdf5"
+    words = ["record", "Pick_Blocks_Size", "--out", str(file)]
+    with pytest.raises(SystemExit) as end:
+        main(words)
+    assert end.value.code == 0 and "success" in capsys.readouterr().out
+    made = read_episode(file)
+    assert made.commanded.shape == (len(made), 14) and len(made) > 30
+    arms = [c for c in range(14) if c not in (6, 13)]
+    assert np.abs(np.diff(made.commanded[:, arms], axis=0)).max() < 0.061  # 1 rad/s for 60 ms
+    assert made.measured is not None
+    assert np.abs(made.measured - made.commanded)[:, arms].max() < 0.1
+    pictures = [made.picture(camera, len(made) // 2) for camera in DEFAULT_CAMERAS]
+    assert all(picture.shape == (240, 320, 3) and picture.std() > 5 for picture in pictures)
+    assert replay(ByHeart(made, False), made, 3).kind == "fits"
+    wrong = replay(ByHeart(made, True), made, 4)
+    assert wrong.best is not None and wrong.best.names == ("gripper inverted",)
+    with pytest.raises(SystemExit) as end:  # nothing is overwritten
+        main(words)
+    assert end.value.code == 1 and "exists already" in capsys.readouterr().err

@@ -1,0 +1,225 @@
+"""One policy for all tasks or one for each, and what a run says about them before it starts."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from run_fakes import SPEC, FakePolicy
+
+from robospa.harness.running.policies import (
+    Probed,
+    check_fit,
+    over_budget,
+    probe_policies,
+    read_map,
+    warnings_of,
+)
+from robospa.harness.running.worker import WorkerConfig
+from robospa.protocol.server import ServerThread
+from robospa.results.lint import lint_run
+from robospa.results.reading import RunError, read_run
+from robospa.results.records import TrialKey
+
+HERE = str(Path(__file__).parents[1])
+KNOWN = {"Pick_A", "Pick_B", "Pick_C", "Pick_D", "Pick_E"}
+KEYS = [TrialKey("Pick_A", 1, 1), TrialKey("Pick_B", 1, 1), TrialKey("Pick_A", 2, 1)]
+
+
+def write(folder: Path, value: Any) -> Path:
+    path = folder / "map.json"
+    path.write_text(value if isinstance(value, str) else json.dumps(value))
+    return path
+
+
+def test_a_map_is_cut_to_the_tasks_of_the_run(tmp_path: Path) -> None:
+    path = write(tmp_path, {"Pick_B": "ws://b", "Pick_A": "ws://a", "Pick_C": "ws://c"})
+    assert read_map(path, ["Pick_A", "Pick_B"], KNOWN) == {"Pick_A": "ws://a", "Pick_B": "ws://b"}
+
+
+@pytest.mark.parametrize(
+    ("value", "reason"),
+    [
+        ("{", "cannot be read"),
+        ('{"Pick_A": "ws://a", "Pick_A": "ws://b"}', "'Pick_A' is there twice"),
+        ([], "no map from tasks to URLs"),
+        ({"Pick_A": 3}, "no map from tasks to URLs"),
+        ({"Pick_A": ""}, "no map from tasks to URLs"),
+        ({"Pick_A": "ws://a", "Pick_Z": "ws://z"}, "tasks that do not exist: Pick_Z"),
+        ({}, "no policy for Pick_A, Pick_B, Pick_C and 1 more; add them"),
+    ],
+)
+def test_maps_that_cannot_be(tmp_path: Path, value: Any, reason: str) -> None:
+    with pytest.raises(RunError, match=reason):
+        read_map(write(tmp_path, value), ["Pick_A", "Pick_B", "Pick_C", "Pick_D"], KNOWN)
+
+
+def test_a_map_that_is_not_there(tmp_path: Path) -> None:
+    with pytest.raises(RunError, match="cannot be read"):
+        read_map(tmp_path / "none.json", [], KNOWN)
+
+
+def test_every_server_is_asked_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[str] = []
+
+    def opened(target: str, options: dict[str, Any]) -> FakePolicy:
+        asked.append(target)
+        return FakePolicy(replace(SPEC, name=target))
+
+    monkeypatch.setattr("robospa.harness.running.policies.open_policy", opened)
+    config = WorkerConfig(tmp_path, "", policies={"Pick_A": "a", "Pick_B": "b"})
+    found = probe_policies(config, KEYS)
+    assert {task: probed.spec.name for task, probed in found.items()} == {
+        "Pick_A": "a",
+        "Pick_B": "b",
+    }
+    assert asked == ["a", "b"]
+    asked.clear()
+    probe_policies(replace(config, policies={}, policy="one"), KEYS)
+    assert asked == ["one"]
+
+
+def test_a_policy_for_another_robot() -> None:
+    with pytest.raises(RunError, match="drives franka, not aloha-agilex"):
+        check_fit(replace(SPEC, embodiments=("franka",)), KEYS)
+
+
+def greeting(**more: Any) -> Probed:
+    return Probed("ws://a", SPEC, {"dialect": "test", **more})
+
+
+def test_warnings_are_told_once_each() -> None:
+    policies = {
+        "Pick_A": greeting(warnings=["one", "two"]),
+        "Pick_B": greeting(warnings=["two", "three"]),
+    }
+    assert warnings_of(policies, {}, 1.0) == ["one", "two", "three"]
+
+
+def test_other_step_limits_are_warned_about() -> None:
+    (text,) = warnings_of({"Pick_A": greeting()}, {}, 3.0)
+    assert "3 times the official ones" in text
+
+
+def test_instructions_over_the_budget_are_warned_about() -> None:
+    policies = {name: greeting(text_budget=6) for name in ("Pick_A", "Pick_B")}
+    told = {"Pick_A": "pick it", "Pick_B": "pick the red, the small block"}
+    (text,) = warnings_of(policies, told, 1.0)
+    assert text.startswith("the model reads 6 tokens of an instruction, and those of 1 of 2 tasks")
+    assert "Pick_B: at least 9" in text
+
+
+def test_a_record_keeps_that_its_instruction_was_cut() -> None:
+    assert over_budget({"text_budget": 4}, "pick the red block") == {
+        "instruction_tokens": 6,
+        "text_budget": 4,
+    }
+    assert over_budget({"text_budget": 6}, "pick the red block") is None
+    assert over_budget({"text_budget": None}, "pick the red block") is None
+    assert over_budget(None, "pick the red block") is None
+
+
+# ---------------------------------------------------------------- from the outside
+
+
+class Named(FakePolicy):
+    """Names itself, and never succeeds if its name says so."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(replace(SPEC, name=name))
+
+    def infer(self, observation: Any) -> Any:
+        chunk = super().infer(observation)
+        return chunk * 0 if self.spec.name == "lazy" else chunk
+
+
+def evaluate(out: Path, *words: str) -> tuple[int, str]:
+    command = [sys.executable, "-m", "robospa.harness.cli.main", "eval", *words]
+    fakes = ["--world", "run_fakes:FakeWorld", "--parts", "run_fakes:parts", "--workers", "1"]
+    what = ["--levels", "1", "--trials", "2", "--seeds", "100000-100001", "--out", str(out)]
+    done = subprocess.run(
+        [*command, *what, *fakes],
+        env={**os.environ, "PYTHONPATH": HERE, "NO_COLOR": "1", "COLUMNS": "300"},
+        capture_output=True,
+        text=True,
+        timeout=200,
+    )
+    return done.returncode, done.stderr
+
+
+def test_a_checkpoint_for_every_task(tmp_path: Path) -> None:
+    tasks = "Pick_Blocks_Size,Pick_Blocks_Height"
+    with (
+        ServerThread(policy_factory=lambda: Named("busy")) as first,
+        ServerThread(policy_factory=lambda: Named("lazy")) as second,
+    ):
+        path = write(tmp_path, {"Pick_Blocks_Size": first.url, "Pick_Blocks_Height": second.url})
+        words = ["--policy-map", str(path), "--tasks", tasks]
+        code, err = evaluate(tmp_path / "run", *words)
+        assert code == 0, err
+        other = write(tmp_path, {"Pick_Blocks_Size": first.url, "Pick_Blocks_Height": first.url})
+        code, err = evaluate(tmp_path / "run", "--policy-map", str(other), "--tasks", tasks,
+                             "--resume")  # fmt: skip
+        assert code == 1
+        assert "policies.Pick_Blocks_Height.spec.name: 'lazy' -> 'busy'" in err
+    run = read_run(tmp_path / "run")
+    assert {r.key.task: r.success for r in run.records.values()} == {
+        "Pick_Blocks_Size": True,
+        "Pick_Blocks_Height": False,
+    }
+    settings, about = run.manifest["settings"], run.manifest["about"]
+    assert settings["policies"]["Pick_Blocks_Height"]["spec"]["name"] == "lazy"
+    assert about["policies"]["Pick_Blocks_Size"]["target"] == first.url
+
+
+def test_a_task_without_policy_stops_before_the_run(tmp_path: Path) -> None:
+    path = write(tmp_path, {"Pick_Blocks_Size": "ws://127.0.0.1:1"})
+    words = ["--policy-map", str(path), "--tasks", "Pick_Blocks_Size,Pick_Blocks_Height"]
+    code, err = evaluate(tmp_path / "run", *words)
+    assert code != 0
+    assert "has no policy for Pick_Blocks_Height" in err
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_policy_and_a_map_are_too_much(tmp_path: Path) -> None:
+    for words in (["ws://127.0.0.1:1", "--policy-map", "x.json"], []):
+        code, err = evaluate(tmp_path / "run", *words)
+        assert code != 0
+        assert "either the policy or --policy-map" in err
+
+
+def test_warnings_and_options_are_printed_and_kept(tmp_path: Path) -> None:
+    with ServerThread(policy_factory=lambda: Named("busy")) as server:
+        url = server.url.replace("ws://", "openpi://") + "?text_budget=4"
+        words = [url, "--tasks", "Pick_Blocks_Size", "--step-scale", "3"]
+        code, err = evaluate(tmp_path / "run", *words)
+        assert code == 0, err
+        again = [url, "--tasks", "Pick_Blocks_Size", "--resume"]
+        code, refusal = evaluate(tmp_path / "run", *again)
+        assert code == 1
+        assert "step_scale: 3.0 -> 1.0" in refusal
+    assert err.count("warning: adapt_to_pi is invisible") == 1
+    assert err.count("warning: step limits are 3 times the official ones") == 1
+    assert err.count("warning: the model reads 4 tokens of an instruction") == 1
+    run = read_run(tmp_path / "run")
+    kept = run.manifest["about"]["warnings"]
+    assert sum("adapt_to_pi" in text for text in kept) == 1
+    assert run.manifest["settings"]["policy"]["options"]["text_budget"] == 4
+    assert run.manifest["settings"]["step_scale"] == 3
+    assert all(r.diagnostics["text_budget"] == 4 for r in run.records.values())
+    assert "step-limits" in {finding.rule for finding in lint_run(run)}
+
+
+def test_step_limits_are_scaled(tmp_path: Path) -> None:
+    with ServerThread(policy_factory=lambda: Named("lazy")) as server:
+        words = [server.url, "--tasks", "Pick_Blocks_Size", "--step-scale", "0.5"]
+        code, err = evaluate(tmp_path / "run", *words)
+    assert code == 0, err
+    found = read_run(tmp_path / "run").records.values()
+    assert {(r.end, r.steps) for r in found} == {("step_limit", 10)}

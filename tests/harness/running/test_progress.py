@@ -1,0 +1,117 @@
+"""What a run says of itself while it goes on."""
+
+from __future__ import annotations
+
+import io
+
+from robospa.harness.running.progress import ROWS, Progress, Tally, clock, details, summary
+from robospa.harness.running.servers import Server
+from robospa.harness.running.status import Status
+from robospa.results.records import TrialKey, TrialRecord
+
+LONG, SHORT = TrialKey("Long", 5, 1), TrialKey("Short", 1, 1)
+
+
+def record(key: TrialKey, end: str = "success") -> TrialRecord:
+    won = end == "success"
+    return TrialRecord(
+        key, "GAC", "go", "", end, won, int(won), int(won), 1, 2, 1, 50, 1, "", "", 0.1
+    )
+
+
+def test_lost_trials_are_no_failures() -> None:
+    tally = Tally(2, 0)
+    tally.add(record(LONG))
+    tally.add(record(SHORT, "infrastructure"))
+    assert "success 100.0 %" in tally.text()
+    assert "1 lost" in tally.text()
+
+
+def test_plain_lines_where_there_is_no_terminal() -> None:
+    stream = io.StringIO()
+    with Progress(1, 0, stream) as progress:
+        progress.add(record(SHORT, "step_limit"))
+        progress.show(Status(0.0, 1, 1, 1))
+    first, last = stream.getvalue().splitlines()
+    assert first == "1 trials to run, 0 already done"
+    assert last.startswith("1/1 trials, success 0.0 %")
+
+
+def test_clock() -> None:
+    assert (clock(65), clock(3723)) == ("1:05", "1:02:03")
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def server(name: str, **means: float) -> Server:
+    found = Server(name, frozenset({"Long"}), batch=8, running=2, task="Long", trials=7)
+    found.means = {"p50": 120.0, **means}
+    return found
+
+
+def status(*servers: Server) -> Status:
+    shares = {"physics": 0.25, "rendering": 0.05, "waiting": 0.7}
+    return Status(0.0, 4, 4, 2, servers, shares, left=90.0)
+
+
+def test_the_live_view_shows_speed_servers_and_who_is_slow() -> None:
+    stream = Terminal()
+    with Progress(3, 1, stream) as progress:
+        progress.add(record(LONG))
+        progress.show(status(server("ws://a", queue=300.0, infer=100.0, batch=7.5)))
+        progress.note("[news] about ws://a")
+    shown = stream.getvalue()
+    for text in (
+        "2/3",
+        "success 100.0 %",
+        "trials/min",
+        "1:30 left",
+        "4 workers on 2 cores; physics 25 %, rendering 5 %, waiting 70 %",
+        "answers in 120 ms, queue 300 ms, batch 7.5 of 8",
+        "the policy server is the bottleneck",
+        "[news] about ws://a",
+    ):
+        assert text in shown, text
+
+
+def test_of_many_servers_the_live_view_lists_some() -> None:
+    stream = Terminal()
+    with Progress(3, 1, stream) as progress:
+        progress.add(record(LONG))
+        progress.show(status(*(server(f"ws://{n}") for n in range(20))))
+    assert f"and {20 - ROWS} more" in stream.getvalue()
+
+
+def test_a_picture_is_not_drawn_more_often_than_it_can_be_read() -> None:
+    stream = Terminal()
+    with Progress(9, 0, stream) as progress:
+        progress.show(status(server("ws://a")))
+        before = len(stream.getvalue())
+        for _ in range(50):
+            progress.show(status(server("ws://a")))
+        assert len(stream.getvalue()) == before
+
+
+def test_plain_lines_tell_the_same_now_and_then() -> None:
+    lines = details(status(server("ws://a", queue=1.0, infer=100.0)))
+    assert lines == [
+        "4 workers on 2 cores; physics 25 %, rendering 5 %, waiting 70 %",
+        "ws://a: 7 trials, answers in 120 ms, queue 1.0 ms",
+        "room for more workers: they wait 70 % of their time, no queue is long",
+    ]
+    stream = io.StringIO()
+    with Progress(9, 0, stream) as progress:
+        progress.add(record(SHORT))
+        for _ in range(5):
+            progress.show(status(server("ws://a")))
+    assert len(stream.getvalue().splitlines()) == 2
+
+
+def test_a_run_ends_with_where_its_time_went() -> None:
+    first, *servers = summary({"physics": 0.9, "waiting": 0.1}, status(server("a"), server("b")))
+    assert first == "time: physics 90 %, waiting 10 %, with 4 workers on 2 cores"
+    assert servers == ["a: 7 trials, answers in 120 ms", "b: 7 trials, answers in 120 ms"]
+    assert summary({}, status()) == []

@@ -1,0 +1,145 @@
+"""A Ray cluster of two nodes on this machine: the same records, whichever node is lost.
+
+Starting Ray takes most of the time, so one cluster serves all tests, and the test that kills one of
+its nodes comes last.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from ray_helpers import QUIET, SIZE, cluster, kill_node
+
+from robospa.harness.running import ray_node
+from robospa.harness.running.ray_bridge import RaySettings
+from robospa.harness.running.ray_executor import NoCluster, RayExecutor, check_address, joined
+from robospa.harness.running.runner import Runner, RunOptions
+from robospa.harness.running.worker import WorkerConfig
+from robospa.results.reading import read_file, read_records
+from robospa.results.records import TrialKey, TrialRecord
+
+pytest.importorskip("ray")
+
+KEYS = [TrialKey("Pick_Fake", 1, 100000 + n) for n in range(30)]
+
+
+@pytest.fixture(scope="module")
+def home(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Any, Any, Path]]:
+    """(cluster, its second node, where policies leave marks)"""
+    marks = tmp_path_factory.mktemp("marks")
+    with pytest.MonkeyPatch.context() as patch:
+        for name, value in {**QUIET, "FAKE_MARKS": str(marks), "FAKE_NODE": "head"}.items():
+            patch.setenv(name, value)
+        patch.setenv(
+            "PYTHONPATH", f"{Path(__file__).parents[1]}:{os.environ.get('PYTHONPATH', '')}"
+        )
+        with cluster(num_cpus=1) as made:
+            yield made, made.add_node(num_cpus=1, env_vars={"FAKE_NODE": "one"}, **SIZE), marks
+
+
+def config(folder: Path, policy: str = "run_fakes:FakePolicy") -> WorkerConfig:
+    return WorkerConfig(folder, policy, world="run_fakes:FakeWorld", parts="run_fakes:parts")
+
+
+def lines(folder: Path) -> list[TrialRecord]:
+    return [r for path in sorted((folder / "trials").glob("*.jsonl")) for r in read_file(path)]
+
+
+def digests(folder: Path) -> dict[TrialKey, tuple[str, str]]:
+    return {k: (r.digest, r.actions_digest) for k, r in read_records(folder).items()}
+
+
+def traces(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in (folder / "actions").iterdir()}
+
+
+@pytest.mark.parametrize(
+    ("address", "text"),
+    [
+        ("nonsense", "none of auto, local, HOST:PORT"),
+        ("127.0.0.1:1", "no Ray cluster answers at 127.0.0.1:1"),
+        ("ray://127.0.0.1:1", "no Ray cluster answers at ray://127.0.0.1:1"),
+    ],
+)
+def test_an_address_without_a_cluster_is_told_at_once(address: str, text: str) -> None:
+    with pytest.raises(NoCluster, match=text):
+        check_address(address)
+
+
+def test_a_cluster_that_is_no_more_is_told_at_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "ray").mkdir()
+    (tmp_path / "ray" / "ray_current_cluster").write_text("127.0.0.1:1")
+    monkeypatch.delenv("RAY_ADDRESS", raising=False)
+    monkeypatch.setenv("RAY_TMPDIR", str(tmp_path))
+    with pytest.raises(NoCluster, match=r"no Ray cluster runs .* last one was at 127.0.0.1:1"):
+        check_address("auto")
+
+
+def test_a_worker_that_fits_on_no_node_is_refused(
+    tmp_path: Path, home: tuple[Any, Any, Path]
+) -> None:
+    wish = RaySettings(home[0].address, cpus=64.0)
+    with pytest.raises(NoCluster, match=r"64 CPUs that a worker takes \(the largest has 1 CPUs\)"):
+        RayExecutor(config(tmp_path / "run"), wish)
+    assert not (tmp_path / "run").exists()
+
+
+def test_the_slurm_example_is_valid_shell() -> None:
+    script = Path(__file__).parents[3] / "docs" / "examples" / "slurm_ray.sh"
+    assert subprocess.run(["bash", "-n", script], capture_output=True).stderr == b""
+
+
+def test_a_node_with_other_versions_is_named() -> None:
+    assert ray_node.misfit(ray_node.versions()) == ""
+    assert ray_node.misfit({"numpy": "0.1"}).endswith("instead of 0.1")
+
+
+def test_the_command_gives_the_same_records_as_local_workers_and_no_noise(
+    tmp_path: Path, home: tuple[Any, Any, Path]
+) -> None:
+    words = [sys.executable, "-m", "robospa.harness.cli.main", "eval", "run_fakes:FakePolicy"]
+    words += ["--tasks", "Pick_Blocks_Size", "--levels", "1-3", "--trials", "10"]
+    words += ["--seeds", "100000-100009", "--world", "run_fakes:FakeWorld"]
+    words += ["--parts", "run_fakes:parts", "--out", str(tmp_path / "ray")]
+    words += ["--executor", "ray", "--address", home[0].address]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=200)
+    assert done.returncode == 0, done.stderr
+    assert "ray" not in done.stderr.lower(), done.stderr
+    keys = [TrialKey("Pick_Blocks_Size", n, 100000 + s) for n in (1, 2, 3) for s in range(10)]
+    Runner(config(tmp_path / "local"), keys, RunOptions(workers=1)).run()
+    assert sorted(r.key for r in lines(tmp_path / "ray")) == keys
+    assert digests(tmp_path / "ray") == digests(tmp_path / "local")
+    assert traces(tmp_path / "ray") == traces(tmp_path / "local")
+
+
+def test_a_node_that_dies_and_one_that_joins_cost_and_double_nothing(
+    tmp_path: Path, home: tuple[Any, Any, Path]
+) -> None:
+    made, second, marks = home
+    records: list[TrialRecord] = []
+    notes: list[str] = []
+
+    def on_record(record: TrialRecord) -> None:
+        records.append(record)
+        if len(records) == 8:
+            kill_node(second)
+            made.add_node(num_cpus=1, env_vars={"FAKE_NODE": "two"}, **SIZE)
+
+    patient = config(tmp_path / "ray", "ray_helpers:NodePolicy")
+    with joined(RaySettings(made.address), patient, False) as executor:
+        runner = Runner(patient, KEYS, RunOptions(backoff=0.01), on_record, notes.append)
+        runner.executor = executor
+        runner.run()
+    Runner(config(tmp_path / "local"), KEYS, RunOptions(workers=1)).run()
+    assert sorted(r.key for r in records) == sorted(r.key for r in lines(tmp_path / "ray")) == KEYS
+    assert digests(tmp_path / "ray") == digests(tmp_path / "local")
+    assert any("Ray lost it" in note for note in notes)
+    assert {mark.name for mark in marks.iterdir()} == {"head", "one", "two"}

@@ -1,0 +1,50 @@
+"""The real simulator on a Ray cluster of its own: records, traces and videos come back whole."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+from robospa.harness.running.ray_bridge import RaySettings
+from robospa.harness.running.ray_executor import joined
+from robospa.harness.running.runner import Runner, RunOptions
+from robospa.harness.running.worker import WorkerConfig
+from robospa.results.reading import differences, read_records
+from robospa.results.records import TrialKey
+
+pytest.importorskip("ray")
+pytestmark = pytest.mark.sim
+
+KEYS = [TrialKey("Pick_Blocks_Size", level, 100000) for level in (1, 3)]
+
+
+def test_records_of_a_cluster_equal_local_ones_and_the_cluster_ends_with_the_run(
+    tmp_path: Path,
+) -> None:
+    def config(name: str, video: str = "none") -> WorkerConfig:
+        return WorkerConfig(tmp_path / name, "robospa.baselines.oracle:create", video=video)
+
+    before = processes("raylet")
+    Runner(config("here"), KEYS, RunOptions(workers=1)).run()
+    filmed = config("ray", "all")
+    with joined(RaySettings("local", workers=1), filmed, True) as executor:
+        Runner(filmed, KEYS, executor=executor).run()
+    here, ray = read_records(tmp_path / "here"), read_records(tmp_path / "ray")
+    assert [differences(here[key], ray[key]) for key in KEYS] == [[] for _ in KEYS]
+    for key in KEYS:
+        trace = f"actions/{key.slug}.npz"
+        assert (tmp_path / "here" / trace).read_bytes() == (tmp_path / "ray" / trace).read_bytes()
+        assert (tmp_path / "ray" / ray[key].video).stat().st_size > 1000
+    assert processes("raylet") <= before
+
+
+def processes(name: str) -> set[int]:
+    """Those whose program's path ends in `name`."""
+    found = set()
+    for path in Path("/proc").glob("[0-9]*/cmdline"):
+        with suppress(OSError):
+            if path.read_bytes().split(b"\0")[0].endswith(name.encode()):
+                found.add(int(path.parent.name))
+    return found

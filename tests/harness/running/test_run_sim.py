@@ -1,0 +1,44 @@
+"""The real simulator: neither the number of workers nor filming enters a record."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from robospa.harness.running.runner import Runner, RunOptions
+from robospa.harness.running.worker import WorkerConfig
+from robospa.results.reading import differences, read_records
+from robospa.results.records import TrialKey
+
+pytestmark = pytest.mark.sim
+
+KEYS = [
+    TrialKey(task, level, 100000)
+    for task in ("Pick_Blocks_Size", "Press_Stapler_Repeat", "Stack_Blocks_Color_Order")
+    for level in (1, 3)
+]
+
+
+def test_records_are_equal_to_the_bit_whatever_the_workers_and_the_camera(tmp_path: Path) -> None:
+    for name, workers, video in (("one", 1, "none"), ("two", 2, "all")):
+        config = WorkerConfig(tmp_path / name, "robospa.baselines.oracle:create", video=video)
+        keys = KEYS if name == "one" else KEYS[::-1]
+        Runner(config, keys, RunOptions(workers=workers)).run()
+    one, two = read_records(tmp_path / "one"), read_records(tmp_path / "two")
+    assert set(one) == set(two) == set(KEYS)
+    assert [differences(one[key], two[key]) for key in KEYS] == [[] for _ in KEYS]
+    assert all(len(record.digest) >= 16 for record in one.values())
+
+
+def test_replaying_recorded_actions_gives_the_same_record(tmp_path: Path) -> None:
+    from robospa.baselines.replay import Replay
+    from robospa.harness.sim.sapien_world import SapienWorld
+    from robospa.harness.trial import run_trial
+
+    config = WorkerConfig(tmp_path, "robospa.baselines.oracle:create")
+    Runner(config, KEYS[:1], RunOptions()).run()
+    world = SapienWorld(render=False)
+    again = run_trial(world, Replay(tmp_path), KEYS[0], policy_seed=0)
+    world.close()
+    assert differences(read_records(tmp_path)[KEYS[0]], again) == []

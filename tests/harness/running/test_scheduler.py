@@ -1,0 +1,249 @@
+"""Which server gets which trial: driven by a small simulation, without processes or clocks."""
+
+from __future__ import annotations
+
+import heapq
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import pytest
+from run_fakes import parts
+
+from robospa.harness.running.queue import TrialQueue
+from robospa.harness.running.scheduler import Job, Scheduler
+from robospa.harness.running.servers import BROKEN, UNFIT, UNREACHED
+from robospa.results.records import TrialKey, TrialRecord
+
+Targets = Callable[[str], Sequence[str]]
+TASKS = ("Pick_A", "Press_B", "Push_C", "Stack_D", "Turn_E", "Open_F")
+
+
+def keys(tasks: Sequence[str] = TASKS, trials: int = 20) -> list[TrialKey]:
+    return [TrialKey(task, level, n) for task in tasks for level in (1, 2) for n in range(trials)]
+
+
+def record(key: TrialKey, latency: float, told: Mapping[str, float] | None = None) -> TrialRecord:
+    return TrialRecord(
+        key, "GAC", "go", "", "success", True, 1, 1, 1, 2, 1, 50, 1, "", "", 0.1,
+        latency={"p50": latency, "p95": latency, "p99": latency, "max": latency, **(told or {})},
+    )  # fmt: skip
+
+
+@dataclass
+class Simulation:
+    """Workers that act for 1 s a trial, and wait as long as their server makes them.
+
+    A server answers one request at a time, `speed` [s] each; it is away in `gone` (from, until).
+    """
+
+    scheduler: Scheduler
+    workers: int
+    speed: Mapping[str, float]
+    gone: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    now: float = 0.0
+    order: list[Job] = field(default_factory=list)
+    settled: list[Job] = field(default_factory=list)
+    after: Callable[[int], None] = lambda count: None
+
+    def run(self) -> None:
+        """Until every trial is settled."""
+        queue = self.scheduler.queue
+        at = [""] * self.workers
+        busy: list[tuple[float, int, float, Job]] = []
+        free = list(range(self.workers))
+        while queue.unsettled:
+            for worker in list(free):
+                job = self.scheduler.next(self.now, at[worker])
+                if job is None:
+                    break
+                free.remove(worker)
+                at[worker] = job.target
+                self.order.append(job)
+                waits = self.speed[job.target] * self.scheduler.servers[job.target].running
+                heapq.heappush(busy, (self.now + 1.0 + waits, worker, waits, job))
+            if not busy:
+                then = self.scheduler.next_time(self.now)
+                assert then is not None, "nobody works and nobody pauses"
+                self.now = then
+                continue
+            begun = self.now
+            self.now, worker, waits, job = heapq.heappop(busy)
+            free.append(worker)
+            away = self.gone.get(job.target, (0.0, 0.0))
+            if away[0] <= self.now < away[1]:
+                fault = UNREACHED if begun >= away[0] else BROKEN
+                charged = self.scheduler.lost(job, self.now, fault, "gone")
+                self.scheduler.again(job, self.now, charged)
+                continue
+            done = record(job.work.key, 1000 * waits)
+            self.scheduler.done(job, done, self.now, 1.0 + waits)
+            self.after(len(self.settled))
+            self.settled.append(job)
+            queue.settle()
+
+    def share(self) -> dict[str, float]:
+        """Part of the trials that each server did."""
+        counts = Counter(job.target for job in self.settled)
+        return {target: count / len(self.settled) for target, count in counts.items()}
+
+
+def schedule(trials: list[TrialKey], targets: Targets) -> Scheduler:
+    return Scheduler(TrialQueue(trials, parts), targets)
+
+
+def equal(*names: str) -> Targets:
+    return lambda task: names
+
+
+def switches(simulation: Simulation, target: str) -> int:
+    tasks = [job.work.key.task for job in simulation.order if job.target == target]
+    return sum(a != b for a, b in pairwise(tasks))
+
+
+def test_one_server_sees_every_task_once() -> None:
+    simulation = Simulation(schedule(keys(), equal("a")), 4, {"a": 0.1})
+    simulation.run()
+    assert switches(simulation, "a") == len(TASKS) - 1
+    assert simulation.scheduler.servers["a"].switches == len(TASKS) - 1
+
+
+@pytest.mark.parametrize("servers", [2, 3, 4])
+def test_equal_servers_share_the_tasks_and_hardly_change_them(servers: int) -> None:
+    names = [f"s{n}" for n in range(servers)]
+    simulation = Simulation(schedule(keys(), equal(*names)), 8, dict.fromkeys(names, 0.1))
+    simulation.run()
+    # No fewer than tasks - servers are possible; each server may help once at the end of others'.
+    least = len(TASKS) - servers
+    assert least <= sum(switches(simulation, name) for name in names) <= least + 2 * servers
+    assert max(simulation.share().values()) < 1.4 / servers
+
+
+def test_with_a_server_for_every_task_no_server_sees_a_change() -> None:
+    scheduler = schedule(keys(), lambda task: (f"ws://{task}",))
+    simulation = Simulation(scheduler, 4, {f"ws://{task}": 0.1 for task in TASKS})
+    simulation.run()
+    assert all(switches(simulation, f"ws://{task}") == 0 for task in TASKS)
+    assert all(job.target == f"ws://{job.work.key.task}" for job in simulation.order)
+
+
+def test_a_slow_server_loses_workers_to_a_quick_one() -> None:
+    simulation = Simulation(
+        schedule(keys(), equal("slow", "quick")), 8, {"slow": 1.0, "quick": 0.1}
+    )
+    simulation.run()
+    assert simulation.share()["quick"] > 0.7
+
+
+def test_a_server_that_gets_slow_is_left_and_asked_again_later() -> None:
+    speed = {"a": 0.2, "b": 0.2}
+
+    def change(count: int) -> None:
+        speed["a"] = 4.0 if 100 < count < 300 else 0.2
+
+    simulation = Simulation(schedule(keys(trials=80), equal("a", "b")), 6, speed, after=change)
+    simulation.run()
+    slow = Counter(job.target for job in simulation.settled[130:300])
+    again = Counter(job.target for job in simulation.settled[-300:])
+    assert slow["b"] > 10 * slow["a"]
+    assert again["a"] > 100
+
+
+def test_a_server_with_twice_the_work_gets_more_workers() -> None:
+    where = {"Pick_A": "small", "Press_B": "big", "Push_C": "big"}
+    scheduler = schedule(keys(("Pick_A", "Press_B", "Push_C")), lambda task: (where[task],))
+    first = [scheduler.next(0.0) for _ in range(9)]
+    counts = Counter(job.target for job in first if job is not None)
+    assert counts == {"big": 6, "small": 3}
+
+
+def test_a_worker_stays_where_it_is_if_the_other_server_is_not_clearly_better() -> None:
+    scheduler = schedule(keys(), equal("a", "b"))
+    first = scheduler.next(0.0)
+    assert first is not None
+    second = scheduler.next(0.0)
+    assert second is not None and second.target != first.target
+    third = scheduler.next(0.0, at="b")
+    assert third is not None and third.target == "b"
+
+
+def test_trials_of_a_server_that_goes_away_are_done_by_the_other() -> None:
+    simulation = Simulation(
+        schedule(keys(), equal("a", "b")), 6, {"a": 0.1, "b": 0.1}, {"a": (5.0, 1e9)}
+    )
+    simulation.run()
+    assert sorted(job.work.key for job in simulation.settled) == sorted(keys())
+    # Its line broke under the trials that were running there: one attempt each, and no more.
+    assert {job.work.attempt for job in simulation.settled} == {1, 2}
+    assert sum(job.work.attempt == 2 for job in simulation.settled) <= 6
+    tried = [job for job in simulation.order if job.target == "a"]
+    assert len(tried) - len([j for j in simulation.settled if j.target == "a"]) < 20
+
+
+def test_a_server_that_comes_back_gets_its_workers_back() -> None:
+    simulation = Simulation(
+        schedule(keys(trials=60), equal("a", "b")), 6, {"a": 0.1, "b": 0.1}, {"a": (5.0, 20.0)}
+    )
+    simulation.run()
+    late = Counter(job.target for job in simulation.settled[-300:])
+    assert late["a"] > 100
+    assert len(simulation.settled) == len(keys(trials=60))
+
+
+def test_one_worker_tries_a_server_before_the_others_follow() -> None:
+    scheduler = schedule(keys(), equal("a", "b"))
+    job = scheduler.next(0.0)
+    assert job is not None
+    assert not scheduler.lost(job, 0.0, UNREACHED)
+    scheduler.again(job, 0.0, False)
+    pause = scheduler.servers[job.target].back
+    jobs = [scheduler.next(pause) for _ in range(6)]
+    assert [j.target for j in jobs if j is not None].count(job.target) == 1
+
+
+def test_waiting_for_the_only_server_of_a_task_is_charged_when_all_else_is_done() -> None:
+    where = {"Pick_A": "a", "Press_B": "b"}
+    scheduler = schedule(keys(("Pick_A", "Press_B"), 1), lambda task: (where[task],))
+    jobs = {job.target: job for job in (scheduler.next(0.0), scheduler.next(0.0)) if job}
+    assert not scheduler.lost(jobs["a"], 0.0, UNREACHED)  # just gone
+    scheduler.again(jobs["a"], 0.0, False)
+    later = scheduler.next(61.0)
+    assert later is not None and later.target == "a"
+    assert not scheduler.lost(later, 61.0, UNREACHED)  # the other server still runs a trial
+    scheduler.again(later, 61.0, False)
+    scheduler.done(jobs["b"], record(jobs["b"].work.key, 1.0), 61.0, 1.0)
+    for _ in range(2):
+        rest = scheduler.next(99.0)
+        assert rest is not None
+        if rest.target == "b":
+            scheduler.done(rest, record(rest.work.key, 1.0), 99.0, 1.0)
+            rest = scheduler.next(99.0)
+            assert rest is not None
+        break
+    assert rest.target == "a"
+    assert scheduler.lost(rest, 99.0, UNREACHED)  # nobody else has anything to do
+
+
+def test_a_server_that_came_back_as_another_one_is_left_out() -> None:
+    scheduler = schedule(keys(), equal("a", "b"))
+    job = scheduler.next(0.0)
+    assert job is not None
+    assert not scheduler.lost(job, 0.0, UNFIT, "another spec")
+    scheduler.again(job, 0.0, False)
+    assert scheduler.orphans() == ()
+    assert all(j.target != job.target for _ in range(20) if (j := scheduler.next(1e6)))
+    (left,) = (s for s in scheduler.servers.values() if not s.retired)
+    other = scheduler.next(1e6)
+    assert other is not None and other.target == left.target
+    scheduler.lost(other, 1e6, UNFIT, "another spec, too")
+    scheduler.again(other, 1e6, False)
+    assert set(scheduler.orphans()) == set(TASKS)
+
+
+def test_trials_lost_for_other_reasons_say_nothing_of_the_server() -> None:
+    scheduler = schedule(keys(), equal("a", "b"))
+    job = scheduler.next(0.0)
+    assert job is not None
+    assert scheduler.lost(job, 0.0)
+    assert scheduler.servers[job.target].up

@@ -1,0 +1,125 @@
+"""Where the time goes, and who holds the others up, in words."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from robospa.harness.running.servers import Server
+from robospa.harness.running.status import Shares, Status, server_text, shares_text
+from robospa.results.records import TrialKey, TrialRecord
+
+KEY = TrialKey("Pick_Fake", 1, 1)
+
+
+def record(wall: float = 10.0, latency: dict[str, float] | None = None, **timing: float) -> Any:
+    return TrialRecord(
+        KEY, "GAC", "go", "", "success", True, 1, 1, 1, 2, 1, 50, 1, "", "", wall,
+        timing=timing, latency=latency or {},
+    )  # fmt: skip
+
+
+def server(running: int = 4, p50: float = 120.0, **means: float) -> Server:
+    found = Server("ws://a", frozenset({"Pick_Fake"}), running=running, trials=9)
+    found.means = {"p50": p50, **means}
+    return found
+
+
+def status(waiting: float, *servers: Server, workers: int = 4, cores: int = 2) -> Status:
+    shares = {"physics": 1.0 - waiting, "waiting": waiting}
+    return Status(0.0, workers, workers, cores, servers, shares)
+
+
+def test_shares_are_those_of_the_recorded_purposes() -> None:
+    shares = Shares()
+    assert shares.now() == {}
+    shares.add(record(physics=4.0, goal=1.0, rendering=2.0, waiting=2.0, loading=0.5))
+    assert shares.now() == pytest.approx(
+        {"physics": 0.5, "rendering": 0.2, "waiting": 0.2, "scenes": 0.05, "other": 0.05}
+    )
+    assert shares_text({"physics": 0.5, "rendering": 0.496, "other": 0.004}) == (
+        "physics 50 %, rendering 50 %"
+    )
+
+
+def test_old_records_without_purposes_are_all_other() -> None:
+    shares = Shares()
+    shares.add(record())
+    assert shares.overall()["other"] == 1.0
+
+
+def test_cores_that_are_busy_are_the_bottleneck() -> None:
+    assert "simulators are the bottleneck: they fill all 2 cores" in status(0.3, server()).verdict
+
+
+def test_a_server_whose_queue_is_longer_than_its_model_is_the_bottleneck() -> None:
+    full = server(queue=200.0, infer=100.0)
+    assert status(0.9, full).verdict.startswith("the policy server is the bottleneck")
+    assert "wait 90 % of their time" in status(0.9, full).verdict
+
+
+def test_idle_cores_and_idle_servers_have_room_for_more_workers() -> None:
+    assert "room for more workers" in status(0.9, server(queue=1.0, infer=100.0)).verdict
+    mixed = status(0.9, server(queue=1.0, infer=100.0), server(queue=900.0, infer=100.0))
+    assert "room for more workers" in mixed.verdict
+
+
+def test_a_server_with_full_batches_is_full_before_its_queue_is_long() -> None:
+    told = server(queue=70.0, infer=116.0, batch=7.9)
+    assert not told.saturated
+    told.batch = 8
+    assert told.saturated
+    told.means["queue"] = 10.0  # full, but idle between its calls
+    assert not told.saturated
+
+
+def test_a_server_that_tells_nothing_is_full_when_it_answers_slower_than_it_could() -> None:
+    slow = server(p50=400.0)
+    slow.fastest = 100.0
+    assert slow.saturated
+    slow.fastest = 390.0
+    assert not slow.saturated
+
+
+def test_before_the_first_trial_there_is_nothing_to_say() -> None:
+    assert Status(0.0, 2, 2, 2).verdict == ""
+
+
+def test_servers_that_are_away_are_said_first() -> None:
+    away = server()
+    away.fail(0.0, 2.0)
+    assert status(0.3, away, server()).verdict == (
+        "a policy server is away; the others get its workers"
+    )
+    assert status(0.3, away).verdict == "a policy server is away"
+    assert server_text(away, 0.5) == "away, next try in 2 s"
+    assert server_text(away, 3.0) == "away, being tried"
+
+
+def test_a_servers_line_says_what_it_told() -> None:
+    told = server(p50=8.25, queue=1.5, infer=6.0, batch=3.96)
+    assert server_text(told, 0.0) == "answers in 8.2 ms, queue 1.5 ms"
+    told.batch = 8
+    assert server_text(told, 0.0) == "answers in 8.2 ms, queue 1.5 ms, batch 4.0 of 8"
+    assert server_text(server(p50=61000.0), 0.0) == "answers in 61 s"
+    assert "no answer" in server_text(Server("ws://b", frozenset()), 0.0)
+
+
+def test_the_pause_of_a_server_grows_but_not_with_every_worker_that_fails_with_it() -> None:
+    away = Server("ws://a", frozenset())
+    pauses = []
+    now = 0.0
+    for _ in range(6):
+        for _ in range(4):
+            away.fail(now, 2.0)
+        pauses.append(away.back - now)
+        now = away.back
+    assert pauses == [2.0, 4.0, 8.0, 16.0, 30.0, 30.0]
+    assert away.since == 0.0
+
+
+def test_workers_that_start_or_idle_are_named() -> None:
+    assert Status(0.0, 4, 4, 2).staff == "4 workers on 2 cores"
+    assert Status(0.0, 4, 3, 2).staff == "4 workers on 2 cores, 1 idle"
+    assert Status(0.0, 4, 2, 2, starting=2).staff == "4 workers on 2 cores, 2 starting"

@@ -1,0 +1,148 @@
+"""Records survive kills at any byte; corruption and contradictions are named."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from robospa.harness.running.store import (
+    RecordWriter,
+    StorageError,
+    action_path,
+    read_actions,
+    replace_file,
+    write_actions,
+)
+from robospa.results.reading import (
+    RepeatabilityError,
+    RunError,
+    from_line,
+    read_file,
+    read_records,
+    to_line,
+)
+from robospa.results.records import TrialKey, TrialRecord
+
+KEY = TrialKey("Pick_Fake", 1, 100000)
+RECORD = TrialRecord(
+    key=KEY,
+    category="GAC",
+    instruction="pick “it”",
+    scene_digest="s",
+    end="success",
+    success=True,
+    done=1,
+    best=1,
+    total=1,
+    candidates=2,
+    steps=3,
+    physics_steps=15,
+    policy_calls=1,
+    digest="d",
+    actions_digest="a",
+    wall_time=0.5,
+    events=({"time": 0.1, "kind": "success", "object": "", "index": -1, "note": ""},),
+    latency={"p50": 1.0},
+)
+
+
+def other(seed: int) -> TrialRecord:
+    return replace(RECORD, key=replace(KEY, seed=seed))
+
+
+def write(folder: Path, *records: TrialRecord) -> Path:
+    writer = RecordWriter(folder)
+    for record in records:
+        writer.write(record)
+    writer.close()
+    return writer.path
+
+
+def test_a_record_survives_its_line() -> None:
+    assert from_line(to_line(RECORD)) == RECORD
+
+
+def test_every_prefix_of_a_file_reads_as_its_whole_lines(tmp_path: Path) -> None:
+    path = write(tmp_path, RECORD, other(1))
+    data = path.read_bytes()
+    first = len(to_line(RECORD).encode())
+    for size in range(len(data)):
+        path.write_bytes(data[:size])
+        assert len(read_file(path)) == (size >= first)
+
+
+def test_a_corrupt_middle_line_is_named(tmp_path: Path) -> None:
+    path = write(tmp_path, RECORD, other(1), other(2))
+    lines = path.read_bytes().split(b"\n")
+    lines[1] = lines[1][:40]
+    path.write_bytes(b"\n".join(lines))
+    with pytest.raises(RunError, match=r"0000\.jsonl, line 2"):
+        read_file(path)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ('"end":"success"|"end":"bored"', "none of success"),
+        ('"category":"GAC"|"categories":"GAC"', "unknown fields categories"),
+        ('"seed":100000|"sead":100000', "not a trial record"),
+    ],
+)
+def test_a_line_of_something_else_says_why(change: str, words: str) -> None:
+    old, new = change.split("|")
+    with pytest.raises(ValueError, match=words):
+        from_line(to_line(RECORD).replace(old, new))
+
+
+def test_writers_never_share_a_file(tmp_path: Path) -> None:
+    first, second = RecordWriter(tmp_path), RecordWriter(tmp_path)
+    assert first.path != second.path
+    first.close()
+    second.close()
+    assert not first.path.exists()  # nothing was written
+
+
+def test_an_identical_record_of_the_same_trial_is_fine(tmp_path: Path) -> None:
+    write(tmp_path, RECORD)
+    write(tmp_path, replace(RECORD, wall_time=9.0, attempts=2))
+    assert list(read_records(tmp_path)) == [KEY]
+
+
+def test_a_different_record_of_the_same_trial_raises_an_alarm(tmp_path: Path) -> None:
+    write(tmp_path, RECORD)
+    write(tmp_path, replace(RECORD, digest="e"))
+    with pytest.raises(RepeatabilityError, match="disagree on digest"):
+        read_records(tmp_path)
+
+
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
+def test_a_result_outranks_a_loss(tmp_path: Path, order: tuple[int, int]) -> None:
+    pair = (RECORD, replace(RECORD, end="infrastructure", success=False, digest=""))
+    write(tmp_path, pair[order[0]])
+    write(tmp_path, pair[order[1]])
+    assert read_records(tmp_path)[KEY].end == "success"
+
+
+def test_replace_file_leaves_nothing_behind_when_it_fails(tmp_path: Path) -> None:
+    (tmp_path / "x").mkdir()
+    with pytest.raises(StorageError, match=r"cannot write .*x: Is a directory"):
+        replace_file(tmp_path / "x", b"data")
+    assert [p.name for p in tmp_path.iterdir()] == ["x"]
+
+
+def test_actions_survive_their_file(tmp_path: Path) -> None:
+    actions = np.linspace(0, 1, 28, dtype=np.float32).reshape(2, 14)
+    write_actions(tmp_path, KEY, actions, "joint")
+    back, space = read_actions(action_path(tmp_path, KEY))
+    assert space == "joint"
+    np.testing.assert_array_equal(back, actions)
+
+
+def test_a_broken_action_trace_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "a.npz"
+    path.write_bytes(b"PK nonsense")
+    with pytest.raises(RunError, match="no action trace"):
+        read_actions(path)

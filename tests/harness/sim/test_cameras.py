@@ -1,0 +1,184 @@
+"""What the cameras see. Needs a Vulkan device."""
+
+from __future__ import annotations
+
+import math
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from world_scenes import block, joint_action, run_digest, scene, two_blocks
+
+from robospa.harness.robots import embodiment
+from robospa.harness.sim.cameras import camera_view, focal_length
+from robospa.harness.sim.sapien_world import SapienWorld
+from robospa.harness.world import RenderUnavailable
+from robospa.protocol.policy import CAMERAS, CameraSpec, PolicySpec
+from robospa.tasks.geometry import Pose
+from robospa.tasks.snapshot import Snapshot
+
+pytestmark = pytest.mark.sim
+
+ROBOT = embodiment("aloha-agilex")
+
+
+def go_on(snapshot: Snapshot) -> bool:
+    return False
+
+
+def red_share(image: np.ndarray) -> float:
+    """Share of clearly red pixels."""
+    levels = image.astype(int)
+    return float(((levels[..., 0] > 100) & (levels[..., 0] > 1.5 * levels[..., 1])).mean())
+
+
+@pytest.fixture(scope="module")
+def world() -> SapienWorld:
+    try:
+        return SapienWorld(render=True)
+    except RenderUnavailable as error:
+        pytest.fail(f"nothing can be drawn here, see `robospa doctor`: {error}")
+
+
+def test_observe_draws_exactly_the_cameras_asked_for(world: SapienWorld) -> None:
+    world.load(two_blocks())
+    spec = PolicySpec("p", cameras=(CameraSpec("head", 64, 48), CameraSpec("third", 40, 30)))
+    images = world.observe(spec)["images"]
+    assert {name: image.shape for name, image in images.items()} == {
+        "head": (48, 64, 3),
+        "third": (30, 40, 3),
+    }
+    assert images["head"].dtype == np.uint8
+
+
+@pytest.mark.parametrize("camera", CAMERAS)
+def test_every_camera_sees_something(world: SapienWorld, camera: str) -> None:
+    world.load(two_blocks())
+    world.step(joint_action(), "joint", go_on)
+    assert world.render(CameraSpec(camera, 64, 48)).std() > 3
+
+
+def test_an_object_is_where_its_projection_says(world: SapienWorld) -> None:
+    world.load(scene(block("one", 0.1, -0.05)))
+    pose, fov, _ = camera_view(ROBOT, "head", ())
+    x, y, z = pose.inverse().apply(world.snapshot().poses["one"].position)
+    focal = focal_length(240, fov)
+    column, row = 160 - focal * y / x, 120 - focal * z / x
+    image = world.render(CameraSpec("head")).astype(int)
+    rows, columns = np.nonzero(image[..., 0] > 1.5 * image[..., 1])
+    assert (columns.mean(), rows.mean()) == pytest.approx((column, row), abs=4)
+
+
+def test_focal_length_is_that_of_the_official_camera() -> None:
+    assert focal_length(240, math.radians(37)) == pytest.approx(358.6, abs=0.1)
+
+
+def test_objects_of_the_last_trial_are_gone(world: SapienWorld) -> None:
+    world.load(two_blocks())
+    assert red_share(world.render(CameraSpec("head"))) > 0.001
+    world.load(scene())
+    assert red_share(world.render(CameraSpec("head"))) == 0.0
+
+
+def test_an_object_that_appears_later_is_drawn_later(world: SapienWorld) -> None:
+    world.load(scene(block("late", 0.0, 0.0, appears_at=0.1)))
+    before = red_share(world.render(CameraSpec("head")))
+    world.step(joint_action((0,) * 6, (0,) * 6), "joint", go_on)
+    assert before == 0.0
+    assert red_share(world.render(CameraSpec("head"))) > 0.001
+
+
+def test_the_same_state_gives_the_same_picture(world: SapienWorld) -> None:
+    pictures = []
+    for _ in range(2):
+        world.load(two_blocks())
+        world.step(joint_action(), "joint", go_on)
+        pictures.append(world.render(CameraSpec("left_wrist")))
+        world.load(scene())
+        world.render(CameraSpec("front"))
+    assert np.array_equal(*pictures)
+
+
+def test_looking_does_not_change_the_trial(world: SapienWorld) -> None:
+    blind = run_digest(SapienWorld(render=False), two_blocks(), seed=5)
+    world.load(two_blocks())
+    from world_scenes import wandering
+
+    for action in wandering(4, 5):
+        world.observe(PolicySpec("p"))
+        world.step(action, "joint", go_on)
+    assert world.digest() == blind
+
+
+def test_an_open_gripper_shows_both_fingertips_in_its_wrist_camera() -> None:
+    for arm in ROBOT.arms:
+        eye = arm.camera.inverse()
+        for finger, side in zip(arm.fingers, (1.0, -1.0), strict=True):
+            tip = finger.origin * Pose((0.083, arm.gripper[1] * side, 0.0))
+            x, y, z = eye.apply(tip.position)
+            assert abs(z / x) < math.tan(ROBOT.wrist_fov / 2)
+            assert abs(y / x) < math.tan(ROBOT.wrist_fov / 2) * 4 / 3
+
+
+def test_an_unknown_camera_is_refused(world: SapienWorld) -> None:
+    world.load(scene())
+    with pytest.raises(ValueError, match="no camera 'rear'; it has head, front, third, left_wrist"):
+        world.render(CameraSpec("rear"))
+
+
+@pytest.mark.parametrize(("width", "height"), [(0, 10), (10, -1), (5000, 10)])
+def test_an_impossible_size_is_refused(world: SapienWorld, width: int, height: int) -> None:
+    world.load(scene())
+    with pytest.raises(ValueError, match="sizes are 1 to 4096"):
+        world.render(CameraSpec("head", width, height))
+
+
+def test_info_names_device_and_driver(world: SapienWorld) -> None:
+    world.load(scene())
+    world.render(CameraSpec("head", 8, 8))
+    assert set(world.info()["renderer"]) == {"name", "driver", "version"}
+
+
+def test_the_trimmed_shader_draws_the_same_pixels(tmp_path: Path) -> None:
+    code = (
+        "import sys, numpy as np; from world_scenes import *; "
+        "import robospa.harness.sim.cameras as c; from robospa.protocol.policy import CameraSpec; "
+        "from robospa.harness.sim.sapien_world import SapienWorld; "
+        "c.shader_folder = c.shader_folder if sys.argv[1] == 'trimmed' else lambda: ''; "
+        "w = SapienWorld(); w.load(two_blocks()); "
+        "np.save(sys.argv[2], w.render(CameraSpec('third')))"
+    )
+    images = []
+    for kind in ("trimmed", "default"):
+        path = tmp_path / f"{kind}.npy"
+        subprocess.run(
+            [sys.executable, "-W", "ignore", "-c", code, kind, str(path)],
+            cwd=Path(__file__).parents[1],
+            check=True,
+            timeout=120,
+        )
+        images.append(np.load(path))
+    assert np.array_equal(*images)
+
+
+def test_without_a_device_physics_runs_and_drawing_says_what_to_do() -> None:
+    code = (
+        "from world_scenes import *; from robospa.harness.sim.sapien_world import SapienWorld; "
+        "from robospa.protocol.policy import CameraSpec\n"
+        "w = SapienWorld(); w.load(two_blocks())\n"
+        "w.step(joint_action(), 'joint', lambda s: False)\n"
+        "try: w.render(CameraSpec('head'))\n"
+        "except Exception as e: print(type(e).__name__, e)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", code],
+        cwd=Path(__file__).parents[1],
+        env={"VK_ICD_FILENAMES": "/nonexistent.json", "VK_DRIVER_FILES": "/nonexistent.json"},
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert done.stdout.startswith("RenderUnavailable"), done.stderr
+    assert "robospa doctor" in done.stdout

@@ -1,0 +1,111 @@
+"""The closed form of rest-to-rest motion, against hand-checked numbers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from robospa.harness.sim.motion import (
+    HOLD_STEPS,
+    RATE,
+    duration,
+    fixed_rate,
+    limit_opening,
+    profile,
+    rest_to_rest,
+    step_count,
+)
+
+ZERO = np.zeros((2, 6))
+OPEN = np.ones(2)
+
+
+def towards(left: float, right: float) -> np.ndarray:
+    goal = ZERO.copy()
+    goal[0, 0], goal[1, 2] = left, right
+    return goal
+
+
+@pytest.mark.parametrize(
+    ("change", "steps"), [(0.001, 15), (0.01, 50), (0.05, 111), (0.1, 158), (0.5, 353), (2.0, 750)]
+)
+def test_steps_are_those_of_the_official_harness(change: float, steps: int) -> None:
+    assert step_count(change) == steps
+
+
+def test_duration_is_continuous_where_the_triangle_becomes_a_trapezium() -> None:
+    assert duration(1.0) == pytest.approx(2.0)
+    assert duration(1.0 + 1e-9) == pytest.approx(2.0)
+
+
+@given(st.floats(1e-4, 6.0))
+def test_profile_starts_and_ends_at_rest(change: float) -> None:
+    fraction, rate = profile(change)
+    assert fraction[-1] == pytest.approx(1.0)
+    assert rate[-1] == pytest.approx(0.0, abs=1e-9)
+
+
+@given(st.floats(1e-3, 6.0))
+def test_profile_keeps_both_limits(change: float) -> None:
+    fraction, rate = profile(change)
+    step = duration(change) / (len(fraction) - 1)
+    assert (rate * change).max() <= 1.0 + 1e-9
+    assert np.abs(np.diff(rate * change)).max() <= step * (1.0 + 1e-6)
+
+
+@given(st.floats(1e-3, 6.0))
+def test_profile_rate_is_the_slope_of_its_fraction(change: float) -> None:
+    fraction, rate = profile(change)
+    step = duration(change) / (len(fraction) - 1)
+    slope = np.diff(fraction) / step
+    assert np.allclose(slope, (rate[1:] + rate[:-1]) / 2, atol=step * 1.01 / change)
+
+
+def test_the_arm_that_is_done_first_holds() -> None:
+    path = rest_to_rest(ZERO, towards(0.5, 0.01), OPEN, OPEN, OPEN)
+    assert len(path) == 353
+    assert np.all(path.joints[1, 49:, 2] == 0.01)
+    assert np.all(path.velocities[1, 50:] == 0.0)
+
+
+def test_both_arms_hold_for_fifty_steps_if_nothing_moves() -> None:
+    assert len(rest_to_rest(ZERO, ZERO, OPEN, OPEN, OPEN)) == HOLD_STEPS
+
+
+def test_an_arm_that_does_not_move_waits_for_the_other() -> None:
+    assert len(rest_to_rest(ZERO, towards(0.001, 0.0), OPEN, OPEN, OPEN)) == 15
+
+
+def test_gripper_goes_linearly_over_its_arms_steps() -> None:
+    path = rest_to_rest(ZERO, towards(0.5, 0.1), OPEN, np.array([0.0, 0.5]), OPEN)
+    assert path.commanded[0, 352] == 0.0
+    assert path.commanded[1, 78] == pytest.approx(1 - 0.5 * 79 / 158)
+    assert np.all(path.commanded[1, 157:] == 0.5)
+
+
+def test_a_gripper_alone_takes_the_hold_time() -> None:
+    path = rest_to_rest(ZERO, ZERO, OPEN, np.zeros(2), OPEN)
+    assert len(path) == HOLD_STEPS
+
+
+def test_opening_is_limited_and_closing_is_not() -> None:
+    assert limit_opening(np.array([1.0, 1.0, 1.0]), 0.0) == pytest.approx([0.1, 0.2, 0.3])
+    assert limit_opening(np.array([0.0, 0.0]), 1.0) == pytest.approx([0.0, 0.0])
+
+
+def test_targets_lie_on_the_straight_joint_line() -> None:
+    goal = np.array([[0.3, -0.2, 0.1, 0.0, 0.05, 0.6], [0.0] * 6])
+    path = rest_to_rest(ZERO, goal, OPEN, OPEN, OPEN)
+    along = path.joints[0] @ goal[0] / (goal[0] @ goal[0])
+    assert np.allclose(path.joints[0], along[:, None] * goal[0], atol=1e-12)
+    assert np.array_equal(path.joints[:, -1], goal)
+
+
+def test_fixed_rate_lasts_as_long_as_it_is_told() -> None:
+    path = fixed_rate(ZERO, towards(0.5, 0.0), OPEN, np.zeros(2), OPEN, 10)
+    assert len(path) == 10
+    assert path.joints[0, 4, 0] == pytest.approx(0.25)
+    assert path.velocities[0, 4, 0] == pytest.approx(0.5 * RATE / 10)
+    assert np.all(path.velocities[:, -1] == 0.0)
