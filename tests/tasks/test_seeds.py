@@ -25,7 +25,7 @@ PENDING: dict[str, tuple[int, ...]] = {
     "Stack_Blocks_Size_Order": (3, 4, 5),
     "Stack_Blocks_Length_Order": (3, 4, 5),
     "Place_Phone_Press_Stapler": (3, 4, 5),
-    "Place_Bottle_Cup": (2, 3, 4, 5),
+    "Place_Bottle_Cup": (3, 4, 5),
     "Hang_Mug_Stack_Blocks": (2, 3, 4, 5),
     "Place_Object_Scale_Click": (2, 3, 4, 5),
     "Place_Burger_Fries_Click_Bell": (2, 3, 4, 5),
