@@ -165,6 +165,10 @@ def _open(
                     f"nobody listens at {address.url}: start the policy server first"
                 ) from error
             time.sleep(0.05)
+        except ConnectionResetError as error:  # it was just closing its door
+            if time.monotonic() >= give_up:
+                raise ConnectFailed(f"cannot connect to {address.url}: {error}") from error
+            time.sleep(0.05)
         except BadAddress:
             raise
         except InvalidStatus as error:

@@ -206,6 +206,7 @@ def _replayed(valid: Any, challenge: str, fraction: float, workers: int, referen
                 why = trial.trouble or "other " + ", ".join(trial.differs)
                 progress.note(f"{trial.key.slug}: {why}")
             progress.add(trial.record or valid.run.records[trial.key])
+            progress.show()
 
         return _reach("replay:replay")(valid, challenge, count, reference, workers or cores(), show)
 

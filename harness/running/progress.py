@@ -111,8 +111,11 @@ class Progress:
         """Count one trial."""
         self.tally.add(record)
 
-    def show(self, status: Status) -> None:
-        """Show the counts and `status`, but not more often than anybody can read."""
+    def show(self, status: Status | None = None) -> None:
+        """Show the counts and `status`, but not more often than anybody can read.
+
+        Without a status the time left follows from the trials so far.
+        """
         self._status = status
         now = time.monotonic()
         if self._live is not None:
@@ -122,8 +125,8 @@ class Progress:
         elif self.tally.ran and (now - self._line >= EVERY or self.tally.left == 0):
             self._line = now
             counted = f"{self.tally.done}/{self.tally.total} trials"
-            self.note(f"{counted}, {self.tally.text(status.left)}")
-            if now - self._detail >= DETAILS and self.tally.left:
+            self.note(f"{counted}, {self.tally.text(self._seconds_left())}")
+            if status is not None and now - self._detail >= DETAILS and self.tally.left:
                 self._detail = now
                 for text in details(status):
                     self.note(f"  {text}")
@@ -134,6 +137,11 @@ class Progress:
             self._live.console.print(text, style="yellow", highlight=False, markup=False)
         else:
             print(text, file=self._stream, flush=True)
+
+    def _seconds_left(self) -> float | None:
+        if self._status is not None:
+            return self._status.left
+        return self.tally.left / self.tally.rate if self.tally.ran else None
 
     def _start_live(self) -> None:
         from rich.console import Console
@@ -153,7 +161,7 @@ class Progress:
         status, tally = self._status, self.tally
         head = Table.grid(padding=(0, 1))
         bar = ProgressBar(total=max(tally.total, 1), completed=tally.done, width=28)
-        said = tally.text(status.left if status is not None else None) if tally.ran else "starting"
+        said = tally.text(self._seconds_left()) if tally.ran else "starting"
         head.add_row(bar, f"{tally.done}/{tally.total}", Text(said))
         if status is None or final:
             return head

@@ -12,6 +12,7 @@ from bundle_fakes import PRESS, REFERENCE, Files, put_rows, rows_of, seal, zip_u
 
 from robospa.leaderboard import bundle as layout
 from robospa.leaderboard.bundle import BundleError
+from robospa.leaderboard.outcomes import outcomes_of
 from robospa.leaderboard.reference import Reference
 from robospa.leaderboard.replay import Replay, replay
 from robospa.leaderboard.scores import scores_of, tables_of
@@ -80,6 +81,7 @@ def forge(files: Files, change: Any) -> Files:
     manifest = json.loads(files[layout.RUN])
     run = Run(Path("forged"), manifest, manifest_keys(manifest), records)
     files[layout.SCORES] = layout.canonical(scores_of(run))
+    files[layout.OUTCOMES] = layout.canonical(outcomes_of(run))
     for ending, table in tables_of(run).items():
         files[layout.TABLES[ending]] = table
     return seal(files)
