@@ -2,6 +2,8 @@
 
 SHELL := /bin/bash
 BIN := .venv/bin
+# A file's tests stay together: they share what is costly to make.
+SPREAD := -n auto --maxprocesses 4 --dist loadfile
 UV_COMPILE := $(BIN)/uv pip compile pyproject.toml --universal --fork-strategy fewest \
 	--python-version 3.11 --default-index https://pypi.org/simple --no-config --no-header -q
 
@@ -31,10 +33,10 @@ types: ## mypy --strict over the installed packages
 		| sed -E 's|^build/__editable__[^/]*/robospa/||'
 
 fast: ## Tests without simulator
-	$(BIN)/pytest
+	$(BIN)/pytest $(SPREAD)
 
 sim: ## Tests that run the simulator
-	$(BIN)/pytest -m sim
+	$(BIN)/pytest -m sim $(SPREAD)
 
 test-models: install-dev ## LeRobot policies with tiny random weights, in .venv-models (Python 3.12)
 	@[ -n "$$ROBOSPA_MODELS_PYTHON" ] || bash scripts/models.sh
