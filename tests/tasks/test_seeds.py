@@ -31,8 +31,8 @@ PENDING: dict[str, tuple[int, ...]] = {
     "Place_Burger_Fries_Click_Bell": (3, 4, 5),
     "Stamp_Seals_Press_Stapler": (3, 4, 5),
     "Click_Bell_Open_Microwave_Place_Object": (3, 4, 5),
-    "Observe_Blocks_Move_Memory": (2, 3, 4, 5),
-    "Observe_Objects_Click_Memory": (2, 3, 4, 5),
+    "Observe_Blocks_Move_Memory": (3, 4, 5),
+    "Observe_Objects_Click_Memory": (3, 4, 5),
     "Remember_Orientation_Restore": (2, 3, 4, 5),
     "Press_Stapler_Memory": (2, 3, 4, 5),
 }
