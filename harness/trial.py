@@ -26,7 +26,7 @@ from robospa.harness.world import ActionError, World
 from robospa.protocol.checks import check_chunk
 from robospa.protocol.errors import PolicyAnswerError
 from robospa.protocol.policy import Policy, PolicySpec, TrialInfo
-from robospa.results.records import TrialKey, TrialRecord
+from robospa.results.records import PROCESSOR, TrialKey, TrialRecord
 from robospa.tasks.catalog import build_scene
 from robospa.tasks.catalog import task as find_task
 from robospa.tasks.events import Event, outcome
@@ -293,7 +293,7 @@ def run_trial(
     Whatever `policy` or `world` raise apart from bad actions and answers is passed on: the caller
     decides whether to try again. `world` may be used for any other trial before and after.
     """
-    begun = time.perf_counter()
+    begun, worked = time.perf_counter(), time.process_time()
     wanted = parts(key)
     run = _Run(world, policy, wanted, recorder)
     level = wanted.task.levels[key.level]
@@ -320,6 +320,7 @@ def run_trial(
     reached = outcome(run.events, tracker.total)
     timing = dict(run.watch.seconds)
     timing["physics"] = run.physics_seconds
+    timing[PROCESSOR] = time.process_time() - worked
     return TrialRecord(
         key=key,
         category=wanted.task.category,

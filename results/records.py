@@ -6,6 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+PROCESSOR = "processor"
+"""Entry of `timing` with a trial's processor time [s]; the others share out its wall time."""
+
 END_REASONS = (
     "success",
     "step_limit",

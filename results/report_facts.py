@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from robospa.results.reading import Run
+from robospa.results.records import PROCESSOR
 
 END_NAMES = {
     "success": "success",
@@ -99,7 +100,8 @@ def timing(run: Run) -> dict[str, float]:
     sums: dict[str, float] = {}
     for record in run.records.values():
         for name, seconds in record.timing.items():
-            sums[name] = sums.get(name, 0.0) + seconds
+            if name != PROCESSOR:
+                sums[name] = sums.get(name, 0.0) + seconds
     return (
         {name: s / total for name, s in sorted(sums.items(), key=lambda p: -p[1])} if total else {}
     )

@@ -1,9 +1,10 @@
 """How many workers a run has: one per core, and more while the cores idle because workers wait.
 
 A worker that waits for its policy leaves its core idle. So after every round of trials (as many as
-there are workers) the driver looks at the share of time spent waiting: if what is left of the
-workers' time does not fill the cores, and the servers are not full, more workers come, at most
-twice as many at once. A full server ends it: more workers would only stand in its queue.
+there are workers) the driver looks at the processor time of their processes: if that does not fill
+the cores, and the servers are not full, more workers come, at most twice as many at once. (What a
+worker does not wait says less: answers come in batches, and then all want the cores at once.) A
+full server ends it: more workers would only stand in its queue.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import os
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from robospa.results.records import TrialRecord
+from robospa.results.records import PROCESSOR, TrialRecord
 
 PER_CORE = 8
 """Most workers for a core."""
@@ -45,21 +46,21 @@ class Staffing:
     most: int
     cores: int = field(default_factory=cores)
     _seconds: float = 0.0
-    _waiting: float = 0.0
+    _worked: float = 0.0
     _heard: int = 0
 
     def heard(self, record: TrialRecord) -> None:
         """Count one trial that was run."""
         self._seconds += record.wall_time
-        self._waiting += record.timing.get("waiting", 0.0)
+        self._worked += record.timing.get(PROCESSOR, 0.0)
         self._heard += 1
 
     def review(self, saturated: bool) -> int:
         """How many more workers come now. `saturated`: no server has room for more."""
         if self.wanted >= self.most or self._heard < self.wanted or self._seconds <= 0:
             return 0
-        busy = self.wanted * (1.0 - min(1.0, self._waiting / self._seconds))
-        self._seconds = self._waiting = 0.0
+        busy = self.wanted * self._worked / self._seconds
+        self._seconds = self._worked = 0.0
         self._heard = 0
         if saturated or busy >= FULL * self.cores:
             return 0

@@ -25,7 +25,9 @@ def test_a_real_run_replays_to_the_bit(tmp_path: Path) -> None:
 
     seeds = accepted("Pick_Blocks_Size", 1)[:2]
     keys = [TrialKey("Pick_Blocks_Size", 1, seed) for seed in seeds]
-    request = make_request("hold", keys, tmp_path / "run", connection={"wait": 0.0}, workers=1)
+    request = make_request(
+        "hold", keys, tmp_path / "run", connection={"wait": 0.0, "patience": 0.0}, workers=1
+    )
     evaluate(request)
     card = deepcopy(CARD)
     spec = json.loads((tmp_path / "run" / "run.json").read_text())

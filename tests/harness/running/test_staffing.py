@@ -11,10 +11,10 @@ KEY = TrialKey("Pick_Fake", 1, 1)
 
 
 def heard(staffing: Staffing, waiting: float, trials: int | None = None) -> None:
-    """A round of trials of 1 s each of which `waiting` was spent waiting."""
+    """A round of trials of 1 s each in which a process did nothing for `waiting`."""
     record = TrialRecord(
         KEY, "GAC", "go", "", "success", True, 1, 1, 1, 2, 1, 50, 1, "", "", 1.0,
-        timing={"waiting": waiting},
+        timing={"processor": 1.0 - waiting},
     )  # fmt: skip
     for _ in range(trials or staffing.wanted):
         staffing.heard(record)
