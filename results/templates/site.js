@@ -228,7 +228,7 @@ function compare() {
   document.getElementById("how").textContent = HOW[pairing.how];
   const names = sides.map((m, n) => make("span", {}, make("span", { className: "key" + (n ? " two" : "") }), m.name));
   const title = (content) => make("th", { scope: "col", className: "num" }, content);
-  document.querySelector("#sides thead tr").replaceChildren(make("th", { scope: "col", className: "name" }, ""), ...names.map(title), title("difference"),
+  document.querySelector("#sides thead tr").replaceChildren(make("th", { scope: "col", className: "name" }, ""), ...names.map(title), title("differ\u00adence"),
     ...(pairing.how === "paired" ? [title("won alone")] : []));
   document.querySelector("#sides tbody").replaceChildren(...rows.map((r) => {
     const values = sides.map((m) => value(m, { metric, row: r, level }));
