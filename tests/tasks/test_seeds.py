@@ -14,7 +14,7 @@ PENDING: dict[str, tuple[int, ...]] = {
     "Move_Blocks_Apart": (4, 5),
     "Move_Playing_Cards_Away": (4, 5),
     "Place_Bowls_Plates": (4, 5),
-    "Separate_Fries_Bread": (3, 4, 5),
+    "Separate_Fries_Bread": (4, 5),
     "Rank_Blocks_Height": (3, 4, 5),
     "Rank_Blocks_Color": (3, 4, 5),
     "Rank_Blocks_Size": (3, 4, 5),
