@@ -17,7 +17,7 @@ PENDING: dict[str, tuple[int, ...]] = {
     "Separate_Fries_Bread": (4, 5),
     "Rank_Blocks_Height": (4, 5),
     "Rank_Blocks_Color": (4, 5),
-    "Rank_Blocks_Size": (3, 4, 5),
+    "Rank_Blocks_Size": (4, 5),
     "Hit_Blocks_Hammer_Order": (3, 4, 5),
     "Click_Objects_Order": (3, 4, 5),
     "Stamp_Seals_Order": (3, 4, 5),
