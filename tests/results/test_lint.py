@@ -40,7 +40,7 @@ def test_a_clean_run_has_no_findings(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "rule"),
     [
-        ({"wall_time": 0.001}, "too-fast"),
+        ({"wall_time": 1e-5}, "too-fast"),
         ({"physics_steps": 3}, "fewer-steps"),
         ({"done": 5}, "progress-range"),
         ({"done": 0}, "ps-below-sr"),
