@@ -20,8 +20,8 @@ from robospa.results.reading import TRIALS, Run, finished, read_file
 from robospa.results.records import TrialKey, TrialRecord
 
 FASTEST_STEP = 4e-6
-"""Wall time of a physics step [s] that no machine known to us beats: 1000 times real time. Arms that
-stand still among sleeping objects take 16 us on two cores of 2026."""
+"""Wall time of a physics step [s] that no machine known to us beats: 1000 times real time. Arms
+that stand still among sleeping objects take 16 us on two cores of 2026."""
 T = TypeVar("T")
 INFORMATIVE = 3
 """Rows with fewer different numbers above zero may well agree by chance."""
