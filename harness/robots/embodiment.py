@@ -51,7 +51,7 @@ class Arm:
     reach: float
     home: tuple[float, ...]
     seeds: tuple[tuple[float, ...], ...]
-    shapes: Mapping[str, tuple[Shape, ...]]
+    shapes: Mapping[str, tuple[Shape, ...]] = field(hash=False)
     camera: Pose
     """Wrist camera in the last arm link: x looks forward, z is up in the image."""
     geometry: str = "any"

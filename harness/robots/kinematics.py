@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +32,7 @@ STEP_LIMIT = 0.35  # [rad] per iteration and joint, keeps far starts from jumpin
 
 @dataclass(frozen=True)
 class Chain:
-    """An arm's joints as arrays, in the world frame. Build once with `chain_of`."""
+    """An arm's joints as arrays, in the world frame, shared: nobody writes to them."""
 
     base: Array  # (4, 4)
     origins: Array  # (J, 4, 4)
@@ -57,8 +58,9 @@ def pose_of(transform: Array) -> Pose:
     return Pose((x, y, z), from_matrix(transform[:3, :3]))
 
 
+@cache
 def chain_of(arm: Arm) -> Chain:
-    """The arm's joints as arrays, ending in its end-effector frame."""
+    """The arm's joints as arrays, ending in its end-effector frame. Made once for equal arms."""
     origins = np.stack([matrix(j.origin) for j in arm.joints])
     tool = matrix(arm.tool)
     return Chain(

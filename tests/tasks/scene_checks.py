@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -18,7 +20,7 @@ from robospa.harness.robots.kinematics import chain_of, end_effector, inverse
 from robospa.harness.skills.grasping import LEANS, LEVEL, candidate_poses, grasps_now
 from robospa.harness.skills.workspace import Workspace
 from robospa.tasks import catalog
-from robospa.tasks.geometry import to_matrix
+from robospa.tasks.geometry import Pose, to_matrix
 from robospa.tasks.layouts import HEIGHT, WIDTH, head_pixel
 from robospa.tasks.objects import object_model
 from robospa.tasks.plan import Pick
@@ -29,8 +31,6 @@ from robospa.tasks.variants import object_sets
 TOUCH = 5e-4
 """Boxes may share this much [m]: what stands beside another thing is no overlap."""
 ROBOT = embodiment("aloha-agilex")
-FIRST_TRIES = 6
-"""Grasps tried before all the others: most objects are taken with one of the first."""
 
 SIGNS = np.array(list(itertools.product((-0.5, 0.5), (-0.5, 0.5), (0.0, 1.0))))
 
@@ -40,12 +40,30 @@ def movable(scene: Scene) -> list[SceneObject]:
     return [o for o in scene.objects if not o.fixed and o.appears_at is None]
 
 
-def corners(item: SceneObject) -> np.ndarray:
-    """(8, 3) corners [m] of the object's box in the world."""
-    model = object_model(item.asset, item.params)
-    local = SIGNS * np.array(model.size) + np.array([0.0, 0.0, model.bottom])
-    turned: np.ndarray = local @ to_matrix(item.pose.rotation).T + np.array(item.pose.position)
-    return turned
+def corners(items: Sequence[SceneObject]) -> np.ndarray:
+    """(N, 8, 3) corners [m] of the objects' boxes in the world."""
+    models = [object_model(item.asset, item.params) for item in items]
+    sizes = np.array([model.size for model in models]).reshape(-1, 3)
+    local = SIGNS * sizes[:, None]
+    local[:, :, 2] += np.array([model.bottom for model in models])[:, None]
+    turned = local @ turns(items).transpose(0, 2, 1)
+    at = np.array([item.pose.position for item in items]).reshape(-1, 1, 3)
+    return np.asarray(turned + at)
+
+
+def turns(items: Sequence[SceneObject]) -> np.ndarray:
+    """(N, 3, 3) rotations of the objects."""
+    return np.array([to_matrix(item.pose.rotation) for item in items]).reshape(-1, 3, 3)
+
+
+def near(items: Sequence[SceneObject]) -> Iterator[tuple[int, int, float]]:
+    """Pairs whose upright cylinders are inside each other, and how deep [m]."""
+    radii = np.array([object_model(item.asset, item.params).radius for item in items])
+    at = np.array([item.pose.position[:2] for item in items]).reshape(-1, 2)
+    apart = np.sqrt(((at[:, None] - at) ** 2).sum(axis=2))
+    deep = radii[:, None] + radii - apart
+    for i, j in zip(*np.nonzero(np.triu(deep > 0, 1)), strict=True):
+        yield int(i), int(j), float(deep[i, j])
 
 
 def overlap(a: SceneObject, b: SceneObject) -> float:
@@ -53,51 +71,51 @@ def overlap(a: SceneObject, b: SceneObject) -> float:
 
     As boxes, by the separating axes of both, and as upright cylinders: round things are no boxes.
     """
-    radii = sum(object_model(item.asset, item.params).radius for item in (a, b))
-    least = radii - math.dist(a.pose.position[:2], b.pose.position[:2])
-    if least <= 0:
-        return 0.0
-    one, other = corners(a), corners(b)
-    for item in (a, b):
-        for axis in to_matrix(item.pose.rotation).T:
-            p, q = one @ axis, other @ axis
-            least = min(least, p.max() - q.min(), q.max() - p.min())
-    return max(0.0, float(least))
+    pair = (a, b)
+    for _, _, least in near(pair):
+        axes = np.concatenate(turns(pair).transpose(0, 2, 1))
+        p, q = corners(pair) @ axes.T
+        gaps = np.minimum(p.max(axis=0) - q.min(axis=0), q.max(axis=0) - p.min(axis=0))
+        return max(0.0, min(least, float(gaps.min())))
+    return 0.0
 
 
 def rests_in(a: SceneObject, b: SceneObject) -> bool:
     """Whether one of the two starts inside or on the other, as things in a bin do."""
-    upper, lower = sorted((a, b), key=lambda item: -corners(item)[:, 2].min())
-    (left, near), (right, far) = (
-        corners(lower)[:, :2].min(axis=0),
-        corners(lower)[:, :2].max(axis=0),
+    boxes = dict(zip((a.name, b.name), corners((a, b)), strict=True))
+    upper, lower = sorted((a, b), key=lambda item: -boxes[item.name][:, 2].min())
+    (left, fore), (right, far) = (
+        boxes[lower.name][:, :2].min(axis=0),
+        boxes[lower.name][:, :2].max(axis=0),
     )
     x, y, _ = upper.pose.position
-    higher = corners(upper)[:, 2].min() > corners(lower)[:, 2].min() + 1e-3
-    return bool(higher and left < x < right and near < y < far)
+    higher = boxes[upper.name][:, 2].min() > boxes[lower.name][:, 2].min() + 1e-3
+    return bool(higher and left < x < right and fore < y < far)
 
 
 def overlaps(scene: Scene) -> Iterator[str]:
     """Movable objects that are inside each other."""
-    for a, b in itertools.combinations(movable(scene), 2):
+    items = movable(scene)
+    for i, j, _ in near(items):
+        a, b = items[i], items[j]
         if overlap(a, b) > TOUCH and not rests_in(a, b):
             yield f"{a.name} ({a.asset}) is in {b.name} ({b.asset})"
 
 
 def unseen(scene: Scene) -> Iterator[str]:
     """Movable objects whose middle the head camera does not see."""
-    for item in movable(scene):
-        x, y, z = corners(item).mean(axis=0)
-        u, v = head_pixel(x, y, z)
-        if not (0 <= u < WIDTH and 0 <= v < HEIGHT):
-            yield f"{item.name} ({item.asset}) is out of view"
+    items = movable(scene)
+    x, y, z = corners(items).mean(axis=1).T
+    u, v = head_pixel(x, y, z)
+    for k in np.flatnonzero((u < 0) | (u >= WIDTH) | (v < 0) | (v >= HEIGHT)):
+        yield f"{items[k].name} ({items[k].asset}) is out of view"
 
 
 def sunk(scene: Scene) -> Iterator[str]:
     """Movable objects that start below the table's top."""
-    for item in movable(scene):
-        if corners(item)[:, 2].min() <= TABLE_TOP - 1e-3:
-            yield f"{item.name} ({item.asset}) is below the table's top"
+    items = movable(scene)
+    for k in np.flatnonzero(corners(items)[:, :, 2].min(axis=1) <= TABLE_TOP - 1e-3):
+        yield f"{items[k].name} ({items[k].asset}) is below the table's top"
 
 
 def named(scene: Scene) -> Iterator[str]:
@@ -120,22 +138,28 @@ def unreachable(scene: Scene) -> Iterator[str]:
 
 def _at_start(scene: Scene) -> Workspace:
     """The scene as drawn, both arms at home with open grippers."""
-    left, right = (end_effector(chain_of(arm), arm.home) for arm in ROBOT.arms)
     joints = (ROBOT.arms[0].home, ROBOT.arms[1].home)
     poses = {o.name: o.pose for o in scene.objects if o.appears_at is None}
-    return Workspace(scene, ROBOT, Snapshot(0.0, poses, (1.0, 1.0), (left, right), joints))
+    return Workspace(scene, ROBOT, Snapshot(0.0, poses, (1.0, 1.0), _home(), joints))
+
+
+@cache
+def _home() -> tuple[Pose, Pose]:
+    left, right = (end_effector(chain_of(arm), arm.home) for arm in ROBOT.arms)
+    return left, right
 
 
 def _reached(ws: Workspace, name: str, arms: tuple[int, ...]) -> bool:
     """Whether inverse kinematics finds joints of one of `arms` for a grasp of the object."""
     body = ws.pose(name)
     grasps = grasps_now(ws.models[name], body)
+    upright = [replace(grasp, tilt=0.0) for grasp in grasps[:1]]  # takes most objects
     for leans in (LEVEL, LEANS):
         for arm in sorted(arms, key=lambda k: (body.position[0] > 0) != (k == 1)):
             reach = ws.robot.arms[arm].reach
-            poses = [c[0] for grasp in grasps for c in candidate_poses(grasp, reach, leans)]
-            for part in (poses[:FIRST_TRIES], poses[FIRST_TRIES:]):
-                if part and inverse(ws.chains[arm], part)[1].any():
+            for some in (upright, grasps):
+                poses = [c[0] for grasp in some for c in candidate_poses(grasp, reach, leans)]
+                if poses and inverse(ws.chains[arm], poses)[1].any():
                     return True
     return False
 
