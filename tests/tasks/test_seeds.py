@@ -25,7 +25,7 @@ PENDING: dict[str, tuple[int, ...]] = {
     "Stack_Blocks_Size_Order": (4, 5),
     "Stack_Blocks_Length_Order": (4, 5),
     "Place_Phone_Press_Stapler": (4, 5),
-    "Place_Bottle_Cup": (3, 4, 5),
+    "Place_Bottle_Cup": (4, 5),
     "Hang_Mug_Stack_Blocks": (3, 4, 5),
     "Place_Object_Scale_Click": (3, 4, 5),
     "Place_Burger_Fries_Click_Bell": (3, 4, 5),
