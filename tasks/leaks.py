@@ -46,7 +46,12 @@ Ask = Callable[[Scene], Question]
 
 
 def _target(scene: Scene) -> Question:
-    return Question([o.name for o in scene.objects], str(scene.facts["target"]))
+    """The reference of a distance stands out, as that from which all distances differ, and is no
+    answer: a guesser leaves it out, and chance is 1 / (n - 1)."""
+    names = [o.name for o in scene.objects]
+    if "distance_rank" in scene.facts:
+        names.remove(str(scene.facts["reference"]))
+    return Question(names, str(scene.facts["target"]))
 
 
 def _first_of(fact: str, *others: str) -> Ask:

@@ -38,7 +38,7 @@ def walk(rng: np.random.Generator, points: Array, fits: Fits, step: float) -> No
         points[good, i] = wanted[good]
 
 
-def pool(starts: Array, fits: Fits, sweeps: int = 160, samples: int = 8) -> Array:
+def pool(starts: Array, fits: Fits, sweeps: int = 160, samples: int = 8, seed: int = SEED) -> Array:
     """Layouts [m] of the shape of `starts`, from every chain: (samples, chains, count, 2).
 
     Each chain starts from a layout that fits (LayoutError if one does not) and is sampled in the
@@ -47,7 +47,7 @@ def pool(starts: Array, fits: Fits, sweeps: int = 160, samples: int = 8) -> Arra
     count = starts.shape[1]
     if not all(bool(fits(starts, starts[:, i], i).all()) for i in range(count)):
         raise LayoutError(f"the start layouts of {count} objects do not keep to their own rules")
-    rng = np.random.Generator(np.random.PCG64(SEED))
+    rng = np.random.Generator(np.random.PCG64(seed))
     points = starts.copy()
     every = max(1, sweeps // 2 // samples)
     found = []

@@ -45,14 +45,19 @@ def block(look: int, params: Mapping[str, Any]) -> ObjectModel:
     color = _triple(params.get("color", BLOCK_COLORS[names[look]]), "color")
     if min(half) <= 0:
         raise ValueError(f"block half sizes must be positive, not {list(half)}")
+    shape = solid(Box(half), color, roughness=0.6)
+    return replace(_plain_block(half), shapes=(shape,), phrases=_block_phrases(color))
+
+
+@lru_cache(maxsize=1024)
+def _block_phrases(color: Color) -> tuple[str, ...]:
+    """What a block of that colour is called: by the nearest colour that has a word."""
     gaps = [math.sqrt(float(d.dot(d))) for d in _KNOWN - color]
-    word = names[gaps.index(min(gaps))]
-    phrases = (
+    word = list(BLOCK_COLORS)[gaps.index(min(gaps))]
+    return (
         f"{word} block", f"{word} box", f"block that is {word}", f"{word} building block",
         f"{word}-coloured block", f"block painted {word}", f"block with {word} sides",
     )  # fmt: skip
-    shape = solid(Box(half), color, roughness=0.6)
-    return replace(_plain_block(half), shapes=(shape,), phrases=phrases)
 
 
 @lru_cache(maxsize=1024)

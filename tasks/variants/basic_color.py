@@ -17,7 +17,7 @@ from robospa.tasks.instructions.words import Slots
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Task
 from robospa.tasks.variants import object_sets as sets
-from robospa.tasks.variants.distances import Family, Thing, choices, put_down, shifted
+from robospa.tasks.variants.distances import Family, Thing, layouts, put_down, shifted
 from robospa.tasks.variants.picking import lifted, pick_target
 
 COLORS = ("red", "green", "blue", "yellow", "orange", "purple", "pink", "black", "brown")
@@ -94,8 +94,9 @@ def color_task(family: Family, colored: Colored, what: str) -> Task:
     rules = family.rules
 
     def draw(level: int, rng: np.random.Generator) -> Draft:
-        found = choices(rules, level).layouts
-        points = shifted(rng, rules, level, found[int(rng.integers(len(found)))])
+        found = layouts(rules, level)
+        layout = found[int(rng.integers(len(found)))]
+        points = shifted(rng, rules, level, layout)
         things, words = colored(level, rng)
         objects, order = put_down(rng, points, things, family.yaw)
         target = int(rng.integers(len(objects)))

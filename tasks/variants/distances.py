@@ -1,13 +1,13 @@
 """What the tasks of Spatial Distance Estimation share: pick the k-th farthest from a reference.
 
-The reference is named, the target is not: it is the k-th farthest from the reference, clearly so
-(its distance differs from those of the neighbouring ranks by the level's gap), with k uniform over
-the n - 1 ranks. The five sets of objects also serve the basic tasks that name the target's colour.
+The reference is named, the target is not: it is the k-th farthest from the reference, with k
+uniform over the n - 1 ranks. All distances from the reference differ by the level's gap, not only
+those beside the asked one, so that nothing in a scene tells which one is asked for. The five sets
+of objects also serve the basic tasks that name the target's colour.
 """
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -15,13 +15,12 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from robospa.tasks.geometry import Array
 from robospa.tasks.goals.pick import Lift
 from robospa.tasks.instructions import words_spatial
 from robospa.tasks.instructions.words import Phrasings, Slots
-from robospa.tasks.layouts import Mask, in_head_view
+from robospa.tasks.layouts import LayoutError, Mask, in_head_view
 from robospa.tasks.objects import object_model
 from robospa.tasks.packing import Fits, apart, pool, walk
 from robospa.tasks.scene import Scene, SceneObject
@@ -34,6 +33,11 @@ Thing = tuple[str, Mapping[str, Any] | None]
 
 CHAINS = 256
 """Random walks that make up the pool; each gives eight layouts."""
+SEARCHES = 512
+"""Random walks that look for layouts with clear distances, ROUNDS times SWEEPS moves long."""
+ROUNDS, SWEEPS = 12, 20
+ENOUGH = 64
+"""So many of them have to get there, or all rounds have to be over."""
 SHIFT = 0.02
 """A layout's places are moved once more by up to this [m] in each trial, where there is room."""
 
@@ -44,8 +48,8 @@ class Rules:
 
     `region` is the x and y range [m] of the origins, `radius` and `tall` [m] bound the objects for
     the view. Origins are at least `apart` [m] from each other and extend over at least `extent`
-    (x, y) [m]; a rank is clear if its distance differs from its neighbours' by `gap` [m]. The
-    layout pool starts from subsets of the places `starts`.
+    (x, y) [m]; distances from the reference differ by `gap` [m]. Layouts are found from subsets of
+    the places `starts`.
     """
 
     counts: tuple[int, ...]
@@ -80,14 +84,6 @@ class Family:
     yaw: float = math.pi / 2
 
 
-@dataclass(frozen=True)
-class Choices:
-    """Layouts (count, n, 2) and, per rank, which (layout, reference place) make it a clear one."""
-
-    layouts: Array
-    by_rank: tuple[NDArray[np.intp], ...]
-
-
 def allowed(rules: Rules, x: Array, y: Array) -> Mask:
     """Whether origins are in the region, with the footprint and the object's axis in view."""
     (left, right), (near, far) = rules.region
@@ -98,27 +94,94 @@ def allowed(rules: Rules, x: Array, y: Array) -> Mask:
 def fits(rules: Rules, level: int) -> Fits:
     """The rule of the level's layouts."""
     least = rules.apart[level - 1]
-    return lambda points, wanted, i: (
-        allowed(rules, wanted[:, 0], wanted[:, 1]) & apart(points, wanted, i, least)
-    )
+
+    def good(points: Array, wanted: Array, i: int) -> Mask:
+        mask = apart(points, wanted, i, least)
+        return mask & allowed(rules, wanted[:, 0], wanted[:, 1]) if mask.any() else mask
+
+    return good
+
+
+def starts(rules: Rules, level: int, chains: int) -> Array:
+    """(chains, n, 2): random choices of the places to start from."""
+    rng = np.random.Generator(np.random.PCG64(level))
+    subsets = np.argsort(rng.random((chains, len(rules.starts))), axis=1)
+    return np.array(rules.starts)[subsets[:, : rules.counts[level - 1]]]
 
 
 @cache
-def choices(rules: Rules, level: int) -> Choices:
-    """The level's layout pool, sorted by the ranks it can ask for."""
-    count = rules.counts[level - 1]
-    rng = np.random.Generator(np.random.PCG64(level))
-    subsets = np.argsort(rng.random((CHAINS, len(rules.starts))), axis=1)[:, :count]
-    layouts = np.concatenate(pool(np.array(rules.starts)[subsets], fits(rules, level)))
-    layouts = layouts[[wide(rules, level, points) for points in layouts]]
-    delta = layouts[:, :, None] - layouts[:, None]
-    # The reference itself is last, at distance 0.
-    ranked = -np.sort(-np.sqrt((delta**2).sum(axis=-1)), axis=2)[:, :, :-1]
-    clear = ranked[:, :, :-1] - ranked[:, :, 1:] >= rules.gap[level - 1]
-    edge = np.ones((*clear.shape[:2], 1), dtype=bool)
-    eligible = np.concatenate([edge, clear], axis=2) & np.concatenate([clear, edge], axis=2)
-    pairs = (np.stack(np.nonzero(eligible[:, :, k]), axis=1) for k in range(count - 1))
-    return Choices(layouts, tuple(pairs))
+def layouts(rules: Rules, level: int) -> Array:
+    """The level's layouts (N, n, 2) [m], evenly from all there are."""
+    found = np.concatenate(pool(starts(rules, level, CHAINS), fits(rules, level)))
+    return found[[wide(rules, level, points) for points in found]]
+
+
+def unclear(points: Array, gap: float) -> Array:
+    """How much [m] is missing, for layouts (..., n, 2), until all distances from place 0 are clear.
+
+    0 if they differ by at least `gap` [m].
+    """
+    far = np.sort(distances(points), axis=-1)
+    missing: Array = np.maximum(gap - (far[..., 1:] - far[..., :-1]), 0.0).sum(axis=-1)
+    return missing
+
+
+def distances(points: Array) -> Array:
+    """(..., n - 1) distances [m] of all places of layouts (..., n, 2) but the first, from it."""
+    delta = points[..., 1:, :] - points[..., :1, :]
+    x, y = delta[..., 0], delta[..., 1]
+    apart: Array = np.sqrt(x * x + y * y)
+    return apart
+
+
+def clearing(rules: Rules, level: int) -> Fits:
+    """As `fits`, and no move makes the distances from place 0 less clear than they are."""
+    valid, gap = fits(rules, level), rules.gap[level - 1]
+
+    def good(points: Array, wanted: Array, i: int) -> Mask:
+        mask = valid(points, wanted, i)
+        if mask.any():
+            moved = points.copy()
+            moved[:, i] = wanted
+            mask &= unclear(moved, gap) <= unclear(points, gap)
+        return mask
+
+    return good
+
+
+@cache
+def clear_layouts(rules: Rules, level: int) -> Array:
+    """Layouts (N, n, 2) [m] in which all distances from place 0, the reference, are clear.
+
+    Few layouts are like that by chance. Walks that never become less clear find some, from each of
+    the likelier references of a start; copies of these, half of them mirrored, walk on.
+    """
+    points = _likelier_references(starts(rules, level, SEARCHES), rules.gap[level - 1])
+    for k in range(ROUNDS):
+        points = pool(points, clearing(rules, level), SWEEPS, 1, seed=k)[0]
+        found = points[unclear(points, rules.gap[level - 1]) == 0.0]
+        if len(found) >= ENOUGH:
+            break
+    mirrored = found * (-1.0, 1.0)
+    seen = allowed(rules, mirrored[..., 0], mirrored[..., 1]).all(axis=1)
+    found = np.concatenate([found, mirrored[seen]])
+    if not len(found):
+        raise LayoutError(f"no layout of {points.shape[1]} objects has clear distances")
+    copies = found[np.arange(CHAINS) % len(found)]
+    walked = np.concatenate(pool(copies, clearing(rules, level)))
+    return walked[[wide(rules, level, layout) for layout in walked]]
+
+
+LIKELY = 3
+"""So many of a start's places are tried as the reference."""
+
+
+def _likelier_references(points: Array, gap: float) -> Array:
+    """Layouts (chains, n, 2) turned so that one of the LIKELY clearest places comes first."""
+    turned = np.stack([np.roll(points, -k, axis=1) for k in range(points.shape[1])], axis=1)
+    best = np.argsort(unclear(turned, gap), axis=1, kind="stable")[:, :LIKELY]
+    chain = np.arange(len(points))
+    return np.asarray(turned[chain, best[chain, chain % best.shape[1]]])
 
 
 def wide(rules: Rules, level: int, points: Array) -> bool:
@@ -126,29 +189,27 @@ def wide(rules: Rules, level: int, points: Array) -> bool:
     return bool((np.ptp(points, axis=0) >= rules.extent[level - 1]).all())
 
 
-def by_distance(points: Array, reference: int) -> list[tuple[float, int]]:
-    """(distance [m], place) of all places but `reference`, farthest first."""
-    x, y = points[reference].tolist()
-    found = [
-        (math.sqrt((px - x) ** 2 + (py - y) ** 2), i)
-        for i, (px, py) in enumerate(points.tolist())
-        if i != reference
-    ]
-    return sorted(found, reverse=True)
-
-
-def is_clear(points: Array, reference: int, rank: int, gap: float) -> bool:
-    """Whether the distance of rank `rank` (from 1) is clear of its neighbours'."""
-    ranked = [d for d, _ in by_distance(points, reference)]
-    around = ranked[max(0, rank - 2) : rank + 1]
-    return all(a - b >= gap for a, b in itertools.pairwise(around))
-
-
 def shifted(rng: np.random.Generator, rules: Rules, level: int, points: Array) -> Array:
     """The layout (n, 2) after one more sweep of small moves, if that keeps its extent."""
     moved = points[None].copy()
     walk(rng, moved, fits(rules, level), SHIFT)
     return moved[0] if wide(rules, level, moved[0]) else points
+
+
+JITTERS = SHIFT * np.repeat(0.5 ** np.arange(6), 2)[:, None, None]
+"""How far [m] places are moved together; the first that leaves them apart and clear is taken."""
+
+
+def jittered(rng: np.random.Generator, rules: Rules, level: int, points: Array) -> Array:
+    """A layout (n, 2) with clear distances, all places moved a little, if there is room."""
+    count, x, y = len(points), *np.triu_indices(len(points), 1)
+    tried = points + JITTERS * (2 * rng.random((len(JITTERS), count, 2)) - 1)
+    delta = tried[:, x] - tried[:, y]
+    near = (delta[..., 0] ** 2 + delta[..., 1] ** 2).min(axis=1) < rules.apart[level - 1] ** 2
+    seen = allowed(rules, tried[..., 0], tried[..., 1]).all(axis=1)
+    wide = (np.ptp(tried, axis=1) >= rules.extent[level - 1]).all(axis=1)
+    good = seen & wide & ~near & (unclear(tried, rules.gap[level - 1]) == 0.0)
+    return tried[int(np.argmax(good))] if good.any() else points
 
 
 def put_down(
@@ -170,22 +231,18 @@ def put_down(
 
 
 def draw(level: int, rng: np.random.Generator, family: Family) -> Draft:
-    """A uniform rank, a layout and reference place at which it is clear, then what lies where."""
+    """A layout with clear distances, a uniform rank, then what lies where."""
     rules = family.rules
-    rank = int(rng.integers(rules.counts[level - 1] - 1)) + 1
-    found = choices(rules, level)
-    pairs = found.by_rank[rank - 1]
-    layout, reference = (int(v) for v in pairs[int(rng.integers(len(pairs)))])
-    points = found.layouts[layout]
-    moved = shifted(rng, rules, level, points)
-    if is_clear(moved, reference, rank, rules.gap[level - 1]):
-        points = moved
-    target = by_distance(points, reference)[rank - 1][1]
-    things = family.things(level, rng, reference)
+    found = clear_layouts(rules, level)
+    layout = found[int(rng.integers(len(found)))]
+    points = jittered(rng, rules, level, layout)
+    rank = int(rng.integers(len(points) - 1)) + 1
+    target = 1 + int(np.argsort(-distances(points))[rank - 1])
+    things = family.things(level, rng, 0)
     objects, order = put_down(rng, points, things, family.yaw)
     facts = {
         "target": f"object_{order.index(target)}",
-        "reference": f"object_{order.index(reference)}",
+        "reference": f"object_{order.index(0)}",
         "distance_rank": rank,
     }
     return Draft(objects, facts)

@@ -1,7 +1,7 @@
 """No scene gives its answer away: guessers that see it without the instruction do as chance does.
 
 By default a few scenes of every variant, which finds gross leaks; `ROBOSPA_SCENES=2000` looks
-closely. What is known and explained stands in TOLD and in docs/fidelity.md.
+closely.
 """
 
 from __future__ import annotations
@@ -38,17 +38,6 @@ LISTING = [
 ]
 
 
-def told_by_places(name: str) -> bool:
-    return catalog.task(name).category in TOLD
-
-
-TOLD = {
-    "SDE": {1: 0.50, 2: 0.40, 3: 0.40, 4: 0.30, 5: 0.25},
-}
-"""Share of answers that geometry tells (docs/fidelity.md): places are drawn so that the asked
-distance is clear, and the clear one can be seen. By category and level, rounded up."""
-
-
 @cache
 def scenes(name: str, level: int) -> tuple[Scene, ...]:
     return tuple(catalog.build_scene(name, level, seed) for seed in SEEDS)
@@ -57,17 +46,6 @@ def scenes(name: str, level: int) -> tuple[Scene, ...]:
 @pytest.mark.parametrize(("name", "level"), ASKED)
 def test_the_scene_alone_does_not_tell_the_answer(name: str, level: int) -> None:
     verdict = leaks.examine(name, level, SEEDS)
-    told = TOLD.get(catalog.task(name).category, {}).get(level, 0.0)
-    verdict = replace(verdict, chance=max(verdict.chance, told))
-    assert verdict.p > ERROR / len(ASKED), verdict
-
-
-@pytest.mark.parametrize(("name", "level"), [v for v in ASKED if told_by_places(v[0])])
-def test_where_places_tell_nothing_else_does(name: str, level: int) -> None:
-    verdict = leaks.examine(name, level, SEEDS, leaks.identity)
-    if catalog.task(name).category == "SDE":  # the reference may stand out, and is no answer
-        objects = len(scenes(name, level)[0].objects)
-        verdict = replace(verdict, chance=1 / (objects - 1))
     assert verdict.p > ERROR / len(ASKED), verdict
 
 

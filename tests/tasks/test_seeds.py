@@ -8,6 +8,11 @@ from robospa.tasks.catalog import LEVELS, tasks
 from robospa.tasks.seeds import FIRST_SEED, PER_VARIANT, accepted, seed_list_hash
 
 PENDING: dict[str, tuple[int, ...]] = {
+    "Pick_Blocks_Distance": (1, 2, 3, 4, 5),
+    "Pick_Mugs_Distance": (1, 2, 3, 4, 5),
+    "Pick_Pill_Bottles_Distance": (1, 2, 3, 4, 5),
+    "Pick_Mixed_Objects_Distance_A": (1, 2, 3, 4, 5),
+    "Pick_Mixed_Objects_Distance_B": (1, 2, 3, 4, 5),
     "Lift_Pot_Repeat": (4, 5),
     "Lift_Fan_Repeat": (4, 5),
     "Click_Bell_Repeat": (4, 5),
@@ -32,7 +37,7 @@ PENDING: dict[str, tuple[int, ...]] = {
     "Stamp_Seals_Press_Stapler": (4, 5),
     "Click_Bell_Open_Microwave_Place_Object": (4, 5),
     "Observe_Blocks_Move_Memory": (4, 5),
-    "Observe_Objects_Click_Memory": (3, 4, 5),
+    "Observe_Objects_Click_Memory": (4, 5),
     "Remember_Orientation_Restore": (3, 4, 5),
     "Press_Stapler_Memory": (3, 4, 5),
 }
