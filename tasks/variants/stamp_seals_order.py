@@ -105,14 +105,16 @@ def goal(scene: Scene) -> UseInOrder:
 
 
 def plan(scene: Scene) -> tuple[Skill, ...]:
-    """From pad to pad, each time with the arm on whose side the seal stands."""
+    """From pad to pad, each time with the arm that has less far to reach: the one on the side of
+    the pad, or of the seal, that is farther out."""
     seal = scene.facts["seal"]
     skills: list[Skill] = []
     here = scene.object(seal).pose.position[0]
     for pad in scene.facts["order"]:
-        arm = side(here)
+        there = scene.object(pad).pose.position[0]
+        arm = side(max(here, there, key=abs))
         skills += [Pick(seal, lift=0.06, arm=arm), Place(seal, on=pad, drop=0.002, arm=arm)]
-        here = scene.object(pad).pose.position[0]
+        here = there
     return tuple(skills)
 
 
