@@ -8,8 +8,6 @@ from robospa.tasks.catalog import LEVELS, tasks
 from robospa.tasks.seeds import FIRST_SEED, PER_VARIANT, accepted, seed_list_hash
 
 PENDING: dict[str, tuple[int, ...]] = {
-    "Pick_Mugs_Distance": (4, 5),
-    "Pick_Pill_Bottles_Distance": (1, 2, 3, 4, 5),
     "Pick_Mixed_Objects_Distance_A": (1, 2, 3, 4, 5),
     "Pick_Mixed_Objects_Distance_B": (1, 2, 3, 4, 5),
     "Lift_Pot_Repeat": (4, 5),
