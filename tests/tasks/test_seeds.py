@@ -8,7 +8,6 @@ from robospa.tasks.catalog import LEVELS, tasks
 from robospa.tasks.seeds import FIRST_SEED, PER_VARIANT, accepted, seed_list_hash
 
 PENDING: dict[str, tuple[int, ...]] = {
-    "Pick_Mixed_Objects_Distance_B": (5,),
     "Lift_Pot_Repeat": (5,),
     "Lift_Fan_Repeat": (5,),
     "Click_Bell_Repeat": (5,),
