@@ -2,6 +2,7 @@
 
 A press counts when the touch begins. The next one needs 0.1 s without a touch first, so that the
 chatter of one physical contact is one press; without that rule a single press can count for five.
+Where the gripper has to be closed, opening it on the object is no leaving (official).
 """
 
 from __future__ import annotations
@@ -35,13 +36,12 @@ class PressCounter:
         self.count = 0
         self.raw_count = 0
         """Touches that began, chatter included: what a counter without re-arming would say."""
-        self._touching = False
+        self._pressing = False
+        self._left = True
         self._last_touch = float("-inf")
 
     def touched(self, snapshot: Snapshot) -> bool:
         """Whether a gripper touches the object inside the box at this instant."""
-        if self.arm is not None and snapshot.gripper[self.arm] >= GRIPPER_CLOSED:
-            return False
         if not snapshot.contacts:
             return False
         contacts = snapshot.gripper_contacts(self.name)
@@ -52,20 +52,29 @@ class PressCounter:
 
     def start(self, snapshot: Snapshot) -> None:
         """Begin with what is touched now not counting as a press."""
-        self._touching = self.touched(snapshot)
-        if self._touching:
+        touching = self.touched(snapshot)
+        self._pressing = touching and self._closed(snapshot)
+        self._left = not touching
+        if touching:
             self._last_touch = snapshot.time
 
     def update(self, snapshot: Snapshot) -> bool:
         """Whether a press begins at this instant."""
         touching = self.touched(snapshot)
-        began, self._touching = touching and not self._touching, touching
-        new = began and snapshot.time - self._last_touch >= REARM - 1e-9
         if touching:
+            self._left |= snapshot.time - self._last_touch >= REARM - 1e-9
             self._last_touch = snapshot.time
-        self.raw_count += began
-        self.count += new
+        pressing = touching and self._closed(snapshot)
+        self.raw_count += pressing and not self._pressing
+        self._pressing = pressing
+        new = pressing and self._left
+        if new:
+            self._left = False
+            self.count += 1
         return new
+
+    def _closed(self, snapshot: Snapshot) -> bool:
+        return self.arm is None or snapshot.gripper[self.arm] < GRIPPER_CLOSED
 
 
 class Repeat:

@@ -60,7 +60,6 @@ CROWDS = (
         what="equal soap bars",
         radius=0.036,
         tall=0.0,
-        pairs=False,
     ),
     Crowd(
         kind="Mixed_Objects_A",

@@ -27,8 +27,8 @@ TURNS = (0.0, -math.pi / 2, math.pi, math.pi / 2)
 """Up, right, down, left: where the bar of the T points, seen from the robot."""
 
 FAR_Y, FAR_X, NEAR_Y, NEAR_X, WALL_Y = 0.18, 0.20, -0.10, 0.21, 0.10
-LOW = 0.03
-"""A turned block's origin is lower than this [m] above the table."""
+LOW = 0.014
+"""A turned block is lower than this [m] above the table (official: z < 0.77, from 0.756 on)."""
 
 FULL_TURN = 0.2
 """Only this far [m] from the middle or more can the expert make half a turn at once."""

@@ -45,6 +45,19 @@ def test_chatter_shorter_than_the_rearm_time_counts_once(gap: int) -> None:
     assert goal.diagnostics() == {"idle_progress": 0.0, "presses": 1, "raw_presses": 6}
 
 
+@pytest.mark.parametrize(
+    ("hand", "count"),
+    [("oooocccc", 1), ("cccooooooccc", 1), ("cooooocooooocoooooc", 1), ("oooooooo", 0)],
+)
+def test_a_gripper_that_opens_on_the_object_has_not_left_it(hand: str, count: int) -> None:
+    counter = PressCounter("s", FRAME, arm=0)
+    counter.start(snap(0, AT, (0.0, 1.0)))
+    for i, mark in enumerate(hand, 1):
+        gripper = (0.0 if mark == "c" else 1.0, 1.0)
+        counter.update(snap(i * TICK, AT, gripper, touched=[("s", TIP)]))
+    assert counter.count == count
+
+
 def test_a_tenth_of_a_second_without_a_touch_rearms() -> None:
     assert kinds(run(tracker(2), touches(".x....x")))[-1] == "success"
 
