@@ -14,7 +14,6 @@ from __future__ import annotations
 import contextlib
 import importlib
 import os
-import pickle
 import queue
 import signal
 import sys
@@ -29,8 +28,10 @@ from pathlib import Path
 from typing import Any
 
 from robospa.harness.running.executor import Message
-from robospa.harness.running.ray_node import Heard, actor_class, pack, versions
-from robospa.harness.running.worker import WorkerConfig, die_with_driver
+from robospa.harness.running.ray_messages import pack_order, unpack_heard
+from robospa.harness.running.ray_node import actor_class, versions
+from robospa.harness.running.worker import die_with_driver
+from robospa.protocol.errors import DecodeError
 
 LOOK_SECONDS = 1.0
 """How often the nodes are counted."""
@@ -70,9 +71,10 @@ class _Place:
 
 
 class Bridge:
-    """All state lives in the main thread; Ray's threads only put answers into a queue."""
+    """All state lives in the main thread; Ray's threads only put answers into a queue.
+    `config` is that of the workers, packed."""
 
-    def __init__(self, pipe: Connection, ray: Any, config: WorkerConfig, wish: RaySettings) -> None:
+    def __init__(self, pipe: Connection, ray: Any, config: bytes, wish: RaySettings) -> None:
         self._pipe = pipe
         self._ray = ray
         self._config = config
@@ -200,7 +202,7 @@ class Bridge:
         elif what == "send":
             place = self._places.get(rest[0])
             if place is not None:
-                place.actor.send.remote(pickle.dumps(rest[1]))
+                place.actor.send.remote(pack_order(rest[1]))
         elif what == "kill":
             with contextlib.suppress(ValueError):
                 self._homeless.remove(rest[0])
@@ -228,7 +230,7 @@ class Bridge:
             scheduling_strategy=there,
         ).remote()
         place = self._places[name] = _Place(name, node, actor, time.monotonic())
-        self._await(place, "begun", actor.begin.remote(self._wanted, pack(self._config, name)))
+        self._await(place, "begun", actor.begin.remote(self._wanted, self._config, name))
 
     def _await(self, place: _Place, what: str, reference: Any) -> None:
         def answered(future: Any) -> None:
@@ -243,20 +245,30 @@ class Bridge:
         if isinstance(answer, BaseException):
             self._lost(place, answer)
         elif what == "begun":
-            self._begun(place, *answer)
+            self._begun(place, answer)
         else:
-            self._heard(place, pickle.loads(answer))
+            self._heard(place, answer)
 
-    def _begun(self, place: _Place, how: str, text: str) -> None:
+    def _begun(self, place: _Place, answer: object) -> None:
         place.begun = True
-        if how == "placed":
-            self._pipe.send(("placed", place.name))
-            self._await(place, "heard", place.actor.hear.remote(HEAR_SECONDS))
-        else:
-            self._leave_out(place.node, text)
-            self._again(place)
+        match answer:
+            case ["placed"]:
+                self._pipe.send(("placed", place.name))
+                self._await(place, "heard", place.actor.hear.remote(HEAR_SECONDS))
+            case ["unfit", str(text)]:
+                self._leave_out(place.node, text)
+                self._again(place)
+            case ["failed", str(text)]:
+                self._lost(place, RuntimeError(text))
+            case _:
+                self._lost(place, DecodeError(f"it answered {answer!r:.100}"))
 
-    def _heard(self, place: _Place, heard: Heard) -> None:
+    def _heard(self, place: _Place, packed: bytes) -> None:
+        try:
+            heard = unpack_heard(packed)
+        except DecodeError as error:
+            self._lost(place, error)
+            return
         place.heard = place.heard or any(message[0] == "ready" for message, _ in heard.said)
         self._pipe.send(("said", place.name, heard))
         if heard.gone is None:
@@ -267,12 +279,14 @@ class Bridge:
         self._end(place)
 
     def _lost(self, place: _Place, error: BaseException) -> None:
-        """The actor itself is gone, most often with its node."""
+        """The actor itself is gone, most often with its node, or says what cannot be read."""
         print(f"{place.name} on {self._where(place.node)}: {error!r}", file=sys.stderr, flush=True)
         if place.heard:
             del self._places[place.name]
             self._end(place)
             text = f"Ray lost it on {self._where(place.node)}"
+            if isinstance(error, DecodeError):
+                text = f"{self._where(place.node)} sent what cannot be read: {_line(error)}"
             self._pipe.send(("gone", place.name, text))
             return
         self._bad[place.node] += 1
@@ -341,8 +355,8 @@ def connect(wish: RaySettings) -> Any:
     return ray
 
 
-def main(pipe: Connection, config: WorkerConfig, wish: RaySettings) -> None:
-    """Entry point of the process."""
+def main(pipe: Connection, config: bytes, wish: RaySettings) -> None:
+    """Entry point of the process; `config` is packed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     die_with_driver()
     with tempfile.TemporaryFile() as quiet:

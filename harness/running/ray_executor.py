@@ -16,15 +16,16 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from multiprocessing.connection import wait
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from urllib.parse import urlsplit
 
 from robospa.harness.running.executor import Hand, Message, RunAborted
 from robospa.harness.running.local_workers import deaf
 from robospa.harness.running.ray_bridge import RaySettings, main
-from robospa.harness.running.ray_node import Heard
-from robospa.harness.running.store import ACTIONS, VIDEOS, RecordWriter, replace_file
+from robospa.harness.running.ray_messages import Heard, pack_config
+from robospa.harness.running.store import RecordWriter, replace_file
 from robospa.harness.running.worker import LOGS, WorkerConfig
+from robospa.protocol.errors import EncodeError
 from robospa.results.records import TrialRecord
 
 CONNECT_SECONDS = 60.0
@@ -100,10 +101,16 @@ class RayExecutor:
         self.nodes: list[str] = []
         """Addresses of the nodes at the start."""
         check_address(wish.address)
+        try:
+            packed = pack_config(config)
+        except EncodeError as error:
+            raise NoCluster(
+                f"this run's settings cannot be sent to its workers: {error}"
+            ) from error
         spawn = multiprocessing.get_context("spawn")
         self._pipe, theirs = spawn.Pipe()
         self._bridge = spawn.Process(
-            target=main, args=(theirs, config, wish), name="ray-bridge", daemon=True
+            target=main, args=(theirs, packed, wish), name="ray-bridge", daemon=True
         )
         with deaf():
             self._bridge.start()
@@ -200,14 +207,12 @@ class RayExecutor:
         for message, files in heard.said:
             if message[0] == "done":
                 self._keep(message[1], files)
-            hand.inbox.append(("ready", None) if message[0] == "ready" else message)
+            hand.inbox.append(message)
 
     def _keep(self, record: TrialRecord, files: Mapping[str, bytes]) -> None:
         """Files first: a record promises that they are there. Raises StorageError."""
         for name, data in files.items():
-            place, leaf = PurePosixPath(name).parts
-            if place in (ACTIONS, VIDEOS):
-                replace_file(self._folder / place / leaf, data)
+            replace_file(self._folder / name, data)
         if self._writer is None:
             self._writer = RecordWriter(self._folder)
         self._writer.write(record)

@@ -10,14 +10,14 @@ from __future__ import annotations
 
 import fcntl
 import os
-import pickle
 import shutil
 import sys
 import tempfile
 import time
+import traceback
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -25,21 +25,13 @@ from typing import Any
 from robospa.harness.running.executor import Message
 from robospa.harness.running.local_workers import LocalExecutor
 from robospa.harness.running.manifest import code_hash
+from robospa.harness.running.ray_messages import Heard, pack_heard, unpack_config, unpack_order
 from robospa.harness.running.store import ACTIONS, VIDEOS
-from robospa.harness.running.worker import LOGS, WorkerConfig
+from robospa.harness.running.worker import LOGS, describe
+from robospa.protocol.errors import DecodeError
 
 LOG_BYTES = 64_000
 """Most of a worker's output that travels at once."""
-
-
-@dataclass(frozen=True)
-class Heard:
-    """What one worker has said: each message with the files that belong to it (folder/name: bytes),
-    its output since, and how it ended (None while it lives)."""
-
-    said: tuple[tuple[Message, Mapping[str, bytes]], ...]
-    output: bytes
-    gone: str | None
 
 
 def versions() -> dict[str, str]:
@@ -67,20 +59,34 @@ def misfit(wanted: Mapping[str, str]) -> str:
 class NodeWorker:
     """The actor's inside: one worker process and its folder."""
 
-    def __init__(self, config: WorkerConfig, name: str) -> None:
+    def __init__(self, packed: bytes, name: str) -> None:
+        """`packed` is the worker's configuration; raises DecodeError if it is none."""
+        config = unpack_config(packed)
         self._folder, self._lock = _own_folder()
         self._log = self._folder / LOGS / f"{name}.log"
         self._read = 0
+        self._trouble = ""
         self._executor = LocalExecutor(replace(config, folder=self._folder), 1)
         with _without_main():
             self._hand = self._executor.hire(name)
 
-    def send(self, message: Message) -> None:
-        """Tell the worker."""
-        self._hand.send(message)
+    def send(self, packed: bytes) -> None:
+        """Tell the worker; what cannot be read ends it, and `hear` says why."""
+        try:
+            self._hand.send(unpack_order(packed))
+        except DecodeError as error:
+            self._trouble = f"it was sent what cannot be read: {error}"
+            self._hand.process.kill()
 
-    def hear(self, seconds: float) -> Heard:
+    def hear(self, seconds: float) -> bytes:
         """Wait until the worker says something of weight or ends, `seconds` at most."""
+        try:
+            return pack_heard(self._hear(seconds))
+        except Exception as error:  # Ray would pickle it
+            traceback.print_exc()
+            return pack_heard(Heard((), b"", describe(error)))
+
+    def _hear(self, seconds: float) -> Heard:
         until = time.monotonic() + seconds
         said: list[Message] = []
         gone: str | None = None
@@ -96,7 +102,7 @@ class NodeWorker:
         heard = Heard(
             tuple((m, self._files() if m[0] == "done" else {}) for m in beats + others),
             self._output(),
-            gone,
+            gone and (self._trouble or gone),
         )
         if gone is not None:
             shutil.rmtree(self._folder, ignore_errors=True)
@@ -171,38 +177,27 @@ def actor_class() -> type:
     and they can say so."""
 
     class RobospaWorker:
-        """Arguments and answers are packed here: a node of another version must not meet them."""
+        """Takes and gives plain values: Ray pickles all others, exceptions too. A node of another
+        version reads nothing but its versions."""
 
-        def begin(self, wanted: dict[str, str], packed: bytes) -> tuple[str, str]:
+        def begin(self, wanted: dict[str, str], config: bytes, name: str) -> list[str]:
             try:
                 from robospa.harness.running import ray_node
             except ImportError as error:
-                return "unfit", f"robospa cannot be imported there ({error})"
+                return ["unfit", f"robospa cannot be imported there ({error})"]
             trouble = ray_node.misfit(wanted)
             if trouble:
-                return "unfit", trouble
-            self.worker = ray_node.unpack(packed)
-            return "placed", ""
+                return ["unfit", trouble]
+            try:
+                self.worker = ray_node.NodeWorker(config, name)
+            except Exception as error:
+                return ["failed", f"{type(error).__name__}: {error}"]
+            return ["placed"]
 
-        def send(self, packed: bytes) -> None:
-            import pickle
-
-            self.worker.send(pickle.loads(packed))
+        def send(self, order: bytes) -> None:
+            self.worker.send(order)
 
         def hear(self, seconds: float) -> bytes:
-            import pickle
-
-            return pickle.dumps(self.worker.hear(seconds))
+            return self.worker.hear(seconds)
 
     return RobospaWorker
-
-
-def pack(config: WorkerConfig, name: str) -> bytes:
-    """What `unpack` makes a worker of, in an actor of the same version."""
-    return pickle.dumps((config, name))
-
-
-def unpack(packed: bytes) -> NodeWorker:
-    """The worker that the driver wants."""
-    config, name = pickle.loads(packed)
-    return NodeWorker(config, name)

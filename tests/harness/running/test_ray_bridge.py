@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pickle
 from concurrent.futures import Future
 from multiprocessing import Pipe
 from pathlib import Path
@@ -12,7 +11,7 @@ import pytest
 
 from robospa.harness.running import ray_bridge
 from robospa.harness.running.ray_bridge import Bridge, RaySettings
-from robospa.harness.running.ray_node import Heard
+from robospa.harness.running.ray_messages import Heard, pack_config, pack_heard
 from robospa.harness.running.worker import WorkerConfig
 
 pytest.importorskip("ray")
@@ -76,7 +75,7 @@ class Rig:
 
     def __init__(self, ray: FakeRay, wish: RaySettings) -> None:
         self.driver, theirs = Pipe()
-        self.bridge = Bridge(theirs, ray, WorkerConfig(Path("run"), "hold"), wish)
+        self.bridge = Bridge(theirs, ray, pack_config(WorkerConfig(Path("run"), "hold")), wish)
         self.bridge._look()
 
     def tell(self, *message: Any) -> None:
@@ -96,7 +95,7 @@ class Rig:
 
 def ready(actor: Actor) -> None:
     """The actor's worker is there."""
-    actor.hear.answers[-1].set_result(pickle.dumps(Heard(((("ready", None), {}),), b"", None)))
+    actor.hear.answers[-1].set_result(pack_heard(Heard(((("ready", None), {}),), b"", None)))
 
 
 @pytest.fixture
@@ -134,7 +133,7 @@ def test_workers_go_where_most_is_free(ray: FakeRay) -> None:
 def test_a_node_that_is_unfit_is_left_out_and_named(ray: FakeRay) -> None:
     rig = Rig(ray, RaySettings())
     rig.tell("hire", "a")
-    ray.actors[0].begin.answers[0].set_result(("unfit", "it has numpy 1 instead of 2"))
+    ray.actors[0].begin.answers[0].set_result(["unfit", "it has numpy 1 instead of 2"])
     rig.step()
     rig.step()
     assert ray.actors[1].node == "small"
@@ -148,7 +147,7 @@ def test_a_run_whose_nodes_are_all_unfit_cannot_go_on() -> None:
     ray = FakeRay(only=1.0)
     rig = Rig(ray, RaySettings())
     rig.tell("hire", "a")
-    ray.actors[0].begin.answers[0].set_result(("unfit", "robospa cannot be imported there"))
+    ray.actors[0].begin.answers[0].set_result(["unfit", "robospa cannot be imported there"])
     rig.step()
     rig.step()
     assert "robospa cannot be imported" in dict(rig.told())["trouble"]
@@ -171,7 +170,7 @@ def test_a_worker_that_was_never_ready_is_placed_again_and_three_times_is_enough
 def test_a_worker_that_was_ready_is_gone_with_its_actor(ray: FakeRay) -> None:
     rig = Rig(ray, RaySettings())
     rig.tell("hire", "a")
-    ray.actors[0].begin.answers[0].set_result(("placed", ""))
+    ray.actors[0].begin.answers[0].set_result(["placed"])
     rig.step()
     ready(ray.actors[0])
     rig.step()
@@ -180,10 +179,42 @@ def test_a_worker_that_was_ready_is_gone_with_its_actor(ray: FakeRay) -> None:
     assert ("gone", "a", "Ray lost it on large") in rig.told()
 
 
+def test_a_worker_that_sends_what_cannot_be_read_is_gone(ray: FakeRay) -> None:
+    rig = Rig(ray, RaySettings())
+    rig.tell("hire", "a")
+    ray.actors[0].begin.answers[0].set_result(["placed"])
+    rig.step()
+    ready(ray.actors[0])
+    rig.step()
+    ray.actors[0].hear.answers[-1].set_result(b"\x80\x04N.")
+    rig.step()
+    (text,) = [rest[1] for what, *rest in rig.told() if what == "gone"]
+    assert text.startswith("large sent what cannot be read: ")
+    assert ray.actors[0].killed
+
+
+@pytest.mark.parametrize(
+    ("answer", "text"),
+    [
+        (["failed", "OSError: no space left"], "(OSError: no space left)"),
+        (("maybe", 1), "(it answered ('maybe', 1))"),
+    ],
+)
+def test_a_worker_that_cannot_begin_says_why(answer: Any, text: str) -> None:
+    ray = FakeRay(only=1.0)
+    rig = Rig(ray, RaySettings())
+    rig.tell("hire", "a")
+    for _ in range(ray_bridge.BAD_STARTS):
+        ray.actors[-1].begin.answers[0].set_result(answer)
+        rig.step()
+    rig.step()
+    assert text in dict(rig.told())["trouble"]
+
+
 def test_what_a_killed_worker_still_says_is_not_heard(ray: FakeRay) -> None:
     rig = Rig(ray, RaySettings())
     rig.tell("hire", "a")
-    ray.actors[0].begin.answers[0].set_result(("placed", ""))
+    ray.actors[0].begin.answers[0].set_result(["placed"])
     rig.step()
     rig.tell("kill", "a")
     rig.told()
