@@ -8,10 +8,10 @@ from robospa.tasks.instructions.pick_clauses import CLAUSES, named
 _HELDOUT = (
     "what has to come off {table} is {target}.",
     "would you mind bringing {target} up from {table}?",
-    "it is {target} that {arm} should carry upward.",
+    "what {arm} should carry upward is {target}.",
     "if color decides what leaves {table}, it must be {target}.",
     "{target} is wanted in the air, held by {arm}.",
-    "my request is that {arm} takes {target} and that all else stays.",
+    "my request is that {arm} lifts {target} and that all else stays.",
     "which item should go up with {arm}? It is {target}.",
     "success means that {target} hangs clear of {table}.",
     "by the end, {target} must no longer touch {table}.",

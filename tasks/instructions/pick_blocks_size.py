@@ -31,7 +31,7 @@ _TRAIN = (
     "move a gripper to {block}, close it, and go up.",
     "get {block} off {table}.",
     "leave the rest where it lies and pick up {block}.",
-    "identify {block} by {measure} and raise it with {arm}.",
+    "use {measure} to identify {block} and raise it with {arm}.",
     "ignore where the blocks lie; lift {block}.",
     "measure the blocks by eye, choose {block}, and lift it up.",
     "go to {block} and pick it up with {arm}.",
@@ -41,14 +41,14 @@ _TRAIN = (
     "guide {arm} to {block}, grasp it, and raise it.",
     "order the blocks by {measure}, {most} first, and pick {block}.",
     "choose {block} and nothing else; lift it from {table}.",
-    "check every block's {measure} before you lift {block}.",
+    "check each block's {measure} before you lift {block}.",
     "bring {block} up into the air.",
     "pinch {block} between the fingers of {arm} and lift it.",
     "seize {block}, then raise it well above {table}.",
     "{measure} is what counts: pick up {block}.",
     "among the blocks on {table}, grab {block}.",
     "from the blocks in front of you, take {block} with {arm}.",
-    "by {measure}, select {block} and lift it away from {table}.",
+    "with {measure} in mind, select {block} and lift it away from {table}.",
     "without touching the rest, pick up {block}.",
     "lower {arm} onto {block}, close the gripper, and lift.",
     "spot {block}, grip it, and carry it upward.",
@@ -62,16 +62,16 @@ _TRAIN = (
 )
 
 _HELDOUT = (
-    "what I need is {block} raised off {table}.",
+    "what I need is for {block} to be raised off {table}.",
     "could {block} be lifted from {table}, please?",
     "the one to end up in a gripper, high above {table}, is {block}.",
     "for this trial to succeed, {block} has to be lifted by {arm}.",
-    "I would like to see {block} held in the air by {arm}.",
+    "I would like {block} to be held in the air by {arm}.",
     "if only one may leave {table}, it must be {block}.",
     "my wish is that {block} rises from {table} while the rest stays put.",
     "going by {measure}, it is {block} that should come up from {table}.",
     "which one leaves {table}? That would be {block}.",
-    "the goal is reached once {arm} has {block} hanging in its gripper.",
+    "the goal is reached once {block} hangs in the gripper of {arm}.",
 )
 
 

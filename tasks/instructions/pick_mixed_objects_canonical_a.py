@@ -43,16 +43,16 @@ _GRID_HELDOUT = (
 )
 
 HELDOUT = (
-    "what I need, {viewer}, is <X> raised off {table}.",
+    "what I need, with places read {viewer}, is for <X> to be raised.",
     "could <X> be brought up for me, with positions read {viewer}?",
-    "{viewer}, <X> should be off {table} in the end.",
-    "the goal, {viewer}, is a gripper holding <X>.",
+    "seen {viewer}, <X> should be off {table} in the end.",
+    "the goal, counting {viewer}, is a gripper holding <X>.",
     "I would like <X> to be raised, the count being made {viewer}.",
     "if the count is made {viewer}, it is <X> that has to go up.",
-    "<X> has to leave {table}; the order is that found {viewer}.",
-    "which one should go up {viewer}? It is <X>.",
+    "<X> has to leave {table}; the order is as it appears {viewer}.",
+    "which one should go up? Counted {viewer}, it is <X>.",
     "success requires {arm} to hold <X>, positions being those seen {viewer}.",
-    "it would help to see <X> in the grip of {arm}, as counted {viewer}.",
+    "it would help if {arm} held <X>, as counted {viewer}.",
 )
 
 

@@ -18,7 +18,7 @@ _WRAPPERS = (
     "assume a viewer looking {view}; {convention}. Now <C>.",
     "<C>. The scene is viewed {view}, and {convention}.",
     "judge positions {view}, where {convention}: <C>.",
-    "for somebody looking {view}, where {convention}, <C>.",
+    "as if looking {view}, where {convention}, <C>.",
     "<C>, with positions as they appear {view}; {convention}.",
 )
 
@@ -28,7 +28,7 @@ _HELDOUT = (
     "what I need is <X> raised, the viewer looking {view}; {convention}.",
     "could <X> be brought up for me, if one looks {view} and {convention}?",
     "to someone looking {view}, <X> should be off {table} in the end; {convention}.",
-    "the goal is a gripper holding <X> as it appears {view}, and {convention}.",
+    "the goal is a gripper holding <X> as seen {view}; {convention}.",
     "I would like to see <X> in the air; the scene is described {view}, so {convention}.",
     "if one looks {view}, it is <X> that has to go up; {convention}.",
     "<X> has to leave {table}; that is its place when viewed {view}, and {convention}.",

@@ -16,7 +16,7 @@ _NAMES = (
     "the one that is {relation} {reference}",
 )
 
-_NAMES_HELDOUT = ("the {noun} {relation} {reference}", "the single {noun} {relation} {reference}")
+_NAMES_HELDOUT = ("the {noun} {relation} {reference}", "the {noun} that is {relation} {reference}")
 
 
 def templates(level: int) -> Templates:

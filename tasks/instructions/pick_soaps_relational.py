@@ -32,16 +32,16 @@ _NAMES = (
 _NAMES_HELDOUT = ("the soap bar {relation} {reference}", "the bar {relation} {reference}")
 
 HELDOUT = (
-    "what I need is <X> raised, with directions as the robot has them: {convention}.",
+    "what I need is for <X> to be raised, with directions as the robot has them: {convention}.",
     "could <X> be brought up for me, if the robot is the viewer and {convention}?",
     "if the robot does the looking and {convention}, then <X> should be off {table}.",
     "the goal, in the robot's own terms, where {convention}, is a gripper holding <X>.",
-    "I would like to see <X> in the air; to the robot, {convention}.",
+    "I would like {arm} to hold up <X>; to the robot, {convention}.",
     "the robot is the viewer here, and {convention}. It is <X> that has to go up.",
-    "<X> has to leave {table}, named the way the robot sees it, so {convention}.",
+    "<X> has to leave {table}, with directions as the robot sees them, so {convention}.",
     "which one should go up? It is <X>, from the robot's view, where {convention}.",
     "success requires {arm} to hold <X>, in the robot's terms: {convention}.",
-    "it would help to have <X> in the grip of {arm}; to the robot's eyes, {convention}.",
+    "it would help if {arm} held <X>; to the robot's eyes, {convention}.",
 )
 
 

@@ -24,7 +24,7 @@ _ORDINALS = (
 COMMON: Slots = {
     "arm": (
         ("one arm", "a single arm", "either arm"),
-        ("just one arm", "any one arm", "one arm only"),
+        ("just one arm", "any one arm", "one of the arms"),
     ),
     "table": (
         ("the table", "the tabletop"),

@@ -25,19 +25,19 @@ class _Measure(NamedTuple):
 _REFERENCES: Slots = {
     "tea box": (("tea box", "box of tea"), ("tea carton", "tea packet", "tea package")),
     "sauce can": (("sauce can", "can of sauce"), ("sauce tin", "tin of sauce", "canned sauce")),
-    "bowl": (("bowl", "round bowl"), ("open bowl", "serving bowl", "table bowl")),
-    "toycar": (("toy car", "toycar"), ("model car", "miniature car", "little car")),
+    "bowl": (("bowl", "round bowl"), ("open bowl", "serving bowl", "kitchen bowl")),
+    "toycar": (("toy car", "small toy car"), ("model car", "miniature car", "little car")),
     "fan": (("fan", "electric fan"), ("desk fan", "table fan", "little fan")),
     "tissue box": (
         ("tissue box", "box of tissues"),
         ("tissue carton", "tissue package", "carton of tissues"),
     ),
     "cup": (("cup", "drinking cup"), ("tumbler", "round cup", "handleless cup")),
-    "bread": (("bread", "piece of bread"), ("baked bread", "bakery bread", "bread item")),
+    "bread": (("bread", "piece of bread"), ("fresh bread", "bakery bread", "bread piece")),
     "can": (("can", "drink can"), ("soda can", "beverage can", "metal can")),
     "stapler": (("stapler", "paper stapler"), ("desk stapler", "office stapler", "hand stapler")),
     "bell": (("bell", "call bell"), ("desk bell", "service bell", "reception bell")),
-    "apple": (("apple", "round apple"), ("apple fruit", "fresh apple", "ripe apple")),
+    "apple": (("apple", "round apple"), ("whole apple", "fresh apple", "ripe apple")),
     "payment sign": (
         ("payment sign", "sign for payments"),
         ("pay sign", "payment code sign", "mobile payment sign"),
@@ -53,11 +53,11 @@ _TRAILING = {"with", "that", "in", "on", "wrapped"}
 
 _COLUMNS: Slots = {
     f"from {a} to {b}": (
-        (f"from {a} to {b}", f"from the {a} to the {b}"),
+        (f"from {a} to {b}", f"counted from {a} to {b}"),
         (
             f"going from {a} to {b}",
-            f"from the {a} end to the {b} end",
-            f"from the {a} side to the {b} side",
+            f"counting from the {a} end to the {b}",
+            f"counting from the {a} side to the {b}",
         ),
     )
     for a, b in (("left", "right"), ("right", "left"))
@@ -65,11 +65,11 @@ _COLUMNS: Slots = {
 
 _ROWS: Slots = {
     f"from {a} to {b}": (
-        (f"from {a} to {b}", f"from the {a} side to the {b} side"),
+        (f"from {a} to {b}", f"counted from {a} to {b}"),
         (
             f"going from {a} to {b}",
-            f"from the {long_a} one to the {long_b} one",
-            f"from the {a} edge to the {b} edge",
+            f"counting from the {long_a} to the {long_b}",
+            f"counting from the {a} edge to the {b}",
         ),
     )
     for (a, long_a), (b, long_b) in (
@@ -89,31 +89,37 @@ _VIEWS: Slots = {
         (
             "from where the robot stands",
             "from the robot's own perspective",
-            "from the place of the robot",
+            "from the robot's own position",
         ),
     ),
     "opposite": (
-        ("from the viewpoint opposite the robot", "from the side of the table facing the robot"),
+        ("from the viewpoint opposite the robot", "from the side of the table opposite the robot"),
         (
             "from across the table opposite the robot",
-            "from the place that faces the robot",
+            "from where someone facing the robot stands",
             "from the far side of the table towards the robot",
         ),
     ),
     "left": (
-        ("from the viewpoint on the robot's left", "from the table side to the robot's left"),
         (
-            "from the robot's left across the table",
-            "from a place at the robot's left-hand side",
+            "from the end of the table on the robot's left",
+            "from the side of the table on the robot's left",
+        ),
+        (
             "from the table end to the left of the robot",
+            "from a seat at the table on the robot's left",
+            "from the table edge to the robot's left",
         ),
     ),
     "right": (
-        ("from the viewpoint on the robot's right", "from the table side to the robot's right"),
         (
-            "from the robot's right across the table",
-            "from a place at the robot's right-hand side",
+            "from the end of the table on the robot's right",
+            "from the side of the table on the robot's right",
+        ),
+        (
             "from the table end to the right of the robot",
+            "from a seat at the table on the robot's right",
+            "from the table edge to the robot's right",
         ),
     ),
 }
@@ -144,19 +150,21 @@ def measured(measure: str, rank: int, count: int) -> Slots:
 def _height(rank: int, count: int) -> Phrasings:
     number, word = ordinal(rank)
     if count == 2:
-        more, most = ("taller", "tallest") if rank == 1 else ("shorter", "shortest")
+        more, most, degree = (
+            ("taller", "tallest", "greater") if rank == 1 else ("shorter", "shortest", "smaller")
+        )
         return (
             (f"the {more} block", f"the {most} block"),
             (
                 f"the {more} of the two blocks",
                 f"the block that is {more} than the other",
                 f"the {more} one of the two blocks",
-                f"the {most} of the two blocks",
+                f"the block of {degree} height",
             ),
         )
     if rank == 1:
         return (
-            ("the tallest block", "the highest block"),
+            ("the tallest block", "the block with the greatest height"),
             (
                 "the tallest of the blocks",
                 "the block that is taller than all others",
@@ -165,11 +173,15 @@ def _height(rank: int, count: int) -> Phrasings:
             ),
         )
     return (
-        (f"the {number} tallest block", f"the {word} tallest block", f"the {number} highest block"),
+        (
+            f"the {number} tallest block",
+            f"the {word} tallest block",
+            f"the block with the {number} greatest height",
+        ),
         (
             f"the {word} tallest of the blocks",
-            f"the block that ranks {number} from the tallest",
-            f"the block that comes {word} from the tallest",
+            f"the block that ranks {number} when the tallest ranks first",
+            f"the block that comes {word} if the tallest comes first",
             f"the {number} tallest of all the blocks",
         ),
     )
@@ -185,10 +197,10 @@ def _length(rank: int, count: int) -> Phrasings:
                 f"the block with the {most} left-to-right length",
             ),
             (
-                f"the {more} of the two blocks, measured left to right",
+                f"the block that is {more} when measured from left to right",
                 f"the block whose left-to-right extent is {most}",
-                f"the block {more} than the other between its left and right ends",
-                f"the one block that reaches {more} from its left to its right end",
+                f"the block that is {more} than the other between its left and right ends",
+                f"the one block of {most} extent from left to right",
             ),
         )
     if rank == 1:
@@ -198,10 +210,10 @@ def _length(rank: int, count: int) -> Phrasings:
                 "the block with the greatest left-to-right length",
             ),
             (
-                "the longest of the blocks, measured left to right",
+                "the block that is longest when measured from left to right",
                 "the block whose left-to-right extent is greatest",
-                "the block longer than all others between its left and right ends",
-                "the one block that reaches longest from its left to its right end",
+                "the block that is longer than all others between its left and right ends",
+                "the one block of greatest extent from left to right",
             ),
         )
     return (
@@ -211,10 +223,10 @@ def _length(rank: int, count: int) -> Phrasings:
             f"the block with the {word} greatest left-to-right length",
         ),
         (
-            f"the {word} longest of the blocks, measured left to right",
+            f"the block that is {word} longest when measured from left to right",
             f"the block whose left-to-right extent is {number} greatest",
             f"the block that is {word} longest between its left and right ends",
-            f"the {number} longest one, measured from its left to its right end",
+            f"the one block of {number} greatest extent from left to right",
         ),
     )
 
@@ -228,7 +240,7 @@ def _area(rank: int, count: int) -> Phrasings:
             (
                 f"the block whose base is {more} than the other's",
                 f"the block that stands on the {more} base",
-                f"the one of the two blocks with the {more} footprint",
+                f"the block that has the {more} footprint",
                 f"the block that covers the {more} area",
             ),
         )
@@ -241,7 +253,7 @@ def _area(rank: int, count: int) -> Phrasings:
         (
             f"the block whose base area is {most[1]}",
             f"the block that stands on the {most[0]} base",
-            f"the one of the blocks with the {most[1]} footprint",
+            f"the block that has the {most[1]} footprint",
             f"the block that covers the {most[0]} area",
         ),
     )
@@ -277,8 +289,8 @@ def size(rank: int, count: int) -> Phrasings:
         )
         held = (
             f"the {word} largest of the blocks",
-            f"the block that ranks {number} from the largest",
-            f"the block that comes {word} from the largest",
+            f"the block that ranks {number} when the largest ranks first",
+            f"the block that comes {word} if the largest comes first",
             f"the {number} biggest of the blocks",
         )
     return train, held
@@ -337,7 +349,7 @@ def distance(rank: int, reference: Phrasings, noun: str = "object") -> Slots:
 
 def by_color(color: str, noun: str) -> Slots:
     """{target}: the only `noun` of a colour."""
-    train = (f"the {color} {noun}", f"the {color} one of the {noun}s")
+    train = (f"the {color} {noun}", f"the {color} one among the {noun}s")
     held = (
         f"the {noun} that is {color}",
         f"the {noun} of {color} color",
@@ -355,9 +367,9 @@ def category(name: str) -> str:
 
 
 NOUNS: Slots = {
-    "object": (("object", "item"), ("thing", "article")),
+    "object": (("object", "item"), ("thing", "piece")),
     "block": (("block", "cube"), ("cubic block", "cube-shaped block")),
-    "cup": (("cup", "drinking cup"), ("cup for drinking", "beaker")),
+    "cup": (("cup", "drinking cup"), ("tumbler", "beaker")),
     "rubik cube": (("Rubik's cube", "puzzle cube"), ("cube puzzle", "Rubik cube")),
     "soap bar": (("soap bar", "soap"), ("bar of soap", "soap")),
     "tea box": (("tea box",), ("tea carton",)),
@@ -426,10 +438,10 @@ def relational(direction: str, reference: str, level: int, noun: str = "soap bar
     at = {"left": "on the left", "right": "on the right", "center": "in the center"}.get(
         where, f"at the {where}"
     )
-    trained, held = NOUNS[noun]
+    plain = NOUNS[noun][0][0]
     names = (
-        (f"the {label} {trained[0]}", f"the {trained[0]} {at}"),
-        (f"the {label} {held[0]}", f"the {held[0]} {at}", f"the {held[-1]} {at}"),
+        (f"the {label} {plain}", f"the {plain} {at}"),
+        (f"the {label} one", f"the one {at}"),
     )
     convention = (
         (
@@ -438,7 +450,7 @@ def relational(direction: str, reference: str, level: int, noun: str = "soap bar
         ),
         (
             "front stands for far and back for near",
-            "the far side counts as front, the near side as back",
+            "the far side counts as front and the near side as back",
         ),
     )
     return with_common(
@@ -461,22 +473,22 @@ def multi_view(position: str, view: str) -> Slots:
     if side not in ("left", "right", "front", "back"):
         raise ValueError(f"no position {position!r}; use leftmost, rightmost, frontmost, backmost")
     target = (
-        (f"the {position} object", f"the object farthest to the {side}"),
+        (f"the {position} object", f"the object at the very {side}"),
         (
-            f"the object lying furthest to the {side}",
-            f"the object placed most to the {side}",
+            f"the object lying at the extreme {side}",
+            f"the object placed at the {side} extreme",
             f"the {position} of all the objects",
-            f"the {position} one of the objects",
+            f"the object that is {position} of all",
         ),
     )
     convention = (
         (
             "front means far from that viewer and back means near",
-            "the front is the viewer's far side and the back the viewer's near side",
+            "the front is the viewer's far side and the back the near side",
         ),
         (
             "front points away from that viewer and back points towards the viewer",
-            "the front side lies far from the viewer, the back side close by",
+            "the front lies far from the viewer and the back close by",
         ),
     )
     return with_common({"target": target, "view": _VIEWS[view], "convention": convention})
