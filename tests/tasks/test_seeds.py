@@ -13,7 +13,7 @@ PENDING: dict[str, tuple[int, ...]] = {
     "Click_Bell_Repeat": (5,),
     "Move_Blocks_Apart": (5,),
     "Move_Playing_Cards_Away": (5,),
-    "Place_Bowls_Plates": (4, 5),
+    "Place_Bowls_Plates": (5,),
     "Separate_Fries_Bread": (4, 5),
     "Rank_Blocks_Height": (4, 5),
     "Rank_Blocks_Color": (4, 5),
