@@ -7,7 +7,7 @@ always come complete and in order.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 
 from robospa.tasks.instructions.grammar import Templates, templates_of
 from robospa.tasks.instructions.words import listed
@@ -48,12 +48,10 @@ CHAINS: tuple[Callable[[Sequence[str]], str], ...] = (
 """Ten ways to chain imperative steps."""
 
 
-def statements(
-    results: Sequence[str], events: Sequence[str], plural: Collection[str] = ()
-) -> tuple[str, ...]:
-    """Ten sentences that state two or more steps; slots of `plural` hold several things."""
+def statements(results: Sequence[str], events: Sequence[str]) -> tuple[str, ...]:
+    """Ten sentences that state two or more steps; no verb form depends on a slot's number."""
     should = _passive(results[0], "should be")
-    present = [_passive(r, "are" if _slot(r) in plural else "is") for r in results]
+    must = _passive(results[0], "must be")
     infinitive = [_passive(result, "to be") for result in results]
     return (
         f"what I need is {listed(results, ', and then ')}.",
@@ -61,16 +59,12 @@ def statements(
         f"{should}, then {listed(results[1:], ' and eventually ')}.",
         f"the task consists of {', followed by '.join(events)}.",
         f"I would like to see {', and later '.join(results)}.",
-        f"if all goes well, {listed(present, ', and at last ')}.",
+        f"for all to go well, {listed([must, *results[1:]], ', and at last ')}.",
         f"the order of events ought to be {', then '.join(events)}.",
-        f"what comes when? It is {' before '.join(events)}.",
+        f"what is to come when? First {', then '.join(events)}.",
         f"success requires {listed(infinitive, ' and thereafter ')}.",
         f"it all ends with {events[-1]}; what precedes is {', and later '.join(events[:-1])}.",
     )
-
-
-def _slot(result: str) -> str:
-    return result[1:].split("}", 1)[0]
 
 
 def _passive(result: str, verb: str) -> str:
@@ -82,8 +76,7 @@ def chained(
     steps: Sequence[Sequence[str]],
     results: Sequence[str],
     events: Sequence[str],
-    plural: Collection[str] = (),
 ) -> Templates:
     """The templates of two or more steps; `steps` has them in five wordings, as clauses."""
     train = [chain(wording) for wording in steps for chain in CHAINS]
-    return templates_of(train, statements(results, events, plural))
+    return templates_of(train, statements(results, events))

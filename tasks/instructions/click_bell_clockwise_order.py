@@ -44,7 +44,7 @@ _HELDOUT = (
     "I would like to hear {bells} ring {way}.",
     "if presses have reached {bells} {way}, the task is complete.",
     "to finish this task, one has to click {bells} {way}.",
-    "in which order must {bells} be touched? It is {way}.",
+    "in which order must {bells} be touched? The answer is this: {way}.",
     "success requires a press of {bells}, {way}.",
     "my request is for {bells} to be sounded {way}.",
 )
@@ -56,5 +56,5 @@ def templates(level: int) -> Templates:
 
 
 _RING = templates_of(
-    [f"{deed} {{way}}." for deed in _DEEDS] + [f"{{way}}, {deed}." for deed in _DEEDS], _HELDOUT
+    [f"{deed}, {{way}}." for deed in _DEEDS] + [f"{{way}}, {deed}." for deed in _DEEDS], _HELDOUT
 )

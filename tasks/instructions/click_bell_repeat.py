@@ -68,7 +68,7 @@ _ONCE_HELDOUT = (
     "the goal is to hear {bell}, touched from above {closed}.",
     "I would like {bell} to be pressed {closed}.",
     "if {bell} has been touched on top {closed}, the task is complete.",
-    "which thing has to ring? It is {bell}, under a robot hand {closed}.",
+    "which thing has to ring? It is {bell}, touched on top {closed}.",
     "success means that {arm} has clicked {bell} {closed}.",
     "my wish is that somebody rings {bell} {closed}.",
     "for this task {bell} must be pressed from above {closed}.",
@@ -123,7 +123,7 @@ _TRAIN = (
     "call for attention {times} by ringing {bell} {closed}.",
     "press {bell} repeatedly {closed}, {times} altogether.",
     "use {arm} for {clicks} on {bell} {closed}.",
-    "tap {bell} {closed} with short pauses, {times} overall.",
+    "tap {bell} {closed}, with short pauses, {times} overall.",
     "count {clicks} while pressing {bell} {closed}.",
 )
 
@@ -134,7 +134,7 @@ _HELDOUT = (
     "the goal is to hear {bell} {times}, touched from above {closed}.",
     "I would like {bell} to be pressed {times} {closed}.",
     "if {bell} has been touched on top {times} {closed}, the task is complete.",
-    "how often has {bell} to ring? The answer is {times}, under a robot hand {closed}.",
+    "how often does {bell} have to ring? The answer is {times}, pressed {closed}.",
     "success means that {arm} has clicked {bell} {times} {closed}.",
     "my wish is for {clicks} on {bell}, each {closed}.",
     "for this task {bell} must go down {times}, pressed {closed}.",

@@ -89,7 +89,7 @@ _TRAIN = (
     "use the right arm for {right}, to the right, and the left arm for {left}, to the left.",
     "transfer {right} to the right and then {left} to the left.",
     "relocate {left} leftward and {right} rightward.",
-    "pick up {right} and put down on the right; do likewise with {left} on the left.",
+    "pick up {right} and let go on the right; pick up {left} and let go on the left.",
     "divide the blocks between the two sides, {right} right and {left} left.",
     "shift {right} to the right of the middle and {left} to the left of it.",
     "first move {right} to the right, then move {left} to the left.",
@@ -119,10 +119,10 @@ _TRAIN = (
     "gather {right} at the right of {table} and {left} at the left.",
     "dissolve the column of blocks: {right} to the right, {left} to the left.",
     "distribute the blocks by color: left for {left} and right for {right}.",
-    "remove {right} toward the right and {left} toward the left from the middle.",
+    "remove {right} from the middle toward the right, and {left} toward the left.",
     "please move {right} to the right side of {table} and {left} to its left side.",
     "handle one color at a time: {right} to the right, next {left} to the left.",
-    "push apart or carry apart {right}, to the right, and {left}, to the left.",
+    "push or carry {right} off to the right, and {left} off to the left.",
     "reposition {left} at the left of the middle and {right} at the right of it.",
 )
 
@@ -134,7 +134,7 @@ _HELDOUT = (
     "I would like to see {left} at the left of {table} and {right} at the right.",
     "if {table} has {right} on its right side and {left} on its left side, all is done.",
     "which way must each color go? To the right with {right}, to the left with {left}.",
-    "success means that nothing but {right} reached the right and nothing but {left} the left.",
+    "success means that the right side now has {right} and the left side {left}.",
     "my wish is that the colors part, {right} rightward and {left} leftward.",
     "for this task {left} must go left and {right} must go right.",
 )

@@ -23,7 +23,7 @@ _BOTH = (
     "haul <X> {out}.",
     "leave <X> {at}.",
     "set <X> down {at}.",
-    "remove <X> from the middle, going {out}.",
+    "remove <X> from the middle, moving {out}.",
     "transport <X> {out}.",
     "pick up and carry <X> {out}.",
     "lift and move <X> {out}.",
@@ -40,7 +40,7 @@ _BOTH = (
     "push or carry <X> {out}.",
     "reposition <X> {at}.",
     "fetch <X> from the middle and let go {at}.",
-    "locate <X> and move {out} with the grip closed.",
+    "locate <X>, take hold, and move {out}.",
     "collect <X> and unload {at}.",
     "displace <X> {out}.",
     "convey <X> {out}.",
@@ -75,7 +75,7 @@ _SEVERAL = (
     "use both arms to move <X> {out}.",
     "spread <X> {out}.",
     "one at a time, haul <X> {out}.",
-    "let the left and right arm take <X> {out}.",
+    "let the left and right arms take <X> {out}.",
     "empty the central area: put <X> {at}.",
 )
 

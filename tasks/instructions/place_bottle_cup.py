@@ -24,4 +24,4 @@ def templates(level: int) -> Templates:
     """Bottles alone up to level 3, cups too from level 4 on."""
     if level < 4:
         return put_bottles_dustbin.templates(level)
-    return chained(_STEPS, _RESULTS, _EVENTS, plural=("bottles",))
+    return chained(_STEPS, _RESULTS, _EVENTS)

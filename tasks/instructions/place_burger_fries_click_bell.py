@@ -16,7 +16,7 @@ _STEPS = (
     ),
     (
         "place {burger} on {tray}",
-        "place {fries} on its right-hand half",
+        "place {fries} on the right-hand half",
         "click {bell}",
         "return {burger} to where it was",
         "do the same with {fries}",
@@ -45,17 +45,17 @@ _STEPS = (
 )
 _RESULTS = (
     "{burger} set on {tray}",
-    "{fries} brought to its right half",
+    "{fries} brought to the tray's right half",
     "{bell} pressed",
     "{burger} put back where it was",
-    "{fries} put back too",
+    "{fries} put back in its own place",
 )
 _EVENTS = (
     "{burger} going onto {tray}",
-    "{fries} joining it on the right half",
+    "{fries} going onto the tray's right half",
     "a press of {bell}",
-    "{burger} going back where it was",
-    "{fries} going back too",
+    "{burger} going back to its place",
+    "{fries} going back to its own place",
 )
 
 

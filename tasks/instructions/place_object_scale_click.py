@@ -48,14 +48,14 @@ _RESULTS = (
     "{object} set on {stand}",
     "{cards} pressed",
     "{bell} put back on {table}",
-    "{object} put back too",
+    "{object} put back there",
 )
 _EVENTS = (
     "{bell} going onto {scale}",
     "{object} going onto {stand}",
     "a press of {cards}",
     "{bell} going back to {table}",
-    "{object} going back too",
+    "{object} going back to {table}",
 )
 
 

@@ -15,7 +15,7 @@ _STEPS = (
     (
         "place {phone} onto {stand}",
         "push down {stapler} {times}",
-        "tip {bin} over {dustbin}",
+        "tip out {bin} over {dustbin}",
     ),
     (
         "set {phone} on {stand}",
@@ -23,7 +23,7 @@ _STEPS = (
         "pour out {bin} above {dustbin}",
     ),
     (
-        "lean {phone} against {stand}",
+        "prop {phone} up on {stand}",
         "push {stapler} {times}",
         "dump what is in {bin} into {dustbin}",
     ),
@@ -41,7 +41,7 @@ _RESULTS = (
 _EVENTS = (
     "{phone} going onto {stand}",
     "{stapler} going down {times}",
-    "{bin} losing its contents to {dustbin}",
+    "{bin} being emptied into {dustbin}",
 )
 
 

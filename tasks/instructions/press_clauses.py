@@ -25,7 +25,7 @@ PRESS_ONCE = (
     "put a gripper on top of <X> and push",
     "bring {arm} to <X> and press it down",
     "use a closed gripper to press <X>",
-    "do one push on <X>, using {arm}",
+    "push once on <X>, using {arm}",
     "look for <X> and press it down",
     "descend onto <X> with {arm} and press",
     "use {arm} to press <X>",
@@ -63,7 +63,7 @@ ONCE_HELDOUT = (
     "I would like to see <X> pressed, {arm} doing the work.",
     "if {arm} has pressed <X>, the task is complete.",
     "to finish this task, <X> has to be pushed down by {arm}.",
-    "what has to go down? It is <X>, under {arm}.",
+    "what has to go down? It is <X>, pushed by {arm}.",
     "one press of <X> by {arm} is all that is wanted.",
     "my request is for <X> to receive a push by {arm}.",
 )

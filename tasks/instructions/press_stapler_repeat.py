@@ -66,7 +66,7 @@ _HELDOUT = (
     "could {stapler} be pressed {times}, please?",
     "{stapler} should be pushed down {times} before the task ends.",
     "the goal is for {stapler} to have been pressed {times}.",
-    "I would like {arm} to push {stapler} down, and this {times}.",
+    "I would like {arm} to push {stapler} down {times}.",
     "if {stapler} has gone down {times}, the task is complete.",
     "to finish this task, one has to push {stapler} down {times}.",
     "how often does {stapler} have to be pressed? The answer is {times}.",

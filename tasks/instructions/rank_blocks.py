@@ -44,8 +44,8 @@ _TRAIN = (
     "go through {blocks} and line them up on {table}, left to right {order}.",
     "place {blocks} beside one another {order}, with the line starting at the left.",
     "leave {blocks} in one tidy row, {order}, from the left side to the right side.",
-    "drop {blocks} into a line, left to right {order}.",
-    "turn the mess of {blocks} into a row {order}, from left to right.",
+    "fit {blocks} into a line, left to right {order}.",
+    "turn {blocks} from a mess into a row {order}, from left to right.",
     "compose a straight line of {blocks} running rightward {order}.",
     "handle {blocks} one after another to get a row, left to right {order}.",
     "carry {blocks} to their places in a row that goes left to right {order}.",
@@ -66,12 +66,12 @@ _HELDOUT = (
     "could {blocks} be lined up from left to right, {order}?",
     "{blocks} should end up in a row, from left to right {order}.",
     "the goal is one straight line with {blocks} in it, {order} from the left.",
-    "I would like to see {blocks} in a left-to-right row {order}.",
-    "if {blocks} stand in line from left to right {order}, the task is complete.",
+    "I would like to see {blocks} in a left-to-right row, {order}.",
+    "if {blocks} stand in line from left to right, {order}, the task is complete.",
     "how must {blocks} stand at the end? In one row, left to right {order}.",
     "success means that {blocks} make up a row, {order} as one looks from left to right.",
     "my wish is for {blocks} to stand next to each other, {order} from the left.",
-    "by the end, a line has to run from left to right, {blocks} standing {order}.",
+    "by the end, there has to be a line of {blocks} from left to right, {order}.",
 )
 
 

@@ -135,7 +135,11 @@ def mug(colors: Sequence[str]) -> Slots:
     if colors:
         slots["area"] = (
             ("near the robot on the left", "at the left near the robot"),
-            ("on the near left side", "at the table's near left", "at the robot's near left"),
+            (
+                "on the near left side of the table",
+                "at the table's near left",
+                "at the robot's near left",
+            ),
         )
     return with_common(slots)
 

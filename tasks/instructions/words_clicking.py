@@ -104,16 +104,15 @@ def staplers_in_a_row(counts: Sequence[int]) -> Slots:
     if len(counts) == 1:
         train, held = _times(counts[0])
         return with_common({"stapler": NOUNS["stapler"], "times": (train, held)})
-    numbers = [str(n) for n in counts]
     words = [_times(n)[0][0] for n in counts]
     ranks = [f"the {ordinal(i)[1]} {word}" for i, word in enumerate(words, 1)]
     places = [f"number {i} {word}" for i, word in enumerate(words, 1)]
-    each = [f"the {ordinal(i)[1]} {n}" for i, n in enumerate(numbers, 1)]
+    each = [f"the {ordinal(i)[1]} one {word}" for i, word in enumerate(words, 1)]
     return with_common(
         {
             "counts": (
                 (listed(ranks), ", ".join(ranks)),
-                (listed(places), ", ".join(places), f"{listed(each)} (number of presses)"),
+                (listed(places), ", ".join(places), listed(each)),
             ),
             "row": (
                 ("from left to right", "counting from the left"),

@@ -15,14 +15,14 @@ _WALL = (
 
 _STRIP = (
     (
-        "the strip along the robot's edge of the table, nearer than all blocks lie now",
-        "the empty strip at the table's near edge, nearer than any block",
+        "the strip along the robot's edge of the table, nearer to the robot than all blocks",
+        "the empty strip at the table's near edge, closer to the robot than any block",
     ),
     (
         "the free zone right in front of the robot, where no block lay at first",
-        "the robot's end of the table, at its very edge, ahead of all blocks",
+        "the edge zone on the robot's side of the table, closer in than any block lay",
         "the empty band close to the robot, along the table's edge",
-        "the near end of the table, between the robot and where all the blocks lay",
+        "the near part of the table, between the robot and where all the blocks lay",
     ),
 )
 """Where the blocks have to go."""
@@ -68,7 +68,7 @@ def shown_objects(count: int) -> Slots:
             ("the object on the table that was shown on the stand", "the twin of the shown object"),
             (
                 "the object equal to the one on the stand",
-                "the same object that could be seen on the stand, now on the table",
+                "the table object that is the same as the one seen on the stand",
                 "the counterpart of the displayed object",
                 "the table's copy of what the stand showed",
             ),
@@ -79,15 +79,13 @@ def shown_objects(count: int) -> Slots:
             (
                 f"the {number} objects on the table in the order in which their twins stood on "
                 "the stand from left to right",
-                f"{both} objects in the order shown on the stand, left to right",
+                f"{both} objects in the left-to-right order shown on the stand",
             ),
             (
                 f"{both} objects on the table in the left-to-right order of the display",
-                f"the {number} table objects in the sequence that the stand showed, read from "
-                "its left end",
-                f"the copies of the {number} displayed objects, in the stand's order from its left "
-                "to its right",
-                f"the {number} objects in the order remembered from the stand, the leftmost first",
+                f"the {number} table objects in the order that the stand showed from its left end",
+                f"the copies of the {number} displayed objects in the stand's left-to-right order",
+                f"the {number} objects in the order remembered from the stand's left to its right",
             ),
         )
     return with_common({"wall": _WALL, "objects": objects})
@@ -125,13 +123,12 @@ def turned_blocks(count: int) -> Slots:
                 (f"each of the {number} blocks in the near row",
                  "every T-shaped block in the row closer to the robot"),
                 ("each T in the row nearer to the robot",
-                 f"all {number} T-blocks of the close row" if count > 2
-                 else "both T-blocks of the close row",
+                 f"each of the {number} T-blocks in the close row",
                  "every T-block at the near side"),
             ),
             "far": (
                 ("the block behind it in the far row", "its counterpart in the far row"),
-                ("the T at the same place of the far row", "the far T straight behind it",
+                ("the T at the same place in the far row", "the far T straight behind it",
                  "the one opposite in the distant row"),
             ),
         }

@@ -65,7 +65,7 @@ def one_card_box(model: ObjectModel) -> Slots:
                 (f"the {color} pack of cards", "the card pack", "the boxed deck of cards"),
             ),
             "out": (
-                ("outward, far to the side of the table", "away from the middle, far to one side"),
+                ("outward, far to the side of the table", "all the way out to one side"),
                 (
                     "far out to either side of the table",
                     "outward to the side area of the table",
@@ -104,7 +104,7 @@ def cards_away(count: int) -> Slots:
             "out": (
                 (
                     "outward, far to the left and right sides",
-                    "away from the middle, far to the sides of the table",
+                    "all the way out to the sides of the table",
                 ),
                 (
                     "far out to either side of the table",
@@ -128,7 +128,7 @@ def cards_away(count: int) -> Slots:
 
 WAYS: dict[str, Phrasings] = {
     "forward": (
-        ("forward, away from the robot", "forward so that the robot is farther away"),
+        ("forward, away from the robot", "forward, to a place farther from the robot"),
         (
             "forward, toward the far side of the table",
             "ahead, farther from the robot",
@@ -136,7 +136,7 @@ WAYS: dict[str, Phrasings] = {
         ),
     ),
     "backward": (
-        ("backward, toward the robot", "backward so that the robot is nearer"),
+        ("backward, toward the robot", "backward, to a place nearer the robot"),
         (
             "backward, toward the near side of the table",
             "back, closer to the robot",

@@ -173,7 +173,7 @@ def click(level: int) -> Slots:
     if level >= 2:
         slots["bread"] = (
             ("the bread", "the piece of bread"),
-            ("the loaf", "the bread loaf", "the bread item"),
+            ("the bread item", "the baked bread", "the bakery item"),
         )
         slots["basket"] = (
             ("the basket", "the bread basket"),

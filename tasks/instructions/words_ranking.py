@@ -32,7 +32,7 @@ def by_color(count: int) -> Slots:
         (
             (f"in the order {listed(colors)}", f"with the colors {steps}"),
             (
-                f"with {listed(colors)} following each other",
+                f"with {listed(colors)} in this sequence",
                 f"with {colors[0]} first and then {listed(colors[1:])}",
                 f"having {colors[0]} first, followed by {listed(colors[1:])}",
                 f"in the color sequence {listed(colors)}",

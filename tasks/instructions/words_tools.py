@@ -48,11 +48,11 @@ def stamps(colors: Sequence[str], seal: ObjectModel) -> Slots:
     number = NUMBERS[len(colors)]
     slots["pads"] = (
         (f"the {number} pads", f"all {len(colors)} pads" if len(colors) > 2 else "both pads"),
-        (f"the row of {number} pads", f"these {number} mats", f"the {number} flat squares"),
+        (f"each of the {number} pads", f"these {number} mats", f"the {number} flat squares"),
     )
     train, held = color_orders(colors)
     slots["order"] = (
         (f"from right to left, {train[0]}", f"right to left: {listed(list(colors))}"),
-        tuple(f"{text}, which is rightmost to leftmost" for text in held),
+        tuple(f"{text}, that is, from the rightmost to the leftmost" for text in held),
     )
     return with_common(slots)

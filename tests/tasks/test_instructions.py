@@ -122,6 +122,18 @@ def test_counts_agree_with_their_nouns(level: int, split: str) -> None:
             assert not re.search(wrong, text), text
 
 
+@each_variant
+@each_split
+def test_groups_are_counted_once_and_agree_with_their_verbs(
+    name: str, level: int, split: str
+) -> None:
+    wrong = (
+        r"\b(rest|others|all) of (all|both)\b|\ball (two|2)\b|\b(each|every one) of [^,;.]* are\b"
+    )
+    for text in sentences_of(name, level, split):
+        assert not re.search(wrong, text), text
+
+
 @each_split
 def test_single_bottle_is_never_plural(split: str) -> None:
     for text in sentences_of("put_bottles_dustbin", 1, split):
