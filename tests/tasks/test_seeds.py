@@ -24,7 +24,7 @@ PENDING: dict[str, tuple[int, ...]] = {
     "Click_Bell_Clockwise_Order": (5,),
     "Stack_Blocks_Size_Order": (5,),
     "Stack_Blocks_Length_Order": (5,),
-    "Place_Phone_Press_Stapler": (4, 5),
+    "Place_Phone_Press_Stapler": (5,),
     "Place_Bottle_Cup": (4, 5),
     "Hang_Mug_Stack_Blocks": (4, 5),
     "Place_Object_Scale_Click": (4, 5),
