@@ -34,6 +34,16 @@ COMMON: Slots = {
 """Slots that any task may use: they change the wording and carry no information."""
 
 
+def acting_arm(side: str) -> Slots:
+    """{arm} where the rule wants the gripper on one `side` ("left" or "right") to be closed."""
+    return {
+        "arm": (
+            (f"the {side} arm", f"your {side} arm", f"the robot's {side} arm"),
+            (f"the arm on the {side}", f"the {side}-hand arm", f"the {side} one of the two arms"),
+        )
+    }
+
+
 def ordinal(rank: int) -> tuple[str, str]:
     """The two spellings of an ordinal from 1 to 12: ("3rd", "third")."""
     if not 1 <= rank <= len(_ORDINALS):

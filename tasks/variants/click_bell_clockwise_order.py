@@ -12,14 +12,14 @@ from collections.abc import Callable
 import numpy as np
 
 from robospa.tasks.goals.clicks import ClickInOrder
-from robospa.tasks.instructions.words import Slots
+from robospa.tasks.instructions.words import Slots, acting_arm
 from robospa.tasks.instructions.words_clicking import ring_of_bells
 from robospa.tasks.layouts import LayoutError
 from robospa.tasks.plan import Skill
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
 from robospa.tasks.variants.clicking import click, click_counter, clickable_look
-from robospa.tasks.variants.tabletop import Item, Point, apart, in_view, named, standing
+from robospa.tasks.variants.tabletop import Item, Point, apart, in_view, named, side, standing
 
 X, Y = (-0.255, 0.255), (-0.225, 0.055)
 APART = {1: 0.0, 2: 0.12, 3: 0.080, 4: 0.085, 5: 0.085}
@@ -111,8 +111,9 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
 
 
 def slots(scene: Scene) -> Slots:
-    """How the bells and their order are said."""
-    return ring_of_bells(scene.level)
+    """How the bells and their order are said, and the arm on the side of the first."""
+    first = scene.object(scene.facts["order"][0])
+    return ring_of_bells(scene.level) | acting_arm(side(first.pose.position[0]))
 
 
 TASK = Task(

@@ -12,7 +12,7 @@ import numpy as np
 from robospa.tasks import objects
 from robospa.tasks.goals.repeat import PressCounter, Repeat
 from robospa.tasks.instructions import words_repeating
-from robospa.tasks.instructions.words import Slots
+from robospa.tasks.instructions.words import Slots, acting_arm
 from robospa.tasks.layouts import view_span
 from robospa.tasks.plan import Press, Skill
 from robospa.tasks.scene import Scene
@@ -61,8 +61,10 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
 
 
 def slots(scene: Scene) -> Slots:
-    """How the bell and the count are said."""
-    return words_repeating.clicks(int(scene.facts["count"]))
+    """How the bell, the arm on its side and the count are said."""
+    bell = scene.object(scene.facts["bell"])
+    arm = acting_arm(side(bell.pose.position[0]))
+    return words_repeating.clicks(int(scene.facts["count"])) | arm
 
 
 TASK = Task(

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from robospa.tasks.goals.clicks import ClickInOrder
-from robospa.tasks.instructions.words import Slots
+from robospa.tasks.instructions.words import Slots, acting_arm
 from robospa.tasks.instructions.words_clicking import click_in_order
 from robospa.tasks.layouts import Area
 from robospa.tasks.plan import Skill
@@ -22,7 +22,7 @@ from robospa.tasks.variants.clicking import (
     scattered,
     turned,
 )
-from robospa.tasks.variants.tabletop import Item, named, standing
+from robospa.tasks.variants.tabletop import Item, named, side, standing
 
 ORDER = ("alarm_clock", "stapler", "can", "playing_cards", "bread")
 AREA, MIDDLE, DISTANCE = Area((-0.25, 0.25), (-0.20, 0.0)), 0.05, 0.14
@@ -53,9 +53,11 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
 
 
 def slots(scene: Scene) -> Slots:
-    """How the things are said."""
+    """How the things are said, and the arm on the side of the first."""
     order = [scene.object(name) for name in scene.facts["order"]]
-    return click_in_order([item.asset for item in order])
+    return click_in_order([item.asset for item in order]) | acting_arm(
+        side(order[0].pose.position[0])
+    )
 
 
 TASK = Task(
