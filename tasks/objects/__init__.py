@@ -78,6 +78,9 @@ def object_model(asset: str, params: Mapping[str, Any] = MappingProxyType({})) -
     ValueError for an unknown parameter, a look out of range or a malformed value.
     """
     _asset(asset)
+    look = params.get("look")
+    if len(params) == 1 and type(look) is int:  # by far the most frequent: what dumps would say
+        return _build(asset, f'{{"look":{look}}}')
     return _build(asset, json.dumps(dict(params), sort_keys=True, separators=(",", ":")))
 
 

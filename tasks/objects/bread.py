@@ -180,8 +180,8 @@ def _long_bun() -> Made:
 
 BREADS: tuple[tuple[Callable[[], Made], tuple[str, ...]], ...] = (
     (_loaf, (
-        "loaf of bread", "tin loaf", "brown bread loaf", "brick-shaped bread", "sandwich loaf",
-        "boxy loaf of bread", "loaf of white bread",
+        "loaf of bread", "crusty loaf", "brown bread loaf", "brick-shaped bread", "sandwich loaf",
+        "boxy loaf of bread", "whole loaf of bread",
     )),
     (_roll, (
         "round bread roll", "bread roll", "round bun", "golden bread roll", "dinner roll",

@@ -102,10 +102,21 @@ def overlaps(scene: Scene) -> Iterator[str]:
             yield f"{a.name} ({a.asset}) is in {b.name} ({b.asset})"
 
 
+def _boxes(scene: Scene) -> tuple[list[SceneObject], np.ndarray]:
+    """The movable objects and their corners; kept for the rule that asks next."""
+    if _last[0] is not scene:
+        items = movable(scene)
+        _last[:] = [scene, items, corners(items)]
+    return _last[1], _last[2]
+
+
+_last: list[Any] = [None, [], None]
+
+
 def unseen(scene: Scene) -> Iterator[str]:
     """Movable objects whose middle the head camera does not see."""
-    items = movable(scene)
-    x, y, z = corners(items).mean(axis=1).T
+    items, boxes = _boxes(scene)
+    x, y, z = boxes.mean(axis=1).T
     u, v = head_pixel(x, y, z)
     for k in np.flatnonzero((u < 0) | (u >= WIDTH) | (v < 0) | (v >= HEIGHT)):
         yield f"{items[k].name} ({items[k].asset}) is out of view"
@@ -113,8 +124,8 @@ def unseen(scene: Scene) -> Iterator[str]:
 
 def sunk(scene: Scene) -> Iterator[str]:
     """Movable objects that start below the table's top."""
-    items = movable(scene)
-    for k in np.flatnonzero(corners(items)[:, :, 2].min(axis=1) <= TABLE_TOP - 1e-3):
+    items, boxes = _boxes(scene)
+    for k in np.flatnonzero(boxes[:, :, 2].min(axis=1) <= TABLE_TOP - 1e-3):
         yield f"{items[k].name} ({items[k].asset}) is below the table's top"
 
 
