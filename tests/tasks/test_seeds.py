@@ -32,7 +32,7 @@ PENDING: dict[str, tuple[int, ...]] = {
     "Stamp_Seals_Press_Stapler": (5,),
     "Click_Bell_Open_Microwave_Place_Object": (5,),
     "Observe_Blocks_Move_Memory": (5,),
-    "Observe_Objects_Click_Memory": (4, 5),
+    "Observe_Objects_Click_Memory": (5,),
     "Remember_Orientation_Restore": (4, 5),
     "Press_Stapler_Memory": (4, 5),
 }
