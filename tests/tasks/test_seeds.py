@@ -8,9 +8,6 @@ from robospa.tasks.catalog import LEVELS, tasks
 from robospa.tasks.seeds import FIRST_SEED, PER_VARIANT, accepted, seed_list_hash
 
 PENDING: dict[str, tuple[int, ...]] = {
-    "Lift_Pot_Repeat": (5,),
-    "Lift_Fan_Repeat": (5,),
-    "Click_Bell_Repeat": (5,),
     "Move_Blocks_Apart": (5,),
     "Move_Playing_Cards_Away": (5,),
     "Place_Bowls_Plates": (5,),
