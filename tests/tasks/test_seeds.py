@@ -8,7 +8,6 @@ from robospa.tasks.catalog import LEVELS, tasks
 from robospa.tasks.seeds import FIRST_SEED, PER_VARIANT, accepted, seed_list_hash
 
 PENDING: dict[str, tuple[int, ...]] = {
-    "Separate_Fries_Bread": (5,),
     "Rank_Blocks_Height": (5,),
     "Rank_Blocks_Color": (5,),
     "Rank_Blocks_Size": (5,),
