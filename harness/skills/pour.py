@@ -22,7 +22,10 @@ Array = NDArray[np.float64]
 LIFT = 0.12
 TIPS = (2.5, 2.1)
 """How far the object is turned over [rad], best first."""
-AZIMUTHS = tuple(2 * math.pi * i / 8 for i in range(8))
+AZIMUTHS = 8
+"""About so many axes."""
+LAST_TIPS, LAST_AZIMUTHS = (2.3, 2.1, 1.9), 32
+"""What is tried if the object came to lie in the hand so that none of these can be reached."""
 SPINS = tuple(2 * math.pi * i / 12 for i in range(12))
 MOUTHS = ((0.05, -0.08), (0.0, -0.12), (0.0, 0.0), (0.05, 0.05))
 """Where the object's mouth goes, from the container's middle [m]."""
@@ -45,6 +48,9 @@ def pour(ws: Workspace, call: Pour) -> Steps:
     offset = grip_offset(ws, arm, call.object)
     found = _reachable(ws, arm, offset, targets, ws.joints[arm], ROUNDS)
     if not found:
+        more = _targets(ws, call, LAST_TIPS, LAST_AZIMUTHS)
+        found = _reachable(ws, arm, offset, more, ws.joints[arm], ROUNDS, len(LAST_TIPS))
+    if not found:
         raise SkillFailed(f"{call.object} cannot be turned over above {call.into}")
     for joints in found:
         travel(ws, arm, joints)
@@ -54,19 +60,27 @@ def pour(ws: Workspace, call: Pour) -> Steps:
 
 
 def _reachable(
-    ws: Workspace, arm: int, offset: Pose, targets: Sequence[Pose], near: Array, count: int
+    ws: Workspace,
+    arm: int,
+    offset: Pose,
+    targets: Sequence[Pose],
+    near: Array,
+    count: int,
+    tips: int = len(TIPS),
 ) -> list[Array]:
     """Joints of up to `count` of the targets, those that are turned furthest and nearest first."""
     back = offset.inverse()
     joints, ok = inverse(ws.chains[arm], [t * back for t in targets])
-    per_tip = len(targets) // len(TIPS)
+    per_tip = len(targets) // tips
     ranked = sorted(
         np.flatnonzero(ok), key=lambda i: (i // per_tip, float(np.abs(joints[i] - near).max()))
     )
     return [joints[i] for i in ranked[:count]]
 
 
-def _targets(ws: Workspace, call: Pour) -> list[Pose]:
+def _targets(
+    ws: Workspace, call: Pour, tips: Sequence[float] = TIPS, azimuths: int = AZIMUTHS
+) -> list[Pose]:
     """Poses of the object with its mouth down over the container, by how far it is turned."""
     bin_pose, bin_model = ws.pose(call.into), ws.models[call.into]
     model = ws.models[call.object]
@@ -74,8 +88,8 @@ def _targets(ws: Workspace, call: Pour) -> list[Pose]:
     rim = z + bin_model.bottom + bin_model.size[2]
     mouth = (0.0, 0.0, model.bottom + model.size[2])
     found = []
-    for tip in TIPS:
-        for azimuth in AZIMUTHS:
+    for tip in tips:
+        for azimuth in (2 * math.pi * i / azimuths for i in range(azimuths)):
             over = axis_rotation((math.cos(azimuth), math.sin(azimuth), 0.0), tip)
             for spin in SPINS:
                 rotation: Quat = multiply(over, yaw_rotation(spin))
