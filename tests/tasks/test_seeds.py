@@ -8,8 +8,6 @@ from robospa.tasks.catalog import LEVELS, tasks
 from robospa.tasks.seeds import FIRST_SEED, PER_VARIANT, accepted, seed_list_hash
 
 PENDING: dict[str, tuple[int, ...]] = {
-    "Place_Object_Scale_Click": (5,),
-    "Place_Burger_Fries_Click_Bell": (5,),
     "Stamp_Seals_Press_Stapler": (5,),
     "Click_Bell_Open_Microwave_Place_Object": (5,),
     "Observe_Blocks_Move_Memory": (5,),
