@@ -8,8 +8,6 @@ from robospa.tasks.catalog import LEVELS, tasks
 from robospa.tasks.seeds import FIRST_SEED, PER_VARIANT, accepted, seed_list_hash
 
 PENDING: dict[str, tuple[int, ...]] = {
-    "Observe_Blocks_Move_Memory": (5,),
-    "Observe_Objects_Click_Memory": (5,),
     "Remember_Orientation_Restore": (5,),
     "Press_Stapler_Memory": (5,),
 }
