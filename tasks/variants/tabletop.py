@@ -71,7 +71,10 @@ def standing(point: Point, yaw: float = 0.0, height: float = 0.0) -> Pose:
 def apart(point: Point, others: Iterable[Point], distance: float) -> bool:
     """Whether `point` is at least `distance` [m] from all `others`."""
     x, y = point
-    return all(math.hypot(x - ox, y - oy) >= distance for ox, oy in others)
+    for ox, oy in others:  # a plain loop: crowded layouts ask thousands of times
+        if math.hypot(x - ox, y - oy) < distance:
+            return False
+    return True
 
 
 def free_point(
@@ -120,13 +123,14 @@ def scatter(
     at most: where points are crowded, few tries are faster than many. Raises RuntimeError if that
     does not do.
     """
+    random = rng.random  # what rng.uniform draws, to the bit, at a third of its time
     for _ in range(LAYOUTS):
         points: list[Point] = []
         for _ in range(tries * count):
-            px, py = float(rng.uniform(*x)), float(rng.uniform(*y))
+            px, py = x[0] + (x[1] - x[0]) * random(), y[0] + (y[1] - y[0]) * random()
             if near_middle and abs(px) < 0.15 and py > 0:
-                py = float(rng.uniform(y[0], 0.0))
-            if allowed((px, py)) and apart((px, py), points, distance):
+                py = y[0] + (0.0 - y[0]) * random()
+            if apart((px, py), points, distance) and allowed((px, py)):
                 points.append((px, py))
                 if len(points) == count:
                     return tuple(points)
