@@ -127,32 +127,24 @@ def scatter(
     """
     for _ in range(restarts):
         x, y, usable = propose(rng)
-        points = _place(x.tolist(), y.tolist(), usable.tolist(), apart)
+        points = _place(x, y, usable, apart)
         if points is not None and accept(points):
             return points
     raise LayoutError(f"no free layout of {len(apart)} objects in {restarts} draws; skip this seed")
 
 
-def _place(
-    x: list[list[float]],
-    y: list[list[float]],
-    usable: list[list[bool]],
-    apart: Sequence[Sequence[float]],
-) -> Points | None:
+def _place(x: Array, y: Array, usable: Mask, apart: Sequence[Sequence[float]]) -> Points | None:
     points: Points = []
     for i, limits in enumerate(apart):
-        squares = [limits[j] ** 2 for j in range(i)]
-        for px, py, ok in zip(x[i], y[i], usable[i], strict=True):
-            if not ok:
-                continue
-            for (qx, qy), limit in zip(points, squares, strict=True):
-                if (px - qx) ** 2 + (py - qy) ** 2 < limit:
-                    break
-            else:
-                points.append((px, py))
-                break
-        else:
+        free = usable[i]
+        if points:
+            taken, least = np.array(points), np.array(limits[:i])
+            dx, dy = x[i] - taken[:, :1], y[i] - taken[:, 1:]
+            free = free & (dx * dx + dy * dy >= (least * least)[:, None]).all(axis=0)
+        first = int(free.argmax())
+        if not free[first]:
             return None
+        points.append((float(x[i, first]), float(y[i, first])))
     return points
 
 
