@@ -71,7 +71,7 @@ def standing(point: Point, yaw: float = 0.0, height: float = 0.0) -> Pose:
 def apart(point: Point, others: Iterable[Point], distance: float) -> bool:
     """Whether `point` is at least `distance` [m] from all `others`."""
     x, y = point
-    for ox, oy in others:  # a plain loop: crowded layouts ask thousands of times
+    for ox, oy in others:  # noqa: SIM110 - crowded layouts ask thousands of times
         if math.hypot(x - ox, y - oy) < distance:
             return False
     return True
