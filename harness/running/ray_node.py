@@ -164,12 +164,12 @@ def _unused(folder: Path) -> bool:
 def _without_main() -> Iterator[None]:
     """Spare a new process the main module of this one, which is Ray's and would load all of Ray."""
     main: Any = sys.modules["__main__"]
-    before = main.__spec__, main.__file__
-    main.__spec__, main.__file__ = None, None
+    before = {name: getattr(main, name, None) for name in ("__spec__", "__file__")}
+    vars(main).update(dict.fromkeys(before))
     try:
         yield
     finally:
-        main.__spec__, main.__file__ = before
+        vars(main).update(before)
 
 
 def actor_class() -> type:

@@ -101,8 +101,8 @@ class Crowd:
     """The data of one task. With one family all objects look alike, else each is of another one.
 
     `pitches`: ranges of the distances of columns and of rows [m] on 2 x 2, 3 x 2 and 3 x 3 slots.
-    `pairs` also keeps any two objects apart, by their spacing and so that the circles around
-    their footprints do not meet. `radius` and `tall` bound the objects for the view.
+    Any two objects keep apart, by their spacing and so that the circles around their footprints do
+    not meet. `radius` and `tall` bound the objects for the view.
     """
 
     kind: str
@@ -112,7 +112,6 @@ class Crowd:
     what: str
     radius: float
     tall: float
-    pairs: bool = True
 
     @property
     def alike(self) -> bool:
@@ -166,7 +165,7 @@ def _places(
     """Where the used slots lie: (count, 2) [m]; LayoutError if nothing fits."""
     pitch_x, pitch_y = crowd.pitches[shape.columns + shape.rows - 4]
     gap_x, gap_y = (round(shape.scale * max(f.spacing[k] for f in families), 4) for k in (0, 1))
-    least = least_distances(crowd, families, shape.scale) if crowd.pairs else None
+    least = least_distances(crowd, families, shape.scale)
     columns, rows = sorted({c for c, _ in used}), sorted({r for _, r in used})
     for _ in range(DRAWS):
         px, py = rng.uniform(*pitch_x), rng.uniform(*pitch_y)
@@ -185,7 +184,7 @@ def _places(
         ):
             continue
         points = np.array([(cx[c] + anchor_x, cy[r] + anchor_y) for c, r in used])
-        if least is not None and (np.hypot(*(points[:, None] - points).T) < least).any():
+        if (np.hypot(*(points[:, None] - points).T) < least).any():
             continue
         if _seen(crowd, points):
             return points

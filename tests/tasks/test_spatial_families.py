@@ -174,10 +174,12 @@ def test_basic_position_tasks_are_seen_by_the_robot(kind: str) -> None:
 def test_bounds_hold_for_all_looks() -> None:
     for crowd in CROWDS:
         for family in crowd.families:
-            if family.asset != "block" and crowd.pairs:
+            if family.asset != "block":
                 for k in range(looks(family.asset)):
                     model = object_model(family.asset, {"look": k})
-                    assert model.radius <= crowd.radius and model.size[2] <= crowd.tall
+                    assert model.radius <= crowd.radius
+                    # of soaps, which are flat, only the footprint is kept in view
+                    assert model.size[2] <= crowd.tall or family.asset == "soap"
 
 
 @pytest.mark.parametrize(

@@ -117,7 +117,7 @@ def test_a_server_that_goes_away_and_comes_back_costs_nothing(tmp_path: Path) ->
 
 def test_ctrl_c_leaves_a_run_that_can_be_resumed(tmp_path: Path) -> None:
     with ServerThread(policy_factory=SlowPolicy) as server:
-        words = command(server.url, tmp_path / "run", trials=15)
+        words = command(server.url, tmp_path / "run", trials=60)
         process = start(words)
         wait_for_records(tmp_path / "run", 3, process)
         os.killpg(process.pid, signal.SIGINT)
@@ -126,7 +126,7 @@ def test_ctrl_c_leaves_a_run_that_can_be_resumed(tmp_path: Path) -> None:
         assert "--resume" in err
         assert "Traceback" not in err
         before = read_run(tmp_path / "run")
-        assert 0 < len(before.missing) < 30
+        assert 0 < len(before.missing) < 120
 
         code, _, err = run(words)
         assert code == 1
@@ -134,12 +134,12 @@ def test_ctrl_c_leaves_a_run_that_can_be_resumed(tmp_path: Path) -> None:
 
         code, _, err = run([*words, "--split", "train", "--resume"])
         assert code == 1
-        assert "split" in err and "trials: 30 new and 30 gone" in err
+        assert "split" in err and "trials: 120 new and 120 gone" in err
 
         code, _, err = run([*words, "--resume"])
     assert code == 0, err
     records = lines(tmp_path / "run")
-    assert len(records) == len({r.key for r in records}) == 30
+    assert len(records) == len({r.key for r in records}) == 120
     assert all(finished(r) for r in records)
 
 

@@ -124,7 +124,7 @@ def test_a_map_gives_every_server_its_own_task(tmp_path: Path) -> None:
         run(words(tmp_path / "run", "--policy-map", str(path)))
     assert (len(first.tasks), len(second.tasks) + len(third.tasks)) == (16, 8)
     assert set(second.tasks) | set(third.tasks) == {TASKS[1]}
-    assert first.switches == 1
+    assert first.switches <= 3  # one change of task, and each worker may help out at the end
     about = read_run(tmp_path / "run").manifest["about"]["policies"]
     assert about[TASKS[1]]["equals"][0]["target"] == third.url
     assert "equals" not in about[TASKS[0]]
