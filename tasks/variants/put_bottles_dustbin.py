@@ -26,15 +26,17 @@ from robospa.tasks.variants.bins import (
     discard,
     reachable,
 )
-from robospa.tasks.variants.tabletop import Item, Point, named, scatter, standing
+from robospa.tasks.variants.tabletop import Item, Point, middle_in_view, named, scatter, standing
 
 X, Y, DISTANCE, MIDDLE = (-0.25, 0.3), (0.03, 0.23), 0.13, 0.05
+HALF_HEIGHT = 0.07
+"""Of a bottle [m]."""
 LEVELS = {n: Level(candidates=n, subtasks=n, steps=400 * n) for n in range(1, 6)}
 
 
 def _usable(point: Point) -> bool:
-    """Off the middle strip and within reach of the arm on that side."""
-    return abs(point[0]) >= MIDDLE and reachable(point)
+    """Off the middle strip, within reach of the arm on that side, a bottle's middle in view."""
+    return abs(point[0]) >= MIDDLE and reachable(point) and middle_in_view(point, HALF_HEIGHT)
 
 
 def draw(level: int, rng: np.random.Generator) -> Draft:

@@ -17,6 +17,7 @@ from robospa.tasks.variants.tabletop import (
     Item,
     Point,
     apart,
+    middle_in_view,
     named,
     scatter,
     standing,
@@ -43,8 +44,10 @@ def draw(level: int, rng: np.random.Generator) -> Draft:
     def away(point: Point) -> bool:
         return abs(point[0]) >= 0.05 and apart(point, [(0.0, -0.10)], 0.10)
 
-    anywhere = (lambda point: True) if level > 1 else away
-    points = scatter(rng, level, X, Y, DISTANCE, anywhere, near_middle=True)
+    def allowed(point: Point) -> bool:
+        return (level > 1 or away(point)) and middle_in_view(point, HALF)
+
+    points = scatter(rng, level, X, Y, DISTANCE, allowed, near_middle=True)
     items = [
         Item(
             color,

@@ -105,6 +105,12 @@ def in_view(asset: str, params: Mapping[str, Any]) -> Callable[[Point], bool]:
     return seen
 
 
+def middle_in_view(point: Point, height: float) -> bool:
+    """Whether the head camera sees what is `height` [m] above the table at a point."""
+    x, y = np.array(point[0]), np.array(point[1])
+    return bool(in_head_view(x, y, 0.0, height, (0.0, 0.0)))
+
+
 def scatter(
     rng: np.random.Generator,
     count: int,
