@@ -21,7 +21,7 @@ from robospa.harness.running.progress import Progress, summary
 from robospa.harness.running.ray_bridge import RaySettings
 from robospa.harness.running.ray_executor import far_away, joined
 from robospa.harness.running.runner import RunAborted, Runner, RunOptions
-from robospa.harness.running.store import tidy
+from robospa.harness.running.store import drop_parts, tidy
 from robospa.harness.running.worker import WorkerConfig, describe
 from robospa.results.reading import finished, read_records
 from robospa.results.records import TrialKey
@@ -171,6 +171,7 @@ def evaluate(request: Request) -> None:
             runner.executor = executor
             runner.on_status = progress.show
             runner.run()
+        drop_parts(folder)
         for text in summary(runner.shares.overall(), runner.status(time.monotonic())):
             progress.note(text)
 

@@ -154,6 +154,14 @@ def tidy(folder: Path, patience: float = ORPHAN_SECONDS) -> None:
     for path in sorted((folder / TRIALS).glob("*.jsonl")):
         with storing(path):
             _settle(path, patience)
+    drop_parts(folder)
+
+
+def drop_parts(folder: Path) -> None:
+    """Remove what workers that were killed while writing left half-written; none may be writing.
+
+    Raises StorageError.
+    """
     for place in (folder, folder / ACTIONS, folder / VIDEOS):
         for path in place.glob(PART):
             with storing(path):
