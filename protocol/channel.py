@@ -19,7 +19,12 @@ from http import HTTPStatus
 from typing import Any
 from urllib.parse import urlsplit
 
-from websockets.exceptions import ConnectionClosed, InvalidStatus, WebSocketException
+from websockets.exceptions import (
+    ConnectionClosed,
+    InvalidMessage,
+    InvalidStatus,
+    WebSocketException,
+)
 from websockets.frames import CloseCode
 from websockets.sync.client import ClientConnection
 from websockets.sync.client import connect as websocket_connect
@@ -165,10 +170,6 @@ def _open(
                     f"nobody listens at {address.url}: start the policy server first"
                 ) from error
             time.sleep(0.05)
-        except ConnectionResetError as error:  # it was just closing its door
-            if time.monotonic() >= give_up:
-                raise ConnectFailed(f"cannot connect to {address.url}: {error}") from error
-            time.sleep(0.05)
         except BadAddress:
             raise
         except InvalidStatus as error:
@@ -179,7 +180,19 @@ def _open(
                 "look at the server's log"
             ) from error
         except (OSError, ValueError, EOFError, WebSocketException) as error:
-            raise ConnectFailed(f"cannot connect to {address.url}: {error}") from error
+            if not _hung_up(error) or time.monotonic() >= give_up:
+                raise ConnectFailed(f"cannot connect to {address.url}: {error}") from error
+            time.sleep(0.05)
+
+
+def _hung_up(error: Exception) -> bool:
+    """Whether the other side hung up before it answered: it restarts, or a tunnel's end is not up.
+
+    The same event raises one of several errors, depending on how far the handshake was.
+    """
+    if isinstance(error, InvalidMessage):
+        return isinstance(error.__cause__, EOFError)
+    return isinstance(error, EOFError | ConnectionResetError | BrokenPipeError | ConnectionClosed)
 
 
 def _open_once(

@@ -30,7 +30,7 @@ Colored = Callable[[int, np.random.Generator], tuple[list[Thing], list[str]]]
 
 def blocks(level: int, rng: np.random.Generator) -> tuple[list[Thing], list[str]]:
     """The blocks of the distance task."""
-    things = sets.blocks(level, rng, 0)
+    things = sets.blocks(level, rng)
     word = {color: word for word, color in sets.BLOCK_COLORS.items()}
     return things, [word[tuple((params or {})["color"])] for _, params in things]
 

@@ -71,14 +71,14 @@ class Rules:
 class Family:
     """A set of objects and what is drawn with it.
 
-    `things(level, rng, reference)` says what lies at each of the places, of which `reference` is
-    the named one; `yaw` [rad] bounds the turns. `reference(scene, object)` are the names of the
+    `things(level, rng)` says what lies at each of the places, the first of which is the
+    reference's; `yaw` [rad] bounds the turns. `reference(scene, object)` are the names of the
     reference without article, `noun` is the plain noun of any of the objects.
     """
 
     name: str
     rules: Rules
-    things: Callable[[int, np.random.Generator, int], Sequence[Thing]]
+    things: Callable[[int, np.random.Generator], Sequence[Thing]]
     reference: Callable[[SceneObject], Phrasings]
     noun: str
     yaw: float = math.pi / 2
@@ -238,7 +238,7 @@ def draw(level: int, rng: np.random.Generator, family: Family) -> Draft:
     points = jittered(rng, rules, level, layout)
     rank = int(rng.integers(len(points) - 1)) + 1
     target = 1 + int(np.argsort(-distances(points))[rank - 1])
-    things = family.things(level, rng, 0)
+    things = family.things(level, rng)
     objects, order = put_down(rng, points, things, family.yaw)
     facts = {
         "target": f"object_{order.index(target)}",

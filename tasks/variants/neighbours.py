@@ -212,6 +212,11 @@ def _label(shape: Shape, slot: tuple[int, int], used: list[tuple[int, int]]) -> 
     return f"{depth[slot[1]]}_{side[slot[0]]}"
 
 
+def _in_line(a: tuple[int, int], b: tuple[int, int]) -> bool:
+    """Whether two slots share a column or a row."""
+    return a[0] == b[0] or a[1] == b[1]
+
+
 def drawer(crowd: Crowd) -> Callable[[int, np.random.Generator], Draft]:
     """The draw of `crowd`: direction and target slot, other slots, a straight layout, turns."""
 
@@ -224,8 +229,12 @@ def drawer(crowd: Crowd) -> Callable[[int, np.random.Generator], Draft]:
         dx, dy = DIRECTIONS[direction]
         reference = (target[0] - dx, target[1] - dy)
         rest = [s for s in cells if s not in (target, reference)]
-        used = [target, reference, *(rest[int(i)] for i in rng.permutation(len(rest)))]
-        used = used[: shape.count]
+        others = [rest[int(i)] for i in rng.permutation(len(rest))]
+        # Three in a corner shape: a diagonal never asks for the corner, so the other directions
+        # have to, in two of three scenes; else a guesser would leave the corner out.
+        if shape.count == 3 and not _in_line(target, others[0]) and rng.random() < 1 / 3:
+            others.reverse()
+        used = [target, reference, *others][: shape.count]
         used = [used[int(i)] for i in rng.permutation(len(used))]
         families = crowd.families * len(used)
         if not crowd.alike:

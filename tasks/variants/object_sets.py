@@ -38,7 +38,7 @@ HALF_EDGES = {
 """Range of the half edge [m], the same for all blocks of a scene."""
 
 
-def blocks(level: int, rng: np.random.Generator, reference: int) -> list[Thing]:
+def blocks(level: int, rng: np.random.Generator) -> list[Thing]:
     """Equal cubes of different colours."""
     half = float(rng.uniform(*HALF_EDGES[level]))
     colors = list(BLOCK_COLORS.values())[: BLOCKS.rules.counts[level - 1]]
@@ -85,8 +85,8 @@ PILL_MODELS = {"orange": (0, 1), "white": (1,), "brown": (2,), "green": (3,)}
 
 
 def one_unlike(asset: str, models: dict[str, tuple[int, ...]], rng: np.random.Generator,
-               count: int, reference: int) -> list[Thing]:  # fmt: skip
-    """`count` models, of which only the one at place `reference` has its colour.
+               count: int) -> list[Thing]:  # fmt: skip
+    """`count` models, of which only the first has its colour.
 
     No model comes twice before all other ones have come once.
     """
@@ -97,8 +97,7 @@ def one_unlike(asset: str, models: dict[str, tuple[int, ...]], rng: np.random.Ge
     drawn: list[tuple[str, int]] = []
     while len(drawn) < count - 1:
         drawn += [others[i] for i in rng.permutation(len(others))]
-    chosen = [drawn[int(i)] for i in rng.permutation(count - 1)]
-    chosen.insert(reference, (word, own))
+    chosen = [(word, own), *(drawn[int(i)] for i in rng.permutation(count - 1))]
     return [(asset, {"look": look, "tint": w}) for w, look in chosen]
 
 
@@ -122,7 +121,7 @@ MUGS = Family(
         tall=0.068,
         starts=STARTS,
     ),
-    lambda level, rng, reference: one_unlike("mug", MUG_MODELS, rng, COUNTS[level - 1], reference),
+    lambda level, rng: one_unlike("mug", MUG_MODELS, rng, COUNTS[level - 1]),
     _tinted_names,
     "mug",
 )
@@ -137,9 +136,7 @@ PILL_BOTTLES = Family(
         tall=0.070,
         starts=STARTS,
     ),
-    lambda level, rng, reference: one_unlike(
-        "pill_bottle", PILL_MODELS, rng, COUNTS[level - 1], reference
-    ),
+    lambda level, rng: one_unlike("pill_bottle", PILL_MODELS, rng, COUNTS[level - 1]),
     _tinted_names,
     "pill bottle",
 )
@@ -176,7 +173,7 @@ MIXED_A = Family(
         tall=0.10,
         starts=PACKED,
     ),
-    lambda level, rng, reference: _mixed(ASSETS_A, level, rng),
+    lambda level, rng: _mixed(ASSETS_A, level, rng),
     _category_names,
     "object",
 )
@@ -191,7 +188,7 @@ MIXED_B = Family(
         tall=0.12,
         starts=PACKED,
     ),
-    lambda level, rng, reference: _mixed(ASSETS_B, level, rng),
+    lambda level, rng: _mixed(ASSETS_B, level, rng),
     _category_names,
     "object",
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import socket
+import struct
 import threading
 from collections.abc import Iterator
 from dataclasses import replace
@@ -73,6 +74,24 @@ def test_waits_for_a_server_that_is_still_starting(start: Any) -> None:
     timer.start()
     connect(f"ws://127.0.0.1:{port}", timeouts=replace(QUICK, wait=10)).close()
     timer.join()
+
+
+def test_waits_for_a_server_that_restarts_and_resets_who_had_come(start: Any) -> None:
+    server = socket.create_server(("127.0.0.1", 0))
+    port = server.getsockname()[1]
+
+    def restart() -> None:
+        peer, _ = server.accept()
+        peer.recv(1000)
+        peer.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+        peer.close()  # with a reset, as the kernel does for a process that ends
+        server.close()
+        start(Recall(), port=port)
+
+    thread = threading.Thread(target=restart)
+    thread.start()
+    connect(f"ws://127.0.0.1:{port}", timeouts=replace(QUICK, wait=10)).close()
+    thread.join()
 
 
 def test_a_port_that_never_answers() -> None:
