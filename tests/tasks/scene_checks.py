@@ -168,8 +168,8 @@ def _reached(ws: Workspace, name: str, arms: tuple[int, ...]) -> bool:
     for leans in (LEVEL, LEANS):
         for arm in sorted(arms, key=lambda k: (body.position[0] > 0) != (k == 1)):
             reach = ws.robot.arms[arm].reach
-            for some in (upright, grasps):
-                poses = [c[0] for grasp in some for c in candidate_poses(grasp, reach, leans)]
+            for grasp in (*upright, *grasps):
+                poses = [pose for pose, _, _ in candidate_poses(grasp, reach, leans)]
                 if poses and inverse(ws.chains[arm], poses)[1].any():
                     return True
     return False
