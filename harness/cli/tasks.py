@@ -17,12 +17,15 @@ if TYPE_CHECKING:
     from robospa.tasks.scene import Scene
     from robospa.tasks.task import Task
 
-GALLERY = Path("docs/images/gallery.jpg")
+GALLERY = Path("gallery.jpg")
 SPLITS = ("train", "heldout")
 
 
 def tasks(
-    name: Annotated[str | None, typer.Argument(help="a task; without it, all are listed")] = None,
+    name: Annotated[
+        str | None,
+        typer.Argument(help="a task; without it, all; with --gallery a list, as in `eval`"),
+    ] = None,
     level: Annotated[int, typer.Option(help="1 to 5")] = 1,
     seed: Annotated[int, typer.Option(help="the scene's seed")] = 100_000,
     split: Annotated[str | None, typer.Option(help="train or heldout; without it, both")] = None,
@@ -32,9 +35,9 @@ def tasks(
     size: Annotated[str, typer.Option(help="WIDTHxHEIGHT of the picture [px]")] = "640x480",
     out: Annotated[Path | None, typer.Option(help="PNG file (or JPEG with --gallery)")] = None,
     frame: Annotated[bool, typer.Option(help="render the scene's first frame")] = True,
-    gallery: Annotated[bool, typer.Option("--gallery", help="one picture of all variants")] = False,
+    gallery: Annotated[bool, typer.Option("--gallery", help="one picture of all levels")] = False,
 ) -> None:
-    """List the tasks; describe and draw one scene; or draw all variants on one sheet."""
+    """List the tasks; describe and draw one scene; or draw tasks at all levels on one sheet."""
     from rich.console import Console
 
     from robospa.protocol.policy import CAMERAS
@@ -211,13 +214,16 @@ def _draw(console: Console, scene: Scene, camera: str, size: tuple[int, int], pa
 def _gallery(console: Console, name: str | None, seed: int, split: str, path: Path) -> None:
     from rich.progress import track
 
+    from robospa.harness.cli.selection import BadChoice, parse_tasks
     from robospa.harness.pictures import gallery
     from robospa.harness.sim.sapien_world import SapienWorld
     from robospa.harness.world import RenderUnavailable, SceneUnstable
-    from robospa.tasks.catalog import tasks as all_tasks
     from robospa.tasks.instructions import instruction
 
-    chosen = list(all_tasks().values()) if name is None else [_find(name)]
+    try:
+        chosen = [_find(each) for each in parse_tasks(name or "all,basic")]
+    except BadChoice as error:
+        raise typer.BadParameter(str(error)) from None
     world = SapienWorld()
     try:
         rows = [
@@ -226,7 +232,7 @@ def _gallery(console: Console, name: str | None, seed: int, split: str, path: Pa
         ]
         count = sum(len(row.cells) for row in rows)
         page = gallery.sheet(rows, f"RoboSPA · {len(rows)} tasks, {count} variants, seed {seed}")
-        size = gallery.save_jpeg(page, path)
+        size = gallery.save_jpeg(page, path, max(gallery.LEAST, gallery.SHARE * len(rows)))
     except (RenderUnavailable, SceneUnstable, OSError, ValueError) as error:
         console.print(f"[red]no gallery:[/red] {error}")
         raise typer.Exit(1) from None

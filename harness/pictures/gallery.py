@@ -29,6 +29,8 @@ CELL = (320, 240)
 GAP, MARGIN, HEADER, TITLE, CAPTION = 10, 24, 34, 64, 66  # [px]
 TEXT, CAPTION_SIZE, LINES = "#20262e", 12, 4
 PAPER, QUIET = "#ffffff", "#68727f"
+LEAST, SHARE = 1_000_000, 75_000
+"""Most bytes of a sheet: so many, or so many for each task; a README's picture stays below 1 MB."""
 TRIES = 20
 """Seeds that `settled_scene` tries."""
 
@@ -152,7 +154,7 @@ def save_png(image: NDArray[np.uint8], path: Path) -> None:
 def save_jpeg(
     page: Image.Image,
     path: Path,
-    limit: int = 1_000_000,
+    limit: int = LEAST,
     qualities: Iterable[int] = (90, 85, 80, 75, 70, 60, 50),
 ) -> int:
     """Write `page` at the best quality that stays below `limit` bytes; returns the size [bytes].
