@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Mapping
 from pathlib import Path
@@ -15,9 +17,10 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from run_fakes import FakePolicy, NanPolicy, SlowPolicy
+from run_fakes import FakePolicy, NanPolicy
 
 from robospa.harness.cli.main import main
+from robospa.protocol.policy import TrialInfo
 from robospa.protocol.server import ServerThread
 from robospa.results.reading import finished, read_file, read_run
 from robospa.results.records import TrialRecord
@@ -56,10 +59,31 @@ def lines(folder: Path) -> list[TrialRecord]:
     return [r for path in sorted((folder / "trials").glob("*.jsonl")) for r in read_file(path)]
 
 
-def wait_for_records(folder: Path, count: int, process: subprocess.Popen[str]) -> None:
-    while len(lines(folder)) < count:
-        assert process.poll() is None, process.communicate()
-        time.sleep(0.01)
+class Gate:
+    """A server's policies that get nowhere from the seventh trial on, until it is open."""
+
+    def __init__(self) -> None:
+        self.trials = itertools.count()
+        self.reached = threading.Event()
+        self.opened = threading.Event()
+
+    def policy(self) -> FakePolicy:
+        gate = self
+
+        class Gated(FakePolicy):
+            def reset(self, trial: TrialInfo) -> None:
+                self.free = next(gate.trials) < 6
+                super().reset(trial)
+
+            def infer(self, observation: Mapping[str, Any]) -> NDArray[np.float32]:
+                answer = super().infer(observation)
+                if self.free or gate.opened.is_set():
+                    return answer
+                gate.reached.set()
+                gate.opened.wait(0.5)
+                return 0 * answer
+
+        return Gated()
 
 
 def test_a_server_is_evaluated_and_reported(tmp_path: Path) -> None:
@@ -101,10 +125,11 @@ def test_a_server_that_is_too_slow_leaves_trials_missing(tmp_path: Path) -> None
 
 
 def test_a_server_that_goes_away_and_comes_back_costs_nothing(tmp_path: Path) -> None:
-    server = ServerThread(policy_factory=SlowPolicy).start()
+    gate = Gate()
+    server = ServerThread(policy_factory=gate.policy).start()
     port = int(server.url.rpartition(":")[2])
     process = start(command(server.url, tmp_path / "run", "--attempts", "9", trials=20))
-    wait_for_records(tmp_path / "run", 3, process)
+    assert gate.reached.wait(60)
     server.stop()
     with ServerThread(policy_factory=FakePolicy, port=port):
         _, err = process.communicate(timeout=120)
@@ -116,12 +141,14 @@ def test_a_server_that_goes_away_and_comes_back_costs_nothing(tmp_path: Path) ->
 
 
 def test_ctrl_c_leaves_a_run_that_can_be_resumed(tmp_path: Path) -> None:
-    with ServerThread(policy_factory=SlowPolicy) as server:
+    gate = Gate()
+    with ServerThread(policy_factory=gate.policy) as server:
         words = command(server.url, tmp_path / "run", trials=60)
         process = start(words)
-        wait_for_records(tmp_path / "run", 3, process)
+        assert gate.reached.wait(60)
         os.killpg(process.pid, signal.SIGINT)
         _, err = process.communicate(timeout=60)
+        gate.opened.set()
         assert process.returncode == 130
         assert "--resume" in err
         assert "Traceback" not in err
