@@ -11,9 +11,12 @@ import heapq
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING
 
 from robospa.results.records import TrialKey
+
+if TYPE_CHECKING:
+    from robospa.tasks.task import Task
 
 
 @dataclass(frozen=True)
@@ -77,10 +80,10 @@ class _Group:
 
 
 class TrialQueue:
-    """All trials of a run that are not settled yet. `parts` finds the task of a key."""
+    """All trials of a run that are not settled yet. `task_of` finds the task of a key."""
 
-    def __init__(self, keys: Sequence[TrialKey], parts: Callable[[TrialKey], Any]) -> None:
-        self._parts = parts
+    def __init__(self, keys: Sequence[TrialKey], task_of: Callable[[TrialKey], Task]) -> None:
+        self._task_of = task_of
         self._facts: dict[tuple[str, int], Facts] = {}
         self._groups: dict[str, _Group] = {}
         self._count = 0
@@ -94,7 +97,7 @@ class TrialQueue:
         """Facts of the variant of `key`; all empty if its task cannot be found."""
         if key.variant not in self._facts:
             try:
-                task = self._parts(key).task
+                task = self._task_of(key)
                 level = task.levels[key.level]
                 found = Facts(task.category, level.candidates, level.subtasks, level.steps)
             except Exception:  # the worker will meet the same error and report it

@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from robospa.harness.factory import is_url, load
+from robospa.harness.factory import is_url
 from robospa.harness.running.executor import Executor, Hand, Message
 from robospa.harness.running.executor import RunAborted as RunAborted
 from robospa.harness.running.local_workers import LocalExecutor
@@ -24,7 +24,7 @@ from robospa.harness.running.staffing import Staffing
 from robospa.harness.running.status import Shares, Status
 from robospa.harness.running.store import RecordWriter, StorageError
 from robospa.harness.running.watchdog import Watch
-from robospa.harness.running.worker import LOGS, WorkerConfig
+from robospa.harness.running.worker import LOGS, WorkerConfig, task_finder
 from robospa.results.reading import read_file
 from robospa.results.records import TrialKey, TrialRecord
 
@@ -94,7 +94,7 @@ class Runner:
 
     def run(self) -> None:
         """Settle every trial. Raises RunAborted; on KeyboardInterrupt workers are killed first."""
-        self._queue = TrialQueue(self.keys, load(self.config.parts))
+        self._queue = TrialQueue(self.keys, task_finder(self.config.parts))
         most = max(self.options.workers, self.options.most)
         self._scheduler = Scheduler(
             self._queue,

@@ -24,7 +24,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from robospa.harness.factory import load, open_policy
 from robospa.harness.running.policies import over_budget
@@ -34,6 +34,9 @@ from robospa.protocol.errors import printable
 from robospa.protocol.policy import PolicySpec
 from robospa.results.records import TrialKey, TrialRecord
 
+if TYPE_CHECKING:
+    from robospa.tasks.task import Task
+
 LOGS = "logs"
 PR_SET_PDEATHSIG = 1
 Targets = str | tuple[str, ...]
@@ -41,6 +44,22 @@ Targets = str | tuple[str, ...]
 SENTENCE = 1000
 """Characters that an error may have in a record."""
 VIDEO = ("none", "failures", "first", "all")
+
+TASK_PARTS = "robospa.harness.trial:task_parts"
+
+
+def task_finder(parts: str) -> Callable[[TrialKey], Task]:
+    """What finds the task of a trial: the catalog, unless `parts` puts something in its place.
+
+    The catalog is asked directly because `parts` build the scene as well, and the first scene of a
+    variant may take a second.
+    """
+    if parts == TASK_PARTS:
+        from robospa.tasks.catalog import task
+
+        return lambda key: task(key.task)
+    find = load(parts)
+    return lambda key: find(key).task
 
 
 @dataclass(frozen=True)
@@ -59,7 +78,7 @@ class WorkerConfig:
     options: Mapping[str, Any] = field(default_factory=dict)
     world: str = "robospa.harness.sim.sapien_world:SapienWorld"
     world_arguments: Mapping[str, Any] = field(default_factory=dict)
-    parts: str = "robospa.harness.trial:task_parts"
+    parts: str = TASK_PARTS
     run_seed: int = 0
     video: str = "none"
     samples: frozenset[TrialKey] = frozenset()

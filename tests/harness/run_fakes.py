@@ -112,6 +112,10 @@ def parts(key: TrialKey) -> TrialParts:
     return TrialParts(scene, fake_task(key.task), tracker, f"sum to {key.seed % 10 + 1}")
 
 
+def fake_task_of(key: TrialKey) -> Task:
+    return parts(key).task
+
+
 class FakePolicy:
     """Sends chunks of ones; subclasses misbehave."""
 

@@ -5,16 +5,17 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from run_fakes import LIMIT, parts
+from run_fakes import LIMIT, fake_task_of
 
 from robospa.harness.running.queue import Pending, TrialQueue
+from robospa.harness.running.worker import TASK_PARTS, task_finder
 from robospa.results.records import TrialKey
 
 KEYS = [TrialKey("Pick_Fake", 1, 100000 + n) for n in range(3)]
 
 
 def test_a_retry_waits_for_its_time_and_then_goes_first() -> None:
-    queue = TrialQueue(KEYS, parts)
+    queue = TrialQueue(KEYS, fake_task_of)
     first = queue.take("Pick_Fake", 0.0)
     assert first is not None
     queue.again(replace(first, attempt=2), due=5.0)
@@ -25,7 +26,7 @@ def test_a_retry_waits_for_its_time_and_then_goes_first() -> None:
 
 
 def test_a_task_that_only_pauses_is_not_due() -> None:
-    queue = TrialQueue(KEYS[:1], parts)
+    queue = TrialQueue(KEYS[:1], fake_task_of)
     work = queue.take("Pick_Fake", 0.0)
     assert work is not None
     queue.again(work, due=5.0)
@@ -35,7 +36,7 @@ def test_a_task_that_only_pauses_is_not_due() -> None:
 
 def test_the_level_that_takes_longest_goes_first() -> None:
     slow, quick = TrialKey("Pick_Fake", 1, 7), TrialKey("Pick_Fake", 2, 7)
-    queue = TrialQueue([slow, quick, replace(slow, seed=8), replace(quick, seed=8)], parts)
+    queue = TrialQueue([slow, quick, replace(slow, seed=8), replace(quick, seed=8)], fake_task_of)
     assert queue.take("Pick_Fake", 0.0) == Pending(slow)  # equal limits: in order
     queue.costs.learn(slow, 9.0)
     queue.costs.learn(quick, 1.0)
@@ -44,7 +45,7 @@ def test_the_level_that_takes_longest_goes_first() -> None:
 
 
 def test_what_is_expected_moves_from_the_step_limit_to_what_was_measured() -> None:
-    queue = TrialQueue(KEYS, parts)
+    queue = TrialQueue(KEYS, fake_task_of)
     key, other = KEYS[0], TrialKey("Pick_Fake", 3, 1)
     assert (queue.costs.expect(key), queue.costs.known) == (LIMIT, False)
     queue.costs.learn(key, 10.0)
@@ -61,3 +62,17 @@ def test_a_task_that_nobody_knows_still_counts() -> None:
 
     queue = TrialQueue(KEYS, unknown)
     assert queue.due(0.0) == {"Pick_Fake": 3.0}
+
+
+def test_the_catalog_is_asked_for_the_task_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    def built(*_: object) -> None:
+        raise AssertionError("a scene was built")
+
+    monkeypatch.setattr("robospa.harness.trial.build_scene", built)
+    found = task_finder(TASK_PARTS)(TrialKey("Put_Bottles_Dustbin", 3, 100000))
+    assert (found.name, found.levels[3].subtasks) == ("Put_Bottles_Dustbin", 3)
+
+
+def test_other_parts_have_their_own_task() -> None:
+    found = task_finder("run_fakes:parts")(TrialKey("Put_Bottles_Dustbin", 3, 100000))
+    assert found.summary == "fake"

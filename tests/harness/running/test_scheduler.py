@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 import pytest
-from run_fakes import parts
+from run_fakes import fake_task_of
 
 from robospa.harness.running.queue import TrialQueue
 from robospa.harness.running.scheduler import Job, Scheduler
@@ -90,7 +90,7 @@ class Simulation:
 
 
 def schedule(trials: list[TrialKey], targets: Targets) -> Scheduler:
-    return Scheduler(TrialQueue(trials, parts), targets)
+    return Scheduler(TrialQueue(trials, fake_task_of), targets)
 
 
 def equal(*names: str) -> Targets:
