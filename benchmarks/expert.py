@@ -104,6 +104,7 @@ def oracle(trials: int, first: int) -> tuple[list[Row], dict[str, Any]]:
     records, wall, whole = evaluate("oracle", tasks(), *seeds)
     failed = [r for r in records if not r.success]
     names = ", ".join(f"{r.key.task} {r.key.level} seed {r.key.seed}" for r in failed[:WORST])
+    missed = f"; not {names}" if names else ""
     solved = len(records) - len(failed)
     rows = [
         Row(
@@ -111,7 +112,7 @@ def oracle(trials: int, first: int) -> tuple[list[Row], dict[str, Any]]:
             round(100 * solved / len(records), 2),
             "%",
             at_least=BAR,
-            note=f"{solved:,} of {len(records):,} {names}".rstrip(),
+            note=f"{solved:,} of {len(records):,}{missed}",
         )
     ]
     if whole:
