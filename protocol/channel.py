@@ -180,8 +180,13 @@ def _open(
                 "look at the server's log"
             ) from error
         except (OSError, ValueError, EOFError, WebSocketException) as error:
-            if not _hung_up(error) or time.monotonic() >= give_up:
+            if not _hung_up(error):
                 raise ConnectFailed(f"cannot connect to {address.url}: {error}") from error
+            if time.monotonic() >= give_up:
+                raise ConnectFailed(
+                    f"cannot connect to {address.url}: it hung up during the handshake ({error}); "
+                    "start the policy server behind it"
+                ) from error
             time.sleep(0.05)
 
 

@@ -218,10 +218,11 @@ def _gallery(console: Console, name: str | None, seed: int, split: str, path: Pa
     from robospa.harness.pictures import gallery
     from robospa.harness.sim.sapien_world import SapienWorld
     from robospa.harness.world import RenderUnavailable, SceneUnstable
+    from robospa.tasks.catalog import tasks as all_tasks
     from robospa.tasks.instructions import instruction
 
     try:
-        chosen = [_find(each) for each in parse_tasks(name or "all,basic")]
+        chosen = [_find(each) for each in (parse_tasks(name) if name else all_tasks())]
     except BadChoice as error:
         raise typer.BadParameter(str(error)) from None
     world = SapienWorld()

@@ -72,8 +72,8 @@ class Family:
     """A set of objects and what is drawn with it.
 
     `things(level, rng)` says what lies at each of the places, the first of which is the
-    reference's; `yaw` [rad] bounds the turns. `reference(scene, object)` are the names of the
-    reference without article, `noun` is the plain noun of any of the objects.
+    reference's; `yaw` [rad] bounds the turns. `reference(object)` are the names of the reference
+    without article, `noun` is the plain noun of any of the objects.
     """
 
     name: str

@@ -94,6 +94,15 @@ def test_waits_for_a_server_that_restarts_and_resets_who_had_come(start: Any) ->
     thread.join()
 
 
+def test_a_port_that_always_hangs_up() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        thread = threading.Thread(target=lambda: server.accept()[0].close())
+        thread.start()
+        with pytest.raises(ConnectFailed, match="start the policy server behind it"):
+            connect(f"ws://127.0.0.1:{server.getsockname()[1]}", timeouts=QUICK)
+        thread.join()
+
+
 def test_a_port_that_never_answers() -> None:
     with silent_port() as url, pytest.raises(ConnectFailed, match="handshake within"):
         connect(url, timeouts=replace(QUICK, connect=0.2))
