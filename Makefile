@@ -5,7 +5,7 @@ BIN := .venv/bin
 # A file's tests stay together: they share what is costly to make.
 SPREAD := -n auto --maxprocesses 4 --dist loadfile
 UV_COMPILE := $(BIN)/uv pip compile pyproject.toml --universal --fork-strategy fewest \
-	--python-version 3.11 --default-index https://pypi.org/simple --no-config --no-header -q
+	--python-version 3.11 --no-header -q
 
 .PHONY: help demo test test-models install install-dev lint types fast sim format lock clean
 
@@ -29,8 +29,7 @@ lint: ## ruff: rules and format
 	$(BIN)/ruff format --check .
 
 types: ## mypy --strict over the installed packages
-	@set -o pipefail; MYPYPATH=$$(echo build/__editable__.robospa-*) $(BIN)/mypy -p robospa \
-		| sed -E 's|^build/__editable__[^/]*/robospa/||'
+	$(BIN)/mypy -p robospa
 
 fast: ## Tests without simulator
 	$(BIN)/pytest $(SPREAD)

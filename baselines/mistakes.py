@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.baselines.oracle import Oracle
+from robospa.geometry import Pose
 from robospa.harness.skills import Expert
 from robospa.harness.skills.pick import pick
 from robospa.harness.skills.place import holder
@@ -25,7 +26,6 @@ from robospa.harness.skills.press import press
 from robospa.harness.skills.workspace import Steps, Workspace
 from robospa.protocol.policy import Observation
 from robospa.tasks.catalog import task as find_task
-from robospa.tasks.geometry import Pose
 from robospa.tasks.plan import Home, Pick, Press, Skill, Wait
 from robospa.tasks.scene import Scene
 from robospa.tasks.snapshot import snapshot_from_json

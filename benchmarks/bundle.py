@@ -34,8 +34,9 @@ from robospa.leaderboard.sampling import announced
 from robospa.leaderboard.verify import verify
 from robospa.results.metrics import CATEGORIES
 from robospa.results.reading import Run
-from robospa.results.records import TrialKey, TrialRecord
+from robospa.results.records import TrialRecord
 from robospa.tasks.catalog import tasks
+from robospa.trial import TrialKey
 
 REACH = 25
 """Actions of one reach."""

@@ -21,8 +21,8 @@ from robospa.baselines.mistakes import create
 from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.harness.trial import TrialParts, run_trial, task_parts
 from robospa.results.failures import NAMES, label
-from robospa.results.records import TrialKey
 from robospa.tasks.catalog import tasks
+from robospa.trial import TrialKey
 
 FIRST_SEED = 920_000
 LEVELS = {"spatial": (2, 3, 5), "procedural": (1, 2, 3, 5)}

@@ -23,8 +23,8 @@ from robospa.harness.sim import bodies, sapien_world
 from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.harness.trial import run_trial
 from robospa.harness.world import SceneUnstable
-from robospa.results.records import TrialKey
 from robospa.tasks.catalog import build_scene, tasks
+from robospa.trial import TrialKey
 
 LEVEL = 2
 FIRST_SEED = 700_000

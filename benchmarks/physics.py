@@ -20,10 +20,10 @@ import numpy as np
 from common import Result, Row, argument_parser, finish
 from numpy.typing import NDArray
 
+from robospa.geometry import Pose
 from robospa.harness.sim.drives import Setter
 from robospa.harness.sim.motion import RATE, rest_to_rest
 from robospa.harness.sim.sapien_world import SapienWorld
-from robospa.tasks.geometry import Pose
 from robospa.tasks.scene import TABLE_TOP, Scene, SceneObject
 from robospa.tasks.snapshot import Snapshot
 

@@ -25,15 +25,15 @@ from sides import line_of, peer_of, peers_for, sides, tell, versions_of
 from wire_sides import CAMERAS, frames
 
 from robospa.clients import connect
+from robospa.geometry import Pose
 from robospa.harness.trial import TrialParts, run_trial
 from robospa.harness.world import Poll, StepResult
 from robospa.protocol.policy import CameraSpec, Policy, PolicySpec
-from robospa.results.records import TrialKey
 from robospa.tasks.events import Event
-from robospa.tasks.geometry import Pose
 from robospa.tasks.scene import Scene
 from robospa.tasks.snapshot import Contact, Snapshot
 from robospa.tasks.task import Level, Task
+from robospa.trial import TrialKey
 
 STEPS = 500
 KEY = TrialKey("Nothing", 1, 100_000)

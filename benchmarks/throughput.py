@@ -31,6 +31,7 @@ import numpy as np
 from common import Result, Row, argument_parser, finish, line
 from numpy.typing import NDArray
 
+from robospa.geometry import Pose
 from robospa.harness.running.runner import Runner, RunOptions
 from robospa.harness.running.staffing import cores, most_workers
 from robospa.harness.running.status import Status
@@ -39,12 +40,11 @@ from robospa.harness.trial import TrialParts
 from robospa.harness.world import Poll, StepResult
 from robospa.protocol.policy import PolicySpec, TrialInfo
 from robospa.protocol.server import ServerThread
-from robospa.results.records import TrialKey
 from robospa.tasks.events import Event
-from robospa.tasks.geometry import Pose
 from robospa.tasks.scene import Scene
 from robospa.tasks.snapshot import Contact, Snapshot
 from robospa.tasks.task import Level, Task
+from robospa.trial import TrialKey
 
 BASE, ITEM, BATCH = 0.100, 0.002, 8
 CALLS = 25

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from robospa.geometry import Pose
 from robospa.harness.robots.embodiment import Embodiment
 from robospa.harness.robots.kinematics import (
     Chain,
@@ -24,7 +25,6 @@ from robospa.harness.robots.kinematics import (
     matrix,
 )
 from robospa.harness.world import ActionError
-from robospa.tasks.geometry import Pose
 from robospa.tasks.snapshot import ARMS
 
 Array = NDArray[np.float64]

@@ -1,36 +1,18 @@
-"""Find things by name: `module:function`, or an entry point of the group "robospa.policies"."""
+"""A policy from a server's URL, by `module:function`, or by the name of an entry point."""
 
 from __future__ import annotations
 
-import importlib
 import os
 import sys
 from collections.abc import Callable
-from importlib import metadata
 from typing import Any
 
-GROUP = "robospa.policies"
-
-
-class UnknownName(Exception):
-    """Nothing goes by that name; the message says what does."""
-
-
-def load(path: str) -> Callable[..., Any]:
-    """The callable at `module:function`; raises UnknownName."""
-    module, _, name = path.partition(":")
-    try:
-        found = getattr(importlib.import_module(module), name)
-    except (ImportError, AttributeError, ValueError) as error:
-        raise UnknownName(f"cannot load {path!r}: {error}") from error
-    if not callable(found):
-        raise UnknownName(f"{path!r} is not callable")
-    return found  # type: ignore[no-any-return]
+from robospa.registry import POLICIES, UnknownName, find, load, names
 
 
 def policy_names() -> tuple[str, ...]:
     """Policies that can be served by name."""
-    return tuple(sorted({point.name for point in metadata.entry_points(group=GROUP)}))
+    return names(POLICIES)
 
 
 def policy_factory(name: str) -> Callable[..., Any]:
@@ -38,12 +20,19 @@ def policy_factory(name: str) -> Callable[..., Any]:
     if ":" in name:
         if os.getcwd() not in sys.path:
             sys.path.append(os.getcwd())  # so that a policy's own folder is enough to serve it
-        return load(name)
-    for point in metadata.entry_points(group=GROUP):
-        if point.name == name:
-            return load(point.value)
-    known = ", ".join(policy_names()) or "none (is robospa installed?)"
-    raise UnknownName(f"no policy {name!r}; known are {known}, or give module:function")
+        return load_function(name)
+    try:
+        return find(POLICIES, name, "policy")  # type: ignore[no-any-return]
+    except UnknownName as error:
+        raise UnknownName(f"{error}, or give module:function") from error.__cause__
+
+
+def load_function(path: str) -> Callable[..., Any]:
+    """The callable at `module:function`; raises UnknownName."""
+    found = load(path)
+    if not callable(found):
+        raise UnknownName(f"{path!r} is not callable")
+    return found  # type: ignore[no-any-return]
 
 
 def is_url(target: str) -> bool:

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from robospa.harness.world import SceneUnstable, World
 from robospa.protocol.policy import Policy
-from robospa.results.records import TrialKey
+from robospa.trial import TrialKey
 
 BATCH = 10
 ORACLE = "robospa.baselines.oracle:create"

@@ -26,7 +26,7 @@ from robospa.harness.world import ActionError, World
 from robospa.protocol.checks import check_chunk
 from robospa.protocol.errors import PolicyAnswerError
 from robospa.protocol.policy import Policy, PolicySpec, TrialInfo
-from robospa.results.records import PROCESSOR, TrialKey, TrialRecord
+from robospa.results.records import PROCESSOR, TrialRecord
 from robospa.tasks.catalog import build_scene
 from robospa.tasks.catalog import task as find_task
 from robospa.tasks.events import Event, outcome
@@ -34,6 +34,7 @@ from robospa.tasks.goals.hands import Hands
 from robospa.tasks.scene import Scene
 from robospa.tasks.snapshot import Snapshot
 from robospa.tasks.task import Task, Tracker
+from robospa.trial import TrialKey
 
 SERVER_TIMES = {"queue": "queue_ms", "infer": "infer_ms", "batch": "batch"}
 """Entries of a record's `latency` that come from the server, and what the wire calls them."""

@@ -13,8 +13,9 @@ from robospa.harness.trial import policy_seed
 from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.reference import LEVELS, Reference
 from robospa.results.reading import finished
-from robospa.results.records import TrialKey, TrialRecord
+from robospa.results.records import TrialRecord
 from robospa.tasks.events import Event, outcome
+from robospa.trial import TrialKey
 
 CONTROLS = ("rest_to_rest",)
 """Ways of executing an action that the benchmark's numbers are made with."""

@@ -16,8 +16,9 @@ from robospa.leaderboard.bundle import BundleError
 from robospa.results.compare import Difference, compare, over_levels
 from robospa.results.metrics import METRICS
 from robospa.results.reading import Run
-from robospa.results.records import TrialKey, TrialRecord
+from robospa.results.records import TrialRecord
 from robospa.results.sides import COMPARED, CompareError, Side, Variant, sample_of
+from robospa.trial import TrialKey
 
 DIGITS = "0123456789abcdefghijklmnopqrstuvwxyz"
 FIELDS = {"candidates", "total", "success", "done"}

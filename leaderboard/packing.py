@@ -19,7 +19,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
-from robospa.harness.factory import load
+from robospa.harness.factory import load_function
 from robospa.harness.grid import PER_UNIT, is_on_grid
 from robospa.harness.running.manifest import changed_settings, group_keys, seed_hash
 from robospa.harness.running.store import action_path, read_actions
@@ -42,7 +42,8 @@ from robospa.leaderboard.traces import Trace, encode
 from robospa.leaderboard.verify import LISTING, Valid, own_version, seed_lists, verify
 from robospa.results.lint import lint_run
 from robospa.results.reading import Run, read_run
-from robospa.results.records import TrialKey, TrialRecord
+from robospa.results.records import TrialRecord
+from robospa.trial import TrialKey
 
 ABOUT = ("versions", "git", "code", "machine", "world", "warnings")
 """What of the machine and its software goes into the bundle."""
@@ -268,7 +269,7 @@ def _films(
             note(f"filming {key.slug} ({number} of {len(chosen)})")
             if world is None:
                 arguments = {"render": True} if reference.world.startswith("robospa.") else {}
-                world = load(reference.world)(**arguments)
+                world = load_function(reference.world)(**arguments)
             films[name] = _film(world, run, key, reference, homes[key])
     finally:
         if world is not None:
@@ -290,7 +291,7 @@ def _film(world: Any, run: Run, key: TrialKey, reference: Reference, home: Path)
         actions,
         str(spec_of(run.manifest["settings"], key.task)["action"]),
         recorder=recorder,
-        parts=load(reference.parts),
+        parts=load_function(reference.parts),
     )
     if again.digest != record.digest:
         raise BundleError(

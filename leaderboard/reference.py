@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from robospa.harness.factory import load
-from robospa.results.records import TrialKey
+from robospa.harness.factory import load_function
 from robospa.tasks.scene import SUITE
+from robospa.trial import TrialKey
 
 WORLD = "robospa.harness.sim.sapien_world:SapienWorld"
 PARTS = "robospa.harness.trial:task_parts"
@@ -51,7 +51,7 @@ def shipped(world: str | None = None, parts: str | None = None) -> Reference:
     def members(category: str) -> list[str]:
         return [t.name for t in tasks().values() if t.category == category]
 
-    found = facts_of(load(parts) if parts else _catalog_parts)
+    found = facts_of(load_function(parts) if parts else _catalog_parts)
     return Reference(accepted, found, members, world or WORLD, parts or PARTS)
 
 

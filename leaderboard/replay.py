@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from multiprocessing import get_context
 from typing import Any
 
-from robospa.harness.factory import load
+from robospa.harness.factory import load_function
 from robospa.harness.running.manifest import about_machine, changed_settings
 from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.claims import spec_of
@@ -24,7 +24,8 @@ from robospa.leaderboard.sampling import catch_probability, drawn
 from robospa.leaderboard.traces import Trace
 from robospa.leaderboard.verify import Valid, read_traces
 from robospa.results.reading import differences
-from robospa.results.records import TrialKey, TrialRecord
+from robospa.results.records import TrialRecord
+from robospa.trial import TrialKey
 
 IDENTICAL, AGREES, DIFFERENT = "identical", "agrees", "different"
 STATE = ("digest", "physics_steps")
@@ -170,7 +171,7 @@ _WORLD: list[Any] = []
 def _start(world: str, parts: str) -> None:
     """What a process keeps: a world without renderer, and what finds scenes and goals."""
     arguments = {"render": False} if world.startswith("robospa.") else {}
-    _WORLD[:] = [load(world)(**arguments), load(parts)]
+    _WORLD[:] = [load_function(world)(**arguments), load_function(parts)]
 
 
 def _again(claimed: TrialRecord, trace: Trace, space: str) -> Replayed:

@@ -21,7 +21,7 @@ from robospa.leaderboard.hidden import Block
 from robospa.leaderboard.reference import Reference
 from robospa.leaderboard.verify import Valid
 from robospa.results.reading import Run
-from robospa.results.records import TrialKey
+from robospa.trial import TrialKey
 
 DROPS = (0.02, 0.05, 0.1)
 """Losses of success for which the power is stated."""

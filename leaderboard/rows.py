@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 from robospa.leaderboard.bundle import BundleError, sha256
 from robospa.leaderboard.strict import is_hash, look, parse_row
 from robospa.results.reading import from_data
-from robospa.results.records import TrialKey, TrialRecord
+from robospa.results.records import TrialRecord
+from robospa.trial import TrialKey
 
 KINDS: dict[str, type] = {"str": str, "int": int, "bool": bool, "float": float}
 """Type of a field by its annotation; a float may be written as a whole number. The fields that are

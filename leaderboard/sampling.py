@@ -11,7 +11,7 @@ import math
 from collections.abc import Iterable, Sequence
 
 from robospa.leaderboard.bundle import BundleError
-from robospa.results.records import TrialKey
+from robospa.trial import TrialKey
 
 CHALLENGE = 8
 """A challenge has at least this many characters: fewer can be guessed."""

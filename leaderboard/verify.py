@@ -38,7 +38,8 @@ from robospa.leaderboard.strict import parse, parse_map
 from robospa.leaderboard.traces import Trace, decode
 from robospa.results.lint import lint_run
 from robospa.results.reading import Run, RunError, manifest_keys
-from robospa.results.records import TrialKey, TrialRecord
+from robospa.results.records import TrialRecord
+from robospa.trial import TrialKey
 
 FIELDS = {"format", "suite", "robospa", "practice", "inputs", "chain", "seeds", "files", "bundle"}
 LISTING = ("unequal-trials", "missing")

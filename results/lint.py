@@ -17,7 +17,8 @@ from robospa.results.aggregate import onta, rounded
 from robospa.results.metrics import PROCEDURAL
 from robospa.results.published import load
 from robospa.results.reading import TRIALS, Run, finished, read_file
-from robospa.results.records import TrialKey, TrialRecord
+from robospa.results.records import TrialRecord
+from robospa.trial import TrialKey
 
 FASTEST_STEP = 4e-6
 """Wall time of a physics step [s] that no machine known to us beats: 1000 times real time. Arms

@@ -25,7 +25,8 @@ from robospa.results.intervals import (
     wilson,
 )
 from robospa.results.reading import Run, finished
-from robospa.results.records import TrialKey, TrialRecord
+from robospa.results.records import TrialRecord
+from robospa.trial import TrialKey
 
 SPATIAL = ("GAC", "SDE", "CPI", "RRR", "CVR")
 PROCEDURAL = ("RPF", "OFE", "OCE", "CAC", "MIP")

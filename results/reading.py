@@ -14,8 +14,9 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from robospa.results.records import TrialKey, TrialRecord
+from robospa.results.records import TrialRecord
 from robospa.results.strangers import check_key, check_manifest, check_record, parse
+from robospa.trial import TrialKey
 
 TRIALS = "trials"
 """Folder inside a run that holds the record files."""

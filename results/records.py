@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from robospa.trial import TrialKey
+
 PROCESSOR = "processor"
 """Entry of `timing` with a trial's processor time [s]; the others share out its wall time."""
 
@@ -16,28 +18,6 @@ END_REASONS = (
     "goal_lost",  # the goal can no longer be met (memory tasks)
     "infrastructure",  # the trial could not be run: missing, never scored as a failure
 )
-
-
-@dataclass(frozen=True, order=True)
-class TrialKey:
-    """What a trial is. The same key and the same actions give the same record."""
-
-    task: str
-    level: int
-    seed: int
-    embodiment: str = "aloha-agilex"
-    mode: str = "clean"
-    split: str = "heldout"
-
-    @property
-    def variant(self) -> tuple[str, int]:
-        """(task, level)."""
-        return (self.task, self.level)
-
-    @property
-    def slug(self) -> str:
-        """A file name for what belongs to this trial."""
-        return f"{self.task}-L{self.level}-{self.seed}-{self.embodiment}-{self.mode}-{self.split}"
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,9 @@ from typing import Any
 
 from robospa.results.failures import NAMES, label
 from robospa.results.reading import Run
-from robospa.results.records import TrialKey, TrialRecord
+from robospa.results.records import TrialRecord
 from robospa.results.report_facts import END_NAMES, NOT_RUN
+from robospa.trial import TrialKey
 
 SHOWN_TRIALS = 60_000
 """Two whole benchmark runs. Beyond that browsers choke: successes are left out first."""

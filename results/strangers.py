@@ -11,7 +11,8 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from robospa.results.records import END_REASONS, TrialKey, TrialRecord
+from robospa.results.records import END_REASONS, TrialRecord
+from robospa.trial import TrialKey
 
 MANIFEST_MAPS = (
     "settings",

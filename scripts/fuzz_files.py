@@ -52,7 +52,7 @@ from robospa.results.reading import (
     read_run,
     to_line,
 )
-from robospa.results.records import TrialKey
+from robospa.trial import TrialKey
 
 ROOT = Path(__file__).resolve().parents[1]
 ROOM = 512 * 2**20

@@ -5,7 +5,7 @@
 #
 # 1. a Python >= 3.11 with venv         (apt, only if it is missing)
 # 2. .venv with the locked packages     (requirements.lock, with --dev requirements-dev.lock)
-# 3. robospa itself, editable           (the strict kind: linked file by file, under build/)
+# 3. robospa itself, editable
 # 4. a software Vulkan driver           (apt, only if SAPIEN finds no device that it can render with)
 #
 # --dev adds the test tools; --dry-run prints the commands that would change something. Run again,
@@ -141,18 +141,12 @@ ensure_packages() {
     stamp "$kind" "$now"
 }
 
-project_files() { # what the editable install links, by name; contents are seen through the links
-    find protocol clients tasks harness baselines results leaderboard -name __pycache__ -prune \
-        -o -type f -print
-}
-
 ensure_project() {
     local now
-    now=$({ project_files | sort; cat pyproject.toml; } | sha256sum | cut -d' ' -f1)
+    now=$(echo pyproject.toml | fingerprint)
     stamped project "$now" && return 0
-    say "linking robospa into $venv"
-    run rm -rf build/__editable__.*
-    pip_install --no-deps --no-build-isolation --config-settings editable_mode=strict -e . ||
+    say "installing robospa itself into $venv"
+    pip_install --no-deps --no-build-isolation -e . ||
         fail "pip could not install robospa itself: see its message above."
     stamp project "$now"
 }
@@ -176,7 +170,10 @@ add_backports() { # as a file of its own, unless some source has it already
     ! grep -qsr "bookworm-backports" "$apt_sources" "$(dirname "$apt_sources")/sources.list" || return 0
     mirror=$(apt-get indextargets --format '$(REPO_URI)' 'Codename: bookworm' 2>/dev/null |
         grep -m1 -v security || true)
-    mirror=${mirror:-http://deb.debian.org/debian}
+    [ -n "$mirror" ] || {
+        say "apt lists no source of Debian 12: please add bookworm-backports to its sources"
+        return 0
+    }
     prefix=$(root_prefix) || {
         say "neither root nor sudo: please run first: echo 'deb $mirror bookworm-backports main' |" \
             "sudo tee ${file%.sources}.list"

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.tasks.geometry import Array
+from robospa.geometry import Array
 from robospa.tasks.scene import TABLE_TOP
 
 Mask = NDArray[np.bool_]

@@ -20,8 +20,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from robospa.geometry import Array
 from robospa.tasks import catalog
-from robospa.tasks.geometry import Array
 from robospa.tasks.objects import assets, object_model
 from robospa.tasks.scene import Scene, SceneObject
 

@@ -13,7 +13,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from robospa.tasks.geometry import Array
+from robospa.geometry import Array
 from robospa.tasks.layouts import LayoutError, Mask
 
 Fits = Callable[[Array, Array, int], Mask]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from robospa.tasks.geometry import Vec3
+from robospa.geometry import Vec3
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from robospa.tasks.geometry import Pose
+from robospa.geometry import Pose
 
 SUITE = "robospa-1"
 """Version of the scenes: a change to any of them needs a new one."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from robospa.tasks.geometry import Pose, Vec3, axis_rotation
+from robospa.geometry import Pose, Vec3, axis_rotation
 
 Color = tuple[float, float, float]
 """Linear RGB, each 0..1."""

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from robospa.tasks.geometry import Pose, Vec3
+from robospa.geometry import Pose, Vec3
 
 ARMS = ("left", "right")
 

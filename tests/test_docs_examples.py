@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from robospa.clients import connect
+from robospa.geometry import Pose
 from robospa.protocol.policy import TrialInfo
 from robospa.protocol.server import ServerThread
-from robospa.tasks.geometry import Pose
 from robospa.tasks.plan import Pick
 from robospa.tasks.scene import Scene
 from robospa.tasks.snapshot import Snapshot

@@ -21,7 +21,7 @@ from robospa.clients import check_options
 from robospa.harness.cli.main import COMMANDS, NAMES
 from robospa.harness.cli.selection import parse_tasks
 from robospa.harness.cli.serve import options_class
-from robospa.harness.factory import load
+from robospa.harness.factory import load_function
 from robospa.harness.replays.episodes import Episode, write_episode
 from robospa.protocol.options import option_table, read_options, url_options
 from robospa.protocol.policy import CAMERAS
@@ -54,7 +54,7 @@ POLICIES = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["entr
 
 def policy_options(name: str) -> Any:
     """The options class of a policy that `robospa serve` knows, or None."""
-    return options_class(load(POLICIES["robospa.policies"][name]))
+    return options_class(load_function(POLICIES["robospa.policies"][name]))
 
 
 ALL = [(page, words) for page in PAGES for words in commands(page)]

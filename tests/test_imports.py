@@ -5,11 +5,12 @@ from __future__ import annotations
 import ast
 import subprocess
 import sys
-import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+
+import robospa
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -23,7 +24,8 @@ ALLOWED = {
     "baselines": ("protocol", "tasks", "harness.skills", "harness.robots"),
     "leaderboard": ("results", "harness", "tasks"),
 }
-"""What each folder may import besides itself. The CLI reaches `baselines` through entry points."""
+"""What each folder may import besides itself and the shared words of `robospa/`. The command line
+reaches `baselines` through entry points."""
 
 HEAVY = ("sapien", "matplotlib", "scipy", "av", "jinja2", "torch", "cv2", "PIL")
 """Modules that cost a good part of a second, or are not part of the base install."""
@@ -42,15 +44,21 @@ def imported_modules(source: str) -> Iterator[str]:
         yield from (name for name in names if name.split(".")[0] == "robospa")
 
 
+def shared_modules() -> list[str]:
+    """The modules of the folder `robospa/` itself: the words that all folders share."""
+    return sorted(path.stem for path in (ROOT / "robospa").glob("[!_]*.py"))
+
+
 def violations(folder: str, source: str) -> list[str]:
     """The imports of `source`, a module of `folder`, that ALLOWED does not list."""
-    allowed = [f"robospa.{name}." for name in (folder, *ALLOWED[folder])]
+    allowed = [f"robospa.{name}." for name in (folder, *ALLOWED[folder], *shared_modules())]
     return [m for m in imported_modules(source) if not (m + ".").startswith(tuple(allowed))]
 
 
-def loaded_after(statement: str) -> set[str]:
-    """Top-level modules that a fresh interpreter has loaded after running `statement`."""
-    code = f"import sys\n{statement}\nprint('\\nloaded', *{{m.split('.')[0] for m in sys.modules}})"
+def loaded_after(statement: str, top: bool = True) -> set[str]:
+    """Modules (their first names) that a fresh interpreter has loaded after `statement`."""
+    name = "m.split('.')[0]" if top else "m"
+    code = f"import sys\n{statement}\nprint('\\nloaded', *{{{name} for m in sys.modules}})"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
     assert done.returncode == 0, done.stderr
     return set(done.stdout.splitlines()[-1].split()[1:])
@@ -90,17 +98,47 @@ def test_the_rule_sees_a_violation(folder: str, line: str, wrong: list[str]) -> 
 
 def test_every_folder_with_code_has_a_rule() -> None:
     folders = {path.parent.name for path in ROOT.glob("*/__init__.py")}
-    assert folders == set(ALLOWED)
+    assert folders - {"robospa"} == set(ALLOWED)
 
 
-def test_packaging_lists_every_package() -> None:
-    listed = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]["packages"]
-    found = {
-        ".".join(("robospa", *path.parent.relative_to(ROOT).parts))
-        for folder in ALLOWED
-        for path in (ROOT / folder).rglob("__init__.py")
-    }
-    assert set(listed) == found
+def test_the_shared_words_import_no_folder() -> None:
+    wrong = [
+        f"{name}.py imports {found}"
+        for name in shared_modules()
+        for found in imported_modules((ROOT / "robospa" / f"{name}.py").read_text())
+        if found.split(".")[1] not in shared_modules()
+    ]
+    assert wrong == []
+
+
+def test_every_folder_with_code_is_linked_into_the_package() -> None:
+    links = {path.name for path in (ROOT / "robospa").iterdir() if path.is_symlink()}
+    assert links == set(ALLOWED)
+
+
+def test_every_subfolder_with_code_is_a_package() -> None:
+    folders = {path.parent for folder in ALLOWED for path in python_files(folder)}
+    assert [str(folder) for folder in folders if not (folder / "__init__.py").exists()] == []
+
+
+@pytest.mark.parametrize("name", robospa.__all__)
+def test_public_names_exist(name: str) -> None:
+    assert getattr(robospa, name) is not None
+
+
+def test_the_public_names_are_listed_where_they_are_found() -> None:
+    assert sorted(robospa.__all__) == sorted({*robospa._HOMES, "__version__"})
+    assert set(robospa.__all__) <= set(dir(robospa))
+
+
+def test_an_unknown_public_name_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError, match="has no attribute 'nothing'"):
+        robospa.nothing  # noqa: B018
+
+
+def test_importing_robospa_loads_no_folder_of_it() -> None:
+    loaded = loaded_after("import robospa", top=False)
+    assert {name for name in loaded if name.split(".")[0] == "robospa"} == {"robospa"}
 
 
 def test_protocol_loads_only_its_three_dependencies() -> None:

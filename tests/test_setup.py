@@ -21,7 +21,8 @@ def setup(folder: Path, body: str, os_release: str = DEBIAN_12) -> str:
     (folder / "os-release").write_text(os_release)
     head = (
         f"source {SCRIPT}; dry_run=1; venv={folder}/venv; apt_sources={folder}/sources.list.d\n"
-        "vulkan_usable() { return 1; }; root_prefix() { echo; }; apt-get() { :; }\n"
+        "vulkan_usable() { return 1; }; root_prefix() { echo; }\n"
+        'apt-get() { if [ "$1" = indextargets ]; then echo http://mirror.example/debian; fi; }\n'
     )
     done = subprocess.run(
         ["bash", "-c", head + body],

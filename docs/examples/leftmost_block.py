@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from robospa.tasks.geometry import Array, Pose, yaw_rotation
+from robospa.geometry import Array, Pose, yaw_rotation
 from robospa.tasks.goals.pick import Lift, PickTracker
 from robospa.tasks.instructions.grammar import Templates
 from robospa.tasks.instructions.words import Slots, with_common

@@ -23,9 +23,9 @@ Hidden = Annotated[str | None, typer.Option(hidden=True)]
 
 
 def _reach(path: str) -> Any:
-    from robospa.harness.factory import load
+    from robospa.harness.factory import load_function
 
-    return load(f"robospa.leaderboard.{path}")
+    return load_function(f"robospa.leaderboard.{path}")
 
 
 @leaderboard.command()

@@ -60,6 +60,11 @@ def _run(words: list[str]) -> None:
     import typer
 
     chosen = next((w for w in words if not w.startswith("-")), "")
+    if "--version" in words[:1]:
+        from importlib.metadata import version
+
+        print(f"robospa {version('robospa')}")
+        return
     if sys.version_info < (3, 11) and chosen in COMMANDS and chosen != "serve":
         raise TooOld(
             f"robospa {chosen} needs Python 3.11 or later; on this one only robospa serve runs"
@@ -71,7 +76,7 @@ def _run(words: list[str]) -> None:
         add_completion=False,
         pretty_exceptions_enable=False,
         rich_markup_mode=None,  # plain help: importing the fancy one takes longer than all the rest
-        epilog="Add --debug to any command to see where an error came from.",
+        epilog="--version prints the version, --debug shows where an error came from.",
     )
     for name, summary in COMMANDS.items():
         if name == chosen:

@@ -35,7 +35,7 @@ def record(
     from robospa.harness.factory import open_policy
     from robospa.harness.replays.episodes import EpisodeRecorder, require, write_episode
     from robospa.harness.trial import policy_seed, run_trial
-    from robospa.results.records import TrialKey
+    from robospa.trial import TrialKey
 
     require()
     names, levels = parse_tasks(task), parse_levels(str(level))

@@ -18,7 +18,7 @@ from robospa.harness.running.staffing import cores as cores
 from robospa.harness.running.staffing import most_workers
 from robospa.harness.running.watchdog import BEAT_SECONDS
 from robospa.harness.running.worker import VIDEO, Targets, WorkerConfig
-from robospa.results.records import TrialKey
+from robospa.trial import TrialKey
 
 CONTROLS = ("rest_to_rest", "fixed_rate")
 

@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from robospa.results.metrics import BASIC, CATEGORIES, DIMENSIONS
-from robospa.results.records import TrialKey
 from robospa.results.strangers import MOST, parse
+from robospa.trial import TrialKey
 
 SPLITS = ("heldout", "train")
 GROUPS = {"all": CATEGORIES, **DIMENSIONS, "basic": BASIC}

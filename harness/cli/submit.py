@@ -21,9 +21,9 @@ Hidden = Annotated[str | None, typer.Option(hidden=True)]
 
 
 def _reach(path: str) -> Any:
-    from robospa.harness.factory import load
+    from robospa.harness.factory import load_function
 
-    return load(f"{LEADERBOARD}.{path}")
+    return load_function(f"{LEADERBOARD}.{path}")
 
 
 @submit.command()

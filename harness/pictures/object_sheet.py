@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from robospa.geometry import Pose, Vec3, look_rotation, yaw_rotation
 from robospa.harness.sim import furniture
-from robospa.tasks.geometry import Pose, Vec3, look_rotation, yaw_rotation
 from robospa.tasks.objects import assets, looks, object_model
 from robospa.tasks.scene import TABLE_TOP
 from robospa.tasks.shapes import Hinge, ObjectModel, Shape

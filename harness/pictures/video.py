@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from robospa.harness.running.store import VIDEOS, replace_file
 from robospa.harness.world import World
 from robospa.protocol.policy import CameraSpec
-from robospa.results.records import TrialKey
+from robospa.trial import TrialKey
 
 FPS = 10
 """Frames per second of a video."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 
+from robospa.geometry import Pose, Vec3, axis_rotation, look_rotation, yaw_rotation
 from robospa.harness.robots.aloha_agilex_shapes import (
     FINGER_SHAPES,
     LINK_SHAPES,
@@ -16,7 +17,6 @@ from robospa.harness.robots.aloha_agilex_shapes import (
     WRIST_CAMERA,
 )
 from robospa.harness.robots.embodiment import Arm, Embodiment, Joint, StaticCamera
-from robospa.tasks.geometry import Pose, Vec3, axis_rotation, look_rotation, yaw_rotation
 
 PI = math.pi
 FLIP = axis_rotation((1, 0, 0), -PI)

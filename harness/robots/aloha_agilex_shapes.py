@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from robospa.tasks.geometry import Pose, Vec3, axis_rotation
+from robospa.geometry import Pose, Vec3, axis_rotation
 from robospa.tasks.shapes import Box, Color, Cylinder, Mesh, Shape
 
 BLACK: Color = (0.028, 0.028, 0.032)

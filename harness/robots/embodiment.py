@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from robospa.tasks.geometry import Pose, Vec3
+from robospa.geometry import Pose, Vec3
 from robospa.tasks.shapes import Shape
 
 

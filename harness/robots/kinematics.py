@@ -14,9 +14,9 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from robospa.geometry import Pose, from_matrix, to_matrix
 from robospa.harness.robots import arx
 from robospa.harness.robots.embodiment import Arm
-from robospa.tasks.geometry import Pose, from_matrix, to_matrix
 
 Array = NDArray[np.float64]
 

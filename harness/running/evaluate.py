@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 from multiprocessing.connection import Connection
 from typing import Any
 
-from robospa.harness.factory import is_url, load
+from robospa.harness.factory import is_url, load_function
 from robospa.harness.running.locking import locked
 from robospa.harness.running.manifest import Manifest, about_machine, check_folder, open_run
 from robospa.harness.running.policies import Probed, probe_policies, warnings_of
@@ -24,7 +24,7 @@ from robospa.harness.running.runner import RunAborted, Runner, RunOptions
 from robospa.harness.running.store import drop_parts, tidy
 from robospa.harness.running.worker import WorkerConfig, describe
 from robospa.results.reading import finished, read_records
-from robospa.results.records import TrialKey
+from robospa.trial import TrialKey
 
 PROBE_SECONDS = 120.0
 
@@ -54,7 +54,7 @@ class WorldBroken(Exception):
 
 def _probe_world(pipe: Connection, factory: str, arguments: dict[str, Any]) -> None:
     try:
-        world = load(factory)(**arguments)
+        world = load_function(factory)(**arguments)
         pipe.send((dict(world.info()), ""))
         world.close()
     except Exception as error:
@@ -101,7 +101,7 @@ def make_manifest(request: Request, policies: Mapping[str, Probed]) -> Manifest:
     config = request.config
     specs = [policy.spec for policy in policies.values()]
     world = probe_world(config, _renders(config, policies))
-    parts = load(config.parts)
+    parts = load_function(config.parts)
     first = {key.task: key for key in reversed(list(request.keys))}
     found = {task: parts(key) for task, key in first.items()}
     one = next(iter(policies.values()))

@@ -22,8 +22,8 @@ from typing import Any
 from robospa.harness.running.locking import LOCK
 from robospa.harness.running.store import PART, replace_file
 from robospa.results.reading import MANIFEST, RunError, manifest_keys, read_manifest
-from robospa.results.records import TrialKey
 from robospa.tasks.scene import SUITE
+from robospa.trial import TrialKey
 
 FORMAT = 1
 

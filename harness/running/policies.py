@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any
 from robospa.harness.factory import open_policy
 from robospa.protocol.policy import PolicySpec
 from robospa.results.reading import RunError
-from robospa.results.records import TrialKey
 from robospa.results.strangers import parse
+from robospa.trial import TrialKey
 
 if TYPE_CHECKING:
     from robospa.harness.running.worker import Targets, WorkerConfig

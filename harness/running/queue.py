@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from robospa.results.records import TrialKey
+from robospa.trial import TrialKey
 
 if TYPE_CHECKING:
     from robospa.tasks.task import Task

@@ -24,8 +24,9 @@ from robospa.protocol.errors import DecodeError, EncodeError
 from robospa.protocol.policy import PolicySpec
 from robospa.protocol.validate import Fields
 from robospa.results.reading import from_line, to_line
-from robospa.results.records import TrialKey, TrialRecord
+from robospa.results.records import TrialRecord
 from robospa.results.strangers import check_key
+from robospa.trial import TrialKey
 
 LIMITS = Limits(message=2**30, text=2**26)
 FILE = re.compile(rf"({ACTIONS}|{VIDEOS})/[A-Za-z0-9_][A-Za-z0-9_.-]*")

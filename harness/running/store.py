@@ -26,7 +26,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.results.reading import TRIALS, RunError, to_line
-from robospa.results.records import TrialKey, TrialRecord
+from robospa.results.records import TrialRecord
+from robospa.trial import TrialKey
 
 ACTIONS = "actions"
 VIDEOS = "videos"

@@ -26,13 +26,14 @@ from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from robospa.harness.factory import load, open_policy
+from robospa.harness.factory import load_function, open_policy
 from robospa.harness.running.policies import over_budget
 from robospa.harness.running.store import RecordWriter, StorageError, storing, write_actions
 from robospa.harness.running.watchdog import Attended, Pulse
 from robospa.protocol.errors import printable
 from robospa.protocol.policy import PolicySpec
-from robospa.results.records import TrialKey, TrialRecord
+from robospa.results.records import TrialRecord
+from robospa.trial import TrialKey
 
 if TYPE_CHECKING:
     from robospa.tasks.task import Task
@@ -58,7 +59,7 @@ def task_finder(parts: str) -> Callable[[TrialKey], Task]:
         from robospa.tasks.catalog import task
 
         return lambda key: task(key.task)
-    find = load(parts)
+    find = load_function(parts)
     return lambda key: find(key).task
 
 
@@ -111,7 +112,7 @@ class Worker:
         self.config = config
         self.writer = writer
         self.pulse = pulse or Pulse()
-        self.parts: Callable[[TrialKey], Any] = load(config.parts)
+        self.parts: Callable[[TrialKey], Any] = load_function(config.parts)
         self._world: Any = None
         self._policy: Any = None
         self._target = ""
@@ -156,7 +157,7 @@ class Worker:
 
     def _prepare(self, target: str) -> None:
         if self._world is None:
-            self._world = load(self.config.world)(**self.config.world_arguments)
+            self._world = load_function(self.config.world)(**self.config.world_arguments)
         if self._policy is not None and self._target != target:
             self._leave()
         if self._policy is None:
@@ -232,10 +233,10 @@ def describe(error: BaseException) -> str:
 
 def _attempt(worker: Worker, key: TrialKey, attempt: int, target: str) -> tuple[Any, ...]:
     """The message that tells how this attempt went. Errors are sorted here, once."""
-    from robospa.harness.factory import UnknownName
     from robospa.harness.running.servers import fault_of
     from robospa.harness.world import SceneUnstable
     from robospa.protocol.errors import ServerError
+    from robospa.registry import UnknownName
 
     try:
         return ("done", worker.run(key, attempt, target))

@@ -17,8 +17,8 @@ import sapien
 from numpy.typing import NDArray
 from sapien import physx
 
+from robospa.geometry import Pose, Quat, Vec3, axis_rotation, look_rotation, multiply
 from robospa.harness.robots.embodiment import Arm, Embodiment, Joint
-from robospa.tasks.geometry import Pose, Quat, Vec3, axis_rotation, look_rotation, multiply
 from robospa.tasks.shapes import Box, Cylinder, Geometry, ObjectModel, Shape, Sphere
 
 Array = NDArray[np.float64]

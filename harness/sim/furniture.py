@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from robospa.tasks.geometry import Pose
+from robospa.geometry import Pose
 from robospa.tasks.scene import TABLE_TOP
 from robospa.tasks.shapes import Box, Color, Shape
 

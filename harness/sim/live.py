@@ -12,8 +12,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
+from robospa.geometry import Pose, Quat, Vec3, multiply, rotate
 from robospa.harness.sim.motion import RATE, Trajectory
-from robospa.tasks.geometry import Pose, Quat, Vec3, multiply, rotate
 from robospa.tasks.snapshot import Contact, Snapshot
 
 FLOATS = 7

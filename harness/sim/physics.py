@@ -16,11 +16,11 @@ import sapien
 from numpy.typing import NDArray
 from sapien import physx
 
+from robospa.geometry import Pose
 from robospa.harness.robots.embodiment import Embodiment
 from robospa.harness.sim import bodies, furniture
 from robospa.harness.sim.live import NO_HINGES
 from robospa.harness.sim.motion import RATE
-from robospa.tasks.geometry import Pose
 from robospa.tasks.shapes import ObjectModel
 from robospa.tasks.snapshot import ARMS, Contact
 

@@ -11,13 +11,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from robospa.geometry import Pose, Vec3, rotate
 from robospa.harness.robots.kinematics import forward, inverse, pose_of
 from robospa.harness.skills.grasping import Reach
 from robospa.harness.skills.moving import line, retreat_home, rise, travel
 from robospa.harness.skills.pick import pick
 from robospa.harness.skills.place import grip_offset
 from robospa.harness.skills.workspace import SkillFailed, Steps, Workspace, backed
-from robospa.tasks.geometry import Pose, Vec3, rotate
 from robospa.tasks.plan import Dock, Pick
 
 Array = NDArray[np.float64]

@@ -14,6 +14,15 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from robospa.geometry import (
+    Pose,
+    Vec3,
+    axis_rotation,
+    look_rotation,
+    multiply,
+    rotate,
+    to_matrix,
+)
 from robospa.harness.robots.kinematics import inverse
 from robospa.harness.skills.workspace import (
     FINGER_HALF_WIDTH,
@@ -23,15 +32,6 @@ from robospa.harness.skills.workspace import (
     far_side,
     is_wall,
     wall_front,
-)
-from robospa.tasks.geometry import (
-    Pose,
-    Vec3,
-    axis_rotation,
-    look_rotation,
-    multiply,
-    rotate,
-    to_matrix,
 )
 from robospa.tasks.scene import TABLE_TOP
 from robospa.tasks.shapes import Grasp, ObjectModel

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
+from robospa.geometry import Pose, Vec3, axis_rotation, multiply, rotate, yaw_rotation
 from robospa.harness.skills.dock import ATTEMPTS, let_go, shifted, ways_in
 from robospa.harness.skills.grasping import Reach, reachable_grasps
 from robospa.harness.skills.moving import travel
 from robospa.harness.skills.pick import arms_for, pick
 from robospa.harness.skills.place import grip_offset, place
 from robospa.harness.skills.workspace import Steps, Workspace
-from robospa.tasks.geometry import Pose, Vec3, axis_rotation, multiply, rotate, yaw_rotation
 from robospa.tasks.plan import Hang, Pick, Place
 
 LIFT = 0.14

@@ -8,12 +8,12 @@ from collections.abc import Generator
 import numpy as np
 from numpy.typing import NDArray
 
+from robospa.geometry import Pose, yaw_rotation
 from robospa.harness.skills.grasping import Reach, reachable_grasps
 from robospa.harness.skills.moving import travel
 from robospa.harness.skills.pick import Fits, arms_for, pick
 from robospa.harness.skills.place import YAWS, Spot, grip_offset, place, place_targets, spots
 from robospa.harness.skills.workspace import SkillFailed, Steps, Workspace
-from robospa.tasks.geometry import Pose, yaw_rotation
 from robospa.tasks.plan import Hit, Pick, Place
 from robospa.tasks.snapshot import Snapshot
 

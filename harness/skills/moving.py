@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from robospa.geometry import Pose
 from robospa.harness.robots.kinematics import forward, pose_of
 from robospa.harness.skills.workspace import FINGERTIP, TRAVEL_HEIGHT, Workspace, raised, wall_front
-from robospa.tasks.geometry import Pose
 from robospa.tasks.scene import TABLE_TOP
 
 Array = NDArray[np.float64]

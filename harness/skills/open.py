@@ -14,12 +14,12 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from robospa.geometry import Pose, axis_rotation, multiply, rotate
 from robospa.harness.robots.kinematics import inverse
 from robospa.harness.skills.grasping import MAX_OPENING
 from robospa.harness.skills.moving import clear_other, line, rise, travel
 from robospa.harness.skills.pick import arms_for
 from robospa.harness.skills.workspace import SkillFailed, Steps, Workspace, backed
-from robospa.tasks.geometry import Pose, axis_rotation, multiply, rotate
 from robospa.tasks.plan import Open
 from robospa.tasks.shapes import Hinge
 

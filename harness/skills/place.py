@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from robospa.geometry import Pose, axis_rotation, multiply, rotate, yaw_rotation
 from robospa.harness.robots.kinematics import inverse
 from robospa.harness.skills.grasping import Reach
 from robospa.harness.skills.moving import line, retreat_home, rise, travel
 from robospa.harness.skills.workspace import SkillFailed, Steps, Workspace, backed, raised
-from robospa.tasks.geometry import Pose, axis_rotation, multiply, rotate, yaw_rotation
 from robospa.tasks.plan import Drop, Place
 
 Array = NDArray[np.float64]

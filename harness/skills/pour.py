@@ -8,13 +8,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from robospa.geometry import Pose, Quat, axis_rotation, multiply, rotate, yaw_rotation
 from robospa.harness.robots.kinematics import inverse
 from robospa.harness.skills.grasping import Reach
 from robospa.harness.skills.moving import travel
 from robospa.harness.skills.pick import pick
 from robospa.harness.skills.place import grip_offset
 from robospa.harness.skills.workspace import SkillFailed, Steps, Workspace
-from robospa.tasks.geometry import Pose, Quat, axis_rotation, multiply, rotate, yaw_rotation
 from robospa.tasks.plan import Pick, Pour
 
 Array = NDArray[np.float64]

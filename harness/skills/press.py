@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from robospa.geometry import Pose, axis_rotation, look_rotation, rotate
 from robospa.harness.robots.kinematics import inverse
 from robospa.harness.skills.moving import clear_other, line, travel
 from robospa.harness.skills.pick import arms_for
@@ -19,7 +20,6 @@ from robospa.harness.skills.workspace import (
     raised,
     wall_front,
 )
-from robospa.tasks.geometry import Pose, axis_rotation, look_rotation, rotate
 from robospa.tasks.plan import Press
 
 TILTS = (0.0, 0.2, 0.4, 0.6, 0.8)

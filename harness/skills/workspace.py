@@ -13,9 +13,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from robospa.geometry import Pose, Vec3, rotate
 from robospa.harness.robots.embodiment import Embodiment
 from robospa.harness.robots.kinematics import Chain, chain_of, inverse
-from robospa.tasks.geometry import Pose, Vec3, rotate
 from robospa.tasks.objects import object_model
 from robospa.tasks.scene import TABLE_TOP, Scene
 from robospa.tasks.shapes import ObjectModel

@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from robospa.geometry import Pose, Vec3
 from robospa.tasks.events import Event
-from robospa.tasks.geometry import Pose, Vec3
 from robospa.tasks.goals.flags import Flags
 from robospa.tasks.goals.handling import Handling
 from robospa.tasks.goals.hands import Role

@@ -12,8 +12,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol, TypeGuard
 
+from robospa.geometry import Pose, Vec3
 from robospa.tasks.events import Event
-from robospa.tasks.geometry import Pose, Vec3
 from robospa.tasks.goals.anyorder import SLOW, Container
 from robospa.tasks.goals.flags import Flags, both_open, closed_near
 from robospa.tasks.goals.handling import Handling

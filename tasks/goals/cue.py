@@ -10,8 +10,8 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
 
+from robospa.geometry import Vec3
 from robospa.tasks.events import Event
-from robospa.tasks.geometry import Vec3
 from robospa.tasks.goals.hands import Role
 from robospa.tasks.snapshot import Snapshot
 

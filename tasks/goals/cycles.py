@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
+from robospa.geometry import Pose, Vec3, rotate
 from robospa.tasks.events import Event
-from robospa.tasks.geometry import Pose, Vec3, rotate
 from robospa.tasks.goals.checklist import HELD_RADIUS
 from robospa.tasks.goals.flags import Flags, closed_near, grasp_centre
 from robospa.tasks.goals.handling import Handling

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from robospa.geometry import Pose, Vec3
 from robospa.tasks.events import Event
-from robospa.tasks.geometry import Pose, Vec3
 from robospa.tasks.snapshot import GRIPPER_OPEN, Snapshot
 
 GRASP_CENTRE = 0.12

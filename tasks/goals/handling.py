@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
+from robospa.geometry import Vec3
 from robospa.tasks.events import Event
-from robospa.tasks.geometry import Vec3
 from robospa.tasks.goals.flags import grasp_centre, holding_arm
 from robospa.tasks.snapshot import Snapshot
 

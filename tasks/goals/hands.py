@@ -11,8 +11,8 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
+from robospa.geometry import Vec3
 from robospa.tasks.events import Event
-from robospa.tasks.geometry import Vec3
 from robospa.tasks.goals.flags import grasp_centre
 from robospa.tasks.objects import object_model
 from robospa.tasks.scene import Scene

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from robospa.geometry import Vec3
 from robospa.tasks.events import Event
-from robospa.tasks.geometry import Vec3
 from robospa.tasks.goals.flags import Flags, both_open, closed_near
 from robospa.tasks.goals.handling import Handling
 from robospa.tasks.goals.hands import Role

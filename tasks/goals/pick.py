@@ -10,8 +10,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from robospa.geometry import Vec3
 from robospa.tasks.events import Event
-from robospa.tasks.geometry import Vec3
 from robospa.tasks.goals.flags import grasp_centre
 from robospa.tasks.goals.handling import Handling
 from robospa.tasks.goals.hands import Role

@@ -7,8 +7,8 @@ Where the gripper has to be closed, opening it on the object is no leaving (offi
 
 from __future__ import annotations
 
+from robospa.geometry import Pose, Vec3
 from robospa.tasks.events import Event
-from robospa.tasks.geometry import Pose, Vec3
 from robospa.tasks.goals.flags import Flags, inside_box
 from robospa.tasks.goals.hands import Role
 from robospa.tasks.snapshot import GRIPPER_CLOSED, Snapshot

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from robospa.geometry import Pose
 from robospa.tasks.events import Event
-from robospa.tasks.geometry import Pose
 from robospa.tasks.goals.clicks import ClickInOrder, Countable
 from robospa.tasks.goals.handling import Handling
 from robospa.tasks.goals.hands import Role

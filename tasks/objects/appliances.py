@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from robospa.tasks.geometry import Pose, look_rotation
+from robospa.geometry import Pose, look_rotation
 from robospa.tasks.objects import meshes as m
 from robospa.tasks.objects.build import (
     ALONG_Y,

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from robospa.tasks.geometry import Vec3
+from robospa.geometry import Vec3
 from robospa.tasks.objects import meshes as m
 from robospa.tasks.objects.build import Asset, across, box_grasps, model, paint, solid, srgb
 from robospa.tasks.shapes import Box, Color, Grasp, ObjectModel, Shape

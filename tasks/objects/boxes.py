@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from robospa.tasks.geometry import Vec3
+from robospa.geometry import Vec3
 from robospa.tasks.objects import meshes as m
 from robospa.tasks.objects.build import (
     PAPER,

@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from robospa.tasks.geometry import yaw_rotation
+from robospa.geometry import yaw_rotation
 from robospa.tasks.objects import meshes as m
 from robospa.tasks.objects.build import (
     Asset,

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from robospa.tasks.geometry import Array, Pose, Quat, Vec3, to_matrix
+from robospa.geometry import Array, Pose, Quat, Vec3, to_matrix
 from robospa.tasks.shapes import (
     Box,
     Color,

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from robospa.tasks.geometry import axis_rotation
+from robospa.geometry import axis_rotation
 from robospa.tasks.objects import meshes as m
 from robospa.tasks.objects.build import (
     ALONG_X,

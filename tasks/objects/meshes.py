@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
-from robospa.tasks.geometry import Array, Pose, Quat, Vec3
+from robospa.geometry import Array, Pose, Quat, Vec3
 from robospa.tasks.shapes import Mesh
 
 Point = tuple[float, float]

@@ -9,7 +9,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from robospa.tasks.geometry import Pose, axis_rotation
+from robospa.geometry import Pose, axis_rotation
 from robospa.tasks.objects import meshes as m
 from robospa.tasks.objects.build import (
     DARK,

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from robospa.tasks.geometry import Pose, Vec3
+from robospa.geometry import Pose, Vec3
 from robospa.tasks.objects import meshes as m
 from robospa.tasks.objects.boxes import SIDES, on_side
 from robospa.tasks.objects.build import (

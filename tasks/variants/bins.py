@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from robospa.geometry import Pose
 from robospa.tasks import objects
-from robospa.tasks.geometry import Pose
 from robospa.tasks.goals.anyorder import Container
 from robospa.tasks.layouts import BASES, MAX_REACH
 from robospa.tasks.plan import Drop, Pick, Place, Skill

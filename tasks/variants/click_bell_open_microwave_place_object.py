@@ -12,8 +12,8 @@ import math
 
 import numpy as np
 
+from robospa.geometry import Pose
 from robospa.tasks import objects
-from robospa.tasks.geometry import Pose
 from robospa.tasks.goals.checklist import Checklist, Counter, Part, Rests
 from robospa.tasks.goals.opening import Opened
 from robospa.tasks.goals.repeat import PressCounter

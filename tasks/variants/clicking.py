@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from robospa.geometry import Array, Vec3
 from robospa.tasks import objects
-from robospa.tasks.geometry import Array, Vec3
 from robospa.tasks.goals.repeat import PRESS_BOX, PressCounter
 from robospa.tasks.layouts import Area, Mask, in_head_view, scatter
 from robospa.tasks.plan import Press

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from robospa.tasks.geometry import Array
+from robospa.geometry import Array
 from robospa.tasks.goals.pick import Lift
 from robospa.tasks.instructions import words_spatial
 from robospa.tasks.instructions.words import Phrasings, Slots

@@ -16,7 +16,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.tasks.geometry import Array
+from robospa.geometry import Array
 from robospa.tasks.goals.pick import Lift
 from robospa.tasks.instructions import words_spatial
 from robospa.tasks.instructions.words import Slots

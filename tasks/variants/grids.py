@@ -14,7 +14,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from robospa.tasks.geometry import Array
+from robospa.geometry import Array
 from robospa.tasks.goals.pick import Lift
 from robospa.tasks.instructions import words_spatial
 from robospa.tasks.instructions.words import Slots

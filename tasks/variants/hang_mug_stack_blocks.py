@@ -12,7 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from robospa.tasks.geometry import Pose
+from robospa.geometry import Pose
 from robospa.tasks.goals.checklist import Checklist, Counter, Near, Part, Rests
 from robospa.tasks.instructions import words_cac
 from robospa.tasks.instructions.words import Slots

@@ -11,8 +11,8 @@ import math
 
 import numpy as np
 
+from robospa.geometry import Array
 from robospa.tasks import objects
-from robospa.tasks.geometry import Array
 from robospa.tasks.goals.tools import HitCounter, UseInOrder
 from robospa.tasks.instructions import words_tools
 from robospa.tasks.instructions.words import Slots

@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from robospa.tasks.geometry import Array, Pose
+from robospa.geometry import Array, Pose
 from robospa.tasks.goals.cue import AfterCue
 from robospa.tasks.goals.gather import Gather, Region
 from robospa.tasks.instructions.words import Slots

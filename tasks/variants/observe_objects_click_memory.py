@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from robospa.tasks.geometry import Pose, yaw_rotation
+from robospa.geometry import Pose, yaw_rotation
 from robospa.tasks.goals.clicks import ClickInOrder
 from robospa.tasks.goals.cue import AfterCue
 from robospa.tasks.instructions.words import Slots

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 
-from robospa.tasks.geometry import Vec3
+from robospa.geometry import Vec3
 from robospa.tasks.layouts import EYE, Points
 from robospa.tasks.scene import TABLE_TOP
 from robospa.tasks.variants.ranking import LAYOUTS, LEVELS, Measure, diagonal, front, rank_task

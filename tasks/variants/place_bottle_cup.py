@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from robospa.tasks.geometry import Pose
+from robospa.geometry import Pose
 from robospa.tasks.goals.checklist import Checklist, Counter, Inside, Part, Rests, on_spot
 from robospa.tasks.instructions import words_cac
 from robospa.tasks.instructions.words import Slots

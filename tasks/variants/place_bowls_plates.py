@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from robospa.geometry import Array, Vec3
 from robospa.tasks import objects
-from robospa.tasks.geometry import Array, Vec3
 from robospa.tasks.goals.nest import Nest
 from robospa.tasks.instructions import words_dishes
 from robospa.tasks.instructions.words import Slots

@@ -12,8 +12,8 @@ import math
 
 import numpy as np
 
+from robospa.geometry import Pose
 from robospa.tasks import objects
-from robospa.tasks.geometry import Pose
 from robospa.tasks.goals.checklist import Checklist, Counter, Part, Rests, on_spot
 from robospa.tasks.instructions import words_cac
 from robospa.tasks.instructions.words import Slots

@@ -13,7 +13,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from robospa.tasks.geometry import Pose
+from robospa.geometry import Pose
 from robospa.tasks.goals.checklist import Checklist, Counter, Part, Rests, on_spot
 from robospa.tasks.instructions import words_cac
 from robospa.tasks.instructions.words import Slots

@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from robospa.tasks.geometry import Pose
+from robospa.geometry import Pose
 from robospa.tasks.goals.checklist import Checklist, Counter, Inside, Near, Part, Rests
 from robospa.tasks.goals.flags import inside_box
 from robospa.tasks.instructions import words_cac

@@ -14,7 +14,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from robospa.tasks.geometry import Vec3
+from robospa.geometry import Vec3
 from robospa.tasks.goals.row import Row
 from robospa.tasks.goals.stack import Bring
 from robospa.tasks.instructions import words_ranking

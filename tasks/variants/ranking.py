@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robospa.tasks.geometry import Array, Pose, Vec3, yaw_rotation
+from robospa.geometry import Array, Pose, Vec3, yaw_rotation
 from robospa.tasks.goals.pick import Lift
 from robospa.tasks.instructions import words_spatial
 from robospa.tasks.instructions.words import Slots

@@ -11,8 +11,8 @@ import math
 
 import numpy as np
 
+from robospa.geometry import yaw_rotation
 from robospa.tasks import objects
-from robospa.tasks.geometry import yaw_rotation
 from robospa.tasks.goals.cue import AfterCue
 from robospa.tasks.goals.restore import Restore, Wanted
 from robospa.tasks.instructions.words import Slots

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from robospa.geometry import Pose, Vec3
 from robospa.tasks import objects
-from robospa.tasks.geometry import Pose, Vec3
 from robospa.tasks.goals.repeat import PRESS_BOX, PressCounter
 from robospa.tasks.plan import Pick, Place, Press, Skill
 from robospa.tasks.scene import Scene

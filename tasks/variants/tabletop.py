@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from robospa.geometry import Pose, yaw_rotation
 from robospa.tasks import objects
-from robospa.tasks.geometry import Pose, yaw_rotation
 from robospa.tasks.layouts import in_head_view
 from robospa.tasks.scene import TABLE_TOP, SceneObject
 from robospa.tasks.shapes import ObjectModel

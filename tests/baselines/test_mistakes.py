@@ -5,15 +5,15 @@ from __future__ import annotations
 import pytest
 
 from robospa.baselines.mistakes import KINDS, Mistaken, create, steps_of, wrong_plan
+from robospa.geometry import Pose
 from robospa.harness.robots import embodiment
 from robospa.harness.skills.workspace import Workspace
 from robospa.results.failures import label
-from robospa.results.records import TrialKey
 from robospa.tasks.catalog import build_scene, task
-from robospa.tasks.geometry import Pose
 from robospa.tasks.plan import Pick, Place, Press
 from robospa.tasks.scene import Scene
 from robospa.tasks.snapshot import Snapshot
+from robospa.trial import TrialKey
 
 SEED = 930_000
 

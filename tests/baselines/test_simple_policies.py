@@ -11,7 +11,7 @@ import pytest
 from robospa.baselines import hold, random, replay
 from robospa.harness.running.store import write_actions
 from robospa.protocol.policy import TrialInfo
-from robospa.results.records import TrialKey
+from robospa.trial import TrialKey
 
 KEY = TrialKey("Pick_Fake", 3, 100007)
 TRIAL = TrialInfo("Pick_Fake", 3, 100007, KEY.embodiment, KEY.mode, KEY.split, "", policy_seed=5)

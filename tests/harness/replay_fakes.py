@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from robospa.geometry import axis_rotation
 from robospa.harness.replays.episodes import Episode
 from robospa.protocol.policy import CameraSpec, PolicySpec, TrialInfo
-from robospa.tasks.geometry import axis_rotation
 
 Array = NDArray[np.float64]
 Change = Callable[[Array, Array], Array]

@@ -18,15 +18,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from robospa.geometry import Pose
 from robospa.harness.trial import TrialParts
 from robospa.harness.world import ActionError, Poll, SceneUnstable, StepResult
 from robospa.protocol.policy import CameraSpec, PolicySpec, TrialInfo
-from robospa.results.records import TrialKey
 from robospa.tasks.events import Event
-from robospa.tasks.geometry import Pose
 from robospa.tasks.scene import Scene
 from robospa.tasks.snapshot import Contact, Snapshot
 from robospa.tasks.task import Level, Task
+from robospa.trial import TrialKey
 
 HERE = Pose((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
 LIMIT = 20

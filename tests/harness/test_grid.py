@@ -15,7 +15,7 @@ from robospa.harness.grid import PER_UNIT, is_on_grid, on_grid
 from robospa.harness.pictures.video import TrialRecorder
 from robospa.harness.trial import actions_digest, run_trial
 from robospa.harness.world import Poll, StepResult
-from robospa.results.records import TrialKey
+from robospa.trial import TrialKey
 
 KEY = TrialKey("Pick_Blocks_Size", 1, 100000)
 FINITE = arrays(np.float32, (4, 3), elements=st.floats(width=32, allow_nan=False,

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.tasks.geometry import Pose
+from robospa.geometry import Pose
 from robospa.tasks.scene import TABLE_TOP, Scene, SceneObject
 
 READY = (0.0, 1.6, 1.5, 0.0, 0.0, 0.0)

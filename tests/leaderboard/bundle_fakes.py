@@ -23,7 +23,7 @@ from robospa.leaderboard import bundle as layout
 from robospa.leaderboard.bundle import BundleError, Limits
 from robospa.leaderboard.reference import Reference, facts_of
 from robospa.leaderboard.verify import seed_lists, verify
-from robospa.results.records import TrialKey
+from robospa.trial import TrialKey
 
 PICK, PRESS = "Pick_Blocks_Size", "Press_Stapler_Repeat"
 SEEDS = tuple(range(100000, 100004))

@@ -14,7 +14,7 @@ from robospa.harness.pictures.video import TrialRecorder
 from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.harness.trial import run_trial
 from robospa.protocol.policy import PolicySpec, TrialInfo
-from robospa.results.records import TrialKey
+from robospa.trial import TrialKey
 
 HORIZON = 50
 

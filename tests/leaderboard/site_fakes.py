@@ -19,7 +19,8 @@ from robospa.leaderboard.verify import Valid
 from robospa.results.columns import Column, table_values
 from robospa.results.metrics import combine, score_cell
 from robospa.results.published import LEVELS, load
-from robospa.results.records import TrialKey, TrialRecord
+from robospa.results.records import TrialRecord
+from robospa.trial import TrialKey
 
 REPLAYED: dict[str, Any] = {
     "challenge": "0123456789abcdef",

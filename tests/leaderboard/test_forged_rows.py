@@ -29,7 +29,7 @@ from bundle_fakes import (
 from robospa.leaderboard import bundle as layout
 from robospa.leaderboard.rows import trace_hash
 from robospa.leaderboard.traces import decode
-from robospa.results.records import TrialKey
+from robospa.trial import TrialKey
 
 
 def test_an_edited_row(files: Files, tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from bundle_fakes import CARD, PICK, PRESS, REFERENCE, SEEDS, Weak, all_keys, ma
 from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.packing import pack
 from robospa.leaderboard.verify import verify
-from robospa.results.records import TrialKey
+from robospa.trial import TrialKey
 
 
 @pytest.fixture(scope="module")

@@ -23,7 +23,7 @@ from robospa.leaderboard.card import read_card
 from robospa.leaderboard.packing import pack
 from robospa.leaderboard.pull_request import check, fetch, submitted
 from robospa.leaderboard.reference import shipped
-from robospa.results.records import TrialKey
+from robospa.trial import TrialKey
 
 ROOT = HERE.parents[1]
 MINE = "leaderboard/submissions/mine/"

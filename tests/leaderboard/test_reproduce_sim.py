@@ -20,8 +20,8 @@ from robospa.leaderboard.reference import shipped
 from robospa.leaderboard.reproduce import check_policy, compare, hidden_keys
 from robospa.protocol.server import ServerThread
 from robospa.results.reading import Run, read_run
-from robospa.results.records import TrialKey
 from robospa.tasks.seeds import accepted
+from robospa.trial import TrialKey
 
 pytestmark = pytest.mark.sim
 TASK, LEVEL, TRIALS = "Pick_Blocks_Size", 1, 5

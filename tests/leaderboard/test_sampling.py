@@ -8,7 +8,7 @@ import pytest
 
 from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.sampling import announced, catch_probability, drawn, sample_size
-from robospa.results.records import TrialKey
+from robospa.trial import TrialKey
 
 KEYS = [TrialKey(task, level, s) for task in ("A", "B") for level in (1, 2) for s in range(10)]
 

@@ -13,7 +13,7 @@ from bundle_fakes import PICK, SEEDS, Weak, make_run
 
 from robospa.leaderboard.hidden import FIRST, Block, write_block
 from robospa.protocol.server import ServerThread
-from robospa.results.records import TrialKey
+from robospa.trial import TrialKey
 
 HERE = Path(__file__).parent
 FAKES = ["--world", "bundle_fakes:World", "--parts", "run_fakes:parts"]

@@ -13,7 +13,7 @@ from robospa.leaderboard.packing import pack
 from robospa.leaderboard.reference import shipped
 from robospa.leaderboard.replay import replay
 from robospa.leaderboard.verify import verify
-from robospa.results.records import TrialKey
+from robospa.trial import TrialKey
 
 pytestmark = pytest.mark.sim
 

@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from robospa.results.reading import Run, read_run, to_line
-from robospa.results.records import TrialKey, TrialRecord
+from robospa.results.records import TrialRecord
+from robospa.trial import TrialKey
 
 CATEGORIES = {"Pick_Blocks_Size": "GAC", "Pick_Mugs_Distance": "SDE", "Put_Bottles_Dustbin": "OFE"}
 

@@ -10,7 +10,8 @@ import pytest
 
 from robospa.results.failures import KINDS, NAMES, distribution, label
 from robospa.results.failures_table import counts_table, trials_table
-from robospa.results.records import TrialKey, TrialRecord
+from robospa.results.records import TrialRecord
+from robospa.trial import TrialKey
 
 Row = tuple[Any, ...]
 PICK = {"target": [0], "other": []}

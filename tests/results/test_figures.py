@@ -14,8 +14,9 @@ from robospa.results.figures.failure_bars import FILLS
 from robospa.results.figures.levels import chance_levels
 from robospa.results.figures.series import FORMATS, GRID, INK, Series, label_of
 from robospa.results.metrics import score
-from robospa.results.records import TrialKey, TrialRecord
+from robospa.results.records import TrialRecord
 from robospa.results.report_page import inline_svg
+from robospa.trial import TrialKey
 
 
 def published(model: str) -> Series:

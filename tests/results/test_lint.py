@@ -19,7 +19,8 @@ from robospa.results.lint import (
     run_rows,
 )
 from robospa.results.reading import RunError, read_run, to_line
-from robospa.results.records import TrialKey, TrialRecord
+from robospa.results.records import TrialRecord
+from robospa.trial import TrialKey
 
 SIZE, MUGS, BOTTLES = "Pick_Blocks_Size", "Pick_Mugs_Distance", "Put_Bottles_Dustbin"
 

@@ -9,7 +9,8 @@ import pytest
 from robospa.results.columns import published_column
 from robospa.results.intervals import METHODS
 from robospa.results.metrics import Scores, score
-from robospa.results.records import TrialKey, TrialRecord
+from robospa.results.records import TrialRecord
+from robospa.trial import TrialKey
 
 BASE = TrialRecord(
     key=TrialKey("A", 1, 0),

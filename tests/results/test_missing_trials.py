@@ -13,10 +13,11 @@ from run_by_hand import outcomes, record, write
 from robospa.results.compare import compare
 from robospa.results.metrics import score_run
 from robospa.results.reading import Run
-from robospa.results.records import TrialKey, TrialRecord
+from robospa.results.records import TrialRecord
 from robospa.results.report import write_report
 from robospa.results.sides import side_of_run
 from robospa.results.tables import loss_lines, terminal, to_json
+from robospa.trial import TrialKey
 
 PICK, PUT = "Pick_Blocks_Size", "Put_Bottles_Dustbin"
 WHY = "ws://gpu:8000 did not send actions within 120 s"

@@ -13,9 +13,10 @@ from robospa.results import tables
 from robospa.results.intervals import Estimate, wilson
 from robospa.results.metrics import score_run
 from robospa.results.reading import Run, RunError, read_run, to_line
-from robospa.results.records import TrialKey, TrialRecord
+from robospa.results.records import TrialRecord
 from robospa.results.report import write_report
 from robospa.results.report_trials import event_row
+from robospa.trial import TrialKey
 
 EVIL = "<script>alert(1)</script>"
 CATEGORY_OF = {"Pick_Blocks_Size": "GAC", "Press_Stapler_Repeat": "RPF"}

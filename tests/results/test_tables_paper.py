@@ -11,10 +11,11 @@ import pytest
 from robospa.results.columns import TableError, published_column, run_column
 from robospa.results.published import LEVELS, load
 from robospa.results.reading import Run
-from robospa.results.records import TrialKey, TrialRecord
+from robospa.results.records import TrialRecord
 from robospa.results.tables_all import make_tables
 from robospa.results.tables_grid import Entry, Grid
 from robospa.results.tables_paper import summary_table, task_table
+from robospa.trial import TrialKey
 
 DATA = load()
 

@@ -15,12 +15,12 @@ from typing import Any
 
 import numpy as np
 
+from robospa.geometry import Pose, to_matrix
 from robospa.harness.robots import embodiment
 from robospa.harness.robots.kinematics import chain_of, end_effector, inverse
 from robospa.harness.skills.grasping import LEANS, LEVEL, candidate_poses, grasps_now
 from robospa.harness.skills.workspace import Workspace
 from robospa.tasks import catalog
-from robospa.tasks.geometry import Pose, to_matrix
 from robospa.tasks.layouts import HEIGHT, WIDTH, head_pixel
 from robospa.tasks.objects import object_model
 from robospa.tasks.plan import Pick

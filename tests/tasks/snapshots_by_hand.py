@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 
+from robospa.geometry import Pose, Vec3
 from robospa.tasks.events import Event
-from robospa.tasks.geometry import Pose, Vec3
 from robospa.tasks.snapshot import Contact, Snapshot
 from robospa.tasks.task import Tracker
 

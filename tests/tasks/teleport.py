@@ -10,8 +10,8 @@ from collections.abc import Iterable
 
 from snapshots_by_hand import AWAY, DOWN, TICK
 
+from robospa.geometry import Pose, Vec3, rotate, yaw_rotation
 from robospa.tasks.events import Event
-from robospa.tasks.geometry import Pose, Vec3, rotate, yaw_rotation
 from robospa.tasks.objects import object_model
 from robospa.tasks.plan import (
     Dock,

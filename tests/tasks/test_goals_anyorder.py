@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from snapshots_by_hand import TICK, held, kinds, run, snap
 
+from robospa.geometry import Pose, Vec3
 from robospa.tasks.events import Event, outcome
-from robospa.tasks.geometry import Pose, Vec3
 from robospa.tasks.goals.anyorder import Collect, Container
 
 BIN = Container(Pose((-0.45, 0.0, 0.0)), (0.15, 0.15), 0.6)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from snapshots_by_hand import TICK, held, kinds, run, snap
 
+from robospa.geometry import Pose, Vec3
 from robospa.tasks.events import Event, outcome
-from robospa.tasks.geometry import Pose, Vec3
 from robospa.tasks.goals.anyorder import Container
 from robospa.tasks.goals.checklist import Checklist, Inside, Rests, on_spot
 from robospa.tasks.goals.repeat import PressCounter

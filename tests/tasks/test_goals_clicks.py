@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from snapshots_by_hand import AWAY, TICK, held, kinds, run, snap
 
+from robospa.geometry import Pose, Vec3
 from robospa.tasks.events import Event, outcome
-from robospa.tasks.geometry import Pose, Vec3
 from robospa.tasks.goals.clicks import ClickInOrder, PressCounts
 from robospa.tasks.goals.repeat import PressCounter
 from robospa.tasks.goals.stamping import StampCounter

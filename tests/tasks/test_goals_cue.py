@@ -7,8 +7,8 @@ import math
 import pytest
 from snapshots_by_hand import AWAY, TICK, held, kinds, run, snap
 
+from robospa.geometry import Pose, Vec3, yaw_rotation
 from robospa.tasks.events import Event, outcome
-from robospa.tasks.geometry import Pose, Vec3, yaw_rotation
 from robospa.tasks.goals.cue import MOVED_EARLY, AfterCue
 from robospa.tasks.goals.gather import Gather, Region
 from robospa.tasks.goals.restore import Restore, Wanted

@@ -7,7 +7,7 @@ import math
 import pytest
 from snapshots_by_hand import AWAY, DOWN, TICK, kinds, run, snap
 
-from robospa.tasks.geometry import Pose, Vec3, axis_rotation
+from robospa.geometry import Pose, Vec3, axis_rotation
 from robospa.tasks.goals.cycles import Cycles, Test, back_home, held_up, put_down, raised
 from robospa.tasks.snapshot import Snapshot
 

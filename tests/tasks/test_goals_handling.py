@@ -6,8 +6,8 @@ from collections.abc import Iterable
 
 from snapshots_by_hand import AWAY, TICK, held, kinds, snap
 
+from robospa.geometry import Vec3
 from robospa.tasks.events import Event
-from robospa.tasks.geometry import Vec3
 from robospa.tasks.goals.handling import Handling
 
 Step = tuple[float, float, float | None]

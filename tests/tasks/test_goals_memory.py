@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from snapshots_by_hand import AWAY, TICK, held, kinds, run, snap
 
+from robospa.geometry import Vec3
 from robospa.tasks.events import Event, outcome
-from robospa.tasks.geometry import Vec3
 from robospa.tasks.goals.memory import Cover, UncoverInOrder
 
 PLACES = {"a": (-0.2, -0.05), "b": (0.0, -0.05), "c": (0.2, -0.05)}

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from snapshots_by_hand import TICK, held, kinds, run, snap
 
+from robospa.geometry import Vec3
 from robospa.tasks.events import outcome
-from robospa.tasks.geometry import Vec3
 from robospa.tasks.goals.nest import Nest
 
 START: dict[str, Vec3] = {

@@ -7,8 +7,8 @@ import math
 import pytest
 from snapshots_by_hand import TICK, held, kinds, run, snap
 
+from robospa.geometry import Vec3
 from robospa.tasks.events import outcome
-from robospa.tasks.geometry import Vec3
 from robospa.tasks.goals.regions import Part, Region, Regions
 
 RIGHT, LEFT = Region(x=(0.1, math.inf)), Region(x=(-math.inf, -0.1))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from snapshots_by_hand import TICK, kinds, run, snap
 
-from robospa.tasks.geometry import Pose, Vec3
+from robospa.geometry import Pose, Vec3
 from robospa.tasks.goals.repeat import PressCounter, Repeat
 from robospa.tasks.snapshot import Contact, Snapshot
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from snapshots_by_hand import TICK, held, kinds, run, snap
 
+from robospa.geometry import Vec3
 from robospa.tasks.events import outcome
-from robospa.tasks.geometry import Vec3
 from robospa.tasks.goals.row import Row
 
 START = {"a": (0.2, 0.0, 0.76), "b": (0.0, -0.05, 0.76), "c": (-0.2, 0.04, 0.76)}

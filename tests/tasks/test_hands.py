@@ -6,8 +6,8 @@ from collections.abc import Iterable
 
 from snapshots_by_hand import AWAY, TICK, kinds, snap
 
+from robospa.geometry import Pose, Vec3
 from robospa.tasks.events import Event
-from robospa.tasks.geometry import Pose, Vec3
 from robospa.tasks.goals.hands import BESIDE, TOUCHING, Hands, Role
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.snapshot import Contact

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from robospa.tasks.geometry import to_matrix
+from robospa.geometry import to_matrix
 from robospa.tasks.objects import assets, looks, object_model
 from robospa.tasks.objects import meshes as m
 from robospa.tasks.objects.containers import COVER_INNER_HEIGHT, COVER_INNER_RADIUS

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from robospa.tasks.geometry import Pose, Vec3, look_rotation
+from robospa.geometry import Pose, Vec3, look_rotation
 from robospa.tasks.objects import assets, looks, object_model
 from robospa.tasks.shapes import Box, Grasp, ObjectModel, Shape
 

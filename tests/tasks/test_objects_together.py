@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from robospa.tasks.geometry import Pose, Vec3, axis_rotation, rotate, yaw_rotation
+from robospa.geometry import Pose, Vec3, axis_rotation, rotate, yaw_rotation
 from robospa.tasks.objects import looks, object_model
 from robospa.tasks.shapes import ObjectModel
 

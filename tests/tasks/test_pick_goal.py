@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import pytest
 from snapshots_by_hand import AWAY, held, kinds, run, snap
 
-from robospa.tasks.geometry import Vec3
+from robospa.geometry import Vec3
 from robospa.tasks.goals.pick import Lift, PickTracker
 from robospa.tasks.snapshot import Snapshot
 

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from teleport import Teleport
 
+from robospa.geometry import rotate
 from robospa.tasks.catalog import build_scene, task
 from robospa.tasks.events import outcome
-from robospa.tasks.geometry import rotate
 from robospa.tasks.layouts import in_head_view, in_reach
 from robospa.tasks.objects import object_model
 from robospa.tasks.plan import Place

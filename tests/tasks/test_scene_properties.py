@@ -16,8 +16,8 @@ from pathlib import Path
 import pytest
 from scene_checks import misplaced, named, overlaps, sunk, unreachable, unseen
 
+from robospa.geometry import Pose
 from robospa.tasks import catalog
-from robospa.tasks.geometry import Pose
 from robospa.tasks.scene import Scene
 
 SCENES = int(os.environ.get("ROBOSPA_SCENES", "5"))

@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from robospa.tasks.geometry import Pose
+from robospa.geometry import Pose
 from robospa.tasks.snapshot import Contact, Snapshot, snapshot_from_json, snapshot_to_json
 
 SNAPSHOT = Snapshot(

@@ -9,7 +9,7 @@ import pytest
 
 from robospa.harness.cli.running import client_options, make_request, run_folder
 from robospa.harness.cli.selection import BadChoice
-from robospa.results.records import TrialKey
+from robospa.trial import TrialKey
 
 KEYS = [TrialKey("A", 1, 0)]
 TIMES = {"timeout": 1.0, "first_timeout": 2.0, "wait": 3.0, "patience": 4.0}

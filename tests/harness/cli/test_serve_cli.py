@@ -16,7 +16,7 @@ import pytest
 from robospa.clients import connect
 from robospa.harness.cli import main as cli
 from robospa.harness.cli import serve as command
-from robospa.harness.factory import load
+from robospa.harness.factory import load_function
 from robospa.protocol.options import option, option_table
 from robospa.protocol.policy import PolicySpec, TrialInfo
 from robospa.protocol.server import ServerThread
@@ -156,7 +156,7 @@ def test_options_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
 
 @pytest.mark.parametrize("name", MODELS)
 def test_every_shipped_server_has_typed_documented_options(name: str) -> None:
-    make = load(f"robospa.baselines.{name}:create")
+    make = load_function(f"robospa.baselines.{name}:create")
     rows = option_table(command.options_class(make))
     assert rows and all(row.help for row in rows)
     page = (ROOT / "docs" / "serving.md").read_text()

@@ -11,7 +11,7 @@ from run_fakes import FakePolicy, FakeWorld, parts
 
 from robospa.harness.pictures.video import FPS, TrialRecorder, VideoBuffer
 from robospa.harness.trial import run_trial
-from robospa.results.records import TrialKey
+from robospa.trial import TrialKey
 
 av = pytest.importorskip("av")
 KEY = TrialKey("Pick_Fake", 2, 100009)

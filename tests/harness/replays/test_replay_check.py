@@ -23,9 +23,9 @@ from replay_fakes import (
     swapped_wrists,
 )
 
+from robospa.geometry import Pose
 from robospa.harness.replays.episodes import EpisodeError
 from robospa.harness.replays.replay_check import Findings, absolute, replay
-from robospa.tasks.geometry import Pose
 
 MADE = episode()
 

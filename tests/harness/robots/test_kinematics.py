@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from robospa.geometry import Pose, look_rotation
 from robospa.harness.robots import embodiment
 from robospa.harness.robots.embodiment import Arm
 from robospa.harness.robots.kinematics import chain_of, end_effector, forward, inverse, pose_of
-from robospa.tasks.geometry import Pose, look_rotation
 
 ARMS = embodiment("aloha-agilex").arms
 

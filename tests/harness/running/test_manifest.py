@@ -17,7 +17,7 @@ from robospa.harness.running.manifest import (
     write_manifest,
 )
 from robospa.results.reading import RunError, manifest_keys, read_manifest
-from robospa.results.records import TrialKey
+from robospa.trial import TrialKey
 
 KEYS = tuple(TrialKey("Pick_Fake", level, seed) for level in (1, 2) for seed in (5, 6))
 MANIFEST = Manifest({"policy": {"name": "fake", "horizon": 4}, "split": "heldout"}, KEYS, {})

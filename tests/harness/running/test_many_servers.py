@@ -24,7 +24,7 @@ from robospa.harness.running.worker import WorkerConfig
 from robospa.protocol.policy import TrialInfo
 from robospa.protocol.server import ServerThread
 from robospa.results.reading import read_file, read_records, read_run
-from robospa.results.records import TrialKey
+from robospa.trial import TrialKey
 
 HERE = str(Path(__file__).parents[1])
 TASKS = ("Pick_Blocks_Size", "Pick_Blocks_Height", "Pick_Cans_Relational")

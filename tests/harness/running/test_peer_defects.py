@@ -32,7 +32,7 @@ from robospa.protocol.policy import TrialInfo
 from robospa.protocol.server import ServerThread
 from robospa.results.metrics import score_run
 from robospa.results.reading import RunError, read_file, read_run
-from robospa.results.records import TrialKey
+from robospa.trial import TrialKey
 
 PATIENT = Timeouts(30, 30, 30, 30, 30, 30, 30, 0.2)
 

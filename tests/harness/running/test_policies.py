@@ -25,7 +25,7 @@ from robospa.harness.running.worker import WorkerConfig
 from robospa.protocol.server import ServerThread
 from robospa.results.lint import lint_run
 from robospa.results.reading import RunError, read_run
-from robospa.results.records import TrialKey
+from robospa.trial import TrialKey
 
 HERE = str(Path(__file__).parents[1])
 KNOWN = {"Pick_A", "Pick_B", "Pick_C", "Pick_D", "Pick_E"}

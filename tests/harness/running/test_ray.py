@@ -22,7 +22,8 @@ from robospa.harness.running.ray_executor import NoCluster, RayExecutor, check_a
 from robospa.harness.running.runner import Runner, RunOptions
 from robospa.harness.running.worker import WorkerConfig
 from robospa.results.reading import read_file, read_records
-from robospa.results.records import TrialKey, TrialRecord
+from robospa.results.records import TrialRecord
+from robospa.trial import TrialKey
 
 pytest.importorskip("ray")
 

@@ -26,7 +26,8 @@ from robospa.protocol.channel import Timeouts
 from robospa.protocol.codec import decode, encode
 from robospa.protocol.errors import DecodeError, EncodeError
 from robospa.protocol.policy import CameraSpec, PolicySpec
-from robospa.results.records import TrialKey, TrialRecord
+from robospa.results.records import TrialRecord
+from robospa.trial import TrialKey
 
 KEY = TrialKey("Pick_Blocks_Size", 3, 100000)
 TRACE = f"actions/{KEY.slug}.npz"

@@ -12,7 +12,7 @@ from robospa.harness.running.ray_executor import joined
 from robospa.harness.running.runner import Runner, RunOptions
 from robospa.harness.running.worker import WorkerConfig
 from robospa.results.reading import differences, read_records
-from robospa.results.records import TrialKey
+from robospa.trial import TrialKey
 
 pytest.importorskip("ray")
 pytestmark = pytest.mark.sim

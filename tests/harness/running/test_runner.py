@@ -15,7 +15,8 @@ import pytest
 from robospa.harness.running.runner import RunAborted, Runner, RunOptions
 from robospa.harness.running.worker import WorkerConfig
 from robospa.results.reading import RunError, finished, read_file, read_records
-from robospa.results.records import TrialKey, TrialRecord
+from robospa.results.records import TrialRecord
+from robospa.trial import TrialKey
 
 QUICK = RunOptions(workers=2, backoff=0.01)
 

@@ -14,7 +14,8 @@ from run_fakes import fake_task_of
 from robospa.harness.running.queue import TrialQueue
 from robospa.harness.running.scheduler import Job, Scheduler
 from robospa.harness.running.servers import BROKEN, UNFIT, UNREACHED
-from robospa.results.records import TrialKey, TrialRecord
+from robospa.results.records import TrialRecord
+from robospa.trial import TrialKey
 
 Targets = Callable[[str], Sequence[str]]
 TASKS = ("Pick_A", "Press_B", "Push_C", "Stack_D", "Turn_E", "Open_F")

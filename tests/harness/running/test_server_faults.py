@@ -25,7 +25,8 @@ from robospa.harness.trial import run_trial
 from robospa.protocol.channel import Timeouts
 from robospa.protocol.errors import WireError
 from robospa.results.metrics import score
-from robospa.results.records import TrialKey, TrialRecord
+from robospa.results.records import TrialRecord
+from robospa.trial import TrialKey
 
 PAGE = Path(__file__).parents[3] / "docs" / "faults.md"
 SAID = "ws://gpu:8000"

@@ -24,7 +24,8 @@ from robospa.results.reading import (
     read_records,
     to_line,
 )
-from robospa.results.records import TrialKey, TrialRecord
+from robospa.results.records import TrialRecord
+from robospa.trial import TrialKey
 
 KEY = TrialKey("Pick_Fake", 1, 100000)
 RECORD = TrialRecord(

@@ -10,11 +10,11 @@ import pytest
 from numpy.typing import NDArray
 
 from robospa.baselines.oracle import Oracle
+from robospa.geometry import Pose
 from robospa.harness.robots import embodiment
 from robospa.harness.robots.kinematics import chain_of, end_effector
 from robospa.protocol.policy import TrialInfo
-from robospa.results.records import TrialKey
-from robospa.tasks.geometry import Pose
+from robospa.trial import TrialKey
 
 CHAINS = [chain_of(arm) for arm in embodiment("aloha-agilex").arms]
 

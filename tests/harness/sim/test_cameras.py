@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from world_scenes import block, joint_action, run_digest, scene, two_blocks
 
+from robospa.geometry import Pose
 from robospa.harness.robots import embodiment
 from robospa.harness.sim.cameras import camera_view, focal_length
 from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.harness.world import RenderUnavailable
 from robospa.protocol.policy import CAMERAS, CameraSpec, PolicySpec
-from robospa.tasks.geometry import Pose
 from robospa.tasks.snapshot import Snapshot
 
 pytestmark = pytest.mark.sim

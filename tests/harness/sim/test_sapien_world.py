@@ -224,8 +224,8 @@ def test_an_object_beside_the_table_is_unstable(world: SapienWorld) -> None:
 
 
 def test_an_object_weighs_what_its_model_says() -> None:
+    from robospa.geometry import Pose
     from robospa.harness.sim.bodies import dynamic_body
-    from robospa.tasks.geometry import Pose
     from robospa.tasks.objects import assets, object_model
 
     for name in assets():
@@ -250,9 +250,9 @@ def test_contacts_are_empty_unless_asked_for(world: SapienWorld) -> None:
 
 
 def test_a_gripper_holds_what_it_closes_on(world: SapienWorld) -> None:
+    from robospa.geometry import Pose, look_rotation
     from robospa.harness.robots import embodiment
     from robospa.harness.robots.kinematics import chain_of, inverse
-    from robospa.tasks.geometry import Pose, look_rotation
 
     chain = chain_of(embodiment("aloha-agilex").arms[0])
     down = look_rotation((0, 0, -1), (-1, 0, 0))

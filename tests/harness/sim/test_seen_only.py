@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from robospa.tasks.geometry import Pose
+from robospa.geometry import Pose
 from robospa.tasks.objects import object_model
 from robospa.tasks.scene import TABLE_TOP, Scene, SceneObject
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from robospa.geometry import Pose
 from robospa.harness.robots import embodiment
 from robospa.harness.robots.kinematics import chain_of, end_effector
 from robospa.harness.skills.raising import raise_lower
 from robospa.harness.skills.workspace import SkillFailed, Workspace
-from robospa.tasks.geometry import Pose
 from robospa.tasks.plan import RaiseLower
 from robospa.tasks.scene import TABLE_TOP, Scene, SceneObject
 from robospa.tasks.snapshot import Snapshot

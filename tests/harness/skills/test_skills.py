@@ -5,17 +5,17 @@ from __future__ import annotations
 import pytest
 
 from robospa.baselines.oracle import create
+from robospa.geometry import Pose, to_matrix
 from robospa.harness.robots import embodiment
 from robospa.harness.robots.kinematics import chain_of, end_effector
 from robospa.harness.skills import Expert
 from robospa.harness.skills.grasping import candidate_poses, crowding, reachable_grasps
 from robospa.harness.skills.workspace import FINGERTIP, Workspace
 from robospa.protocol.policy import TrialInfo
-from robospa.results.records import TrialKey
 from robospa.tasks.catalog import build_scene, tasks
-from robospa.tasks.geometry import Pose, to_matrix
 from robospa.tasks.scene import TABLE_TOP, Scene, SceneObject
 from robospa.tasks.snapshot import Snapshot
+from robospa.trial import TrialKey
 
 ROBOT = embodiment("aloha-agilex")
 UNTUNED_SEED = 7_000_000

@@ -6,13 +6,13 @@ import math
 
 import pytest
 
+from robospa.geometry import Pose, rotate
 from robospa.harness.robots import embodiment
 from robospa.harness.robots.kinematics import chain_of, end_effector
 from robospa.harness.skills import hang, pour
 from robospa.harness.skills.dock import shifted, ways_in
 from robospa.harness.skills.workspace import Workspace
 from robospa.tasks.catalog import build_scene
-from robospa.tasks.geometry import Pose, rotate
 from robospa.tasks.plan import Pour
 from robospa.tasks.scene import Scene
 from robospa.tasks.snapshot import Snapshot

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import pytest
 
+from robospa.geometry import Pose, to_matrix
 from robospa.harness.robots import embodiment
 from robospa.harness.robots.kinematics import chain_of, end_effector
 from robospa.harness.skills.grasping import reachable_grasps
 from robospa.harness.skills.moving import tops, travel_height
 from robospa.harness.skills.workspace import TRAVEL_HEIGHT, Workspace, wall_front
 from robospa.tasks.catalog import build_scene, task
-from robospa.tasks.geometry import Pose, to_matrix
 from robospa.tasks.scene import TABLE_TOP, Scene, SceneObject
 from robospa.tasks.snapshot import Snapshot
 

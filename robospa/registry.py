@@ -1,0 +1,56 @@
+"""Find things by name: policies, robots, dialects and tasks are entry points of a package.
+
+A package adds one by a line in its pyproject.toml, ours and others' alike:
+
+    [project.entry-points."robospa.policies"]
+    mine = "my_package.policy:create"
+"""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+from importlib import metadata
+from typing import Any
+
+POLICIES = "robospa.policies"
+"""Functions that make a policy, called with the options of `robospa serve --arg`."""
+ROBOTS = "robospa.robots"
+"""Objects of `robospa.harness.robots.embodiment.Embodiment`."""
+DIALECTS = "robospa.dialects"
+"""Objects of `robospa.clients.dialect.Dialect`: servers that speak something else than ours."""
+TASKS = "robospa.tasks"
+"""Objects of `robospa.tasks.task.Task`."""
+
+
+class UnknownName(Exception):
+    """Nothing goes by that name; the message says what does."""
+
+
+def load(path: str) -> Any:
+    """What is found at `module:name`; raises UnknownName."""
+    module, _, name = path.partition(":")
+    try:
+        return getattr(importlib.import_module(module), name)
+    except (ImportError, AttributeError, ValueError) as error:
+        raise UnknownName(f"cannot load {path!r}: {error}") from error
+
+
+def names(group: str) -> tuple[str, ...]:
+    """What goes by name in `group`, sorted; imports nothing of it."""
+    return tuple(sorted({point.name for point in metadata.entry_points(group=group)}))
+
+
+def find(group: str, name: str, what: str) -> Any:
+    """The object called `name` in `group`; `what` is what a person calls one, such as "policy".
+
+    Raises UnknownName, with near matches and all that exists.
+    """
+    for point in metadata.entry_points(group=group):
+        if point.name == name:
+            return load(point.value)
+    known = names(group)
+    near = difflib.get_close_matches(name, known, n=1)
+    hint = f"did you mean {near[0]}? " if near else ""
+    listed = ", ".join(known) or "none (is robospa installed?)"
+    raise UnknownName(f"no {what} {name!r}; {hint}known are {listed}")
