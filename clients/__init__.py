@@ -4,7 +4,7 @@
     go1+http://gpu:9000?wrists=swapped        options of the dialect in the query
 
 A dialect is a module of this package with `Options`, a frozen dataclass of its conventions (see
-`robospa.protocol.options`), and `open_session`, which makes a `ClientSession`. Everything else
+`robospa.protocol.options`), and `open_session`, which makes a `WireClient`. Everything else
 (time limits, request ids, checking chunks, reconnecting between trials) is the same for all.
 """
 
@@ -18,12 +18,12 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from robospa.clients.guess import explained
-from robospa.protocol.channel import Timeouts
-from robospa.protocol.client import ClientSession, RemotePolicy, expecting
+from robospa.protocol.client import RemotePolicy, WireClient, expecting
 from robospa.protocol.codec import DEFAULT_LIMITS, Limits
 from robospa.protocol.errors import HandshakeError, TransportError, Unauthorized
 from robospa.protocol.options import read_options, url_options
 from robospa.protocol.policy import PolicySpec
+from robospa.protocol.transport import Timeouts
 
 __all__ = [
     "SCHEMES",
@@ -145,10 +145,10 @@ def connect(
     line = Line(target, timeouts or Timeouts(), limits, token, ssl)
     known = expect is not None
 
-    def opened() -> ClientSession:
+    def opened() -> WireClient:
         nonlocal known
         try:
-            session: ClientSession = module.open_session(line, chosen)
+            session: WireClient = module.open_session(line, chosen)
             known = True
             return session
         except Unauthorized:

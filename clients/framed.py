@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from robospa.clients.msgpack_arrays import Form, pack, unpack
 from robospa.clients.openpi import websocket_address
-from robospa.protocol.channel import Channel
 from robospa.protocol.client import violation
 from robospa.protocol.errors import DecodeError, TransportError, printable
+from robospa.protocol.transport import Transport
 
 if TYPE_CHECKING:
     from robospa.clients import Line
@@ -21,17 +21,17 @@ class Frames:
     """Sends and receives maps; `form` is how arrays are written."""
 
     def __init__(self, line: Line, form: Form) -> None:
-        self._channel = Channel(websocket_address(line), line.timeouts, line.limits, None)
+        self._transport = Transport(websocket_address(line), line.timeouts, line.limits, None)
         self._form, self._limits = form, line.limits
         self.url = line.target.url
 
     def send(self, message: dict[str, Any]) -> None:
         """Raises EncodeError and ConnectionLost."""
-        self._channel.send(pack(message, self._form, self._limits))
+        self._transport.send(pack(message, self._form, self._limits))
 
     def receive(self, timeout: float, what: str) -> dict[str, Any]:
         """The next message; raises CallTimeout, ConnectionLost, ProtocolViolation."""
-        data = self._channel.receive(timeout, what)
+        data = self._transport.receive(timeout, what)
         if isinstance(data, str):
             raise self.violation(f"a text frame came instead of {what}: {printable(data, 200)!r}")
         try:
@@ -49,4 +49,4 @@ class Frames:
 
     def close(self) -> None:
         """Close; harmless when closed already."""
-        self._channel.close()
+        self._transport.close()

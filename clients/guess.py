@@ -17,9 +17,9 @@ from typing import TYPE_CHECKING, Any
 
 from robospa.clients.http import open_http
 from robospa.clients.msgpack_arrays import binary_form, pack, unpack
-from robospa.protocol.channel import Address, Channel, Timeouts
 from robospa.protocol.codec import Limits
 from robospa.protocol.errors import HandshakeError, WireError
+from robospa.protocol.transport import Address, Timeouts, Transport
 
 if TYPE_CHECKING:
     from robospa.clients import Line, Target
@@ -125,11 +125,11 @@ def _look_websocket(line: Line) -> Look | None:
     url = f"{'wss' if target.secure else 'ws'}://{host}:{target.port}{target.path}"
     short = Timeouts(connect=SECONDS, hello=SECONDS, close=0.2)
     try:
-        channel = Channel(Address(url, line.token, line.ssl), short, SMALL)
+        transport = Transport(Address(url, line.token, line.ssl), short, SMALL)
     except WireError:
         return None
     try:
-        if channel.subprotocol is not None:
+        if transport.subprotocol is not None:
             return ROBOSPA
         hello = {
             "message_type": "hello",
@@ -137,8 +137,8 @@ def _look_websocket(line: Line) -> Look | None:
             "evaluation_id": "robospa",
             "payload": {},
         }
-        channel.send(pack(hello, binary_form, SMALL))
-        data = channel.receive(SECONDS, "a greeting")
+        transport.send(pack(hello, binary_form, SMALL))
+        data = transport.receive(SECONDS, "a greeting")
         value = unpack(data, SMALL) if isinstance(data, bytes) else None
         if isinstance(value, dict) and value.get("message_type") == "hello_ack":
             return XPOLICYLAB
@@ -146,7 +146,7 @@ def _look_websocket(line: Line) -> Look | None:
     except WireError:
         return None
     finally:
-        channel.close()
+        transport.close()
 
 
 def _look_tcp(target: Target) -> Look | None:

@@ -10,15 +10,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from robospa.clients.text import check_budget
-from robospa.protocol.channel import Address, Channel
 from robospa.protocol.errors import DecodeError
 from robospa.protocol.openpi import CAMERA_NAMES, OpenPiOptions, OpenPiSession
 from robospa.protocol.options import option, plain_options
 from robospa.protocol.policy import CameraSpec, PolicySpec
+from robospa.protocol.transport import Address, Transport
 
 if TYPE_CHECKING:
     from robospa.clients import Line
-    from robospa.protocol.client import ClientSession
+    from robospa.protocol.client import WireClient
 
 WARNINGS = (
     "adapt_to_pi is invisible on the wire: the served config must have adapt_to_pi=False for "
@@ -78,14 +78,14 @@ class Options:
         return OpenPiOptions(PolicySpec.from_json(spec.to_json()), names, extra)
 
 
-def open_session(line: Line, options: Options) -> ClientSession:
+def open_session(line: Line, options: Options) -> WireClient:
     """A session with the server at `line.target`."""
     convention = options.convention()
-    channel = Channel(websocket_address(line), line.timeouts, line.limits, None)
+    transport = Transport(websocket_address(line), line.timeouts, line.limits, None)
     try:
-        session = OpenPiSession(channel, convention, line.timeouts, line.limits)
+        session = OpenPiSession(transport, convention, line.timeouts, line.limits)
     except BaseException:
-        channel.close()
+        transport.close()
         raise
     session.hello["options"] = plain_options(options)
     session.hello["warnings"] = list(WARNINGS)

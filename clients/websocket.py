@@ -11,7 +11,7 @@ from robospa.protocol.options import plain_options
 
 if TYPE_CHECKING:
     from robospa.clients import Line
-    from robospa.protocol.client import ClientSession
+    from robospa.protocol.client import WireClient
 
 
 @dataclass(frozen=True)
@@ -19,7 +19,7 @@ class Options(openpi.Options):
     """Used only if the server turns out to speak openpi's dialect; ours tells everything."""
 
 
-def open_session(line: Line, options: Options) -> ClientSession:
+def open_session(line: Line, options: Options) -> WireClient:
     """A session in the dialect that the server selects."""
     opener = websocket_opener(
         openpi.websocket_address(line), line.timeouts, line.limits, options.convention()

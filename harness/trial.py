@@ -23,9 +23,9 @@ from numpy.typing import NDArray
 
 from robospa.harness.grid import on_grid
 from robospa.harness.world import ActionError, World
-from robospa.protocol.checks import check_chunk
 from robospa.protocol.errors import PolicyAnswerError
 from robospa.protocol.policy import Policy, PolicySpec, TrialInfo
+from robospa.protocol.validation import check_chunk
 from robospa.results.records import PROCESSOR, TrialRecord
 from robospa.tasks.catalog import build_scene
 from robospa.tasks.catalog import task as find_task

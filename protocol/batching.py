@@ -1,7 +1,7 @@
 """Requests that arrive together become one call of the model, without anything to tune.
 
 While a call runs, requests gather. When it is over, the batcher may still wait for those that are
-about to come, if that raises the number of answers per second (see `robospa.protocol.pacing`), at
+about to come, if that raises the number of answers per second (`robospa.protocol.batch_window`), at
 most for as long as one call takes. So a lone client never waits, eight clients in step share one
 call, and a client in the middle of a long simulation delays nobody. With a fixed number of clients
 more answers per second are also shorter waits on average: there is one goal, not two.
@@ -18,7 +18,7 @@ from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from robospa.protocol.pacing import Paces
+from robospa.protocol.batch_window import AdaptiveBatchWindow
 from robospa.protocol.policy import Observation
 from robospa.protocol.waiting import within
 
@@ -46,7 +46,7 @@ class Batcher:
     queue: int
     clock: Callable[[], float] = time.perf_counter
     _pending: list[_Request] = field(default_factory=list)
-    _paces: Paces = field(default_factory=Paces)
+    _window: AdaptiveBatchWindow = field(default_factory=AdaptiveBatchWindow)
     _arrived: asyncio.Event = field(default_factory=asyncio.Event)
     _task: asyncio.Task[None] | None = None
 
@@ -55,7 +55,7 @@ class Batcher:
         if len(self._pending) >= self.queue:
             raise QueueFull(f"{self.queue} requests are waiting already")
         now = self.clock()
-        self._paces.arrived(session, now)
+        self._window.arrived(session, now)
         future: asyncio.Future[tuple[Any, dict[str, float]]]
         future = asyncio.get_running_loop().create_future()
         request = _Request(session, observation, now, future)
@@ -72,11 +72,11 @@ class Batcher:
 
     def coming(self, session: int) -> None:
         """The first bytes of a request of `session` are here."""
-        self._paces.coming(session, self.clock())
+        self._window.coming(session, self.clock())
 
     def forget(self, session: int) -> None:
         """The session rests (trial over, connection closed): nobody waits for it any more."""
-        self._paces.forget(session)
+        self._window.forget(session)
         self._arrived.set()
 
     async def _run(self) -> None:
@@ -99,13 +99,13 @@ class Batcher:
         waiting = {request.session for request in self._pending}
         if not waiting or len(self._pending) >= self.size:
             return 0.0
-        return self._paces.wait_for(now, waiting, self._pending[0].arrival, self.size)
+        return self._window.wait_for(now, waiting, self._pending[0].arrival, self.size)
 
     async def _answer(self, batch: list[_Request]) -> None:
         start = self.clock()
         outcomes = await self._call(batch)
         end = self.clock()
-        self._paces.answered([request.session for request in batch], start, end)
+        self._window.answered([request.session for request in batch], start, end)
         for request, outcome in zip(batch, outcomes, strict=True):
             if request.future.done():
                 continue

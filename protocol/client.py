@@ -19,8 +19,6 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.protocol.channel import Address, Channel, Timeouts
-from robospa.protocol.checks import check_chunk, check_size, compare_specs
 from robospa.protocol.codec import DEFAULT_LIMITS, Limits
 from robospa.protocol.errors import (
     ConnectionLost,
@@ -51,6 +49,8 @@ from robospa.protocol.messages import (
 )
 from robospa.protocol.openpi import OpenPiOptions, OpenPiSession
 from robospa.protocol.policy import Observation, PolicySpec, TrialInfo
+from robospa.protocol.transport import Address, Timeouts, Transport
+from robospa.protocol.validation import check_chunk, check_size, compare_specs
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -60,7 +60,7 @@ FIRST_PAUSE, LONGEST_PAUSE = 0.02, 1.0
 """[s] between two requests to a server that is busy."""
 
 
-class ClientSession(Protocol):
+class WireClient(Protocol):
     """One connection in one dialect: pure translation, no retries, errors of `protocol.errors`.
 
     `hello` has at least `dialect` and `spec`, and `options` and `warnings` where the dialect has
@@ -92,7 +92,7 @@ class RemotePolicy:
     """
 
     def __init__(
-        self, url: str, open_session: Callable[[], ClientSession], timeouts: Timeouts
+        self, url: str, open_session: Callable[[], WireClient], timeouts: Timeouts
     ) -> None:
         self.url, self.timeouts = url, timeouts
         self.last_timing: dict[str, float] = {}
@@ -180,14 +180,14 @@ class RemotePolicy:
         self.close()
 
 
-class _Session:
+class _RobospaClient:
     """One connection in `robospa.v1`."""
 
-    def __init__(self, channel: Channel, timeouts: Timeouts, limits: Limits) -> None:
-        self._channel, self._timeouts, self._limits = channel, timeouts, limits
+    def __init__(self, transport: Transport, timeouts: Timeouts, limits: Limits) -> None:
+        self._transport, self._timeouts, self._limits = transport, timeouts, limits
         hello = self._receive(Hello, 0, timeouts.hello)
         self.spec = hello.spec
-        check_size(hello.spec, limits, channel.url)
+        check_size(hello.spec, limits, transport.url)
         self.hello = {
             "dialect": "robospa.v1",
             "version": hello.version,
@@ -210,14 +210,14 @@ class _Session:
         self._call(End(id, outcome), Ended, self._timeouts.end)
 
     def close(self) -> None:
-        self._channel.close()
+        self._transport.close()
 
     def _call(self, request: Message, answer: type[M], timeout: float) -> M:
-        self._channel.send(pack(request, self._limits))
+        self._transport.send(pack(request, self._limits))
         return self._receive(answer, request.id, timeout)
 
     def _receive(self, wanted: type[M], id: int, timeout: float) -> M:
-        data = self._channel.receive(timeout, wanted.type)
+        data = self._transport.receive(timeout, wanted.type)
         if isinstance(data, str):
             said = printable(data, 200)
             raise self._violation(f"a text frame came instead of {wanted.type}: {said!r}")
@@ -229,10 +229,10 @@ class _Session:
             if message.id == 0:
                 self.close()
                 reason = printable(message.message)
-                raise ConnectionLost(f"{self._channel.url} gave up the connection: {reason}")
+                raise ConnectionLost(f"{self._transport.url} gave up the connection: {reason}")
             if message.code == BAD_ANSWER:
                 raise PolicyAnswerError(printable(message.message))
-            url = self._channel.url
+            url = self._transport.url
             raise ServerError(message.code, message.message, message.retriable, url)
         if message.id != id:
             raise self._violation(f"answer {message.id} came to request {id}")
@@ -242,7 +242,7 @@ class _Session:
 
     def _violation(self, reason: str) -> TransportError:
         self.close()
-        return violation(self._channel.url, reason)
+        return violation(self._transport.url, reason)
 
 
 def violation(url: str, reason: str) -> TransportError:
@@ -291,18 +291,18 @@ def websocket_opener(
     limits: Limits,
     openpi: OpenPiOptions,
     force_openpi: bool = False,
-) -> Callable[[], ClientSession]:
+) -> Callable[[], WireClient]:
     """What opens a session of `robospa.v1`, or of openpi's dialect if the server speaks that."""
 
-    def opened() -> ClientSession:
+    def opened() -> WireClient:
         offer = None if force_openpi else SUBPROTOCOL
-        channel = Channel(address, timeouts, limits, offer)
+        transport = Transport(address, timeouts, limits, offer)
         try:
-            if channel.subprotocol is None:
-                return OpenPiSession(channel, openpi, timeouts, limits)
-            return _Session(channel, timeouts, limits)
+            if transport.subprotocol is None:
+                return OpenPiSession(transport, openpi, timeouts, limits)
+            return _RobospaClient(transport, timeouts, limits)
         except BaseException:
-            channel.close()
+            transport.close()
             raise
 
     return opened

@@ -18,8 +18,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.protocol.channel import Address, Channel, Timeouts
-from robospa.protocol.checks import compare_specs
 from robospa.protocol.client import RemotePolicy, connect
 from robospa.protocol.codec import DEFAULT_LIMITS, encode
 from robospa.protocol.errors import TransportError, WireError
@@ -36,6 +34,8 @@ from robospa.protocol.messages import (
     unpack,
 )
 from robospa.protocol.policy import PolicySpec, TrialInfo
+from robospa.protocol.transport import Address, Timeouts, Transport
+from robospa.protocol.validation import compare_specs
 
 TRIAL = TrialInfo(
     task="Pick_Blocks_Size",  # a real one: a server may load a checkpoint by this name
@@ -88,13 +88,13 @@ class _Target:
             return self.connector()
         return connect(self.url, self.token, self.timeouts, ssl=self.ssl)
 
-    def raw(self) -> Channel:
+    def raw(self) -> Transport:
         if self.dialect != OURS:
             raise _Skip(f"the dialect {self.dialect} has nothing like it")
-        channel = Channel(Address(self.url, self.token, self.ssl), self.timeouts)
-        hello = unpack(_bytes(channel, self.timeouts.hello))
+        transport = Transport(Address(self.url, self.token, self.ssl), self.timeouts)
+        hello = unpack(_bytes(transport, self.timeouts.hello))
         assert isinstance(hello, Hello)
-        return channel
+        return transport
 
 
 def check(
@@ -178,15 +178,15 @@ def _subprotocol(target: _Target) -> str:
     if target.dialect != OURS:
         raise _Skip(f"the dialect {target.dialect} has no versions of ours")
     try:
-        channel = Channel(
+        transport = Transport(
             Address(target.url, target.token, target.ssl),
             replace(target.timeouts, wait=0.0),
             subprotocol="robospa.v999",
         )
     except WireError as error:
         return f"refused: {error}"
-    chosen = channel.subprotocol
-    channel.close()
+    chosen = transport.subprotocol
+    transport.close()
     assert chosen is None, "the server accepted a version that does not exist"
     raise AssertionError("a client that offers only robospa.v999 must be refused")
 
@@ -225,46 +225,46 @@ def _latency(target: _Target) -> str:
 
 
 def _order(target: _Target) -> str:
-    channel = target.raw()
+    transport = target.raw()
     try:
-        answer = _ask(channel, Infer(1, synthetic_observation(target.spec)), target.timeouts)
+        answer = _ask(transport, Infer(1, synthetic_observation(target.spec)), target.timeouts)
         assert isinstance(answer, Error), f"infer before reset was answered with {answer.type}"
-        answer = _ask(channel, Reset(2, TRIAL), target.timeouts)
+        answer = _ask(transport, Reset(2, TRIAL), target.timeouts)
         assert isinstance(answer, Ready), f"reset was then answered with {answer.type}"
         return "infer before reset is refused, and the reset after it works"
     finally:
-        channel.close()
+        transport.close()
 
 
 def _bad_observation(target: _Target) -> str:
-    channel = target.raw()
+    transport = target.raw()
     try:
-        _ask(channel, Reset(1, TRIAL), target.timeouts)
+        _ask(transport, Reset(1, TRIAL), target.timeouts)
         broken = {**synthetic_observation(target.spec), "images": None, "instruction": None}
-        answer = _ask(channel, Infer(2, broken), target.timeouts)
+        answer = _ask(transport, Infer(2, broken), target.timeouts)
         assert isinstance(answer, Error), "an observation without text and images was accepted"
         assert answer.message, "the error has no message"
-        answer = _ask(channel, Reset(3, TRIAL), target.timeouts)
+        answer = _ask(transport, Reset(3, TRIAL), target.timeouts)
         assert isinstance(answer, Ready), "the reset after an error failed"
         if target.spec.privileged:
             return "refused, and the next reset works"
-        answer = _ask(channel, Infer(4, synthetic_observation(target.spec)), target.timeouts)
+        answer = _ask(transport, Infer(4, synthetic_observation(target.spec)), target.timeouts)
         assert isinstance(answer, Actions), f"infer after the error gave {answer.type}"
         return "refused, and the next trial gets its own answers"
     finally:
-        channel.close()
+        transport.close()
 
 
 def _unknown_fields(target: _Target) -> str:
-    channel = target.raw()
+    transport = target.raw()
     try:
         later = {"type": "reset", "id": 1, "trial": TRIAL.to_json(), "field_of_1_9": [1, 2]}
-        channel.send(encode(later))
-        answer = unpack(_bytes(channel, target.timeouts.reset))
+        transport.send(encode(later))
+        answer = unpack(_bytes(transport, target.timeouts.reset))
         assert isinstance(answer, Ready), f"a reset with an unknown field gave {answer.type}"
         return "fields of later minor versions are ignored"
     finally:
-        channel.close()
+        transport.close()
 
 
 def _two_sessions(target: _Target) -> str:
@@ -345,15 +345,15 @@ def _reconnect(target: _Target) -> str:
 
 
 def _garbage(target: _Target) -> str:
-    channel = target.raw()
-    channel.send(b"\xc1 no message")
+    transport = target.raw()
+    transport.send(b"\xc1 no message")
     try:
-        answer: Any = unpack(_bytes(channel, target.timeouts.end))
+        answer: Any = unpack(_bytes(transport, target.timeouts.end))
         assert isinstance(answer, Error), f"garbage was answered with {answer.type}"
     except TransportError:
         answer = None
     finally:
-        channel.close()
+        transport.close()
     with target.connect() as policy:
         policy.reset(TRIAL)
     return "garbage is refused and the server lives on"
@@ -377,15 +377,15 @@ CHECKS: dict[str, Callable[[_Target], str]] = {
 }
 
 
-def _ask(channel: Channel, request: Message, timeouts: Timeouts) -> Message:
-    channel.send(pack(request))
-    answer = unpack(_bytes(channel, timeouts.first_infer))
+def _ask(transport: Transport, request: Message, timeouts: Timeouts) -> Message:
+    transport.send(pack(request))
+    answer = unpack(_bytes(transport, timeouts.first_infer))
     assert answer.id == request.id, f"answer {answer.id} came to request {request.id}"
     return answer
 
 
-def _bytes(channel: Channel, timeout: float) -> bytes:
-    data = channel.receive(timeout, "an answer")
+def _bytes(transport: Transport, timeout: float) -> bytes:
+    data = transport.receive(timeout, "an answer")
     assert not isinstance(data, str), "a text frame came in robospa.v1"
     assert len(data) <= DEFAULT_LIMITS.message
     return data

@@ -22,10 +22,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.protocol.channel import Channel, Timeouts
 from robospa.protocol.codec import Limits, decode, encode
 from robospa.protocol.errors import DecodeError, EncodeError, ProtocolViolation, ServerError
 from robospa.protocol.policy import Observation, PolicySpec, TrialInfo
+from robospa.protocol.transport import Timeouts, Transport
 from robospa.protocol.validate import as_said
 
 CAMERA_NAMES = {
@@ -55,9 +55,9 @@ class OpenPiSession:
     """One connection to an openpi server (client side)."""
 
     def __init__(
-        self, channel: Channel, options: OpenPiOptions, timeouts: Timeouts, limits: Limits
+        self, transport: Transport, options: OpenPiOptions, timeouts: Timeouts, limits: Limits
     ) -> None:
-        self._channel, self._options, self._limits = channel, options, limits
+        self._transport, self._options, self._limits = transport, options, limits
         metadata = self._receive(timeouts.hello, "metadata")
         self.spec = options.spec
         self.hello = {
@@ -72,10 +72,10 @@ class OpenPiSession:
     def infer(
         self, id: int, observation: Observation, timeout: float
     ) -> tuple[Any, Mapping[str, float]]:
-        if self._channel.has_more():
+        if self._transport.has_more():
             self.close()
-            raise ProtocolViolation(f"{self._channel.url} sent what nobody asked for")
-        self._channel.send(encode(to_openpi(observation, self._options), self._limits))
+            raise ProtocolViolation(f"{self._transport.url} sent what nobody asked for")
+        self._transport.send(encode(to_openpi(observation, self._options), self._limits))
         answer = self._receive(timeout, "actions")
         actions = answer.get("actions")
         if isinstance(actions, np.ndarray) and actions.dtype.kind == "f":
@@ -87,24 +87,24 @@ class OpenPiSession:
         """Nothing to send."""
 
     def close(self) -> None:
-        self._channel.close()
+        self._transport.close()
 
     def _receive(self, timeout: float, what: str) -> dict[str, Any]:
-        data = self._channel.receive(timeout, what)
+        data = self._transport.receive(timeout, what)
         if isinstance(data, str):
             self.close()
             lines = data.strip().splitlines() or ["no text"]
-            error = ServerError("openpi", lines[-1], True, self._channel.url)
+            error = ServerError("openpi", lines[-1], True, self._transport.url)
             error.add_note(data)
             raise error
         try:
             value = decode(data, self._limits)
         except DecodeError as error:
             self.close()
-            raise ProtocolViolation(f"{self._channel.url}: unreadable {what}: {error}") from error
+            raise ProtocolViolation(f"{self._transport.url}: unreadable {what}: {error}") from error
         if not isinstance(value, dict):
             self.close()
-            raise ProtocolViolation(f"{self._channel.url}: {what} is no map")
+            raise ProtocolViolation(f"{self._transport.url}: {what} is no map")
         return value
 
 

@@ -31,14 +31,14 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 from websockets.typing import Subprotocol
 
-from robospa.protocol.channel import SOCKET_BUFFER
 from robospa.protocol.codec import DEFAULT_LIMITS, Limits
-from robospa.protocol.door import Door, Guarded, keep_alive
-from robospa.protocol.engine import Engine, PolicyFactory
+from robospa.protocol.connection_limits import ConnectionLimiter, MonitoredConnection, keep_alive
+from robospa.protocol.handler import ConnectionHandler, refuse
 from robospa.protocol.memory import keep_freed_memory
 from robospa.protocol.messages import SUBPROTOCOL
 from robospa.protocol.policy import Policy
-from robospa.protocol.session import Session, refuse
+from robospa.protocol.policy_host import PolicyFactory, PolicyHost
+from robospa.protocol.transport import SOCKET_BUFFER
 from robospa.protocol.waiting import within
 
 if TYPE_CHECKING:
@@ -87,16 +87,16 @@ class PolicyServer:
         options: ServerOptions | None = None,
     ) -> None:
         self._options = options or ServerOptions()
-        self._engine = Engine(
+        self._policies = PolicyHost(
             policy,
             policy_factory,
             threads=self._options.threads,
             queue=self._options.queue,
         )
-        self._host, self._port, self._token, self._ssl = host, port, token, ssl
+        self._address, self._token, self._ssl = (host, port), token, ssl
         most = self._options.max_connections
-        self._door = Door(
-            min(most, self._engine.max_sessions or most),
+        self._limiter = ConnectionLimiter(
+            min(most, self._policies.max_sessions or most),
             patience=self._options.patience,
             handshakes=self._options.handshakes,
             message=self._options.message,
@@ -115,13 +115,12 @@ class PolicyServer:
         keep_freed_memory()
         self._server = await websocket_serve(
             self._handle,
-            self._host,
-            self._port,
+            *self._address,
             ssl=self._ssl,
             origins=[None],
             select_subprotocol=_select,
             process_request=self._admit,
-            create_connection=self._door.connection,
+            create_connection=self._limiter.connection,
             server_header=None,
             logger=QUIET,
             compression=None,
@@ -134,7 +133,7 @@ class PolicyServer:
         )
         for listener in self._server.sockets:
             _tune(listener)
-        self._door.start()
+        self._limiter.start()
         return self
 
     async def __aexit__(
@@ -147,15 +146,15 @@ class PolicyServer:
         self._server.close()
         with contextlib.suppress(TimeoutError):
             await within(1, self._server.wait_closed())
-        self._door.stop()
-        self._engine.close()
+        self._limiter.stop()
+        self._policies.close()
 
     async def _admit(self, connection: ServerConnection, request: Request) -> Response | None:
         """None to go on with the handshake, else the HTTP answer."""
         if request.path == "/healthz":
             return connection.respond(HTTPStatus.OK, "OK\n")
         if not _authorized(self._token, request):
-            self._door.tell("a client was refused: its token is missing or wrong")
+            self._limiter.tell("a client was refused: its token is missing or wrong")
             return connection.respond(HTTPStatus.UNAUTHORIZED, "missing or wrong token\n")
         offered = ",".join(request.headers.get_all("Sec-WebSocket-Protocol"))
         names = [name.strip() for name in offered.split(",")]
@@ -165,15 +164,15 @@ class PolicyServer:
         if "Upgrade" not in request.headers:
             text = "a policy server, for WebSocket connections only (RoboSPA)\n"
             return connection.respond(HTTPStatus.UPGRADE_REQUIRED, text)
-        assert isinstance(connection, Guarded)
-        if not await self._door.seat(connection):
-            text = f"all {self._door.places} places of this server are taken\n"
+        assert isinstance(connection, MonitoredConnection)
+        if not await self._limiter.seat(connection):
+            text = f"all {self._limiter.places} places of this server are taken\n"
             return connection.respond(HTTPStatus.SERVICE_UNAVAILABLE, text)
         return None
 
     async def _handle(self, connection: ServerConnection) -> None:
-        assert isinstance(connection, Guarded)
-        self._door.entered(connection)
+        assert isinstance(connection, MonitoredConnection)
+        self._limiter.entered(connection)
         talk = asyncio.ensure_future(self._converse(connection))
         gone = asyncio.ensure_future(connection.wait_closed())
         try:
@@ -191,19 +190,19 @@ class PolicyServer:
         finally:
             talk.cancel()
             gone.cancel()
-            self._door.left(connection)
+            self._limiter.left(connection)
 
-    async def _converse(self, connection: Guarded) -> None:
+    async def _converse(self, connection: MonitoredConnection) -> None:
         options, ours = self._options, connection.subprotocol == SUBPROTOCOL
         try:
-            policy = await self._engine.open()
+            policy = await self._policies.open()
         except Exception as error:
             log.exception("no policy could be made for a new connection")
             return await refuse(connection, ours, error)
         connection.on_begin = policy.coming
         try:
-            session = Session(
-                connection, policy, self._engine.spec, options.name, options.limits, options.idle
+            session = ConnectionHandler(
+                connection, policy, self._policies.spec, options.name, options.limits, options.idle
             )
             await (session.run() if ours else session.run_openpi())
         finally:
@@ -242,7 +241,7 @@ def serve(
     options: ServerOptions | None = None,
     on_ready: Callable[[str], None] | None = None,
 ) -> None:
-    """Serve until SIGINT or SIGTERM. Give a policy or a factory (see `robospa.protocol.engine`).
+    """Serve until SIGINT or SIGTERM. Give a policy or a factory (`robospa.protocol.policy_host`).
 
     `on_ready` is called with the URL once clients can connect. Raises OSError if the port is taken.
     """

@@ -18,8 +18,8 @@ import numpy as np
 from original_servers import QUICK, TRIAL, Original, observation, run_checks
 
 from robospa.clients import connect
-from robospa.protocol.channel import Timeouts
 from robospa.protocol.errors import ServerError, WireError
+from robospa.protocol.transport import Timeouts
 
 SERVER = """
 import hashlib, json, sys

@@ -30,7 +30,6 @@ from typing import Any
 
 import numpy as np
 
-from robospa.protocol.checks import check_chunk, check_observation
 from robospa.protocol.codec import decode, encode
 from robospa.protocol.errors import DecodeError, PolicyAnswerError, VersionMismatch
 from robospa.protocol.messages import (
@@ -48,6 +47,7 @@ from robospa.protocol.messages import (
 )
 from robospa.protocol.openpi import OpenPiOptions, from_openpi, to_openpi
 from robospa.protocol.policy import CameraSpec, PolicySpec, TrialInfo
+from robospa.protocol.validation import check_chunk, check_observation
 
 ROOM = 512 * 2**20
 PER_BYTE, BASE = 400, 200_000

@@ -71,8 +71,8 @@ def check(
 
     from robospa.clients import connect, find
     from robospa.harness.cli.running import client_options
-    from robospa.protocol.channel import Timeouts
     from robospa.protocol.conformance import check as run_checks
+    from robospa.protocol.transport import Timeouts
 
     try:
         target = find(url)

@@ -88,7 +88,7 @@ def make_request(
     targets = [t for g in given for t in ((g,) if isinstance(g, str) else g)]
     urls = [t for t in dict.fromkeys(targets) if is_url(t)]
     if urls:
-        from robospa.protocol.channel import Timeouts
+        from robospa.protocol.transport import Timeouts
 
         connecting["timeouts"] = Timeouts(
             infer=connection["timeout"],

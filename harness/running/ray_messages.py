@@ -65,7 +65,7 @@ def unpack_config(packed: bytes) -> WorkerConfig:
     data = _unpack("a worker's settings", packed)
     options = data.map("options")
     if "timeouts" in options:
-        from robospa.protocol.channel import Timeouts
+        from robospa.protocol.transport import Timeouts
 
         given = Fields("timeouts", options["timeouts"])
         options["timeouts"] = Timeouts(**{n: _number(given, n) for n in asdict(Timeouts())})

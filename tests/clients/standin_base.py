@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from robospa.protocol.channel import Timeouts
 from robospa.protocol.policy import TrialInfo
+from robospa.protocol.transport import Timeouts
 
 QUICK = Timeouts(connect=10, hello=10, reset=10, first_infer=10, infer=10, end=10, close=0.2)
 TRIAL = TrialInfo(

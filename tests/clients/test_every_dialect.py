@@ -12,7 +12,6 @@ from standin_base import QUICK, TRIAL, joint_chunk, observation
 from standins import Go1, OpenPi, RoboTwin, Status, VlaEval, XPolicyLab, XVla
 
 from robospa.clients import SCHEMES, connect, guess
-from robospa.protocol.channel import Timeouts
 from robospa.protocol.errors import (
     CallTimeout,
     ConnectFailed,
@@ -23,6 +22,7 @@ from robospa.protocol.errors import (
 )
 from robospa.protocol.policy import PolicySpec
 from robospa.protocol.server import ServerThread
+from robospa.protocol.transport import Timeouts
 
 JOINT = {
     "go1": Go1,

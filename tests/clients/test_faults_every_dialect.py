@@ -19,9 +19,9 @@ from standin_base import TRIAL, joint_chunk, observation
 from standins import Go1, OpenPi, RoboTwin, VlaEval, XPolicyLab, XVla
 
 from robospa.clients import connect
-from robospa.protocol.channel import Timeouts
 from robospa.protocol.client import RemotePolicy
 from robospa.protocol.errors import PolicyAnswerError, ServerError, TransportError
+from robospa.protocol.transport import Timeouts
 
 PAGE = Path(__file__).parents[2] / "docs" / "faults.md"
 SERVERS: dict[str, tuple[Callable[[Any], Any], str, str]] = {

@@ -19,8 +19,8 @@ import numpy as np
 import pytest
 
 from robospa.clients import connect
-from robospa.protocol.channel import Timeouts
 from robospa.protocol.policy import PolicySpec, TrialInfo
+from robospa.protocol.transport import Timeouts
 
 ROOT = Path(__file__).resolve().parents[2]
 HERE = Path(__file__).resolve().parent

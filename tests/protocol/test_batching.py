@@ -9,91 +9,93 @@ from typing import Any
 import pytest
 from virtual_time import run
 
+from robospa.protocol.batch_window import KEPT, SLACK, AdaptiveBatchWindow, CallCost
 from robospa.protocol.batching import Batcher, QueueFull
-from robospa.protocol.pacing import KEPT, SLACK, Cost, Paces
 
 
 @pytest.fixture
-def paces() -> Paces:
+def window() -> AdaptiveBatchWindow:
     """A model that takes 1 s and became free at t = 10 s; session 2 pauses 0.1 s, always."""
-    found = Paces()
+    found = AdaptiveBatchWindow()
     found.answered([9], 9.0, 10.0)
     used(found, 2, 0.1)
     return found
 
 
-def used(paces: Paces, session: int, pause: float, answered: float = 10.0) -> None:
+def used(window: AdaptiveBatchWindow, session: int, pause: float, answered: float = 10.0) -> None:
     """`session` was answered at `answered` and has paused `pause` [s] so far, each time."""
-    paces.arrived(session, 0.0)
-    pace = paces._sessions[session]
+    window.arrived(session, 0.0)
+    pace = window._sessions[session]
     pace.pauses.extend([pause] * KEPT)
     pace.answered = answered
 
 
-def wait(paces: Paces, now: float = 10.0, *waiting: int, size: int = 4) -> float:
-    return paces.wait_for(now, waiting or (1,), 10.0, size)
+def wait(window: AdaptiveBatchWindow, now: float = 10.0, *waiting: int, size: int = 4) -> float:
+    return window.wait_for(now, waiting or (1,), 10.0, size)
 
 
-def test_a_session_that_is_due_soon_is_waited_for(paces: Paces) -> None:
-    assert wait(paces) == pytest.approx(0.1 + SLACK)
+def test_a_session_that_is_due_soon_is_waited_for(window: AdaptiveBatchWindow) -> None:
+    assert wait(window) == pytest.approx(0.1 + SLACK)
 
 
 def test_nobody_else_nothing_to_wait_for() -> None:
-    paces = Paces()
-    paces.answered([1], 9.0, 10.0)
-    assert wait(paces) == 0
+    window = AdaptiveBatchWindow()
+    window.answered([1], 9.0, 10.0)
+    assert wait(window) == 0
 
 
-def test_who_is_late_is_not_waited_for(paces: Paces) -> None:
-    assert wait(paces, 10.2) == 0
+def test_who_is_late_is_not_waited_for(window: AdaptiveBatchWindow) -> None:
+    assert wait(window, 10.2) == 0
 
 
-def test_a_session_in_a_long_simulation_is_not_waited_for(paces: Paces) -> None:
-    paces.forget(2)
-    used(paces, 3, 5.0)
-    assert wait(paces) == 0
+def test_a_session_in_a_long_simulation_is_not_waited_for(window: AdaptiveBatchWindow) -> None:
+    window.forget(2)
+    used(window, 3, 5.0)
+    assert wait(window) == 0
 
 
-def test_a_wait_that_costs_more_than_it_brings_is_not_made(paces: Paces) -> None:
-    paces.forget(2)
-    used(paces, 4, 0.4)
+def test_a_wait_that_costs_more_than_it_brings_is_not_made(window: AdaptiveBatchWindow) -> None:
+    window.forget(2)
+    used(window, 4, 0.4)
     assert 4 / (1 + 0.4) < 3 / 1
-    assert wait(paces, 10.0, 1, 2, 3) == 0
+    assert wait(window, 10.0, 1, 2, 3) == 0
 
 
-def test_a_resting_session_is_forgotten(paces: Paces) -> None:
-    paces.forget(2)
-    assert wait(paces) == 0
+def test_a_resting_session_is_forgotten(window: AdaptiveBatchWindow) -> None:
+    window.forget(2)
+    assert wait(window) == 0
 
 
 def test_without_a_measured_call_nobody_waits() -> None:
-    paces = Paces()
-    used(paces, 2, 0.1)
-    assert wait(paces) == 0
+    window = AdaptiveBatchWindow()
+    used(window, 2, 0.1)
+    assert wait(window) == 0
 
 
-def test_a_request_whose_first_bytes_are_here_is_waited_for(paces: Paces) -> None:
-    paces.forget(2)
-    paces.coming(5, 1.0)
-    paces.arrived(5, 1.02)
-    paces.coming(6, 10.0)
-    assert 0 < wait(paces, 10.001) < 0.01
+def test_a_request_whose_first_bytes_are_here_is_waited_for(window: AdaptiveBatchWindow) -> None:
+    window.forget(2)
+    window.coming(5, 1.0)
+    window.arrived(5, 1.02)
+    window.coming(6, 10.0)
+    assert 0 < wait(window, 10.001) < 0.01
 
 
-def test_who_sends_byte_by_byte_is_not_waited_for(paces: Paces) -> None:
-    paces.forget(2)
-    paces.coming(5, 1.0)
-    paces.arrived(5, 1.02)
-    paces.coming(6, 9.0)
-    assert wait(paces) == 0
+def test_who_sends_byte_by_byte_is_not_waited_for(window: AdaptiveBatchWindow) -> None:
+    window.forget(2)
+    window.coming(5, 1.0)
+    window.arrived(5, 1.02)
+    window.coming(6, 9.0)
+    assert wait(window) == 0
 
 
-def test_a_model_that_gains_nothing_from_batches_is_not_waited_for(paces: Paces) -> None:
-    paces.cost = Cost()
+def test_a_model_that_gains_nothing_from_batches_is_not_waited_for(
+    window: AdaptiveBatchWindow,
+) -> None:
+    window.cost = CallCost()
     for size in (1, 4, 2, 8):
-        paces.cost.add(size, 0.25 * size)
-    assert paces.cost(4) == pytest.approx(1.0)
-    assert wait(paces) == 0
+        window.cost.add(size, 0.25 * size)
+    assert window.cost(4) == pytest.approx(1.0)
+    assert wait(window) == 0
 
 
 # ---------------------------------------------------------------- calls that go wrong

@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 from wire_helpers import HELLO, QUICK, SPEC, TRIAL, Recall, Scripted, answer, observation
 
-from robospa.protocol.channel import Channel
 from robospa.protocol.client import connect
 from robospa.protocol.codec import Limits
 from robospa.protocol.errors import (
@@ -31,6 +30,7 @@ from robospa.protocol.errors import (
     VersionMismatch,
 )
 from robospa.protocol.messages import Actions, Error, Hello, Ready, pack
+from robospa.protocol.transport import Transport
 
 READY = answer(Ready)
 CHUNK = np.zeros((2, 14), np.float32)
@@ -199,14 +199,14 @@ def test_only_the_first_call_of_a_task_may_be_slow(
     start: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     allowed: list[float] = []
-    receive = Channel.receive
+    receive = Transport.receive
 
-    def spy(self: Channel, timeout: float, what: str) -> Any:
+    def spy(self: Transport, timeout: float, what: str) -> Any:
         if what == "actions":
             allowed.append(timeout)
         return receive(self, timeout, what)
 
-    monkeypatch.setattr(Channel, "receive", spy)
+    monkeypatch.setattr(Transport, "receive", spy)
     remote = connect(start(Recall()).url, timeouts=replace(QUICK, first_infer=99, infer=9))
     for task in ("a", "a", "b"):
         remote.reset(replace(TRIAL, task=task))
@@ -322,7 +322,7 @@ def test_a_server_that_stops_reading_is_given_up() -> None:
         remote = connect(url, timeouts=replace(QUICK, first_infer=0.2, infer=0.2))
         with pytest.raises(TransportError):
             for _ in range(9):
-                remote._session._channel.send(bytes(8_000_000))
+                remote._session._transport.send(bytes(8_000_000))
         given_up.set()
 
 

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from wire_helpers import QUICK, SPEC, Recall, Scripted, answer
 
-from robospa.protocol.checks import check_observation
 from robospa.protocol.conformance import CHECKS, check, synthetic_observation
 from robospa.protocol.messages import Actions, Hello, Ready, pack
 from robospa.protocol.policy import CameraSpec, PolicySpec
+from robospa.protocol.validation import check_observation
 
 
 def verdicts(url: str, **options: Any) -> dict[str, bool | None]:

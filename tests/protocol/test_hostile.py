@@ -20,7 +20,7 @@ from wire_helpers import QUICK, TRIAL, Recall, ask, observation, raw, until
 
 from robospa.protocol.client import connect
 from robospa.protocol.codec import encode
-from robospa.protocol.door import FRAMES
+from robospa.protocol.connection_limits import FRAMES
 from robospa.protocol.errors import ConnectionLost, TransportError
 from robospa.protocol.messages import Error, Infer, Ready, Reset, pack
 from robospa.protocol.server import ServerOptions, ServerThread
@@ -156,7 +156,7 @@ def test_a_thousand_idle_connections(start: Any, dial: Any) -> None:
     server = start(policy_factory=Recall, options=ServerOptions(max_connections=64))
     idle = [dial(server) for _ in range(half)] + [dial(server, HANDSHAKE) for _ in range(half)]
     assert served(server)
-    assert len(server._server._door._open) <= 64 + 128 + half
+    assert len(server._server._limiter._open) <= 64 + 128 + half
     assert len(idle) == 2 * half
 
 
@@ -224,13 +224,13 @@ def test_a_long_inference_is_no_slow_client(start: Any) -> None:
             return super().infer(seen)
 
     server = start(policy_factory=Slow, options=HURRIED)
-    channel = raw(server.url)
-    channel.send(pack(Reset(1, TRIAL)))
+    transport = raw(server.url)
+    transport.send(pack(Reset(1, TRIAL)))
     for id in range(2, 5):  # more than the server reads ahead
-        channel.send(pack(Infer(id, observation(id))))
+        transport.send(pack(Infer(id, observation(id))))
     for _ in range(4):
-        channel.receive(10, "answer")
-    channel.close()
+        transport.receive(10, "answer")
+    transport.close()
 
 
 def test_who_never_reads_its_answers_is_not_read_either(start: Any, dial: Any) -> None:
@@ -325,11 +325,11 @@ def test_a_model_that_hangs_does_not_keep_the_places_of_those_who_left(start: An
 
     server = start(Hangs(), options=ServerOptions(max_connections=2))
     for _ in range(4):
-        channel = raw(server.url)
-        channel.send(pack(Reset(1, TRIAL)))
-        channel.send(pack(Infer(2, observation())))
-        channel.close()
-    until(lambda: not server._server._door._seated)
+        transport = raw(server.url)
+        transport.send(pack(Reset(1, TRIAL)))
+        transport.send(pack(Infer(2, observation())))
+        transport.close()
+    until(lambda: not server._server._limiter._seated)
     hung.set()
     assert served(server)
 
@@ -339,12 +339,12 @@ def test_a_policy_that_wants_to_exit_does_not(start: Any) -> None:
         def infer(self, seen: Any) -> Any:
             raise SystemExit("out of memory")
 
-    channel = raw(start(Exits()).url)
-    assert isinstance(ask(channel, pack(Reset(1, TRIAL))), Ready)
-    answer = ask(channel, pack(Infer(2, observation())))
+    transport = raw(start(Exits()).url)
+    assert isinstance(ask(transport, pack(Reset(1, TRIAL))), Ready)
+    answer = ask(transport, pack(Infer(2, observation())))
     assert isinstance(answer, Error) and "SystemExit: out of memory" in answer.message
-    assert isinstance(ask(channel, pack(Reset(3, TRIAL))), Ready)
-    channel.close()
+    assert isinstance(ask(transport, pack(Reset(3, TRIAL))), Ready)
+    transport.close()
 
 
 @pytest.mark.parametrize(
@@ -353,12 +353,12 @@ def test_a_policy_that_wants_to_exit_does_not(start: Any) -> None:
 @pytest.mark.parametrize("field", ["task", "embodiment", "mode", "split"])
 def test_names_that_could_be_paths_are_refused(start: Any, name: str, field: str) -> None:
     policy = Recall()
-    channel = raw(start(policy).url)
-    answer = ask(channel, pack(Reset(1, replace(TRIAL, **{field: name}))))
+    transport = raw(start(policy).url)
+    answer = ask(transport, pack(Reset(1, replace(TRIAL, **{field: name}))))
     assert isinstance(answer, Error) and answer.code == "bad_message"
     assert field in answer.message and len(answer.message) < 300
     assert not policy.trials
-    channel.close()
+    transport.close()
 
 
 def test_who_never_asks_gives_way(start: Any, caplog: pytest.LogCaptureFixture) -> None:

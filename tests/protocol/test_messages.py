@@ -11,7 +11,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from wire_helpers import SPEC, TRIAL, observation
 
-from robospa.protocol.checks import check_chunk, check_observation, compare_specs
 from robospa.protocol.codec import encode
 from robospa.protocol.errors import DecodeError, PolicyAnswerError, VersionMismatch
 from robospa.protocol.messages import (
@@ -29,6 +28,7 @@ from robospa.protocol.messages import (
     unpack,
 )
 from robospa.protocol.policy import CAMERAS, SPACES, STATES, CameraSpec, PolicySpec, TrialInfo
+from robospa.protocol.validation import check_chunk, check_observation, compare_specs
 
 IDS = st.integers(0, MAX_ID)
 TEXT = st.text(max_size=20)

@@ -117,13 +117,13 @@ def test_a_frame_without_request_ends_this_connection_only(
 ) -> None:
     server = start(policy_factory=Recall)
     other = connect(server.url, timeouts=QUICK)
-    channel = raw(server.url)
-    answer = ask(channel, frame)
+    transport = raw(server.url)
+    answer = ask(transport, frame)
     assert isinstance(answer, Error)
     assert answer.id == 0
     assert reason in answer.message
     with pytest.raises(ConnectionLost):
-        channel.receive(10, "nothing")
+        transport.receive(10, "nothing")
     other.reset(TRIAL)
     other.close()
 
@@ -133,56 +133,56 @@ def test_a_frame_without_request_ends_this_connection_only(
     [{"type": "sing"}, {"type": "reset", "trial": 3}, {"type": "ready"}, {"type": 4}, {}],
 )
 def test_a_request_that_makes_no_sense_is_answered(start: Any, fields: dict[str, Any]) -> None:
-    channel = raw(start(Recall()).url)
-    answer = ask(channel, encode({"id": 7, **fields}))
+    transport = raw(start(Recall()).url)
+    answer = ask(transport, encode({"id": 7, **fields}))
     assert isinstance(answer, Error)
     assert (answer.id, answer.code, answer.retriable) == (7, "bad_message", False)
-    assert isinstance(ask(channel, pack(Reset(8, TRIAL))), Ready)
-    channel.close()
+    assert isinstance(ask(transport, pack(Reset(8, TRIAL))), Ready)
+    transport.close()
 
 
 def test_a_request_id_cannot_come_twice(start: Any) -> None:
-    channel = raw(start(Recall()).url)
-    assert isinstance(ask(channel, pack(Reset(5, TRIAL))), Ready)
-    assert ask(channel, pack(Reset(5, TRIAL))).id == 0
-    channel.close()
+    transport = raw(start(Recall()).url)
+    assert isinstance(ask(transport, pack(Reset(5, TRIAL))), Ready)
+    assert ask(transport, pack(Reset(5, TRIAL))).id == 0
+    transport.close()
 
 
 @pytest.mark.parametrize("request_", [Infer(1, observation()), End(1, {})])
 def test_nothing_before_the_first_reset(start: Any, request_: Message) -> None:
-    channel = raw(start(Recall()).url)
-    answer = ask(channel, pack(request_))
+    transport = raw(start(Recall()).url)
+    answer = ask(transport, pack(request_))
     assert isinstance(answer, Error)
     assert answer.code == "no_trial"
-    channel.close()
+    transport.close()
 
 
 def test_requests_sent_at_once_are_answered_in_order(start: Any) -> None:
-    channel = raw(start(Recall()).url)
-    channel.send(pack(Reset(1, TRIAL)))
+    transport = raw(start(Recall()).url)
+    transport.send(pack(Reset(1, TRIAL)))
     for id in range(2, 6):
-        channel.send(pack(Infer(id, observation(id))))
-    answers = [unpack(channel.receive(10, "answer")) for _ in range(5)]  # type: ignore[arg-type]
+        transport.send(pack(Infer(id, observation(id))))
+    answers = [unpack(transport.receive(10, "answer")) for _ in range(5)]  # type: ignore[arg-type]
     assert [answer.id for answer in answers] == [1, 2, 3, 4, 5]
     assert [answer.chunk[0, 0] for answer in answers[1:]] == [2, 3, 4, 5]  # type: ignore[union-attr]
-    channel.close()
+    transport.close()
 
 
 def test_a_message_over_the_limit_ends_this_connection_only(start: Any) -> None:
     options = ServerOptions(limits=Limits(message=5000))
     server = start(policy_factory=Recall, options=options)
-    channel = raw(server.url)
+    transport = raw(server.url)
     with pytest.raises(TransportError):
-        channel.send(b"\x00" * 200_000)
-        channel.receive(10, "nothing")
+        transport.send(b"\x00" * 200_000)
+        transport.receive(10, "nothing")
     connect(server.url, timeouts=QUICK).close()
 
 
 def test_a_text_frame_ends_this_connection_only(start: Any) -> None:
     server = start(policy_factory=Recall)
-    channel = raw(server.url)
-    channel._socket.send("hello")
-    assert "text frames" in str(channel.receive(10, "answer"))
+    transport = raw(server.url)
+    transport._socket.send("hello")
+    assert "text frames" in str(transport.receive(10, "answer"))
     connect(server.url, timeouts=QUICK).close()
 
 
@@ -197,15 +197,17 @@ def test_half_a_handshake_blocks_nobody(start: Any) -> None:
 
 def test_half_a_message_blocks_nobody(start: Any) -> None:
     server = start(policy_factory=Recall)
-    channel = raw(server.url)
-    channel._socket.socket.sendall(b"\x82\xff" + b"\x00\x00\x00\x00\x00\x0f\x00\x00" + b"abcd" * 9)
+    transport = raw(server.url)
+    transport._socket.socket.sendall(
+        b"\x82\xff" + b"\x00\x00\x00\x00\x00\x0f\x00\x00" + b"abcd" * 9
+    )
     with connect(server.url, timeouts=QUICK) as remote:
         remote.reset(TRIAL)
-    channel.close()
+    transport.close()
 
 
 def test_a_silent_connection_is_closed_in_the_end(start: Any) -> None:
     server = start(policy_factory=Recall, options=ServerOptions(idle=0.1))
-    channel = raw(server.url)
+    transport = raw(server.url)
     with pytest.raises(ConnectionLost):
-        channel.receive(10, "nothing")
+        transport.receive(10, "nothing")

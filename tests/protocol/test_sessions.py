@@ -85,12 +85,12 @@ def test_places_are_limited(start: Any) -> None:
 def test_a_client_that_leaves_during_inference_harms_nobody(start: Any) -> None:
     policy = Together()
     server = start(policy)
-    channel = raw(server.url)
-    channel.send(pack(Reset(1, TRIAL)))
-    channel.receive(10, "ready")
-    channel.send(pack(Infer(2, observation(1))))
+    transport = raw(server.url)
+    transport.send(pack(Reset(1, TRIAL)))
+    transport.receive(10, "ready")
+    transport.send(pack(Infer(2, observation(1))))
     policy.started.wait(10)
-    channel._socket.socket.shutdown(socket.SHUT_RDWR)
+    transport._socket.socket.shutdown(socket.SHUT_RDWR)
     policy.open.set()
     with connect(server.url, timeouts=QUICK) as remote:
         remote.reset(TRIAL)
@@ -112,14 +112,14 @@ def test_the_server_answers_others_while_a_policy_computes(start: Any) -> None:
 def test_stopping_a_server_whose_model_hangs() -> None:
     policy = Together()
     server = ServerThread(policy).start()
-    channel = raw(server.url)
-    channel.send(pack(Reset(1, TRIAL)))
-    channel.receive(10, "ready")
-    channel.send(pack(Infer(2, observation(1))))
+    transport = raw(server.url)
+    transport.send(pack(Reset(1, TRIAL)))
+    transport.receive(10, "ready")
+    transport.send(pack(Infer(2, observation(1))))
     assert policy.started.wait(10)
     server.stop()
     with pytest.raises(ConnectionLost):
-        channel.receive(10, "actions")
+        transport.receive(10, "actions")
     policy.open.set()
 
 
@@ -133,7 +133,7 @@ def test_requests_that_wait_together_become_one_call(start: Any) -> None:
         first = pool.submit(remotes[0].infer, observation(0))
         assert policy.started.wait(10)
         rest = [pool.submit(remotes[n].infer, observation(n)) for n in (1, 2, 3)]
-        until(lambda: len(server._server._engine._batcher._pending) == 3)
+        until(lambda: len(server._server._policies._batcher._pending) == 3)
         policy.open.set()
         assert [future.result(10)[0, 0] for future in (first, *rest)] == [0, 1, 2, 3]
     assert [sorted(batch) for batch in policy.batches] == [[0], [1, 2, 3]]
@@ -153,7 +153,7 @@ def test_one_bad_sample_spares_the_others(start: Any) -> None:
         assert policy.started.wait(10)
         good = [pool.submit(remotes[n].infer, observation(n)) for n in (1, 2)]
         bad = pool.submit(remotes[3].infer, observation(3, instruction="poison"))
-        until(lambda: len(server._server._engine._batcher._pending) == 3)
+        until(lambda: len(server._server._policies._batcher._pending) == 3)
         policy.open.set()
         assert [future.result(10)[0, 0] for future in (first, *good)] == [0, 1, 2]
         with pytest.raises(ServerError, match="one sample is bad"):
@@ -171,7 +171,7 @@ def crowd(server: ServerThread, policy: Together, third: Any) -> tuple[list[Any]
         first = pool.submit(remotes[0].infer, observation(0))
         assert policy.started.wait(10)
         second = pool.submit(remotes[1].infer, observation(1))
-        until(lambda: len(server._server._engine._batcher._pending) == 1)
+        until(lambda: len(server._server._policies._batcher._pending) == 1)
         found = third(pool, remotes[2])
         policy.open.set()
         answers = [first.result(10)[0, 0], second.result(10)[0, 0]]
@@ -241,7 +241,7 @@ def test_a_session_that_fails_is_in_the_log(
     async def broken(session: Any) -> None:
         raise ZeroDivisionError("a mistake of ours")
 
-    monkeypatch.setattr("robospa.protocol.session.Session.run", broken)
+    monkeypatch.setattr("robospa.protocol.handler.ConnectionHandler.run", broken)
     server = start(policy_factory=Recall)
     with pytest.raises(ConnectionLost):
         connect(server.url, timeouts=QUICK)

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 from websockets.sync.server import serve
 
-from robospa.protocol.channel import Address, Channel, Timeouts
 from robospa.protocol.messages import Hello, Message, pack, unpack
 from robospa.protocol.policy import CameraSpec, Observation, PolicySpec, TrialInfo
+from robospa.protocol.transport import Address, Timeouts, Transport
 
 CAMERA = CameraSpec("head", 8, 6)
 SPEC = PolicySpec("test", cameras=(CAMERA,), horizon=4, action_dim=14)
@@ -131,16 +131,16 @@ def answer(make: Any) -> Any:
     return lambda request: pack(make(unpack(request).id))
 
 
-def raw(url: str) -> Channel:
+def raw(url: str) -> Transport:
     """A connection past the hello."""
-    channel = Channel(Address(url), QUICK)
-    channel.receive(10, "hello")
-    return channel
+    transport = Transport(Address(url), QUICK)
+    transport.receive(10, "hello")
+    return transport
 
 
-def ask(channel: Channel, frame: bytes) -> Message:
-    channel.send(frame)
-    data = channel.receive(10, "answer")
+def ask(transport: Transport, frame: bytes) -> Message:
+    transport.send(frame)
+    data = transport.receive(10, "answer")
     assert isinstance(data, bytes)
     return unpack(data)
 

@@ -26,10 +26,10 @@ from robospa.harness.running.runner import RunOptions
 from robospa.harness.running.store import RecordWriter, action_path, read_actions
 from robospa.harness.running.worker import Worker, WorkerConfig
 from robospa.harness.trial import run_trial
-from robospa.protocol.channel import Timeouts
 from robospa.protocol.errors import ServerError, TransportError
 from robospa.protocol.policy import TrialInfo
 from robospa.protocol.server import ServerThread
+from robospa.protocol.transport import Timeouts
 from robospa.results.metrics import score_run
 from robospa.results.reading import RunError, read_file, read_run
 from robospa.trial import TrialKey

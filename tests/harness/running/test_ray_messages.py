@@ -22,10 +22,10 @@ from robospa.harness.running.ray_messages import (
     unpack_order,
 )
 from robospa.harness.running.worker import WorkerConfig
-from robospa.protocol.channel import Timeouts
 from robospa.protocol.codec import decode, encode
 from robospa.protocol.errors import DecodeError, EncodeError
 from robospa.protocol.policy import CameraSpec, PolicySpec
+from robospa.protocol.transport import Timeouts
 from robospa.results.records import TrialRecord
 from robospa.trial import TrialKey
 

@@ -22,8 +22,8 @@ from robospa.harness.running.policies import probe
 from robospa.harness.running.runner import RunAborted, Runner, RunOptions
 from robospa.harness.running.worker import WorkerConfig
 from robospa.harness.trial import run_trial
-from robospa.protocol.channel import Timeouts
 from robospa.protocol.errors import WireError
+from robospa.protocol.transport import Timeouts
 from robospa.results.metrics import score
 from robospa.results.records import TrialRecord
 from robospa.trial import TrialKey

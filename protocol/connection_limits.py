@@ -42,10 +42,10 @@ NO_ROOM = (errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM)
 _DATA = (0, 1, 2)  # continuation, text, binary
 
 
-class Guarded(ServerConnection):
+class MonitoredConnection(ServerConnection):
     """A connection that keeps count of what its client does."""
 
-    door: Door
+    door: ConnectionLimiter
     asked = False
     """Whether a whole message has come."""
     handling = False
@@ -115,19 +115,21 @@ class Guarded(ServerConnection):
         return f"{address[0]}:{address[1]}" if isinstance(address, tuple) else "(gone)"
 
 
-class Door:
+class ConnectionLimiter:
     """Places for at most `places` connections, and the watch over all of them."""
 
     def __init__(self, places: int, *, patience: float, handshakes: int, message: float) -> None:
         self.places = places
         self._patience, self._handshakes, self._message = patience, handshakes, message
-        self._seated: dict[Guarded, float] = {}
+        self._seated: dict[MonitoredConnection, float] = {}
         self._waiting: list[object] = []
-        self._open: dict[Guarded, None] = {}
-        self._entering: dict[Guarded, None] = {}
+        self._open: dict[MonitoredConnection, None] = {}
+        self._entering: dict[MonitoredConnection, None] = {}
         self._told: dict[str, float] = {}
         self._watch: asyncio.Task[None] | None = None
-        self.connection: type[Guarded] = type("Guarded", (Guarded,), {"door": self})
+        self.connection: type[MonitoredConnection] = type(
+            "MonitoredConnection", (MonitoredConnection,), {"door": self}
+        )
 
     def start(self) -> None:
         """Begin to watch."""
@@ -142,7 +144,7 @@ class Door:
 
     # ------------------------------------------------------------ the life of a connection
 
-    def opened(self, connection: Guarded) -> None:
+    def opened(self, connection: MonitoredConnection) -> None:
         """A socket was accepted; nothing has been read from it."""
         self._open[connection] = self._entering[connection] = None
         if len(self._entering) > self._handshakes:
@@ -151,7 +153,7 @@ class Door:
             del self._entering[oldest]
             oldest.transport.abort()
 
-    async def seat(self, connection: Guarded) -> bool:
+    async def seat(self, connection: MonitoredConnection) -> bool:
         """Wait a little for a place: a client that reconnects may be faster than the news that its
         old connection is gone. The newest is served first: a crowd that came before can wait."""
         clock, ticket = asyncio.get_running_loop().time, object()
@@ -179,17 +181,17 @@ class Door:
                 return True
         return False
 
-    def entered(self, connection: Guarded) -> None:
+    def entered(self, connection: MonitoredConnection) -> None:
         """The handshake is over and a session begins."""
         self._entering.pop(connection, None)
         connection.handling = True
 
-    def left(self, connection: Guarded) -> None:
+    def left(self, connection: MonitoredConnection) -> None:
         """The session is over."""
         connection.handling = False
         self._seated.pop(connection, None)
 
-    def lost(self, connection: Guarded) -> None:
+    def lost(self, connection: MonitoredConnection) -> None:
         """The socket is closed. A session that still has to end keeps its place until then."""
         self._open.pop(connection, None)
         self._entering.pop(connection, None)
@@ -206,7 +208,7 @@ class Door:
             for connection in list(self._open):
                 self._check(connection, now)
 
-    def _check(self, connection: Guarded, now: float) -> None:
+    def _check(self, connection: MonitoredConnection, now: float) -> None:
         if connection.unread is not None:
             if now - connection.unread > self._message:
                 connection.drop(f"it has not read its answers for {self._message:g} s")

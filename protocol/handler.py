@@ -16,9 +16,7 @@ from typing import Any
 from websockets.asyncio.server import ServerConnection
 
 from robospa.protocol.batching import QueueFull
-from robospa.protocol.checks import check_chunk, check_observation
 from robospa.protocol.codec import Limits, decode, encode
-from robospa.protocol.engine import PolicySession
 from robospa.protocol.errors import DecodeError, PolicyAnswerError
 from robospa.protocol.images import decode_images
 from robospa.protocol.messages import (
@@ -44,13 +42,15 @@ from robospa.protocol.messages import (
 )
 from robospa.protocol.openpi import from_openpi
 from robospa.protocol.policy import PolicySpec, TrialInfo
+from robospa.protocol.policy_host import PolicySession
+from robospa.protocol.validation import check_chunk, check_observation
 from robospa.protocol.waiting import within
 
 log = logging.getLogger("robospa.server")
 
 
 @dataclass
-class Session:
+class ConnectionHandler:
     """Serves one connection until it closes or stays silent for `idle` seconds."""
 
     socket: ServerConnection

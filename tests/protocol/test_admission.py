@@ -14,7 +14,6 @@ from websockets.sync.client import connect as open_socket
 from websockets.typing import Origin
 from wire_helpers import QUICK, TRIAL, Recall, observation
 
-from robospa.protocol.channel import Address, Channel
 from robospa.protocol.client import connect
 from robospa.protocol.errors import (
     ConnectFailed,
@@ -22,6 +21,7 @@ from robospa.protocol.errors import (
     Unauthorized,
 )
 from robospa.protocol.server import ServerThread
+from robospa.protocol.transport import Address, Transport
 
 
 def test_the_token_is_needed(start: Any) -> None:
@@ -35,7 +35,7 @@ def test_the_token_is_needed(start: Any) -> None:
 def test_another_version_is_refused(start: Any) -> None:
     url = start(Recall()).url
     with pytest.raises(HandshakeError, match=r"speaks robospa\.v1, not robospa\.v2"):
-        Channel(Address(url), QUICK, subprotocol="robospa.v2")
+        Transport(Address(url), QUICK, subprotocol="robospa.v2")
 
 
 def test_browsers_are_refused(start: Any) -> None:

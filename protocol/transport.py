@@ -3,7 +3,7 @@
 Chosen for large messages on a quiet line: no compression, large socket buffers, one buffer and one
 frame per message (fragments cost more wake-ups than their overlap saves on a busy machine), and no
 keepalive pings (a server that computes for a minute is not dead; deadlines are set per call
-instead). A channel that failed once is closed and stays closed.
+instead). A transport that failed once is closed and stays closed.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ class Address:
         return {"Authorization": f"Bearer {self.token}"} if self.token is not None else {}
 
 
-class Channel:
+class Transport:
     """Sends and receives whole messages; `subprotocol` is what the server selected, or None."""
 
     def __init__(
@@ -106,7 +106,7 @@ class Channel:
             raise self._lost("while sending", error) from error
 
     def receive(self, timeout: float, what: str) -> bytes | str:
-        """The next message: bytes, or str for a text frame. After CallTimeout the channel is
+        """The next message: bytes, or str for a text frame. After CallTimeout the transport is
         closed, because a late answer could be taken for the next one."""
         try:
             return self._socket.recv(timeout)

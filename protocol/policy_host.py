@@ -47,7 +47,7 @@ class PolicySession(Protocol):
     def close(self) -> None: ...
 
 
-class Engine:
+class PolicyHost:
     """Owns the policy or its factory, and the threads that it runs in."""
 
     def __init__(
@@ -109,17 +109,17 @@ class _OwnSession:
     """A policy object of its own. `alone`: held while it is called, because a client may leave,
     and the next one or `close` come, while a call is under way in another thread."""
 
-    def __init__(self, engine: Engine, policy: Policy, alone: threading.Lock, keep: bool) -> None:
-        self._engine, self._policy, self._alone, self._keep = engine, policy, alone, keep
+    def __init__(self, host: PolicyHost, policy: Policy, alone: threading.Lock, keep: bool) -> None:
+        self._host, self._policy, self._alone, self._keep = host, policy, alone, keep
 
     def coming(self) -> None:
         return None
 
     async def reset(self, trial: TrialInfo) -> None:
-        await self._engine.run(self._call, self._policy.reset, trial)
+        await self._host.run(self._call, self._policy.reset, trial)
 
     async def infer(self, observation: Observation) -> Answer:
-        return await self._engine.run(self._call, self._timed, time.perf_counter(), observation)
+        return await self._host.run(self._call, self._timed, time.perf_counter(), observation)
 
     def _call(self, method: Callable[..., T], *args: Any) -> T:
         with self._alone:
@@ -135,18 +135,18 @@ class _OwnSession:
     async def end(self, outcome: Mapping[str, Any]) -> None:
         method = getattr(self._policy, "end", None)
         if method is not None:
-            await self._engine.run(self._call, method, outcome)
+            await self._host.run(self._call, method, outcome)
 
     def close(self) -> None:
         if not self._keep and hasattr(self._policy, "close"):
-            self._engine.post(self._call, self._policy.close)
+            self._host.post(self._call, self._policy.close)
 
 
 class _SharedSession:
     """One session of a policy that serves many at once."""
 
-    def __init__(self, engine: Engine, policy: Any, batcher: Batcher, number: int) -> None:
-        self._engine, self._policy, self._batcher, self._number = engine, policy, batcher, number
+    def __init__(self, host: PolicyHost, policy: Any, batcher: Batcher, number: int) -> None:
+        self._host, self._policy, self._batcher, self._number = host, policy, batcher, number
 
     def coming(self) -> None:
         self._batcher.coming(self._number)
@@ -154,9 +154,9 @@ class _SharedSession:
     async def reset(self, trial: TrialInfo) -> None:
         self._batcher.forget(self._number)
         if hasattr(self._policy, "reset_session"):
-            await self._engine.run(self._policy.reset_session, self._number, trial)
+            await self._host.run(self._policy.reset_session, self._number, trial)
         else:
-            await self._engine.run(self._policy.reset, trial)
+            await self._host.run(self._policy.reset, trial)
 
     async def infer(self, observation: Observation) -> Answer:
         return await self._batcher.infer(self._number, observation)
@@ -167,4 +167,4 @@ class _SharedSession:
     def close(self) -> None:
         self._batcher.forget(self._number)
         if hasattr(self._policy, "end_session"):
-            self._engine.post(self._policy.end_session, self._number)
+            self._host.post(self._policy.end_session, self._number)

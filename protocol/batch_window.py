@@ -48,7 +48,7 @@ class _Pace:
 
 
 @dataclass
-class Cost:
+class CallCost:
     """What a call of n observations takes [s]: a straight line through recent calls."""
 
     weight: float = 0.0
@@ -73,11 +73,11 @@ class Cost:
         return seconds + min(max(slope, 0.0), seconds / mean) * (size - mean)
 
 
-class Paces:
+class AdaptiveBatchWindow:
     """The pace of all sessions of one model. Times are of one clock [s]."""
 
     def __init__(self) -> None:
-        self.cost = Cost()
+        self.cost = CallCost()
         self._sessions: dict[int, _Pace] = {}
         self._all: deque[float] = deque(maxlen=2 * KEPT)
         self._transfer = 0.0
