@@ -30,7 +30,7 @@ from robospa.clients.msgpack_arrays import binary_form
 from robospa.protocol.errors import PolicyAnswerError, ServerError, printable
 from robospa.protocol.options import option, plain_options
 from robospa.protocol.policy import Observation, PolicySpec, TrialInfo
-from robospa.protocol.rot6d import quaternion_to_matrix
+from robospa.rotations import quaternion_to_matrix
 
 if TYPE_CHECKING:
     from robospa.clients import Line

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from robospa.geometry import Pose
+from robospa.geometry import Pose, to_transform
 from robospa.harness.robots.embodiment import Embodiment
 from robospa.harness.robots.kinematics import (
     Chain,
@@ -22,9 +22,9 @@ from robospa.harness.robots.kinematics import (
     end_effector,
     forward,
     inverse,
-    matrix,
 )
 from robospa.harness.world import ActionError
+from robospa.rotations import turning_vector
 from robospa.tasks.snapshot import ARMS
 
 Array = NDArray[np.float64]
@@ -141,13 +141,12 @@ def polished(chain: Chain, joints: Array, target: Pose) -> Array:
 
     Inverse kinematics stops within half a millimetre, which would swallow small `delta_ee` actions.
     """
-    wanted = matrix(target)
+    wanted = to_transform(target)
     for _ in range(POLISH):
         frames, jacobians = forward(chain, joints[None])
         frame, jacobian = frames[0], jacobians[0]
         turn = wanted[:3, :3] @ frame[:3, :3].T
-        spin = [turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]]
-        error = np.concatenate([wanted[:3, 3] - frame[:3, 3], np.array(spin) / 2])
+        error = np.concatenate([wanted[:3, 3] - frame[:3, 3], turning_vector(turn) / 2])
         square = jacobian.T @ jacobian + POLISH_DAMPING * np.eye(len(joints))
         step = np.linalg.solve(square, jacobian.T @ error)
         joints = np.clip(joints + step, chain.lower, chain.upper)

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from robospa.geometry import Array
 from robospa.protocol.errors import PolicyAnswerError
-
-Array = NDArray[np.float64]
+from robospa.rotations import matrix_to_quaternion, quaternion_to_matrix
 
 ORDERS = ("xyzw", "wxyz")
 LAYOUTS = ("interleaved", "columns")
@@ -26,44 +26,6 @@ ARM = 10
 
 PARALLEL = 1e-6
 """Sine of the angle between two columns below which they name no rotation."""
-
-
-def quaternion_to_matrix(quaternion: Array) -> Array:
-    """(..., 4) w x y z to (..., 3, 3); of any length but 0."""
-    w, x, y, z = np.moveaxis(quaternion / np.linalg.norm(quaternion, axis=-1, keepdims=True), -1, 0)
-    rows = (
-        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
-        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
-        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
-    )
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
-
-
-def matrix_to_quaternion(matrix: Array) -> Array:
-    """(..., 3, 3) to (..., 4) w x y z with w >= 0; the largest component is divided by."""
-    m = np.asarray(matrix, dtype=float)
-    r00, r11, r22 = m[..., 0, 0], m[..., 1, 1], m[..., 2, 2]
-    # One symmetric 4x4 matrix holds 4 q q^T; its row with the largest diagonal is the safe one.
-    four = np.empty((*m.shape[:-2], 4, 4))
-    four[..., 0, 0] = 1 + r00 + r11 + r22
-    four[..., 1, 1] = 1 + r00 - r11 - r22
-    four[..., 2, 2] = 1 - r00 + r11 - r22
-    four[..., 3, 3] = 1 - r00 - r11 + r22
-    pairs = {
-        (0, 1): m[..., 2, 1] - m[..., 1, 2],
-        (0, 2): m[..., 0, 2] - m[..., 2, 0],
-        (0, 3): m[..., 1, 0] - m[..., 0, 1],
-        (1, 2): m[..., 1, 0] + m[..., 0, 1],
-        (1, 3): m[..., 0, 2] + m[..., 2, 0],
-        (2, 3): m[..., 2, 1] + m[..., 1, 2],
-    }
-    for (i, j), value in pairs.items():
-        four[..., i, j] = four[..., j, i] = value
-    best = np.argmax(np.diagonal(four, axis1=-2, axis2=-1), axis=-1)
-    row = np.take_along_axis(four, best[..., None, None], axis=-2)[..., 0, :]
-    unit = row / np.linalg.norm(row, axis=-1, keepdims=True)
-    positive: Array = np.where(unit[..., :1] < 0, -unit, unit)
-    return positive
 
 
 def encode_rotation(quaternion: Array, order: str, layout: str) -> Array:

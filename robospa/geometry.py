@@ -1,7 +1,8 @@
-"""Poses and the little rotation algebra that scenes, goals and skills share.
+"""Poses and the little rotation algebra that scenes, goals, skills and robots share.
 
 Positions are metres in the world frame (x right, y away from the robot, z up); rotations are unit
-quaternions in the order w, x, y, z. Everything here is plain numpy: no simulator, no global state.
+quaternions in the order w, x, y, z. One pose at a time; `robospa.rotations` has many at a time.
+Everything here is plain numpy: no simulator, no global state.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 Vec3 = tuple[float, float, float]
 Quat = tuple[float, float, float, float]
 Array = NDArray[np.float64]
+Number = TypeVar("Number", float, Array)
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,8 +46,10 @@ class Pose:
         return Pose((-px, -py, -pz), back)
 
 
-def multiply(a: Quat, b: Quat) -> Quat:
-    """Hamilton product a*b of two wxyz quaternions."""
+def multiply(
+    a: tuple[Number, Number, Number, Number], b: tuple[Number, Number, Number, Number]
+) -> tuple[Number, Number, Number, Number]:
+    """Hamilton product a*b of two wxyz quaternions, of numbers or of equal arrays."""
     aw, ax, ay, az = a
     bw, bx, by, bz = b
     return (
@@ -80,21 +85,37 @@ def axis_rotation(axis: ArrayLike, angle: float) -> Quat:
     return (math.cos(angle / 2), float(x) * s, float(y) * s, float(z) * s)
 
 
+def matrix_rows(w: Number, x: Number, y: Number, z: Number) -> tuple[tuple[Number, ...], ...]:
+    """The three rows of a unit quaternion's rotation matrix, of numbers or of equal arrays."""
+    return (
+        (1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)),
+        (2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)),
+        (2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)),
+    )
+
+
 def to_matrix(q: Quat) -> Array:
     """3x3 rotation matrix of a unit quaternion."""
-    w, x, y, z = q
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )
+    return np.array(matrix_rows(*q))
 
 
 def from_matrix(m: Array) -> Quat:
     """Unit quaternion (wxyz, w >= 0) of a 3x3 rotation matrix."""
     return _quaternion(m.tolist())
+
+
+def to_transform(pose: Pose) -> Array:
+    """4x4 homogeneous transform of a pose."""
+    out = np.eye(4)
+    out[:3, :3] = to_matrix(pose.rotation)
+    out[:3, 3] = pose.position
+    return out
+
+
+def from_transform(transform: Array) -> Pose:
+    """Pose of a 4x4 homogeneous transform."""
+    x, y, z = (float(v) for v in transform[:3, 3])
+    return Pose((x, y, z), from_matrix(transform[:3, :3]))
 
 
 def _quaternion(m: Sequence[Sequence[float]]) -> Quat:

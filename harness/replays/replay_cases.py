@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from robospa.geometry import Array
+from robospa.rotations import angle_between
 
 SCALES = {"joints": 0.1, "gripper": 0.2, "position": 0.03, "rotation": 0.2}
 """The mean error [rad, 1, m, rad] of an answer that is about as good as it should be."""
@@ -76,7 +76,9 @@ def score(case: Case) -> float:
 
 
 def _angle(a: Array, b: Array) -> Array:
-    """Angles [rad] between rotations; pi for what is none."""
-    lengths = np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1)
-    dots = np.abs((a * b).sum(axis=1)) / np.where(lengths > 1e-9, lengths, 1.0)
-    return np.where(lengths > 1e-9, 2 * np.arccos(np.clip(dots, 0.0, 1.0)), np.pi)
+    """Angles [rad] between rotations of any length; pi for what is none."""
+    lengths = np.linalg.norm(a, axis=1, keepdims=True) * np.linalg.norm(b, axis=1, keepdims=True)
+    real = lengths > 1e-9
+    # both lengths at once: the vector part of a product scales with them
+    angle = angle_between(a / np.where(real, lengths, 1.0), b)
+    return np.where(real[:, 0], angle, np.pi)

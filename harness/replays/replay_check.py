@@ -18,11 +18,13 @@ from typing import Any
 
 import numpy as np
 
+from robospa.geometry import Array
 from robospa.harness.replays.episodes import Episode, EpisodeError
-from robospa.harness.replays.replay_cases import UNITS, Array, Case, errors, groups, score
-from robospa.harness.replays.replay_parts import PARTS, Part, fitted, product
+from robospa.harness.replays.replay_cases import UNITS, Case, errors, groups, score
+from robospa.harness.replays.replay_parts import PARTS, Part, fitted
 from robospa.harness.replays.replay_views import VIEWS, View
 from robospa.protocol.policy import Policy, PolicySpec, TrialInfo
+from robospa.rotations import product
 
 POINTS = 8
 """Frames at which the policy is asked."""

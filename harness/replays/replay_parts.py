@@ -13,7 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from robospa.harness.replays.replay_cases import Array, Case
+from robospa.geometry import Array
+from robospa.harness.replays.replay_cases import Case
+from robospa.rotations import product, quaternion_to_matrix
 
 TCP_AHEAD = 0.12
 """The tool centre point is this far [m] along the x axis of the end-effector frame."""
@@ -97,9 +99,9 @@ def _moved(case: Case, along: float) -> Array:
     given = case.given.copy()
     for arm in (0, 8):
         q = given[:, arm + 3 : arm + 7]
-        w, x, y, z = (q / np.maximum(np.linalg.norm(q, axis=1, keepdims=True), 1e-9)).T
-        axis = np.stack([1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)], axis=1)
-        given[:, arm : arm + 3] += along * axis
+        real = np.linalg.norm(q, axis=1, keepdims=True) > 1e-9
+        turn = quaternion_to_matrix(np.where(real, q, [1.0, 0.0, 0.0, 0.0]))
+        given[:, arm : arm + 3] += along * turn[:, :, 0]
     return given
 
 
@@ -114,12 +116,6 @@ def _pose_delta(case: Case, each: bool) -> Array:
             row[:] = product(turned, row)
             turned = row.copy() if each else turned
     return given
-
-
-def product(a: Array, b: Array) -> Array:
-    """Hamilton product of two quaternions w x y z."""
-    w, v, s, u = a[0], a[1:], b[0], b[1:]
-    return np.concatenate([[w * s - v @ u], w * u + s * v + np.cross(v, u)])
 
 
 ORDER, HAND, TIME = "order", "grippers", "time"

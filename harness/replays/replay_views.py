@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from robospa.harness.replays.replay_cases import Array
+from robospa.geometry import Array
 
 
 @dataclass(frozen=True)

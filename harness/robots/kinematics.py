@@ -14,11 +14,10 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.geometry import Pose, from_matrix, to_matrix
+from robospa.geometry import Array, Pose, from_transform, to_transform
 from robospa.harness.robots import arx
 from robospa.harness.robots.embodiment import Arm
-
-Array = NDArray[np.float64]
+from robospa.rotations import axis_transforms, turning_vector
 
 POSITION_TOLERANCE = 5e-4  # [m]
 ROTATION_TOLERANCE = 3e-3  # [rad]
@@ -44,27 +43,13 @@ class Chain:
     links: arx.Links | None = None
 
 
-def matrix(pose: Pose) -> Array:
-    """4x4 homogeneous transform of a pose."""
-    out = np.eye(4)
-    out[:3, :3] = to_matrix(pose.rotation)
-    out[:3, 3] = pose.position
-    return out
-
-
-def pose_of(transform: Array) -> Pose:
-    """Pose of a 4x4 homogeneous transform."""
-    x, y, z = (float(v) for v in transform[:3, 3])
-    return Pose((x, y, z), from_matrix(transform[:3, :3]))
-
-
 @cache
 def chain_of(arm: Arm) -> Chain:
     """The arm's joints as arrays, ending in its end-effector frame. Made once for equal arms."""
-    origins = np.stack([matrix(j.origin) for j in arm.joints])
-    tool = matrix(arm.tool)
+    origins = np.stack([to_transform(j.origin) for j in arm.joints])
+    tool = to_transform(arm.tool)
     return Chain(
-        base=matrix(arm.base),
+        base=to_transform(arm.base),
         origins=origins,
         axes=np.array([j.axis for j in arm.joints], dtype=float),
         tool=tool,
@@ -73,17 +58,6 @@ def chain_of(arm: Arm) -> Chain:
         upper=np.array([j.upper for j in arm.joints]),
         seeds=np.array(arm.seeds, dtype=float),
     )
-
-
-def _rotations(axis: Array, angles: Array) -> Array:
-    """(N, 4, 4) rotations about one unit axis (Rodrigues)."""
-    x, y, z = axis
-    k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    out = np.zeros((len(angles), 4, 4))
-    s, c = np.sin(angles)[:, None, None], (1 - np.cos(angles))[:, None, None]
-    out[:, :3, :3] = np.eye(3) + s * k + c * (k @ k)
-    out[:, 3, 3] = 1
-    return out
 
 
 def forward(chain: Chain, joints: Array) -> tuple[Array, Array]:
@@ -95,7 +69,7 @@ def forward(chain: Chain, joints: Array) -> tuple[Array, Array]:
         frame = frame @ chain.origins[i]
         points.append(frame[:, :3, 3])
         axes.append(frame[:, :3, :3] @ chain.axes[i])
-        frame = frame @ _rotations(chain.axes[i], joints[:, i])
+        frame = frame @ axis_transforms(chain.axes[i], joints[:, i])
     frame = frame @ chain.tool
     axis = np.stack(axes, axis=2)  # (N, 3, J)
     arm = frame[:, :3, 3:4] - np.stack(points, axis=2)
@@ -105,20 +79,13 @@ def forward(chain: Chain, joints: Array) -> tuple[Array, Array]:
 
 def end_effector(chain: Chain, joints: Sequence[float]) -> Pose:
     """Pose of the end-effector frame in the world at `joints` [rad]."""
-    return pose_of(forward(chain, np.asarray(joints, dtype=float)[None])[0][0])
+    return from_transform(forward(chain, np.asarray(joints, dtype=float)[None])[0][0])
 
 
 def _errors(frame: Array, target: Array) -> Array:
     """(N, 6) position and rotation-vector errors from frames to targets."""
     turn = target[:, :3, :3] @ frame[:, :3, :3].transpose(0, 2, 1)
-    vector = np.stack(
-        [
-            turn[:, 2, 1] - turn[:, 1, 2],
-            turn[:, 0, 2] - turn[:, 2, 0],
-            turn[:, 1, 0] - turn[:, 0, 1],
-        ],
-        axis=1,
-    )
+    vector = turning_vector(turn)
     sine = np.linalg.norm(vector, axis=1) / 2
     cosine = (np.trace(turn, axis1=1, axis2=2) - 1) / 2
     angle = np.arctan2(sine, cosine)
@@ -171,7 +138,7 @@ def inverse(
     arm's `seeds`, aimed at the target, are tried in their order until one arrives. A target that
     is out of reach or beyond the joint limits has success False and the best joints found.
     """
-    wanted = np.stack([matrix(t) for t in targets])
+    wanted = np.stack([to_transform(t) for t in targets])
     count = len(targets)
     if chain.links is not None:
         local = np.linalg.inv(chain.base) @ wanted

@@ -15,6 +15,7 @@ from robospa.harness.sim.live import FLOATS
 from robospa.harness.sim.motion import RATE
 from robospa.harness.sim.physics import Physics
 from robospa.harness.world import SceneUnstable
+from robospa.rotations import angle_between
 
 Array = NDArray[np.float64]
 
@@ -67,13 +68,7 @@ def _state(physics: Physics, names: list[str]) -> Array:
 def mover(names: list[str], before: Array, after: Array) -> str:
     """The object that moved most between two packed states, or "" if all are at rest."""
     shift = np.linalg.norm(after[:, 4:] - before[:, 4:], axis=1)
-    sine = np.linalg.norm(_relative(before[:, :4], after[:, :4]), axis=1)
-    turn = 2.0 * np.arcsin(np.clip(sine, 0.0, 1.0))
+    turn = angle_between(before[:, :4], after[:, :4])
     unrest = np.maximum(shift / REST_DISTANCE, turn / REST_ANGLE)
     worst = int(np.argmax(unrest))
     return names[worst] if unrest[worst] > 1.0 else ""
-
-
-def _relative(a: Array, b: Array) -> Array:
-    """Vector part (N, 3) of conj(a) * b for unit quaternions (N, 4)."""
-    return a[:, :1] * b[:, 1:] - b[:, :1] * a[:, 1:] - np.cross(a[:, 1:], b[:, 1:])

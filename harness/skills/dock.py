@@ -11,8 +11,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.geometry import Pose, Vec3, rotate
-from robospa.harness.robots.kinematics import forward, inverse, pose_of
+from robospa.geometry import Pose, Vec3, from_transform, rotate
+from robospa.harness.robots.kinematics import forward, inverse
 from robospa.harness.skills.grasping import Reach
 from robospa.harness.skills.moving import line, retreat_home, rise, travel
 from robospa.harness.skills.pick import pick
@@ -67,7 +67,7 @@ def ways_in(
 def let_go(ws: Workspace, arm: int, retreat: float = RETREAT) -> None:
     """Open the gripper and back out along its approach, then up."""
     frames, _ = forward(ws.chains[arm], ws.joints[arm][None])
-    pose = pose_of(frames[0])
+    pose = from_transform(frames[0])
     ws.add(arm)
     ws.add(arm, gripper=1.0)
     away = backed(pose, rotate(pose.rotation, (1, 0, 0)), retreat)

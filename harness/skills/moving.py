@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.geometry import Pose
-from robospa.harness.robots.kinematics import forward, pose_of
+from robospa.geometry import Pose, from_transform
+from robospa.harness.robots.kinematics import forward
 from robospa.harness.skills.workspace import FINGERTIP, TRAVEL_HEIGHT, Workspace, raised, wall_front
 from robospa.tasks.scene import TABLE_TOP
 
@@ -81,7 +81,7 @@ def rise(ws: Workspace, arm: int, to: float | None = None) -> None:
     if height >= to - 0.01:
         return
     frames, _ = forward(ws.chains[arm], ws.joints[arm][None])
-    here = pose_of(frames[0])
+    here = from_transform(frames[0])
     for share in (1.0, 0.75, 0.5, 0.25):
         joints = ws.solve(arm, raised(here, (to - height) * share), ws.joints[arm])
         if joints is not None:
@@ -95,7 +95,7 @@ def travel(ws: Workspace, arm: int, goal: Array) -> None:
     start = ws.joints[arm]
     if blocked(ws, arm, start, goal):
         frames, _ = forward(ws.chains[arm], goal[None])
-        here = pose_of(frames[0])
+        here = from_transform(frames[0])
         climb = travel_height(ws, arm) - float(tip_heights(ws, arm, goal[None])[0])
         for share in (1.0, 0.7, 0.4):
             above = ws.solve(arm, raised(here, climb * share), goal) if climb > 0.01 else None

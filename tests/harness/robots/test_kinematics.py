@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from robospa.geometry import Pose, look_rotation
+from robospa.geometry import Pose, from_transform, look_rotation
 from robospa.harness.robots import embodiment
 from robospa.harness.robots.embodiment import Arm
-from robospa.harness.robots.kinematics import chain_of, end_effector, forward, inverse, pose_of
+from robospa.harness.robots.kinematics import chain_of, end_effector, forward, inverse
 
 ARMS = embodiment("aloha-agilex").arms
 
@@ -37,7 +37,7 @@ def test_closed_form_returns_the_joints_that_made_the_pose(arm: Arm) -> None:
     chain = chain_of(arm)
     joints = random_joints(arm, 500)
     frames, _ = forward(chain, joints)
-    found, ok = inverse(chain, [pose_of(f) for f in frames])
+    found, ok = inverse(chain, [from_transform(f) for f in frames])
     assert ok.all()
     assert np.abs(found - joints).max() < 1e-6
 
@@ -46,7 +46,7 @@ def test_closed_form_returns_the_joints_that_made_the_pose(arm: Arm) -> None:
 def test_numerical_way_agrees_with_the_closed_form(arm: Arm) -> None:
     chain = replace(chain_of(arm), links=None)
     frames, _ = forward(chain, random_joints(arm, 60))
-    found, ok = inverse(chain, [pose_of(f) for f in frames])
+    found, ok = inverse(chain, [from_transform(f) for f in frames])
     reached, _ = forward(chain, found[ok])
     assert ok.mean() > 0.9
     assert np.abs(reached - frames[ok]).max() < 5e-3
