@@ -19,6 +19,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+from robospa.harness.running.code_hash import code_hash
 from robospa.harness.running.locking import LOCK
 from robospa.harness.running.store import PART, replace_file
 from robospa.results.reading import MANIFEST, RunError, manifest_keys, read_manifest
@@ -91,22 +92,6 @@ def git_state(folder: Path) -> dict[str, Any]:
         return {"commit": commit, "dirty": bool(git("status", "--porcelain"))}
     except (OSError, subprocess.TimeoutExpired):
         return {}
-
-
-def code_hash() -> str:
-    """Hash of the installed code and data that decide a trial's result.
-
-    Unlike a commit it also exists outside a checkout, and does not change with the documentation.
-    Seed lists are left out: the list of trials is compared itself.
-    """
-    digest = hashlib.sha256()
-    root = Path(__file__).resolve().parents[2]
-    for folder in ("protocol", "clients", "tasks", "harness"):
-        for path in sorted((root / folder).rglob("*")):
-            inside = path.relative_to(root)
-            if path.suffix in (".py", ".json") and not {"cli", "seeds"} & set(inside.parts):
-                digest.update(f"{inside}\0".encode() + path.read_bytes())
-    return digest.hexdigest()[:16]
 
 
 def about_machine(world: Mapping[str, Any]) -> dict[str, Any]:

@@ -22,9 +22,9 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+from robospa.harness.running.code_hash import code_hash
 from robospa.harness.running.executor import Message
 from robospa.harness.running.local_workers import LocalExecutor
-from robospa.harness.running.manifest import code_hash
 from robospa.harness.running.ray_messages import Heard, pack_heard, unpack_config, unpack_order
 from robospa.harness.running.store import ACTIONS, VIDEOS
 from robospa.harness.running.worker import LOGS, describe

@@ -1,0 +1,190 @@
+"""One short hash of the code and data that can change what a trial does.
+
+A run may only go on with the code that it was started with, and a cluster's nodes must have the
+driver's. What counts is what a trial executes: its loop, the world, and everything that these
+import; the packages in PACKAGES count whole, because their modules are found by name. What never
+acts is left out: comments, layout, docstrings, annotations of functions, `if TYPE_CHECKING`. So are
+the policy, which a run identifies by its spec, the lists of seeds, which a run's own list of trials
+replaces, and all that only starts trials or shows them.
+"""
+
+from __future__ import annotations
+
+import ast
+import contextlib
+import gc
+import hashlib
+import os
+import tempfile
+from collections.abc import Iterable, Iterator
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+
+ROOTS = ("robospa.harness.trial", "robospa.harness.sim.sapien_world")
+PACKAGES = (
+    "robospa.clients",
+    "robospa.harness.robots",
+    "robospa.harness.skills",
+    "robospa.tasks",
+)
+LEFT_OUT = ("robospa.tasks.seeds",)
+NO_DATA = (".py", ".pyc", ".pyi", ".typed", ".md")
+"""Files in PACKAGES that are no data of a trial."""
+LENGTH = 16
+"""Hexadecimal digits of a hash."""
+
+
+@cache
+def code_hash() -> str:
+    """The hash for the installed package.
+
+    The last one is kept in the user's cache folder beside a hash of all files as they are: reading
+    those takes 20 ms, their syntax trees half a second.
+    """
+    root = Path(import_module("robospa").__path__[0])
+    files = {path.relative_to(root).as_posix(): path.read_bytes() for path in _files(root)}
+    raw = hashlib.sha256()
+    for name, data in sorted(files.items()):
+        raw.update(f"{name} {len(data)}\0".encode() + data)
+    key = raw.hexdigest()
+    kept = _cache_file()
+    with contextlib.suppress(OSError, ValueError):
+        before, known = kept.read_text(encoding="ascii").split()
+        if before == key and len(known) == LENGTH:
+            return known
+    found = hash_files(files)
+    with contextlib.suppress(OSError):
+        _replace(kept, f"{key} {found}\n")
+    return found
+
+
+def hash_files(
+    files: dict[str, bytes],
+    roots: Iterable[str] = ROOTS,
+    packages: Iterable[str] = PACKAGES,
+) -> str:
+    """The hash of `files`, by path relative to the folder of `robospa`."""
+    digest = hashlib.sha256()
+    for name, tree in sorted(covered(files, roots, packages).items()):
+        text: list[str] = []
+        _write(tree, text)
+        digest.update(f"{name}\0{''.join(text)}\0".encode())
+    inside = tuple(f"{_path(package)}/" for package in packages)
+    outside = tuple(f"{_path(package)}/" for package in LEFT_OUT)
+    for path, data in sorted(files.items()):
+        if path.startswith(inside) and not path.startswith(outside) and not path.endswith(NO_DATA):
+            digest.update(f"{path} {len(data)}\0".encode() + data)
+    return digest.hexdigest()[:LENGTH]
+
+
+def covered(
+    files: dict[str, bytes],
+    roots: Iterable[str] = ROOTS,
+    packages: Iterable[str] = PACKAGES,
+) -> dict[str, ast.Module]:
+    """The modules of `files` that count, by name, with their syntax trees.
+
+    Raises KeyError if a root or a package is not there.
+    """
+    modules = {_module(path): path for path in files if path.endswith(".py")}
+    wanted = [*roots, *packages]
+    for package in packages:
+        wanted += [name for name in modules if name.startswith(f"{package}.")]
+    found: dict[str, ast.Module] = {}
+    collecting = gc.isenabled()
+    gc.disable()  # it would look again and again through a million nodes that all stay
+    try:
+        while wanted:
+            name = wanted.pop()
+            if name in found or any(f"{name}.".startswith(f"{out}.") for out in LEFT_OUT):
+                continue
+            found[name] = ast.parse(files[modules[name]])
+            wanted += [m for m in _imports(found[name]) if m in modules]
+    finally:
+        if collecting:
+            gc.enable()
+    return found
+
+
+def _files(root: Path) -> Iterator[Path]:
+    """The package's files, but for those that Python or an editor made."""
+    for folder, folders, names in os.walk(root, followlinks=True):
+        folders[:] = [n for n in folders if not n.startswith((".", "__"))]
+        yield from (Path(folder, n) for n in names if not n.startswith(".") and n[-1] != "~")
+
+
+def _module(path: str) -> str:
+    """`harness/trial.py` as `robospa.harness.trial`, `tasks/__init__.py` as `robospa.tasks`."""
+    parts = path.removesuffix(".py").removesuffix("__init__").rstrip("/").split("/")
+    return ".".join(["robospa", *filter(None, parts)])
+
+
+def _path(module: str) -> str:
+    return module.removeprefix("robospa.").replace(".", "/")
+
+
+def _imports(tree: ast.AST) -> Iterator[str]:
+    """Names of what may be modules of ours that `tree` imports anywhere, also inside functions."""
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            if node.module is not None:
+                yield node.module
+                yield from (f"{node.module}.{alias.name}" for alias in node.names)
+        elif isinstance(node, ast.stmt) and not _never_acts(node):
+            yield from _imports(node)
+
+
+def _never_acts(node: ast.AST) -> bool:
+    """Docstrings, also those of attributes, and what only type checkers see."""
+    match node:
+        case ast.Expr(value=ast.Constant(value=str())):
+            return True
+        case ast.If(test=ast.Name(id="TYPE_CHECKING"), orelse=[]):
+            return True
+    return False
+
+
+_SKIPPED = frozenset(("annotation", "returns", "type_comment", "kind"))
+
+
+def _write(node: object, out: list[str]) -> None:
+    """Append pieces of a text that two syntax trees share only if they do the same.
+
+    Empty fields are left out, so that fields which a later Python adds change nothing. Annotations
+    of a class's fields stay: dataclasses and the like read them.
+    """
+    if isinstance(node, ast.AST):
+        out.append(f"{type(node).__name__}(")
+        annotated = isinstance(node, ast.AnnAssign)
+        for name in node._fields:
+            value = getattr(node, name, None)
+            if value is None or value == []:
+                continue
+            if name not in _SKIPPED or (annotated and name == "annotation"):
+                out.append(f"{name}=")
+                _write(value, out)
+        out.append(")")
+    elif isinstance(node, list):
+        out.append("[")
+        for item in node:
+            if not _never_acts(item):
+                _write(item, out)
+        out.append("]")
+    else:
+        out.append(f"{node!r},")
+
+
+def _cache_file() -> Path:
+    base = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
+    return Path(base) / "robospa" / "code_hash"
+
+
+def _replace(path: Path, text: str) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, part = tempfile.mkstemp(dir=path.parent, prefix=".code_hash-")
+    with os.fdopen(handle, "w") as file:
+        file.write(text)
+    os.replace(part, path)
