@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from typing import Any
 from urllib.parse import urlsplit
 
-from robospa.clients.guess import explained
+from robospa.clients.detect import explained
 from robospa.protocol.client import RemotePolicy, WireClient, expecting
 from robospa.protocol.codec import DEFAULT_LIMITS, Limits
 from robospa.protocol.errors import HandshakeError, TransportError, Unauthorized
@@ -47,16 +47,18 @@ class Dialect:
 
 
 SCHEMES: Mapping[str, Dialect] = {
-    "ws": Dialect("websocket", "robospa.v1, or openpi's dialect if the server does not know it"),
-    "wss": Dialect("websocket", "the same through TLS", 443),
-    "openpi": Dialect("openpi", "openpi's serve_policy"),
-    "go1+http": Dialect("go1", "GO-1's deploy.py", 9000),
-    "go1+https": Dialect("go1", "the same through TLS", 443),
-    "xvla+http": Dialect("xvla", "X-VLA's deploy.py"),
-    "xvla+https": Dialect("xvla", "the same through TLS", 443),
-    "xpolicylab": Dialect("xpolicylab", "XPolicyLab's policy server", 19000),
-    "vla-eval": Dialect("vla_eval", "vla-eval's model servers"),
-    "robotwin+tcp": Dialect("robotwin_tcp", "RoboTwin's policy_model_server", 9999),
+    "ws": Dialect(
+        "robospa_v1.client", "robospa.v1, or openpi's dialect if the server does not know it"
+    ),
+    "wss": Dialect("robospa_v1.client", "the same through TLS", 443),
+    "openpi": Dialect("openpi.client", "openpi's serve_policy"),
+    "go1+http": Dialect("go1.client", "GO-1's deploy.py", 9000),
+    "go1+https": Dialect("go1.client", "the same through TLS", 443),
+    "xvla+http": Dialect("xvla.client", "X-VLA's deploy.py"),
+    "xvla+https": Dialect("xvla.client", "the same through TLS", 443),
+    "xpolicylab": Dialect("xpolicylab.client", "XPolicyLab's policy server", 19000),
+    "vla-eval": Dialect("vla_eval.client", "vla-eval's model servers"),
+    "robotwin+tcp": Dialect("robotwin.client", "RoboTwin's policy_model_server", 9999),
 }
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robospa.baselines.model import Ask, Chunk, ModelPolicy
+from robospa.clients.model_policy import Ask, Chunk, ModelPolicy
 from robospa.protocol.options import option
 from robospa.protocol.policy import CameraSpec, PolicySpec
 

@@ -184,7 +184,7 @@ def warnings_of(
         if isinstance(budget, int):
             budgets.setdefault(budget, {})[task] = instructions.get(task, "")
     if budgets:
-        from robospa.clients.text import budget_warning
+        from robospa.clients.token_budget import budget_warning
 
         found += [
             text
@@ -199,7 +199,7 @@ def over_budget(hello: Mapping[str, Any] | None, instruction: str) -> dict[str, 
     budget = (hello or {}).get("text_budget")
     if not isinstance(budget, int):
         return None
-    from robospa.clients.text import least_tokens
+    from robospa.clients.token_budget import least_tokens
 
     count = least_tokens(instruction)
     return {"instruction_tokens": count, "text_budget": budget} if count > budget else None

@@ -11,7 +11,7 @@ import pytest
 from standin_base import QUICK, TRIAL, joint_chunk, observation
 from standins import Go1, OpenPi, RoboTwin, Status, VlaEval, XPolicyLab, XVla
 
-from robospa.clients import SCHEMES, connect, guess
+from robospa.clients import SCHEMES, connect, detect
 from robospa.protocol.errors import (
     CallTimeout,
     ConnectFailed,
@@ -163,7 +163,7 @@ def test_the_wrong_dialect_is_told_which_it_looks_like(
 ) -> None:
     """When connecting or at the first question; a HandshakeError, so the run stops at once."""
     # RoboTwin's server leaves a question over HTTP without answer, all others answer at once.
-    monkeypatch.setattr(guess, "SECONDS", 2.0 if server == "robotwin" else 20.0)
+    monkeypatch.setattr(detect, "SECONDS", 2.0 if server == "robotwin" else 20.0)
     with JOINT[server]() as url, pytest.raises(HandshakeError) as caught:
         use(url.replace(SPOKEN[server], SPOKEN[spoken]))
     assert LOOKS[server] in str(caught.value)
@@ -174,7 +174,7 @@ def test_the_wrong_dialect_is_told_which_it_looks_like(
 def test_something_that_never_answers_is_not_guessed_at(
     spoken: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(guess, "SECONDS", 0.05)
+    monkeypatch.setattr(detect, "SECONDS", 0.05)
     with socket.create_server(("127.0.0.1", 0)) as silent:
         url = f"{SPOKEN[spoken]}://127.0.0.1:{silent.getsockname()[1]}"
         with pytest.raises(TransportError) as caught:

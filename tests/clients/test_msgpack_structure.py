@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robospa.clients.msgpack_arrays import binary_form, check_structure, pack, text_form, unpack
+from robospa.clients.numpy_msgpack import binary_form, check_structure, pack, text_form, unpack
 from robospa.protocol.codec import DEFAULT_LIMITS, Limits
 from robospa.protocol.errors import DecodeError
 

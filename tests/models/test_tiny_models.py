@@ -26,9 +26,9 @@ ROOT = Path(__file__).resolve().parents[2]
 HERE = Path(__file__).resolve().parent
 PYTHON = os.environ.get("ROBOSPA_MODELS_PYTHON", str(ROOT / ".venv-models" / "bin" / "python"))
 SERVED = {
-    "act": "robospa.baselines.lerobot:create",
-    "diffusion": "robospa.baselines.lerobot:create",
-    "xvla": "robospa.baselines.lerobot:create",
+    "act": "robospa.clients.lerobot.serve:create",
+    "diffusion": "robospa.clients.lerobot.serve:create",
+    "xvla": "robospa.clients.lerobot.serve:create",
     "pi05": "tiny:serve_pi05",
 }
 SIZES = {"xvla": 856_344, "pi05": 455_520}
@@ -39,15 +39,11 @@ pytestmark = [pytest.mark.models, pytest.mark.timeout(1500)]
 
 
 @pytest.fixture(scope="module")
-def environment(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+def environment() -> dict[str, str]:
     """Variables with which the models' Python finds this source tree, and nothing online."""
-    folder = tmp_path_factory.mktemp("source") / "robospa"
-    folder.mkdir()
-    for name in ("protocol", "clients", "tasks", "harness", "baselines"):
-        (folder / name).symlink_to(ROOT / name)
     return {
         **os.environ,
-        "PYTHONPATH": str(folder.parent),
+        "PYTHONPATH": str(ROOT),
         "PYTHONDONTWRITEBYTECODE": "1",
         "HF_HUB_OFFLINE": "1",
         "CUDA_VISIBLE_DEVICES": "",

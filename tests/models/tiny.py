@@ -26,9 +26,9 @@ import torch
 from lerobot.configs.types import FeatureType, PolicyFeature
 from lerobot.policies.factory import make_pre_post_processors
 
-from robospa.baselines import lerobot as served
-from robospa.baselines.model import Ask
-from robospa.baselines.noise import NotByRow, seeded_rows
+from robospa.clients.lerobot import serve as served
+from robospa.clients.model_policy import Ask
+from robospa.clients.seeded_noise import NotByRow, seeded_rows
 from robospa.protocol.policy import TrialInfo
 
 VIEWS = ("head_camera", "left_camera", "right_camera")

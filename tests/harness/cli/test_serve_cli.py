@@ -156,7 +156,7 @@ def test_options_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
 
 @pytest.mark.parametrize("name", MODELS)
 def test_every_shipped_server_has_typed_documented_options(name: str) -> None:
-    make = load_function(f"robospa.baselines.{name}:create")
+    make = load_function(f"robospa.clients.{name}.serve:create")
     rows = option_table(command.options_class(make))
     assert rows and all(row.help for row in rows)
     page = (ROOT / "docs" / "serving.md").read_text()
@@ -167,7 +167,7 @@ def test_every_shipped_server_is_an_entry_point() -> None:
     points = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["entry-points"]
     listed = points["robospa.policies"]
     assert {name: listed.get(name) for name in MODELS} == {
-        name: f"robospa.baselines.{name}:create" for name in MODELS
+        name: f"robospa.clients.{name}.serve:create" for name in MODELS
     }
 
 

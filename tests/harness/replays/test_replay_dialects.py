@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from replay_fakes import CHUNK, FRAMES, Learned, episode
 
+from robospa.clients.ee6d import poses_to_ee6d
 from robospa.harness.cli.main import main
 from robospa.harness.replays.episodes import write_episode
-from robospa.protocol.rot6d import poses_to_ee6d
 
 MADE = episode()
 KNOWS = Learned(MADE)

@@ -1,0 +1,127 @@
+"""GO-1 (AgiBot World) behind its own `deploy.py`: POST /act, JSON with arrays inside.
+
+    ours                   sent
+    images.head            top     (240, 320, 3) uint8 RGB
+    images.right_wrist     right   (swapped with left if `wrists=swapped`)
+    images.left_wrist      left
+    state (14,)            state   (1, 14) float32
+    instruction            instruction
+    option ctrl_freq       ctrl_freqs (1,) float32
+
+The answer is a bare list (T, 14) of absolute joint targets. There is no reset, no spec and no
+reason in its errors: every failure inside the server is a bare HTTP 500.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from robospa.clients.chunks import check_horizon
+from robospa.clients.detect import explained
+from robospa.clients.http import JsonServer
+from robospa.clients.numpy_json import chunk_of, dumps
+from robospa.protocol.errors import ServerError
+from robospa.protocol.options import option, plain_options
+from robospa.protocol.policy import Observation, PolicySpec, TrialInfo
+
+if TYPE_CHECKING:
+    from robospa.clients import Line
+
+VIEWS = {"top": "head", "right": "right_wrist", "left": "left_wrist"}
+
+WARNINGS = (
+    "the control frequency that the model was trained with is invisible on the wire: `ctrl_freq` "
+    "must equal ctrl_freq of its training config",
+    "a stock AgileX config trains on one constant prompt: unless it maps final_prompt to the task, "
+    "the model ignores the instruction",
+)
+SWAPPED = (
+    "left and right wrist images are swapped, as in RoboTwin's GO-1 client, to reproduce "
+    "numbers made with it"
+)
+
+
+@dataclass(frozen=True)
+class Options:
+    """What GO-1's server does not say."""
+
+    wrists: str = option(
+        "correct",
+        "`swapped` sends each wrist image under the other's name, as RoboTwin's client does",
+        ("correct", "swapped"),
+    )
+    ctrl_freq: float = option(30.0, "control frequency [Hz] given to the network")
+    horizon: int = option(30, "actions in a chunk, at most")
+    execute: int | None = option(None, "actions executed before the next query; none for all")
+    state: str = option("commanded", "which joints to send", ("commanded", "measured"))
+
+    def __post_init__(self) -> None:
+        """ValueError for options that cannot be."""
+        if not 0 < self.ctrl_freq < 10_000:
+            raise ValueError(f"option ctrl_freq={self.ctrl_freq:g} is no frequency in Hz")
+        check_horizon(self.horizon, self.execute)
+
+
+def body(observation: Observation, options: Options) -> bytes:
+    """The JSON body of one request."""
+    images = observation["images"]
+    views = dict(VIEWS)
+    if options.wrists == "swapped":
+        views["right"], views["left"] = views["left"], views["right"]
+    sent: dict[str, Any] = {theirs: images[ours] for theirs, ours in views.items()}
+    sent["instruction"] = observation.get("instruction", "")
+    sent["state"] = np.asarray(observation["state"], np.float32)[None]
+    sent["ctrl_freqs"] = np.array([options.ctrl_freq], np.float32)
+    return dumps(sent).encode()
+
+
+class Session:
+    """One kept-alive HTTP connection."""
+
+    def __init__(self, line: Line, options: Options) -> None:
+        self._line, self._options, self._answered = line, options, False
+        self._path = line.target.path if line.target.path.strip("/") else "/act"
+        self.spec = PolicySpec(
+            name="go1",
+            state=options.state,
+            horizon=options.horizon,
+            execute=options.execute,
+            action_dim=14,
+        )
+        warnings = [*WARNINGS, SWAPPED] if options.wrists == "swapped" else list(WARNINGS)
+        self.hello: dict[str, Any] = {
+            "dialect": "go1",
+            "spec": self.spec.to_json(),
+            "options": plain_options(options),
+            "warnings": warnings,
+        }
+        self._server = JsonServer(line)
+        self._server.greet(self._path, line.timeouts.hello)
+
+    def reset(self, id: int, trial: TrialInfo) -> None:
+        """Nothing to send: the server keeps no state between calls."""
+
+    def infer(
+        self, id: int, observation: Observation, timeout: float
+    ) -> tuple[Any, Mapping[str, float]]:
+        try:
+            answer = self._server.post(self._path, body(observation, self._options), timeout)
+        except ServerError as error:
+            raise error if self._answered else explained(error, self._line) from error
+        self._answered = True
+        return chunk_of(answer), {}
+
+    def end(self, id: int, outcome: Mapping[str, Any]) -> None:
+        """Nothing to send."""
+
+    def close(self) -> None:
+        self._server.close()
+
+
+def open_session(line: Line, options: Options) -> Session:
+    """A session with the server at `line.target`."""
+    return Session(line, options)

@@ -1,0 +1,317 @@
+"""Any LeRobot policy by its path, behind our wire: pi0.5, X-VLA, SmolVLA, ACT, diffusion and more.
+
+LeRobot's own server unpickles what it is sent; this one does not. The checkpoint's configuration
+says which images and state the policy wants, its saved processors do the rest. Cameras are matched
+to the configuration's names, never to their places; where a name says nothing, option `images`
+must. No state of the policy outlives a query: frames that it wants from the past are asked for
+anew, so trials never mix and several of them make one batch.
+
+    robospa serve lerobot --option path=outputs/train/pi05/checkpoints/last/pretrained_model
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from robospa.clients.ee6d import LAYOUTS, ORDERS
+from robospa.clients.image_preprocessing import resize
+from robospa.clients.model_policy import (
+    Ask,
+    Chunk,
+    ModelMissing,
+    ModelPolicy,
+    check_horizon,
+    import_installed,
+    import_torch,
+)
+from robospa.clients.seeded_noise import NotByRow, seeded_rows
+from robospa.clients.state_encoding import SPACES, Style
+from robospa.protocol.options import option
+from robospa.protocol.policy import CAMERAS, CameraSpec, PolicySpec
+
+STATE = "observation.state"
+WORDS = {
+    "head": ("head", "high", "top"),
+    "left_wrist": ("left",),
+    "right_wrist": ("right",),
+    "front": ("front", "low"),
+}
+"""Parts of an image's name that tell which of our cameras it is."""
+STATE_STEP = "Pi05PrepareStateTokenizerProcessorStep"
+
+
+@dataclass(frozen=True)
+class Options:
+    """How a LeRobot policy is loaded and fed."""
+
+    path: str = option("", "folder of the checkpoint (`pretrained_model`), or a hub name")
+    device: str = option("cuda", "device of the model")
+    batch: int = option(8, "observations in one call of the model, at most")
+    images: str | None = option(
+        None, "camera:key pairs, as head:observation.images.image; none to go by the keys' names"
+    )
+    resize: str = option(
+        "declared",
+        "`declared`: squash images to the size in the configuration; `no`: leave it to the policy",
+        ("declared", "no"),
+    )
+    colors: str = option("rgb", "order of an image's channels", ("rgb", "bgr"))
+    tokenizer: str | None = option(None, "folder of the tokenizer, where the hub is out of reach")
+    state_prompt: int | None = option(
+        None,
+        "pi0.5: numbers of state in its prompt, 14 (LeRobot >= 0.5) or 32 (before), as the "
+        "checkpoint was trained; none: as the installed version does",
+    )
+    domain_id: int | None = option(
+        None, "X-VLA: the soft prompt; none: as saved with the checkpoint (often 0)"
+    )
+    space: str | None = option(
+        None, "joint (14), ee (16) or ee6d (20); none: by the width of the actions"
+    )
+    quaternions: str = option(
+        "xyzw", "ee6d: how w x y z are read; `xyzw` repeats RoboTwin's slip", ORDERS
+    )
+    rotation: str = option("interleaved", "ee6d: order of the six rotation numbers", LAYOUTS)
+    proprio: str = option(
+        "measured",
+        "after the first query: what the robot reports, or the last command executed",
+        ("commanded", "measured"),
+    )
+    grippers: str = option(
+        "open", "joint: whether a gripper number says open or closed", ("open", "closed")
+    )
+    closed_above: float = option(0.7, "ee6d, closed: a number above this closes the gripper")
+    execute: int | None = option(
+        None, "actions executed before the next query; none: n_action_steps of the configuration"
+    )
+
+    def __post_init__(self) -> None:
+        """ValueError for options that cannot be."""
+        if not self.path:
+            raise ValueError("option path is needed: the checkpoint's folder or hub name")
+        if self.batch < 1:
+            raise ValueError(f"option batch={self.batch}: at least 1")
+        if self.state_prompt not in (None, 14, 32):
+            raise ValueError(f"option state_prompt={self.state_prompt} is none of 14, 32")
+        if self.space is not None and self.space not in SPACES:
+            raise ValueError(f"option space={self.space!r} is none of {', '.join(SPACES)}")
+
+
+@dataclass(frozen=True)
+class View:
+    """One image of the policy: its `key`, our `camera`, its declared size [px]."""
+
+    key: str
+    camera: str
+    width: int
+    height: int
+
+
+def find_views(features: Mapping[str, Sequence[int]], images: str | None) -> tuple[View, ...]:
+    """Which of our cameras each image (key to (C, H, W)) is; raises ValueError.
+
+    Keys that say `empty` are left out: the policy fills them itself.
+    """
+    wanted = {key: shape for key, shape in features.items() if "empty" not in key}
+    told: dict[str, str] = {}
+    for pair in (images or "").split(","):
+        camera, colon, key = pair.strip().partition(":")
+        if not pair.strip():
+            continue
+        if not colon or camera not in CAMERAS or key not in wanted or key in told:
+            raise ValueError(
+                f"option images={images!r}: {pair!r} is no camera:key with a camera of "
+                f"{', '.join(CAMERAS)} and a key of {', '.join(wanted) or 'no images'}"
+            )
+        told[key] = camera
+    views = []
+    for key, (_, height, width) in wanted.items():
+        camera = told.get(key) or _camera_named(key)
+        views.append(View(key, camera, int(width), int(height)))
+    cameras = [view.camera for view in views]
+    if len(set(cameras)) != len(cameras):
+        raise ValueError(f"two images of the policy are the same camera: {views}; set images")
+    return tuple(views)
+
+
+def _camera_named(key: str) -> str:
+    words = re.split(r"[^a-z]+", key.rpartition(".")[2].lower())
+    found = [camera for camera, names in WORDS.items() if any(name in words for name in names)]
+    if len(found) != 1:
+        raise ValueError(
+            f"the name {key!r} does not tell which camera it is; say "
+            f"--option images=head:{key}, with a pair for every image"
+        )
+    return found[0]
+
+
+class LeRobot(ModelPolicy):
+    """A LeRobot policy with its processors."""
+
+    def __init__(self, policy: Any, before: Any, after: Any, options: Options) -> None:
+        """Raises ValueError for a policy whose inputs or outputs are none of ours."""
+        super().__init__()
+        self.policy, self.before, self.after, self.options = policy, before, after, options
+        config = policy.config
+        inputs = {key: tuple(feature.shape) for key, feature in config.input_features.items()}
+        unknown = [k for k in inputs if k != STATE and not k.startswith("observation.image")]
+        if unknown:
+            raise ValueError(f"the policy wants {', '.join(unknown)}, which we do not have")
+        self.views = find_views({k: s for k, s in inputs.items() if k != STATE}, options.images)
+        width = int(config.output_features["action"].shape[0])
+        self.style = Style(
+            options.space or _space(width, "action"),
+            options.quaternions,
+            options.rotation,
+            options.proprio,
+            options.grippers,
+            options.closed_above,
+        )
+        self.state = _space(inputs[STATE][0], "state") if STATE in inputs else None
+        frames = int(getattr(config, "n_obs_steps", 1) or 1)
+        self.history = tuple(range(1 - frames, 0))
+        if self.history and (self.state or "joint") != "joint":
+            raise ValueError("a policy that wants earlier poses is not supported, only joints")
+        horizon = getattr(config, "chunk_size", None) or config.n_action_steps
+        execute = options.execute or min(int(config.n_action_steps), int(horizon))
+        check_horizon(int(horizon), execute)
+        joint = self.style.space == "joint"
+        self.spec = PolicySpec(
+            name=f"lerobot:{config.type}",
+            cameras=tuple(CameraSpec(view.camera) for view in self.views),
+            action="joint" if joint else "ee",
+            horizon=int(horizon),
+            execute=execute,
+            history=self.history,
+            batch=options.batch,
+            seeded=True,
+            action_dim=14 if joint else 16,
+        )
+
+    def predict(self, asks: Sequence[Ask]) -> list[Chunk]:
+        """One chunk per query, in the space of the spec."""
+        try:
+            return self._predict(asks)
+        except NotByRow:
+            return [chunk for ask in asks for chunk in self._predict([ask])]
+
+    def _predict(self, asks: Sequence[Ask]) -> list[Chunk]:
+        torch = import_torch()
+        self.policy.reset()
+        with torch.inference_mode():
+            batch = self.before(self._batch(asks, None))
+            batch.pop("action", None)  # empty, but a policy with queues would look for it
+            if self.history:
+                batch = self._queue(asks, batch)
+            with seeded_rows([ask.seed for ask in asks]):
+                answer = self.policy.predict_action_chunk(batch)
+            chunks = self.after(answer).float().cpu().numpy()[:, : self.spec.horizon]
+        return [self.style.actions(ask, c) for ask, c in zip(asks, chunks, strict=True)]
+
+    def _batch(self, asks: Sequence[Ask], offset: int | None) -> dict[str, Any]:
+        """The observations of now, or of `offset` actions ago, as LeRobot's data loader gives them:
+        images float (B, C, H, W) from 0 to 1."""
+        torch = import_torch()
+        batch: dict[str, Any] = {"task": [ask.observation["instruction"] for ask in asks]}
+        seen = [
+            ask.observation if offset is None else ask.observation["history"][offset]
+            for ask in asks
+        ]
+        for view in self.views:
+            images = np.stack([self._image(one["images"][view.camera], view) for one in seen])
+            batch[view.key] = torch.from_numpy(images).permute(0, 3, 1, 2).float() / 255
+        if self.state is not None:
+            if offset is None:
+                told = [self.style.told(ask, self.state) for ask in asks]
+            else:
+                told = [np.array(one["state"], np.float32) for one in seen]
+            batch[STATE] = torch.from_numpy(np.stack(told))
+        return batch
+
+    def _image(self, image: Any, view: View) -> Any:
+        if self.options.resize == "declared":
+            image = resize(image, view.width, view.height)
+        return np.ascontiguousarray(image if self.options.colors == "rgb" else image[..., ::-1])
+
+    def _queue(self, asks: Sequence[Ask], now: dict[str, Any]) -> dict[str, Any]:
+        """Fill the policy's queues with the frames of all queries, oldest first."""
+        torch = import_torch()
+        utils = import_installed("lerobot.policies.utils")
+        keys = list(self.policy.config.image_features)
+        frames = [self.before(self._batch(asks, offset)) for offset in self.history]
+        for frame in (*frames, now):
+            if keys:
+                frame["observation.images"] = torch.stack([frame[key] for key in keys], dim=-4)
+            self.policy._queues = utils.populate_queues(self.policy._queues, frame, ["action"])
+        return now
+
+
+def _space(width: int, what: str) -> str:
+    for space, size in SPACES.items():
+        if size == width:
+            return space
+    sizes = ", ".join(f"{space} {size}" for space, size in SPACES.items())
+    raise ValueError(f"the policy's {what} has {width} numbers, which is none of ours ({sizes})")
+
+
+class StateWidth:
+    """A processor step that pads or cuts the state before pi0.5 prints it into its prompt."""
+
+    def __init__(self, width: int) -> None:
+        self.width = width
+
+    def __call__(self, transition: Any) -> Any:
+        """The transition with a state of `width` numbers, zeros appended."""
+        torch = import_torch()
+        changed = dict(transition)
+        observation = dict(changed["observation"])
+        state = observation[STATE]
+        lacking = self.width - state.shape[-1]
+        observation[STATE] = torch.nn.functional.pad(state, (0, lacking)) if lacking > 0 else state
+        changed["observation"] = observation
+        return changed
+
+
+def print_state(before: Any, width: int) -> None:
+    """Make the processors of pi0.5 print `width` numbers of state; ValueError for others'."""
+    steps = list(before.steps)
+    places = [i for i, step in enumerate(steps) if type(step).__name__ == STATE_STEP]
+    if not places:
+        raise ValueError("option state_prompt is for pi0.5: these processors print no state")
+    steps[places[0]].max_state_dim = width  # LeRobot < 0.5 pads to this itself
+    steps.insert(places[0], StateWidth(width))
+    before.steps = steps
+
+
+def create(options: Options) -> LeRobot:
+    """Load a policy and its processors. Raises ModelMissing, ValueError."""
+    import_torch()
+    configs = import_installed("lerobot.configs.policies")
+    factory = import_installed("lerobot.policies.factory")
+    overrides: dict[str, Any] = {"device_processor": {"device": options.device}}
+    if options.tokenizer is not None:
+        overrides["tokenizer_processor"] = {"tokenizer_name": options.tokenizer}
+    try:
+        config = configs.PreTrainedConfig.from_pretrained(options.path)
+        config.device = options.device
+        if options.tokenizer is not None and hasattr(config, "tokenizer_name"):
+            config.tokenizer_name = options.tokenizer
+        policy = factory.get_policy_class(config.type).from_pretrained(options.path, config=config)
+        before, after = factory.make_pre_post_processors(
+            config, options.path, preprocessor_overrides=overrides
+        )
+    except (OSError, KeyError, ImportError) as error:
+        raise ModelMissing(f"cannot load {options.path}: {error}") from error
+    if options.domain_id is not None:
+        steps = [step for step in before.steps if hasattr(step, "domain_id")]
+        if not steps:
+            raise ValueError("option domain_id is for X-VLA: these processors have no such step")
+        steps[0].domain_id = options.domain_id
+    if options.state_prompt is not None:
+        print_state(before, options.state_prompt)
+    return LeRobot(policy.eval(), before, after, options)

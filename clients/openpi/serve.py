@@ -1,0 +1,106 @@
+"""openpi's policy in this process: noise from our seeds, and its conventions can be looked at.
+
+Its own server (`scripts/serve_policy.py`, reached by `openpi://`) needs none of this. Here a
+configuration whose `adapt_to_pi` is on is refused: it turns joints and grippers of another robot
+into ours without a word, which over the wire nobody can see.
+
+    robospa serve openpi --option config=pi05_robotwin --option checkpoint=...
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from robospa.clients.model_policy import Ask, Chunk, ModelPolicy, check_horizon, import_code
+from robospa.protocol.options import option
+from robospa.protocol.policy import PolicySpec
+
+VIEWS = {"cam_high": "head", "cam_left_wrist": "left_wrist", "cam_right_wrist": "right_wrist"}
+"""Our camera for each image of openpi's Aloha transform."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """How the policy is loaded."""
+
+    config: str = option("", "name of the training configuration in openpi")
+    checkpoint: str = option("", "its folder (or gs:// address)")
+    code: str | None = option(None, "folder with openpi's sources, if it is not installed")
+    adapt_to_pi: str = option(
+        "refuse",
+        "`refuse` a configuration with adapt_to_pi on, or `accept` it",
+        ("refuse", "accept"),
+    )
+    batch: int = option(8, "observations in one call, where the class has infer_batch")
+    execute: int | None = option(None, "actions executed before the next query; none for all")
+
+    def __post_init__(self) -> None:
+        """ValueError for options that cannot be."""
+        if not self.config or not self.checkpoint:
+            raise ValueError("options config and checkpoint are needed")
+        if self.batch < 1:
+            raise ValueError(f"option batch={self.batch}: at least 1")
+
+
+class OpenPi(ModelPolicy):
+    """A policy of openpi's `create_trained_policy`."""
+
+    def __init__(self, policy: Any, horizon: int, width: int, options: Options) -> None:
+        """`horizon` and `width`: the shape of the model's noise."""
+        super().__init__()
+        check_horizon(horizon, options.execute)
+        self.policy, self.shape = policy, (horizon, width)
+        self.batches = hasattr(policy, "infer_batch")
+        self.spec = PolicySpec(
+            name=f"openpi:{options.config}",
+            horizon=horizon,
+            execute=options.execute,
+            batch=options.batch if self.batches else 1,
+            seeded=True,
+            action_dim=14,
+        )
+
+    def predict(self, asks: Sequence[Ask]) -> list[Chunk]:
+        """One chunk (T, 14) of absolute joint targets per query."""
+        inputs = [_observation(ask) for ask in asks]
+        noise = [self._noise(ask.seed) for ask in asks]
+        if self.batches and len(asks) > 1:
+            answer = self.policy.infer_batch(inputs, noise=np.stack(noise))["actions"]
+            return [np.array(chunk, np.float32) for chunk in answer]
+        pairs = zip(inputs, noise, strict=True)
+        return [np.array(self.policy.infer(i, noise=n)["actions"], np.float32) for i, n in pairs]
+
+    def _noise(self, seed: int) -> Chunk:
+        return np.random.default_rng(seed).standard_normal(self.shape, np.float32)
+
+
+def _observation(ask: Ask) -> dict[str, Any]:
+    """What the Aloha input transform takes: images (3, H, W), no other camera."""
+    images = ask.observation["images"]
+    return {
+        "state": np.array(ask.observation["state"], np.float32),
+        "images": {
+            theirs: np.ascontiguousarray(images[ours].transpose(2, 0, 1))
+            for theirs, ours in VIEWS.items()
+        },
+        "prompt": ask.observation["instruction"],
+    }
+
+
+def create(options: Options) -> OpenPi:
+    """Load the policy. Raises ModelMissing, and ValueError for a configuration that is refused."""
+    configs = import_code("openpi.training.config", options.code, "openpi's sources")
+    loading = import_code("openpi.policies.policy_config", options.code, "openpi's sources")
+    config = configs.get_config(options.config)
+    if options.adapt_to_pi == "refuse" and getattr(config.data, "adapt_to_pi", False):
+        raise ValueError(
+            f"openpi's configuration {options.config!r} has adapt_to_pi on, which bends joints and "
+            "grippers for another robot; use one with adapt_to_pi=False, or say "
+            "--option adapt_to_pi=accept"
+        )
+    policy = loading.create_trained_policy(config, options.checkpoint)
+    return OpenPi(policy, config.model.action_horizon, config.model.action_dim, options)

@@ -1,0 +1,164 @@
+"""RDT-1B: the official class, unmodified, behind our wire (it has no server of its own).
+
+Imports `scripts.agilex_model` from a checkout of RoboticsDiffusionTransformer. What is done here is
+what its callers do for RoboTwin: six images (head, right wrist, left wrist, one action ago and now;
+at the first step there is no past), each brought to 640x480 and through JPEG; the instruction as
+T5 hidden states, made once and cached; and the real robot's gripper factors, which the class
+applies in both directions, cancelled, because our grippers are 0..1.
+
+    PYTHONPATH=RoboticsDiffusionTransformer robospa serve rdt --option checkpoint=...
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from robospa.clients.image_preprocessing import jpeg_round_trip, pictures, resize
+from robospa.clients.model_policy import (
+    Ask,
+    Chunk,
+    ModelMissing,
+    ModelPolicy,
+    check_horizon,
+    existing,
+    import_code,
+    import_installed,
+    import_torch,
+)
+from robospa.clients.rdt.t5 import Embeddings
+from robospa.clients.seeded_noise import seeded_rows
+from robospa.protocol.options import option
+from robospa.protocol.policy import Observation, PolicySpec, TrialInfo
+
+VIEWS = ("head", "right_wrist", "left_wrist")
+"""Our cameras in the order of the model's images."""
+GRIPPERS = (6, 13)
+STATE_FACTORS = (4.7908, 4.7888)
+"""By which the official class divides the grippers of the state."""
+ACTION_FACTORS = (11.8997, 13.9231)
+"""By which it multiplies those of its actions."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """How RDT is loaded and fed."""
+
+    checkpoint: str = option("", "folder or file (.pt, .safetensors) with the fine-tuned weights")
+    code: str | None = option(None, "checkout of RoboticsDiffusionTransformer, or set PYTHONPATH")
+    config: str | None = option(None, "the model's YAML; none for configs/base.yaml in the code")
+    vision: str = option("google/siglip-so400m-patch14-384", "SigLIP: a hub name or a folder")
+    embeddings: str | None = option(
+        None, "folder of .pt files with T5 embeddings; new ones are added to it"
+    )
+    t5: str | None = option(
+        "google/t5-v1_1-xxl", "T5 for instructions without a file (9.5 GB); none: files only"
+    )
+    t5_device: str | None = option(None, "device of T5; none for that of the model")
+    device: str = option("cuda", "device of the model")
+    dtype: str = option("bfloat16", "of weights and activations", ("bfloat16", "float32"))
+    ctrl_freq: int = option(25, "control frequency [Hz] given to the network")
+    grippers: str = option(
+        "cancelled",
+        "`cancelled` undoes the real robot's gripper factors; `none` if the class has none (fork)",
+        ("cancelled", "none"),
+    )
+    jpeg: bool = option(True, "put images through JPEG, as in training")
+    horizon: int = option(64, "actions in a chunk, at most")
+    execute: int | None = option(None, "actions executed before the next query; none for all")
+
+    def __post_init__(self) -> None:
+        """ValueError for options that cannot be."""
+        check_horizon(self.horizon, self.execute)
+        if not self.checkpoint:
+            raise ValueError("option checkpoint is needed: the fine-tuned weights")
+        if self.embeddings is None and self.t5 is None:
+            raise ValueError("options embeddings and t5 are both none: instructions need one")
+
+
+class Rdt(ModelPolicy):
+    """The official class, one observation at a time: it stacks images of one sample only."""
+
+    def __init__(self, model: Any, embeddings: Embeddings, options: Options) -> None:
+        super().__init__()
+        self.model, self.embeddings, self.options = model, embeddings, options
+        self.spec = PolicySpec(
+            name="rdt",
+            horizon=options.horizon,
+            execute=options.execute,
+            history=(-1,),
+            seeded=True,
+            action_dim=14,
+        )
+
+    def begin(self, trial: TrialInfo) -> None:
+        """Encode the trial's instruction now, so that no step waits for it."""
+        self.embeddings.find(trial.instruction)
+
+    def predict(self, asks: Sequence[Ask]) -> list[Chunk]:
+        """One chunk (T, 14) of absolute joint targets per query."""
+        return [self._one(ask.observation, ask.seed) for ask in asks]
+
+    def _one(self, observation: Observation, seed: int) -> Chunk:
+        torch = import_torch()
+        now, first = observation["images"], int(observation["step"]) < 1
+        past = None if first else observation["history"][-1]["images"]
+        images = [None if past is None else self._picture(past[name]) for name in VIEWS]
+        images += [self._picture(now[name]) for name in VIEWS]
+        state = np.array(observation["state"], np.float32)
+        if self.options.grippers == "cancelled":
+            state[list(GRIPPERS)] *= STATE_FACTORS
+        with torch.inference_mode(), seeded_rows([seed]):
+            answer = self.model.step(
+                torch.from_numpy(state[None]),
+                images,
+                self.embeddings.find(observation["instruction"]),
+            )
+        chunk: Chunk = answer.float().cpu().numpy()[0, : self.options.horizon].copy()
+        if self.options.grippers == "cancelled":
+            chunk[:, GRIPPERS] /= np.array(ACTION_FACTORS, np.float32)
+        return chunk
+
+    def _picture(self, image: Any) -> Any:
+        large = resize(image, 640, 480)
+        return pictures().fromarray(jpeg_round_trip(large) if self.options.jpeg else large)
+
+
+def create(options: Options) -> Rdt:
+    """Load the model. Raises ModelMissing."""
+    torch = import_torch()
+    source = import_code(
+        "scripts.agilex_model", options.code, "a checkout of RoboticsDiffusionTransformer"
+    )
+    dtype = getattr(torch, options.dtype)
+    args = read_config(options.config, source)
+    model = source.create_model(
+        args=args,
+        dtype=dtype,
+        device=options.device,
+        pretrained=existing(options.checkpoint, "checkpoint"),
+        pretrained_vision_encoder_name_or_path=options.vision,
+        control_frequency=options.ctrl_freq,
+    )
+    embeddings = Embeddings(
+        None if options.embeddings is None else Path(options.embeddings).expanduser(),
+        options.t5,
+        options.t5_device or options.device,
+        dtype,
+        int(args["dataset"]["tokenizer_max_length"]),
+    )
+    return Rdt(model, embeddings, options)
+
+
+def read_config(path: str | None, source: Any) -> dict[str, Any]:
+    """The model's YAML as a map; by default that beside the code. Raises ModelMissing."""
+    yaml = import_installed("yaml")
+    chosen = path or str(Path(source.__file__).resolve().parents[1] / "configs" / "base.yaml")
+    value = yaml.safe_load(Path(existing(chosen, "config")).read_text())
+    if not isinstance(value, dict) or "dataset" not in value:
+        raise ModelMissing(f"{chosen} is no configuration of RDT: it lacks 'dataset'")
+    return value

@@ -1,0 +1,196 @@
+"""vla-eval's model servers (AllenAI's evaluation harness), as its RoboTwin benchmark talks to them.
+
+    ours                    payload of `observation` (msgpack, arrays with text keys)
+    images.head             images.head_camera              (240, 320, 3) uint8 RGB, raw
+    images.left_wrist       images.left_camera
+    images.right_wrist      images.right_camera
+    state (14,)             joint_state, state, states      one array under each name
+    instruction             task_description
+
+The server keeps the chunk and answers one action an observation, or a whole chunk if it was
+configured without chunking; both are understood. A trial begins with `episode_start`, which has no
+answer: an error in it comes later, in place of an action. So an error or an action with another
+number than the observation's ends the connection here, and every trial begins on the safe side.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from robospa.clients.chunks import WIDTHS, as_chunk, check_horizon, turned
+from robospa.clients.msgpack_socket import Frames
+from robospa.clients.numpy_msgpack import text_form
+from robospa.protocol.errors import HandshakeError, ServerError, printable
+from robospa.protocol.options import option, plain_options
+from robospa.protocol.policy import CameraSpec, Observation, PolicySpec, TrialInfo
+from robospa.protocol.validate import as_said
+
+if TYPE_CHECKING:
+    from robospa.clients import Line
+
+CAMERAS = {"head": "head_camera", "left_wrist": "left_camera", "right_wrist": "right_camera"}
+PROTOCOL = 1
+
+WARNINGS = (
+    "most vla-eval servers answer one action an observation: then every action needs rendering and "
+    "sending; a server started without chunk_size answers whole chunks",
+    "models of vla-eval take images in the order they come, whatever their names: `cameras` must "
+    "be the order of training",
+    "whether 1 is an open or a closed gripper is invisible on the wire: see `grippers`",
+)
+
+
+@dataclass(frozen=True)
+class Options:
+    """What a vla-eval server does not say."""
+
+    space: str = option("joint", "what the model answers", ("joint", "ee"))
+    grippers: str = option("open", "what 1 means in an answered gripper", ("open", "closed"))
+    cameras: str = option("head,left_wrist,right_wrist", "our cameras to send, in this order")
+    state_keys: str = option("joint_state,state,states", "names under which the joints are sent")
+    state: str = option("commanded", "which joints to send", ("commanded", "measured"))
+    horizon: int = option(64, "actions in a chunk, at most")
+    execute: int | None = option(None, "actions executed before the next query; none for all")
+
+    def __post_init__(self) -> None:
+        """ValueError for options that cannot be."""
+        check_horizon(self.horizon, self.execute)
+        wrong = [name for name in self.views if name not in CAMERAS]
+        if wrong or len(set(self.views)) != len(self.views):
+            raise ValueError(f"option cameras={self.cameras!r}: some of {', '.join(CAMERAS)}")
+
+    @property
+    def views(self) -> tuple[str, ...]:
+        """Our cameras in the order they are sent."""
+        return tuple(name for name in self.cameras.split(",") if name)
+
+
+def encode(observation: Observation, options: Options) -> dict[str, Any]:
+    """The payload of one `observation`."""
+    images = observation["images"]
+    sent: dict[str, Any] = {
+        "images": {CAMERAS[name]: images[name] for name in options.views},
+        "task_description": observation.get("instruction", ""),
+    }
+    state = np.asarray(observation["state"], np.float32)
+    return {**sent, **{key: state for key in options.state_keys.split(",") if key}}
+
+
+class Session:
+    """One WebSocket, which is one session of the server."""
+
+    def __init__(self, line: Line, options: Options) -> None:
+        self._options = options
+        self._number = 0
+        self._frames = Frames(line, text_form)
+        self.spec = PolicySpec(
+            name="vla-eval",
+            cameras=tuple(CameraSpec(name) for name in options.views),
+            state=options.state,
+            action=options.space,
+            horizon=options.horizon,
+            execute=options.execute,
+            action_dim=WIDTHS[options.space],
+        )
+        number = self._send("hello", {"harness_version": "robospa", "protocol_version": PROTOCOL})
+        greeting = self._answer("hello", number, line.timeouts.hello)
+        theirs = greeting.get("protocol_version")
+        if theirs != PROTOCOL:
+            self.close()
+            raise HandshakeError(
+                f"{line.target.url} speaks version {str(theirs)[:40]} of vla-eval's protocol, "
+                f"not {PROTOCOL}"
+            )
+        name = str(greeting.get("model_server", ""))
+        said = {key: as_said(greeting[key]) for key in SAID if key in greeting}
+        self.hello: dict[str, Any] = {
+            "dialect": "vla-eval",
+            "server": printable(f"{name} {greeting.get('harness_version', '')}", 200),
+            "said": said,
+            "spec": self.spec.to_json(),
+            "options": plain_options(options),
+            "warnings": [*WARNINGS, *_doubts(said, options)],
+        }
+
+    def reset(self, id: int, trial: TrialInfo) -> None:
+        task = {
+            "name": trial.task,
+            "suite": "robospa",
+            "seed": trial.seed,
+            "episode_idx": 0,
+            "instruction": trial.instruction,
+        }
+        self._send("episode_start", {"task": task})
+
+    def infer(
+        self, id: int, observation: Observation, timeout: float
+    ) -> tuple[Any, Mapping[str, float]]:
+        number = self._send("observation", encode(observation, self._options))
+        answer = self._answer("action", number, timeout)
+        chunk = as_chunk(answer.get("actions", answer.get("action")))
+        if isinstance(chunk, np.ndarray) and chunk.ndim == 1:
+            chunk = chunk[None]
+        if self._options.grippers == "closed":
+            chunk = turned(chunk, self._options.space)
+        return chunk, {}
+
+    def end(self, id: int, outcome: Mapping[str, Any]) -> None:
+        self._send("episode_end", {"metrics": {"success": bool(outcome.get("success"))}})
+
+    def close(self) -> None:
+        self._frames.close()
+
+    def _send(self, kind: str, payload: dict[str, Any]) -> int:
+        self._number += 1
+        message = {"type": kind, "payload": payload, "seq": self._number, "timestamp": time.time()}
+        self._frames.send(message)
+        return self._number
+
+    def _answer(self, wanted: str, number: int, timeout: float) -> Mapping[str, Any]:
+        """The payload of the answer of type `wanted` to message `number`."""
+        answer = self._frames.receive(timeout, wanted)
+        kind, body = answer.get("type"), answer.get("payload")
+        if not isinstance(body, Mapping):
+            raise self._frames.violation("its answer is no message of vla-eval")
+        if kind == "error":
+            text = str(body.get("error", "no reason given"))
+            late = answer.get("seq") != number
+            if late:  # of `episode_start`: this observation's own answer is still to come
+                self.close()
+            what = "an error" if not late else "an error of an earlier message"
+            raise ServerError(what, text, True, self._frames.url)
+        if answer.get("seq") != number:
+            raise self._frames.violation(f"answer {answer.get('seq')} came to message {number}")
+        if kind != wanted:
+            raise self._frames.violation(f"{kind} came where {wanted} was due")
+        return body
+
+
+SAID = ("observation_params", "action_spec", "observation_spec", "capabilities")
+
+
+def _doubts(said: Mapping[str, Any], options: Options) -> list[str]:
+    """What the server says of its actions and does not fit the options."""
+    parts = said.get("action_spec")
+    if not isinstance(parts, Mapping):
+        return []
+    sizes = {name: part.get("dims") for name, part in parts.items() if isinstance(part, Mapping)}
+    known = [size for size in sizes.values() if isinstance(size, int)]
+    total = sum(known)
+    if not all(known) or not known or total == WIDTHS[options.space]:
+        return []
+    told = ", ".join(f"{name} {size}" for name, size in sizes.items())
+    return [
+        f"the server announces {total} numbers an action ({told}), but {options.space} actions "
+        f"have {WIDTHS[options.space]}"
+    ]
+
+
+def open_session(line: Line, options: Options) -> Session:
+    """A session with the server at `line.target`."""
+    return Session(line, options)

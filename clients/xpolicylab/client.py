@@ -1,0 +1,230 @@
+"""XPolicyLab's policy server: one WebSocket protocol in front of some forty policies.
+
+    ours                       payload.observation (msgpack, arrays as msgpack-numpy writes them)
+    images.head                vision.cam_head.color           (240, 320, 3) uint8 RGB
+    images.left_wrist          vision.cam_left_wrist.color
+    images.right_wrist         vision.cam_right_wrist.color
+    state (14,)                state.left_arm_joint_state (6,), left_ee_joint_state (1,), right..
+    ee (2, 8)                  state.left_ee_pose (7,) x y z qw qx qy qz, left_tcp_pose, right..
+    instruction                instruction, instructions
+
+Answered is a list of maps, one an action, with the same names; an arm or a gripper that an action
+does not name keeps what was observed. Every message has an id, which its answer must repeat. A
+message that the server cannot read is never answered: then the deadline is the only news.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import datetime, timezone
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robospa.clients.chunks import as_chunk, check_horizon, turned
+from robospa.clients.msgpack_socket import Frames
+from robospa.clients.numpy_msgpack import binary_form
+from robospa.protocol.errors import PolicyAnswerError, ServerError, printable
+from robospa.protocol.options import option, plain_options
+from robospa.protocol.policy import Observation, PolicySpec, TrialInfo
+from robospa.rotations import quaternion_to_matrix
+
+if TYPE_CHECKING:
+    from robospa.clients import Line
+
+CAMERAS = {"head": "cam_head", "left_wrist": "cam_left_wrist", "right_wrist": "cam_right_wrist"}
+ARMS = ("left", "right")
+TCP_AHEAD = 0.12
+"""The tool centre point is this far [m] along the x axis of the end-effector frame."""
+
+WARNINGS = (
+    "a model behind XPolicyLab's server is shared by all connections: unless it keeps no state "
+    "between calls, give every worker a server of its own (--workers 1)",
+    "XPolicyLab's protocol shows a policy only the observations at which it is asked: one that "
+    "wants the frame before (RDT) gets that of its previous query instead",
+    "whether a policy answers joints or poses is invisible on the wire: `space` must be the "
+    "action_type it was configured with",
+    "some adapters (X_VLA) answer 1 for a closed gripper: `grippers=closed` turns it round",
+)
+
+
+@dataclass(frozen=True)
+class Options:
+    """What XPolicyLab's server does not say."""
+
+    space: str = option(
+        "joint", "the action_type that the policy is configured with", ("joint", "ee")
+    )
+    grippers: str = option("open", "what 1 means in an answered gripper", ("open", "closed"))
+    frequency: int = option(30, "control frequency [Hz] told in additional_info")
+    state: str = option("commanded", "which joints to send", ("commanded", "measured"))
+    horizon: int = option(64, "actions in a chunk, at most")
+    execute: int | None = option(None, "actions executed before the next query; none for all")
+    evaluation_id: str = option("robospa", "name of the evaluation in every message")
+
+    def __post_init__(self) -> None:
+        """ValueError for options that cannot be."""
+        check_horizon(self.horizon, self.execute)
+        if not 0 < self.frequency < 10_000:
+            raise ValueError(f"option frequency={self.frequency} is no frequency in Hz")
+
+
+def encode(observation: Observation, options: Options) -> dict[str, Any]:
+    """`payload.observation` of one query."""
+    instruction = observation.get("instruction", "")
+    images = observation["images"]
+    return {
+        "data_format_version": "v1.0",
+        "instruction": instruction,
+        "instructions": [instruction] if instruction else [],
+        "env_idx": 0,
+        "vision": {
+            theirs: {"color": images[ours], "shape": list(images[ours].shape[:2])}
+            for ours, theirs in CAMERAS.items()
+        },
+        "state": robot_state(observation),
+        "additional_info": {"frequency": options.frequency},
+    }
+
+
+def robot_state(observation: Observation) -> dict[str, NDArray[np.float32]]:
+    """Joints, grippers and poses of both arms under XPolicyLab's names, float32."""
+    joints = np.asarray(observation["state"], np.float32).reshape(2, 7)
+    poses = np.asarray(observation["ee"], np.float32)[:, :7]
+    found: dict[str, NDArray[np.float32]] = {}
+    for arm, name in enumerate(ARMS):
+        found[f"{name}_arm_joint_state"] = joints[arm, :6]
+        found[f"{name}_ee_joint_state"] = joints[arm, 6:]
+        found[f"{name}_ee_pose"] = poses[arm]
+        axis = quaternion_to_matrix(poses[arm, 3:].astype(float))[:, 0]
+        tcp = poses[arm, :3] + TCP_AHEAD * axis
+        found[f"{name}_tcp_pose"] = np.concatenate([tcp, poses[arm, 3:]]).astype(np.float32)
+    return found
+
+
+def decode(answer: Any, observation: Observation, options: Options) -> Any:
+    """The chunk in `payload.actions`; raises PolicyAnswerError for an action that names nothing."""
+    if isinstance(answer, Mapping):
+        answer = [answer]
+    if not isinstance(answer, list) or not any(isinstance(item, Mapping) for item in answer):
+        chunk = as_chunk(answer)
+    else:
+        seen = robot_state(observation)
+        chunk = as_chunk([_action(item, seen, options.space) for item in answer])
+    return turned(chunk, options.space) if options.grippers == "closed" else chunk
+
+
+def _action(item: Any, seen: Mapping[str, NDArray[np.float32]], space: str) -> list[Any]:
+    body = "arm_joint_state" if space == "joint" else "ee_pose"
+    size = 6 if space == "joint" else 7
+    if not isinstance(item, Mapping) or not any(f"{arm}_{body}" in item for arm in ARMS):
+        names = sorted(map(str, item)) if isinstance(item, Mapping) else type(item).__name__
+        raise PolicyAnswerError(
+            f"the policy answered an action of {names}, without left_{body} or right_{body}; is "
+            "option space its action_type?"
+        )
+    row: list[Any] = []
+    for arm in ARMS:
+        for name, width in ((f"{arm}_{body}", size), (f"{arm}_ee_joint_state", 1)):
+            value = np.ravel(item.get(name, seen[name]))
+            if len(value) != width:
+                raise PolicyAnswerError(
+                    f"the policy answered {len(value)} numbers as {name}, not {width}"
+                )
+            row += value.tolist()
+    return row
+
+
+class Session:
+    """One WebSocket."""
+
+    def __init__(self, line: Line, options: Options) -> None:
+        self._options, self._timeouts = options, line.timeouts
+        self._trial: dict[str, Any] = {}
+        self._ids: dict[str, Any] = {}
+        self.spec = PolicySpec(
+            name="xpolicylab",
+            state=options.state,
+            action=options.space,
+            horizon=options.horizon,
+            execute=options.execute,
+            action_dim=16 if options.space == "ee" else 14,
+        )
+        self._frames = Frames(line, binary_form)
+        greeting = self._call(0, "hello", "hello_ack", {}, line.timeouts.hello)
+        self.hello: dict[str, Any] = {
+            "dialect": "xpolicylab",
+            "server": printable(str(greeting.get("server", "")), 200),
+            "spec": self.spec.to_json(),
+            "options": plain_options(options),
+            "warnings": list(WARNINGS),
+        }
+
+    def reset(self, id: int, trial: TrialInfo) -> None:
+        case = f"{trial.task}-L{trial.level}"
+        self._trial = {
+            "task_name": trial.task,
+            "seed": trial.seed,
+            "instruction": trial.instruction,
+            "action_type": self._options.space,
+        }
+        self._ids = {"action_case_id": case, "trial_id": f"{case}-{trial.seed}"}
+        limit = self._timeouts.reset
+        payload = {"action_case_id": case, **self._trial}
+        with contextlib.suppress(ServerError):  # a hook that few models have; its own client too
+            self._call(id, "prepare_case", "prepare_case_ack", payload, limit)
+        payload = {"trial_id": self._ids["trial_id"], **self._trial}
+        self._call(id, "reset", "reset_result", payload, limit)
+
+    def infer(
+        self, id: int, observation: Observation, timeout: float
+    ) -> tuple[Any, Mapping[str, float]]:
+        payload = {"observation": encode(observation, self._options)}
+        step = int(observation["step"])
+        answer = self._call(id, "infer", "infer_result", payload, timeout, step)
+        spent = answer.get("latency_ms")
+        timing = {"infer_ms": float(spent)} if isinstance(spent, int | float) else {}
+        return decode(answer.get("actions"), observation, self._options), timing
+
+    def end(self, id: int, outcome: Mapping[str, Any]) -> None:
+        payload = {**self._ids, **self._trial, "success": bool(outcome.get("success", False))}
+        self._call(id, "trial_end", "trial_end_ack", payload, self._timeouts.end)
+
+    def close(self) -> None:
+        self._frames.close()
+
+    def _call(
+        self, id: int, kind: str, wanted: str, payload: Any, timeout: float, step: int = 0
+    ) -> Mapping[str, Any]:
+        """The payload of the answer of type `wanted` to this very message."""
+        name = f"{id}-{kind}"
+        message = {
+            "message_type": kind,
+            "message_id": name,
+            "evaluation_id": self._options.evaluation_id,
+            **self._ids,
+            "step": step,
+            "sent_at": datetime.now(timezone.utc).isoformat(),
+            "payload": payload,
+        }
+        self._frames.send(message)
+        answer = self._frames.receive(timeout, wanted)
+        body = answer.get("payload")
+        if not isinstance(body, Mapping) or "message_type" not in answer:
+            raise self._frames.violation("its answer is no message of XPolicyLab")
+        if answer.get("message_id") != name:
+            raise self._frames.violation(f"answer {answer.get('message_id')!r} came to {name!r}")
+        if answer["message_type"] == "error":
+            text = str(body.get("message", "no reason given"))
+            raise ServerError(str(body.get("code", "an error")), text, True, self._frames.url)
+        if answer["message_type"] != wanted:
+            raise self._frames.violation(f"{answer['message_type']} came where {wanted} was due")
+        return body
+
+
+def open_session(line: Line, options: Options) -> Session:
+    """A session with the server at `line.target`."""
+    return Session(line, options)

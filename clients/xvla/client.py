@@ -1,0 +1,204 @@
+"""X-VLA behind its own `deploy.py`: POST /act, JSON whose arrays are JSON texts themselves.
+
+    ours                   sent (each array as the text of its JSON object)
+    images.head            image0
+    images.left_wrist      image1
+    images.right_wrist     image2
+    ee (2, 8)              proprio (20,): per arm position, six of the rotation, gripper
+    instruction            language_instruction
+    options                domain_id, steps
+
+Answered are T x 20 absolute end-effector poses, executed as our `ee` actions; with `space=joint`
+T x 14 joint targets for a joint-space fine-tune. From the second query of a trial on, what is told
+of the robot is not measured but the command executed last, as in X-VLA's own evaluation.
+Errors inside the server are a bare HTTP 400 without a reason.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robospa.clients.chunks import turned
+from robospa.clients.detect import explained
+from robospa.clients.ee6d import ARM, closed_to_open, ee6d_to_actions, poses_to_ee6d
+from robospa.clients.http import JsonServer
+from robospa.clients.numpy_json import chunk_of, dumps
+from robospa.clients.token_budget import check_budget
+from robospa.clients.xvla.conventions import Conventions
+from robospa.protocol.errors import PolicyAnswerError, ProtocolViolation, ServerError
+from robospa.protocol.options import option, plain_options
+from robospa.protocol.policy import CameraSpec, Observation, PolicySpec, TrialInfo
+
+if TYPE_CHECKING:
+    from robospa.clients import Line
+
+WARNINGS = (
+    "whether a checkpoint was trained with red and blue swapped is invisible on the wire: if it "
+    "sees nothing, try `colors=bgr`",
+    "the order of quaternions is invisible on the wire: the released RoboTwin checkpoint needs "
+    "`quaternions=xyzw`, an own fine-tune with the correct order `wxyz`",
+    "domain_id chooses the soft prompt: 6 is the released RoboTwin checkpoint's",
+)
+SILENT = (
+    "X-VLA's server gives no reason: its log has it (a wrong domain_id and a wrong size of proprio "
+    "look like this)"
+)
+
+
+@dataclass(frozen=True)
+class Options(Conventions):
+    """What X-VLA's server does not say."""
+
+    joint_grippers: str = option(
+        "open",
+        "what 1 means in a gripper number of `space=joint`, sent and answered, which are then "
+        "executed as they are",
+        ("open", "closed"),
+    )
+    text: str = option(
+        "instruction",
+        "what the model is told: the instruction, or the task's name as words, as in X-VLA's own "
+        "RoboTwin evaluation",
+        ("instruction", "task"),
+    )
+    text_budget: int | None = option(
+        50, "tokens of text that the model's processor keeps; the rest is cut off in silence"
+    )
+
+    def __post_init__(self) -> None:
+        """ValueError for options that cannot be."""
+        super().__post_init__()
+        check_budget(self.text_budget)
+
+
+def to_ee6d(poses: NDArray[np.floating[Any]], options: Options) -> NDArray[np.float64]:
+    """(2, 8) poses with gripper 0..1 open, to the 20 numbers; grippers become 1 - 2 g."""
+    return poses_to_ee6d(poses, options.quaternions, options.rotation)
+
+
+def from_ee6d(chunk: NDArray[np.floating[Any]], options: Options) -> NDArray[np.float32]:
+    """(T, 20) to our `ee` actions (T, 16), grippers open (1) or closed (0).
+
+    Raises PolicyAnswerError if six numbers name no rotation.
+    """
+    return ee6d_to_actions(chunk, options.quaternions, options.rotation, options.closed_above)
+
+
+def from_joint(chunk: NDArray[np.float32], options: Options) -> NDArray[np.float32]:
+    """(T, 14) of a joint-space model to our actions: its gripper numbers say closed, ours open."""
+    return closed_to_open(chunk, options.closed_above)
+
+
+class Session:
+    """One kept-alive HTTP connection, and the last chunk of the trial in progress."""
+
+    def __init__(self, line: Line, options: Options) -> None:
+        self._line, self._options, self._answered = line, options, False
+        self._task = ""
+        self._path = line.target.path if line.target.path.strip("/") else "/act"
+        self._chunk: NDArray[np.float32] | None = None
+        self._asked_at = 0
+        joint = options.space == "joint"
+        self.spec = PolicySpec(
+            name="xvla",
+            cameras=tuple(CameraSpec(name) for name in options.views),
+            action="joint" if joint else "ee",
+            horizon=options.horizon,
+            execute=options.execute,
+            action_dim=14 if joint else 16,
+        )
+        self.hello: dict[str, Any] = {
+            "dialect": "xvla",
+            "spec": self.spec.to_json(),
+            "options": plain_options(options),
+            "warnings": list(WARNINGS),
+            "text_budget": options.text_budget if options.text == "instruction" else None,
+        }
+        self._server = JsonServer(line)
+        self._server.greet(self._path, line.timeouts.hello)
+
+    def reset(self, id: int, trial: TrialInfo) -> None:
+        """Nothing to send; the command of the trial before is forgotten."""
+        self._chunk = None
+        self._task = trial.task.replace("_", " ")
+
+    def infer(
+        self, id: int, observation: Observation, timeout: float
+    ) -> tuple[Any, Mapping[str, float]]:
+        try:
+            answer = self._server.post(self._path, self.body(observation), timeout)
+        except ServerError as error:
+            if error.code == "HTTP 400":  # all that its server ever says, of any failure
+                error = ServerError(error.code, f"{error.message}; {SILENT}", True)
+            raise error if self._answered else explained(error, self._line) from error
+        self._answered = True
+        if not isinstance(answer, Mapping) or "action" not in answer:
+            raise ProtocolViolation(
+                f"{self._server.url}{self._path} did not answer an 'action': is it X-VLA's server?"
+            )
+        self._chunk = self._actions(chunk_of(answer["action"]))
+        self._asked_at = int(observation["step"])
+        return self._chunk, {}
+
+    def _actions(self, chunk: Any) -> NDArray[np.float32]:
+        joint = self._options.space == "joint"
+        width = 14 if joint else 2 * ARM
+        if not isinstance(chunk, np.ndarray) or chunk.ndim != 2 or chunk.shape[1] != width:
+            shape = chunk.shape if isinstance(chunk, np.ndarray) else type(chunk).__name__
+            hint = "; is it a fine-tune in the other space (option space)?"
+            raise PolicyAnswerError(f"the policy answered {shape}, not (T, {width}){hint}")
+        if not joint:
+            return from_ee6d(chunk, self._options)
+        actions: NDArray[np.float32] = (
+            chunk if self._options.joint_grippers == "open" else turned(chunk, "joint")
+        )
+        return actions
+
+    def body(self, observation: Observation) -> bytes:
+        """The JSON body of one request."""
+        sent: dict[str, Any] = {}
+        for place, name in enumerate(self._options.views):
+            image = observation["images"][name]
+            sent[f"image{place}"] = dumps(
+                image if self._options.colors == "rgb" else image[..., ::-1]
+            )
+        sent["proprio"] = dumps(self.proprio(observation).astype(np.float32))
+        told = observation.get("instruction", "")
+        sent["language_instruction"] = told if self._options.text == "instruction" else self._task
+        sent["domain_id"] = self._options.domain_id
+        sent["steps"] = self._options.steps
+        return dumps(sent).encode()
+
+    def proprio(self, observation: Observation) -> NDArray[np.float64]:
+        """What the model is told of the robot's own state."""
+        last = self._last_command(observation)
+        if self._options.space == "joint":
+            state = np.array(observation["state"] if last is None else last, dtype=float)
+            if self._options.joint_grippers == "closed":
+                state[[6, 13]] = 1 - state[[6, 13]]
+            return state
+        poses = observation["ee"] if last is None else last.reshape(2, 8)
+        return to_ee6d(np.asarray(poses), self._options)
+
+    def _last_command(self, observation: Observation) -> NDArray[np.float32] | None:
+        """The action executed just before this query, if proprioception is to be that."""
+        if self._chunk is None or self._options.proprio == "measured":
+            return None
+        done = int(observation["step"]) - self._asked_at
+        return self._chunk[min(done, len(self._chunk)) - 1] if done > 0 else None
+
+    def end(self, id: int, outcome: Mapping[str, Any]) -> None:
+        """Nothing to send."""
+
+    def close(self) -> None:
+        self._server.close()
+
+
+def open_session(line: Line, options: Options) -> Session:
+    """A session with the server at `line.target`."""
+    return Session(line, options)

@@ -1,0 +1,302 @@
+"""A LeRobot policy gets the keys, sizes and widths of its own configuration, through processors."""
+
+from __future__ import annotations
+
+from collections import deque
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from model_fakes import COLORS, install, seen, tensor, trial
+
+from robospa.clients.lerobot import serve as lerobot
+from robospa.clients.model_policy import ModelMissing
+
+HEAD = "observation.images.head_camera"
+VIEWS = {
+    HEAD: (3, 240, 320),
+    "observation.images.left_camera": (3, 120, 160),
+    "observation.images.right_camera": (3, 224, 224),
+}
+
+
+class Processor:
+    """Keeps what passed; `steps` as LeRobot's pipelines have."""
+
+    def __init__(self, *steps: Any) -> None:
+        self.steps = list(steps)
+        self.seen: list[Any] = []
+
+    def __call__(self, value: Any) -> Any:
+        self.seen.append(value)
+        return dict(value) if isinstance(value, dict) else value
+
+
+class OfficialPolicy:
+    """Answers the state in every row, plus noise in column 0."""
+
+    def __init__(self, torch: Any, config: Any, state: str = "observation.state") -> None:
+        self.torch, self.config, self.state = torch, config, state
+        self.calls: list[dict[str, Any]] = []
+        self.resets = 0
+        self._queues: dict[str, Any] = {}
+
+    def reset(self) -> None:
+        self.resets += 1
+        frames = getattr(self.config, "n_obs_steps", 1)
+        keys = ("action", "observation.state", "observation.images")
+        self._queues = {key: deque(maxlen=frames) for key in keys}
+
+    def eval(self) -> Any:
+        return self
+
+    def predict_action_chunk(self, batch: dict[str, Any]) -> Any:
+        self.calls.append(batch)
+        rows = len(batch["task"])
+        width = self.config.output_features["action"].shape[0]
+        answer = np.zeros((rows, self.config.chunk_size, width), np.float32)
+        if "observation.state" in batch:
+            answer += np.asarray(batch["observation.state"])[:, None, :width]
+        answer[..., 0] += np.asarray(self.torch.randn(rows, self.config.chunk_size))
+        return tensor(answer)
+
+
+def config(views: Any = VIEWS, state: int = 14, action: int = 14, **more: Any) -> Any:
+    """A configuration as LeRobot has them."""
+    features = {key: SimpleNamespace(shape=shape) for key, shape in views.items()}
+    inputs = {**features, "observation.state": SimpleNamespace(shape=(state,))}
+    values = {
+        "type": "pi05",
+        "n_obs_steps": 1,
+        "chunk_size": 50,
+        "n_action_steps": 50,
+        "input_features": inputs,
+        "image_features": features,
+        "output_features": {"action": SimpleNamespace(shape=(action,))},
+        **more,
+    }
+    return SimpleNamespace(**values)
+
+
+def served(torch: Any, chosen: Any = None, **given: Any) -> lerobot.LeRobot:
+    policy = OfficialPolicy(torch, chosen or config())
+    options = lerobot.Options(path="x", **given)
+    return lerobot.LeRobot(policy, Processor(), Processor(), options)
+
+
+def test_a_batch_is_what_the_data_loader_gives(torch: Any) -> None:
+    policy = served(torch)
+    policy.reset(trial())
+    observation = seen(policy.spec)
+    policy.infer(observation)
+    batch = policy.before.seen[0]
+    assert set(batch) == {*VIEWS, "observation.state", "task"}
+    assert batch["task"] == [trial().instruction]
+    assert np.array_equal(batch["observation.state"][0], observation["state"])
+    for (key, shape), color in zip(VIEWS.items(), COLORS.values(), strict=True):
+        assert batch[key].shape == (1, *shape) and batch[key].dtype == np.float32
+        np.testing.assert_allclose(batch[key][0, :, 0, 0], np.array(color) / 255, atol=1e-6)
+
+
+def test_sizes_may_be_left_to_the_policy_and_colours_turned(torch: Any) -> None:
+    policy = served(torch, resize="no", colors="bgr")
+    policy.reset(trial())
+    policy.infer(seen(policy.spec))
+    image = policy.before.seen[0]["observation.images.left_camera"]
+    assert image.shape == (1, 3, 240, 320)
+    np.testing.assert_allclose(image[0, ::-1, 0, 0] * 255, COLORS["left_wrist"], atol=1e-3)
+
+
+def test_the_answer_goes_through_the_processor_and_out(torch: Any) -> None:
+    policy = served(torch, config(chunk_size=20, n_action_steps=10))
+    policy.reset(trial())
+    observation = seen(policy.spec)
+    chunk = policy.infer(observation)
+    assert policy.after.seen[0].shape == (1, 20, 14)
+    assert chunk.shape == (20, 14) and chunk.dtype == np.float32
+    np.testing.assert_allclose(chunk[:, 1:], np.tile(observation["state"][1:], (20, 1)))
+    assert (policy.spec.horizon, policy.spec.execute, policy.spec.action_dim) == (20, 10, 14)
+
+
+def test_nothing_outlives_a_query(torch: Any) -> None:
+    policy = served(torch)
+    policy.reset(trial())
+    policy.infer(seen(policy.spec))
+    policy.infer(seen(policy.spec, step=50))
+    assert policy.policy.resets == 2
+
+
+def test_a_batch_gives_what_singles_give(torch: Any) -> None:
+    policy = served(torch)
+    for session in range(3):
+        policy.reset_session(session, trial(session))
+    asked = [seen(policy.spec) for _ in range(3)]
+    together = policy.infer_batch(asked, [0, 1, 2])
+    assert len(policy.policy.calls) == 1
+    for session, one in enumerate(asked):
+        np.testing.assert_array_equal(policy.infer_batch([one], [session])[0], together[session])
+    assert not np.array_equal(together[0], together[1])
+
+
+def test_a_policy_with_odd_noise_is_asked_one_by_one(torch: Any) -> None:
+    policy = served(torch)
+
+    def odd(batch: Any) -> Any:
+        policy.policy.calls.append(batch)
+        return tensor(np.tile(np.asarray(torch.randn(14)), (len(batch["task"]), 50, 1)))
+
+    policy.policy.predict_action_chunk = odd
+    for session in (1, 2):
+        policy.reset_session(session, trial(session))
+    one, two = policy.infer_batch([seen(policy.spec)] * 2, [1, 2])
+    assert [len(call["task"]) for call in policy.policy.calls] == [2, 1, 1]
+    assert not np.array_equal(one, two)
+
+
+def test_earlier_frames_are_queued_oldest_first(
+    torch: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def populate(queues: Any, batch: Any, exclude: Any) -> Any:
+        assert exclude == ["action"]
+        for key in set(queues) & set(batch):
+            queues[key].append(batch[key])
+        return queues
+
+    install(monkeypatch, "lerobot.policies.utils", populate_queues=populate)
+    policy = served(torch, config({HEAD: (3, 240, 320)}, n_obs_steps=3))
+    assert policy.spec.history == (-2, -1)
+    policy.reset(trial())
+    observation = seen(policy.spec, step=5)
+    observation["history"][-2]["state"] = np.full(14, -9, np.float32)
+    policy.infer(observation)
+    states = policy.policy._queues["observation.state"]
+    assert [float(s[0, 13]) for s in states] == [-9.0, 0.5, 1.0]
+    images = policy.policy._queues["observation.images"]
+    assert [image.shape for image in images] == [(1, 1, 3, 240, 320)] * 3
+
+
+def test_poses_in_and_out(torch: Any) -> None:
+    policy = served(torch, config(state=20, action=20), closed_above=-0.5)
+    policy.reset(trial())
+    observation = seen(policy.spec)
+    chunk = policy.infer(observation).reshape(50, 2, 8)
+    told = policy.before.seen[0]["observation.state"][0]
+    assert told.shape == (20,)
+    np.testing.assert_allclose(told[3:9], [1, 0, 0, 0, 0, 1], atol=1e-6)
+    assert policy.spec.action == "ee" and policy.spec.action_dim == 16
+    np.testing.assert_allclose(chunk[0, 1, :7], observation["ee"][1, :7], atol=1e-6)
+    assert chunk[0, :, 7].tolist() == [1.0, 0.0]
+
+
+def test_joint_actions_of_a_policy_that_sees_poses(torch: Any) -> None:
+    policy = served(torch, config(state=16, action=14))
+    policy.reset(trial())
+    policy.infer(seen(policy.spec))
+    assert policy.before.seen[0]["observation.state"].shape == (1, 16)
+
+
+@pytest.mark.parametrize(
+    ("keys", "images", "cameras"),
+    [
+        (("cam_high", "cam_left_wrist", "cam_right_wrist"), None, ["head", "left", "right"]),
+        (("image", "image2", "empty_camera_0"), "head:IMAGE,left_wrist:IMAGE2", ["head", "left"]),
+        (("top", "wrist_right"), None, ["head", "right"]),
+    ],
+)
+def test_cameras_go_by_names(keys: Any, images: Any, cameras: list[str]) -> None:
+    prefix = "observation.images."
+    told = images and images.replace("IMAGE", prefix + "image")
+    views = lerobot.find_views({prefix + key: (3, 8, 8) for key in keys}, told)
+    assert [view.camera.split("_")[0] for view in views] == cameras
+
+
+@pytest.mark.parametrize(
+    ("keys", "images", "words"),
+    [
+        (("image",), None, "does not tell which camera"),
+        (("left_head",), None, "does not tell which camera"),
+        (("head", "top"), None, "the same camera"),
+        (("image",), "hat:observation.images.image", "no camera:key"),
+        (("image",), "head:observation.images.other", "no camera:key"),
+    ],
+)
+def test_cameras_that_cannot_be_told(keys: Any, images: Any, words: str) -> None:
+    features = {f"observation.images.{key}": (3, 8, 8) for key in keys}
+    with pytest.raises(ValueError, match=words):
+        lerobot.find_views(features, images)
+
+
+@pytest.mark.parametrize("width", [14, 32])
+def test_both_sides_of_the_state_prompt_change(torch: Any, width: int) -> None:
+    class Pi05PrepareStateTokenizerProcessorStep:
+        max_state_dim = 32
+
+    step = Pi05PrepareStateTokenizerProcessorStep()
+    before = Processor(object(), step)
+    lerobot.print_state(before, width)
+    assert before.steps[2] is step and step.max_state_dim == width
+    state = tensor(np.ones((2, 14), np.float32))
+    transition = {"observation": {"observation.state": state}, "task": ["a", "b"]}
+    padded = before.steps[1](transition)["observation"]["observation.state"]
+    assert padded.shape == (2, width) and float(padded.sum()) == 28.0
+    assert transition["observation"]["observation.state"].shape == (2, 14)
+
+
+def test_loading_offline(torch: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: dict[str, Any] = {}
+    chosen = config(tokenizer_name="facebook/bart-large")
+    domain = SimpleNamespace(domain_id=0)
+
+    class Policies:
+        @classmethod
+        def from_pretrained(cls, path: str, config: Any) -> Any:
+            asked["device"] = config.device
+            return OfficialPolicy(torch, config)
+
+    def processors(config: Any, path: str, preprocessor_overrides: Any) -> Any:
+        asked["overrides"] = preprocessor_overrides
+        return Processor(domain), Processor()
+
+    configs = SimpleNamespace(from_pretrained=lambda path: chosen)
+    install(monkeypatch, "lerobot.configs.policies", PreTrainedConfig=configs)
+    install(
+        monkeypatch,
+        "lerobot.policies.factory",
+        get_policy_class=lambda name: Policies,
+        make_pre_post_processors=processors,
+    )
+    lerobot.create(lerobot.Options(path="x", device="cpu", tokenizer="words", domain_id=6))
+    assert asked["device"] == "cpu" and domain.domain_id == 6
+    assert chosen.tokenizer_name == "words"
+    assert asked["overrides"] == {
+        "device_processor": {"device": "cpu"},
+        "tokenizer_processor": {"tokenizer_name": "words"},
+    }
+    with pytest.raises(ValueError, match=r"state_prompt is for pi0\.5"):
+        lerobot.create(lerobot.Options(path="x", state_prompt=32))
+
+
+def test_a_checkpoint_that_is_not_there(torch: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    def nothing(path: str) -> Any:
+        raise FileNotFoundError("no config.json")
+
+    configs = SimpleNamespace(from_pretrained=nothing)
+    install(monkeypatch, "lerobot.configs.policies", PreTrainedConfig=configs)
+    install(monkeypatch, "lerobot.policies.factory")
+    with pytest.raises(ModelMissing, match=r"cannot load x: no config\.json"):
+        lerobot.create(lerobot.Options(path="x"))
+
+
+@pytest.mark.parametrize(
+    ("chosen", "words"),
+    [
+        (config(action=7), "action has 7 numbers"),
+        (config(state=9), "state has 9 numbers"),
+        (config({**VIEWS, "observation.environment_state": (3,)}), "environment_state"),
+        (config(state=20, action=20, n_obs_steps=2), "earlier poses"),
+    ],
+)
+def test_policies_that_are_not_for_this_robot(torch: Any, chosen: Any, words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        served(torch, chosen)
