@@ -28,8 +28,8 @@ from robospa.harness.grid import on_grid
 from robospa.harness.running.manifest import about_machine, group_keys, seed_hash
 from robospa.harness.trial import policy_seed
 from robospa.leaderboard.packing import inputs_of, sizes_of, write_bundle
+from robospa.leaderboard.record_rows import trace_hash
 from robospa.leaderboard.reference import WORLD, Reference, shipped
-from robospa.leaderboard.rows import trace_hash
 from robospa.leaderboard.sampling import announced
 from robospa.leaderboard.verify import verify
 from robospa.results.metrics import CATEGORIES

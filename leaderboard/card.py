@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from robospa.leaderboard.bundle import MEGA, BundleError
-from robospa.leaderboard.strict import is_hash, look
+from robospa.leaderboard.strict_json import is_hash, look
 
 LINK = re.compile(r"https://[A-Za-z0-9.-]+(:[0-9]+)?(/[A-Za-z0-9._~/%+=@:,-]*)?")
 LEVELS = 5

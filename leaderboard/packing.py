@@ -24,21 +24,21 @@ from robospa.harness.grid import PER_UNIT, is_on_grid
 from robospa.harness.running.manifest import changed_settings, group_keys, seed_hash
 from robospa.harness.running.store import action_path, read_actions
 from robospa.leaderboard import bundle as layout
+from robospa.leaderboard.action_traces import Trace, encode
 from robospa.leaderboard.bundle import BundleError
-from robospa.leaderboard.card import check_card
-from robospa.leaderboard.claims import (
+from robospa.leaderboard.bundle_rules import (
     check_card_fits,
     check_record,
     check_seeds,
     check_settings,
     spec_of,
 )
-from robospa.leaderboard.outcomes import outcomes_of
+from robospa.leaderboard.card import check_card
+from robospa.leaderboard.record_rows import Row, trace_hash, write_rows
 from robospa.leaderboard.reference import Reference
-from robospa.leaderboard.rows import Row, trace_hash, write_rows
 from robospa.leaderboard.sampling import announced
 from robospa.leaderboard.scores import scores_of, tables_of
-from robospa.leaderboard.traces import Trace, encode
+from robospa.leaderboard.trial_outcomes import outcomes_of
 from robospa.leaderboard.verify import LISTING, Valid, own_version, seed_lists, verify
 from robospa.results.lint import lint_run
 from robospa.results.reading import Run, read_run

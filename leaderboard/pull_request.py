@@ -22,7 +22,7 @@ from robospa.leaderboard import bundle as layout
 from robospa.leaderboard.archive import Archive
 from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.card import read_card
-from robospa.leaderboard.strict import parse_map
+from robospa.leaderboard.strict_json import parse_map
 from robospa.leaderboard.submission import ASKED, BUNDLE, EVIDENCE, SLUG, read_announced
 
 HOME = PurePosixPath("leaderboard/submissions")

@@ -17,11 +17,11 @@ from typing import Any
 
 from robospa.harness.factory import load_function
 from robospa.harness.running.manifest import about_machine, changed_settings
+from robospa.leaderboard.action_traces import Trace
 from robospa.leaderboard.bundle import BundleError
-from robospa.leaderboard.claims import spec_of
+from robospa.leaderboard.bundle_rules import spec_of
 from robospa.leaderboard.reference import Reference
 from robospa.leaderboard.sampling import catch_probability, drawn
-from robospa.leaderboard.traces import Trace
 from robospa.leaderboard.verify import Valid, read_traces
 from robospa.results.reading import differences
 from robospa.results.records import TrialRecord

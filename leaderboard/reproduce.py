@@ -16,8 +16,8 @@ from robospa.harness.running.manifest import changed_settings
 from robospa.harness.running.policies import probe_policies
 from robospa.leaderboard.agreement import Agreement, Counts, agreement, holm, power
 from robospa.leaderboard.bundle import BundleError
-from robospa.leaderboard.claims import spec_of
-from robospa.leaderboard.hidden import Block
+from robospa.leaderboard.bundle_rules import spec_of
+from robospa.leaderboard.hidden_seeds import Block
 from robospa.leaderboard.reference import Reference
 from robospa.leaderboard.verify import Valid
 from robospa.results.reading import Run

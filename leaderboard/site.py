@@ -22,7 +22,7 @@ from typing import Any
 from robospa.harness.running.store import replace_file
 from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.entries import BADGES, Entry, all_entries, page_values
-from robospa.leaderboard.pairs import pairs_of, write_pairs
+from robospa.leaderboard.pairwise import pairs_of, write_pairs
 from robospa.leaderboard.submission import read_submissions, waiting
 from robospa.results.failures import KINDS, NAMES, SIMULATED_PER_FILM
 from robospa.results.figures.draw import draw

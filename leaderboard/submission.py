@@ -24,7 +24,7 @@ from robospa.leaderboard import bundle as layout
 from robospa.leaderboard.archive import Archive
 from robospa.leaderboard.bundle import MEGA, BundleError
 from robospa.leaderboard.card import LINK, check_card, read_card
-from robospa.leaderboard.strict import is_hash, parse_map
+from robospa.leaderboard.strict_json import is_hash, parse_map
 from robospa.leaderboard.verify import Valid
 from robospa.results.failures import NAMES, distribution
 from robospa.results.reading import Run

@@ -18,10 +18,10 @@ from typing import Any
 
 from robospa.harness.running.manifest import seed_hash
 from robospa.leaderboard import bundle as layout
+from robospa.leaderboard.action_traces import Trace, decode
 from robospa.leaderboard.archive import Archive
 from robospa.leaderboard.bundle import BundleError, Limits
-from robospa.leaderboard.card import check_card
-from robospa.leaderboard.claims import (
+from robospa.leaderboard.bundle_rules import (
     check_card_fits,
     check_categories,
     check_record,
@@ -29,13 +29,13 @@ from robospa.leaderboard.claims import (
     check_settings,
     check_trace,
 )
-from robospa.leaderboard.outcomes import outcomes_of
+from robospa.leaderboard.card import check_card
+from robospa.leaderboard.record_rows import read_rows, trace_hash
 from robospa.leaderboard.reference import Reference
-from robospa.leaderboard.rows import read_rows, trace_hash
 from robospa.leaderboard.sampling import announced
 from robospa.leaderboard.scores import compare_scores, scores_of, tables_of
-from robospa.leaderboard.strict import parse, parse_map
-from robospa.leaderboard.traces import Trace, decode
+from robospa.leaderboard.strict_json import parse, parse_map
+from robospa.leaderboard.trial_outcomes import outcomes_of
 from robospa.results.lint import lint_run
 from robospa.results.reading import Run, RunError, manifest_keys
 from robospa.results.records import TrialRecord

@@ -36,10 +36,10 @@ from robospa.harness.running.manifest import changed_settings, seed_hash
 from robospa.harness.running.policies import read_map
 from robospa.harness.running.store import read_actions, write_actions
 from robospa.leaderboard import bundle as layout
+from robospa.leaderboard.action_traces import decode, encode
 from robospa.leaderboard.archive import Archive
 from robospa.leaderboard.bundle import BundleError, canonical
 from robospa.leaderboard.packing import pack
-from robospa.leaderboard.traces import decode, encode
 from robospa.leaderboard.verify import verify
 from robospa.results.reading import (
     RunError,

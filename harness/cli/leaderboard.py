@@ -60,6 +60,6 @@ def add(
     for path in evidence or []:
         if path.stat().st_size > MOST:
             raise ValueError(f"{path} is larger than evidence can be")
-        found.append(_reach("strict:parse_map")(path.read_bytes(), str(path)))
+        found.append(_reach("strict_json:parse_map")(path.read_bytes(), str(path)))
     folder = _reach("submission:add")(valid, found, submissions, name, address)
     print(f"Submission: {folder}")

@@ -131,8 +131,10 @@ def block(
         for task in selection.parse_tasks(tasks)
         for level in selection.parse_levels(levels)
     ]
-    made = _reach("hidden:draw_block")(variants, trials, workers or running.cores(), note=print)
-    _reach("hidden:write_block")(made, out)
+    made = _reach("hidden_seeds:draw_block")(
+        variants, trials, workers or running.cores(), note=print
+    )
+    _reach("hidden_seeds:write_block")(made, out)
     print(f"Keep {out} secret until the trials begin. Publish now:")
     print(f"commitment {made.commitment}")
 
@@ -166,7 +168,7 @@ def reproduce(
 
     reference = _reach("reference:shipped")(world, parts)
     valid = _reach("verify:verify")(bundle, reference, practice)
-    seeds = _reach("hidden:read_block")(block, commitment)
+    seeds = _reach("hidden_seeds:read_block")(block, commitment)
     keys = _reach("reproduce:hidden_keys")(valid, seeds, reference)
     limits = {"timeout": 120.0, "first_timeout": 600.0, "wait": 0.0, "patience": 60.0}
     request = running.make_request(

@@ -29,8 +29,8 @@ from bundle_fakes import (
 )
 
 from robospa.leaderboard import bundle as layout
+from robospa.leaderboard.action_traces import HEAD, MAGIC, encode
 from robospa.leaderboard.bundle import BundleError, Limits
-from robospa.leaderboard.traces import HEAD, MAGIC, encode
 from robospa.leaderboard.verify import verify
 
 

@@ -27,8 +27,8 @@ from bundle_fakes import (
 )
 
 from robospa.leaderboard import bundle as layout
-from robospa.leaderboard.rows import trace_hash
-from robospa.leaderboard.traces import decode
+from robospa.leaderboard.action_traces import decode
+from robospa.leaderboard.record_rows import trace_hash
 from robospa.trial import TrialKey
 
 

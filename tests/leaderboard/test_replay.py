@@ -12,10 +12,10 @@ from bundle_fakes import PRESS, REFERENCE, Files, put_rows, rows_of, seal, zip_u
 
 from robospa.leaderboard import bundle as layout
 from robospa.leaderboard.bundle import BundleError
-from robospa.leaderboard.outcomes import outcomes_of
 from robospa.leaderboard.reference import Reference
 from robospa.leaderboard.replay import Replay, replay
 from robospa.leaderboard.scores import scores_of, tables_of
+from robospa.leaderboard.trial_outcomes import outcomes_of
 from robospa.leaderboard.verify import verify
 from robospa.results.reading import Run, from_data, manifest_keys
 
@@ -110,8 +110,8 @@ def test_actions_of_another_task_forged_with_all_hashes_are_caught(
 ) -> None:
     from robospa.harness.grid import on_grid
     from robospa.harness.trial import actions_digest
-    from robospa.leaderboard.rows import trace_hash
-    from robospa.leaderboard.traces import decode, encode
+    from robospa.leaderboard.action_traces import decode, encode
+    from robospa.leaderboard.record_rows import trace_hash
 
     name = layout.actions_name(PRESS, 1)
     traces = [on_grid(0.5 * trace) for trace in decode(files[name], name)]

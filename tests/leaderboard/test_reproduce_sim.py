@@ -14,7 +14,7 @@ from shadow import HORIZON, Shadow
 
 from robospa.harness.cli.running import make_request
 from robospa.harness.running.evaluate import evaluate
-from robospa.leaderboard.hidden import draw_block, read_block, write_block
+from robospa.leaderboard.hidden_seeds import draw_block, read_block, write_block
 from robospa.leaderboard.packing import pack
 from robospa.leaderboard.reference import shipped
 from robospa.leaderboard.reproduce import check_policy, compare, hidden_keys

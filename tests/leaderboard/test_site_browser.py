@@ -18,7 +18,7 @@ sys.path.append(str(Path(__file__).parents[1] / "results"))
 from devtools import Page, chromium
 
 from robospa.leaderboard.entries import entry_of, published_entries
-from robospa.leaderboard.pairs import pairs_of, write_pairs
+from robospa.leaderboard.pairwise import pairs_of, write_pairs
 from robospa.leaderboard.site import index_page, write_model
 from robospa.leaderboard.submission import read_submission, read_submissions
 from robospa.results.compare import over_levels

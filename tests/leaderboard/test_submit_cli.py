@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from bundle_fakes import PICK, SEEDS, Weak, make_run
 
-from robospa.leaderboard.hidden import FIRST, Block, write_block
+from robospa.leaderboard.hidden_seeds import FIRST, Block, write_block
 from robospa.protocol.server import ServerThread
 from robospa.trial import TrialKey
 

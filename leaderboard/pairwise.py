@@ -1,8 +1,8 @@
 """Two submissions on equal seeds, as small scripts that the site loads when they are compared.
 
-`pairs/FIRST/SECOND.js` hands the page what `robospa.leaderboard.outcomes.paired` found; a page that
-is opened from disk can load a script, but no data. First is the one whose name comes first. What
-was computed from the same bundles by the same version is kept.
+`pairs/FIRST/SECOND.js` hands the page what `trial_outcomes.paired` found; a page that is opened
+from disk can load a script, but no data. First is the one whose name comes first.
+What was computed from the same bundles by the same version is kept.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from pathlib import Path
 from robospa.harness.running.store import replace_file
 from robospa.leaderboard import bundle as layout
 from robospa.leaderboard.entries import Entry
-from robospa.leaderboard.outcomes import paired, side_of
+from robospa.leaderboard.trial_outcomes import paired, side_of
 from robospa.results.reading import manifest_keys
 from robospa.results.report_page import own_version
 from robospa.results.sides import Side

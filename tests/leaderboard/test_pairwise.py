@@ -11,9 +11,9 @@ from site_fakes import Weaker, make_submission
 
 from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.entries import entry_of
-from robospa.leaderboard.outcomes import outcomes_of, paired, side_of
-from robospa.leaderboard.pairs import pairs_of, write_pairs
+from robospa.leaderboard.pairwise import pairs_of, write_pairs
 from robospa.leaderboard.submission import read_submissions
+from robospa.leaderboard.trial_outcomes import outcomes_of, paired, side_of
 from robospa.results.compare import compare
 from robospa.results.reading import Run, read_run
 from robospa.results.sides import Side, side_of_run

@@ -21,7 +21,7 @@ from typing import Any
 from robospa.harness.running.store import replace_file
 from robospa.harness.seeds import Sweep
 from robospa.leaderboard.bundle import MEGA, BundleError, canonical, sha256
-from robospa.leaderboard.strict import parse_map
+from robospa.leaderboard.strict_json import parse_map
 from robospa.tasks.scene import SUITE
 
 FORMAT = 1

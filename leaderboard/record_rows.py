@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.leaderboard.bundle import BundleError, sha256
-from robospa.leaderboard.strict import is_hash, look, parse_row
+from robospa.leaderboard.strict_json import is_hash, look, parse_row
 from robospa.results.reading import from_data
 from robospa.results.records import TrialRecord
 from robospa.trial import TrialKey
