@@ -29,6 +29,7 @@ from robospa.tasks.catalog import task as find_task
 from robospa.tasks.plan import Home, Pick, Press, Skill, Wait
 from robospa.tasks.scene import Scene
 from robospa.tasks.snapshot import snapshot_from_json
+from robospa.workcell import workcell
 
 KINDS = {
     "neighbour": "picks the object nearest to the target instead",
@@ -275,7 +276,7 @@ class Mistaken(Oracle):
         if self._scene is None:
             raise RuntimeError("the policy was asked for actions before a reset")
         state: Mapping[str, Any] = observation["privileged"]
-        snapshot = snapshot_from_json(state)
+        snapshot = snapshot_from_json(state, workcell(self._scene.embodiment))
         if self._expert is None:
             expert = ClumsyExpert(self._scene, snapshot, ())
             try:

@@ -17,6 +17,7 @@ from robospa.protocol.policy import Observation, PolicySpec, TrialInfo
 from robospa.tasks.catalog import build_scene
 from robospa.tasks.scene import Scene
 from robospa.tasks.snapshot import snapshot_from_json
+from robospa.workcell import workcell
 
 HORIZON = 200
 
@@ -49,7 +50,7 @@ class Oracle:
         if self._scene is None:
             raise RuntimeError("the oracle was asked for actions before a reset")
         state: Mapping[str, Any] = observation["privileged"]
-        snapshot = snapshot_from_json(state)
+        snapshot = snapshot_from_json(state, workcell(self._scene.embodiment))
         if self._expert is None:
             self._expert = Expert(self._scene, snapshot)
         return self._expert.next(snapshot)

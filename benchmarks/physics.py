@@ -24,8 +24,9 @@ from robospa.geometry import Pose
 from robospa.harness.sim.drives import Setter
 from robospa.harness.sim.motion import RATE, rest_to_rest
 from robospa.harness.sim.sapien_world import SapienWorld
-from robospa.tasks.scene import TABLE_TOP, Scene, SceneObject
+from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.snapshot import Snapshot
+from robospa.workcell import TABLE_TOP
 
 BAR = 1.15
 TEXT = """\

@@ -85,7 +85,8 @@ class Still:
 
     def snapshot(self) -> Snapshot:
         here = Pose()
-        return Snapshot(0.0, {}, (1.0, 1.0), (here, here))
+        points = (here.position, here.position)
+        return Snapshot(0.0, {}, (1.0, 1.0), (here, here), grasp_points=points)
 
     def contacts(self) -> tuple[Contact, ...]:
         return ()

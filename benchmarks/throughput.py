@@ -101,7 +101,9 @@ class World:
 
     def snapshot(self) -> Snapshot:
         """Nothing to see."""
-        return Snapshot(0.02 * self.steps, {"block": HERE}, (0.0, 0.0), (HERE, HERE))
+        points = (HERE.position, HERE.position)
+        poses = {"block": HERE}
+        return Snapshot(0.02 * self.steps, poses, (0.0, 0.0), (HERE, HERE), grasp_points=points)
 
     def contacts(self) -> tuple[Contact, ...]:
         """None."""

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.geometry import Array
-from robospa.tasks.scene import TABLE_TOP
+from robospa.workcell import TABLE_TOP
 
 Mask = NDArray[np.bool_]
 

@@ -14,12 +14,10 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from robospa.geometry import Pose
+from robospa.workcell import TABLE_TOP
 
 SUITE = "robospa-1"
 """Version of the scenes: a change to any of them needs a new one."""
-
-TABLE_TOP = 0.74
-"""Height of the table's surface [m] (official infrastructure)."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +42,11 @@ class Scene:
     """Everything that a world needs to load a trial and that a goal or a plan needs to judge it.
 
     `facts` holds what the task drew (target, order, reference, directions...): JSON values, read
-    by the task's own goal, plan and instruction slots. `table_shift` moves the table in x, y [m].
+    by the task's own goal, plan and instruction slots. `table_shift` moves the table in x, y [m],
+    `table_rise` is how much higher it stands than TABLE_TOP [m].
+
+    What only some scene modes change has a default and is left out of the JSON form where it has
+    that value, so that the digests of all other scenes do not depend on it.
     """
 
     task: str
@@ -56,6 +58,12 @@ class Scene:
     facts: Mapping[str, Any]
     table_shift: tuple[float, float] = (0.0, 0.0)
     suite: str = SUITE
+    table_rise: float = 0.0
+
+    @property
+    def table_top(self) -> float:
+        """Height of the table's surface [m]."""
+        return TABLE_TOP + self.table_rise
 
     def object(self, name: str) -> SceneObject:
         """The object called `name`; KeyError, naming what exists, if there is none."""
@@ -67,7 +75,7 @@ class Scene:
     def to_json(self) -> dict[str, Any]:
         """Plain JSON values; `from_json` is the inverse."""
         data: dict[str, Any] = json.loads(json.dumps(asdict(self)))
-        return data
+        return {k: v for k, v in data.items() if k not in OPTIONAL or v != OPTIONAL[k]}
 
     @staticmethod
     def from_json(data: Mapping[str, Any]) -> Scene:
@@ -89,3 +97,7 @@ class Scene:
         """Hash of the canonical JSON form: equal digests mean equal scenes."""
         text = json.dumps(self.to_json(), sort_keys=True, separators=(",", ":"))
         return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+OPTIONAL: Mapping[str, Any] = {"table_rise": 0.0}
+"""Fields that the JSON form leaves out where they have this value."""

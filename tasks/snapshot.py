@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from robospa.geometry import Pose, Vec3
+from robospa.workcell import Workcell
 
 ARMS = ("left", "right")
 
@@ -34,16 +35,18 @@ class Snapshot:
 
     `poses` has every object that exists at this instant. `gripper` is the *commanded* opening
     (0 closed .. 1 open) of left and right; `end_effector` the pose of each arm's end-effector
-    frame (x axis = approach, 0.12 m behind the grasp centre); `joints` the commanded arm joints
-    [rad] of left and right, `measured` the measured ones. `contacts` is filled only for goals that
-    ask for it (`Tracker.needs_contacts`). `hinges` has the angle [rad] of every object with a
-    hinged part, 0 when closed.
+    frame (x axis = approach); `grasp_points` the point [m, world] between the fingers of each,
+    which depends on the robot; `joints` the commanded arm joints [rad] of left and right,
+    `measured` the measured ones. `contacts` is filled only for goals that ask for it
+    (`Tracker.needs_contacts`). `hinges` has the angle [rad] of every object with a hinged part, 0
+    when closed.
     """
 
     time: float
     poses: Mapping[str, Pose]
     gripper: tuple[float, float]
     end_effector: tuple[Pose, Pose]
+    grasp_points: tuple[Vec3, Vec3] = field(kw_only=True)
     joints: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())
     measured: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())
     contacts: tuple[Contact, ...] = field(default=())
@@ -76,8 +79,9 @@ class Snapshot:
 def snapshot_to_json(snapshot: Snapshot) -> dict[str, Any]:
     """Plain JSON values: poses as [x, y, z, qw, qx, qy, qz]; `snapshot_from_json` is the inverse.
 
-    Contacts are not included: they belong to goals, not to experts. "hinges" is there only where
-    an object has one.
+    Contacts are not included: they belong to goals, not to experts. Neither are grasp points: they
+    follow from the end-effector poses and the robot. "hinges" is there only where an object has
+    one.
     """
     data = {
         "time": snapshot.time,
@@ -92,9 +96,13 @@ def snapshot_to_json(snapshot: Snapshot) -> dict[str, Any]:
     return data
 
 
-def snapshot_from_json(data: Mapping[str, Any]) -> Snapshot:
-    """The snapshot that `snapshot_to_json` wrote; KeyError or ValueError if it is not one."""
+def snapshot_from_json(data: Mapping[str, Any], workcell: Workcell) -> Snapshot:
+    """The snapshot that `snapshot_to_json` wrote of the robot that `workcell` belongs to.
+
+    KeyError or ValueError if it is none.
+    """
     left, right = data["end_effector"]
+    ends = (_pose(left), _pose(right))
     grip_left, grip_right = data["gripper"]
     joints_left, joints_right = data["joints"]
     measured_left, measured_right = data["measured"]
@@ -102,7 +110,8 @@ def snapshot_from_json(data: Mapping[str, Any]) -> Snapshot:
         time=float(data["time"]),
         poses={name: _pose(row) for name, row in data["poses"].items()},
         gripper=(float(grip_left), float(grip_right)),
-        end_effector=(_pose(left), _pose(right)),
+        end_effector=ends,
+        grasp_points=workcell.grasp_points(ends),
         joints=(_floats(joints_left), _floats(joints_right)),
         measured=(_floats(measured_left), _floats(measured_right)),
         hinges={name: float(angle) for name, angle in data.get("hinges", {}).items()},

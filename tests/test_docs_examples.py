@@ -36,8 +36,9 @@ def held_up(scene: Scene, name: str, rise: float) -> Snapshot:
     poses = {item.name: item.pose for item in scene.objects}
     x, y, z = poses[name].position
     poses[name] = Pose((x, y, z + rise))
-    gripper = Pose((x - 0.12, y, z + rise))  # its x axis points at the object
-    return Snapshot(rise, poses, (0.0, 1.0), (gripper, Pose((5.0, 0.0, 0.0))))
+    ends = (Pose((x - 0.12, y, z + rise)), Pose((5.0, 0.0, 0.0)))
+    points = (poses[name].position, (5.0, 0.0, 0.0))
+    return Snapshot(rise, poses, (0.0, 1.0), ends, grasp_points=points)
 
 
 def trial(policy_seed: int = 0) -> TrialInfo:

@@ -13,8 +13,9 @@ from robospa.tasks.instructions.grammar import Templates
 from robospa.tasks.instructions.words import Slots, with_common
 from robospa.tasks.layouts import Area, Mask, Points, in_head_view, scatter
 from robospa.tasks.plan import Pick, Skill
-from robospa.tasks.scene import TABLE_TOP, Scene, SceneObject
+from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.task import Draft, Level, Task, Tracker
+from robospa.workcell import TABLE_TOP
 
 HALF = 0.022  # [m]
 AREA = Area(x=(-0.25, 0.25), y=(-0.15, 0.08), clear_middle=True)

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from robospa.geometry import Pose, Vec3, look_rotation, yaw_rotation
 from robospa.harness.sim import furniture
 from robospa.tasks.objects import assets, looks, object_model
-from robospa.tasks.scene import TABLE_TOP
 from robospa.tasks.shapes import Hinge, ObjectModel, Shape
+from robospa.workcell import TABLE_TOP
 
 if TYPE_CHECKING:
     from PIL import Image

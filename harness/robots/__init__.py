@@ -1,19 +1,27 @@
-"""Robots as data, and their kinematics."""
+"""Robots as data, and their kinematics. Each is an entry point in the group `robospa.robots`."""
 
 from __future__ import annotations
 
 from functools import cache
 
 from robospa.harness.robots.embodiment import Embodiment
+from robospa.registry import ROBOTS, UnknownName, find, names
 
-EMBODIMENTS = ("aloha-agilex",)
+
+def embodiments() -> tuple[str, ...]:
+    """Names of all installed robots."""
+    return names(ROBOTS)
 
 
 @cache
 def embodiment(name: str) -> Embodiment:
     """The robot called `name`; ValueError, listing what exists, if there is none."""
-    if name == "aloha-agilex":
-        from robospa.harness.robots.aloha_agilex import ALOHA_AGILEX
-
-        return ALOHA_AGILEX
-    raise ValueError(f"no embodiment {name!r}; there are {', '.join(EMBODIMENTS)}")
+    try:
+        found = find(ROBOTS, name, "embodiment")
+    except UnknownName as error:
+        raise ValueError(str(error)) from error
+    if not isinstance(found, Embodiment) or found.name != name:
+        raise ValueError(
+            f"the entry point {name!r} of {ROBOTS} has to lead to a robot of that name"
+        )
+    return found

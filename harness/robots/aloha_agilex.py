@@ -9,14 +9,15 @@ from __future__ import annotations
 
 import math
 
-from robospa.geometry import Pose, Vec3, axis_rotation, look_rotation, yaw_rotation
+from robospa.geometry import Pose, Vec3, axis_rotation, yaw_rotation
 from robospa.harness.robots.aloha_agilex_shapes import (
     FINGER_SHAPES,
     LINK_SHAPES,
     STAND_SHAPES,
     WRIST_CAMERA,
 )
-from robospa.harness.robots.embodiment import Arm, Embodiment, Joint, StaticCamera
+from robospa.harness.robots.embodiment import Arm, Embodiment, Joint
+from robospa.workcell import ArmSite, FixedCamera, Gripper, Workcell
 
 PI = math.pi
 FLIP = axis_rotation((1, 0, 0), -PI)
@@ -33,7 +34,21 @@ CHAIN: tuple[tuple[Vec3, tuple[float, float, float, float], Vec3, float, float],
 )
 FINGER_TRAVEL = 0.04765
 GRASP_CENTRE = 0.145  # along the last link's x axis
-REACH = 0.12  # from the end-effector frame to the grasp centre (gripper_bias)
+
+GRIPPER = Gripper(
+    grasp_centre=0.12,  # official gripper_bias
+    opening=0.088,
+    fingertip=0.012,
+    finger_half_width=0.010,
+    finger_thickness=0.008,
+    radius=0.05,
+    palm_back=(0.095, 0.125, 0.155),
+    palm_half=(0.08, 0.026),
+    hand_back=0.09,
+    hand_half=(0.09, 0.03),
+    wrist_back=0.22,
+    wrist_half=0.09,
+)
 
 READY = (0.0, 1.6, 1.5, 0.0, 0.0, 0.0)
 SEEDS = (
@@ -71,8 +86,7 @@ def _arm(name: str, prefix: str, base: Vec3) -> Arm:
         joints=joints,
         fingers=fingers,
         gripper=(-0.01, 0.045),
-        tool=Pose((GRASP_CENTRE - REACH, 0.0, 0.0)),
-        reach=REACH,
+        tool=Pose((GRASP_CENTRE - GRIPPER.grasp_centre, 0.0, 0.0)),
         home=(0.0,) * 6,
         seeds=SEEDS,
         shapes=shapes,
@@ -81,9 +95,28 @@ def _arm(name: str, prefix: str, base: Vec3) -> Arm:
     )
 
 
-def _looking(position: Vec3, forward: Vec3, left: Vec3, fov_degrees: float) -> StaticCamera:
-    return StaticCamera(Pose(position, look_rotation(forward, left)), math.radians(fov_degrees))
+def _looking(position: Vec3, forward: Vec3, left: Vec3, fov_degrees: float) -> FixedCamera:
+    return FixedCamera(position, forward, left, math.radians(fov_degrees))
 
+
+def _site(x: float) -> ArmSite:
+    return ArmSite(base=(x, -0.417), reach=0.69, tool_reach=(0.25, 0.63), gripper=GRIPPER)
+
+
+WORKCELL = Workcell(
+    # The right arm is mounted at x = 0.307, but the scenes of this suite were drawn for 0.3.
+    arms=(_site(-0.3), _site(0.3)),
+    cameras={
+        "head": _looking((-0.032, -0.45, 1.35), (0, 0.6, -0.8), (-1, 0, 0), 37),
+        "front": _looking((0.0, -0.45, 0.85), (0, 1, -0.1), (-1, 0, 0), 37),
+        "third": _looking((0.0, 0.23, 1.33), (0, -1, -1.02), (1, 0, 0), 93),
+    },
+    sideways_from=0.02,
+    sideways_within=math.radians(40),
+    exchange=(-0.03, -0.08),
+    travel_height=0.17,
+    highest=0.3,
+)
 
 # The robot stands at (0, -0.65, 0) turned by 90 degrees; the bases below are in the world frame.
 ALOHA_AGILEX = Embodiment(
@@ -92,10 +125,6 @@ ALOHA_AGILEX = Embodiment(
         _arm("left", "fl", (-0.3, -0.417, 0.7775)),
         _arm("right", "fr", (0.307, -0.417, 0.7775)),
     ),
-    cameras={
-        "head": _looking((-0.032, -0.45, 1.35), (0, 0.6, -0.8), (-1, 0, 0), 37),
-        "front": _looking((0.0, -0.45, 0.85), (0, 1, -0.1), (-1, 0, 0), 37),
-        "third": _looking((0.0, 0.23, 1.33), (0, -1, -1.02), (1, 0, 0), 93),
-    },
+    workcell=WORKCELL,
     body=STAND_SHAPES,
 )

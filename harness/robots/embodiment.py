@@ -1,6 +1,7 @@
 """A two-armed robot as data: joint chains, link shapes, grippers and camera mounts.
 
-Adding a robot means writing one module like `aloha_agilex.py`; nothing else changes.
+Adding a robot means writing one module like `aloha_agilex.py` and naming it among the entry points
+(docs/adding-a-robot.md); nothing else changes.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from dataclasses import dataclass, field
 
 from robospa.geometry import Pose, Vec3
 from robospa.tasks.shapes import Shape
+from robospa.workcell import Workcell
 
 
 @dataclass(frozen=True)
@@ -36,7 +38,7 @@ class Arm:
     `base` is the world pose of the first link. `joints` are the arm's own joints in order,
     `fingers` the prismatic ones, both driven to the same travel. `gripper` gives that travel [m]
     commanded for 0 (closed) and 1 (open). `tool` is the end-effector frame in the last arm link:
-    x is the approach direction, y the closing direction, the grasp centre lies `reach` [m] ahead.
+    x is the approach direction, y the closing direction (`robospa.workcell.Gripper` has the rest).
     `home` are joint angles [rad]; `seeds` are postures from which inverse kinematics starts.
     `shapes` maps every link to what it is made of, in its frame.
     """
@@ -48,7 +50,6 @@ class Arm:
     fingers: tuple[Joint, ...]
     gripper: tuple[float, float]
     tool: Pose
-    reach: float
     home: tuple[float, ...]
     seeds: tuple[tuple[float, ...], ...]
     shapes: Mapping[str, tuple[Shape, ...]] = field(hash=False)
@@ -69,20 +70,13 @@ class Arm:
 
 
 @dataclass(frozen=True)
-class StaticCamera:
-    """A camera fixed in the world: x of `pose` looks forward, z is up; `fov` is vertical [rad]."""
-
-    pose: Pose
-    fov: float
-
-
-@dataclass(frozen=True)
 class Embodiment:
-    """A robot: two arms and its fixed cameras. `stiffness` and `damping` are the drives'."""
+    """A robot: two arms and its place of work. `stiffness` and `damping` are the drives'."""
 
     name: str
     arms: tuple[Arm, Arm]
-    cameras: Mapping[str, StaticCamera]
+    workcell: Workcell
+    """What tasks and skills know of this robot."""
     stiffness: float = 1000.0
     damping: float = 200.0
     link_mass: float = 1.0

@@ -226,10 +226,11 @@ def camera_view(embodiment: Embodiment, name: str, links: Links) -> tuple[Pose, 
     if name in WRISTS:
         arm = embodiment.arms[WRISTS[name]]
         return links[WRISTS[name]][arm.last_link] * arm.camera, embodiment.wrist_fov, WRIST_NEAR
-    if name in embodiment.cameras:
-        fixed = embodiment.cameras[name]
+    fixed_cameras = embodiment.workcell.cameras
+    if name in fixed_cameras:
+        fixed = fixed_cameras[name]
         return fixed.pose, fixed.fov, NEAR
-    known = ", ".join([*embodiment.cameras, *WRISTS])
+    known = ", ".join([*fixed_cameras, *WRISTS])
     raise ValueError(f"{embodiment.name} has no camera {name!r}; it has {known}")
 
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from robospa.geometry import Pose
-from robospa.tasks.scene import TABLE_TOP
 from robospa.tasks.shapes import Box, Color, Shape
+from robospa.workcell import TABLE_TOP
 
 WHITE: Color = (0.86, 0.86, 0.85)
 WALL: Color = (1.0, 0.9, 0.9)

@@ -15,6 +15,7 @@ from types import MappingProxyType
 from robospa.geometry import Pose, Quat, Vec3, multiply, rotate
 from robospa.harness.sim.motion import RATE, Trajectory
 from robospa.tasks.snapshot import Contact, Snapshot
+from robospa.workcell import Workcell
 
 FLOATS = 7
 """Numbers of a pose in SAPIEN's packed form: qw qx qy qz, x y z, float32."""
@@ -79,6 +80,7 @@ class Layout:
     """
 
     tools: tuple[tuple[int, Pose], ...]
+    workcell: Workcell
 
 
 class LiveSnapshot(Snapshot):
@@ -88,6 +90,7 @@ class LiveSnapshot(Snapshot):
         "_commanded",
         "_ends",
         "_floats",
+        "_grasps",
         "_grippers",
         "_layout",
         "_measure",
@@ -111,6 +114,7 @@ class LiveSnapshot(Snapshot):
     _points: tuple[Contact, ...]
     _table: PoseTable
     _ends: tuple[Pose, Pose]
+    _grasps: tuple[Vec3, Vec3]
 
     def __init__(
         self,
@@ -183,6 +187,16 @@ class LiveSnapshot(Snapshot):
             ends = (self._tool(*left), self._tool(*right))
             _put(self, "_ends", ends)
             return ends
+
+    @property
+    def grasp_points(self) -> tuple[Vec3, Vec3]:
+        """Measured grasp centres."""
+        try:
+            return self._grasps
+        except AttributeError:
+            points = self._layout.workcell.grasp_points(self.end_effector)
+            _put(self, "_grasps", points)
+            return points
 
     def _tool(self, row: int, tool: Pose) -> Pose:
         """`unpack(packed, row) * tool`, with the quaternion whose w is not negative."""

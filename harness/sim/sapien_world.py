@@ -89,7 +89,8 @@ class SapienWorld:
             tuple(
                 (physics.links[a][arm.last_link], arm.tool)
                 for a, arm in enumerate(self._embodiment.arms)
-            )
+            ),
+            self._embodiment.workcell,
         )
         self._later = sorted(
             (math.ceil(item.appears_at * RATE - 1e-9), i)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from itertools import product
 
 import numpy as np
@@ -25,16 +26,13 @@ from robospa.geometry import (
 )
 from robospa.harness.robots.kinematics import inverse
 from robospa.harness.skills.workspace import (
-    FINGER_HALF_WIDTH,
-    FINGER_THICKNESS,
-    FINGERTIP,
     Workspace,
     far_side,
     is_wall,
     wall_front,
 )
-from robospa.tasks.scene import TABLE_TOP
 from robospa.tasks.shapes import Grasp, ObjectModel
+from robospa.workcell import Gripper
 
 Array = NDArray[np.float64]
 
@@ -42,12 +40,10 @@ TILTS = (0.0, 0.2, -0.2, 0.4, -0.4, 0.6, -0.6, 0.8, -0.8, 1.0, -1.0, 1.2, -1.2)
 LEVEL = (0.0,)
 LEANS = (0.0, 0.2, -0.2, 0.4, -0.4)
 """Sideways leans of the gripper [rad], tried when nothing else reaches."""
-PALM_BACK = (0.095, 0.125, 0.155)
-"""How far behind the fingertips the palm is looked at [m]."""
-PALM_HALF, PALM_THICK = 0.08, 0.026
 OPENING_MARGIN = 0.022
 """How much wider than the object the fingers open [m]."""
-MAX_OPENING = 0.088
+SPARE_OPENING = 0.01
+"""What a tipped body is grasped across is narrower than the opening by this [m]."""
 TABLE_CLEARANCE = 0.003
 WRONG_SIDE = 0.6
 """Cost of using the arm on the other side of the table."""
@@ -71,7 +67,7 @@ def upright(pose: Pose) -> bool:
     return rotate(pose.rotation, (0, 0, 1))[2] > 0.9
 
 
-def grasps_now(model: ObjectModel, pose: Pose) -> tuple[Grasp, ...]:
+def grasps_now(model: ObjectModel, pose: Pose, hand: Gripper) -> tuple[Grasp, ...]:
     """The model's grasps in the world; for a body that has tipped over, one across its axis."""
     if upright(pose):
         return tuple(
@@ -88,20 +84,22 @@ def grasps_now(model: ObjectModel, pose: Pose) -> tuple[Grasp, ...]:
     sizes = np.array(model.size)
     axes = to_matrix(pose.rotation)
     flat = np.abs(axes[2]) < 0.5  # body axes that lie in the table's plane
-    choices = [i for i in range(3) if flat[i] and sizes[i] < MAX_OPENING - 0.01]
+    choices = [i for i in range(3) if flat[i] and sizes[i] < hand.opening - SPARE_OPENING]
     return tuple(
         Grasp(centre, (0.0, 0.0, -1.0), tuple(axes[:, i]), float(sizes[i]), 0.6) for i in choices
     )
 
 
 def candidate_poses(
-    grasp: Grasp, reach: float, leans: tuple[float, ...] = LEVEL
+    grasp: Grasp, hand: Gripper, table_top: float, leans: tuple[float, ...] = LEVEL
 ) -> list[tuple[Pose, Vec3, float]]:
     """End-effector poses for one grasp: both finger orders, all tilts that it allows.
 
-    `leans` turn the gripper about the approach's other side, so that one finger comes lower.
+    The fingers stay clear of a table of height `table_top` [m]. `leans` turn the gripper about the
+    approach's other side, so that one finger comes lower.
     """
     found = []
+    reach = hand.grasp_centre
     across = np.cross(grasp.approach, grasp.closing)
     for lean in leans:
         leaning = axis_rotation(across, lean)
@@ -114,10 +112,10 @@ def candidate_poses(
                 continue
             closing = rotate(leaning, grasp.closing)
             slope = math.sqrt(max(0.0, 1 - approach[2] ** 2))
-            lowest = FINGERTIP * -approach[2] + FINGER_HALF_WIDTH * slope
-            lowest += abs(closing[2]) * (grasp.width / 2 + FINGER_THICKNESS)
+            lowest = hand.fingertip * -approach[2] + hand.finger_half_width * slope
+            lowest += abs(closing[2]) * (grasp.width / 2 + hand.finger_thickness)
             x, y, z = grasp.point
-            z = max(z, TABLE_TOP + TABLE_CLEARANCE + lowest)
+            z = max(z, table_top + TABLE_CLEARANCE + lowest)
             position = (x - approach[0] * reach, y - approach[1] * reach, z - approach[2] * reach)
             for sign in (1.0, -1.0):
                 facing = (sign * closing[0], sign * closing[1], sign * closing[2])
@@ -162,25 +160,29 @@ def _grid(back: Sequence[float], side: Sequence[float], across: Sequence[float])
     return np.array(list(product(back, side, across))).T[:, :, None]
 
 
-FINGERS = _grid((0.0, 0.03, 0.06), (1.0, 1.0, -1.0, -1.0), (-FINGER_HALF_WIDTH, FINGER_HALF_WIDTH))
-"""Points of both fingers; half the opening and THICKNESS are added on their side."""
-THICKNESS = np.tile(np.repeat([0.0, FINGER_THICKNESS], 2), 6)[:, None]
-PALM = _grid(
-    PALM_BACK,
-    (-PALM_HALF, -PALM_HALF / 2, 0.0, PALM_HALF / 2, PALM_HALF),
-    (-PALM_THICK, PALM_THICK),
-)
+@cache
+def _points(hand: Gripper) -> tuple[Array, Array, Array]:
+    """What is looked at of a gripper: points of both fingers and of the palm (`_grid`).
+
+    Half the opening is added to the fingers' side; the second array is what their outer points are
+    farther out, (N, 1).
+    """
+    wide, (half, thick) = hand.finger_half_width, hand.palm_half
+    fingers = _grid((0.0, 0.03, 0.06), (1.0, 1.0, -1.0, -1.0), (-wide, wide))
+    thickness = np.tile(np.repeat([0.0, hand.finger_thickness], 2), 6)[:, None]
+    palm = _grid(hand.palm_back, (-half, -half / 2, 0.0, half / 2, half), (-thick, thick))
+    return fingers, thickness, palm
 
 
 def crowding(
     ws: Workspace,
+    hand: Gripper,
     target: str,
     pose: Pose,
-    approach: Vec3,
     opening: float,
     near: Sequence[_Box] | None = None,
 ) -> float:
-    """How deep [m] the opened fingers would be inside neighbours at `pose` (0 = free).
+    """How deep [m] the opened fingers of `hand` would be inside neighbours at `pose` (0 = free).
 
     `near` are the target's neighbours, for a caller that asks about many poses.
     """
@@ -189,10 +191,11 @@ def crowding(
         return 0.0
     frame = to_matrix(pose.rotation)
     ahead, side, across = frame.T[:, None]
-    tip = np.array(pose.position) + ahead[0] * (ws.robot.arms[0].reach + FINGERTIP)
-    fingers = tip - ahead * FINGERS[0] + side * FINGERS[1] * (opening / 2 + THICKNESS)
-    palm = tip - ahead * PALM[0] + side * PALM[1]
-    cloud = np.concatenate([fingers + across * FINGERS[2], palm + across * PALM[2]])
+    tip = np.array(pose.position) + ahead[0] * hand.tip
+    finger, thickness, palm = _points(hand)
+    fingers = tip - ahead * finger[0] + side * finger[1] * (opening / 2 + thickness)
+    body = tip - ahead * palm[0] + side * palm[1]
+    cloud = np.concatenate([fingers + across * finger[2], body + across * palm[2]])
     worst = 0.0
     for box in near:
         local = (cloud - box.position) @ box.turn
@@ -209,16 +212,16 @@ def reachable_grasps(
     """All grasps of `name` that one of `arms` can take now, best first."""
     model = ws.models[name]
     body = ws.pose(name)
-    grasps = grasps_now(model, body)
     near = _boxes_near(ws, name)
     front = wall_front(ws)
     found: list[Reach] = []
     for arm in arms:
-        reach = ws.robot.arms[arm].reach
+        hand, home = ws.hand(arm), ws.robot.arms[arm].home
         poses: list[tuple[Pose, Vec3, float, float]] = []
-        for grasp in grasps:
-            opening = min(MAX_OPENING, grasp.width + OPENING_MARGIN)
-            poses += [(*c, opening) for c in candidate_poses(grasp, reach, leans)]
+        for grasp in grasps_now(model, body, hand):
+            opening = min(hand.opening, grasp.width + OPENING_MARGIN)
+            found_poses = candidate_poses(grasp, hand, ws.scene.table_top, leans)
+            poses += [(*c, opening) for c in found_poses]
         if not poses:
             continue
         joints, ok = inverse(ws.chains[arm], [p[0] for p in poses])
@@ -227,10 +230,11 @@ def reachable_grasps(
             wrong *= abs(body.position[0]) / 0.04
         for i in np.flatnonzero(ok):
             pose, approach, tilt, opening = poses[i]
-            depth = crowding(ws, name, pose, approach, opening, near)
-            roll = abs(float(joints[i][-1])) + 0.5 * abs(float(joints[i][-2]))
-            depth = max(depth, far_side(pose, reach + FINGERTIP) - front)
+            depth = crowding(ws, hand, name, pose, opening, near)
+            turned = joints[i] - home  # of the last two joints: how far hand and wrist turn
+            roll = abs(float(turned[-1])) + 0.5 * abs(float(turned[-2]))
+            depth = max(depth, far_side(pose, hand) - front)
             cost = wrong + 0.5 * tilt + 0.25 * roll + 60.0 * depth
-            share = opening / MAX_OPENING
+            share = opening / hand.opening
             found.append(Reach(arm, pose, approach, joints[i], share, cost, tilt))
     return sorted(found, key=lambda r: r.cost)

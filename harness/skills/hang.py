@@ -68,7 +68,7 @@ def _fits(
 
     def fits(grasp: Reach) -> bool:
         offset = grasp.pose.inverse() * body
-        x, y, _ = offset.inverse().apply((ws.robot.arms[grasp.arm].reach, 0.0, 0.0))
+        x, y, _ = offset.inverse().apply((ws.hand(grasp.arm).grasp_centre, 0.0, 0.0))
         if math.hypot(x, y) > OFF_AXIS:
             return False
         return ways_in(ws, grasp.arm, offset, targets, path, grasp.joints) is not None

@@ -7,15 +7,12 @@ from numpy.typing import NDArray
 
 from robospa.geometry import Pose, from_transform
 from robospa.harness.robots.kinematics import forward
-from robospa.harness.skills.workspace import FINGERTIP, TRAVEL_HEIGHT, Workspace, raised, wall_front
-from robospa.tasks.scene import TABLE_TOP
+from robospa.harness.skills.workspace import Workspace, raised, wall_front
 
 Array = NDArray[np.float64]
 
 NEAR_HOME = 0.15
 """An arm whose joints are all this close to home [rad] is out of the way."""
-HIGHEST = TABLE_TOP + 0.3
-GRIPPER_RADIUS = 0.05
 SPARE = 0.025
 """Room between what is carried and what it is carried over [m]."""
 SAMPLES = np.linspace(0.0, 1.0, 12)[1:-1, None]
@@ -24,7 +21,7 @@ SAMPLES = np.linspace(0.0, 1.0, 12)[1:-1, None]
 def tip_heights(ws: Workspace, arm: int, joints: Array) -> Array:
     """Height [m] of the grasp centre for each row of joints (N, J)."""
     frames, _ = forward(ws.chains[arm], joints)
-    return np.asarray(frames[:, 2, 3] + frames[:, 2, 0] * ws.robot.arms[arm].reach)
+    return np.asarray(frames[:, 2, 3] + frames[:, 2, 0] * ws.hand(arm).grasp_centre)
 
 
 def tops(ws: Workspace, but: str | None) -> list[tuple[Array, float, float]]:
@@ -44,17 +41,19 @@ def tops(ws: Workspace, but: str | None) -> list[tuple[Array, float, float]]:
 
 def hangs(ws: Workspace, arm: int) -> float:
     """How far the lowest point of the gripper, or of what it holds, is below the grasp centre."""
-    name = ws.held[arm]
+    name, fingertip = ws.held[arm], ws.hand(arm).fingertip
     if name is None:
-        return FINGERTIP
+        return fingertip
     centre = float(tip_heights(ws, arm, ws.joints[arm][None])[0])
-    return max(FINGERTIP, centre - (ws.pose(name).position[2] + ws.models[name].bottom))
+    return max(fingertip, centre - (ws.pose(name).position[2] + ws.models[name].bottom))
 
 
 def travel_height(ws: Workspace, arm: int) -> float:
     """Height [m] of the grasp centre at which the arm and what it holds clear everything."""
-    highest = max((top for _, _, top in tops(ws, ws.held[arm])), default=TABLE_TOP)
-    return min(HIGHEST, max(TRAVEL_HEIGHT, highest + hangs(ws, arm) + SPARE))
+    table, cell = ws.scene.table_top, ws.robot.workcell
+    highest = max((top for _, _, top in tops(ws, ws.held[arm])), default=table)
+    lowest = max(table + cell.travel_height, highest + hangs(ws, arm) + SPARE)
+    return min(table + cell.highest, lowest)
 
 
 def blocked(ws: Workspace, arm: int, start: Array, goal: Array) -> bool:
@@ -63,10 +62,11 @@ def blocked(ws: Workspace, arm: int, start: Array, goal: Array) -> bool:
     The ends are the caller's business: only what is met on the way counts.
     """
     frames, _ = forward(ws.chains[arm], start + (goal - start) * SAMPLES)
-    centres = frames[:, :3, 3] + frames[:, :3, 0] * ws.robot.arms[arm].reach
+    centres = frames[:, :3, 3] + frames[:, :3, 0] * ws.hand(arm).grasp_centre
     low = centres[:, 2] - hangs(ws, arm)
-    name = ws.held[arm]
-    wide = GRIPPER_RADIUS if name is None else max(GRIPPER_RADIUS, ws.models[name].radius + 0.01)
+    name, wide = ws.held[arm], ws.hand(arm).radius
+    if name is not None:
+        wide = max(wide, ws.models[name].radius + 0.01)
     for centre, radius, top in tops(ws, name):
         near = np.linalg.norm(centres[:, :2] - centre, axis=1) < radius + wide
         if bool((near & (low < top + 0.01)).any()):

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from robospa.geometry import Pose, axis_rotation, multiply, rotate
 from robospa.harness.robots.kinematics import inverse
-from robospa.harness.skills.grasping import MAX_OPENING
 from robospa.harness.skills.moving import clear_other, line, rise, travel
 from robospa.harness.skills.pick import arms_for
 from robospa.harness.skills.workspace import SkillFailed, Steps, Workspace, backed
@@ -72,7 +71,7 @@ def pull_open(ws: Workspace, call: Open) -> Steps:
 def _pull(ws: Workspace, way: Pull) -> Steps:
     arm = way.arm
     clear_other(ws, arm)
-    ws.add(arm, gripper=OPENING / MAX_OPENING)
+    ws.add(arm, gripper=OPENING / ws.hand(arm).opening)
     travel(ws, arm, way.before)
     ws.add(arm, way.at)
     ws.add(arm, gripper=0.0)
@@ -105,7 +104,7 @@ def _ways(ws: Workspace, call: Open, hinge: Hinge) -> Iterator[Pull]:
     )
     arms = arms_for(call.arm)
     for arm, share, ahead, tip, flip in product(arms, SHARES, AHEAD, TIPS, (0.0, math.pi)):
-        reach = ws.robot.arms[arm].reach
+        reach = ws.hand(arm).grasp_centre
         poses, approach = [], (0.0, 0.0, 0.0)
         for a, spot in zip(angles, at, strict=True):
             turn = axis_rotation(axis, ahead + share * (a - angle))

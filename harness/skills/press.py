@@ -11,7 +11,6 @@ from robospa.harness.robots.kinematics import inverse
 from robospa.harness.skills.moving import clear_other, line, travel
 from robospa.harness.skills.pick import arms_for
 from robospa.harness.skills.workspace import (
-    FINGERTIP,
     SkillFailed,
     Steps,
     Workspace,
@@ -49,7 +48,7 @@ def _plan(ws: Workspace, call: Press) -> tuple[int, np.ndarray, np.ndarray]:
     if len(arms) == 2:
         arms = (0, 1) if x < 0 else (1, 0)
     for arm in arms:
-        reach = ws.robot.arms[arm].reach + FINGERTIP
+        hand = ws.hand(arm)
         poses = []
         for tilt in TILTS:
             for turn in TURNS:
@@ -57,7 +56,7 @@ def _plan(ws: Workspace, call: Press) -> tuple[int, np.ndarray, np.ndarray]:
                 for sign in (1, -1):
                     approach = rotate(axis_rotation(closing, sign * tilt), (0, 0, -1))
                     tip = Pose((x, y, z - DEPTH), look_rotation(approach, closing))
-                    position = backed(tip, approach, reach).position
+                    position = backed(tip, approach, hand.tip).position
                     for side in (1, -1):
                         facing = tuple(side * c for c in closing)
                         poses.append(Pose(position, look_rotation(approach, facing)))
@@ -68,7 +67,7 @@ def _plan(ws: Workspace, call: Press) -> tuple[int, np.ndarray, np.ndarray]:
         ranked = sorted(
             np.flatnonzero(ok),
             key=lambda i: (
-                far_side(poses[i], reach) > front,
+                far_side(poses[i], hand) > front,
                 i // per_tilt,
                 float(np.abs(joints[i] - near).max()),
             ),

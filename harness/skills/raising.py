@@ -126,7 +126,7 @@ def _hold(ws: Workspace, call: RaiseLower, arm: int, framed: bool, skip: int) ->
 
 
 def _at_frame(ws: Workspace, name: str, frame: str, reach: Reach) -> bool:
-    ahead = ws.robot.arms[reach.arm].reach
+    ahead = ws.hand(reach.arm).grasp_centre
     x, y, z = reach.pose.position
     dx, dy, dz = reach.approach
     centre = (x + ahead * dx, y + ahead * dy, z + ahead * dz)

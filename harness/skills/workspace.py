@@ -17,28 +17,18 @@ from robospa.geometry import Pose, Vec3, rotate
 from robospa.harness.robots.embodiment import Embodiment
 from robospa.harness.robots.kinematics import Chain, chain_of, inverse
 from robospa.tasks.objects import object_model
-from robospa.tasks.scene import TABLE_TOP, Scene
+from robospa.tasks.scene import Scene
 from robospa.tasks.shapes import ObjectModel
 from robospa.tasks.snapshot import ARMS, Snapshot
+from robospa.workcell import Gripper
 
 Array = NDArray[np.float64]
 Steps = Generator[Array, Snapshot, None]
-
-FINGERTIP = 0.012
-"""How far the fingertips reach beyond the grasp centre along the approach [m]."""
-FINGER_HALF_WIDTH = 0.010
-FINGER_THICKNESS = 0.008
-TRAVEL_HEIGHT = TABLE_TOP + 0.17
-"""Grasp centres move sideways at this height [m] or above."""
 
 WALL_HEIGHT, WALL_DEPTH = 0.3, 0.03
 """What is higher and less deep than this [m] is a wall."""
 
 AXES: tuple[Vec3, Vec3, Vec3] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-HAND_BACK, HAND_HALF = 0.09, (0.09, 0.03)
-"""How far behind the fingertips the hand is, and how far it reaches along and across its width."""
-WRIST_BACK, WRIST_HALF = 0.22, 0.09
-"""How far behind the fingertips the wrist is, and how far it reaches away from the arm's base."""
 
 
 class SkillFailed(Exception):
@@ -65,6 +55,10 @@ class Workspace:
         self.chains = (chain_of(left), chain_of(right))
         self.joints = [np.asarray(j, dtype=float) for j in self.snapshot.joints]
         self.gripper = list(self.snapshot.gripper)
+
+    def hand(self, arm: int) -> Gripper:
+        """The gripper of an arm."""
+        return self.robot.workcell.arms[arm].gripper
 
     def see(self, snapshot: Snapshot) -> None:
         """Take over what the world says now."""
@@ -122,12 +116,13 @@ def wall_front(ws: Workspace) -> float:
     return min((pose.position[1] - model.size[1] / 2 for pose, model in walls), default=math.inf)
 
 
-def far_side(pose: Pose, ahead: float) -> float:
-    """Largest y [m] of hand and wrist at an end-effector pose with fingertips `ahead` [m] of it."""
+def far_side(pose: Pose, hand: Gripper) -> float:
+    """Largest y [m] of a gripper's hand and wrist at an end-effector pose."""
     forward, closing, across = (rotate(pose.rotation, axis)[1] for axis in AXES)
-    tip = pose.position[1] + forward * ahead
-    wide = HAND_HALF[0] * abs(closing) + HAND_HALF[1] * abs(across)
-    return max(tip - forward * HAND_BACK + wide, tip - forward * WRIST_BACK + WRIST_HALF)
+    tip = pose.position[1] + forward * hand.tip
+    wide = hand.hand_half[0] * abs(closing) + hand.hand_half[1] * abs(across)
+    wrist = tip - forward * hand.wrist_back + hand.wrist_half
+    return max(tip - forward * hand.hand_back + wide, wrist)
 
 
 def raised(pose: Pose, height: float) -> Pose:

@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from robospa.geometry import Pose, Vec3, rotate
 from robospa.tasks.events import Event
 from robospa.tasks.goals.checklist import HELD_RADIUS
-from robospa.tasks.goals.flags import Flags, closed_near, grasp_centre
+from robospa.tasks.goals.flags import Flags, closed_near
 from robospa.tasks.goals.handling import Handling
 from robospa.tasks.goals.hands import Role
 from robospa.tasks.snapshot import Snapshot
@@ -38,8 +38,8 @@ def held_up(name: str, above: float, handles: Sequence[Vec3]) -> Test:
         if pose.position[2] <= above or not upright(pose):
             return False
         return all(
-            math.dist(grasp_centre(arm), pose.apply(handle)) < AT_HANDLE
-            for arm, handle in zip(snapshot.end_effector, handles, strict=True)
+            math.dist(point, pose.apply(handle)) < AT_HANDLE
+            for point, handle in zip(snapshot.grasp_points, handles, strict=True)
         )
 
     return test

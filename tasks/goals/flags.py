@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from robospa.geometry import Pose, Vec3
+from robospa.geometry import Vec3
 from robospa.tasks.events import Event
 from robospa.tasks.snapshot import GRIPPER_OPEN, Snapshot
-
-GRASP_CENTRE = 0.12
-"""The grasp centre lies this far [m] ahead of the end-effector frame, along its x axis."""
 
 
 class Flags:
@@ -39,17 +36,6 @@ def both_open(snapshot: Snapshot) -> bool:
     return left > GRIPPER_OPEN and right > GRIPPER_OPEN
 
 
-def grasp_centre(end_effector: Pose) -> Vec3:
-    """The point [m, world] between the fingertips of an arm with this end-effector pose."""
-    w, x, y, z = end_effector.rotation
-    px, py, pz = end_effector.position
-    return (
-        px + GRASP_CENTRE * (1 - 2 * (y * y + z * z)),
-        py + GRASP_CENTRE * 2 * (x * y + w * z),
-        pz + GRASP_CENTRE * 2 * (x * z - w * y),
-    )
-
-
 def closed_near(snapshot: Snapshot, point: Vec3, radius: float) -> bool:
     """Whether a gripper that is not open has its grasp centre within `radius` [m] of `point`."""
     return holding_arm(snapshot, point, radius) is not None
@@ -59,7 +45,7 @@ def holding_arm(snapshot: Snapshot, point: Vec3, radius: float) -> int | None:
     """The arm (0 left, 1 right) whose gripper is not open and within `radius` [m] of `point`."""
     for arm, opening in enumerate(snapshot.gripper):
         if opening <= GRIPPER_OPEN:
-            x, y, z = grasp_centre(snapshot.end_effector[arm])
+            x, y, z = snapshot.grasp_points[arm]
             dx, dy, dz = x - point[0], y - point[1], z - point[2]
             if dx * dx + dy * dy + dz * dz < radius * radius:
                 return arm

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from robospa.geometry import Vec3
 from robospa.tasks.events import Event
-from robospa.tasks.goals.flags import grasp_centre, holding_arm
+from robospa.tasks.goals.flags import holding_arm
 from robospa.tasks.snapshot import Snapshot
 
 LIFT = 0.03
@@ -95,7 +95,7 @@ class Handling:
         if arm is None:
             self._rest[name] = at[2]
         elif at[2] > self._rest[name] + LIFT:
-            below = grasp_centre(snapshot.end_effector[arm])[2] - at[2]
+            below = snapshot.grasp_points[arm][2] - at[2]
             self._lifted[name] = _Hold(arm, snapshot.time, below)
             return (Event(snapshot.time, "grasped", name),)
         return ()
@@ -103,7 +103,7 @@ class Handling:
     def _carried(self, snapshot: Snapshot, name: str, at: Vec3, speed: float) -> tuple[Event, ...]:
         """A lifted object that falls at `speed` [m/s]."""
         hold = self._lifted[name]
-        below = grasp_centre(snapshot.end_effector[hold.arm])[2] - at[2]
+        below = snapshot.grasp_points[hold.arm][2] - at[2]
         if speed > FALL_SPEED and below > hold.below + SLIP:
             del self._lifted[name]
             self._rest[name] = at[2]
@@ -113,7 +113,7 @@ class Handling:
             return ()
         arm = holding_arm(snapshot, at, self._radius)
         if arm is not None and speed <= FALL_SPEED:
-            below = grasp_centre(snapshot.end_effector[arm])[2] - at[2]
+            below = snapshot.grasp_points[arm][2] - at[2]
             self._lifted[name] = _Hold(arm, snapshot.time, below)
         elif snapshot.time - hold.time > RELEASE:
             del self._lifted[name]

@@ -13,7 +13,6 @@ from dataclasses import dataclass, field
 
 from robospa.geometry import Vec3
 from robospa.tasks.events import Event
-from robospa.tasks.goals.flags import grasp_centre
 from robospa.tasks.objects import object_model
 from robospa.tasks.scene import Scene
 from robospa.tasks.snapshot import ARMS, GRIPPER_CLOSED, Contact, Snapshot
@@ -143,7 +142,7 @@ class Hands:
 
     def _nearest(self, snapshot: Snapshot, arm: int) -> str:
         """The object whose box is nearest to the grasp centre; "" if none is near."""
-        centre = grasp_centre(snapshot.end_effector[arm])
+        centre = snapshot.grasp_points[arm]
         best, found = AROUND, ""
         for name in self._roles:
             if name in snapshot.poses:
@@ -154,11 +153,11 @@ class Hands:
 
     def _approaches(self, snapshot: Snapshot, arm: int, state: _Arm) -> tuple[Event, ...]:
         """What a moving arm has come near to since the last look."""
-        pose = snapshot.end_effector[arm]
-        if math.dist(pose.position, state.seen) < AT_REST:
+        at = snapshot.end_effector[arm].position
+        if math.dist(at, state.seen) < AT_REST:
             return ()
-        state.seen = pose.position
-        centre = grasp_centre(pose)
+        state.seen = at
+        centre = snapshot.grasp_points[arm]
         events: tuple[Event, ...] = ()
         for name in self._roles:
             if name not in snapshot.poses:

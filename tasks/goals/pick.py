@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 from robospa.geometry import Vec3
 from robospa.tasks.events import Event
-from robospa.tasks.goals.flags import grasp_centre
 from robospa.tasks.goals.handling import Handling
 from robospa.tasks.goals.hands import Role
 from robospa.tasks.snapshot import GRIPPER_CLOSED, GRIPPER_OPEN, Snapshot
@@ -114,9 +113,8 @@ class PickTracker:
 
 def carried(snapshot: Snapshot, point: Vec3, opening: float) -> bool:
     """Whether an arm commanded to less than `opening` has its grasp centre near `point`."""
-    for commanded, pose in zip(snapshot.gripper, snapshot.end_effector, strict=True):
+    for commanded, (x, y, z) in zip(snapshot.gripper, snapshot.grasp_points, strict=True):
         if commanded < opening:
-            x, y, z = grasp_centre(pose)
             dx, dy, dz = x - point[0], y - point[1], z - point[2]
             if dx * dx + dy * dy + dz * dz < CARRY_DISTANCE**2:
                 return True

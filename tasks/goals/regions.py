@@ -15,8 +15,8 @@ from robospa.tasks.goals.checklist import HELD_RADIUS
 from robospa.tasks.goals.flags import Flags, both_open, closed_near
 from robospa.tasks.goals.handling import Handling
 from robospa.tasks.goals.hands import Role
-from robospa.tasks.scene import TABLE_TOP
 from robospa.tasks.snapshot import Snapshot
+from robospa.workcell import TABLE_TOP
 
 FALLEN = TABLE_TOP - 0.05
 """An origin below this [m] has left the table."""

@@ -13,8 +13,9 @@ from robospa.tasks import objects
 from robospa.tasks.goals.anyorder import Container
 from robospa.tasks.layouts import BASES, MAX_REACH
 from robospa.tasks.plan import Drop, Pick, Place, Skill
-from robospa.tasks.scene import TABLE_TOP, SceneObject
+from robospa.tasks.scene import SceneObject
 from robospa.tasks.variants.tabletop import Point, apart
+from robospa.workcell import TABLE_TOP
 
 BIN = Pose((-0.45, 0.0, 0.0))
 TABLE_SHIFT = (0.3, 0.0)

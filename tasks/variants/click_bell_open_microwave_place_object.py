@@ -21,7 +21,7 @@ from robospa.tasks.instructions import words_opening
 from robospa.tasks.instructions.words import Slots
 from robospa.tasks.layouts import in_head_view
 from robospa.tasks.plan import Open, Pick, Place, Press, Skill
-from robospa.tasks.scene import TABLE_TOP, Scene
+from robospa.tasks.scene import Scene
 from robospa.tasks.shapes import Hinge
 from robospa.tasks.task import Draft, Level, Task
 from robospa.tasks.variants.tabletop import (
@@ -35,6 +35,7 @@ from robospa.tasks.variants.tabletop import (
     side,
     standing,
 )
+from robospa.workcell import TABLE_TOP
 
 STEPS = {1: "c", 2: "co", 3: "coc", 4: "cocp", 5: "cocpc"}
 """What is asked for: c a click, o the microwave opened, p one thing placed left of another."""

@@ -17,7 +17,7 @@ from robospa.tasks.goals.repeat import PressCounter
 from robospa.tasks.instructions import words_procedural
 from robospa.tasks.instructions.words import Slots
 from robospa.tasks.plan import Home, Pick, Place, Press, Skill
-from robospa.tasks.scene import TABLE_TOP, Scene
+from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
 from robospa.tasks.variants.tabletop import (
     Item,
@@ -29,6 +29,7 @@ from robospa.tasks.variants.tabletop import (
     retry,
     standing,
 )
+from robospa.workcell import TABLE_TOP
 
 STEPS = {1: "c", 2: "cb", 3: "cbc", 4: "cbcp", 5: "cbcpc"}
 """What is asked for: c a click, b the bread into the basket, p the pill bottle onto the pad."""

@@ -22,7 +22,7 @@ from robospa.tasks.instructions import words_spatial
 from robospa.tasks.instructions.words import Slots
 from robospa.tasks.layouts import LayoutError, Mask, head_pixel, in_head_view
 from robospa.tasks.packing import Fits, pool, walk
-from robospa.tasks.scene import TABLE_TOP, Scene, SceneObject
+from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.task import Draft, Level, Task
 from robospa.tasks.variants.picking import (
     BLOCK_HALF,
@@ -33,6 +33,7 @@ from robospa.tasks.variants.picking import (
     pick_target,
 )
 from robospa.tasks.variants.tabletop import standing
+from robospa.workcell import TABLE_TOP
 
 OBJECTS = {1: 3, 2: 4, 3: 5, 4: 6, 5: 7}
 """How many objects lie there; the paper's n counts the at most four extreme ones."""

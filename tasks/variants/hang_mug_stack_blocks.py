@@ -18,7 +18,7 @@ from robospa.tasks.instructions import words_cac
 from robospa.tasks.instructions.words import Slots
 from robospa.tasks.layouts import in_head_view
 from robospa.tasks.plan import Hang, Pick, Place, Skill
-from robospa.tasks.scene import TABLE_TOP, Scene
+from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
 from robospa.tasks.variants.bins import reachable
 from robospa.tasks.variants.stations import frame_of
@@ -33,6 +33,7 @@ from robospa.tasks.variants.tabletop import (
     retry,
     standing,
 )
+from robospa.workcell import TABLE_TOP
 
 COLORS = {
     "red": (1.0, 0.0, 0.0),

@@ -16,9 +16,10 @@ from robospa.tasks.goals.regions import Part, Region, Regions
 from robospa.tasks.instructions import words_moving
 from robospa.tasks.instructions.words import Slots
 from robospa.tasks.plan import Pick, Place, Skill
-from robospa.tasks.scene import TABLE_TOP, Scene
+from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
 from robospa.tasks.variants.tabletop import LAYOUTS, TRIES_PER_POINT, Item, named, standing
+from robospa.workcell import TABLE_TOP
 
 COLORS = {
     "red": (1.0, 0.0, 0.0),

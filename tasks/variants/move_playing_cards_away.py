@@ -15,10 +15,11 @@ from robospa.tasks.goals.regions import Part, Region, Regions
 from robospa.tasks.instructions import words_moving
 from robospa.tasks.instructions.words import Slots
 from robospa.tasks.plan import Pick, Place, Skill
-from robospa.tasks.scene import TABLE_TOP, Scene
+from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
 from robospa.tasks.variants.picking import drawn_yaw
 from robospa.tasks.variants.tabletop import Item, draw_look, named, shuffled_scatter, side, standing
+from robospa.workcell import TABLE_TOP
 
 X, Y, DISTANCE = (-0.20, 0.20), (-0.20, 0.10), 0.15
 AWAY = 0.23

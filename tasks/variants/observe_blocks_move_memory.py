@@ -18,10 +18,11 @@ from robospa.tasks.instructions.words import Slots
 from robospa.tasks.instructions.words_memory import shown_blocks
 from robospa.tasks.layouts import Area, Mask, in_head_view, scatter
 from robospa.tasks.plan import Home, Pick, Place, Skill
-from robospa.tasks.scene import TABLE_TOP, Scene
+from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
 from robospa.tasks.variants.shown import HOLD_STILL, STAND_TOP, WALL, row, stand, wall
 from robospa.tasks.variants.tabletop import Item, named, side, standing
+from robospa.workcell import TABLE_TOP
 
 COLORS = {
     "red": (1.0, 0.0, 0.0),

@@ -10,8 +10,8 @@ import itertools
 
 from robospa.geometry import Vec3
 from robospa.tasks.layouts import EYE, Points
-from robospa.tasks.scene import TABLE_TOP
 from robospa.tasks.variants.ranking import LAYOUTS, LEVELS, Measure, diagonal, front, rank_task
+from robospa.workcell import TABLE_TOP
 
 HALF_HEIGHTS = (
     (0.077, 0.078),

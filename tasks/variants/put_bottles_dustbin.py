@@ -16,7 +16,7 @@ from robospa.tasks.goals.anyorder import Collect
 from robospa.tasks.instructions import words_procedural
 from robospa.tasks.instructions.words import Slots
 from robospa.tasks.plan import Skill
-from robospa.tasks.scene import TABLE_TOP, Scene
+from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
 from robospa.tasks.variants.bins import (
     BIN,
@@ -27,6 +27,7 @@ from robospa.tasks.variants.bins import (
     reachable,
 )
 from robospa.tasks.variants.tabletop import Item, Point, middle_in_view, named, scatter, standing
+from robospa.workcell import TABLE_TOP
 
 X, Y, DISTANCE, MIDDLE = (-0.25, 0.3), (0.03, 0.23), 0.13, 0.05
 HALF_HEIGHT = 0.07

@@ -21,7 +21,7 @@ from robospa.tasks.instructions import words_ranking
 from robospa.tasks.instructions.words import Slots
 from robospa.tasks.layouts import view_span
 from robospa.tasks.plan import Pick, Place, Skill
-from robospa.tasks.scene import TABLE_TOP, Scene
+from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
 from robospa.tasks.variants.tabletop import (
     LAYOUTS,
@@ -34,6 +34,7 @@ from robospa.tasks.variants.tabletop import (
     standing,
 )
 from robospa.tasks.variants.towers import NEAR_BAND, draw_color
+from robospa.workcell import TABLE_TOP
 
 Color = list[float]
 Look = tuple[Vec3, Color]

@@ -18,9 +18,10 @@ from robospa.tasks.goals.pick import Lift
 from robospa.tasks.instructions import words_spatial
 from robospa.tasks.instructions.words import Slots
 from robospa.tasks.layouts import Area, Mask, Points, in_head_view, scatter, spread
-from robospa.tasks.scene import TABLE_TOP, Scene, SceneObject
+from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.task import Draft, Level, Task
 from robospa.tasks.variants.picking import lifted, pick_target
+from robospa.workcell import TABLE_TOP
 
 Range = tuple[float, float]
 

@@ -12,9 +12,10 @@ from robospa.tasks.goals.memory import Cover, UncoverInOrder
 from robospa.tasks.instructions import words_procedural
 from robospa.tasks.instructions.words import Slots
 from robospa.tasks.plan import Home, Pick, Place, Skill, Wait
-from robospa.tasks.scene import TABLE_TOP, Scene
+from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
 from robospa.tasks.variants.tabletop import Item, named, side, standing
+from robospa.workcell import TABLE_TOP
 
 COLORS = {
     "red": (1.0, 0.0, 0.0),

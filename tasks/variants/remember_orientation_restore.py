@@ -18,10 +18,11 @@ from robospa.tasks.goals.restore import Restore, Wanted
 from robospa.tasks.instructions.words import Slots
 from robospa.tasks.instructions.words_memory import turned_blocks
 from robospa.tasks.plan import Home, Pick, Place, Skill
-from robospa.tasks.scene import TABLE_TOP, Scene
+from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
 from robospa.tasks.variants.shown import HOLD_STILL, WALL, row, wall
 from robospa.tasks.variants.tabletop import Item, named, side, standing
+from robospa.workcell import TABLE_TOP
 
 TURNS = (0.0, -math.pi / 2, math.pi, math.pi / 2)
 """Up, right, down, left: where the bar of the T points, seen from the robot."""

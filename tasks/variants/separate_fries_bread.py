@@ -15,9 +15,10 @@ from robospa.tasks.goals.regions import Part, Region, Regions
 from robospa.tasks.instructions import words_moving
 from robospa.tasks.instructions.words import Slots
 from robospa.tasks.plan import Pick, Place, Skill
-from robospa.tasks.scene import TABLE_TOP, Scene
+from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
 from robospa.tasks.variants.tabletop import Item, draw_look, named, side, standing
+from robospa.workcell import TABLE_TOP
 
 ASSETS = {"bread": "bread", "fries": "french_fries"}
 SLOTS_X = {

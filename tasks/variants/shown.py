@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from robospa.geometry import Pose
 from robospa.tasks.plan import Wait
-from robospa.tasks.scene import TABLE_TOP
 from robospa.tasks.variants.tabletop import Item
+from robospa.workcell import TABLE_TOP
 
 HIDDEN_AT = 2.0
 """When the wall appears [s]."""

@@ -16,9 +16,10 @@ import numpy as np
 from robospa.geometry import Pose, yaw_rotation
 from robospa.tasks import objects
 from robospa.tasks.layouts import in_head_view
-from robospa.tasks.scene import TABLE_TOP, SceneObject
+from robospa.tasks.scene import SceneObject
 from robospa.tasks.shapes import ObjectModel
 from robospa.tasks.task import Draft
+from robospa.workcell import TABLE_TOP
 
 Point = tuple[float, float]
 TRIES_PER_POINT = 100

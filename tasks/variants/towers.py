@@ -16,8 +16,9 @@ import numpy as np
 from robospa.tasks.goals.stack import HEIGHT_TOLERANCE, Bring, Stack
 from robospa.tasks.layouts import Area, LayoutError, Points, in_head_view
 from robospa.tasks.plan import Pick, Place, Skill
-from robospa.tasks.scene import TABLE_TOP, Scene
+from robospa.tasks.scene import Scene
 from robospa.tasks.variants.tabletop import Point, apart, side
+from robospa.workcell import TABLE_TOP
 
 NEAR_BAND: tuple[Point, Point] = ((-0.05, 0.05), (-1.0, -0.08))
 """Level 1: the block's centre must come here (x, y)."""

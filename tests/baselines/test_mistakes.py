@@ -21,9 +21,12 @@ SEED = 930_000
 def planned(kind: str, name: str, level: int) -> tuple[Scene, tuple[object, ...]]:
     scene = build_scene(name, level, SEED)
     poses = {item.name: item.pose for item in scene.objects}
-    joints = tuple(tuple(arm.home) for arm in embodiment("aloha-agilex").arms)
-    start = Snapshot(0.0, poses, (1.0, 1.0), (Pose(), Pose()), (joints[0], joints[1]))
-    return scene, wrong_plan(kind, scene, Workspace(scene, embodiment("aloha-agilex"), start))
+    robot = embodiment("aloha-agilex")
+    ends = (Pose(), Pose())
+    points = robot.workcell.grasp_points(ends)
+    joints = (robot.arms[0].home, robot.arms[1].home)
+    start = Snapshot(0.0, poses, (1.0, 1.0), ends, joints, grasp_points=points)
+    return scene, wrong_plan(kind, scene, Workspace(scene, robot, start))
 
 
 def test_the_neighbour_is_not_the_target() -> None:

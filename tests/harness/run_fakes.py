@@ -61,7 +61,11 @@ class FakeWorld:
         return np.full((camera.height, camera.width, 3), self.steps % 256, np.uint8)
 
     def snapshot(self) -> Snapshot:
-        return Snapshot(0.02 * self.steps, {"sum": HERE}, (self.total, 1.0), (HERE, HERE))
+        points = (HERE.position, HERE.position)
+        poses = {"sum": HERE}
+        return Snapshot(
+            0.02 * self.steps, poses, (self.total, 1.0), (HERE, HERE), grasp_points=points
+        )
 
     def contacts(self) -> tuple[Contact, ...]:
         return ()

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.geometry import Pose
-from robospa.tasks.scene import TABLE_TOP, Scene, SceneObject
+from robospa.tasks.scene import Scene, SceneObject
+from robospa.workcell import TABLE_TOP
 
 READY = (0.0, 1.6, 1.5, 0.0, 0.0, 0.0)
 RED = (0.7, 0.1, 0.1)

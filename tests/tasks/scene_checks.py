@@ -24,9 +24,10 @@ from robospa.tasks import catalog
 from robospa.tasks.layouts import HEIGHT, WIDTH, head_pixel
 from robospa.tasks.objects import object_model
 from robospa.tasks.plan import Pick
-from robospa.tasks.scene import TABLE_TOP, Scene, SceneObject
+from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.snapshot import ARMS, Snapshot
 from robospa.tasks.variants import object_sets
+from robospa.workcell import TABLE_TOP
 
 TOUCH = 5e-4
 """Boxes may share this much [m]: what stands beside another thing is no overlap."""
@@ -151,7 +152,10 @@ def _at_start(scene: Scene) -> Workspace:
     """The scene as drawn, both arms at home with open grippers."""
     joints = (ROBOT.arms[0].home, ROBOT.arms[1].home)
     poses = {o.name: o.pose for o in scene.objects if o.appears_at is None}
-    return Workspace(scene, ROBOT, Snapshot(0.0, poses, (1.0, 1.0), _home(), joints))
+    ends = _home()
+    points = ROBOT.workcell.grasp_points(ends)
+    start = Snapshot(0.0, poses, (1.0, 1.0), ends, joints, grasp_points=points)
+    return Workspace(scene, ROBOT, start)
 
 
 @cache
@@ -163,13 +167,13 @@ def _home() -> tuple[Pose, Pose]:
 def _reached(ws: Workspace, name: str, arms: tuple[int, ...]) -> bool:
     """Whether inverse kinematics finds joints of one of `arms` for a grasp of the object."""
     body = ws.pose(name)
-    grasps = grasps_now(ws.models[name], body)
-    upright = [replace(grasp, tilt=0.0) for grasp in grasps[:1]]  # takes most objects
     for leans in (LEVEL, LEANS):
         for arm in sorted(arms, key=lambda k: (body.position[0] > 0) != (k == 1)):
-            reach = ws.robot.arms[arm].reach
+            hand = ws.hand(arm)
+            grasps = grasps_now(ws.models[name], body, hand)
+            upright = [replace(grasp, tilt=0.0) for grasp in grasps[:1]]  # takes most objects
             for grasp in (*upright, *grasps):
-                poses = [pose for pose, _, _ in candidate_poses(grasp, reach, leans)]
+                poses = [p for p, _, _ in candidate_poses(grasp, hand, ws.scene.table_top, leans)]
                 if poses and inverse(ws.chains[arm], poses)[1].any():
                     return True
     return False

@@ -27,7 +27,7 @@ def snap(
     left, right = (Pose((x, y, z + 0.12), DOWN) for x, y, z in grasp)
     contacts = tuple(Contact("left_gripper", name, point) for name, point in touched)
     poses = {name: Pose(position) for name, position in positions.items()}
-    return Snapshot(time, poses, gripper, (left, right), contacts=contacts)
+    return Snapshot(time, poses, gripper, (left, right), contacts=contacts, grasp_points=grasp)
 
 
 def held(point: Vec3) -> tuple[Vec3, Vec3]:

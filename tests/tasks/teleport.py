@@ -75,6 +75,7 @@ class Teleport:
             there,
             opening,
             (left, right),
+            grasp_points=(self.grasp[0], self.grasp[1]),
             contacts=tuple(contacts),
             hinges=dict(self.hinges),
         )

@@ -11,7 +11,8 @@ from teleport import Teleport
 from robospa.tasks.catalog import build_scene, task, tasks
 from robospa.tasks.events import outcome
 from robospa.tasks.objects import object_model
-from robospa.tasks.scene import TABLE_TOP, Scene, SceneObject
+from robospa.tasks.scene import Scene, SceneObject
+from robospa.workcell import TABLE_TOP
 
 LIMITS = {
     "Place_Phone_Press_Stapler": (400, 600, 800, 1000, 1300),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from snapshots_by_hand import TICK, held, kinds, run, snap
 
 from robospa.geometry import Pose, Vec3
@@ -18,10 +20,7 @@ NEAR = on_spot(0.035, -0.01, 0.01, Pose(), Pose((0.0, 0.0, 0.005)))
 
 
 def play(goal: Checklist, snapshots: list[Snapshot]) -> list[Event]:
-    timed = [
-        Snapshot(i * TICK, s.poses, s.gripper, s.end_effector, contacts=s.contacts)
-        for i, s in enumerate(snapshots)
-    ]
+    timed = [replace(s, time=i * TICK) for i, s in enumerate(snapshots)]
     return run(goal, timed)
 
 

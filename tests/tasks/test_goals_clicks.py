@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from snapshots_by_hand import AWAY, TICK, held, kinds, run, snap
 
@@ -33,10 +35,7 @@ def touching(names: str, opening: float = 0.0) -> list[Snapshot]:
 
 
 def timed(snapshots: list[Snapshot]) -> list[Snapshot]:
-    return [
-        Snapshot(i * TICK, s.poses, s.gripper, s.end_effector, contacts=s.contacts)
-        for i, s in enumerate(snapshots)
-    ]
+    return [replace(s, time=i * TICK) for i, s in enumerate(snapshots)]
 
 
 def click(order: str, touched: str, others: str = "", opening: float = 0.0) -> list[Event]:
@@ -131,7 +130,7 @@ def hits(points: list[tuple[Vec3, str]]) -> list[Event]:
         pose = {**PLACES, "hammer": point}
         touch = snap(0, pose)
         contacts = (Contact(name, "hammer", point),) if name else ()
-        made += [Snapshot(0, touch.poses, touch.gripper, touch.end_effector, contacts=contacts)]
+        made += [replace(touch, contacts=contacts)]
         made += [snap(0, {**PLACES, "hammer": far})] * 8
     return run(goal, timed(made))
 

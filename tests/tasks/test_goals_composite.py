@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from snapshots_by_hand import AWAY, TICK, held, kinds, run, snap
 
 from robospa.geometry import Pose, Vec3
@@ -40,10 +42,7 @@ def put(bread: Vec3 = IN_BASKET) -> list[Snapshot]:
 def play(*parts: list[Snapshot]) -> tuple[ClickAndPlace, list[Event]]:
     goal = tracker()
     flat = [snap(0, START), *(s for part in parts for s in part)]
-    timed = [
-        Snapshot(i * TICK, s.poses, s.gripper, s.end_effector, contacts=s.contacts)
-        for i, s in enumerate(flat)
-    ]
+    timed = [replace(s, time=i * TICK) for i, s in enumerate(flat)]
     return goal, run(goal, timed)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 from snapshots_by_hand import AWAY, TICK, held, kinds, run, snap
@@ -21,7 +22,7 @@ NEAR: dict[str, Vec3] = {"a": (-0.1, -0.18, 0.755), "b": (0.1, -0.18, 0.755)}
 
 
 def timed(snapshots: list[Snapshot]) -> list[Snapshot]:
-    return [Snapshot(i * TICK, s.poses, s.gripper, s.end_effector) for i, s in enumerate(snapshots)]
+    return [replace(s, time=i * TICK) for i, s in enumerate(snapshots)]
 
 
 def play(*after: Snapshot, before: list[Snapshot] | None = None) -> tuple[AfterCue, list[Event]]:
@@ -59,7 +60,7 @@ def test_a_held_or_lifted_block_does_not_count() -> None:
 
 
 def test_success_waits_for_open_grippers() -> None:
-    closed = Snapshot(0, there("a", "b").poses, (0.1, 1.0), there().end_effector)
+    closed = replace(there("a", "b"), gripper=(0.1, 1.0))
     _, events = play(closed)
     assert kinds(events).count("subtask_done") == 2 and "success" not in kinds(events)
 
@@ -91,7 +92,7 @@ def turned(*yaws: float, shift: float = 0.0, lift: float = 0.0, gripper: float =
         for i, (name, yaw) in enumerate(zip("ab", yaws, strict=True))
     }
     blank = snap(0, {}, (gripper, 1.0), held((0.0, 0.0, 0.76)) if gripper < 1 else AWAY)
-    return Snapshot(0, poses, blank.gripper, blank.end_effector)
+    return replace(blank, poses=poses)
 
 
 def restore(*after: Snapshot) -> list[Event]:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
-from snapshots_by_hand import AWAY, DOWN, TICK, kinds, run, snap
+from snapshots_by_hand import AWAY, TICK, kinds, run, snap
 
 from robospa.geometry import Pose, Vec3, axis_rotation
 from robospa.tasks.goals.cycles import Cycles, Test, back_home, held_up, put_down, raised
@@ -58,7 +59,7 @@ def turned(angle: float) -> Pose:
 
 @pytest.mark.parametrize(("angle", "home"), [(0.09, True), (0.11, False), (2 * math.pi, True)])
 def test_home_asks_for_the_first_turn(angle: float, home: bool) -> None:
-    snapshot = Snapshot(0.0, {"f": turned(angle)}, (1, 1), (Pose(), Pose()))
+    snapshot = replace(snap(0.0, {}), poses={"f": turned(angle)})
     assert back_home("f", 0.04, 0.05)(snapshot, Pose(HOME)) is home
 
 
@@ -66,8 +67,8 @@ def hanging(rise: float, slip: float = 0.0, lean: float = 0.0) -> Snapshot:
     """A pot with a gripper at either handle, the right one `slip` [m] off, leaning by `lean`."""
     pose = Pose((HOME[0], HOME[1], HOME[2] + rise), axis_rotation((1, 0, 0), lean))
     (lx, ly, lz), (rx, ry, rz) = (pose.apply(h) for h in HANDLES)
-    arms = (Pose((lx, ly, lz + 0.12), DOWN), Pose((rx + slip, ry, rz + 0.12), DOWN))
-    return Snapshot(0.0, {"p": pose}, (0.1, 0.1), arms)
+    held = snap(0.0, {}, (0.1, 0.1), ((lx, ly, lz), (rx + slip, ry, rz)))
+    return replace(held, poses={"p": pose})
 
 
 UP: Test = held_up("p", 0.82, HANDLES)
@@ -98,7 +99,7 @@ def test_a_pot_is_down_upright_near_the_table(snapshot: Snapshot, down: bool) ->
 
 
 def test_a_pot_elsewhere_is_not_put_back() -> None:
-    aside = Snapshot(0.0, {"p": Pose((0.081, HOME[1], HOME[2]))}, (1, 1), (Pose(), Pose()))
+    aside = snap(0.0, {"p": (0.081, HOME[1], HOME[2])})
     assert not DOWN_AGAIN(aside, Pose(HOME))
 
 

@@ -17,7 +17,7 @@ from robospa.tasks.layouts import (
     view_span,
 )
 from robospa.tasks.packing import apart, pool, walk
-from robospa.tasks.scene import TABLE_TOP
+from robospa.workcell import TABLE_TOP
 
 A = np.array
 

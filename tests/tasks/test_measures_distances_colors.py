@@ -21,10 +21,11 @@ from robospa.tasks.objects import looks, object_model
 from robospa.tasks.objects.build import PALETTE
 from robospa.tasks.objects.tint import TINTS
 from robospa.tasks.plan import Pick, Skill
-from robospa.tasks.scene import TABLE_TOP, Scene
+from robospa.tasks.scene import Scene
 from robospa.tasks.variants import object_sets
 from robospa.tasks.variants.basic_color import COLORS
 from robospa.tasks.variants.pick_blocks_measures import none_hidden
+from robospa.workcell import TABLE_TOP
 
 MEASURES = {"Pick_Blocks_Height": 2, "Pick_Blocks_Length": 0, "Pick_Blocks_Area": 0}
 """Which half size makes the rank."""

@@ -18,8 +18,9 @@ from robospa.tasks.goals.opening import Opened
 from robospa.tasks.layouts import in_head_view
 from robospa.tasks.objects import object_model
 from robospa.tasks.plan import Home, Open, Pick, Place, Press
-from robospa.tasks.scene import TABLE_TOP, Scene
+from robospa.tasks.scene import Scene
 from robospa.tasks.snapshot import Snapshot
+from robospa.workcell import TABLE_TOP
 
 NAME = "Click_Bell_Open_Microwave_Place_Object"
 LEVELS = range(1, 6)

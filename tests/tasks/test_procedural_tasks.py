@@ -15,7 +15,8 @@ from robospa.tasks.catalog import build_scene, task
 from robospa.tasks.events import outcome
 from robospa.tasks.layouts import in_head_view, in_reach
 from robospa.tasks.objects import object_model
-from robospa.tasks.scene import TABLE_TOP, Scene, SceneObject
+from robospa.tasks.scene import Scene, SceneObject
+from robospa.workcell import TABLE_TOP
 
 TASKS = (
     "Press_Stapler_Repeat",

@@ -17,7 +17,8 @@ from robospa.tasks.events import outcome
 from robospa.tasks.layouts import in_head_view, in_reach
 from robospa.tasks.objects import object_model
 from robospa.tasks.plan import Place
-from robospa.tasks.scene import TABLE_TOP, Scene
+from robospa.tasks.scene import Scene
+from robospa.workcell import TABLE_TOP
 
 RANKED = ("Rank_Blocks_Height", "Rank_Blocks_Color", "Rank_Blocks_Size")
 TASKS = (

@@ -18,11 +18,12 @@ from robospa.tasks.events import outcome
 from robospa.tasks.layouts import Area, in_head_view, in_reach
 from robospa.tasks.objects import looks, object_model
 from robospa.tasks.plan import Pick
-from robospa.tasks.scene import TABLE_TOP, Scene
+from robospa.tasks.scene import Scene
 from robospa.tasks.snapshot import Contact
 from robospa.tasks.variants import neighbours, object_sets
 from robospa.tasks.variants.extremes import LEADS
 from robospa.tasks.variants.pick_multi_view import SPREADS
+from robospa.workcell import TABLE_TOP
 
 BLOCKS, DISTANCE, CANONICAL, SOAPS, VIEWS = TASKS = (
     "Pick_Blocks_Size",

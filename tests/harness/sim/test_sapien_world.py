@@ -13,8 +13,8 @@ from world_scenes import READY, block, joint_action, run_digest, scene, two_bloc
 from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.harness.world import ActionError, RenderUnavailable, SceneUnstable
 from robospa.protocol.policy import CameraSpec, PolicySpec
-from robospa.tasks.scene import TABLE_TOP
 from robospa.tasks.snapshot import Snapshot, snapshot_from_json
+from robospa.workcell import TABLE_TOP, workcell
 
 pytestmark = pytest.mark.sim
 
@@ -172,7 +172,7 @@ def test_only_what_the_spec_asks_for_is_observed(world: SapienWorld) -> None:
 def test_the_privileged_state_is_the_snapshot(world: SapienWorld) -> None:
     world.load(two_blocks())
     seen = world.observe(PolicySpec("p", cameras=(), privileged=True))["privileged"]
-    assert snapshot_from_json(seen).poses == dict(world.snapshot().poses)
+    assert snapshot_from_json(seen, workcell("aloha-agilex")).poses == dict(world.snapshot().poses)
 
 
 def test_short_cuts_of_a_snapshot_say_what_its_poses_say(world: SapienWorld) -> None:

@@ -6,7 +6,8 @@ import pytest
 
 from robospa.geometry import Pose
 from robospa.tasks.objects import object_model
-from robospa.tasks.scene import TABLE_TOP, Scene, SceneObject
+from robospa.tasks.scene import Scene, SceneObject
+from robospa.workcell import TABLE_TOP
 
 pytestmark = pytest.mark.sim
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,8 +13,9 @@ from robospa.harness.robots.kinematics import chain_of, end_effector
 from robospa.harness.skills.raising import raise_lower
 from robospa.harness.skills.workspace import SkillFailed, Workspace
 from robospa.tasks.plan import RaiseLower
-from robospa.tasks.scene import TABLE_TOP, Scene, SceneObject
+from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.snapshot import Snapshot
+from robospa.workcell import TABLE_TOP
 
 ROBOT = embodiment("aloha-agilex")
 RISE = 0.1
@@ -45,7 +48,10 @@ class Table:
             self.rise = max(0.0, min(closed) - self._from)
         poses = {"thing": Pose((0.0, -0.05, TABLE_TOP + self.rise))}
         joints = (tuple(left[:6]), tuple(right[:6]))
-        return Snapshot(0.0, poses, (left[6], right[6]), (ends[0], ends[1]), joints)
+        points = ROBOT.workcell.grasp_points((ends[0], ends[1]))
+        return Snapshot(
+            0.0, poses, (left[6], right[6]), (ends[0], ends[1]), joints, grasp_points=points
+        )
 
     def run(self, call: RaiseLower) -> None:
         """Send every row to the robot; note how high the thing was whenever the expert looks."""
@@ -92,12 +98,8 @@ def test_a_thing_that_stays_is_given_up_after_a_few_attempts() -> None:
 
 def test_what_no_arm_reaches_is_refused() -> None:
     table = Table("fan")
-    table.workspace.snapshot = Snapshot(
-        0.0,
-        {"thing": Pose((0.0, 0.6, TABLE_TOP))},
-        (1.0, 1.0),
-        table.workspace.snapshot.end_effector,
-        table.workspace.snapshot.joints,
+    table.workspace.snapshot = replace(
+        table.workspace.snapshot, poses={"thing": Pose((0.0, 0.6, TABLE_TOP))}, gripper=(1.0, 1.0)
     )
     with pytest.raises(SkillFailed, match="finds no grasp of thing"):
         table.run(RaiseLower("thing", RISE, 1, ("left",)))

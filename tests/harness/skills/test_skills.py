@@ -10,14 +10,16 @@ from robospa.harness.robots import embodiment
 from robospa.harness.robots.kinematics import chain_of, end_effector
 from robospa.harness.skills import Expert
 from robospa.harness.skills.grasping import candidate_poses, crowding, reachable_grasps
-from robospa.harness.skills.workspace import FINGERTIP, Workspace
+from robospa.harness.skills.workspace import Workspace
 from robospa.protocol.policy import TrialInfo
 from robospa.tasks.catalog import build_scene, tasks
-from robospa.tasks.scene import TABLE_TOP, Scene, SceneObject
+from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.snapshot import Snapshot
 from robospa.trial import TrialKey
+from robospa.workcell import TABLE_TOP
 
 ROBOT = embodiment("aloha-agilex")
+HAND = ROBOT.workcell.arms[0].gripper
 UNTUNED_SEED = 7_000_000
 
 
@@ -29,20 +31,24 @@ def block(name: str, x: float, y: float, half: float = 0.02) -> SceneObject:
 def workspace(*objects: SceneObject) -> Workspace:
     """A scene at rest, both arms at home with open grippers."""
     scene = Scene("none", 1, 0, ROBOT.name, "clean", objects, {})
-    home = tuple(end_effector(chain_of(a), a.home) for a in ROBOT.arms)
+    left, right = (end_effector(chain_of(a), a.home) for a in ROBOT.arms)
+    points = ROBOT.workcell.grasp_points((left, right))
     joints = (ROBOT.arms[0].home, ROBOT.arms[1].home)
     poses = {o.name: o.pose for o in objects}
-    return Workspace(scene, ROBOT, Snapshot(0.0, poses, (1.0, 1.0), (home[0], home[1]), joints))
+    start = Snapshot(0.0, poses, (1.0, 1.0), (left, right), joints, grasp_points=points)
+    return Workspace(scene, ROBOT, start)
 
 
 def test_a_grasp_closes_on_the_object_and_clears_the_table() -> None:
     ws = workspace(block("b", -0.15, -0.1))
     best = reachable_grasps(ws, "b", (0, 1))[0]
     frame = to_matrix(best.pose.rotation)
-    centre = [p + 0.12 * a for p, a in zip(best.pose.position, best.approach, strict=True)]
+    centre = [
+        p + HAND.grasp_centre * a for p, a in zip(best.pose.position, best.approach, strict=True)
+    ]
     assert best.arm == 0
     assert centre == pytest.approx([-0.15, -0.1, TABLE_TOP + 0.02], abs=0.011)
-    assert centre[2] + FINGERTIP * frame[2, 0] > TABLE_TOP + 0.002
+    assert centre[2] + HAND.fingertip * frame[2, 0] > TABLE_TOP + 0.002
 
 
 def test_each_side_gets_its_own_arm() -> None:
@@ -55,7 +61,7 @@ def test_each_side_gets_its_own_arm() -> None:
 def test_fingers_do_not_go_where_a_neighbour_stands() -> None:
     ws = workspace(block("b", -0.15, -0.05), block("wall", -0.15 + 0.045, -0.05))
     best = reachable_grasps(ws, "b", (0,))[0]
-    assert crowding(ws, "b", best.pose, best.approach, best.opening * 0.088) == 0.0
+    assert crowding(ws, HAND, "b", best.pose, best.opening * HAND.opening) == 0.0
 
 
 def test_nothing_reaches_beyond_the_table() -> None:
@@ -66,17 +72,18 @@ def test_low_objects_are_taken_with_the_tips_above_the_table() -> None:
     from robospa.tasks.shapes import Grasp
 
     flat = Grasp((0.0, 0.0, TABLE_TOP + 0.002), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0), 0.03)
-    for pose, approach, _ in candidate_poses(flat, 0.12):
-        tip = pose.position[2] + (0.12 + FINGERTIP) * approach[2]
+    for pose, approach, _ in candidate_poses(flat, HAND, TABLE_TOP):
+        tip = pose.position[2] + (HAND.grasp_centre + HAND.fingertip) * approach[2]
         assert tip > TABLE_TOP + 0.002
 
 
 def test_the_expert_holds_still_when_its_plan_is_over() -> None:
     scene = build_scene("Press_Stapler_Repeat", 1, 0)
-    home = tuple(end_effector(chain_of(a), a.home) for a in ROBOT.arms)
+    left, right = (end_effector(chain_of(a), a.home) for a in ROBOT.arms)
+    points = ROBOT.workcell.grasp_points((left, right))
     joints = (ROBOT.arms[0].home, ROBOT.arms[1].home)
     poses = {o.name: o.pose for o in scene.objects}
-    snapshot = Snapshot(0.0, poses, (1.0, 1.0), (home[0], home[1]), joints)
+    snapshot = Snapshot(0.0, poses, (1.0, 1.0), (left, right), joints, grasp_points=points)
     expert = Expert(scene, snapshot)
     for _ in range(10):
         rows = expert.next(snapshot)

@@ -23,10 +23,11 @@ UPWARDS = (0.0, 0.0, 1.0)
 
 def at_rest(scene: Scene) -> Snapshot:
     """The scene as drawn, both arms at home with open grippers."""
-    home = tuple(end_effector(chain_of(a), a.home) for a in ROBOT.arms)
+    left, right = (end_effector(chain_of(a), a.home) for a in ROBOT.arms)
+    points = ROBOT.workcell.grasp_points((left, right))
     joints = (ROBOT.arms[0].home, ROBOT.arms[1].home)
     poses = {o.name: o.pose for o in scene.objects}
-    return Snapshot(0.0, poses, (1.0, 1.0), (home[0], home[1]), joints)
+    return Snapshot(0.0, poses, (1.0, 1.0), (left, right), joints, grasp_points=points)
 
 
 def workspace(name: str, level: int) -> tuple[Scene, Workspace]:

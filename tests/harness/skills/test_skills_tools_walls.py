@@ -9,10 +9,11 @@ from robospa.harness.robots import embodiment
 from robospa.harness.robots.kinematics import chain_of, end_effector
 from robospa.harness.skills.grasping import reachable_grasps
 from robospa.harness.skills.moving import tops, travel_height
-from robospa.harness.skills.workspace import TRAVEL_HEIGHT, Workspace, wall_front
+from robospa.harness.skills.workspace import Workspace, wall_front
 from robospa.tasks.catalog import build_scene, task
-from robospa.tasks.scene import TABLE_TOP, Scene, SceneObject
+from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.snapshot import Snapshot
+from robospa.workcell import TABLE_TOP
 
 ROBOT = embodiment("aloha-agilex")
 WALL_Y = 0.06
@@ -26,10 +27,12 @@ def thing(name: str, y: float, half: tuple[float, float, float], x: float = -0.1
 def workspace(*objects: SceneObject) -> Workspace:
     """A scene at rest, both arms at home with open grippers."""
     scene = Scene("none", 1, 0, ROBOT.name, "clean", objects, {})
-    home = tuple(end_effector(chain_of(a), a.home) for a in ROBOT.arms)
+    left, right = (end_effector(chain_of(a), a.home) for a in ROBOT.arms)
+    points = ROBOT.workcell.grasp_points((left, right))
     joints = (ROBOT.arms[0].home, ROBOT.arms[1].home)
     poses = {o.name: o.pose for o in objects}
-    return Workspace(scene, ROBOT, Snapshot(0.0, poses, (1.0, 1.0), (home[0], home[1]), joints))
+    start = Snapshot(0.0, poses, (1.0, 1.0), (left, right), joints, grasp_points=points)
+    return Workspace(scene, ROBOT, start)
 
 
 CUBE = thing("cube", 0.0, (0.02, 0.02, 0.02))
@@ -41,7 +44,7 @@ def test_a_wall_and_what_is_behind_it_are_not_travelled_over() -> None:
     ws = workspace(CUBE, WALL, BEHIND)
     assert wall_front(ws) == pytest.approx(WALL_Y - 0.005)
     assert len(tops(ws, None)) == 1
-    assert travel_height(ws, 0) == TRAVEL_HEIGHT
+    assert travel_height(ws, 0) == TABLE_TOP + ROBOT.workcell.travel_height
     assert len(tops(workspace(CUBE, BEHIND), None)) == 2
 
 

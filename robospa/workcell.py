@@ -1,0 +1,249 @@
+"""A robot's place of work: table, fixed cameras, where the arms stand, and what its grippers are.
+
+This is what tasks, goals and skills may know of a robot. A `Workcell` belongs to an embodiment
+(`robospa.harness.robots`) and is found by the embodiment's name (`workcell`). Lengths are metres,
+angles radians, positions in the world frame: x right, y away from the robot, z up.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cache, cached_property
+from typing import TYPE_CHECKING, Any
+
+from robospa.geometry import Pose, Vec3, look_rotation
+from robospa.registry import ROBOTS, find
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+    Mask = NDArray[np.bool_]
+
+WIDTH, HEIGHT = 320, 240
+"""Size [px] of the image that scenes have to be seen in."""
+TABLE_TOP = 0.74
+"""Height of the benchmark's table [m], on which scenes are drawn."""
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table: the height of its top and its size in x and y; its middle is at x = y = 0."""
+
+    top: float = TABLE_TOP
+    size: tuple[float, float] = (1.2, 0.7)
+    thickness: float = 0.05
+
+
+@dataclass(frozen=True)
+class FixedCamera:
+    """A camera that does not move; it looks `forward`, `left` is left in its level picture.
+
+    The two directions need not have unit length. `fov` is the vertical field of view.
+    """
+
+    position: Vec3
+    forward: Vec3
+    left: Vec3
+    fov: float
+
+    @cached_property
+    def pose(self) -> Pose:
+        """Pose of the camera: x looks forward, y is left, z is up in the image."""
+        return Pose(self.position, look_rotation(self.forward, self.left))
+
+    @cached_property
+    def axes(self) -> tuple[Vec3, Vec3, Vec3]:
+        """Unit vectors: forward, and right and up in the image."""
+        (a, b, c), (d, e, f) = _unit(self.forward), _unit(self.left)
+        return (a, b, c), (-d, -e, -f), (b * f - c * e, c * d - a * f, a * e - b * d)
+
+    @cached_property
+    def focal(self) -> float:
+        """Focal length [px] in an image of HEIGHT."""
+        return HEIGHT / 2 / math.tan(self.fov / 2)
+
+    def column(self, x: Array, y: Array, z: Array | float) -> Array:
+        """How far right [px] of the left edge points [m] are in an image of WIDTH x HEIGHT."""
+        forward, right, _ = self.axes
+        depth = self._along(forward, x, y, z)
+        column: Array = WIDTH / 2 + self.focal * self._along(right, x, y, z) / depth
+        return column
+
+    def row(self, x: Array, y: Array, z: Array | float) -> Array:
+        """How far below [px] the top edge points [m] are in an image of WIDTH x HEIGHT."""
+        forward, _, up = self.axes
+        depth = self._along(forward, x, y, z)
+        row: Array = HEIGHT / 2 - self.focal * self._along(up, x, y, z) / depth
+        return row
+
+    def pixel(self, x: Array, y: Array, z: Array | float) -> tuple[Array, Array]:
+        """Column and row [px] of points [m] in an image of WIDTH x HEIGHT."""
+        return self.column(x, y, z), self.row(x, y, z)
+
+    def _along(self, axis: Vec3, *point: Array | float) -> Any:
+        """Component [m] along the unit vector `axis` of the way from the camera to points."""
+        # Most components are 0 or 1, and samplers ask for millions of points: do only what counts.
+        parts = [
+            value - eye if share == 1.0 else share * (value - eye)
+            for share, value, eye in zip(axis, point, self.position, strict=True)
+            if share
+        ]
+        return sum(parts[1:], parts[0])
+
+
+def _unit(vector: Vec3) -> Vec3:
+    x, y, z = vector
+    length = math.sqrt(x * x + y * y + z * z)
+    return (x / length, y / length, z / length)
+
+
+@dataclass(frozen=True)
+class Gripper:
+    """A parallel gripper in its end-effector frame: x is the approach, y the closing direction.
+
+    The grasp centre, between the fingers, lies `grasp_centre` ahead of the frame; the fingertips
+    are `fingertip` farther ahead. `opening` is the greatest width between the fingers that skills
+    use, at the gripper value 1.
+    """
+
+    grasp_centre: float
+    opening: float
+    fingertip: float
+    finger_half_width: float
+    finger_thickness: float
+    radius: float
+    """How far around the approach axis nothing may stand when the gripper moves sideways."""
+    palm_back: tuple[float, ...]
+    """How far behind the fingertips the palm is looked at when neighbours are avoided."""
+    palm_half: tuple[float, float]
+    """How far the palm reaches along the closing direction, and across it."""
+    hand_back: float
+    """How far behind the fingertips the hand is."""
+    hand_half: tuple[float, float]
+    """How far the hand reaches along the closing direction, and across it."""
+    wrist_back: float
+    """How far behind the fingertips the wrist is."""
+    wrist_half: float
+    """How far the wrist reaches to any side."""
+
+    @property
+    def tip(self) -> float:
+        """How far ahead of the end-effector frame the fingertips are."""
+        return self.grasp_centre + self.fingertip
+
+    def grasp_point(self, end_effector: Pose) -> Vec3:
+        """The grasp centre [m, world] of a gripper whose end-effector frame has this pose."""
+        w, x, y, z = end_effector.rotation
+        px, py, pz = end_effector.position
+        ahead = self.grasp_centre
+        return (
+            px + ahead * (1 - 2 * (y * y + z * z)),
+            py + ahead * 2 * (x * y + w * z),
+            pz + ahead * 2 * (x * z - w * y),
+        )
+
+
+@dataclass(frozen=True)
+class ArmSite:
+    """Where an arm stands on the plan, and how far it gets.
+
+    `reach` is the farthest planar distance from `base` at which a tilted grasp still gets there;
+    `tool_reach` are the distances at which several grasps of a tool (a hammer) do.
+    """
+
+    base: tuple[float, float]
+    reach: float
+    tool_reach: tuple[float, float]
+    gripper: Gripper
+
+
+@dataclass(frozen=True)
+class Workcell:
+    """What tasks and skills know of a robot: two arms, left and right, and its surroundings.
+
+    Beyond `sideways_from` [m, y] an arm cannot close its fingers along its own direction of reach:
+    there the closing direction is within `sideways_within` [rad] of the x axis.
+    `exchange` is where, on the table, one arm leaves a thing for the other.
+    """
+
+    arms: tuple[ArmSite, ArmSite]
+    cameras: Mapping[str, FixedCamera] = field(hash=False)
+    sideways_from: float
+    sideways_within: float
+    exchange: tuple[float, float]
+    travel_height: float
+    """Grasp centres move sideways at least so high above the table."""
+    highest: float
+    """Grasp centres need not go higher above the table than this."""
+    table: Table = Table()
+
+    @property
+    def head(self) -> FixedCamera:
+        """The camera that scenes have to be seen by."""
+        return self.cameras["head"]
+
+    def grasp_points(self, end_effectors: tuple[Pose, Pose]) -> tuple[Vec3, Vec3]:
+        """Grasp centres [m, world] of both arms at these poses of their end-effector frames."""
+        left, right = self.arms
+        return (
+            left.gripper.grasp_point(end_effectors[0]),
+            right.gripper.grasp_point(end_effectors[1]),
+        )
+
+    def in_reach(self, x: Array, y: Array) -> Mask:
+        """Whether the nearer arm can grasp at these places, as a boolean array."""
+        import numpy as np
+
+        left, right = (np.hypot(x - a.base[0], y - a.base[1]) <= a.reach for a in self.arms)
+        reached: Mask = left | right
+        return reached
+
+    def in_view(
+        self,
+        x: Array,
+        y: Array,
+        radius: Array | float = 0.0,
+        height: Array | float = 0.0,
+        margin: tuple[float, float] = (0.02, 0.02),
+    ) -> Mask:
+        """Whether upright cylinders on the table lie inside the head image, as a boolean array.
+
+        `radius` and `height` bound each object; `margin` is the part of the image's width and
+        height that stays free on each side.
+        """
+        camera, low, high = self.head, self.table.top, self.table.top + height
+        left, right = camera.column(x - radius, y, high), camera.column(x + radius, y, high)
+        top, bottom = camera.row(x, y + radius, high), camera.row(x, y - radius, low)
+        free_x, free_y = margin[0] * WIDTH, margin[1] * HEIGHT
+        inside: Mask = (
+            (left >= free_x)
+            & (right <= WIDTH - free_x)
+            & (top >= free_y)
+            & (bottom <= HEIGHT - free_y)
+        )
+        return inside
+
+    def view_span(
+        self, y: float, radius: float = 0.0, height: float = 0.0, margin: float = 0.02
+    ) -> tuple[float, float]:
+        """The x range in which a cylinder of this `radius` and `height` at `y` is in view.
+
+        The head camera's picture has to be level and the camera must not look sideways.
+        """
+        camera = self.head
+        ex, ey, ez = camera.position
+        _, ahead, down = camera.forward
+        depth = ahead * (y - ey) - down * (ez - self.table.top - height)
+        half = (0.5 - margin) * WIDTH / camera.focal * depth - radius
+        return ex - half, ex + half
+
+
+@cache
+def workcell(embodiment: str) -> Workcell:
+    """The workcell of an installed robot; UnknownName, with near matches, if there is none."""
+    found: Workcell = find(ROBOTS, embodiment, "robot").workcell
+    return found
