@@ -40,19 +40,19 @@ READY = (0.0, 1.6, 1.5, 0.0, 0.0, 0.0, 1.0)
 
 def bare_cameras(world: SapienWorld) -> tuple[Any, list[Any]]:
     """SAPIEN cameras with its default shader where the world's are, in the world's drawn scene."""
-    studio = world._studio
-    assert studio is not None
+    renderer = world._renderer
+    assert renderer is not None
     cameras = []
-    for camera in list(studio._cameras.values()):
+    for camera in list(renderer._cameras.values()):
         twin = sapien.render.RenderCameraComponent(camera.width, camera.height)
         twin.set_fovy(camera.fovy, compute_x=True)
         twin.near, twin.far = camera.near, camera.far
         mount = sapien.Entity()
         mount.add_component(twin)
         mount.pose = camera.entity.pose
-        studio._scene.add_entity(mount)
+        renderer._scene.add_entity(mount)
         cameras.append(twin)
-    return studio._scene, cameras
+    return renderer._scene, cameras
 
 
 def capture(scene: Any, cameras: list[Any]) -> list[Any]:
@@ -93,9 +93,9 @@ def measure(rounds: int) -> Result:
         worlds[name].observe(spec)
         scene, cameras = bare_cameras(worlds[name])
         if name == "primitives":
-            studio = worlds[name]._studio
-            assert studio is not None
-            for links in studio._robot:
+            renderer = worlds[name]._renderer
+            assert renderer is not None
+            for links in renderer._robot:
                 for entity in links.values():
                     scene.remove_entity(entity)
         sides[name] = partial(capture, scene, cameras)

@@ -45,8 +45,8 @@ class Booth:
     def __init__(self) -> None:
         import sapien
 
-        from robospa.harness.sim import cameras
-        from robospa.harness.sim.looks import render_body
+        from robospa.harness.sim import renderer as cameras
+        from robospa.harness.sim.render_bodies import render_body
 
         self._render_body = render_body
         self._scene: Any = sapien.Scene([cameras.open_render_system()])

@@ -1,7 +1,7 @@
 """From `robospa.tasks.shapes` to SAPIEN: collision bodies, articulated arms, shapes to draw.
 
 Collision and drawing never meet: physics lives in a scene without a render system, and what is
-drawn lives in another one (`robospa.harness.sim.cameras`), so that a trial is the same to the bit
+drawn lives in another one (`robospa.harness.sim.renderer`), so that a trial is the same to the bit
 whether anybody looks at it or not. Meshes collide as their convex hull.
 """
 

@@ -19,7 +19,7 @@ from sapien import physx
 from robospa.geometry import Pose
 from robospa.harness.robots.embodiment import Embodiment
 from robospa.harness.sim import bodies, furniture
-from robospa.harness.sim.live import NO_HINGES
+from robospa.harness.sim.lazy_snapshot import NO_HINGES
 from robospa.harness.sim.motion import RATE
 from robospa.tasks.shapes import ObjectModel
 from robospa.tasks.snapshot import ARMS, Contact
@@ -84,7 +84,7 @@ class Physics:
         return {name: float(one.qpos[0]) for name, one in self._hinged.items()}
 
     def packed(self) -> bytes:
-        """Poses of all entities, as `robospa.harness.sim.live` unpacks them."""
+        """Poses of all entities, as `robospa.harness.sim.lazy_snapshot` unpacks them."""
         return self._pack()  # type: ignore[no-any-return]
 
     def contacts(self) -> tuple[Contact, ...]:

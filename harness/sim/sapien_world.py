@@ -1,6 +1,6 @@
 """The world on SAPIEN: CPU PhysX at 250 Hz, official action timing, images only when asked for.
 
-A trial gets a fresh physics scene; what it draws with (`robospa.harness.sim.cameras`) is made on
+A trial gets a fresh physics scene; what it draws with (`robospa.harness.sim.renderer`) is made on
 the first image and holds no physical state. All drive targets of an action are computed before its
 first physics step, and between two polls there is nothing but SAPIEN's own calls.
 """
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from robospa.harness.actions import ActionReader
 from robospa.harness.robots import embodiment as embodiment_named
 from robospa.harness.sim.drives import Drives
-from robospa.harness.sim.live import Layout, LiveSnapshot, Pair, PoseTable, unpack
+from robospa.harness.sim.lazy_snapshot import LazySnapshot, Pair, PoseTable, StateLayout, unpack
 from robospa.harness.sim.motion import RATE, Trajectory, fixed_rate, rest_to_rest
 from robospa.harness.sim.physics import Physics
 from robospa.harness.sim.settling import settle
@@ -28,7 +28,7 @@ from robospa.tasks.shapes import ObjectModel
 from robospa.tasks.snapshot import Contact, Snapshot, snapshot_to_json
 
 if TYPE_CHECKING:
-    from robospa.harness.sim.cameras import Studio
+    from robospa.harness.sim.renderer import Renderer
 
 Models = Callable[[str, Mapping[str, Any]], ObjectModel]
 
@@ -62,10 +62,10 @@ class SapienWorld:
         self._action_steps = action_steps
         self._models = models
         self._physics: Physics | None = None
-        self._studio: Studio | None = None
+        self._renderer: Renderer | None = None
         self._readers: dict[str, ActionReader] = {}
         if render:
-            self._open_studio()
+            self._open_renderer()
 
     # -- loading ------------------------------------------------------------------------------
 
@@ -85,7 +85,7 @@ class SapienWorld:
         self._steps = 0
         physics = self._physics = Physics(self._embodiment, scene.table_shift)
         self._drives = Drives(self._embodiment, physics.arms)
-        self._layout = Layout(
+        self._layout = StateLayout(
             tuple(
                 (physics.links[a][arm.last_link], arm.tool)
                 for a, arm in enumerate(self._embodiment.arms)
@@ -182,7 +182,7 @@ class SapienWorld:
         self, measure: Callable[[int], Pair], touching: Callable[[int], tuple[Contact, ...]]
     ) -> Snapshot:
         physics = self._loaded()
-        return LiveSnapshot(
+        return LazySnapshot(
             self._steps,
             physics.packed(),
             physics.rows,
@@ -237,22 +237,22 @@ class SapienWorld:
         if not cameras:
             return []
         physics = self._loaded()
-        studio = self._studio or self._open_studio()
-        studio.arrange(self._scene, self._embodiment, self._model)
+        renderer = self._renderer or self._open_renderer()
+        renderer.sync(self._scene, self._embodiment, self._model)
         packed = physics.packed()
         links = [
             {link: unpack(packed, row) for link, row in rows.items()} for rows in physics.links
         ]
         poses = PoseTable(packed, physics.rows)
-        return studio.pictures(cameras, links, poses, physics.hinges())
+        return renderer.render(cameras, links, poses, physics.hinges())
 
-    def _open_studio(self) -> Studio:
+    def _open_renderer(self) -> Renderer:
         if self._render is False:
             raise RenderUnavailable("this world was made with render=False and draws no images")
-        from robospa.harness.sim.cameras import Studio
+        from robospa.harness.sim.renderer import Renderer
 
-        self._studio = Studio()
-        return self._studio
+        self._renderer = Renderer()
+        return self._renderer
 
     def contacts(self) -> tuple[Contact, ...]:
         """What touches what at this instant."""
@@ -264,9 +264,6 @@ class SapienWorld:
 
     def info(self) -> Mapping[str, Any]:
         """Simulator, versions, control, and the render device if it is open."""
-        renderer: Mapping[str, str] | None = None
-        if self._studio:
-            renderer = self._studio.device()
         return {
             "simulator": "sapien",
             **versions(),
@@ -274,15 +271,15 @@ class SapienWorld:
             "physics_hz": RATE,
             "control": self._control,
             **({"action_steps": self._action_steps} if self._control == "fixed_rate" else {}),
-            "renderer": renderer,
+            "renderer": self._renderer.device() if self._renderer else None,
         }
 
     def close(self) -> None:
         """Free the scenes; the world cannot be used afterwards until it loads again."""
         self._drop_physics()
-        if self._studio:
-            self._studio.close()
-            self._studio = None
+        if self._renderer:
+            self._renderer.close()
+            self._renderer = None
 
     def _drop_physics(self) -> None:
         if self._physics:

@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.harness.sim.live import FLOATS
+from robospa.harness.sim.lazy_snapshot import FLOATS
 from robospa.harness.sim.motion import RATE
 from robospa.harness.sim.physics import Physics
 from robospa.harness.world import SceneUnstable

@@ -13,7 +13,7 @@ from world_scenes import block, joint_action, run_digest, scene, two_blocks
 
 from robospa.geometry import Pose
 from robospa.harness.robots import embodiment
-from robospa.harness.sim.cameras import camera_view, focal_length
+from robospa.harness.sim.renderer import camera_view, focal_length
 from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.harness.world import RenderUnavailable
 from robospa.protocol.policy import CAMERAS, CameraSpec, PolicySpec
@@ -144,7 +144,7 @@ def test_info_names_device_and_driver(world: SapienWorld) -> None:
 def test_the_trimmed_shader_draws_the_same_pixels(tmp_path: Path) -> None:
     code = (
         "import sys, numpy as np; from world_scenes import *; "
-        "import robospa.harness.sim.cameras as c; from robospa.protocol.policy import CameraSpec; "
+        "import robospa.harness.sim.renderer as c; from robospa.protocol.policy import CameraSpec; "
         "from robospa.harness.sim.sapien_world import SapienWorld; "
         "c.shader_folder = c.shader_folder if sys.argv[1] == 'trimmed' else lambda: ''; "
         "w = SapienWorld(); w.load(two_blocks()); "

@@ -73,7 +73,7 @@ class PoseTable(Mapping[str, Pose]):
 
 
 @dataclass(frozen=True, slots=True)
-class Layout:
+class StateLayout:
     """What the rows and columns of a state mean: of one embodiment in one scene.
 
     `tools` are, per arm, the row of the last link and the end-effector frame in it.
@@ -83,7 +83,7 @@ class Layout:
     workcell: Workcell
 
 
-class LiveSnapshot(Snapshot):
+class LazySnapshot(Snapshot):
     """A `Snapshot` of a running world: the same values, computed when first asked for."""
 
     __slots__ = (
@@ -105,7 +105,7 @@ class LiveSnapshot(Snapshot):
     _packed: bytes
     _floats: memoryview
     _rows: Mapping[str, int]
-    _layout: Layout
+    _layout: StateLayout
     _commanded: tuple[Trajectory, int]
     _steps: int
     _measure: Callable[[int], Pair]
@@ -121,7 +121,7 @@ class LiveSnapshot(Snapshot):
         steps: int,
         packed: bytes,
         rows: Mapping[str, int],
-        layout: Layout,
+        layout: StateLayout,
         commanded: tuple[Trajectory, int],
         measure: Callable[[int], Pair],
         touching: Callable[[int], tuple[Contact, ...]],
@@ -234,14 +234,14 @@ _time, _steps, _touching, _hinges, _packed, _floats, _rows, _layout, _commanded,
     getattr(cls, name).__set__
     for cls, name in (
         (Snapshot, "time"),
-        (LiveSnapshot, "_steps"),
-        (LiveSnapshot, "_touching"),
+        (LazySnapshot, "_steps"),
+        (LazySnapshot, "_touching"),
         (Snapshot, "hinges"),
-        (LiveSnapshot, "_packed"),
-        (LiveSnapshot, "_floats"),
-        (LiveSnapshot, "_rows"),
-        (LiveSnapshot, "_layout"),
-        (LiveSnapshot, "_commanded"),
-        (LiveSnapshot, "_measure"),
+        (LazySnapshot, "_packed"),
+        (LazySnapshot, "_floats"),
+        (LazySnapshot, "_rows"),
+        (LazySnapshot, "_layout"),
+        (LazySnapshot, "_commanded"),
+        (LazySnapshot, "_measure"),
     )
 )

@@ -53,7 +53,7 @@ def open_render_system() -> Any:
         raise RenderUnavailable(f"cannot draw on this machine ({error}); {ADVICE}") from error
 
 
-class Studio:
+class Renderer:
     """The drawn scene of one world. Raises RenderUnavailable if nothing can be drawn here."""
 
     def __init__(self) -> None:
@@ -91,14 +91,14 @@ class Studio:
 
     def _draw(self, shapes: Sequence[Any], name: str) -> Any:
         """An entity in the drawn scene; None if none of the shapes is visual."""
-        from robospa.harness.sim.looks import render_body
+        from robospa.harness.sim.render_bodies import render_body
 
         entity = render_body(shapes, name)
         if entity is not None:
             self._scene.add_entity(entity)
         return entity
 
-    def arrange(
+    def sync(
         self,
         scene: Scene,
         embodiment: Embodiment,
@@ -129,7 +129,7 @@ class Studio:
         self._cameras = {}
         self._embodiment = embodiment
 
-    def pictures(
+    def render(
         self,
         cameras: Sequence[CameraSpec],
         links: Links,
