@@ -12,10 +12,10 @@ from collections.abc import Callable
 
 from common import Result, Row, argument_parser, finish
 
-from robospa.results import bootstrap, significance
-from robospa.results.bootstrap import RESAMPLES, Sample, draw, rate, resample_episodes
-from robospa.results.intervals import METHODS, interval_of
-from robospa.results.published import LEVELS, load
+from robospa.results.paper.published import LEVELS, load
+from robospa.results.statistics import bootstrap, significance
+from robospa.results.statistics.bootstrap import RESAMPLES, Sample, draw, rate, resample_episodes
+from robospa.results.statistics.intervals import METHODS, interval_of
 
 
 def seconds(work: Callable[[], object], repeat: int) -> tuple[float, float]:

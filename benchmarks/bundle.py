@@ -32,9 +32,9 @@ from robospa.leaderboard.record_rows import trace_hash
 from robospa.leaderboard.reference import WORLD, Reference, shipped
 from robospa.leaderboard.sampling import announced
 from robospa.leaderboard.verify import verify
-from robospa.results.metrics import CATEGORIES
-from robospa.results.reading import Run
-from robospa.results.records import TrialRecord
+from robospa.results.records.run_io import Run
+from robospa.results.records.trial_record import TrialRecord
+from robospa.results.scoring.scores import CATEGORIES
 from robospa.tasks.catalog import tasks
 from robospa.trial import TrialKey
 

@@ -21,8 +21,8 @@ from typing import Any
 
 from common import Result, Row, argument_parser, finish
 
-from robospa.results.reading import read_run
-from robospa.results.records import TrialRecord
+from robospa.results.records.run_io import read_run
+from robospa.results.records.trial_record import TrialRecord
 from robospa.tasks.catalog import LEVELS, tasks
 from robospa.tasks.seeds import FIRST_SEED, PER_VARIANT, accepted
 

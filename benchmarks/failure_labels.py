@@ -20,7 +20,7 @@ from common import Row as Figure
 from robospa.baselines.mistakes import create
 from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.harness.trial import TrialParts, run_trial, task_parts
-from robospa.results.failures import NAMES, label
+from robospa.results.failures.labels import NAMES, label
 from robospa.tasks.catalog import tasks
 from robospa.trial import TrialKey
 

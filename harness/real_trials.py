@@ -16,7 +16,7 @@ from robospa.harness.trial import TrialParts, policy_seed, run_trial, task_parts
 from robospa.protocol.client import RemotePolicy
 from robospa.protocol.errors import WireError
 from robospa.protocol.policy import PolicySpec
-from robospa.results.records import TrialRecord
+from robospa.results.records.trial_record import TrialRecord
 from robospa.tasks.seeds import accepted
 from robospa.trial import TrialKey
 

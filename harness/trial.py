@@ -26,7 +26,7 @@ from robospa.harness.world import ActionError, World
 from robospa.protocol.errors import PolicyAnswerError
 from robospa.protocol.policy import Policy, PolicySpec, TrialInfo
 from robospa.protocol.validation import check_chunk
-from robospa.results.records import PROCESSOR, TrialRecord
+from robospa.results.records.trial_record import PROCESSOR, TrialRecord
 from robospa.tasks.catalog import build_scene
 from robospa.tasks.catalog import task as find_task
 from robospa.tasks.events import Event, outcome

@@ -22,11 +22,11 @@ from typing import Any
 from urllib.parse import unquote
 
 from robospa.results.figures.series import Drawing
-from robospa.results.reading import MANIFEST, TRIALS, Run, RunError, read_run
-from robospa.results.report import draw_figures, gather
-from robospa.results.report_page import FIGURES, page
-from robospa.results.report_tables import for_page
-from robospa.results.report_trials import FILMS
+from robospa.results.records.run_io import MANIFEST, TRIALS, Run, RunError, read_run
+from robospa.results.report.page import FIGURES, page
+from robospa.results.report.report import draw_figures, gather
+from robospa.results.report.tables import for_page
+from robospa.results.report.trials import FILMS
 
 FORMATS = ("svg",)
 REST = 5.0

@@ -12,8 +12,8 @@ from typing import Any
 from robospa.harness.trial import policy_seed
 from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.reference import LEVELS, Reference
-from robospa.results.reading import finished
-from robospa.results.records import TrialRecord
+from robospa.results.records.run_io import finished
+from robospa.results.records.trial_record import TrialRecord
 from robospa.tasks.events import Event, outcome
 from robospa.trial import TrialKey
 

@@ -13,12 +13,12 @@ from typing import Any
 from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.scores import compare_scores
 from robospa.leaderboard.submission import Submission, slug_of
-from robospa.results import aggregate
-from robospa.results.columns import Column, published_column, table_values
-from robospa.results.intervals import Estimate
-from robospa.results.metrics import CATEGORIES, DIMENSIONS, SPATIAL, Cell, combine
-from robospa.results.published import LEVELS, load
-from robospa.results.tables import to_json
+from robospa.results.paper import rounding
+from robospa.results.paper.columns import Column, published_column, table_values
+from robospa.results.paper.published import LEVELS, load
+from robospa.results.report.score_table import to_json
+from robospa.results.scoring.scores import CATEGORIES, DIMENSIONS, SPATIAL, Cell, combine
+from robospa.results.statistics.intervals import Estimate
 
 BADGES = {
     "published": "published, not verified",
@@ -244,7 +244,7 @@ def evidence_lines(evidence: Mapping[str, Any]) -> list[tuple[str, str]]:
 def page_values(entry: Entry) -> dict[str, dict[str, list[list[float] | int]]]:
     """Percent by metric, row and level (0: all levels) as [value, low, high]; 0 is no value."""
     made: dict[str, dict[str, list[list[float] | int]]] = {}
-    rows = [*load().tasks, *CATEGORIES, *DIMENSIONS, aggregate.OVERALL]
+    rows = [*load().tasks, *CATEGORIES, *DIMENSIONS, rounding.OVERALL]
     for metric in ("sr", "onta", "ps"):
         made[metric] = {}
         for row in rows:
@@ -267,7 +267,7 @@ def _shown(column: Column, metric: str, row: str, level: int) -> list[float] | i
 
 def _over_levels(column: Column, metric: str, row: str) -> Estimate | None:
     scores = column.scores
-    if row == aggregate.OVERALL:
+    if row == rounding.OVERALL:
         return scores.overall[0].values.get(metric)
     part = scores.tasks.get(row) or scores.categories.get((row, 0))
     part = part or scores.dimensions.get((row, 0))

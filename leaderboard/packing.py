@@ -40,9 +40,9 @@ from robospa.leaderboard.sampling import announced
 from robospa.leaderboard.scores import scores_of, tables_of
 from robospa.leaderboard.trial_outcomes import outcomes_of
 from robospa.leaderboard.verify import LISTING, Valid, own_version, seed_lists, verify
-from robospa.results.lint import lint_run
-from robospa.results.reading import Run, read_run
-from robospa.results.records import TrialRecord
+from robospa.results.records.lint import lint_run
+from robospa.results.records.run_io import Run, read_run
+from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
 ABOUT = ("versions", "git", "code", "machine", "world", "warnings")

@@ -16,9 +16,9 @@ from robospa.harness.running.store import replace_file
 from robospa.leaderboard import bundle as layout
 from robospa.leaderboard.entries import Entry
 from robospa.leaderboard.trial_outcomes import paired, side_of
-from robospa.results.reading import manifest_keys
-from robospa.results.report_page import own_version
-from robospa.results.sides import Side
+from robospa.results.comparison.operands import Side
+from robospa.results.records.run_io import manifest_keys
+from robospa.results.report.page import own_version
 
 FOLDER = "pairs"
 Pair = tuple[Entry, Entry]

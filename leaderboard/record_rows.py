@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from robospa.leaderboard.bundle import BundleError, sha256
 from robospa.leaderboard.strict_json import is_hash, look, parse_row
-from robospa.results.reading import from_data
-from robospa.results.records import TrialRecord
+from robospa.results.records.run_io import from_data
+from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
 KINDS: dict[str, type] = {"str": str, "int": int, "bool": bool, "float": float}

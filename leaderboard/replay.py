@@ -23,8 +23,8 @@ from robospa.leaderboard.bundle_rules import spec_of
 from robospa.leaderboard.reference import Reference
 from robospa.leaderboard.sampling import catch_probability, drawn
 from robospa.leaderboard.verify import Valid, read_traces
-from robospa.results.reading import differences
-from robospa.results.records import TrialRecord
+from robospa.results.records.run_io import differences
+from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
 IDENTICAL, AGREES, DIFFERENT = "identical", "agrees", "different"

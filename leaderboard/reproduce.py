@@ -20,7 +20,7 @@ from robospa.leaderboard.bundle_rules import spec_of
 from robospa.leaderboard.hidden_seeds import Block
 from robospa.leaderboard.reference import Reference
 from robospa.leaderboard.verify import Valid
-from robospa.results.reading import Run
+from robospa.results.records.run_io import Run
 from robospa.trial import TrialKey
 
 DROPS = (0.02, 0.05, 0.1)

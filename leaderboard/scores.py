@@ -6,12 +6,12 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from robospa.results.columns import TableError, run_column
-from robospa.results.metrics import score_run
-from robospa.results.reading import Run
-from robospa.results.report_tables import report_tables
-from robospa.results.tables import to_json
-from robospa.results.tables_all import FORMATS
+from robospa.results.paper.columns import TableError, run_column
+from robospa.results.paper.tables import FORMATS
+from robospa.results.records.run_io import Run
+from robospa.results.report.score_table import to_json
+from robospa.results.report.tables import report_tables
+from robospa.results.scoring.scores import score_run
 
 CLOSE = 1e-9
 """Two computations of one number may differ by this much: other numpy, other order of sums."""

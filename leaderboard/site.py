@@ -24,15 +24,15 @@ from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.entries import BADGES, Entry, all_entries, page_values
 from robospa.leaderboard.pairwise import pairs_of, write_pairs
 from robospa.leaderboard.submission import read_submissions, waiting
-from robospa.results.failures import KINDS, NAMES, SIMULATED_PER_FILM
+from robospa.results.failures.labels import KINDS, NAMES, SIMULATED_PER_FILM
 from robospa.results.figures.draw import draw
 from robospa.results.figures.failure_bars import draw_failures
 from robospa.results.figures.series import Drawing, Series, save, styled
-from robospa.results.metrics import CATEGORIES, CATEGORY_NAMES, DIMENSIONS
-from robospa.results.published import load
-from robospa.results.report import method_notes
-from robospa.results.report_page import FIGURES, card, figure, own_version, render
-from robospa.results.report_tables import Shown, for_page, report_tables
+from robospa.results.paper.published import load
+from robospa.results.report.page import FIGURES, card, figure, own_version, render
+from robospa.results.report.report import method_notes
+from robospa.results.report.tables import Shown, for_page, report_tables
+from robospa.results.scoring.scores import CATEGORIES, CATEGORY_NAMES, DIMENSIONS
 
 MARK = ".robospa-site"
 """A file that says a folder is ours to write over."""

@@ -26,10 +26,10 @@ from robospa.leaderboard.bundle import MEGA, BundleError
 from robospa.leaderboard.card import LINK, check_card, read_card
 from robospa.leaderboard.strict_json import is_hash, parse_map
 from robospa.leaderboard.verify import Valid
-from robospa.results.failures import NAMES, distribution
-from robospa.results.reading import Run
-from robospa.results.report_facts import END_NAMES
-from robospa.results.report_trials import trial_rows
+from robospa.results.failures.labels import NAMES, distribution
+from robospa.results.records.run_io import Run
+from robospa.results.report.run_card import END_NAMES
+from robospa.results.report.trials import trial_rows
 
 ASKED, BUNDLE = "model.toml", "bundle.txt"
 EVIDENCE = "evidence.json"

@@ -13,11 +13,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from robospa.leaderboard.bundle import BundleError
-from robospa.results.compare import Difference, compare, over_levels
-from robospa.results.metrics import METRICS
-from robospa.results.reading import Run
-from robospa.results.records import TrialRecord
-from robospa.results.sides import COMPARED, CompareError, Side, Variant, sample_of
+from robospa.results.comparison.compare import Difference, compare, over_levels
+from robospa.results.comparison.operands import COMPARED, CompareError, Side, Variant, sample_of
+from robospa.results.records.run_io import Run
+from robospa.results.records.trial_record import TrialRecord
+from robospa.results.scoring.scores import METRICS
 from robospa.trial import TrialKey
 
 DIGITS = "0123456789abcdefghijklmnopqrstuvwxyz"

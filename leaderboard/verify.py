@@ -36,9 +36,9 @@ from robospa.leaderboard.sampling import announced
 from robospa.leaderboard.scores import compare_scores, scores_of, tables_of
 from robospa.leaderboard.strict_json import parse, parse_map
 from robospa.leaderboard.trial_outcomes import outcomes_of
-from robospa.results.lint import lint_run
-from robospa.results.reading import Run, RunError, manifest_keys
-from robospa.results.records import TrialRecord
+from robospa.results.records.lint import lint_run
+from robospa.results.records.run_io import Run, RunError, manifest_keys
+from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
 FIELDS = {"format", "suite", "robospa", "practice", "inputs", "chain", "seeds", "files", "bundle"}

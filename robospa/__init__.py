@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from robospa.protocol.policy import PolicySpec as PolicySpec
     from robospa.protocol.policy import TrialInfo as TrialInfo
     from robospa.protocol.server import serve as serve
-    from robospa.results.reading import read_run as load_run
-    from robospa.results.records import TrialRecord as TrialRecord
+    from robospa.results.records.run_io import read_run as load_run
+    from robospa.results.records.trial_record import TrialRecord as TrialRecord
     from robospa.tasks.catalog import build_scene as build_scene
     from robospa.tasks.scene import Scene as Scene
     from robospa.trial import TrialKey as TrialKey
@@ -34,10 +34,10 @@ _HOMES = {
     "Scene": "robospa.tasks.scene:Scene",
     "TrialInfo": "robospa.protocol.policy:TrialInfo",
     "TrialKey": "robospa.trial:TrialKey",
-    "TrialRecord": "robospa.results.records:TrialRecord",
+    "TrialRecord": "robospa.results.records.trial_record:TrialRecord",
     "build_scene": "robospa.tasks.catalog:build_scene",
     "connect": "robospa.clients:connect",
-    "load_run": "robospa.results.reading:read_run",
+    "load_run": "robospa.results.records.run_io:read_run",
     "serve": "robospa.protocol.server:serve",
 }
 """Where each public name is defined."""

@@ -41,7 +41,7 @@ from robospa.leaderboard.archive import Archive
 from robospa.leaderboard.bundle import BundleError, canonical
 from robospa.leaderboard.packing import pack
 from robospa.leaderboard.verify import verify
-from robospa.results.reading import (
+from robospa.results.records.run_io import (
     RunError,
     finished,
     from_line,
@@ -269,7 +269,7 @@ class Readers:
 
     def _run(self, rng: random.Random) -> None:
         """A whole run, one of its records or its manifest changed, up to its tables."""
-        from robospa.results.tables import terminal
+        from robospa.results.report.score_table import terminal
 
         run = self.folder / "whole"
         (run / "trials").mkdir(parents=True, exist_ok=True)

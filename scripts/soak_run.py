@@ -16,8 +16,8 @@ from typing import Any
 
 from robospa.harness.running.store import ACTIONS, PART, action_path, read_actions
 from robospa.harness.trial import actions_digest
-from robospa.results.reading import TRIALS, finished, read_file, read_run
-from robospa.results.records import TrialRecord
+from robospa.results.records.run_io import TRIALS, finished, read_file, read_run
+from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
 ROBOSPA = [sys.executable, "-m", "robospa.harness.cli.main"]

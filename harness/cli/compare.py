@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from robospa.results.compare import Comparison, Difference
-    from robospa.results.sides import Side
+    from robospa.results.comparison.compare import Comparison, Difference
+    from robospa.results.comparison.operands import Side
 
 GAPS = (0.02, 0.05, 0.1, 0.2)
 """Differences of rates in the table of sample sizes."""
@@ -54,8 +54,8 @@ def compare(
         return
     if not (first and second):
         raise ValueError("compare needs two sides: folders of runs, or names of published models")
-    from robospa.results.compare import compare as differences
-    from robospa.results.compare import stop_early
+    from robospa.results.comparison.compare import compare as differences
+    from robospa.results.comparison.compare import stop_early
 
     one, two = _side(first, metric.value), _side(second, metric.value)
     if one.name == two.name:
@@ -83,9 +83,9 @@ def compare(
 
 def _side(name: str, metric: str) -> Side:
     """A run's folder, or else a published model."""
-    from robospa.results.published import load
-    from robospa.results.reading import read_run
-    from robospa.results.sides import side_of_published, side_of_run
+    from robospa.results.comparison.operands import side_of_published, side_of_run
+    from robospa.results.paper.published import load
+    from robospa.results.records.run_io import read_run
 
     folder = Path(name)
     if not folder.exists() and name in load().models:
@@ -97,8 +97,8 @@ def _side(name: str, metric: str) -> Side:
 
 
 def _print(found: Comparison, variants: bool) -> None:
-    from robospa.results.metrics import METRIC_NAMES
-    from robospa.results.significance import ALPHA
+    from robospa.results.scoring.scores import METRIC_NAMES
+    from robospa.results.statistics.significance import ALPHA
 
     print(f"{METRIC_NAMES[found.metric]} of {found.first} minus {found.second}, percentage points")
     for note in found.notes:
@@ -161,7 +161,7 @@ def _chance(p: float) -> str:
 
 
 def _print_drops(one: Side, two: Side) -> None:
-    from robospa.results.compare import drops
+    from robospa.results.comparison.compare import drops
 
     for side in (one, two):
         print(f"{side.name} loses from level to level, percentage points")
@@ -175,7 +175,7 @@ def _print_drops(one: Side, two: Side) -> None:
 
 
 def _print_power(base: float) -> None:
-    from robospa.results.power import POWER, plan
+    from robospa.results.statistics.power import POWER, plan
 
     print(f"Trials a side to tell rates apart with probability {POWER:.0%}, first rate {base:.0%}")
     print("Equal seeds: by the correlation (phi) of both policies' outcomes on one seed.")

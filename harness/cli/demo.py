@@ -85,8 +85,8 @@ def _list(names: Sequence[str], levels: Sequence[int], trials: int, seeds: Any) 
 def _evaluate(policy: str, keys: Any, folder: Path, workers: int, video: str) -> Path:
     """Serve `policy`, evaluate it over the wire, print its table; returns the report's page."""
     from robospa.harness.cli import running
-    from robospa.results.reading import read_run
-    from robospa.results.report import write_report
+    from robospa.results.records.run_io import read_run
+    from robospa.results.report.report import write_report
 
     with server(policy) as url:
         print(f"`robospa serve {policy}` listens at {url}; evaluating it over the wire", flush=True)

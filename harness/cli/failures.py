@@ -17,9 +17,9 @@ def failures(
     layout: Annotated[str, typer.Option("--format", help="markdown, csv or json")] = "markdown",
 ) -> None:
     """Print the types of failure in a run; docs/failures.md says how they are told."""
-    from robospa.results.failures import OURS, label
-    from robospa.results.failures_table import counts_table, trials_table
-    from robospa.results.reading import read_run
+    from robospa.results.failures.labels import OURS, label
+    from robospa.results.failures.listing import counts_table, trials_table
+    from robospa.results.records.run_io import read_run
 
     found = read_run(run)
     records = list(found.records.values())

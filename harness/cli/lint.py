@@ -15,8 +15,8 @@ def lint(
     """Check runs for results that cannot be; several runs also for fitting into one table."""
     from pathlib import Path
 
-    from robospa.results.lint import lint_published, lint_run, lint_runs
-    from robospa.results.reading import read_run
+    from robospa.results.records.lint import lint_published, lint_run, lint_runs
+    from robospa.results.records.run_io import read_run
     from robospa.tasks.catalog import tasks
 
     known = {(name, level) for name in tasks() for level in range(1, 6)}

@@ -26,12 +26,12 @@ def paper(
 
     Prints the first of them (the main one) and all printed values that cannot be reproduced.
     """
-    from robospa.results.columns import published_column, run_column
-    from robospa.results.errata import checks, errata
-    from robospa.results.published import load
-    from robospa.results.reading import read_run
-    from robospa.results.tables_all import FORMATS, make_tables, write_tables
-    from robospa.results.tables_terminal import show
+    from robospa.results.paper.check import checks, errata
+    from robospa.results.paper.columns import published_column, run_column
+    from robospa.results.paper.published import load
+    from robospa.results.paper.tables import FORMATS, make_tables, write_tables
+    from robospa.results.records.run_io import read_run
+    from robospa.results.tables.terminal import show
 
     endings = list(FORMATS) if format == "all" else [format]
     if format != "all" and format not in FORMATS:
@@ -48,7 +48,7 @@ def paper(
         print(f"{number:3} {check}")
     print(f"\n{len(written)} files of tables in {out}")
     if figures and not table:
-        from robospa.results.report import draw_figures
+        from robospa.results.report.report import draw_figures
 
         (out / "figures").mkdir(exist_ok=True)
         drawn = draw_figures(runs, [*added, *published], out / "figures")

@@ -21,11 +21,11 @@ def report(
     ] = None,
 ) -> None:
     """Write report.html, report.md, report.json, tables and figures of one or several runs."""
-    from robospa.results.intervals import METHODS
-    from robospa.results.published import load
-    from robospa.results.reading import read_run
-    from robospa.results.report import write_report
-    from robospa.results.tables import terminal
+    from robospa.results.paper.published import load
+    from robospa.results.records.run_io import read_run
+    from robospa.results.report.report import write_report
+    from robospa.results.report.score_table import terminal
+    from robospa.results.statistics.intervals import METHODS
 
     if ci not in METHODS:
         raise ValueError(f"no interval is called {ci!r}; there are {', '.join(METHODS)}")

@@ -157,7 +157,7 @@ def policy_map(file: Path, keys: Sequence[TrialKey]) -> dict[str, Targets]:
 def client_options(url: str, file: Path | None) -> dict[str, Any]:
     """The options of the JSON `file`, checked together with those of the URL; raises BadChoice."""
     from robospa.clients import check_options
-    from robospa.results.strangers import parse
+    from robospa.results.records.schema import parse
 
     try:
         given = parse(file.read_text()) if file is not None else {}
@@ -187,8 +187,8 @@ def _settings(keys: Sequence[TrialKey]) -> dict[str, Any]:
 
 def run_and_show(request: Request) -> None:
     """Evaluate, print the table, and end with 1 if trials are missing, 130 on Ctrl-C."""
-    from robospa.results.reading import read_run
-    from robospa.results.tables import terminal
+    from robospa.results.records.run_io import read_run
+    from robospa.results.report.score_table import terminal
 
     folder = request.config.folder
     again = f"the same command with --out {folder} --resume goes on from here"

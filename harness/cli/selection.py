@@ -6,8 +6,8 @@ import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from robospa.results.metrics import BASIC, CATEGORIES, DIMENSIONS
-from robospa.results.strangers import MOST, parse
+from robospa.results.records.schema import MOST, parse
+from robospa.results.scoring.scores import BASIC, CATEGORIES, DIMENSIONS
 from robospa.trial import TrialKey
 
 SPLITS = ("heldout", "train")

@@ -164,7 +164,7 @@ def reproduce(
     """Run hidden seeds against the submitter's server and test exactly whether they agree."""
     from robospa.harness.cli import running
     from robospa.harness.running.evaluate import evaluate
-    from robospa.results.reading import read_run
+    from robospa.results.records.run_io import read_run
 
     reference = _reach("reference:shipped")(world, parts)
     valid = _reach("verify:verify")(bundle, reference, practice)

@@ -20,7 +20,7 @@ def view(
     import time
 
     from robospa.harness.viewing import View, serving
-    from robospa.results.published import load
+    from robospa.results.paper.published import load
 
     published = tuple(load().models) if with_published else ()
     with serving(View(run, published), port) as server:

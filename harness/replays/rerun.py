@@ -15,7 +15,7 @@ from robospa.harness.trial import Recorder, TrialParts, run_trial, task_parts
 from robospa.harness.world import World
 from robospa.protocol.errors import PolicyAnswerError
 from robospa.protocol.policy import Observation, PolicySpec, TrialInfo
-from robospa.results.records import TrialRecord
+from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
 CHUNK = 1000

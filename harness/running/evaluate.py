@@ -23,7 +23,7 @@ from robospa.harness.running.ray_executor import far_away, joined
 from robospa.harness.running.runner import RunAborted, Runner, RunOptions
 from robospa.harness.running.store import drop_parts, tidy
 from robospa.harness.running.worker import WorkerConfig, describe
-from robospa.results.reading import finished, read_records
+from robospa.results.records.run_io import finished, read_records
 from robospa.trial import TrialKey
 
 PROBE_SECONDS = 120.0

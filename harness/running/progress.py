@@ -11,7 +11,7 @@ from typing import Any, TextIO
 
 from robospa.harness.running.servers import Server
 from robospa.harness.running.status import Status, server_text, shares_text
-from robospa.results.records import TrialRecord
+from robospa.results.records.trial_record import TrialRecord
 
 EVERY = 15.0
 """Seconds between two plain lines."""

@@ -26,7 +26,7 @@ from robospa.harness.running.ray_messages import Heard, pack_config
 from robospa.harness.running.store import RecordWriter, replace_file
 from robospa.harness.running.worker import LOGS, WorkerConfig
 from robospa.protocol.errors import EncodeError
-from robospa.results.records import TrialRecord
+from robospa.results.records.trial_record import TrialRecord
 
 CONNECT_SECONDS = 60.0
 KNOCK_SECONDS = 5.0

@@ -23,9 +23,9 @@ from robospa.protocol.codec import Limits, decode, encode
 from robospa.protocol.errors import DecodeError, EncodeError
 from robospa.protocol.policy import PolicySpec
 from robospa.protocol.validate import Fields
-from robospa.results.reading import from_line, to_line
-from robospa.results.records import TrialRecord
-from robospa.results.strangers import check_key
+from robospa.results.records.run_io import from_line, to_line
+from robospa.results.records.schema import check_key
+from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
 LIMITS = Limits(message=2**30, text=2**26)

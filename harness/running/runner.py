@@ -25,8 +25,8 @@ from robospa.harness.running.status import Shares, Status
 from robospa.harness.running.store import RecordWriter, StorageError
 from robospa.harness.running.watchdog import Watch
 from robospa.harness.running.worker import LOGS, WorkerConfig, task_finder
-from robospa.results.reading import read_file
-from robospa.results.records import TrialRecord
+from robospa.results.records.run_io import read_file
+from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
 START_SECONDS = 120.0

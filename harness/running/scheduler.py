@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 
 from robospa.harness.running.queue import Pending, TrialQueue
 from robospa.harness.running.servers import BROKEN, UNFIT, Server
-from robospa.results.records import TrialRecord
+from robospa.results.records.trial_record import TrialRecord
 
 STAY = 0.8
 """What another server's pull is worth to a worker that would have to move there."""

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from robospa.results.records import TrialRecord
+from robospa.results.records.trial_record import TrialRecord
 
 UNREACHED, BROKEN, UNFIT = "unreached", "broken", "unfit"
 """Faults of a server: nobody listens; the line ended in a trial; it is another one than before."""

@@ -13,7 +13,7 @@ import os
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from robospa.results.records import PROCESSOR, TrialRecord
+from robospa.results.records.trial_record import PROCESSOR, TrialRecord
 
 PER_CORE = 8
 """Most workers for a core."""

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from robospa.harness.factory import is_url
 from robospa.harness.running.servers import Server
 from robospa.harness.running.staffing import FULL
-from robospa.results.records import TrialRecord
+from robospa.results.records.trial_record import TrialRecord
 
 RECENT = 200
 """Trials whose shares of time are shown while a run goes on."""

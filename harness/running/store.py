@@ -25,8 +25,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.results.reading import TRIALS, RunError, to_line
-from robospa.results.records import TrialRecord
+from robospa.results.records.run_io import TRIALS, RunError, to_line
+from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
 ACTIONS = "actions"

@@ -32,7 +32,7 @@ from robospa.harness.running.store import RecordWriter, StorageError, storing, w
 from robospa.harness.running.watchdog import Attended, Pulse
 from robospa.protocol.errors import printable
 from robospa.protocol.policy import PolicySpec
-from robospa.results.records import TrialRecord
+from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
 if TYPE_CHECKING:

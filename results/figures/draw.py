@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from robospa.results.failures import KINDS, NAMES, distribution
+from robospa.results.failures.labels import KINDS, NAMES, distribution
 from robospa.results.figures.failure_bars import draw_failures
 from robospa.results.figures.heat import draw_heat
 from robospa.results.figures.latency import draw_latency, has_latency

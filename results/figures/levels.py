@@ -16,7 +16,7 @@ from robospa.results.figures.series import (
     plain,
     series_handles,
 )
-from robospa.results.metrics import CATEGORY_NAMES, PROCEDURAL, SPATIAL, Scores
+from robospa.results.scoring.scores import CATEGORY_NAMES, PROCEDURAL, SPATIAL, Scores
 
 
 def chance_levels(scores: Scores) -> dict[tuple[str, int], float]:

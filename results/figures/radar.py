@@ -17,7 +17,7 @@ from robospa.results.figures.series import (
     percent_of,
     series_handles,
 )
-from robospa.results.metrics import CATEGORIES
+from robospa.results.scoring.scores import CATEGORIES
 
 LEVELS = (1, 5)
 

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from robospa.results.metrics import BASIC, CATEGORIES, Average, Cell, Scores
-from robospa.results.records import TrialRecord
+from robospa.results.records.trial_record import TrialRecord
+from robospa.results.scoring.scores import BASIC, CATEGORIES, Average, Cell, Scores
 
 WIDTH = 3.4
 """Width of a column [inch]."""

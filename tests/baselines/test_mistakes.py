@@ -8,7 +8,7 @@ from robospa.baselines.mistakes import KINDS, Mistaken, create, steps_of, wrong_
 from robospa.geometry import Pose
 from robospa.harness.robots import embodiment
 from robospa.harness.skills.workspace import Workspace
-from robospa.results.failures import label
+from robospa.results.failures.labels import label
 from robospa.tasks.catalog import build_scene, task
 from robospa.tasks.plan import Pick, Place, Press
 from robospa.tasks.scene import Scene

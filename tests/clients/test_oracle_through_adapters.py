@@ -21,7 +21,7 @@ from robospa.clients import connect
 from robospa.harness.robots import embodiment
 from robospa.harness.robots.kinematics import chain_of, end_effector
 from robospa.protocol.policy import DEFAULT_CAMERAS, TrialInfo
-from robospa.results.records import TrialRecord
+from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
 pytestmark = pytest.mark.sim

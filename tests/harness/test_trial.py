@@ -12,7 +12,7 @@ from run_fakes import LIMIT, SPEC, FakePolicy, FakeWorld, NanPolicy, parts
 from robospa.harness.pictures.video import TrialRecorder
 from robospa.harness.trial import policy_seed, run_trial
 from robospa.harness.world import Poll, SceneUnstable, StepResult
-from robospa.results.records import TrialRecord
+from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
 KEY = TrialKey("Pick_Fake", 2, 100004)

@@ -16,7 +16,7 @@ from test_report import EVIL, make_run, record
 
 from robospa.harness import viewing
 from robospa.harness.viewing import Server, View, part_of, serving
-from robospa.results.reading import RunError, to_line
+from robospa.results.records.run_io import RunError, to_line
 
 FILM = bytes(range(200))
 RECORDS = [record("Pick_Blocks_Size", 1, n, n < 3, candidates=2) for n in range(4)]

@@ -16,10 +16,10 @@ from robospa.leaderboard.entries import Entry, published_entries
 from robospa.leaderboard.packing import pack
 from robospa.leaderboard.submission import add
 from robospa.leaderboard.verify import Valid
-from robospa.results.columns import Column, table_values
-from robospa.results.metrics import combine, score_cell
-from robospa.results.published import LEVELS, load
-from robospa.results.records import TrialRecord
+from robospa.results.paper.columns import Column, table_values
+from robospa.results.paper.published import LEVELS, load
+from robospa.results.records.trial_record import TrialRecord
+from robospa.results.scoring.scores import combine, score_cell
 from robospa.trial import TrialKey
 
 REPLAYED: dict[str, Any] = {

@@ -14,9 +14,9 @@ from robospa.leaderboard.entries import entry_of
 from robospa.leaderboard.pairwise import pairs_of, write_pairs
 from robospa.leaderboard.submission import read_submissions
 from robospa.leaderboard.trial_outcomes import outcomes_of, paired, side_of
-from robospa.results.compare import compare
-from robospa.results.reading import Run, read_run
-from robospa.results.sides import Side, side_of_run
+from robospa.results.comparison.compare import compare
+from robospa.results.comparison.operands import Side, side_of_run
+from robospa.results.records.run_io import Run, read_run
 
 
 @pytest.fixture(scope="module")

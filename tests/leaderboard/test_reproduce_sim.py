@@ -19,7 +19,7 @@ from robospa.leaderboard.packing import pack
 from robospa.leaderboard.reference import shipped
 from robospa.leaderboard.reproduce import check_policy, compare, hidden_keys
 from robospa.protocol.server import ServerThread
-from robospa.results.reading import Run, read_run
+from robospa.results.records.run_io import Run, read_run
 from robospa.tasks.seeds import accepted
 from robospa.trial import TrialKey
 

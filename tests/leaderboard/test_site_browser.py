@@ -21,9 +21,9 @@ from robospa.leaderboard.entries import entry_of, published_entries
 from robospa.leaderboard.pairwise import pairs_of, write_pairs
 from robospa.leaderboard.site import index_page, write_model
 from robospa.leaderboard.submission import read_submission, read_submissions
-from robospa.results.compare import over_levels
-from robospa.results.reading import read_run
-from robospa.results.sides import side_of_run
+from robospa.results.comparison.compare import over_levels
+from robospa.results.comparison.operands import side_of_run
+from robospa.results.records.run_io import read_run
 
 pytestmark = pytest.mark.browser
 

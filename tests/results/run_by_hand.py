@@ -8,8 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from robospa.results.reading import Run, read_run, to_line
-from robospa.results.records import TrialRecord
+from robospa.results.records.run_io import Run, read_run, to_line
+from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
 CATEGORIES = {"Pick_Blocks_Size": "GAC", "Pick_Mugs_Distance": "SDE", "Put_Bottles_Dustbin": "OFE"}

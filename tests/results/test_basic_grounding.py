@@ -8,13 +8,13 @@ from pathlib import Path
 import pytest
 from run_by_hand import outcomes, write
 
-from robospa.results.columns import published_column, run_column
-from robospa.results.metrics import score_run
-from robospa.results.reading import Run
-from robospa.results.records import TrialRecord
-from robospa.results.report_tables import report_tables
-from robospa.results.tables import rows, to_json
-from robospa.results.tables_all import make_tables
+from robospa.results.paper.columns import published_column, run_column
+from robospa.results.paper.tables import make_tables
+from robospa.results.records.run_io import Run
+from robospa.results.records.trial_record import TrialRecord
+from robospa.results.report.score_table import rows, to_json
+from robospa.results.report.tables import report_tables
+from robospa.results.scoring.scores import score_run
 
 SETS = 5
 SOLVED = (4, 3, 4, 2, 4)

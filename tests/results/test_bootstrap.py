@@ -7,7 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from robospa.results.bootstrap import (
+from robospa.results.paper.published import load
+from robospa.results.statistics.bootstrap import (
     Sample,
     draw,
     draw_over_tasks,
@@ -15,7 +16,6 @@ from robospa.results.bootstrap import (
     rate,
     resample_episodes,
 )
-from robospa.results.published import load
 
 SPATIAL = ("GAC", "SDE", "CPI", "RRR", "CVR")
 PROCEDURAL = ("RPF", "OFE", "OCE", "CAC", "MIP")

@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 from run_by_hand import outcomes, record, write
 
-from robospa.results.compare import Comparison, Difference, compare, drops, stop_early
-from robospa.results.intervals import difference, paired_difference, wilson
-from robospa.results.records import TrialRecord
-from robospa.results.sides import CompareError, Side, side_of_published, side_of_run
-from robospa.results.significance import boschloo, mcnemar_mid_p
+from robospa.results.comparison.compare import Comparison, Difference, compare, drops, stop_early
+from robospa.results.comparison.operands import CompareError, Side, side_of_published, side_of_run
+from robospa.results.records.trial_record import TrialRecord
+from robospa.results.statistics.intervals import difference, paired_difference, wilson
+from robospa.results.statistics.significance import boschloo, mcnemar_mid_p
 from robospa.trial import TrialKey
 
 SIZE, MUGS, BOTTLES = "Pick_Blocks_Size", "Pick_Mugs_Distance", "Put_Bottles_Dustbin"

@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from robospa.results import published
-from robospa.results.errata import checks, errata
+from robospa.results.paper import published
+from robospa.results.paper.check import checks, errata
 
 KNOWN = [  # from a separate check of the paper's tables: table, row, model, column, printed, right
     ("main", "CAC", "GO-1", "L1", 24.2, 29.25),

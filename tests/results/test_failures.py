@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 
-from robospa.results.failures import KINDS, NAMES, distribution, label
-from robospa.results.failures_table import counts_table, trials_table
-from robospa.results.records import TrialRecord
+from robospa.results.failures.labels import KINDS, NAMES, distribution, label
+from robospa.results.failures.listing import counts_table, trials_table
+from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
 Row = tuple[Any, ...]

@@ -7,15 +7,15 @@ from pathlib import Path
 
 import pytest
 
-from robospa.results.columns import published_column
-from robospa.results.failures import KINDS
+from robospa.results.failures.labels import KINDS
 from robospa.results.figures.draw import draw
 from robospa.results.figures.failure_bars import FILLS
 from robospa.results.figures.levels import chance_levels
 from robospa.results.figures.series import FORMATS, GRID, INK, Series, label_of
-from robospa.results.metrics import score
-from robospa.results.records import TrialRecord
-from robospa.results.report_page import inline_svg
+from robospa.results.paper.columns import published_column
+from robospa.results.records.trial_record import TrialRecord
+from robospa.results.report.page import inline_svg
+from robospa.results.scoring.scores import score
 from robospa.trial import TrialKey
 
 

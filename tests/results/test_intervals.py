@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robospa.results.bootstrap import Sample, rate
-from robospa.results.intervals import (
+from robospa.results.statistics.bootstrap import Sample, rate
+from robospa.results.statistics.intervals import (
     METHODS,
     Estimate,
     below,

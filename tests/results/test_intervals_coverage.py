@@ -13,8 +13,8 @@ from math import comb
 import numpy as np
 import pytest
 
-from robospa.results.bootstrap import Sample, rate
-from robospa.results.intervals import (
+from robospa.results.statistics.bootstrap import Sample, rate
+from robospa.results.statistics.intervals import (
     Estimate,
     difference,
     interval_of,

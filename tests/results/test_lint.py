@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from run_by_hand import outcomes, record, write
 
-from robospa.results.lint import (
+from robospa.results.records.lint import (
     Finding,
     Row,
     lint_published,
@@ -18,8 +18,8 @@ from robospa.results.lint import (
     lint_table,
     run_rows,
 )
-from robospa.results.reading import RunError, read_run, to_line
-from robospa.results.records import TrialRecord
+from robospa.results.records.run_io import RunError, read_run, to_line
+from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
 SIZE, MUGS, BOTTLES = "Pick_Blocks_Size", "Pick_Mugs_Distance", "Put_Bottles_Dustbin"

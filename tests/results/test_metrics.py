@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import pytest
 
-from robospa.results.columns import published_column
-from robospa.results.intervals import METHODS
-from robospa.results.metrics import Scores, score
-from robospa.results.records import TrialRecord
+from robospa.results.paper.columns import published_column
+from robospa.results.records.trial_record import TrialRecord
+from robospa.results.scoring.scores import Scores, score
+from robospa.results.statistics.intervals import METHODS
 from robospa.trial import TrialKey
 
 BASE = TrialRecord(

@@ -10,13 +10,13 @@ from pathlib import Path
 import pytest
 from run_by_hand import outcomes, record, write
 
-from robospa.results.compare import compare
-from robospa.results.metrics import score_run
-from robospa.results.reading import Run
-from robospa.results.records import TrialRecord
-from robospa.results.report import write_report
-from robospa.results.sides import side_of_run
-from robospa.results.tables import loss_lines, terminal, to_json
+from robospa.results.comparison.compare import compare
+from robospa.results.comparison.operands import side_of_run
+from robospa.results.records.run_io import Run
+from robospa.results.records.trial_record import TrialRecord
+from robospa.results.report.report import write_report
+from robospa.results.report.score_table import loss_lines, terminal, to_json
+from robospa.results.scoring.scores import score_run
 from robospa.trial import TrialKey
 
 PICK, PUT = "Pick_Blocks_Size", "Put_Bottles_Dustbin"

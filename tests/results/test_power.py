@@ -5,9 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from robospa.results.power import discordant, plan, power_paired, trials_paired, trials_unpaired
-from robospa.results.sequential import NOT_OFFICIAL, THRESHOLD, decide, evidence
-from robospa.results.significance import mcnemar_mid_p
+from robospa.results.statistics.power import (
+    discordant,
+    plan,
+    power_paired,
+    trials_paired,
+    trials_unpaired,
+)
+from robospa.results.statistics.sequential import NOT_OFFICIAL, THRESHOLD, decide, evidence
+from robospa.results.statistics.significance import mcnemar_mid_p
 
 
 def test_unrelated_seeds() -> None:

@@ -9,13 +9,13 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
-from robospa.results import published
-from robospa.results.columns import published_column
-from robospa.results.errata import Check, checks, errata
-from robospa.results.metrics import CATEGORIES, CATEGORY_NAMES, SPATIAL
-from robospa.results.published import LEVELS, load
-from robospa.results.tables_all import make_tables
-from robospa.results.tables_grid import to_csv
+from robospa.results.paper import published
+from robospa.results.paper.check import Check, checks, errata
+from robospa.results.paper.columns import published_column
+from robospa.results.paper.published import LEVELS, load
+from robospa.results.paper.tables import make_tables
+from robospa.results.scoring.scores import CATEGORIES, CATEGORY_NAMES, SPATIAL
+from robospa.results.tables.table import to_csv
 
 FOLDER = Path(published.__file__).parent
 DATA = load()

@@ -9,13 +9,13 @@ from typing import Any
 
 import pytest
 
-from robospa.results import tables
-from robospa.results.intervals import Estimate, wilson
-from robospa.results.metrics import score_run
-from robospa.results.reading import Run, RunError, read_run, to_line
-from robospa.results.records import TrialRecord
-from robospa.results.report import write_report
-from robospa.results.report_trials import event_row
+from robospa.results.records.run_io import Run, RunError, read_run, to_line
+from robospa.results.records.trial_record import TrialRecord
+from robospa.results.report import score_table as tables
+from robospa.results.report.report import write_report
+from robospa.results.report.trials import event_row
+from robospa.results.scoring.scores import score_run
+from robospa.results.statistics.intervals import Estimate, wilson
 from robospa.trial import TrialKey
 
 EVIL = "<script>alert(1)</script>"

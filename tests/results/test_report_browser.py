@@ -15,7 +15,7 @@ import pytest
 from devtools import Page, chromium
 from test_report import EVIL, make_run, record
 
-from robospa.results.report import write_report
+from robospa.results.report.report import write_report
 
 pytestmark = pytest.mark.browser
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from robospa.results.bootstrap import Sample, rate
-from robospa.results.intervals import Estimate, interval_of, paired_difference
-from robospa.results.published import load
-from robospa.results.significance import (
+from robospa.results.paper.published import load
+from robospa.results.statistics.bootstrap import Sample, rate
+from robospa.results.statistics.intervals import Estimate, interval_of, paired_difference
+from robospa.results.statistics.significance import (
     benjamini_hochberg,
     boschloo,
     mcnemar_mid_p,

@@ -8,13 +8,13 @@ from typing import Any
 
 import pytest
 
-from robospa.results.columns import TableError, published_column, run_column
-from robospa.results.published import LEVELS, load
-from robospa.results.reading import Run
-from robospa.results.records import TrialRecord
-from robospa.results.tables_all import make_tables
-from robospa.results.tables_grid import Entry, Grid
-from robospa.results.tables_paper import summary_table, task_table
+from robospa.results.paper.columns import TableError, published_column, run_column
+from robospa.results.paper.published import LEVELS, load
+from robospa.results.paper.result_tables import summary_table, task_table
+from robospa.results.paper.tables import make_tables
+from robospa.results.records.run_io import Run
+from robospa.results.records.trial_record import TrialRecord
+from robospa.results.tables.table import Entry, Grid
 from robospa.trial import TrialKey
 
 DATA = load()

@@ -12,13 +12,13 @@ from pathlib import Path
 
 import pytest
 
-from robospa.results.columns import published_column
-from robospa.results.published import load
-from robospa.results.tables_all import FORMATS, TABLES, make_tables, write_tables
-from robospa.results.tables_grid import Entry, Grid, Line, to_csv, to_markdown
-from robospa.results.tables_html import fragment, page
-from robospa.results.tables_latex import document, escape_latex, to_latex
-from robospa.results.tables_terminal import show
+from robospa.results.paper.columns import published_column
+from robospa.results.paper.published import load
+from robospa.results.paper.tables import FORMATS, TABLES, make_tables, write_tables
+from robospa.results.tables.html import fragment, page
+from robospa.results.tables.latex import document, escape_latex, to_latex
+from robospa.results.tables.table import Entry, Grid, Line, to_csv, to_markdown
+from robospa.results.tables.terminal import show
 
 EVIL = "=a|b_c & 100% <script>alert(1)</script> \\input{x} $#~^{} “é” 模型"
 SMALL = Grid(

@@ -22,8 +22,8 @@ from run_fakes import FakePolicy, NanPolicy
 from robospa.harness.cli.main import main
 from robospa.protocol.policy import TrialInfo
 from robospa.protocol.server import ServerThread
-from robospa.results.reading import finished, read_file, read_run
-from robospa.results.records import TrialRecord
+from robospa.results.records.run_io import finished, read_file, read_run
+from robospa.results.records.trial_record import TrialRecord
 
 HERE = str(Path(__file__).parents[1])
 ROBOSPA = [sys.executable, "-m", "robospa.harness.cli.main"]

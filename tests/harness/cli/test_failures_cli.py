@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from robospa.harness.cli.main import main
-from robospa.results.reading import to_line
-from robospa.results.records import TrialRecord
+from robospa.results.records.run_io import to_line
+from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
 LIFT = {"time": 3.0, "kind": "grasped", "object": "b", "index": -1, "note": "", "step": 4}

@@ -48,7 +48,7 @@ def test_figures_are_drawn_of_all_columns(
         asked.append(([c.title for c in columns], folder))
         return ["one"]
 
-    monkeypatch.setattr("robospa.results.report.draw_figures", draw)
+    monkeypatch.setattr("robospa.results.report.report.draw_figures", draw)
     code, out, _ = run(capsys, "--out", str(tmp_path / "p"), "--format", "csv")
     assert code == 0
     assert asked == [(["RDT", "GO-1", "π0.5", "X-VLA"], tmp_path / "p" / "figures")]

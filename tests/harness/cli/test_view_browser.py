@@ -20,7 +20,7 @@ from test_report_browser import write_film
 
 from robospa.harness import viewing
 from robospa.harness.viewing import View, serving
-from robospa.results.reading import to_line
+from robospa.results.records.run_io import to_line
 
 pytestmark = pytest.mark.browser
 

@@ -23,7 +23,7 @@ from robospa.harness.running.runner import Runner, RunOptions
 from robospa.harness.running.worker import WorkerConfig
 from robospa.protocol.policy import TrialInfo
 from robospa.protocol.server import ServerThread
-from robospa.results.reading import read_file, read_records, read_run
+from robospa.results.records.run_io import read_file, read_records, read_run
 from robospa.trial import TrialKey
 
 HERE = str(Path(__file__).parents[1])

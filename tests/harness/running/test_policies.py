@@ -23,8 +23,8 @@ from robospa.harness.running.policies import (
 )
 from robospa.harness.running.worker import WorkerConfig
 from robospa.protocol.server import ServerThread
-from robospa.results.lint import lint_run
-from robospa.results.reading import RunError, read_run
+from robospa.results.records.lint import lint_run
+from robospa.results.records.run_io import RunError, read_run
 from robospa.trial import TrialKey
 
 HERE = str(Path(__file__).parents[1])

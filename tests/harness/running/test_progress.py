@@ -7,7 +7,7 @@ import io
 from robospa.harness.running.progress import ROWS, Progress, Tally, clock, details, summary
 from robospa.harness.running.servers import Server
 from robospa.harness.running.status import Status
-from robospa.results.records import TrialRecord
+from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
 LONG, SHORT = TrialKey("Long", 5, 1), TrialKey("Short", 1, 1)

@@ -21,8 +21,8 @@ from robospa.harness.running.ray_bridge import RaySettings
 from robospa.harness.running.ray_executor import NoCluster, RayExecutor, check_address, joined
 from robospa.harness.running.runner import Runner, RunOptions
 from robospa.harness.running.worker import WorkerConfig
-from robospa.results.reading import read_file, read_records
-from robospa.results.records import TrialRecord
+from robospa.results.records.run_io import read_file, read_records
+from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
 pytest.importorskip("ray")

@@ -26,7 +26,7 @@ from robospa.protocol.codec import decode, encode
 from robospa.protocol.errors import DecodeError, EncodeError
 from robospa.protocol.policy import CameraSpec, PolicySpec
 from robospa.protocol.transport import Timeouts
-from robospa.results.records import TrialRecord
+from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
 KEY = TrialKey("Pick_Blocks_Size", 3, 100000)

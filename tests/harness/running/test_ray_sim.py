@@ -11,7 +11,7 @@ from robospa.harness.running.ray_bridge import RaySettings
 from robospa.harness.running.ray_executor import joined
 from robospa.harness.running.runner import Runner, RunOptions
 from robospa.harness.running.worker import WorkerConfig
-from robospa.results.reading import differences, read_records
+from robospa.results.records.run_io import differences, read_records
 from robospa.trial import TrialKey
 
 pytest.importorskip("ray")

@@ -13,7 +13,7 @@ from test_manifest import KEYS
 from robospa.harness.running.manifest import Manifest, check_folder, open_run, write_manifest
 from robospa.harness.running.runner import Runner, RunOptions
 from robospa.harness.running.worker import WorkerConfig
-from robospa.results.reading import RunError, manifest_keys, read_manifest, read_records
+from robospa.results.records.run_io import RunError, manifest_keys, read_manifest, read_records
 
 MANIFEST = Manifest({"run_seed": 0}, tuple(KEYS), {"code": "a", "versions": {"numpy": "2"}}, {})
 

@@ -8,7 +8,7 @@ import pytest
 
 from robospa.harness.running.runner import Runner, RunOptions
 from robospa.harness.running.worker import WorkerConfig
-from robospa.results.reading import differences, read_records
+from robospa.results.records.run_io import differences, read_records
 from robospa.trial import TrialKey
 
 pytestmark = pytest.mark.sim

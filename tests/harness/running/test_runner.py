@@ -14,8 +14,8 @@ import pytest
 
 from robospa.harness.running.runner import RunAborted, Runner, RunOptions
 from robospa.harness.running.worker import WorkerConfig
-from robospa.results.reading import RunError, finished, read_file, read_records
-from robospa.results.records import TrialRecord
+from robospa.results.records.run_io import RunError, finished, read_file, read_records
+from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
 QUICK = RunOptions(workers=2, backoff=0.01)
@@ -126,8 +126,8 @@ from pathlib import Path
 from robospa.harness.running.runner import Runner, RunOptions
 from robospa.harness.running.locking import locked
 from robospa.harness.running.worker import WorkerConfig
-from robospa.results.reading import finished, read_records
-from robospa.results.records import TrialKey
+from robospa.results.records.run_io import finished, read_records
+from robospa.results.records.trial_record import TrialKey
 
 if __name__ == "__main__":
     folder = Path(sys.argv[1])

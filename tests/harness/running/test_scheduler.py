@@ -14,7 +14,7 @@ from run_fakes import fake_task_of
 from robospa.harness.running.queue import TrialQueue
 from robospa.harness.running.scheduler import Job, Scheduler
 from robospa.harness.running.servers import BROKEN, UNFIT, UNREACHED
-from robospa.results.records import TrialRecord
+from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
 Targets = Callable[[str], Sequence[str]]

@@ -24,8 +24,8 @@ from robospa.harness.running.worker import WorkerConfig
 from robospa.harness.trial import run_trial
 from robospa.protocol.errors import WireError
 from robospa.protocol.transport import Timeouts
-from robospa.results.metrics import score
-from robospa.results.records import TrialRecord
+from robospa.results.records.trial_record import TrialRecord
+from robospa.results.scoring.scores import score
 from robospa.trial import TrialKey
 
 PAGE = Path(__file__).parents[3] / "docs" / "faults.md"

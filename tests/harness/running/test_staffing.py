@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from robospa.harness.running.staffing import Staffing, most_workers
-from robospa.results.records import TrialRecord
+from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
 KEY = TrialKey("Pick_Fake", 1, 1)

@@ -8,7 +8,7 @@ import pytest
 
 from robospa.harness.running.servers import Server
 from robospa.harness.running.status import Shares, Status, server_text, shares_text
-from robospa.results.records import TrialRecord
+from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
 KEY = TrialKey("Pick_Fake", 1, 1)

@@ -16,7 +16,7 @@ from robospa.harness.running.store import (
     replace_file,
     write_actions,
 )
-from robospa.results.reading import (
+from robospa.results.records.run_io import (
     RepeatabilityError,
     RunError,
     from_line,
@@ -24,7 +24,7 @@ from robospa.results.reading import (
     read_records,
     to_line,
 )
-from robospa.results.records import TrialRecord
+from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
 KEY = TrialKey("Pick_Fake", 1, 100000)

@@ -15,7 +15,7 @@ from run_fakes import FakePolicy
 from robospa.harness.running.runner import Runner, RunOptions
 from robospa.harness.running.watchdog import ASKING, INSIDE, WORKING, Attended, Beat, Pulse, Watch
 from robospa.harness.running.worker import WorkerConfig
-from robospa.results.records import TrialRecord
+from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
 KEYS = [TrialKey("Pick_Fake", 1, 100000 + n) for n in range(3)]

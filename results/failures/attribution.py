@@ -1,0 +1,279 @@
+"""The root of a failure in a long-horizon task: the first mistake that was not put right.
+
+Events are read in order. Each may be a mistake, tied to the subtasks whose completion would put it
+right; one that is tied to none is put right by any new progress. Plain mistakes (a drop, a grasp
+out of turn) count before traces (an object was reached or lifted, and nothing came of it).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from robospa.results.records.trial_record import TrialRecord
+
+Happened = Mapping[str, Any]
+"""An event of a record."""
+
+ORDERED = ("OCE", "MIP")
+"""Categories whose steps have to be done in the order of their subtasks."""
+MEMORY = "MIP"
+"""There a step out of turn means that what the cue showed is not known any more."""
+
+
+PRESSES = ("subtask_done", "wrong_order", "repeated")
+"""What a press can show as."""
+LATE = 1.0
+"""A closing is reported up to this long [s] after what it did."""
+
+
+@dataclass(frozen=True)
+class Cause:
+    """A kind of failure, the event that shows it, and the sentence that says so."""
+
+    kind: str
+    event: Happened
+    evidence: str
+
+
+@dataclass(frozen=True)
+class _Mistake:
+    """`needs`: subtasks that all have to hold at the end for it to be forgiven; () any progress."""
+
+    cause: Cause
+    needs: tuple[int, ...]
+    plain: bool
+
+
+def roles_of(record: TrialRecord) -> dict[str, tuple[int, ...]]:
+    """Subtasks by object name; what is named without any was not asked for."""
+    known = record.diagnostics.get("roles")
+    if known is not None:
+        return {name: tuple(subtasks) for name, subtasks in known.items()}
+    found: dict[str, tuple[int, ...]] = {}
+    for event in record.events:
+        if event["object"] and event["index"] >= 0:
+            before = found.get(event["object"], ())
+            found[event["object"]] = tuple(sorted({*before, event["index"]}))
+    return found
+
+
+def _worked(events: Sequence[Happened]) -> set[int]:
+    """Closings that led to a lift of their object before the next closing on it."""
+    found: set[int] = set()
+    for i, event in enumerate(events):
+        if event["kind"] != "closed":
+            continue
+        for other in events[max(0, i - 8) :]:
+            if other["object"] != event["object"] or other["time"] < event["time"] - LATE:
+                continue
+            if other["kind"] == "grasped":
+                found.add(id(event))
+            elif other["kind"] == "closed" and other["time"] > event["time"]:
+                break
+    return found
+
+
+@dataclass
+class _Reader:
+    """Walks through a trial's events and gathers what went wrong."""
+
+    category: str
+    total: int
+    roles: Mapping[str, tuple[int, ...]]
+    done: set[int] = field(default_factory=set)
+    idle: set[int] = field(default_factory=set)
+    """Subtasks that held before anything moved."""
+    ever: set[int] = field(default_factory=set)
+    tried: set[int] = field(default_factory=set)
+    undone: dict[int, float] = field(default_factory=dict)
+    pressed: tuple[str, ...] = ()
+    miss: _Mistake | None = None
+    """The last closing, if it was beside something."""
+    worked: set[int] = field(default_factory=set)
+    """Closings, by the identity of their events, that led to a lift."""
+    progress: float = -1.0
+    mistakes: list[_Mistake] = field(default_factory=list)
+
+    def read(self, event: Happened) -> None:
+        kind = str(event["kind"])
+        if event["object"] in self.pressed and kind in PRESSES and self.miss is not None:
+            self.mistakes.remove(self.miss)  # it only made the gripper ready to press
+            self.miss = None
+        method = getattr(self, f"_{kind}", None)
+        if method is not None:
+            method(event)
+
+    def _add(
+        self,
+        kind: str,
+        event: Happened,
+        evidence: str,
+        needs: tuple[int, ...] = (),
+        plain: bool = True,
+    ) -> None:
+        self.mistakes.append(_Mistake(Cause(kind, event, evidence), needs, plain))
+
+    # -- progress ------------------------------------------------------------------------------
+
+    def _subtask_done(self, event: Happened) -> None:
+        index = event["index"]
+        self.done.add(index)
+        self.tried.add(index)
+        if event["time"] <= 0.0:
+            self.idle.add(index)
+        if index not in self.ever:
+            self.ever.add(index)
+            self.progress = event["time"]
+
+    def _subtask_undone(self, event: Happened) -> None:
+        index = event["index"]
+        self.done.discard(index)
+        self.undone[index] = event["time"]
+        self._add("manipulation", event, f"subtask {index + 1} was undone", (index,))
+
+    # -- attempts ------------------------------------------------------------------------------
+
+    def _grasped(self, event: Happened) -> None:
+        self._taken(event, "lifted")
+
+    def _closed(self, event: Happened) -> None:
+        self.miss = None
+        name, touching = event["object"], event.get("note") == "touching"
+        if touching:
+            self._taken(event, "closed on")
+        else:
+            needs = self._aimed_at(name)
+            self.tried.update(needs)
+            self._add("manipulation", event, f"closed beside {name} and touched nothing", needs)
+            self.miss = self.mistakes[-1]
+
+    def _aimed_at(self, name: str) -> tuple[int, ...]:
+        """The open subtasks of the object beside which a gripper closed, else what was due."""
+        mine = tuple(i for i in self.roles.get(name, ()) if i not in self.done)
+        due = next((i for i in range(self.total) if i not in self.done), -1)
+        return mine or (due,)
+
+    def _taken(self, event: Happened, did: str) -> None:
+        """A gripper has an object between its fingers: was it its turn?"""
+        name = event["object"]
+        subtasks = self.roles.get(name, ())
+        if not subtasks:
+            self._add("target_grounding", event, f"{did} {name}, which was not asked for")
+            return
+        index = next((i for i in subtasks if i not in self.done), subtasks[0])
+        early = self._out_of_turn(index)
+        self.tried.add(index)
+        if self._was_done(index, event["time"]) and index not in self.idle:
+            for mistake in [m for m in self.mistakes if self._undoing(m, index, event["time"])]:
+                self.mistakes.remove(mistake)
+            self._add("redundant_repetition", event, f"{did} {name} again, which was done")
+        elif early:
+            kind = "memory" if self.category == MEMORY else "temporal_ordering"
+            needs = tuple(range(max(self.tried) + 1))
+            self._add(kind, event, f"{did} {name} before it was its turn", needs)
+        elif did == "closed on" and id(event) not in self.worked:
+            self._add("manipulation", event, f"closed on {name}, did not lift it", subtasks)
+        else:
+            evidence = f"lifted {name}, did not bring it where it belongs"
+            self._add("manipulation", event, evidence, subtasks, plain=False)
+
+    def _out_of_turn(self, index: int) -> bool:
+        """Whether something else had to be tried before subtask `index`, or this one was."""
+        if self.category == MEMORY:
+            return any(i not in self.done for i in range(index))
+        if self.category not in ORDERED or index in self.tried - self.idle:
+            return False
+        if any(i not in self.tried for i in range(index)):
+            return True
+        return any(i > index and i not in self.ever for i in self.tried)
+
+    def _was_done(self, index: int, time: float) -> bool:
+        """Whether a subtask held until a gripper closed on its object at `time` or just before."""
+        return index in self.done or time - self.undone.get(index, -LATE) < LATE
+
+    def _undoing(self, mistake: _Mistake, index: int, time: float) -> bool:
+        """Whether a mistake is only that subtask `index` was undone by what happens at `time`."""
+        event = mistake.cause.event
+        at, kind = event["time"], event["kind"]
+        return bool(kind == "subtask_undone" and event["index"] == index and time - at < LATE)
+
+    def _dropped(self, event: Happened) -> None:
+        name = event["object"]
+        needs = self.roles.get(name, ())
+        kind = "manipulation" if needs else "target_grounding"
+        self._add(kind, event, f"dropped {name}", needs)
+
+    def _approached(self, event: Happened) -> None:
+        needs = self.roles.get(event["object"], ())
+        if needs and any(i not in self.done for i in needs):
+            evidence = f"reached {event['object']}, and nothing came of it"
+            self._add("manipulation", event, evidence, plain=False)
+
+    # -- what goals say ------------------------------------------------------------------------
+
+    def _wrong_order(self, event: Happened) -> None:
+        name = event["object"]
+        kind = "memory" if self.category == MEMORY else "temporal_ordering"
+        evidence = f"{name} was done before it was its turn"
+        if any(i in self.ever and i != event["index"] for i in self.roles.get(name, ())):
+            kind, evidence = (
+                "redundant_repetition",
+                f"{name} was done again instead of what was due",
+            )
+        needs = tuple(range(event["index"] + 1))
+        self._add(kind, event, evidence, needs, plain=self.category in ORDERED)
+
+    def _repeated(self, event: Happened) -> None:
+        evidence = f"{event['object']} was done once more than asked"
+        self._add("redundant_repetition", event, evidence)
+
+    def _failed(self, event: Happened) -> None:
+        note = event.get("note", "")
+        if not event["object"]:
+            self._add("temporal_ordering", event, note or "acted too soon", (-1,))
+        elif "taken again" in note:
+            self._add("redundant_repetition", event, f"{event['object']}: {note}", (-1,))
+        elif "too early" not in note:  # that is a wrong_order event's second half
+            self._add("manipulation", event, f"{event['object']}: {note}", (-1,))
+
+    # -- the verdict ---------------------------------------------------------------------------
+
+    def root(self) -> Cause | None:
+        """The first plain mistake that was not put right, else the first trace of one."""
+        left = [m for m in self.mistakes if not self._forgiven(m)]
+        plain = [m for m in left if m.plain]
+        if not left:
+            return None
+        return self._worst(plain or left)
+
+    def _forgiven(self, mistake: _Mistake) -> bool:
+        if mistake.needs:
+            return all(i in self.done for i in mistake.needs)
+        return bool(mistake.cause.event["time"] < self.progress)
+
+    def _worst(self, mistakes: list[_Mistake]) -> Cause:
+        """The first; of a failed grasp, its end: the drop is what a viewer wants to see."""
+        first = mistakes[0]
+        if first.cause.kind == "manipulation" and first.needs:
+            same = [
+                m for m in mistakes if m.needs == first.needs and m.cause.event["kind"] == "dropped"
+            ]
+            if same:
+                return same[0].cause
+        return first.cause
+
+
+def root_of(record: TrialRecord) -> Cause | None:
+    """Why a failed trial of a long-horizon task failed; None if nothing was tried."""
+    reader = _Reader(
+        record.category,
+        record.total,
+        roles_of(record),
+        pressed=tuple(record.diagnostics.get("pressed", ())),
+        worked=_worked(record.events),
+    )
+    for event in record.events:
+        reader.read(event)
+    return reader.root()

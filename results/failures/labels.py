@@ -1,0 +1,149 @@
+"""What kind of failure a failed trial is: decided from its events, by rules that can be read here.
+
+The types are the paper's (its authors labelled videos by hand) and two of ours for trials that none
+of those describes: nothing was tried, and an answer that cannot be executed. The rules look for the
+*root*: the first thing that went wrong and was not put right. `docs/failures.md` has them in words.
+
+A trial lost to infrastructure is no failure of the policy and gets no type.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from robospa.results.failures.attribution import Cause, roles_of, root_of
+from robospa.results.records.trial_record import TrialRecord
+
+NAMES = {
+    "target_grounding": "target grounding",
+    "target_execution": "target execution",
+    "no_contact_grasp": "no-contact grasp",
+    "manipulation": "manipulation",
+    "memory": "memory",
+    "temporal_ordering": "temporal ordering",
+    "redundant_repetition": "redundant repetition",
+    "no_attempt": "no attempt",
+    "invalid_action": "invalid action",
+}
+"""Kinds of failure and how people read them."""
+
+KINDS = tuple(NAMES)
+OURS = ("no_attempt", "invalid_action")
+"""Kinds that the paper does not have."""
+
+SPATIAL = ("GAC", "SDE", "CPI", "RRR", "CVR")
+
+SIMULATED_PER_FILM = 2.0
+"""Simulated seconds in a second of video: a frame every 0.2 s, ten frames a second."""
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Why a trial failed. `evidence` says what was seen, in one sentence.
+
+    `time` [s, simulated] and `step` (actions begun by then, the failing one included) say when;
+    `video_seconds` is that moment in the trial's video. Each is None where it is not known.
+    """
+
+    kind: str
+    evidence: str
+    time: float | None = None
+    step: int | None = None
+    video_seconds: float | None = None
+
+
+def label(record: TrialRecord) -> Failure | None:
+    """The one type of a failed trial; None for a success and for a trial that was not run."""
+    if record.success or record.end == "infrastructure":
+        return None
+    if record.end == "policy_error":
+        return _at_end(record, "invalid_action", record.message or "the answer was refused")
+    cause = _spatial(record) if record.category in SPATIAL else root_of(record)
+    if cause is None:
+        return _at_end(record, "no_attempt", _idle(record))
+    time = float(cause.event["time"])
+    return Failure(cause.kind, cause.evidence, time, cause.event.get("step"), _film(record, time))
+
+
+def distribution(records: Iterable[TrialRecord], by: str = "task") -> dict[str, dict[str, int]]:
+    """How often each kind occurs, by "task", "category" or "variant"; kinds in their order.
+
+    Groups without a failure are left out. ValueError for another grouping.
+    """
+    if by not in _GROUPS:
+        raise ValueError(f"failures are grouped by {', '.join(_GROUPS)}, not by {by!r}")
+    counts: dict[str, dict[str, int]] = {}
+    for record in records:
+        failure = label(record)
+        if failure is not None:
+            row = counts.setdefault(_GROUPS[by](record), dict.fromkeys(KINDS, 0))
+            row[failure.kind] += 1
+    return {
+        name: {kind: count for kind, count in row.items() if count}
+        for name, row in sorted(counts.items())
+    }
+
+
+_GROUPS: Mapping[str, Callable[[TrialRecord], str]] = {
+    "task": lambda record: record.key.task,
+    "category": lambda record: record.category,
+    "variant": lambda record: f"{record.key.task} L{record.key.level}",
+}
+
+
+def _film(record: TrialRecord, time: float) -> float | None:
+    return round(time / SIMULATED_PER_FILM, 1) if record.video else None
+
+
+def _at_end(record: TrialRecord, kind: str, evidence: str) -> Failure:
+    """A failure that no event shows: the trial's last action is where it stands."""
+    return Failure(kind, evidence, None, record.steps, None)
+
+
+def _idle(record: TrialRecord) -> str:
+    if "roles" not in record.diagnostics:
+        return "the record does not tell what the grippers tried: an older version wrote it"
+    if record.done:
+        return (
+            f"{record.done} of {record.total} subtasks hold at the end; "
+            "nothing was tried at the others after the last of them"
+        )
+    return "no gripper came near anything that was asked for"
+
+
+def _spatial(record: TrialRecord) -> Cause | None:
+    """The selection is the first object that a gripper touched in closing, or lifted."""
+    roles = roles_of(record)
+    beside: Mapping[str, Any] | None = None
+    lost: Mapping[str, Any] | None = None
+    reached: Mapping[str, Any] | None = None
+    chosen: Mapping[str, Any] | None = None
+    for event in record.events:
+        kind, note = event["kind"], event.get("note", "")
+        if kind == "grasped" or (kind == "closed" and note == "touching"):
+            chosen = chosen or event
+        elif kind == "closed":
+            beside = beside or event
+        elif kind == "dropped":
+            lost = lost or event
+        elif kind in ("approached", "wrong_object"):
+            reached = reached or event
+    if chosen is not None:
+        name = chosen["object"]
+        if not roles.get(name):
+            return Cause("target_grounding", chosen, f"took {name}, which was not asked for")
+        if lost is not None and lost["object"] == name:
+            return Cause("target_execution", lost, f"took the target {name} and dropped it")
+        return Cause("target_execution", chosen, f"closed on the target {name}, did not lift it")
+    if beside is not None:
+        return Cause(
+            "no_contact_grasp", beside, f"closed beside {beside['object']} and touched nothing"
+        )
+    if reached is None:
+        return None
+    name = reached["object"]
+    if roles.get(name):
+        return Cause("target_execution", reached, f"reached the target {name}, never closed on it")
+    return Cause("target_grounding", reached, f"reached {name}, which was not asked for")

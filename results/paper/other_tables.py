@@ -1,0 +1,244 @@
+"""The paper's tables of intervals, embodiments and what else it gives, and the list of errata."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from robospa.results.paper import rounding
+from robospa.results.paper.check import checks, errata
+from robospa.results.paper.columns import Column, check_columns
+from robospa.results.paper.published import load, title
+from robospa.results.paper.result_tables import DASH, DIMENSION_NAMES, not_run_note
+from robospa.results.scoring.scores import BASIC, CATEGORY_NAMES, DIMENSIONS
+from robospa.results.statistics.intervals import interval_of
+from robospa.results.tables.table import MISSING, Entry, Grid, Line
+
+INTERVAL_METHODS = (("bootstrap", "Stratified bootstrap"), ("wilson", "MOVER on Wilson limits"))
+
+
+def interval_table(columns: Sequence[Column]) -> Grid:
+    """Success at L5 with intervals by two methods; of published models also as printed."""
+    check_columns(columns)
+    data = load()
+    level, rows = int(data.intervals["level"]), (*DIMENSIONS, rounding.OVERALL)
+    lines = []
+    for column in columns:
+        entries = [
+            _interval(column, row, level, method) for method, _ in INTERVAL_METHODS for row in rows
+        ]
+        lines.append(Line(column.title, tuple(entries)))
+        printed = data.intervals["rows"].get(column.published)
+        if printed:
+            given = [_with_ends(*(x / 100 for x in printed[row])) for row in rows]
+            blank = [Entry()] * len(rows)
+            lines.append(Line(f"{column.title}, as printed", (*given, *blank)))
+    heads = ("Fine-grained", "Long-horizon", "Overall") * len(INTERVAL_METHODS)
+    groups = tuple((name, len(rows)) for _, name in INTERVAL_METHODS)
+    notes = (
+        "The bootstrap resamples trials within every variant (10,000 times): the same tasks, other "
+        "seeds. MOVER combines Wilson limits of the single variants and needs no seed; it stays "
+        "honest where all trials of a variant fail.",
+        *_open_notes(columns, level),
+    )
+    name = "Success rate (SR) at L5 in percent with 95 % intervals"
+    return Grid("intervals", name, "Model", heads, tuple(lines), groups, notes)
+
+
+def _open_notes(columns: Sequence[Column], level: int) -> list[str]:
+    """What columns lack at `level`."""
+    notes: list[str] = []
+    for column in columns:
+        notes += not_run_note(column, [level])
+        if lost := column.missing(rounding.OVERALL, level):
+            part = column.part(rounding.OVERALL, level)
+            low, high = (100 * end for end in (part and part.bounds("sr")) or (0.0, 1.0))
+            notes.append(
+                f"{MISSING} {column.title}: {lost} trials at L{level} have no result; over what is "
+                f"listed SR lies between {rounding.text(low)} and {rounding.text(high)}."
+            )
+    return notes
+
+
+def _interval(column: Column, row: str, level: int, method: str) -> Entry:
+    samples, shares = column.samples(row, level)
+    if not samples:
+        return DASH
+    found = interval_of(samples, shares, method)
+    value = column.value("sr", row, level) or 0.0
+    entry = _with_ends(value / 100, found.low, found.high)
+    return replace(entry, **column.lacks("sr", row, level))
+
+
+def _with_ends(value: float, low: float, high: float, sign: str = "") -> Entry:
+    shown = [rounding.text(100 * x) for x in (value, low, high)]
+    text = f"{shown[0]} [{shown[1]}, {shown[2]}]"
+    return Entry(text, 100 * value, 100 * low, 100 * high, sign=sign)
+
+
+def embodiment_table(dimension: str, columns: Sequence[Column] = ()) -> Grid:
+    """One task a category on five robots; runs become further rows, each with its own robot."""
+    table, data = load().embodiments, load()
+    shorts = [s for s, t in table.tasks.items() if data.tasks[t].category in DIMENSIONS[dimension]]
+    levels = [int(name[1]) for name in table.columns]
+    lines = [
+        Line(
+            f"{table.model}, {table.names[robot]}",
+            tuple(Entry(rounding.text(x, 0), x) for s in shorts for x in row[s]),
+        )
+        for robot, row in table.rows.items()
+    ]
+    for column in columns:
+        if column.published:
+            continue
+        robot = table.names.get(column.embodiment, column.embodiment)
+        entries = [_variant(column, table.tasks[s], n) for s in shorts for n in levels]
+        lines.append(Line(f"{column.title}, {robot}", tuple(entries)))
+    groups = tuple((short, len(levels)) for short in shorts)
+    names = "; ".join(f"{s} {data.tasks[table.tasks[s]].printed}" for s in shorts)
+    lost = any(entry.sign for line in lines for entry in line.entries)
+    notes = (f"{names}.", *((f"{MISSING} Some trials have no result.",) if lost else ()))
+    return Grid(
+        f"embodiments-{dimension}",
+        f"Success rate (SR) in percent by embodiment: {DIMENSION_NAMES[dimension]}",
+        "Model, embodiment",
+        table.columns * len(shorts),
+        tuple(lines),
+        groups,
+        notes,
+    )
+
+
+def _variant(column: Column, task: str, level: int) -> Entry:
+    value = column.value("sr", task, level)
+    if value is None:
+        return DASH
+    found = column.estimate("sr", task, level)
+    assert found is not None, "a value has an interval"
+    text = rounding.text(value, 0 if value == round(value) else 1)
+    ends = (100 * found.low, 100 * found.high)
+    return Entry(text, value, *ends, **column.lacks("sr", task, level))
+
+
+def _words(*texts: object) -> tuple[Entry, ...]:
+    return tuple(Entry(str(text)) for text in texts)
+
+
+def basic_table(columns: Sequence[Column] = ()) -> Grid:
+    """Basic grounding tasks, which are no part of the 56: the printed values, and those of runs.
+
+    A run's value is the mean over the sets of objects; it stays open unless all were run.
+    """
+    table = load().basic_grounding
+    runs = [c for c in columns if c.covers_basic]
+    heads = tuple(table["columns"])
+    names = {CATEGORY_NAMES[category]: category for category in BASIC}
+    lines = []
+    for name, printed in table["rows"].items():
+        entries = [Entry(rounding.text(x), x) for x in printed]
+        for run in runs:
+            entries += [_grounding(run, names[name], int(h[1]), table["tasks"]) for h in heads]
+        lines.append(Line(name, tuple(entries)))
+    groups = (("Printed", len(heads)), *((c.title, len(heads)) for c in runs)) if runs else ()
+    notes = [
+        f"Means over {table['tasks']} tasks of {table['trials']} trials; "
+        "the paper does not name the model."
+    ]
+    if runs:
+        notes.append(
+            "Intervals of runs are 95 % intervals of the mean over the tasks; it stays open where "
+            "not all of them were run."
+        )
+    if any(entry.sign for line in lines for entry in line.entries):
+        notes.append(f"{MISSING} Some trials have no result.")
+    name = "Success rate (SR) in percent on basic spatial tasks"
+    return Grid("basic", name, "Task", heads * (1 + len(runs)), tuple(lines), groups, tuple(notes))
+
+
+def _grounding(run: Column, category: str, level: int, sets: int) -> Entry:
+    """A run's mean over the `sets` of a basic category at `level`."""
+    part = run.scores.categories.get((category, level))
+    found = None if part is None else part.values.get("sr")
+    if part is None or found is None:
+        return DASH
+    cells = run.scores.cells.items()
+    if sum(cell.category == category and n == level for (_, n), cell in cells) < sets:
+        return DASH
+    return _with_ends(found.value, found.low, found.high, MISSING if part.missing else "")
+
+
+def models_table() -> Grid:
+    """Size and training of the published models."""
+    lines = tuple(
+        Line(
+            title(model),
+            (
+                Entry(row["parameters"]),
+                Entry(str(row["gpus"]), row["gpus"]),
+                Entry(f"{row['hours']:g}", row["hours"]),
+                Entry(f"{row['gpu_hours']:g}", row["gpu_hours"]),
+            ),
+        )
+        for model, row in load().models.items()
+    )
+    heads = ("Parameters", "GPUs", "Hours", "GPU hours")
+    return Grid("models", "Model size and training per base task", "Model", heads, lines)
+
+
+def datasets_table() -> Grid:
+    """Data sets and benchmarks beside RoboSPA."""
+    table = load().datasets
+    given = ("categories", "tasks", "trajectories", "embodiments")
+    has = ("spatial_reasoning", "long_horizon", "step_level", "multi_difficulty", "scene_diversity")
+    lines, last = [], ""
+    for row in table["rows"]:
+        if row["kind"] != last:
+            last = row["kind"]
+            lines.append(
+                Line({"dataset": "Datasets", "benchmark": "Benchmarks"}[last], (), "section")
+            )
+        words = [row[key] or "–" for key in given] + ["yes" if row[key] else "no" for key in has]
+        lines.append(Line(row["name"], _words(*words)))
+    heads = (
+        *("Categories", "Tasks", "Trajectories", "Embodiments", "Spatial reasoning"),
+        *("Long-horizon", "Step-level", "Multi-difficulty", "Scene diversity"),
+    )
+    notes = (table["note"],)
+    name = "Robot manipulation datasets and benchmarks"
+    return Grid("datasets", name, "Name", heads, tuple(lines), notes=notes, words=True)
+
+
+def assets_table() -> Grid:
+    """Object categories and their variants."""
+    table = load().assets
+    rows = tuple(Line(name, (Entry(str(n), n),)) for name, n in table["rows"].items())
+    total = sum(table["rows"].values())
+    lines = (*rows, Line("Total", (Entry(str(total), total),), "average"))
+    name = f"Object categories ({len(rows)}) and variants of each"
+    return Grid("assets", name, "Asset", ("Variants",), lines)
+
+
+def errata_table() -> Grid:
+    """Every printed value that does not follow from the per-task tables."""
+    lines = tuple(
+        Line(
+            check.table,
+            _words(
+                check.row,
+                title(check.model),
+                check.column,
+                rounding.text(check.printed, check.digits),
+                rounding.text(check.recomputed, check.digits),
+                check.reason or "–",
+            ),
+        )
+        for check in errata()
+    )
+    derived = sum(check.derived for check in checks())
+    notes = (
+        f"{len(checks())} printed cells were walked, {derived} of them follow from others. "
+        "Interval ends count as reproduced within 0.1; all else to the printed digit.",
+    )
+    heads = ("Row", "Model", "Column", "Printed", "Recomputed", "Remark")
+    name = "Printed values that do not follow from the per-task tables"
+    return Grid("errata", name, "Table", heads, lines, notes=notes, words=True)

@@ -1,0 +1,246 @@
+"""The paper's tables of results, from any mix of published models and runs.
+
+A value is printed as the paper prints it (`paper.rounding`). What a run lacks is a dash and a note,
+what it lost is a † with the range that the lost trials leave open, and a published value that does
+not follow from the per-task tables is a * with what was printed instead.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from robospa.results.paper import rounding
+from robospa.results.paper.check import Check, errata
+from robospa.results.paper.columns import METRIC_CATEGORIES, Column, check_columns
+from robospa.results.paper.published import LEVELS, load
+from robospa.results.scoring.scores import CATEGORY_NAMES, DIMENSIONS, METRIC_NAMES
+from robospa.results.statistics.significance import separable
+from robospa.results.tables.table import MISSING, PRINTED_OTHERWISE, Entry, Grid, Line
+
+MARKS = ("tied", "highest", "none")
+"""Which values are marked as best: all that cannot be told from the highest (Boschloo's test or
+the interval of the difference, Benjamini-Hochberg over the table), the highest, or none."""
+DIMENSION_NAMES = {
+    "spatial": "Fine-Grained Spatial Reasoning",
+    "procedural": "Long-Horizon Procedural Planning",
+}
+_MARK_NOTES = {
+    "tied": "Bold: the highest value of a row and level, and all that cannot be told from it "
+    "(false discovery rate 5 % over the table).",
+    "highest": "Bold: the highest value of a row and level.",
+    "none": "",
+}
+DASH = Entry("–")
+
+
+def summary_table(
+    columns: Sequence[Column], name: str, metric: str, heads: Sequence[str], mark: str = "tied"
+) -> Grid:
+    """Categories, dimensions and the overall value of `metric` at some levels, or their drop."""
+    check_columns(columns)
+    rows = _summary_rows(metric)
+    levels = [int(head[1]) for head in heads if head != "Drop"]
+    best = _best(columns, metric, [r for r, _ in rows if r], levels, mark)
+    wrong = _wrong(_source(name))
+    lines = []
+    for row, label in rows:
+        if not row:
+            lines.append(Line(label, kind="section"))
+            continue
+        entries = []
+        for column in columns:
+            for head in heads:
+                if head == "Drop":
+                    ends = [column.value(metric, row, level) for level in levels]
+                    entry = _number(rounding.drop(*ends))
+                else:
+                    level = int(head[1])
+                    entry = _value(column, metric, row, level, column.title in best[row, level])
+                sign = PRINTED_OTHERWISE if (row, column.published, head) in wrong else ""
+                entries.append(_signed(entry, sign))
+        lines.append(Line(label, tuple(entries), "row" if row in CATEGORY_NAMES else "average"))
+    title = f"{_long_name(metric)} in percent by category"
+    notes = _notes(columns, metric, [r for r, _ in rows if r], levels, mark, wrong)
+    groups = tuple((c.title, len(heads)) for c in columns)
+    return Grid(name, title, "", tuple(heads) * len(columns), tuple(lines), groups, notes)
+
+
+def task_table(columns: Sequence[Column], name: str, metric: str, mark: str = "tied") -> Grid:
+    """Every task at every level."""
+    check_columns(columns)
+    data = load()
+    shown = [t for t in data.tasks.values() if t.category in METRIC_CATEGORIES[metric]]
+    best = _best(columns, metric, [t.name for t in shown], LEVELS, mark)
+    wrong = {
+        key: check
+        for column in columns
+        if column.published
+        for key, check in _wrong(data.per_task[column.published, metric].source).items()
+    }
+    lines, last = [], ""
+    for task in shown:
+        if task.category != last:
+            last = task.category
+            lines.append(Line(f"{last} {CATEGORY_NAMES[last]}", kind="section"))
+        entries = []
+        for column in columns:
+            for level in LEVELS:
+                marked = column.title in best[task.name, level]
+                entry = _value(column, metric, task.name, level, marked)
+                key = (task.printed, column.published, f"L{level}")
+                if key in wrong and metric == "ps":  # it is given there, not derived
+                    entry = _signed(_number(wrong[key].printed), "")
+                sign = PRINTED_OTHERWISE if key in wrong else ""
+                entries.append(_signed(entry, sign))
+        lines.append(Line(task.printed, tuple(entries)))
+    heads = tuple(f"L{level}" for level in LEVELS)
+    title = f"{_long_name(metric)} in percent by task"
+    notes = _notes(columns, metric, [t.name for t in shown], LEVELS, mark, wrong)
+    groups = tuple((c.title, len(heads)) for c in columns)
+    return Grid(name, title, "Task", heads * len(columns), tuple(lines), groups, notes)
+
+
+def _source(name: str) -> str:
+    """The label of the paper's table that the summary table `name` redraws."""
+    data = load()
+    return {"main": data.main, "onta": data.onta, "ps": data.ps}[name].source
+
+
+def _long_name(metric: str) -> str:
+    full = {
+        "sr": "Success rate",
+        "onta": "Object-normalized target accuracy",
+        "ps": "Progress score",
+    }
+    return f"{full[metric]} ({METRIC_NAMES[metric]})"
+
+
+def _summary_rows(metric: str) -> list[tuple[str, str]]:
+    """(row, label) in the paper's order; a section's row is ""."""
+    rows: list[tuple[str, str]] = []
+    dimensions = [d for d in DIMENSIONS if set(DIMENSIONS[d]) <= set(METRIC_CATEGORIES[metric])]
+    for dimension in dimensions:
+        rows += [("", DIMENSION_NAMES[dimension])] * (len(dimensions) > 1)
+        rows += [(category, CATEGORY_NAMES[category]) for category in DIMENSIONS[dimension]]
+        rows.append((dimension, "Average"))
+    if len(dimensions) > 1:
+        rows += [("", "Overall"), (rounding.OVERALL, "Overall average")]
+    return rows
+
+
+def _best(
+    columns: Sequence[Column], metric: str, rows: Sequence[str], levels: Sequence[int], mark: str
+) -> dict[tuple[str, int], set[str]]:
+    """Titles of the columns to mark, by row and level."""
+    if mark not in MARKS:
+        raise ValueError(f"no mark is called {mark!r}; there are {', '.join(MARKS)}")
+    places = [(row, level) for row in rows for level in levels]
+    columns = [c for c in columns if not c.privileged]
+    if mark == "none" or len(columns) < 2:
+        return {place: set() for place in places}
+    if mark == "tied":
+        entries = [[column.sample(metric, *place) for column in columns] for place in places]
+        found = separable(entries)
+        return {
+            place: {columns[n].title for n in marked}
+            for place, marked in zip(places, found, strict=True)
+        }
+    made: dict[tuple[str, int], set[str]] = {}
+    for place in places:
+        shown = {
+            c.title: rounding.rounded(value)
+            for c in columns
+            if (value := c.value(metric, *place)) is not None
+        }
+        top = max(shown.values(), default=0.0)
+        made[place] = {title for title, value in shown.items() if value == top}
+    return made
+
+
+def _value(column: Column, metric: str, row: str, level: int, best: bool) -> Entry:
+    value = column.value(metric, row, level)
+    if value is None:
+        return DASH
+    whole = metric == "sr" and row in load().tasks and value == round(value)
+    found = column.estimate(metric, row, level)
+    return Entry(
+        rounding.text(value, 0 if whole else 1),
+        value,
+        100 * found.low if found else None,
+        100 * found.high if found else None,
+        best,
+        **column.lacks(metric, row, level),
+    )
+
+
+def _number(value: float | None) -> Entry:
+    return DASH if value is None else Entry(rounding.text(value), value)
+
+
+def _signed(entry: Entry, sign: str) -> Entry:
+    return replace(entry, sign=entry.sign + sign)
+
+
+def _wrong(source: str) -> Mapping[tuple[str, str, str], Check]:
+    return {(c.row, c.model, c.column): c for c in errata() if c.source == source}
+
+
+def _notes(
+    columns: Sequence[Column],
+    metric: str,
+    rows: Sequence[str],
+    levels: Sequence[int],
+    mark: str,
+    wrong: Mapping[tuple[str, str, str], Check],
+) -> tuple[str, ...]:
+    notes = [_MARK_NOTES[mark]] if len(columns) > 1 and mark != "none" else []
+    shown = {c.published for c in columns if c.published}
+    listed = [
+        f"{c.row} {c.model} {c.column} {rounding.text(c.printed, c.digits)}"
+        for c in wrong.values()
+        if c.model in shown
+    ]
+    if listed and metric == "ps" and rows[0] in load().tasks:
+        notes.append(f"{PRINTED_OTHERWISE} Does not follow from SR: {'; '.join(listed)}.")
+    elif listed:
+        notes.append(f"{PRINTED_OTHERWISE} The paper prints: {'; '.join(listed)}.")
+    trials = load().trials
+    for column in columns:
+        if column.published:
+            continue
+        if column.trials != trials:
+            notes.append(
+                f"{column.title}: up to {column.trials} trials a variant, "
+                f"the published models {trials}."
+            )
+        notes += not_run_note(column, levels)
+        places = [(row, level) for row in rows for level in levels]
+        lost = [text for place in places if (text := _lost(column, metric, *place))]
+        if lost:
+            notes.append(f"{MISSING} {column.title}, trials without a result: {'; '.join(lost)}.")
+    return tuple(notes)
+
+
+def not_run_note(column: Column, levels: Sequence[int]) -> list[str]:
+    """How many of the benchmark's tasks `column` lacks at `levels`, or nothing."""
+    lacking = [f"{n} at L{level}" for level in levels if (n := column.not_run(level))]
+    if not lacking:
+        return []
+    total = len(load().tasks)
+    return [
+        f"{column.title}: of {total} tasks {', '.join(lacking)} were not run; "
+        "averages over them stay open."
+    ]
+
+
+def _lost(column: Column, metric: str, row: str, level: int) -> str:
+    part = column.part(row, level)
+    if part is None or not part.missing or not (metric in part.values or not part.trials):
+        return ""
+    name = load().tasks[row].printed if row in load().tasks else row
+    ends = part.bounds(metric)
+    if ends is None:
+        return f"{name} L{level} lacks {part.missing}"
+    low, high = (rounding.text(100 * end) for end in ends)
+    return f"{name} L{level} lacks {part.missing}, {METRIC_NAMES[metric]} between {low} and {high}"

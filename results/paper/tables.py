@@ -1,0 +1,72 @@
+"""All tables of the paper by name, and writing them to files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from robospa.results.paper import other_tables as given
+from robospa.results.paper.columns import Column, TableError
+from robospa.results.paper.result_tables import summary_table, task_table
+from robospa.results.tables.html import page
+from robospa.results.tables.latex import document, to_latex
+from robospa.results.tables.table import Grid, to_csv, to_markdown
+
+Maker = Callable[[Sequence[Column], str], Grid]
+
+TABLES: dict[str, Maker] = {
+    "main": lambda c, m: summary_table(c, "main", "sr", ("L1", "L5", "Drop"), m),
+    "onta": lambda c, m: summary_table(c, "onta", "onta", ("L1", "L3", "L5"), m),
+    "ps": lambda c, m: summary_table(c, "ps", "ps", ("L1", "L3", "L5"), m),
+    "intervals": lambda c, m: given.interval_table(c),
+    "sr-tasks": lambda c, m: task_table(c, "sr-tasks", "sr", m),
+    "onta-tasks": lambda c, m: task_table(c, "onta-tasks", "onta", m),
+    "ps-tasks": lambda c, m: task_table(c, "ps-tasks", "ps", m),
+    "embodiments-spatial": lambda c, m: given.embodiment_table("spatial", c),
+    "embodiments-procedural": lambda c, m: given.embodiment_table("procedural", c),
+    "basic": lambda c, m: given.basic_table(c),
+    "models": lambda c, m: given.models_table(),
+    "datasets": lambda c, m: given.datasets_table(),
+    "assets": lambda c, m: given.assets_table(),
+    "errata": lambda c, m: given.errata_table(),
+}
+"""Name -> what makes it from columns and a way of marking the best (`tables_paper.MARKS`)."""
+
+FORMATS: dict[str, Callable[[Sequence[Grid]], str]] = {
+    "md": lambda grids: "\n".join(to_markdown(grid) for grid in grids),
+    "tex": document,
+    "html": lambda grids: page(grids, "RoboSPA: results"),
+    "csv": to_csv,
+}
+"""Ending -> what writes several tables as one file."""
+
+
+def make_tables(
+    columns: Sequence[Column], names: Sequence[str] | None = None, mark: str = "tied"
+) -> list[Grid]:
+    """The tables called `names` (default all); TableError if one is unknown.
+
+    Runs of basic grounding tasks alone appear in the table of these only.
+    """
+    chosen = list(TABLES) if names is None else list(names)
+    for name in chosen:
+        if name not in TABLES:
+            raise TableError(f"no table is called {name!r}; there are {', '.join(TABLES)}")
+    base = [column for column in columns if column.covers_benchmark]
+    return [TABLES[name](columns if name == "basic" else base, mark) for name in chosen]
+
+
+def write_tables(grids: Sequence[Grid], folder: Path, formats: Sequence[str]) -> list[Path]:
+    """Write `tables.<ending>` with all of `grids`; for LaTeX also one file each, to be input."""
+    folder.mkdir(parents=True, exist_ok=True)
+    written = []
+    for ending in formats:
+        path = folder / f"tables.{ending}"
+        path.write_text(FORMATS[ending](grids), encoding="utf-8")
+        written.append(path)
+        if ending == "tex":
+            for grid in grids:
+                path = folder / f"{grid.name}.tex"
+                path.write_text(to_latex(grid), encoding="utf-8")
+                written.append(path)
+    return written

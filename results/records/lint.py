@@ -1,0 +1,332 @@
+"""What looks wrong in a run or in a table of results, found without running anything again.
+
+Numbers that cannot be (progress below success, a share of subtasks that no count gives), numbers
+that are too alike to be true (one row under two tasks, one sequence of actions for two seeds), and
+what a reader must know before averaging (trials missing, listed twice, from mixed settings or
+versions). An error makes numbers wrong; a warning asks for a look. No finding proves a run right.
+"""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import TypeVar
+
+from robospa.results.paper.published import load
+from robospa.results.paper.rounding import onta, rounded
+from robospa.results.records.run_io import TRIALS, Run, finished, read_file
+from robospa.results.records.trial_record import TrialRecord
+from robospa.results.scoring.scores import PROCEDURAL
+from robospa.trial import TrialKey
+
+FASTEST_STEP = 4e-6
+"""Wall time of a physics step [s] that no machine known to us beats: 1000 times real time. Arms
+that stand still among sleeping objects take 16 us on two cores of 2026."""
+T = TypeVar("T")
+INFORMATIVE = 3
+"""Rows with fewer different numbers above zero may well agree by chance."""
+NAMED = 3
+"""How many examples a finding names before it only counts."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing found: `rule` is its short name, `severity` is "error" or "warning"."""
+
+    rule: str
+    severity: str
+    where: str
+    text: str
+
+    def __str__(self) -> str:
+        return f"{self.severity}: {self.where}: {self.text} [{self.rule}]"
+
+
+@dataclass(frozen=True)
+class Row:
+    """One model's results of one task, in percent by level, None where there is none.
+
+    `candidates` and `subtasks` are the n of ONTA and the T of PS by level, empty if unknown;
+    `trials` per level. `printed`: values are rounded to one decimal.
+    """
+
+    model: str
+    task: str
+    levels: tuple[int, ...]
+    sr: tuple[float | None, ...]
+    onta: tuple[float | None, ...] = ()
+    ps: tuple[float | None, ...] = ()
+    candidates: tuple[int, ...] = ()
+    subtasks: tuple[int, ...] = ()
+    trials: tuple[int, ...] = ()
+    printed: bool = False
+
+
+def lint_published() -> list[Finding]:
+    """Everything that is odd about the paper's per-task tables."""
+    return lint_table(published_rows())
+
+
+def published_rows() -> list[Row]:
+    """The paper's per-task tables."""
+    data, rows = load(), []
+    for model in data.models:
+        for task, values in data.per_task[model, "sr"].rows.items():
+            spatial = task in data.per_task[model, "onta"].rows
+            other = data.per_task[model, "onta" if spatial else "ps"].rows[task]
+            counts = data.tasks[task].counts
+            row = Row(
+                model,
+                task,
+                (1, 2, 3, 4, 5),
+                tuple(values),
+                onta=tuple(other) if spatial else (),
+                ps=() if spatial else tuple(other),
+                candidates=counts if spatial else (),
+                subtasks=() if spatial else counts,
+                trials=(data.trials,) * 5,
+                printed=True,
+            )
+            rows.append(row)
+    return rows
+
+
+def lint_table(rows: Sequence[Row]) -> list[Finding]:
+    """Findings in rows of results; each cell on its own, then rows that repeat each other."""
+    found = [finding for row in rows for finding in _lint_row(row)]
+    same: dict[tuple[object, ...], list[str]] = defaultdict(list)
+    for row in rows:
+        numbers = (*row.sr, *row.ps, *row.onta)
+        if len({x for x in numbers if x is not None and x > 0}) >= INFORMATIVE:
+            same[row.model, row.levels, row.trials, *numbers].append(row.task)
+    for (model, *_), tasks in same.items():
+        if len(tasks) > 1:
+            text = f"{' and '.join(tasks)} have the same results at every level"
+            found.append(Finding("identical-rows", "error", str(model), text))
+    return found
+
+
+def _lint_row(row: Row) -> Iterator[Finding]:
+    for place, level in enumerate(row.levels):
+        where = f"{row.model}, {row.task} L{level}"
+        sr, ps, corrected = (_at(x, place) for x in (row.sr, row.ps, row.onta))
+        trials, total = _at(row.trials, place), _at(row.subtasks, place)
+        if sr is not None and not 0 <= sr <= 100:
+            yield Finding("range", "error", where, f"SR {sr:g} is no percentage")
+        if sr is not None and trials and not _possible(sr, trials, row.printed):
+            text = f"SR {sr:g} is no whole number of {trials} trials"
+            yield Finding("sr-not-a-count", "error", where, text)
+        if ps is not None and sr is not None and ps < sr - 1e-9:
+            text = f"PS {ps:g} is below SR {sr:g}, though every success is full progress"
+            yield Finding("ps-below-sr", "error", where, text)
+        if ps is not None and sr is not None and total == 1 and abs(ps - sr) > 0.05:
+            text = f"PS {ps:g} is not SR {sr:g}, though there is a single subtask"
+            yield Finding("ps-is-sr", "error", where, text)
+        if ps is not None and trials and total and not _possible(ps, trials * total, row.printed):
+            text = f"PS {ps:g} is no multiple of 1/{total} over {trials} trials"
+            yield Finding("ps-not-a-share", "error", where, text)
+        n = _at(row.candidates, place)
+        if corrected is not None and sr is not None and n:
+            follows = onta(sr, n)
+            if abs((rounded(follows) if row.printed else follows) - corrected) > 0.05:
+                text = f"ONTA {corrected:g} does not follow from SR {sr:g} and n = {n}"
+                yield Finding("onta-from-sr", "error", where, f"{text}: {rounded(follows):g} does")
+
+
+def _at(values: Sequence[T], place: int) -> T | None:
+    return values[place] if place < len(values) else None
+
+
+def _possible(percent: float, parts: int, printed: bool) -> bool:
+    """Whether some whole number out of `parts` gives `percent`."""
+    near = round(percent * parts / 100)
+    values = (100 * n / parts for n in (near - 1, near, near + 1))
+    if not printed:
+        return any(abs(v - percent) < 1e-6 for v in values)
+    return any(abs(rounded(v) - percent) < 1e-6 for v in values)
+
+
+def lint_run(run: Run, variants: Collection[tuple[str, int]] | None = None) -> list[Finding]:
+    """Findings in one run; `variants` are those that exist, if the caller knows."""
+    name = run.folder.name
+    results = [r for r in run.records.values() if finished(r)]
+    found = [*_lint_listing(run, name, variants), *_lint_files(run, name), *_lint_limits(run, name)]
+    groups: dict[tuple[str, int], list[TrialRecord]] = defaultdict(list)
+    for record in results:
+        groups[record.key.variant].append(record)
+    for (task, level), records in groups.items():
+        found += _lint_variant(f"{name}, {task} L{level}", records)
+    for rule, what, value in (
+        ("same-actions", "actions", lambda r: r.actions_digest if r.steps else ""),
+        ("same-end-state", "final state", lambda r: r.digest),
+    ):
+        found += _repeats(name, rule, what, results, value)
+    return found + lint_table(run_rows(run, name, groups))
+
+
+def lint_runs(runs: Sequence[Run]) -> list[Finding]:
+    """What keeps several runs from standing in one table."""
+    found: list[Finding] = []
+    for title, read in (
+        ("code", lambda r: r.manifest.get("about", {}).get("code")),
+        ("versions", lambda r: r.manifest.get("about", {}).get("versions")),
+        ("list of trials", lambda r: r.manifest.get("seed_hash")),
+        ("embodiments", lambda r: sorted({k.embodiment for k in r.keys})),
+        ("scene modes", lambda r: sorted({k.mode for k in r.keys})),
+        ("instruction splits", lambda r: sorted({k.split for k in r.keys})),
+        ("step limits", step_scale),
+    ):
+        if len({repr(read(run)) for run in runs}) > 1:
+            names = ", ".join(run.folder.name for run in runs)
+            rule = "mixed-versions" if title in ("code", "versions") else "mixed-suites"
+            text = f"they differ in their {title}: not for one table"
+            found.append(Finding(rule, "warning", names, text))
+    return found
+
+
+def run_rows(
+    run: Run, name: str, groups: dict[tuple[str, int], list[TrialRecord]] | None = None
+) -> list[Row]:
+    """A run's results by task, in percent."""
+    if groups is None:
+        groups = defaultdict(list)
+        for record in run.records.values():
+            if finished(record):
+                groups[record.key.variant].append(record)
+    rows = []
+    for task in dict.fromkeys(task for task, _ in groups):
+        levels = tuple(sorted(level for t, level in groups if t == task))
+        cells = [groups[task, level] for level in levels]
+        ps: tuple[float, ...] = ()
+        if all(r.category in PROCEDURAL and r.total for cell in cells for r in cell):
+            ps = tuple(100 * sum(r.done / r.total for r in cell) / len(cell) for cell in cells)
+        sr = tuple(100 * sum(r.success for r in cell) / len(cell) for cell in cells)
+        rows.append(Row(name, task, levels, sr, ps=ps, trials=tuple(map(len, cells))))
+    return rows
+
+
+def _lint_listing(
+    run: Run, name: str, variants: Collection[tuple[str, int]] | None
+) -> Iterator[Finding]:
+    """Which trials there are, against which there should be."""
+    listed = Counter(run.keys)
+    twice = [key.slug for key, count in listed.items() if count > 1]
+    if twice:
+        text = f"{_some(twice)} listed twice: each would count double"
+        yield Finding("listed-twice", "error", name, text)
+    if strangers := [key.slug for key in run.records if key not in listed]:
+        text = f"{_some(strangers)} recorded but not in the run's list"
+        yield Finding("not-listed", "error", name, text)
+    if variants is not None:
+        unknown = [
+            f"{t} L{n}" for t, n in {k.variant: 0 for k in run.keys} if (t, n) not in variants
+        ]
+        if unknown:
+            text = f"{_some(unknown)} not among the benchmark's variants"
+            yield Finding("unknown-variant", "error", name, text)
+    if missing := [key.slug for key in dict.fromkeys(run.missing)]:
+        text = f"{len(missing)} of {len(listed)} trials have no result: {_some(missing)}"
+        yield Finding("missing", "warning", name, text)
+    sizes = Counter(key.variant for key in listed)
+    if len(set(sizes.values())) > 1:
+        low, high = min(sizes.values()), max(sizes.values())
+        text = f"variants have between {low} and {high} trials: their intervals differ in width"
+        yield Finding("unequal-trials", "warning", name, text)
+    for what in ("embodiment", "mode", "split"):
+        if len(values := sorted({getattr(key, what) for key in run.keys})) > 1:
+            text = f"holds {what}s {' and '.join(values)}, whose averages mean nothing"
+            yield Finding("mixed-suites", "warning", name, text)
+
+
+def step_scale(run: Run) -> float:
+    """How many times the official step limits the run allowed."""
+    return float(run.manifest.get("settings", {}).get("step_scale", 1.0))
+
+
+def _lint_limits(run: Run, name: str) -> Iterator[Finding]:
+    """What a run allowed beyond the benchmark."""
+    if (scale := step_scale(run)) != 1:
+        text = f"step limits are {scale:g} times the official ones: not the benchmark's numbers"
+        yield Finding("step-limits", "warning", name, text)
+
+
+def _lint_files(run: Run, name: str) -> Iterator[Finding]:
+    """How the records were written."""
+    seen: Counter[TrialKey] = Counter()
+    for path in sorted((run.folder / TRIALS).glob("*.jsonl")):
+        written = path.read_bytes()
+        if written and not written.endswith(b"\n"):
+            text = f"the last line of {path.name} was torn off: its trial has to be run again"
+            yield Finding("torn-line", "warning", name, text)
+        seen.update(r.key for r in read_file(path) if finished(r))
+    if again := [key.slug for key, count in seen.items() if count > 1]:
+        text = f"{_some(again)} recorded more than once (the records agree)"
+        yield Finding("recorded-twice", "warning", name, text)
+
+
+def _lint_variant(where: str, records: Sequence[TrialRecord]) -> Iterator[Finding]:
+    """The trials of one variant."""
+    for rule, what, names in (
+        ("mixed-totals", "number of subtasks", {str(r.total) for r in records}),
+        ("mixed-categories", "category", {r.category for r in records}),
+    ):
+        if len(names) > 1:
+            text = f"trials differ in their {what}: {' and '.join(sorted(names))}"
+            yield Finding(rule, "error", where, text)
+    if len(candidates := sorted({r.candidates for r in records})) > 1:
+        text = f"trials have between {candidates[0]} and {candidates[-1]} candidates: no ONTA"
+        yield Finding("mixed-candidates", "warning", where, text)
+    tests: tuple[tuple[str, str, Callable[[TrialRecord], bool]], ...] = (
+        ("progress-range", "more done than there is", lambda r: not 0 <= r.done <= r.total),
+        ("ps-below-sr", "success without full progress", lambda r: r.success and r.done < r.total),
+        (
+            "end-and-success",
+            "end and success disagree",
+            lambda r: r.success != (r.end == "success"),
+        ),
+        ("too-fast", "faster than physics can be simulated", _too_fast),
+        (
+            "fewer-steps",
+            "fewer physics steps than actions",  # of which a refused one took none
+            lambda r: r.physics_steps < r.steps - (r.end == "policy_error"),
+        ),
+    )
+    for rule, words, wrong in tests:
+        if seeds := [f"seed {r.key.seed}" for r in records if wrong(r)]:
+            yield Finding(rule, "error", where, f"{words}: {_some(seeds)}")
+    scenes = defaultdict(list)
+    for record in records:
+        scenes[record.scene_digest].append(f"seed {record.key.seed}")
+    for digest, seeds in scenes.items():
+        if digest and len(seeds) > 1:
+            yield Finding("same-scene", "error", where, f"one scene under {_some(seeds)}")
+
+
+def _too_fast(record: TrialRecord) -> bool:
+    return record.wall_time < record.physics_steps * FASTEST_STEP
+
+
+def _repeats(
+    name: str,
+    rule: str,
+    what: str,
+    records: Iterable[TrialRecord],
+    value: Callable[[TrialRecord], str],
+) -> Iterator[Finding]:
+    """Different trials that share a digest that should tell them apart."""
+    same: dict[str, list[str]] = defaultdict(list)
+    for record in records:
+        if found := value(record):
+            same[found].append(record.key.slug)
+    repeated = [slugs for slugs in same.values() if len(slugs) > 1]
+    if repeated:
+        count = sum(map(len, repeated))
+        text = f"{count} trials share their {what} with another: {_some(max(repeated, key=len))}"
+        yield Finding(rule, "warning", name, text)
+
+
+def _some(names: Sequence[str]) -> str:
+    """The first few names and how many more there are."""
+    more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+    return ", ".join(names[:NAMED]) + more

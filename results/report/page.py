@@ -1,0 +1,164 @@
+"""The report as one HTML page that opens from disk: no server, nothing loaded from elsewhere.
+
+Text from outside (instructions, messages of servers, names) is escaped by Jinja or reaches the page
+as JSON that the script turns into text nodes. Figures are put into the page as SVG whose text takes
+the page's colours; only videos lie beside it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from robospa.results.failures.labels import NAMES, SIMULATED_PER_FILM
+from robospa.results.figures.series import FORMATS, GRID, INK, Drawing
+from robospa.results.records.run_io import Run
+from robospa.results.report.run_card import facts, is_privileged
+from robospa.results.report.score_table import percent
+from robospa.results.report.trials import failure_counts, trial_rows
+from robospa.results.scoring.scores import BASIC, CATEGORY_NAMES, Scores
+
+FIGURES = "figures"
+
+
+def page(
+    runs: Sequence[Run],
+    names: Sequence[str],
+    scores: Mapping[str, Scores],
+    tables: Sequence[Mapping[str, Any]],
+    drawings: Sequence[Drawing],
+    notes: Mapping[str, Sequence[str]],
+    folder: Path,
+    drawn: Path | None = None,
+    formats: Sequence[str] = FORMATS,
+    live: bool = False,
+) -> str:
+    """The page of `runs`, called `names`; `scores` also has published models.
+
+    `tables` have title, html (already escaped) and folded. `notes` has `missing`, `findings` and
+    `method`, each as sentences. Videos are put into `folder`, figures are read from `drawn` or else
+    from there, with links to their `formats`. A `live` page asks its server for what is new.
+    """
+    trials = trial_rows(runs, folder)
+    failures = failure_counts(runs)
+    listed = sum(len(run.keys) for run in runs)
+    sections = ["summary", "tables", "trials", "runs"]
+    sections += ["figures"] if drawings else []
+    sections += ["failures"] if failures else []
+    sections += ["videos"] if any("video" in t for t in trials) else []
+    return render(
+        "report.html",
+        title=", ".join(names),
+        badges=badges(runs, names),
+        scores_shown=len(scores),
+        cards=[card(name, found) for name, found in scores.items()],
+        missing=notes["missing"],
+        findings=notes["findings"],
+        tables=tables,
+        note=" ".join(notes["method"]),
+        figures=[figure(d, drawn or folder, formats) for d in drawings],
+        failures=failures,
+        names=names,
+        runs=[{"name": name, "facts": facts(run)} for name, run in zip(names, runs, strict=True)],
+        sections=sections,
+        left_out=listed - len(trials),
+        live=live,
+        data={"names": names, "kinds": NAMES, "speed": SIMULATED_PER_FILM, "trials": trials},
+    )
+
+
+def render(template: str, **context: Any) -> str:
+    """A page from one of our templates; whatever is put into it is escaped."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=PackageLoader("robospa.results.report", "templates"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.policies["json.dumps_kwargs"] = {}  # keep the order of what a script shows
+    return environment.get_template(template).render(version=own_version(), **context)
+
+
+def badges(runs: Sequence[Run], names: Sequence[str]) -> list[str]:
+    """What a reader has to know before any number."""
+    made = []
+    for run, name in zip(runs, names, strict=True):
+        of = f"{name}: " if len(runs) > 1 else ""
+        if is_privileged(run):
+            made.append(f"{of}privileged, sees the exact state")
+        if run.missing:
+            made.append(f"{of}{len(run.missing)} of {len(run.keys)} trials are missing")
+    return made
+
+
+def card(name: str, scores: Scores) -> dict[str, Any]:
+    """Overall success rate with its interval, and both dimensions."""
+    overall = scores.overall.get(0)
+    value, _, interval = percent(overall.values.get("sr") if overall else None).partition(" ")
+    lines = []
+    for dimension in ("spatial", "procedural"):
+        part = scores.dimensions.get((dimension, 0))
+        if part is not None:
+            lines.append(f"{dimension}: {percent(part.values.get('sr'))}")
+    for category in BASIC:
+        part = scores.categories.get((category, 0))
+        if part is not None:
+            lines.append(f"{CATEGORY_NAMES[category]}: {percent(part.values.get('sr'))}")
+    if overall is not None:
+        count = sum(cell.category not in BASIC for cell in scores.cells.values())
+        covered = f"{count} variant{'' if count == 1 else 's'}"
+        lines.append(f"mean over {covered}, {overall.trials} trials")
+    return {
+        "name": name,
+        "value": f"{value} %" if value != "–" else value,
+        "interval": f"95 % interval {interval}" if interval else "no value: results are missing",
+        "lines": lines,
+    }
+
+
+def figure(drawing: Drawing, folder: Path, formats: Sequence[str] = FORMATS) -> dict[str, Any]:
+    """A figure for the page: its SVG as markup, and where its files are."""
+    from markupsafe import Markup
+
+    svg = (folder / FIGURES / f"{drawing.name}.svg").read_text(encoding="utf-8")
+    return {
+        "title": drawing.title,
+        "caption": drawing.caption,
+        "file": f"{FIGURES}/{drawing.name}",
+        "formats": formats,
+        "svg": Markup(inline_svg(svg, drawing.name, f"{drawing.title}. {drawing.caption}")),
+    }
+
+
+def inline_svg(svg: str, prefix: str, label: str) -> str:
+    """Matplotlib's file as an element of a page: ids of its own, the page's colours, a label."""
+    from markupsafe import escape
+
+    body = svg[svg.index("<svg") :]
+    body = re.sub(r"<metadata>.*?</metadata>", "", body, count=1, flags=re.DOTALL)
+    body = re.sub(r"<style.*?</style>", "", body, count=1, flags=re.DOTALL)  # would hold page-wide
+    body = re.sub(r' xmlns(:xlink)?="[^"]*"', "", body)
+    body = re.sub(r'\bid="([^"]+)"', rf'id="{prefix}-\1"', body)
+    body = re.sub(r'href="#([^"]+)"', rf'href="#{prefix}-\1"', body)
+    body = re.sub(r"url\(#([^)]+)\)", rf"url(#{prefix}-\1)", body)
+    body = body.replace(INK, "currentColor").replace(GRID, "var(--line)")
+    body = re.sub(r'\b(width|height)="[0-9.]+pt" ?', "", body, count=2)
+    # Glyphs have no colour of their own: they are black unless told otherwise.
+    style = "fill: currentColor; stroke-linejoin: round; stroke-linecap: butt"
+    return body.replace(
+        "<svg ", f'<svg role="img" style="{style}" aria-label="{escape(label)}" ', 1
+    )
+
+
+def own_version() -> str:
+    """The installed version of robospa."""
+    try:
+        return version("robospa")
+    except PackageNotFoundError:
+        return ""

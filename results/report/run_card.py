@@ -1,0 +1,183 @@
+"""The card of a run: what was evaluated, with what, where, and how its trials ended."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from robospa.results.records.run_io import Run
+from robospa.results.records.trial_record import PROCESSOR
+
+END_NAMES = {
+    "success": "success",
+    "step_limit": "step limit",
+    "policy_error": "policy error",
+    "goal_lost": "goal lost",
+    "infrastructure": "missing",
+}
+NOT_RUN = "not run"
+ACTIONS = {"action": "", "horizon": "chunks of at most ", "execute": "executed of each: "}
+"""What the spec says of actions, and the words before it."""
+
+
+def spec_of(run: Run) -> Mapping[str, Any]:
+    """What the policy said about itself."""
+    found: Mapping[str, Any] = run.manifest.get("settings", {}).get("policy", {}).get("spec", {})
+    return found
+
+
+def is_privileged(run: Run) -> bool:
+    """Whether the policy saw the exact state."""
+    return bool(run.manifest.get("settings", {}).get("privileged"))
+
+
+def names_of(runs: Sequence[Run]) -> list[str]:
+    """A name for every run: its policy's, with the run's folder where two would be equal."""
+    policies = [str(spec_of(run).get("name", "unknown")) for run in runs]
+    names: list[str] = []
+    for run, policy in zip(runs, policies, strict=True):
+        name = policy if policies.count(policy) == 1 else f"{policy} ({run.folder.name})"
+        while name in names:
+            name += "'"
+        names.append(name)
+    return names
+
+
+def about(run: Run) -> dict[str, Any]:
+    """The facts of the manifest that a reader needs."""
+    manifest = run.manifest
+    settings = manifest.get("settings", {})
+    machine = manifest.get("about", {})
+    spec = spec_of(run)
+    return {
+        "policy": spec.get("name", "unknown"),
+        "privileged": is_privileged(run),
+        "seeded": bool(spec.get("seeded")),
+        "spec": spec,
+        "trials": len(run.keys),
+        "results": len(run.keys) - len(run.missing),
+        "missing": len(run.missing),
+        "settings": settings,
+        "seed_hash": manifest.get("seed_hash", ""),
+        "versions": machine.get("versions", {}),
+        "git": machine.get("git", {}),
+        "machine": machine.get("machine", {}),
+        "world": machine.get("world", {}),
+    }
+
+
+def ends(run: Run) -> dict[str, int]:
+    """How many trials ended in which way; trials that were never run count as "not run"."""
+    counts: dict[str, int] = {}
+    for key in run.keys:
+        record = run.records.get(key)
+        name = NOT_RUN if record is None else END_NAMES[record.end]
+        counts[name] = counts.get(name, 0) + 1
+    return dict(sorted(counts.items(), key=lambda item: -item[1]))
+
+
+def latency(run: Run) -> dict[str, float]:
+    """Milliseconds that the policy took to answer: median and largest of the trials' p50, p99.
+
+    Where its server told them, also the means of `queue`, `infer` and of the size of a `batch`.
+    """
+    found = [r.latency for r in run.records.values() if r.latency]
+    if not found:
+        return {}
+    middle = sorted(x["p50"] for x in found)[len(found) // 2]
+    told = {
+        name: sum(values) / len(values)
+        for name in ("queue", "infer", "batch")
+        if (values := [x[name] for x in found if name in x])
+    }
+    worst = {name: max(x[name] for x in found) for name in ("p99", "max")}
+    return {"p50": middle, **worst, **told}
+
+
+def timing(run: Run) -> dict[str, float]:
+    """Share of the trials' wall time by purpose."""
+    total = sum(r.wall_time for r in run.records.values())
+    sums: dict[str, float] = {}
+    for record in run.records.values():
+        for name, seconds in record.timing.items():
+            if name != PROCESSOR:
+                sums[name] = sums.get(name, 0.0) + seconds
+    return (
+        {name: s / total for name, s in sorted(sums.items(), key=lambda p: -p[1])} if total else {}
+    )
+
+
+def facts(run: Run) -> list[tuple[str, str]]:
+    """The run's card, as name and text; facts that are not known are left out."""
+    info = about(run)
+    settings, spec = info["settings"], info["spec"]
+    seeded = "honours the trial's policy seed" if info["seeded"] else "ignores the policy seed"
+    asked = ", ".join(str(c.get("name", c)) if isinstance(c, Mapping) else str(c)
+                      for c in spec.get("cameras") or ()) or "no camera"  # fmt: skip
+    sees = "the exact state (privileged)" if info["privileged"] else f"observations: {asked}"
+    found = [
+        ("policy", info["policy"]),
+        ("sees", sees),
+        ("actions", _words(f"{said}{spec[n]}" for n, said in ACTIONS.items() if spec.get(n))),
+        ("seeding", f"{seeded}; seed {settings.get('policy_seed', 0)}" if spec else ""),
+        ("trials", f"{info['results']} of {info['trials']} with a result"),
+        ("ends", _words(f"{count} {name}" for name, count in ends(run).items())),
+        ("setting", _words(_line(settings.get(n)) for n in ("embodiment", "mode", "split")
+                           if settings.get(n))),
+        ("departure", _departure(settings)),
+        ("list of trials", f"hash {info['seed_hash']}" if info["seed_hash"] else ""),
+        ("software", _software(info)),
+        ("machine", _pairs(info["machine"])),
+        ("world", _pairs(info["world"])),
+        ("policy latency", _latency(run)),
+        ("time spent on", _words(f"{name} {100 * share:.0f} %" for name, share in
+                                 timing(run).items() if share >= 0.005)),
+        ("repeated attempts", _repeats(run)),
+    ]  # fmt: skip
+    return [(name, text) for name, text in found if text]
+
+
+def _departure(settings: Mapping[str, Any]) -> str:
+    scale = float(settings.get("step_scale", 1))
+    return f"step limits are {scale:g} times the official ones" if scale != 1 else ""
+
+
+def _software(info: Mapping[str, Any]) -> str:
+    git = info["git"]
+    commit = str(git.get("commit", ""))[:12] + (" with changes" if git.get("dirty") else "")
+    parts = [f"{name} {version}" for name, version in info["versions"].items()]
+    return _words([*parts, f"commit {commit}"] if git.get("commit") else parts)
+
+
+def _latency(run: Run) -> str:
+    spent = latency(run)
+    if not spent:
+        return ""
+    text = f"median {spent['p50']:.1f} ms, p99 {spent['p99']:.1f} ms, most {spent['max']:.1f} ms"
+    if "queue" in spent and "infer" in spent:
+        text += f"; {spent['infer']:.1f} ms in the model, {spent['queue']:.1f} ms in its queue"
+    if spent.get("batch", 1.0) > 1.0:
+        text += f"; {spent['batch']:.1f} observations a call"
+    return text
+
+
+def _repeats(run: Run) -> str:
+    again = [r.attempts - 1 for r in run.records.values() if r.attempts > 1]
+    return f"{sum(again)} in {len(again)} trials" if again else ""
+
+
+def _pairs(values: Mapping[str, Any]) -> str:
+    return _words(f"{name} {_line(v)}" for name, v in values.items() if v not in (None, "", {}))
+
+
+def _words(parts: Any) -> str:
+    return ", ".join(parts)
+
+
+def _line(value: object) -> str:
+    """`value` as text without line breaks; of a mapping or a list, its values."""
+    if isinstance(value, Mapping):
+        value = list(value.values())
+    if isinstance(value, (list, tuple)):
+        return " ".join(dict.fromkeys(_line(v) for v in value if v is not None))
+    return " ".join(str(value).split())

@@ -1,0 +1,122 @@
+"""Which tables a report shows: the paper's, cut to what its runs cover.
+
+Rows of tasks that no run of the report has are left out, so that a run of ten tasks is no page of
+dashes; the notes below a table say how much was not run. Averages over tasks that were not run stay
+open and are shown as dashes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from robospa.results.paper.columns import METRIC_CATEGORIES, Column
+from robospa.results.paper.other_tables import basic_table
+from robospa.results.paper.result_tables import DASH, summary_table, task_table
+from robospa.results.paper.tables import write_tables
+from robospa.results.tables.html import fragment
+from robospa.results.tables.table import Grid, Line
+
+FEW = 2
+"""So many columns are shown with all their levels; more of them as in the paper."""
+LONG = 250
+"""Characters of a note; longer ones are opened by hand."""
+SUMMARIES = (("main", "sr"), ("onta", "onta"), ("ps", "ps"))
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A table of the report; a `folded` one is opened by hand."""
+
+    grid: Grid
+    folded: bool
+
+
+def report_tables(columns: Sequence[Column]) -> list[Shown]:
+    """The tables of `columns`; the ones that are published models come last in them."""
+    runs = [c for c in columns if not c.published] or list(columns)
+    levels = sorted({level for c in runs for _, level in c.scores.cells})
+    made = []
+    for name, metric in SUMMARIES:
+        if any(_has(c, metric) for c in runs):
+            grid = summary_table(columns, name, metric, _heads(columns, levels, metric))
+            made.append(Shown(covered(grid, len(runs)), False))
+    if any(c.covers_basic for c in runs):
+        made.append(Shown(basic_table(columns), False))
+    for _, metric in SUMMARIES:
+        if any(_has(c, metric) for c in runs):
+            grid = task_table(columns, f"{metric}-tasks", metric)
+            made.append(Shown(covered(grid, len(runs)), len(columns) > 1))
+    return [s for s in made if any(line.entries for line in s.grid.lines)]
+
+
+def _has(column: Column, metric: str) -> bool:
+    wanted = METRIC_CATEGORIES[metric]
+    return any(cell.category in wanted and cell.trials for cell in column.scores.cells.values())
+
+
+def _heads(columns: Sequence[Column], levels: Sequence[int], metric: str) -> tuple[str, ...]:
+    if len(columns) <= FEW or not {1, 5} <= set(levels):
+        return tuple(f"L{level}" for level in levels)
+    return ("L1", "L3", "L5") if metric != "sr" else ("L1", "L5", "Drop")
+
+
+def covered(grid: Grid, runs: int) -> Grid:
+    """`grid` without the rows that none of its first `runs` columns has a value in."""
+    width = len(grid.heads) // max(1, len(grid.groups)) * runs
+    kept: list[Line] = []
+    for line in grid.lines:
+        if line.kind == "section" or any(e.text != DASH.text for e in line.entries[:width]):
+            kept.append(line)
+    after = [line.kind for line in kept[1:]] + ["section"]
+    pairs = list(zip(kept, after, strict=False))
+    full = [line for line, kind in pairs if line.kind != "section" or kind != "section"]
+    return _levels_that_were_run(replace(grid, lines=tuple(full)), runs)
+
+
+def _levels_that_were_run(grid: Grid, runs: int) -> Grid:
+    """`grid` without the levels at which its first `runs` groups have no value at all."""
+    width = len(grid.heads) // max(1, len(grid.groups))
+    rows = [line.entries for line in grid.lines if line.kind != "section"]
+    kept = [
+        place
+        for place in range(width)
+        if any(row[n * width + place].text != DASH.text for row in rows for n in range(runs))
+    ]
+    if not rows or len(kept) == width:
+        return grid
+    places = [n * width + place for n in range(len(grid.heads) // width) for place in kept]
+    lines = [
+        line
+        if line.kind == "section"
+        else replace(line, entries=tuple(line.entries[p] for p in places))
+        for line in grid.lines
+    ]
+    return replace(
+        grid,
+        heads=tuple(grid.heads[p] for p in places),
+        groups=tuple((title, len(kept)) for title, _ in grid.groups),
+        lines=tuple(lines),
+    )
+
+
+def for_page(tables: Sequence[Shown]) -> list[Mapping[str, Any]]:
+    """Title, markup, whether it is folded, and notes too long to stand below it, of each table."""
+    from markupsafe import Markup
+
+    made: list[Mapping[str, Any]] = []
+    for table in tables:
+        grid = table.grid
+        long = [note for note in grid.notes if len(note) > LONG]
+        short = replace(grid, notes=tuple(note for note in grid.notes if note not in long))
+        html = Markup(fragment(short))
+        made.append({"title": grid.title, "html": html, "folded": table.folded, "notes": long})
+    return made
+
+
+def write_files(tables: Sequence[Shown], folder: Path) -> None:
+    """The same tables for papers and programs: LaTeX and CSV."""
+    if tables:
+        write_tables([t.grid for t in tables], folder, ("tex", "csv"))

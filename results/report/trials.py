@@ -1,0 +1,100 @@
+"""The page's list of trials: one compact row of JSON a trial, and the videos beside the page."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from robospa.results.failures.labels import NAMES, label
+from robospa.results.records.run_io import Run
+from robospa.results.records.trial_record import TrialRecord
+from robospa.results.report.run_card import END_NAMES, NOT_RUN
+from robospa.trial import TrialKey
+
+SHOWN_TRIALS = 60_000
+"""Two whole benchmark runs. Beyond that browsers choke: successes are left out first."""
+FILMS = "videos"
+
+
+def trial_rows(runs: Sequence[Run], folder: Path) -> list[dict[str, Any]]:
+    """A row for every trial of `runs`, in their order; videos are put into `folder`."""
+    pairs = [(number, run, key) for number, run in enumerate(runs) for key in run.keys]
+    if len(pairs) > SHOWN_TRIALS:
+        pairs = sorted(pairs, key=lambda p: _succeeded(p[1], p[2]))[:SHOWN_TRIALS]
+    return [_row(number, run, key, folder, len(runs) > 1) for number, run, key in pairs]
+
+
+def _succeeded(run: Run, key: TrialKey) -> bool:
+    record = run.records.get(key)
+    return record is not None and record.success
+
+
+def _row(number: int, run: Run, key: TrialKey, folder: Path, several: bool) -> dict[str, Any]:
+    """One trial; what is empty is left out, because 28,000 of them are one file."""
+    record = run.records.get(key)
+    row: dict[str, Any] = {"run": number, "task": key.task, "level": key.level, "seed": key.seed}
+    if record is None:
+        return {**row, "end": NOT_RUN}
+    place = folder / FILMS / str(number + 1) if several else folder / FILMS
+    video = film(run, record, place)
+    failure = label(record)
+    row |= {
+        "end": END_NAMES[record.end],
+        "good": int(record.success),
+        "done": record.done,
+        "total": record.total,
+        "steps": record.steps,
+        "seconds": round(record.wall_time, 1),
+        "instruction": record.instruction,
+        "message": record.message,
+        "attempts": record.attempts if record.attempts > 1 else 0,
+        "events": [event_row(e) for e in record.events],
+        "digest": record.digest[:16],
+        "video": video and video.relative_to(folder).as_posix(),
+    }
+    if failure is not None:
+        row |= {"failure": failure.kind, "why": failure.evidence, "at": failure.time}
+    return {name: value for name, value in row.items() if value not in ("", None, [])}
+
+
+def event_row(event: Mapping[str, Any]) -> list[Any]:
+    """Simulated time [s], kind, and the rest in words."""
+    kind = str(event.get("kind", "")).replace("_", " ")
+    words = [str(event[name]) for name in ("object", "note") if event.get(name)]
+    if int(event.get("index", -1)) >= 0:
+        words.insert(0, f"#{int(event['index']) + 1}")
+    return [round(float(event.get("time", 0.0)), 2), kind, " ".join(words)]
+
+
+def failure_counts(runs: Sequence[Run]) -> list[dict[str, Any]]:
+    """How often each type occurs in each run, by frequency; types that never occur are left out."""
+    counts: dict[str, list[int]] = {}
+    for number, run in enumerate(runs):
+        for record in run.records.values():
+            failure = label(record)
+            if failure is not None:
+                counts.setdefault(failure.kind, [0] * len(runs))[number] += 1
+    made = [{"kind": k, "name": NAMES.get(k, k), "counts": n} for k, n in counts.items()]
+    return sorted(made, key=lambda row: -sum(row["counts"]))
+
+
+def film(run: Run, record: TrialRecord, place: Path) -> Path | None:
+    """Put the trial's video into the folder `place`; None if it has none inside its run."""
+    if not record.video:  # first: resolving 28,000 paths takes seconds
+        return None
+    source = (run.folder / record.video).resolve()
+    if not source.is_relative_to(run.folder.resolve()) or not source.is_file():
+        return None
+    target = place / source.name
+    place.mkdir(parents=True, exist_ok=True)
+    if target.exists() and target.samefile(source):
+        return target
+    target.unlink(missing_ok=True)  # of an earlier report, before the trial was run again
+    try:
+        os.link(source, target)
+    except OSError:
+        shutil.copyfile(source, target)
+    return target

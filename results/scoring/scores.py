@@ -1,0 +1,300 @@
+"""Success rate, ONTA and progress score of a run: per variant, level, category, dimension, overall.
+
+As in the paper: ONTA for the five spatial categories, progress for the five procedural ones; a
+category is the mean of its tasks, a dimension or the overall value the mean of its categories.
+The appendix's basic grounding categories have success rates of their own and enter nothing above.
+Missing trials are never averaged away: a cell knows how many it lacks and between which values its
+rate must lie, and every average says how many trials are missing below it.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from robospa.results.records.run_io import Run, finished
+from robospa.results.records.trial_record import TrialRecord
+from robospa.results.statistics.bootstrap import Sample, progress, rate
+from robospa.results.statistics.intervals import (
+    METHODS,
+    Estimate,
+    chance_corrected,
+    interval_of,
+    mean,
+    wilson,
+)
+from robospa.trial import TrialKey
+
+SPATIAL = ("GAC", "SDE", "CPI", "RRR", "CVR")
+PROCEDURAL = ("RPF", "OFE", "OCE", "CAC", "MIP")
+CATEGORIES = SPATIAL + PROCEDURAL
+BASIC = ("CBG", "EPG", "SOI")
+"""The appendix's references: scored by category, part of no dimension, not of the overall value."""
+CATEGORY_NAMES = {
+    "GAC": "Geometric Attribute Cognition",
+    "SDE": "Spatial Distance Estimation",
+    "CPI": "Canonical Position Indexing",
+    "RRR": "Referential Relational Reasoning",
+    "CVR": "Cross-View Reasoning",
+    "RPF": "Repetitive Procedure Following",
+    "OFE": "Order-Free Execution",
+    "OCE": "Order-Constrained Execution",
+    "CAC": "Composite Action Coordination",
+    "MIP": "Memory-Intensive Planning",
+    "CBG": "Color-Based Grounding",
+    "EPG": "Egocentric Position Grounding",
+    "SOI": "Simple Ordinal Indexing",
+}
+DIMENSIONS = {"spatial": SPATIAL, "procedural": PROCEDURAL}
+METRICS = ("sr", "onta", "ps")
+METRIC_NAMES = {"sr": "SR", "onta": "ONTA", "ps": "PS"}
+
+
+Weighted = tuple[tuple[Sample, float], ...]
+Range = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One variant: `listed` trials, of which `trials` have a result and `successes` succeeded.
+
+    `values` has the metrics that apply to it, None where there is no result to compute them from.
+    """
+
+    task: str
+    level: int
+    category: str
+    listed: int
+    trials: int
+    successes: int
+    values: Mapping[str, Estimate | None]
+    candidates: int = 0
+    """The n of ONTA; 0 where it does not apply or trials disagree on it."""
+    samples: Mapping[str, Sample] = field(default_factory=dict)
+    """What the metrics' intervals are made from; none of a published mean."""
+
+    @property
+    def missing(self) -> int:
+        """Listed trials without a result."""
+        return self.listed - self.trials
+
+    @property
+    def worst(self) -> float:
+        """Success rate if every missing trial were a failure."""
+        return self.successes / self.listed if self.listed else 0.0
+
+    @property
+    def best(self) -> float:
+        """Success rate if every missing trial were a success."""
+        return (self.successes + self.missing) / self.listed if self.listed else 1.0
+
+    def bounds(self, metric: str) -> Range | None:
+        """`metric` if every missing trial had achieved nothing, and if every one all; None where
+        it does not apply or cannot be known."""
+        if metric not in self.values:
+            return None
+        if metric == "onta":
+            if (n := self.candidates) < 2:
+                return None
+            return (self.worst * n - 1) / (n - 1), (self.best * n - 1) / (n - 1)
+        if metric == "ps":
+            known = self.values["ps"]
+            held = known.value * self.trials if known is not None else 0.0
+            whole = max(self.listed, 1)
+            return held / whole, (held + self.missing) / whole
+        return self.worst, self.best
+
+
+@dataclass(frozen=True)
+class Average:
+    """A mean over tasks or categories, by metric; None where something below has no value.
+
+    `worst` and `best` bound the mean success rate over all that the missing trials could be.
+    """
+
+    trials: int
+    missing: int
+    values: Mapping[str, Estimate | None]
+    worst: float
+    best: float
+    samples: Mapping[str, Weighted] = field(default_factory=dict)
+    """By metric the samples of all variants below with their weights, where all are known."""
+    ranges: Mapping[str, Range] = field(default_factory=dict)
+    """By metric between which values the missing trials leave it, where that is known."""
+
+    def bounds(self, metric: str) -> Range | None:
+        """`metric` in the worst and the best case; see `Cell.bounds`."""
+        return self.ranges.get(metric)
+
+
+@dataclass(frozen=True)
+class Scores:
+    """Everything that a run's tables show. Level 0, like `tasks`, is the mean over levels."""
+
+    cells: Mapping[tuple[str, int], Cell]
+    levels: tuple[int, ...]
+    tasks: Mapping[str, Average]
+    categories: Mapping[tuple[str, int], Average]
+    dimensions: Mapping[tuple[str, int], Average]
+    overall: Mapping[int, Average]
+
+
+def _seed(task: str, level: int) -> int:
+    """A bootstrap seed of the variant's own, so that no cell depends on which others exist."""
+    return zlib.crc32(f"{task}/{level}".encode())
+
+
+def score_cell(
+    task: str, level: int, category: str, listed: int, records: Sequence[TrialRecord]
+) -> Cell:
+    """The cell of one variant from its results (`records` without lost ones)."""
+    count = len(records)
+    successes = sum(r.success for r in records)
+    sr = wilson(successes, count) if count else None
+    values: dict[str, Estimate | None] = {"sr": sr}
+    samples = {"sr": rate(successes, count)} if count else {}
+    candidates = 0
+    if category in SPATIAL:
+        found = {r.candidates for r in records}
+        candidates = found.pop() if len(found) == 1 else 0
+        values["onta"] = None
+        if sr and candidates > 1:
+            values["onta"] = chance_corrected(sr, candidates)
+            samples["onta"] = rate(successes, count, candidates)
+    elif category in PROCEDURAL:
+        values["ps"] = None
+        if count:
+            done = [(r.done, r.total) if r.total else (int(r.success), 1) for r in records]
+            samples["ps"] = progress(done)
+            values["ps"] = interval_of([samples["ps"]], seed=_seed(task, level))
+    return Cell(task, level, category, listed, count, successes, values, candidates, samples)
+
+
+def with_intervals(cell: Cell, ci: str) -> Cell:
+    """`cell` with the intervals that the method `ci` makes; Wilson's are there already."""
+    if ci == METHODS[0]:
+        return cell
+    made: dict[str, Estimate | None] = dict(cell.values)
+    for metric, sample in cell.samples.items():
+        known = made[metric]
+        if known is not None:
+            found = interval_of([sample], method=ci, seed=_seed(cell.task, cell.level))
+            made[metric] = replace(found, value=known.value)
+    return replace(cell, values=made)
+
+
+def _join(parts: Sequence[Cell | Average], ci: str = METHODS[0]) -> Average:
+    """Mean of cells, or of averages, that all count the same.
+
+    A metric has a mean only if every part that it applies to has a value: one variant without a
+    single result leaves all averages above it open.
+    """
+    values: dict[str, Estimate | None] = {}
+    samples: dict[str, Weighted] = {}
+    ranges: dict[str, Range] = {}
+    for metric in METRICS:
+        fit = [p for p in parts if metric in p.values]
+        ends = [span for p in fit if (span := p.bounds(metric)) is not None]
+        if fit and len(ends) == len(fit):
+            low, high = np.mean(ends, axis=0)
+            ranges[metric] = (float(low), float(high))
+        below = [p.values[metric] for p in fit]
+        known = [e for e in below if e is not None]
+        if below:
+            samples[metric] = _flat(fit, metric)
+            joined = mean(known) if len(known) == len(below) else None
+            if ci == "bootstrap" and joined is not None and samples[metric]:
+                found, weights = zip(*samples[metric], strict=True)
+                joined = replace(interval_of(found, weights, ci), value=joined.value)
+            values[metric] = joined
+    return Average(
+        trials=sum(p.trials for p in parts),
+        missing=sum(p.missing for p in parts),
+        values=values,
+        worst=float(np.mean([p.worst for p in parts])),
+        best=float(np.mean([p.best for p in parts])),
+        samples=samples,
+        ranges=ranges,
+    )
+
+
+def _flat(parts: Sequence[Cell | Average], metric: str) -> Weighted:
+    """The samples of all variants below `parts`, which count the same; empty if one has none."""
+    flat: list[tuple[Sample, float]] = []
+    for part in parts:
+        if isinstance(part, Cell):
+            below: Weighted = ((part.samples[metric], 1.0),) if metric in part.samples else ()
+        else:
+            below = part.samples.get(metric, ())
+        if not below:
+            return ()
+        flat += [(sample, weight / len(parts)) for sample, weight in below]
+    return tuple(flat)
+
+
+def _by_level(
+    groups: Mapping[str, Sequence[str]],
+    levels: Sequence[int],
+    find: Callable[[str, int], Cell | Average | None],
+    ci: str,
+) -> dict[tuple[str, int], Average]:
+    """Average of each group's members at every level, and at level 0 of what `find` gives there."""
+    made: dict[tuple[str, int], Average] = {}
+    for name, members in groups.items():
+        for level in (*levels, 0):
+            parts = [p for m in members if (p := find(m, level)) is not None]
+            if parts:
+                made[name, level] = _join(parts, ci)
+    return made
+
+
+def score(
+    keys: Iterable[TrialKey],
+    records: Mapping[TrialKey, TrialRecord],
+    category_of: Mapping[str, str] | None = None,
+    ci: str = METHODS[0],
+) -> Scores:
+    """All scores of the trials `keys` from their `records`, with intervals by the method `ci`.
+
+    `category_of` tells the category of tasks that may have no record yet.
+    """
+    listed: dict[tuple[str, int], list[TrialKey]] = {}
+    for key in keys:
+        listed.setdefault(key.variant, []).append(key)
+    category = {r.key.task: r.category for r in records.values() if r.category}
+    category.update(category_of or {})
+    cells = {}
+    for (task, level), members in listed.items():
+        found = [records[k] for k in members if k in records and finished(records[k])]
+        cells[task, level] = score_cell(task, level, category.get(task, ""), len(members), found)
+    return combine(cells, ci)
+
+
+def combine(cells: Mapping[tuple[str, int], Cell], ci: str = METHODS[0]) -> Scores:
+    """All averages above `cells`, and their intervals by the method `ci` (`intervals.METHODS`).
+
+    Under `bootstrap` an average resamples the episodes of all variants below it, as the paper does.
+    """
+    cells = {place: with_intervals(cell, ci) for place, cell in cells.items()}
+    levels = tuple(sorted({level for _, level in cells}))
+    category = {task: cell.category for (task, _), cell in cells.items()}
+    names = list(category)
+    tasks = {t: _join([cells[t, n] for n in levels if (t, n) in cells], ci) for t in names}
+
+    def cell_or_mean(task: str, level: int) -> Cell | Average | None:
+        return cells.get((task, level)) if level else tasks[task]
+
+    members_of = {c: [t for t in names if category.get(t) == c] for c in CATEGORIES + BASIC}
+    categories = _by_level(members_of, levels, cell_or_mean, ci)
+    dimensions = _by_level(DIMENSIONS, levels, lambda c, n: categories.get((c, n)), ci)
+    everything = _by_level({"": CATEGORIES}, levels, lambda c, n: categories.get((c, n)), ci)
+    overall = {level: average for (_, level), average in everything.items()}
+    return Scores(cells, levels, tasks, categories, dimensions, overall)
+
+
+def score_run(run: Run, ci: str = METHODS[0]) -> Scores:
+    """All scores of `run`, with intervals by the method `ci`."""
+    return score(run.keys, run.records, run.manifest.get("categories"), ci)

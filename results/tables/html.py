@@ -1,0 +1,93 @@
+"""A table as HTML, and a page of several that needs nothing from elsewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+
+from robospa.results.tables.table import Entry, Grid, Line, plain
+
+STYLE = """
+:root { color-scheme: light dark; }
+body { font: 15px/1.45 system-ui, sans-serif; }
+body { margin: 2rem auto; max-width: 80rem; padding: 0 1rem; }
+.scroll { overflow-x: auto; }
+table { border-collapse: collapse; font-variant-numeric: tabular-nums; margin: .5rem 0; }
+th, td { padding: .15rem .55rem; text-align: right; white-space: nowrap; }
+th:first-child, .words td { text-align: left; }
+thead th { border-bottom: 1px solid; }
+thead tr:first-child th[colspan] { text-align: center; }
+tr.section th { padding-top: .8rem; border-bottom: 1px solid #8888; }
+tr.average { font-style: italic; }
+td.best { background: #4a7dff33; font-weight: 700; }
+.notes { font-size: .87em; opacity: .85; max-width: 60rem; }
+"""
+
+
+def fragment(grid: Grid) -> str:
+    """The table with its title as caption and its notes below, to put into a page."""
+    kind = ' class="words"' if grid.words else ""
+    parts = [
+        f'<section id="{_text(grid.name)}">',
+        f"<h2>{_text(grid.title)}</h2>",
+        f'<div class="scroll"><table{kind}>',
+        "<thead>",
+        *_head(grid),
+        "</thead>",
+        "<tbody>",
+        *(_line(line, len(grid.heads)) for line in grid.lines),
+        "</tbody></table></div>",
+        *(f'<p class="notes">{_text(note)}</p>' for note in grid.notes),
+        "</section>",
+    ]
+    return "\n".join(parts)
+
+
+def page(grids: Sequence[Grid], title: str) -> str:
+    """A whole page with all tables."""
+    links = " · ".join(f'<a href="#{_text(g.name)}">{_text(g.name)}</a>' for g in grids)
+    body = "\n".join(fragment(grid) for grid in grids)
+    return (
+        '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f"<title>{_text(title)}</title>\n<style>{STYLE}</style></head>\n"
+        f"<body>\n<h1>{_text(title)}</h1>\n<p>{links}</p>\n{body}\n</body></html>\n"
+    )
+
+
+def _head(grid: Grid) -> list[str]:
+    names = "".join(f'<th scope="col">{_text(name)}</th>' for name in (grid.corner, *grid.heads))
+    rows = [f"<tr>{names}</tr>"]
+    if grid.groups:
+        spans = "".join(
+            f'<th colspan="{width}" scope="colgroup">{_text(title)}</th>'
+            for title, width in grid.groups
+        )
+        rows.insert(0, f"<tr><td></td>{spans}</tr>")
+    return rows
+
+
+def _line(line: Line, width: int) -> str:
+    if line.kind == "section":
+        name = f'<th colspan="{width + 1}" scope="rowgroup">{_text(line.label)}</th>'
+        return f'<tr class="section">{name}</tr>'
+    kind = ' class="average"' if line.kind == "average" else ""
+    cells = "".join(map(_entry, line.entries))
+    return f'<tr{kind}><th scope="row">{_text(line.label)}</th>{cells}</tr>'
+
+
+def _entry(entry: Entry) -> str:
+    kind = ' class="best"' if entry.best else ""
+    hint = ""
+    if entry.low is not None and entry.high is not None:
+        lacks = f"; {entry.missing} trials missing" if entry.missing else ""
+        if lacks and entry.bounds is not None:
+            lacks += f", so between {entry.bounds[0]:z.1f} and {entry.bounds[1]:z.1f}"
+        hint = f' title="95 %: {entry.low:.1f} to {entry.high:.1f}{lacks}"'
+        hint += f' data-interval="[{entry.low:z.1f}, {entry.high:z.1f}]"'
+    sign = f"<sup>{_text(entry.sign)}</sup>" if entry.sign else ""
+    return f"<td{kind}{hint}>{_text(entry.text)}{sign}</td>"
+
+
+def _text(text: str) -> str:
+    return escape(plain(text), quote=True)
