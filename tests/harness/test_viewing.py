@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import http.client
-import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
-
-sys.path.append(str(Path(__file__).parents[1] / "results"))
-
-from test_report import EVIL, make_run, record
+from report_runs import EVIL, make_run, record
 
 from robospa.harness import viewing
 from robospa.harness.viewing import Server, View, part_of, serving

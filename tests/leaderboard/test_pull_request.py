@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from bundle_fakes import PICK, SEEDS, make_run
-from test_submit_cli import CARD, FAKES, HERE
+from bundle_fakes import CARD_TEXT as CARD
+from bundle_fakes import FAKES, PICK, SEEDS, make_run
 
 from robospa.leaderboard import pull_request
 from robospa.leaderboard.bundle import BundleError
@@ -25,7 +25,7 @@ from robospa.leaderboard.pull_request import check, fetch, submitted
 from robospa.leaderboard.reference import shipped
 from robospa.trial import TrialKey
 
-ROOT = HERE.parents[1]
+ROOT = Path(__file__).parents[2]
 MINE = "leaderboard/submissions/mine/"
 TWO = [MINE + "model.toml", MINE + "bundle.txt"]
 
@@ -80,7 +80,6 @@ def test_other_changes_are_refused(path: str, words: str) -> None:
 def test_what_was_announced_is_downloaded_verified_and_replayed(
     bundle: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv("PYTHONPATH", f"{HERE}:{HERE.parent / 'harness'}")
     asked: list[tuple[str, int]] = []
 
     def get(address: str, path: Path, size: int) -> None:

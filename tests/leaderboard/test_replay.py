@@ -22,16 +22,12 @@ from robospa.results.records.run_io import Run, from_data, manifest_keys
 CHALLENGE = "a value nobody knew"
 
 
-def replayed(
-    path: Path, count: int, monkeypatch: pytest.MonkeyPatch, reference: Reference = REFERENCE
-) -> Replay:
-    here, other = Path(__file__).parent, Path(__file__).parents[1] / "harness"
-    monkeypatch.setenv("PYTHONPATH", f"{here}:{other}")
+def replayed(path: Path, count: int, reference: Reference = REFERENCE) -> Replay:
     return replay(verify(path, REFERENCE), CHALLENGE, count, reference)
 
 
-def test_an_honest_bundle_replays_to_the_bit(honest: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    made = replayed(honest, 40, monkeypatch)
+def test_an_honest_bundle_replays_to_the_bit(honest: Path) -> None:
+    made = replayed(honest, 40)
     assert made.holds and made.exact
     assert {t.record.end for t in made.trials if t.record} == {
         "success",
@@ -42,29 +38,25 @@ def test_an_honest_bundle_replays_to_the_bit(honest: Path, monkeypatch: pytest.M
     assert json.loads(json.dumps(made.to_json()))["identical"] == 40
 
 
-def test_another_build_with_the_same_outcomes_is_said_to_be_that(
-    honest: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_another_build_with_the_same_outcomes_is_said_to_be_that(honest: Path) -> None:
     other = replace(REFERENCE, world="bundle_fakes:OtherBuild")
-    made = replayed(honest, 5, monkeypatch, other)
+    made = replayed(honest, 5, other)
     assert made.holds and not made.exact
     assert made.count("agrees") == 5
     assert "Outcomes agree but final states do not" in made.sentences()[2]
 
 
-def test_another_physics_does_not_hold(honest: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_another_physics_does_not_hold(honest: Path) -> None:
     other = replace(REFERENCE, world="bundle_fakes:OtherPhysics")
-    made = replayed(honest, 40, monkeypatch, other)
+    made = replayed(honest, 40, other)
     assert not made.holds
     assert "First difference" in made.sentences()[-1]
 
 
-def test_a_world_that_does_not_start_is_one_sentence(
-    honest: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_world_that_does_not_start_is_one_sentence(honest: Path) -> None:
     other = replace(REFERENCE, world="run_fakes:Broken")
     with pytest.raises(BundleError, match="robospa doctor"):
-        replayed(honest, 2, monkeypatch, other)
+        replayed(honest, 2, other)
 
 
 def forge(files: Files, change: Any) -> Files:
@@ -95,18 +87,16 @@ def claim_success(row: Any) -> None:
     record["events"] = [{"time": 0.1, "kind": "success", "object": "", "index": -1, "note": ""}]
 
 
-def test_outcomes_forged_with_all_hashes_are_caught(
-    files: Files, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_outcomes_forged_with_all_hashes_are_caught(files: Files, tmp_path: Path) -> None:
     path = zip_up(tmp_path / "b.zip", forge(files, claim_success))
-    made = replayed(path, 40, monkeypatch)
+    made = replayed(path, 40)
     assert not made.holds
     assert made.count("different") == 8
     assert set(made.trials[0].differs) <= {"success", "done", "best", "end"}
 
 
 def test_actions_of_another_task_forged_with_all_hashes_are_caught(
-    files: Files, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    files: Files, tmp_path: Path
 ) -> None:
     from robospa.harness.grid import on_grid
     from robospa.harness.trial import actions_digest
@@ -124,6 +114,6 @@ def test_actions_of_another_task_forged_with_all_hashes_are_caught(
         row["trace"] = trace_hash(trace)
         row["record"]["actions_digest"] = actions_digest(list(trace))
     put_rows(files, rows)
-    made = replayed(zip_up(tmp_path / "b.zip", seal(files)), 40, monkeypatch)
+    made = replayed(zip_up(tmp_path / "b.zip", seal(files)), 40)
     assert not made.holds
     assert {t.key.variant for t in made.trials if t.kind == "different"} == {(PRESS, 1)}

@@ -5,17 +5,13 @@ Needs Chromium: run with `-m browser`.
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from site_fakes import REPLAYED, Weaker, make_submission, many_entries
-
-sys.path.append(str(Path(__file__).parents[1] / "results"))
-
 from devtools import Page, chromium
+from site_fakes import REPLAYED, Weaker, make_submission, many_entries
 
 from robospa.leaderboard.entries import entry_of, published_entries
 from robospa.leaderboard.pairwise import pairs_of, write_pairs

@@ -9,39 +9,18 @@ import sys
 from pathlib import Path
 
 import pytest
-from bundle_fakes import PICK, SEEDS, Weak, make_run
+from bundle_fakes import CARD_TEXT as CARD
+from bundle_fakes import FAKES, PICK, SEEDS, Weak, make_run
 
 from robospa.leaderboard.hidden_seeds import FIRST, Block, write_block
 from robospa.protocol.server import ServerThread
 from robospa.trial import TrialKey
 
-HERE = Path(__file__).parent
-FAKES = ["--world", "bundle_fakes:World", "--parts", "run_fakes:parts"]
-CARD = """
-name = "Fake 1"
-team = "Nobody"
-licence = "MIT"
-parameters = 3
-link = "https://example.org/fake"
-[training]
-tasks = "multi"
-scenes = "clean"
-demonstrations = [50, 50, 50, 50, 50]
-[actions]
-space = "joint"
-chunk = 4
-rate = 10.0
-[checkpoints.all]
-reference = "https://example.org/w"
-sha256 = "0000000000000000000000000000000000000000000000000000000000000000"
-"""
-
 
 def submit(*words: str | Path) -> subprocess.CompletedProcess[str]:
-    path = f"{HERE}:{HERE.parent / 'harness'}"
     return subprocess.run(
         [sys.executable, "-m", "robospa.harness.cli.main", "submit", *map(str, words)],
-        env={**os.environ, "PYTHONPATH": path, "NO_COLOR": "1"},
+        env={**os.environ, "NO_COLOR": "1"},
         capture_output=True,
         text=True,
         timeout=120,

@@ -8,12 +8,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
-import numpy as np
 import pytest
 from devtools import Page, chromium
-from test_report import EVIL, make_run, record
+from report_runs import EVIL, make_run, record, write_film
 
 from robospa.results.report.report import write_report
 
@@ -26,19 +24,6 @@ EVENTS = (
 COUNT = 130
 ROWS = "[...document.querySelectorAll('#list tr.row')].map(r => [...r.cells].map(c => c.innerText))"
 SHOWN = "document.getElementById('count').textContent"
-
-
-def write_film(path: Path, seconds: int) -> None:
-    """A film of grey frames, ten a second."""
-    import av
-
-    with av.open(str(path), "w") as file:
-        stream: Any = file.add_stream("libx264", rate=10)
-        stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
-        for number in range(10 * seconds):
-            image = np.full((48, 64, 3), 2 * number, np.uint8)
-            file.mux(stream.encode(av.VideoFrame.from_ndarray(image, format="rgb24")))
-        file.mux(stream.encode())
 
 
 @pytest.fixture(scope="module")

@@ -25,7 +25,6 @@ from robospa.protocol.server import ServerThread
 from robospa.results.records.run_io import finished, read_file, read_run
 from robospa.results.records.trial_record import TrialRecord
 
-HERE = str(Path(__file__).parents[1])
 ROBOSPA = [sys.executable, "-m", "robospa.harness.cli.main"]
 
 
@@ -38,7 +37,7 @@ def command(url: str, out: Path, *more: str, trials: int = 4) -> list[str]:
 
 def start(words: list[str]) -> subprocess.Popen[str]:
     """In a process group of its own, so that Ctrl-C can reach all of it as in a terminal."""
-    environment = {**os.environ, "PYTHONPATH": HERE, "NO_COLOR": "1"}
+    environment = {**os.environ, "NO_COLOR": "1"}
     return subprocess.Popen(
         words,
         env=environment,

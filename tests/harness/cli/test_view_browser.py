@@ -5,18 +5,13 @@ Needs Chromium: run with `-m browser`.
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
-
-sys.path.append(str(Path(__file__).parents[2] / "results"))
-
 from devtools import Page, chromium
-from test_report import EVIL, make_run, record
-from test_report_browser import write_film
+from report_runs import EVIL, make_run, record, write_film
 
 from robospa.harness import viewing
 from robospa.harness.viewing import View, serving

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import pytest
-
-sys.path.append(str(Path(__file__).parents[2] / "results"))
-
-from test_report import KNOWN, make_run
+from report_runs import KNOWN, make_run
 
 from robospa.harness.cli.main import main
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import importlib
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import standins
 from replay_fakes import CHUNK, FRAMES, Learned, episode
 
 from robospa.clients.ee6d import poses_to_ee6d
@@ -23,10 +22,7 @@ FLIP = np.where(np.isin(np.arange(14), [1, 2, 8, 9]), -1.0, 1.0)
 
 def stand_in(name: str) -> Any:
     """A stand-in server of the clients' tests."""
-    folder = str(Path(__file__).parents[2] / "clients")
-    if folder not in sys.path:
-        sys.path.append(folder)
-    return getattr(importlib.import_module("standins"), name)
+    return getattr(standins, name)
 
 
 def ahead(head: Any, left: Any, right: Any) -> Any:

@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 
 import pytest
-from test_store import KEY, RECORD, other
+from fake_records import KEY, RECORD, other
 
 from robospa.harness.running.store import (
     RecordWriter,

@@ -26,7 +26,6 @@ from robospa.protocol.server import ServerThread
 from robospa.results.records.run_io import read_file, read_records, read_run
 from robospa.trial import TrialKey
 
-HERE = str(Path(__file__).parents[1])
 TASKS = ("Pick_Blocks_Size", "Pick_Blocks_Height", "Pick_Cans_Relational")
 FAKES = ["--world", "run_fakes:FakeWorld", "--parts", "run_fakes:parts"]
 
@@ -77,7 +76,7 @@ def words(out: Path, *more: str, tasks: tuple[str, ...] = TASKS, trials: int = 4
 def start(command: list[str]) -> subprocess.Popen[str]:
     return subprocess.Popen(
         [sys.executable, "-m", "robospa.harness.cli.main", *command],
-        env={**os.environ, "PYTHONPATH": HERE},
+        env=dict(os.environ),
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,

@@ -27,7 +27,6 @@ from robospa.results.records.lint import lint_run
 from robospa.results.records.run_io import RunError, read_run
 from robospa.trial import TrialKey
 
-HERE = str(Path(__file__).parents[1])
 KNOWN = {"Pick_A", "Pick_B", "Pick_C", "Pick_D", "Pick_E"}
 KEYS = [TrialKey("Pick_A", 1, 1), TrialKey("Pick_B", 1, 1), TrialKey("Pick_A", 2, 1)]
 
@@ -145,7 +144,7 @@ def evaluate(out: Path, *words: str) -> tuple[int, str]:
     what = ["--levels", "1", "--trials", "2", "--seeds", "100000-100001", "--out", str(out)]
     done = subprocess.run(
         [*command, *what, *fakes],
-        env={**os.environ, "PYTHONPATH": HERE, "NO_COLOR": "1", "COLUMNS": "300"},
+        env={**os.environ, "NO_COLOR": "1", "COLUMNS": "300"},
         capture_output=True,
         text=True,
         timeout=200,

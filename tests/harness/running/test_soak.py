@@ -1,23 +1,23 @@
-"""A short form of `scripts/soak.py` and of `scripts/fuzz_files.py`."""
+"""A short form of `tests/helpers/soak.py` and of `tests/helpers/fuzz_files.py`."""
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import subprocess
 import sys
 from pathlib import Path
 from typing import Any
 
+import fuzz_files
 import pytest
+import soak
 
-SCRIPTS = Path(__file__).parents[3] / "scripts"
 KINDS = "driver killed,workers killed while writing,server killed,file too large,second driver"
 
 
 def test_a_run_interrupted_at_random_equals_one_in_peace(tmp_path: Path) -> None:
     out = tmp_path / "soak.json"
-    words = [sys.executable, str(SCRIPTS / "soak.py"), "--interruptions", "5", "--trials", "40"]
+    words = [sys.executable, soak.__file__, "--interruptions", "5", "--trials", "40"]
     words += ["--seed", "4", "--kinds", KINDS, "--json", str(out)]
     done = subprocess.run(words, capture_output=True, text=True, timeout=290)
     assert done.returncode == 0, done.stdout + done.stderr
@@ -27,11 +27,7 @@ def test_a_run_interrupted_at_random_equals_one_in_peace(tmp_path: Path) -> None
 
 @pytest.fixture(scope="module")
 def readers(tmp_path_factory: pytest.TempPathFactory) -> Any:
-    found = importlib.util.spec_from_file_location("fuzz_files", SCRIPTS / "fuzz_files.py")
-    assert found is not None and found.loader is not None
-    module = importlib.util.module_from_spec(found)
-    found.loader.exec_module(module)
-    return module, module.Readers(tmp_path_factory.mktemp("fuzz"))
+    return fuzz_files, fuzz_files.Readers(tmp_path_factory.mktemp("fuzz"))
 
 
 def test_damaged_files_are_read_or_refused(readers: Any) -> None:

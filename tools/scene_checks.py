@@ -1,6 +1,6 @@
 """What must hold of every scene, each rule as a function that returns what is wrong with it.
 
-The tests look at a few scenes of every variant, `scripts/check_scenes.py` at thousands. No
+The tests look at a few scenes of every variant, `tools/check_scenes.py` at thousands. No
 simulator; nothing here asks the code that draws the scenes.
 """
 

@@ -1,6 +1,6 @@
 """Damaged files by the million: whatever is in them, they are read or refused, in one sentence.
 
-    python scripts/fuzz_files.py [--seconds 60] [--seed 0] [--target all] [--out FILE.json]
+    python tests/helpers/fuzz_files.py [--seconds 60] [--seed 0] [--target all] [--out FILE.json]
 
 Targets: a run's records and manifest, its action traces, option files of the command line, and
 bundles of the leaderboard as archives, as action files, and with inner files that were changed and
@@ -28,6 +28,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import bundle_fakes as fakes
 import numpy as np
 
 from robospa.harness.cli.running import client_options
@@ -54,7 +55,6 @@ from robospa.results.records.run_io import (
 )
 from robospa.trial import TrialKey
 
-ROOT = Path(__file__).resolve().parents[1]
 ROOM = 512 * 2**20
 SLOW = 10
 ALLOWED = (RunError, BundleError, BadChoice)
@@ -139,10 +139,6 @@ class Readers:
     """The targets, and the valid files that they start from."""
 
     def __init__(self, folder: Path) -> None:
-        sys.path[:0] = [str(ROOT / "tests" / part) for part in ("leaderboard", "harness")]
-        import bundle_fakes as fakes
-
-        self.fakes = fakes
         self.folder = folder
         self.run = fakes.make_run(folder / "run")
         self.bundle = folder / "run.zip"
@@ -249,11 +245,11 @@ class Readers:
         name = rng.choice(sorted(files))
         self.last = name, damage(rng, [files[name]])
         if name == layout.RECORDS and rng.random() < 0.7:
-            rows = self.fakes.rows_of(files)
+            rows = fakes.rows_of(files)
             place = rng.randrange(len(rows))
             changed = change(rng, rows[place])
             rows[place] = changed if isinstance(changed, dict) else {"record": changed}
-            self.fakes.put_rows(files, rows)
+            fakes.put_rows(files, rows)
         elif name.endswith("json") and rng.random() < 0.8:
             try:
                 files[name] = canonical(change(rng, json.loads(files[name])))
@@ -264,8 +260,8 @@ class Readers:
         self.last = name, files[name]
         if name != layout.MANIFEST:
             with contextlib.suppress(Exception):  # the forger's own tools may choke on it
-                self.fakes.seal(files)
-        verify(self.fakes.zip_up(self.folder / "b.zip", files), self.fakes.REFERENCE)
+                fakes.seal(files)
+        verify(fakes.zip_up(self.folder / "b.zip", files), fakes.REFERENCE)
 
     def _run(self, rng: random.Random) -> None:
         """A whole run, one of its records or its manifest changed, up to its tables."""

@@ -1,8 +1,8 @@
 """Look at thousands of scenes of every variant, without a simulator.
 
-    python scripts/check_scenes.py --scenes 10000 --out build/scenes.json [--tasks A,B] [--levels 1]
+    python tools/check_scenes.py --scenes 10000 --out build/scenes.json [--tasks A,B] [--levels 1]
 
-Every scene is built once and all rules of `tests/tasks/scene_checks.py` are asked: no overlap, all
+Every scene is built once and all rules of `tools/scene_checks.py` are asked: no overlap, all
 in view, all in reach, one answer, neutral names. What was drawn for the question (ranks, rows,
 directions, colours, which object) is counted: `off` is how far the rarest or commonest value is
 from an even share. A variant that is in the file with as many scenes is not looked at again, so the
@@ -24,8 +24,6 @@ from typing import Any
 from rich.progress import track
 
 from robospa.tasks import catalog
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "tasks"))
 
 FIRST_SEED = 10_000_000
 """Seeds that nothing was ever tuned on."""

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import json
-import sys
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
-
-sys.path.append(str(Path(__file__).parents[1] / "harness"))
 
 import pytest
 from run_fakes import LIMIT, FakePolicy, FakeWorld, parts
@@ -38,6 +35,26 @@ CARD: dict[str, Any] = {
     "actions": {"space": "joint", "chunk": 4, "rate": 10.0},
     "checkpoints": {"all": {"reference": "https://example.org/w", "sha256": "0" * 64}},
 }
+FAKES = ["--world", "bundle_fakes:World", "--parts", "run_fakes:parts"]
+"""Options of the command line that stand for the fake world."""
+CARD_TEXT = """
+name = "Fake 1"
+team = "Nobody"
+licence = "MIT"
+parameters = 3
+link = "https://example.org/fake"
+[training]
+tasks = "multi"
+scenes = "clean"
+demonstrations = [50, 50, 50, 50, 50]
+[actions]
+space = "joint"
+chunk = 4
+rate = 10.0
+[checkpoints.all]
+reference = "https://example.org/w"
+sha256 = "0000000000000000000000000000000000000000000000000000000000000000"
+"""
 
 
 class World(FakeWorld):

@@ -1,6 +1,6 @@
 """Soak: interrupt a real `robospa eval` at random, resume, compare with a run in peace.
 
-    python scripts/soak.py --interruptions 200 --seed 1 --json soak.json
+    python tests/helpers/soak.py --interruptions 200 --seed 1 --json soak.json
 
 Drivers, workers and policy servers are real processes. In the end every run must hold exactly the
 trials it was to hold, each once, with records and actions equal to those of an uninterrupted run,
@@ -21,8 +21,6 @@ import tempfile
 import time
 from collections import Counter
 from pathlib import Path
-
-sys.path.append(str(Path(__file__).parent))
 
 from soak_kinds import ENDS_DRIVER, KINDS, Trouble
 from soak_run import Bench, Finding, check_run

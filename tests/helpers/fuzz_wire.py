@@ -1,6 +1,6 @@
 """Damaged messages by the million: nothing may come out but a value or the documented error.
 
-    python scripts/fuzz_wire.py [--inputs 1000000] [--seed 0] [--target all] [--out FILE.json]
+    python tests/helpers/fuzz_wire.py [--inputs 1000000] [--seed 0] [--target all] [--out FILE.json]
 
 Valid messages of every type (ours, and openpi's observations) are changed at random: bits, bytes,
 lengths, cut, doubled, spliced, with the tags and lengths that are hard to read right put in. Each

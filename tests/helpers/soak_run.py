@@ -21,7 +21,7 @@ from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
 ROBOSPA = [sys.executable, "-m", "robospa.harness.cli.main"]
-FAKES = Path(__file__).resolve().parents[1] / "tests" / "harness"
+HELPERS = Path(__file__).resolve().parent
 UNDECIDED = ("wall_time", "timing", "latency", "attempts", "video")
 """Fields of a record that may differ from one run to the next."""
 STUCK_SECONDS = 3.0
@@ -136,7 +136,8 @@ class Bench:
 
     def __init__(self, base: Path, trials: int, workers: int, real: bool) -> None:
         self.base = base
-        self.environment = {**os.environ, "PYTHONPATH": str(FAKES), "NO_COLOR": "1"}
+        path = os.pathsep.join(filter(None, (str(HELPERS), os.environ.get("PYTHONPATH"))))
+        self.environment = {**os.environ, "PYTHONPATH": path, "NO_COLOR": "1"}
         self.environment["OMP_NUM_THREADS"] = "1"
         self.server = None if real else Server(self.environment)
         per = max(1, trials // 2)

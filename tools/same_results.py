@@ -1,7 +1,7 @@
 """Write down what the code computes, to show that a change of its structure changed none of it.
 
-    python scripts/same_results.py write FOLDER [--only scenes,wire,trials,tables] [--run RUN]
-    python scripts/same_results.py compare BEFORE AFTER
+    python tools/same_results.py write FOLDER [--only scenes,wire,trials,tables] [--run RUN]
+    python tools/same_results.py compare BEFORE AFTER
 
 `scenes`: digest of three scenes of each of the 355 variants, with all sentences of both splits.
 `wire`: the bytes of one message of every kind.
