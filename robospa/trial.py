@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+REFERENCE = "aloha-agilex"
+"""The suite's own robot: scenes are drawn for its workcell, and a trial has it by default."""
+
 
 @dataclass(frozen=True, order=True)
 class TrialKey:
@@ -12,7 +15,7 @@ class TrialKey:
     task: str
     level: int
     seed: int
-    embodiment: str = "aloha-agilex"
+    embodiment: str = REFERENCE
     mode: str = "clean"
     split: str = "heldout"
 

@@ -166,15 +166,13 @@ class Workcell:
     """What tasks and skills know of a robot: two arms, left and right, and its surroundings.
 
     Beyond `sideways_from` [m, y] an arm cannot close its fingers along its own direction of reach:
-    there the closing direction is within `sideways_within` [rad] of the x axis.
-    `exchange` is where, on the table, one arm leaves a thing for the other.
+    there the closing direction has to be within `sideways_within` [rad] of the x axis.
     """
 
     arms: tuple[ArmSite, ArmSite]
     cameras: Mapping[str, FixedCamera] = field(hash=False)
     sideways_from: float
     sideways_within: float
-    exchange: tuple[float, float]
     travel_height: float
     """Grasp centres move sideways at least so high above the table."""
     highest: float

@@ -10,6 +10,8 @@ import numpy as np
 
 from robospa.tasks.scene import SUITE, Scene
 from robospa.tasks.task import Task
+from robospa.trial import REFERENCE
+from robospa.workcell import workcell
 
 MODULES = (
     "pick_blocks_size",
@@ -55,7 +57,6 @@ BASIC_MODULES: tuple[str, ...] = ("basic_color", "basic_position", "basic_ordina
 """The appendix's basic grounding tasks, outside the 280 variants; each defines TASKS."""
 
 LEVELS = (1, 2, 3, 4, 5)
-
 
 EXTENSIONS = "robospa.tasks"
 """Group of entry points by which other packages offer tasks: a name and "module:TASK"."""
@@ -127,13 +128,13 @@ def build_scene(
     name: str,
     level: int,
     seed: int,
-    embodiment: str = "aloha-agilex",
+    embodiment: str = REFERENCE,
     mode: str = "clean",
 ) -> Scene:
     """The scene of one trial: a pure function of its arguments.
 
-    All randomness comes from one generator seeded by (suite, task, level, seed); the embodiment
-    does not enter, so that every robot meets the same scenes.
+    All randomness comes from one generator seeded by (suite, task, level, seed); they are drawn
+    for the workcell of the suite's own robot, so that every robot meets the same scenes.
     """
     found = task(name)
     if level not in found.levels:
@@ -142,7 +143,7 @@ def build_scene(
         raise ValueError(f"scene mode {mode!r} is not built yet; use 'clean'")
     text = f"{SUITE}/{found.name}/{level}/{seed}".encode()
     entropy = int.from_bytes(hashlib.sha256(text).digest()[:16], "big")
-    draft = found.draw(level, np.random.Generator(np.random.PCG64(entropy)))
+    draft = found.draw(level, np.random.Generator(np.random.PCG64(entropy)), workcell(REFERENCE))
     return Scene(
         task=found.name,
         level=level,

@@ -12,6 +12,7 @@ from robospa.tasks.events import Event
 from robospa.tasks.plan import Skill
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.snapshot import Snapshot
+from robospa.workcell import Workcell
 
 
 class Tracker(Protocol):
@@ -47,6 +48,9 @@ class Level:
     steps: int
 
 
+Draw = Callable[[int, np.random.Generator, Workcell], Draft]
+"""A level's draw. Scenes are the same for every robot: the workcell is that of the suite's own."""
+
 BASIC = ("CBG", "EPG", "SOI")
 """Color-Based Grounding, Egocentric Position Grounding, Simple Ordinal Indexing."""
 
@@ -62,7 +66,7 @@ class Task:
     name: str
     category: str
     levels: Mapping[int, Level]
-    draw: Callable[[int, np.random.Generator], Draft]
+    draw: Draw
     goal: Callable[[Scene], Tracker]
     plan: Callable[[Scene], tuple[Skill, ...]]
     slots: Callable[[Scene], Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]]]

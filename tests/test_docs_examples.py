@@ -17,6 +17,9 @@ from robospa.protocol.server import ServerThread
 from robospa.tasks.plan import Pick
 from robospa.tasks.scene import Scene
 from robospa.tasks.snapshot import Snapshot
+from robospa.workcell import workcell
+
+CELL = workcell("aloha-agilex")
 
 ROOT = Path(__file__).resolve().parents[1]
 EXAMPLES = ROOT / "docs" / "examples"
@@ -105,7 +108,7 @@ def test_the_example_task_draws_valid_scenes() -> None:
     task = example("leftmost_block").TASK
     for level, limits in task.levels.items():
         for seed in range(60):
-            draft = task.draw(level, np.random.default_rng(seed))
+            draft = task.draw(level, np.random.default_rng(seed), CELL)
             xs = sorted(item.pose.position[0] for item in draft.objects)
             target = next(o for o in draft.objects if o.name == draft.facts["target"])
             assert len(draft.objects) == limits.candidates
@@ -114,7 +117,7 @@ def test_the_example_task_draws_valid_scenes() -> None:
 
 def test_the_example_task_is_solved_by_lifting_its_target() -> None:
     task = example("leftmost_block").TASK
-    draft = task.draw(3, np.random.default_rng(0))
+    draft = task.draw(3, np.random.default_rng(0), CELL)
     scene = Scene("Pick_Leftmost_Block", 3, 0, "none", "clean", draft.objects, draft.facts)
     target = scene.facts["target"]
     assert task.plan(scene) == (Pick(target),)

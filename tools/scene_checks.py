@@ -21,13 +21,12 @@ from robospa.harness.robots.kinematics import chain_of, end_effector, inverse
 from robospa.harness.skills.grasping import LEANS, LEVEL, candidate_poses, grasps_now
 from robospa.harness.skills.workspace import Workspace
 from robospa.tasks import catalog
-from robospa.tasks.layouts import HEIGHT, WIDTH, head_pixel
 from robospa.tasks.objects import object_model
 from robospa.tasks.plan import Pick
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.snapshot import ARMS, Snapshot
 from robospa.tasks.variants import object_sets
-from robospa.workcell import TABLE_TOP
+from robospa.workcell import HEIGHT, TABLE_TOP, WIDTH
 
 TOUCH = 5e-4
 """Boxes may share this much [m]: what stands beside another thing is no overlap."""
@@ -118,7 +117,7 @@ def unseen(scene: Scene) -> Iterator[str]:
     """Movable objects whose middle the head camera does not see."""
     items, boxes = _boxes(scene)
     x, y, z = boxes.mean(axis=1).T
-    u, v = head_pixel(x, y, z)
+    u, v = ROBOT.workcell.head.pixel(x, y, z)
     for k in np.flatnonzero((u < 0) | (u >= WIDTH) | (v < 0) | (v >= HEIGHT)):
         yield f"{items[k].name} ({items[k].asset}) is out of view"
 

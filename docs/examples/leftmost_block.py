@@ -11,11 +11,11 @@ from robospa.geometry import Array, Pose, yaw_rotation
 from robospa.tasks.goals.pick import Lift, PickTracker
 from robospa.tasks.instructions.grammar import Templates
 from robospa.tasks.instructions.words import Slots, with_common
-from robospa.tasks.layouts import Area, Mask, Points, in_head_view, scatter
+from robospa.tasks.layouts import Area, Mask, Points, scatter
 from robospa.tasks.plan import Pick, Skill
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.task import Draft, Level, Task, Tracker
-from robospa.workcell import TABLE_TOP
+from robospa.workcell import TABLE_TOP, Workcell
 
 HALF = 0.022  # [m]
 AREA = Area(x=(-0.25, 0.25), y=(-0.15, 0.08), clear_middle=True)
@@ -43,13 +43,13 @@ HELDOUT = (
 LEVELS = {k: Level(candidates=k + 1, subtasks=1, steps=150) for k in range(1, 6)}
 
 
-def draw(level: int, rng: np.random.Generator) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """Blocks scattered at least 9 cm apart, the leftmost one by a clear 3 cm."""
     count = LEVELS[level].candidates
 
     def propose(rng: np.random.Generator) -> tuple[Array, Array, Mask]:
         x, y = AREA.draw(rng, (count, 40))
-        return x, y, in_head_view(x, y, 1.42 * HALF, 2 * HALF)
+        return x, y, workcell.in_view(x, y, 1.42 * HALF, 2 * HALF)
 
     def unambiguous(points: Points) -> bool:
         first, second = sorted(x for x, _ in points)[:2]

@@ -113,7 +113,6 @@ WORKCELL = Workcell(
     },
     sideways_from=0.02,
     sideways_within=math.radians(40),
-    exchange=(-0.03, -0.08),
     travel_height=0.17,
     highest=0.3,
 )

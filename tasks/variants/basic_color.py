@@ -19,6 +19,7 @@ from robospa.tasks.task import Draft, Task
 from robospa.tasks.variants import object_sets as sets
 from robospa.tasks.variants.distances import Family, Thing, layouts, put_down, shifted
 from robospa.tasks.variants.picking import lifted, pick_target
+from robospa.workcell import Workcell
 
 COLORS = ("red", "green", "blue", "yellow", "orange", "purple", "pink", "black", "brown")
 """Colours of modelled objects that nobody takes for one another. White is left out: the table and
@@ -93,12 +94,12 @@ def color_task(family: Family, colored: Colored, what: str) -> Task:
     """The task that names the target of `family` by its colour."""
     rules = family.rules
 
-    def draw(level: int, rng: np.random.Generator) -> Draft:
-        found = layouts(rules, level)
+    def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
+        found = layouts(workcell, rules, level)
         layout = found[int(rng.integers(len(found)))]
-        points = shifted(rng, rules, level, layout)
+        points = shifted(rng, workcell, rules, level, layout)
         things, words = colored(level, rng)
-        objects, order = put_down(rng, points, things, family.yaw)
+        objects, order = put_down(rng, workcell, points, things, family.yaw)
         target = int(rng.integers(len(objects)))
         return Draft(objects, {"target": f"object_{target}", "color": words[order[target]]})
 

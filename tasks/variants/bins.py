@@ -11,11 +11,10 @@ from collections.abc import Iterable
 from robospa.geometry import Pose
 from robospa.tasks import objects
 from robospa.tasks.goals.anyorder import Container
-from robospa.tasks.layouts import BASES, MAX_REACH
 from robospa.tasks.plan import Drop, Pick, Place, Skill
 from robospa.tasks.scene import SceneObject
 from robospa.tasks.variants.tabletop import Point, apart
-from robospa.workcell import TABLE_TOP
+from robospa.workcell import TABLE_TOP, Workcell
 
 BIN = Pose((-0.45, 0.0, 0.0))
 TABLE_SHIFT = (0.3, 0.0)
@@ -36,10 +35,10 @@ def container(dustbin: SceneObject) -> Container:
     return Container(dustbin.pose, (size[0] / 2, size[1] / 2), rim)
 
 
-def reachable(point: Point) -> bool:
+def reachable(workcell: Workcell, point: Point) -> bool:
     """Whether the arm on that side can take a thing there."""
-    x, y = BASES[int(point[0] > 0)]
-    return not apart(point, [(x, y)], MAX_REACH)
+    arm = workcell.arms[int(point[0] > 0)]
+    return not apart(point, [arm.base], arm.reach)
 
 
 def discard(name: str, right: bool, dustbin: str, exchange: Point = EXCHANGE) -> tuple[Skill, ...]:

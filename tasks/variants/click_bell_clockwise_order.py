@@ -20,6 +20,7 @@ from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
 from robospa.tasks.variants.clicking import click, click_counter, clickable_look
 from robospa.tasks.variants.tabletop import Item, Point, apart, in_view, named, side, standing
+from robospa.workcell import Workcell
 
 X, Y = (-0.255, 0.255), (-0.225, 0.055)
 APART = {1: 0.0, 2: 0.12, 3: 0.080, 4: 0.085, 5: 0.085}
@@ -34,10 +35,10 @@ LEAD, TURN, LAYOUTS = 0.012, 0.12, 400
 LEVELS = {n: Level(candidates=n, subtasks=n, steps=200 * n) for n in range(1, 6)}
 
 
-def draw(level: int, rng: np.random.Generator) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """The ring of bells, all of one look, shifted to a random place of the region."""
     params = clickable_look(rng, "bell")
-    points = _ring(level, rng, in_view("bell", params))
+    points = _ring(level, rng, in_view(workcell, "bell", params))
     items = [
         Item(f"bell {i}", "bell", standing(point), params, fixed=True)
         for i, point in enumerate(points)

@@ -19,7 +19,6 @@ from robospa.tasks.goals.opening import Opened
 from robospa.tasks.goals.repeat import PressCounter
 from robospa.tasks.instructions import words_opening
 from robospa.tasks.instructions.words import Slots
-from robospa.tasks.layouts import in_head_view
 from robospa.tasks.plan import Open, Pick, Place, Press, Skill
 from robospa.tasks.scene import Scene
 from robospa.tasks.shapes import Hinge
@@ -35,7 +34,7 @@ from robospa.tasks.variants.tabletop import (
     side,
     standing,
 )
-from robospa.workcell import TABLE_TOP
+from robospa.workcell import TABLE_TOP, Workcell
 
 STEPS = {1: "c", 2: "co", 3: "coc", 4: "cocp", 5: "cocpc"}
 """What is asked for: c a click, o the microwave opened, p one thing placed left of another."""
@@ -72,12 +71,14 @@ ELBOW = 0.04
 """Free space [m] around the bell."""
 
 
-def draw(level: int, rng: np.random.Generator) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """Bell, microwave and things, each in its region, none where the door swings."""
-    return retry(lambda: _draw(level, rng), f"objects around the microwave, level {level}")
+    return retry(
+        lambda: _draw(level, rng, workcell), f"objects around the microwave, level {level}"
+    )
 
 
-def _draw(level: int, rng: np.random.Generator) -> Draft | None:
+def _draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft | None:
     bell, look = _point(rng, BELL_X, BELL_Y), draw_look(rng, "bell")
     items = [Item("bell", "bell", standing(bell), look, fixed=True)]
     if level >= 2:
@@ -86,7 +87,7 @@ def _draw(level: int, rng: np.random.Generator) -> Draft | None:
         if level >= 4:
             hinge = (oven[0] + _door().point[0], oven[1] + _door().point[1])
             far = [(bell, radius("bell", look) + ELBOW), (hinge, SWING)]
-            things = _things(rng, far, oven)
+            things = _things(rng, workcell, far, oven)
             if things is None:
                 return None
             items += things
@@ -98,7 +99,7 @@ def _point(rng: np.random.Generator, x: tuple[float, float], y: tuple[float, flo
 
 
 def _things(
-    rng: np.random.Generator, far: list[tuple[Point, float]], oven: Point
+    rng: np.random.Generator, workcell: Workcell, far: list[tuple[Point, float]], oven: Point
 ) -> list[Item] | None:
     """Two things, either of which has room to the left of the other; None if there is no room.
 
@@ -118,7 +119,7 @@ def _things(
         fits &= np.hypot(*(at - oven).T) > OVEN_ROOM
         for point, room in far:
             fits &= np.hypot(*(at - point).T) >= room + size
-        fits &= in_head_view(at[:, 0], at[:, 1], size, 0.0, (0.0, 0.0))
+        fits &= workcell.in_view(at[:, 0], at[:, 1], size, 0.0, (0.0, 0.0))
     if not fits.any():
         return None
     first = int(np.argmax(fits))

@@ -13,12 +13,12 @@ from robospa.tasks import objects
 from robospa.tasks.goals.repeat import PressCounter, Repeat
 from robospa.tasks.instructions import words_repeating
 from robospa.tasks.instructions.words import Slots, acting_arm
-from robospa.tasks.layouts import view_span
 from robospa.tasks.plan import Press, Skill
 from robospa.tasks.scene import Scene
 from robospa.tasks.snapshot import ARMS
 from robospa.tasks.task import Draft, Level, Task
 from robospa.tasks.variants.tabletop import Item, draw_look, named, side, standing
+from robospa.workcell import Workcell
 
 FAR, Y, MIDDLE = 0.25, (-0.2, 0.0), 0.05
 BOX = (0.025, 0.025, 0.03)
@@ -30,12 +30,12 @@ HOVER = 0.045
 LEVELS = {n: Level(candidates=1, subtasks=n, steps=200 * n) for n in range(1, 6)}
 
 
-def draw(level: int, rng: np.random.Generator) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """One bell in view and off the middle strip; left and right are equally likely."""
     look = draw_look(rng, "bell")
     model = objects.object_model("bell", look)
     y = float(rng.uniform(*Y))
-    low, high = view_span(y, model.radius, model.size[2])
+    low, high = workcell.view_span(y, model.radius, model.size[2])
     if rng.random() < 0.5:
         x = float(rng.uniform(max(-FAR, low), -MIDDLE))
     else:

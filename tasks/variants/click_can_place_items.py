@@ -29,7 +29,7 @@ from robospa.tasks.variants.tabletop import (
     retry,
     standing,
 )
-from robospa.workcell import TABLE_TOP
+from robospa.workcell import TABLE_TOP, Workcell
 
 STEPS = {1: "c", 2: "cb", 3: "cbc", 4: "cbcp", 5: "cbcpc"}
 """What is asked for: c a click, b the bread into the basket, p the pill bottle onto the pad."""
@@ -51,12 +51,14 @@ LEVELS = {
 }
 
 
-def draw(level: int, rng: np.random.Generator) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """The things of this level, each in its region, no two touching."""
-    return retry(lambda: _draw(level, rng), f"objects of Click_Can_Place_Items level {level}")
+    return retry(
+        lambda: _draw(level, rng, workcell), f"objects of Click_Can_Place_Items level {level}"
+    )
 
 
-def _draw(level: int, rng: np.random.Generator) -> Draft | None:
+def _draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft | None:
     can = draw_look(rng, "can")
     items: list[Item] = []
     far: list[tuple[Point, float]] = []  # what the can must keep away from, and how far [m]

@@ -23,6 +23,7 @@ from robospa.tasks.variants.clicking import (
     turned,
 )
 from robospa.tasks.variants.tabletop import Item, named, side, standing
+from robospa.workcell import Workcell
 
 ORDER = ("alarm_clock", "stapler", "can", "playing_cards", "bread")
 AREA, MIDDLE, DISTANCE = Area((-0.25, 0.25), (-0.20, 0.0)), 0.05, 0.14
@@ -30,10 +31,10 @@ AREA, MIDDLE, DISTANCE = Area((-0.25, 0.25), (-0.20, 0.0)), 0.05, 0.14
 LEVELS = {n: Level(candidates=n, subtasks=n, steps=200 * n) for n in range(1, 6)}
 
 
-def draw(level: int, rng: np.random.Generator) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """The first things of the order, at random places off the middle."""
     looks = [(asset, clickable_look(rng, asset)) for asset in ORDER[:level]]
-    points = scattered(rng, AREA, MIDDLE, DISTANCE, looks)
+    points = scattered(rng, workcell, AREA, MIDDLE, DISTANCE, looks)
     items = [
         Item(asset, asset, standing(point, turned(rng, asset)), look, fixed=True)
         for (asset, look), point in zip(looks, points, strict=True)

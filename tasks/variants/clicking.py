@@ -11,11 +11,12 @@ import numpy as np
 from robospa.geometry import Array, Vec3
 from robospa.tasks import objects
 from robospa.tasks.goals.repeat import PRESS_BOX, PressCounter
-from robospa.tasks.layouts import Area, Mask, in_head_view, scatter
+from robospa.tasks.layouts import Area, Mask, scatter
 from robospa.tasks.plan import Press
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.snapshot import ARMS
 from robospa.tasks.variants.tabletop import Point, side
+from robospa.workcell import Workcell
 
 Look = tuple[str, Mapping[str, Any]]
 """An asset and its parameters."""
@@ -48,7 +49,12 @@ def turned(rng: np.random.Generator, asset: str) -> float:
 
 
 def scattered(
-    rng: np.random.Generator, area: Area, middle: float, distance: float, items: Sequence[Look]
+    rng: np.random.Generator,
+    workcell: Workcell,
+    area: Area,
+    middle: float,
+    distance: float,
+    items: Sequence[Look],
 ) -> list[Point]:
     """A free place [m] for each item (asset and parameters), seen whole by the head camera.
 
@@ -63,7 +69,7 @@ def scattered(
 
     def propose(generator: np.random.Generator) -> tuple[Array, Array, Mask]:
         x, y = area.draw(generator, (len(items), TRIES))
-        return x, y, (np.abs(x) >= middle) & in_head_view(x, y, radius, height, (0.0, 0.0))
+        return x, y, (np.abs(x) >= middle) & workcell.in_view(x, y, radius, height, (0.0, 0.0))
 
     found = scatter(rng, propose, [[distance] * len(items)] * len(items))
     return [found[order.index(i)] for i in range(len(items))]

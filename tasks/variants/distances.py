@@ -20,13 +20,14 @@ from robospa.geometry import Array
 from robospa.tasks.goals.pick import Lift
 from robospa.tasks.instructions import words_spatial
 from robospa.tasks.instructions.words import Phrasings, Slots
-from robospa.tasks.layouts import LayoutError, Mask, in_head_view
+from robospa.tasks.layouts import LayoutError, Mask
 from robospa.tasks.objects import object_model
 from robospa.tasks.packing import Fits, apart, pool, walk
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.task import Draft, Level, Task
 from robospa.tasks.variants.picking import drawn_yaw, lifted, pick_target
 from robospa.tasks.variants.tabletop import draw_look, standing
+from robospa.workcell import Workcell
 
 Thing = tuple[str, Mapping[str, Any] | None]
 """Asset and parameters of an object; None for a look to be drawn."""
@@ -84,20 +85,22 @@ class Family:
     yaw: float = math.pi / 2
 
 
-def allowed(rules: Rules, x: Array, y: Array) -> Mask:
+def allowed(workcell: Workcell, rules: Rules, x: Array, y: Array) -> Mask:
     """Whether origins are in the region, with the footprint and the object's axis in view."""
     (left, right), (near, far) = rules.region
     inside = (x >= left) & (x <= right) & (y >= near) & (y <= far)
-    return inside & in_head_view(x, y, rules.radius, 0.0) & in_head_view(x, y, 0.0, rules.tall)
+    return (
+        inside & workcell.in_view(x, y, rules.radius, 0.0) & workcell.in_view(x, y, 0.0, rules.tall)
+    )
 
 
-def fits(rules: Rules, level: int) -> Fits:
+def fits(workcell: Workcell, rules: Rules, level: int) -> Fits:
     """The rule of the level's layouts."""
     least = rules.apart[level - 1]
 
     def good(points: Array, wanted: Array, i: int) -> Mask:
         mask = apart(points, wanted, i, least)
-        return mask & allowed(rules, wanted[:, 0], wanted[:, 1]) if mask.any() else mask
+        return mask & allowed(workcell, rules, wanted[:, 0], wanted[:, 1]) if mask.any() else mask
 
     return good
 
@@ -110,9 +113,9 @@ def starts(rules: Rules, level: int, chains: int) -> Array:
 
 
 @cache
-def layouts(rules: Rules, level: int) -> Array:
+def layouts(workcell: Workcell, rules: Rules, level: int) -> Array:
     """The level's layouts (N, n, 2) [m], evenly from all there are."""
-    found = np.concatenate(pool(starts(rules, level, CHAINS), fits(rules, level)))
+    found = np.concatenate(pool(starts(rules, level, CHAINS), fits(workcell, rules, level)))
     return found[[wide(rules, level, points) for points in found]]
 
 
@@ -134,9 +137,9 @@ def distances(points: Array) -> Array:
     return apart
 
 
-def clearing(rules: Rules, level: int) -> Fits:
+def clearing(workcell: Workcell, rules: Rules, level: int) -> Fits:
     """As `fits`, and no move makes the distances from place 0 less clear than they are."""
-    valid, gap = fits(rules, level), rules.gap[level - 1]
+    valid, gap = fits(workcell, rules, level), rules.gap[level - 1]
 
     def good(points: Array, wanted: Array, i: int) -> Mask:
         mask = valid(points, wanted, i)
@@ -150,7 +153,7 @@ def clearing(rules: Rules, level: int) -> Fits:
 
 
 @cache
-def clear_layouts(rules: Rules, level: int) -> Array:
+def clear_layouts(workcell: Workcell, rules: Rules, level: int) -> Array:
     """Layouts (N, n, 2) [m] in which all distances from place 0, the reference, are clear.
 
     Few layouts are like that by chance. Walks that never become less clear find some, from each of
@@ -158,17 +161,17 @@ def clear_layouts(rules: Rules, level: int) -> Array:
     """
     points = _likelier_references(starts(rules, level, SEARCHES), rules.gap[level - 1])
     for k in range(ROUNDS):
-        points = pool(points, clearing(rules, level), SWEEPS, 1, seed=k)[0]
+        points = pool(points, clearing(workcell, rules, level), SWEEPS, 1, seed=k)[0]
         found = points[unclear(points, rules.gap[level - 1]) == 0.0]
         if len(found) >= ENOUGH:
             break
     mirrored = found * (-1.0, 1.0)
-    seen = allowed(rules, mirrored[..., 0], mirrored[..., 1]).all(axis=1)
+    seen = allowed(workcell, rules, mirrored[..., 0], mirrored[..., 1]).all(axis=1)
     found = np.concatenate([found, mirrored[seen]])
     if not len(found):
         raise LayoutError(f"no layout of {points.shape[1]} objects has clear distances")
     copies = found[np.arange(CHAINS) % len(found)]
-    walked = np.concatenate(pool(copies, clearing(rules, level)))
+    walked = np.concatenate(pool(copies, clearing(workcell, rules, level)))
     return walked[[wide(rules, level, layout) for layout in walked]]
 
 
@@ -189,10 +192,12 @@ def wide(rules: Rules, level: int, points: Array) -> bool:
     return bool((np.ptp(points, axis=0) >= rules.extent[level - 1]).all())
 
 
-def shifted(rng: np.random.Generator, rules: Rules, level: int, points: Array) -> Array:
+def shifted(
+    rng: np.random.Generator, workcell: Workcell, rules: Rules, level: int, points: Array
+) -> Array:
     """The layout (n, 2) after one more sweep of small moves, if that keeps its extent."""
     moved = points[None].copy()
-    walk(rng, moved, fits(rules, level), SHIFT)
+    walk(rng, moved, fits(workcell, rules, level), SHIFT)
     return moved[0] if wide(rules, level, moved[0]) else points
 
 
@@ -200,20 +205,26 @@ JITTERS = SHIFT * np.repeat(0.5 ** np.arange(6), 2)[:, None, None]
 """How far [m] places are moved together; the first that leaves them apart and clear is taken."""
 
 
-def jittered(rng: np.random.Generator, rules: Rules, level: int, points: Array) -> Array:
+def jittered(
+    rng: np.random.Generator, workcell: Workcell, rules: Rules, level: int, points: Array
+) -> Array:
     """A layout (n, 2) with clear distances, all places moved a little, if there is room."""
     count, x, y = len(points), *np.triu_indices(len(points), 1)
     tried = points + JITTERS * (2 * rng.random((len(JITTERS), count, 2)) - 1)
     delta = tried[:, x] - tried[:, y]
     near = (delta[..., 0] ** 2 + delta[..., 1] ** 2).min(axis=1) < rules.apart[level - 1] ** 2
-    seen = allowed(rules, tried[..., 0], tried[..., 1]).all(axis=1)
+    seen = allowed(workcell, rules, tried[..., 0], tried[..., 1]).all(axis=1)
     wide = (np.ptp(tried, axis=1) >= rules.extent[level - 1]).all(axis=1)
     good = seen & wide & ~near & (unclear(tried, rules.gap[level - 1]) == 0.0)
     return tried[int(np.argmax(good))] if good.any() else points
 
 
 def put_down(
-    rng: np.random.Generator, points: Array, things: Sequence[Thing], yaw: float
+    rng: np.random.Generator,
+    workcell: Workcell,
+    points: Array,
+    things: Sequence[Thing],
+    yaw: float,
 ) -> tuple[tuple[SceneObject, ...], list[int]]:
     """The things at their places, in random order, and the place of each object."""
     order = [int(i) for i in rng.permutation(len(points))]
@@ -222,7 +233,7 @@ def put_down(
         x, y = points[i].tolist()
         asset, given = things[i]
         params = draw_look(rng, asset) if given is None else given
-        turn = drawn_yaw(rng, asset, params, y, yaw)
+        turn = drawn_yaw(rng, workcell, asset, params, y, yaw)
         height = -object_model(asset, params).bottom
         objects.append(
             SceneObject(f"object_{k}", asset, standing((x, y), turn, height), dict(params))
@@ -230,16 +241,16 @@ def put_down(
     return tuple(objects), order
 
 
-def draw(level: int, rng: np.random.Generator, family: Family) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell, family: Family) -> Draft:
     """A layout with clear distances, a uniform rank, then what lies where."""
     rules = family.rules
-    found = clear_layouts(rules, level)
+    found = clear_layouts(workcell, rules, level)
     layout = found[int(rng.integers(len(found)))]
-    points = jittered(rng, rules, level, layout)
+    points = jittered(rng, workcell, rules, level, layout)
     rank = int(rng.integers(len(points) - 1)) + 1
     target = 1 + int(np.argsort(-distances(points))[rank - 1])
     things = family.things(level, rng)
-    objects, order = put_down(rng, points, things, family.yaw)
+    objects, order = put_down(rng, workcell, points, things, family.yaw)
     facts = {
         "target": f"object_{order.index(target)}",
         "reference": f"object_{order.index(0)}",
@@ -259,7 +270,7 @@ def distance_task(family: Family, name: str, what: str) -> Task:
         name=name,
         category="SDE",
         levels=family.rules.levels,
-        draw=lambda level, rng: draw(level, rng, family),
+        draw=lambda level, rng, workcell: draw(level, rng, workcell, family),
         goal=lifted(Lift(above=0.82)),
         plan=pick_target,
         slots=slots,

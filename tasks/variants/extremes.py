@@ -9,7 +9,6 @@ exist in words only; no image shows them.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 
@@ -20,10 +19,10 @@ from robospa.geometry import Array
 from robospa.tasks.goals.pick import Lift
 from robospa.tasks.instructions import words_spatial
 from robospa.tasks.instructions.words import Slots
-from robospa.tasks.layouts import LayoutError, Mask, head_pixel, in_head_view
+from robospa.tasks.layouts import LayoutError, Mask
 from robospa.tasks.packing import Fits, pool, walk
 from robospa.tasks.scene import Scene, SceneObject
-from robospa.tasks.task import Draft, Level, Task
+from robospa.tasks.task import Draft, Draw, Level, Task
 from robospa.tasks.variants.picking import (
     BLOCK_HALF,
     draw_params,
@@ -33,7 +32,7 @@ from robospa.tasks.variants.picking import (
     pick_target,
 )
 from robospa.tasks.variants.tabletop import standing
-from robospa.workcell import TABLE_TOP
+from robospa.workcell import TABLE_TOP, Workcell
 
 OBJECTS = {1: 3, 2: 4, 3: 5, 4: 6, 5: 7}
 """How many objects lie there; the paper's n counts the at most four extreme ones."""
@@ -95,13 +94,13 @@ class Spread:
         """Whether all objects of a scene are equal."""
         return len(self.assets) == 1
 
-    def allowed(self, x: Array, y: Array) -> Mask:
+    def allowed(self, workcell: Workcell, x: Array, y: Array) -> Mask:
         """Whether origins are in the official region with the whole object in view."""
         inside = (np.abs(x) <= 0.24 - self.inset) & (y >= -0.225 + self.inset)
         inside &= y <= 0.095 - self.inset
-        return inside & in_head_view(x, y, self.radius, self.tall, MARGIN)
+        return inside & workcell.in_view(x, y, self.radius, self.tall, MARGIN)
 
-    def apart(self, points: Array, wanted: Array, i: int) -> Mask:
+    def apart(self, workcell: Workcell, points: Array, wanted: Array, i: int) -> Mask:
         """Whether `wanted` is far enough from its chain's other places, on table and image."""
         dx = np.abs(points[..., 0] - wanted[:, None, 0])
         dy = np.abs(points[..., 1] - wanted[:, None, 1])
@@ -109,27 +108,27 @@ class Spread:
             dx**2 + dy**2 >= self.spacing[2] ** 2
         )
         if self.alike:
-            free &= self._separate(points, wanted)
+            free &= self._separate(workcell, points, wanted)
         else:
-            u, v = head_pixel(points[..., 0], points[..., 1], TABLE_TOP + self.tall / 2)
-            wu, wv = head_pixel(wanted[:, :1], wanted[:, 1:], TABLE_TOP + self.tall / 2)
+            u, v = workcell.head.pixel(points[..., 0], points[..., 1], TABLE_TOP + self.tall / 2)
+            wu, wv = workcell.head.pixel(wanted[:, :1], wanted[:, 1:], TABLE_TOP + self.tall / 2)
             free &= (u - wu) ** 2 + (v - wv) ** 2 >= PIXELS**2
         free[:, i] = True
         return np.asarray(free.all(axis=1))
 
-    def _separate(self, points: Array, wanted: Array) -> Mask:
+    def _separate(self, workcell: Workcell, points: Array, wanted: Array) -> Mask:
         """Whether the bounding boxes in the head image do not overlap."""
-        left, right, top, bottom = self._box(points[..., 0], points[..., 1])
-        wl, wr, wt, wb = self._box(wanted[:, :1], wanted[:, 1:])
+        left, right, top, bottom = self._box(workcell, points[..., 0], points[..., 1])
+        wl, wr, wt, wb = self._box(workcell, wanted[:, :1], wanted[:, 1:])
         return np.asarray((left >= wr) | (wl >= right) | (top >= wb) | (wt >= bottom))
 
-    def _box(self, x: Array, y: Array) -> tuple[Array, Array, Array, Array]:
+    def _box(self, workcell: Workcell, x: Array, y: Array) -> tuple[Array, Array, Array, Array]:
         """Left, right, top and bottom [px] of the upright cylinders that bound the objects."""
         high = TABLE_TOP + self.tall
-        left = head_pixel(x - self.seen, y, high)[0]
-        right = head_pixel(x + self.seen, y, high)[0]
-        top = head_pixel(x, y + self.seen, high)[1]
-        bottom = head_pixel(x, y - self.seen, TABLE_TOP)[1]
+        left = workcell.head.column(x - self.seen, y, high)
+        right = workcell.head.column(x + self.seen, y, high)
+        top = workcell.head.row(x, y + self.seen, high)
+        bottom = workcell.head.row(x, y - self.seen, TABLE_TOP)
         return left, right, top, bottom
 
 
@@ -145,7 +144,7 @@ def leaders(points: Array) -> tuple[NDArray[np.int64], Array]:
     return along.argmax(axis=-2), ordered[..., -1, :] - ordered[..., -2, :]
 
 
-def fits(spread: Spread, level: int, roles: NDArray[np.int64]) -> Fits:
+def fits(workcell: Workcell, spread: Spread, level: int, roles: NDArray[np.int64]) -> Fits:
     """The rule of layouts in which place `roles[chain, e]` is the e-th of EXTREMES.
 
     It must be so in the head image as well, where perspective could put another object outermost.
@@ -156,16 +155,16 @@ def fits(spread: Spread, level: int, roles: NDArray[np.int64]) -> Fits:
         moved = points.copy()
         moved[:, i] = wanted
         place, lead = leaders(moved)
-        u, v = head_pixel(moved[..., 0], moved[..., 1], middle)
+        u, v = workcell.head.pixel(moved[..., 0], moved[..., 1], middle)
         seen = leaders(np.stack([u, -v], axis=-1))[0]
         clear = ((place == roles) & (seen == roles) & (lead >= LEADS[level])).all(axis=1)
-        allowed = spread.allowed(wanted[:, 0], wanted[:, 1])
-        return np.asarray(clear & allowed & spread.apart(points, wanted, i))
+        allowed = spread.allowed(workcell, wanted[:, 0], wanted[:, 1])
+        return np.asarray(clear & allowed & spread.apart(workcell, points, wanted, i))
 
     return rule
 
 
-def _starts(spread: Spread, level: int) -> list[Array]:
+def _starts(workcell: Workcell, spread: Spread, level: int) -> list[Array]:
     """Start layouts of the level's size, no object extreme more often than it must be.
 
     LayoutError if none keeps to the rule.
@@ -176,7 +175,7 @@ def _starts(spread: Spread, level: int) -> list[Array]:
         parts = [layout[:count]] if count > 3 else [np.delete(layout[:4], k, 0) for k in range(4)]
         for part in parts:
             roles = leaders(part)[0]
-            rule = fits(spread, level, roles[None])
+            rule = fits(workcell, spread, level, roles[None])
             whole = len(set(roles.tolist())) == min(count, 4)
             if whole and all(rule(part[None], part[None, i], i).all() for i in range(count)):
                 good.append(part)
@@ -186,26 +185,26 @@ def _starts(spread: Spread, level: int) -> list[Array]:
 
 
 @cache
-def layouts(spread: Spread, level: int) -> Array:
+def layouts(workcell: Workcell, spread: Spread, level: int) -> Array:
     """The level's layouts (many, n, 2) [m]; which place is extreme differs between them."""
-    good = _starts(spread, level)
+    good = _starts(workcell, spread, level)
     starts = np.stack([good[k % len(good)] for k in range(CHAINS)])
-    found = pool(starts, fits(spread, level, leaders(starts)[0]))
+    found = pool(starts, fits(workcell, spread, level, leaders(starts)[0]))
     return found.reshape(-1, *starts.shape[1:])
 
 
-def drawer(spread: Spread, views: tuple[str, ...]) -> Callable[[int, np.random.Generator], Draft]:
+def drawer(spread: Spread, views: tuple[str, ...]) -> Draw:
     """The draw of `spread`: a uniform viewpoint of `views`, a layout, what lies where, and one of
     the objects that are extreme there, each equally likely: the scene does not tell which.
     """
 
-    def draw(level: int, rng: np.random.Generator) -> Draft:
+    def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
         count = OBJECTS[level]
         view = views[int(rng.integers(len(views)))]
-        known = layouts(spread, level)
+        known = layouts(workcell, spread, level)
         points = known[int(rng.integers(len(known)))][None].copy()
         roles = leaders(points)[0]
-        walk(rng, points, fits(spread, level, roles), SHIFT)
+        walk(rng, points, fits(workcell, spread, level, roles), SHIFT)
         asked = int(rng.choice(np.unique(roles)))
         extreme = int(rng.choice(np.flatnonzero(roles[0] == asked)))
         order = [int(i) for i in rng.permutation(count)]
@@ -218,7 +217,7 @@ def drawer(spread: Spread, views: tuple[str, ...]) -> Callable[[int, np.random.G
             is_block = assets[k] == "block"
             x, y = points[0, i].tolist()
             params = common if spread.alike else draw_params(rng, assets[k])
-            yaw = drawn_yaw(rng, assets[k], params, y, 0.75 if is_block else math.pi)
+            yaw = drawn_yaw(rng, workcell, assets[k], params, y, 0.75 if is_block else math.pi)
             pose = standing((x, y), yaw, BLOCK_HALF if is_block else 0.0)
             objects.append(SceneObject(f"object_{k}", assets[k], pose, params))
         facts = {

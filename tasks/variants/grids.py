@@ -18,11 +18,12 @@ from robospa.geometry import Array
 from robospa.tasks.goals.pick import Lift
 from robospa.tasks.instructions import words_spatial
 from robospa.tasks.instructions.words import Slots
-from robospa.tasks.layouts import LayoutError, in_head_view, in_reach, view_span
+from robospa.tasks.layouts import LayoutError
 from robospa.tasks.scene import Scene, SceneObject
-from robospa.tasks.task import Draft, Level, Task
+from robospa.tasks.task import Draft, Draw, Level, Task
 from robospa.tasks.variants.picking import lifted, pick_name, pick_target
 from robospa.tasks.variants.tabletop import draw_look, standing
+from robospa.workcell import Workcell
 
 Thing = tuple[str, Mapping[str, Any]]
 """Asset and parameters."""
@@ -39,7 +40,9 @@ class Layout(Protocol):
     @property
     def columns(self) -> int: ...
 
-    def places(self, rng: np.random.Generator) -> Callable[[int, int], tuple[float, float]]:
+    def places(
+        self, rng: np.random.Generator, workcell: Workcell
+    ) -> Callable[[int, int], tuple[float, float]]:
         """A drawn grid: place [m] of object `k` on cell `cell` (row by row from the robot)."""
         ...
 
@@ -64,21 +67,26 @@ class Grid:
     radius: float = 0.06
     tall: float = 0.12
 
-    def centre_x(self, y: float) -> tuple[float, float]:
+    def centre_x(self, y: float, workcell: Workcell) -> tuple[float, float]:
         """Where the centre may be when it is at `y`, so that the near row is in view."""
         near = y - (self.rows - 1) / 2 * self.pitch_y - self.jitter[1]
         half = (self.columns - 1) / 2 * self.pitch_x + self.jitter[0]
-        footprint, axis = view_span(near, self.radius), view_span(near, 0.0, self.tall)
+        footprint, axis = (
+            workcell.view_span(near, self.radius),
+            workcell.view_span(near, 0.0, self.tall),
+        )
         low = max(self.x[0], footprint[0] + half, axis[0] + half)
         high = min(self.x[1], footprint[1] - half, axis[1] - half)
         if low > high:
             raise ValueError(f"no room in view for {self.columns} columns at y = {y}")
         return low, high
 
-    def places(self, rng: np.random.Generator) -> Callable[[int, int], tuple[float, float]]:
+    def places(
+        self, rng: np.random.Generator, workcell: Workcell
+    ) -> Callable[[int, int], tuple[float, float]]:
         """Centre and jitter of every object, uniform."""
         centre_y = float(rng.uniform(*self.y))
-        centre_x = float(rng.uniform(*self.centre_x(centre_y)))
+        centre_x = float(rng.uniform(*self.centre_x(centre_y, workcell)))
         jitter = rng.uniform(-1, 1, (self.rows * self.columns, 2)) * self.jitter
 
         def place(k: int, cell: int) -> tuple[float, float]:
@@ -116,11 +124,13 @@ class GapGrid:
     radius: float
     tall: float
 
-    def places(self, rng: np.random.Generator) -> Callable[[int, int], tuple[float, float]]:
+    def places(
+        self, rng: np.random.Generator, workcell: Workcell
+    ) -> Callable[[int, int], tuple[float, float]]:
         """The first grid that keeps its gaps, uniform among those that do; LayoutError if none."""
         for _ in range(BATCHES):
             x, y = self._drawn(rng)
-            good = np.flatnonzero(self._fits(x, y))
+            good = np.flatnonzero(self._fits(x, y, workcell))
             if len(good):
                 xs, ys = x[good[0]].ravel().tolist(), y[good[0]].ravel().tolist()
                 return lambda k, cell: (xs[cell], ys[cell])
@@ -139,10 +149,10 @@ class GapGrid:
         y = centre_y + row * pitch_y + rng.uniform(*self.jitter_y, shape)
         return x, y
 
-    def _fits(self, x: Array, y: Array) -> Array:
+    def _fits(self, x: Array, y: Array, workcell: Workcell) -> Array:
         free = np.hypot(x - self.keep_out[0], y - self.keep_out[1]) >= self.keep_out[2]
-        seen = in_head_view(x, y, self.radius) & in_head_view(x, y, 0.0, self.tall)
-        every = (free & seen & in_reach(x, y)).all(axis=(1, 2))
+        seen = workcell.in_view(x, y, self.radius) & workcell.in_view(x, y, 0.0, self.tall)
+        every = (free & seen & workcell.in_reach(x, y)).all(axis=(1, 2))
         columns = (np.diff(x, axis=2) >= self.gaps[0]).all(axis=(1, 2))
         rows = (np.diff(y.mean(axis=2), axis=1) >= self.gaps[1]).all(axis=1)
         return np.asarray(every & columns & rows)
@@ -184,16 +194,16 @@ class Line:
     sideways: tuple[str, ...] = ()
 
 
-def drawer(line: Line, fixed: bool) -> Callable[[int, np.random.Generator], Draft]:
+def drawer(line: Line, fixed: bool) -> Draw:
     """The draw of `line`: the grid, what stands where, and a uniform cell to count to.
 
     Directions are uniform too, or, if `fixed`, left to right and far to near.
     """
 
-    def draw(level: int, rng: np.random.Generator) -> Draft:
+    def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
         grid = line.layouts[level]
         count = grid.rows * grid.columns
-        place = grid.places(rng)
+        place = grid.places(rng, workcell)
         cells = [int(c) for c in rng.permutation(count)]
         objects = []
         for k, (asset, params) in enumerate(line.things(rng, count)):

@@ -8,6 +8,7 @@ left area, every further block on the one before it.
 from __future__ import annotations
 
 import math
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -16,7 +17,6 @@ from robospa.geometry import Pose
 from robospa.tasks.goals.checklist import Checklist, Counter, Near, Part, Rests
 from robospa.tasks.instructions import words_cac
 from robospa.tasks.instructions.words import Slots
-from robospa.tasks.layouts import in_head_view
 from robospa.tasks.plan import Hang, Pick, Place, Skill
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
@@ -33,7 +33,7 @@ from robospa.tasks.variants.tabletop import (
     retry,
     standing,
 )
-from robospa.workcell import TABLE_TOP
+from robospa.workcell import TABLE_TOP, Workcell
 
 COLORS = {
     "red": (1.0, 0.0, 0.0),
@@ -67,15 +67,17 @@ HELD_RADIUS = 0.03
 LEVELS = {n: Level(candidates=n, subtasks=n, steps=200 + 200 * n) for n in range(1, 6)}
 
 
-def draw(level: int, rng: np.random.Generator) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """Mug and rack on the right, blocks on the left."""
-    return retry(lambda: _draw(level, rng), f"objects of Hang_Mug_Stack_Blocks level {level}")
+    return retry(
+        lambda: _draw(level, rng, workcell), f"objects of Hang_Mug_Stack_Blocks level {level}"
+    )
 
 
-def _draw(level: int, rng: np.random.Generator) -> Draft | None:
+def _draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft | None:
     mug, rack = draw_look(rng, "mug"), draw_look(rng, "mug_rack")
-    at = free_point(rng, MUG_X, MUG_Y, [], allowed=in_view("mug", mug))
-    stand = free_point(rng, RACK_X, RACK_Y, [], allowed=_rack_seen)
+    at = free_point(rng, MUG_X, MUG_Y, [], allowed=in_view(workcell, "mug", mug))
+    stand = free_point(rng, RACK_X, RACK_Y, [], allowed=partial(_rack_seen, workcell))
     if at is None or stand is None:
         return None
     if math.dist(at, stand) < radius("mug", mug) + radius("mug_rack", rack):
@@ -86,7 +88,7 @@ def _draw(level: int, rng: np.random.Generator) -> Draft | None:
     items.append(Item("rack", "mug_rack", standing(stand, turn), rack, fixed=True))
     points: list[Point] = [PLACE]
     for color in list(COLORS)[: level - 1]:
-        point = _block_point(rng, BLOCK_Y[level], points)
+        point = _block_point(rng, workcell, BLOCK_Y[level], points)
         if point is None:
             return None
         points.append(point)
@@ -96,22 +98,23 @@ def _draw(level: int, rng: np.random.Generator) -> Draft | None:
     return Draft(*named(rng, items))
 
 
-def _rack_seen(point: Point) -> bool:
+def _rack_seen(workcell: Workcell, point: Point) -> bool:
     """Whether foot and peg are in the head image; the head of the post is above it."""
     x, y = np.array(point[0]), np.array(point[1])
-    return bool(in_head_view(x, y, *RACK_SEEN, margin=(0.0, 0.0)))
+    return bool(workcell.in_view(x, y, *RACK_SEEN, margin=(0.0, 0.0)))
 
 
 def _block_point(
-    rng: np.random.Generator, y: tuple[float, float], others: list[Point]
+    rng: np.random.Generator, workcell: Workcell, y: tuple[float, float], others: list[Point]
 ) -> Point | None:
     """A free place: off the far middle, where the official scenes draw another y."""
     far = [(other, DISTANCE) for other in others]
-    point = free_point(rng, BLOCK_X, y, far, allowed=reachable)
+    allowed = partial(reachable, workcell)
+    point = free_point(rng, BLOCK_X, y, far, allowed=allowed)
     if point is None or abs(point[0]) >= MIDDLE or point[1] <= 0:
         return point
     x = (point[0], point[0])
-    return free_point(rng, x, (y[0], 0.0), far, 1, reachable)
+    return free_point(rng, x, (y[0], 0.0), far, 1, allowed)
 
 
 def _blocks(scene: Scene) -> list[str]:

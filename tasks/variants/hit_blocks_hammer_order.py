@@ -16,12 +16,13 @@ from robospa.tasks import objects
 from robospa.tasks.goals.tools import HitCounter, UseInOrder
 from robospa.tasks.instructions import words_tools
 from robospa.tasks.instructions.words import Slots
-from robospa.tasks.layouts import BASES, Area, Mask, in_head_view, scatter
+from robospa.tasks.layouts import Area, Mask, scatter
 from robospa.tasks.plan import Hit, Skill
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
 from robospa.tasks.variants.stack_blocks_color_order import COLORS
 from robospa.tasks.variants.tabletop import Item, Point, draw_look, named, side, standing
+from robospa.workcell import Workcell
 
 HALF, YAW, DISTANCE, TRIES = 0.025, 0.5, 0.12, 60
 HAMMER: Point = (0.0, -0.06)
@@ -33,25 +34,23 @@ ACROSS = 0.10
 FREE = 0.068
 """Least distance [m] of a block's centre from the hammer's handle and head."""
 
-REACH = (0.25, 0.63)
-"""Distances [m] from the arm's base at which it can hit with several grasps of the hammer."""
-
 LEVELS = {n: Level(candidates=n, subtasks=n, steps=200 * n) for n in range(1, 6)}
 
 
-def draw(level: int, rng: np.random.Generator) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """The first block on a random side, the others where the same arm gets to."""
     left = bool(rng.random() < 0.5)
-    base = BASES[0 if left else 1]
+    arm = workcell.arms[0 if left else 1]
+    nearest, farthest = arm.tool_reach
 
     def propose(generator: np.random.Generator) -> tuple[Array, Array, Mask]:
         x, y = AREA.draw(generator, (level, TRIES))
         inward = -x if left else x  # the first arm's side is positive
         usable = (np.abs(x) >= MIDDLE) & (inward >= -ACROSS) & _beside_hammer(x, y)
         usable[0] &= inward[0] > 0
-        reach = np.hypot(x - base[0], y - base[1])
-        usable &= (reach >= REACH[0]) & (reach <= REACH[1])
-        return x, y, usable & in_head_view(x, y, HALF * math.sqrt(2), 2 * HALF, (0.0, 0.0))
+        reach = np.hypot(x - arm.base[0], y - arm.base[1])
+        usable &= (reach >= nearest) & (reach <= farthest)
+        return x, y, usable & workcell.in_view(x, y, HALF * math.sqrt(2), 2 * HALF, (0.0, 0.0))
 
     found = scatter(rng, propose, [[DISTANCE] * level] * level)
     first, *others = found

@@ -20,6 +20,7 @@ from robospa.tasks.plan import RaiseLower, Skill
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
 from robospa.tasks.variants.tabletop import Item, draw_look, named, side, standing
+from robospa.workcell import Workcell
 
 LEVELS = {n: Level(candidates=1, subtasks=n, steps=200 * n) for n in range(1, 6)}
 
@@ -90,7 +91,7 @@ THINGS = (
 )
 
 
-def _draw(thing: Thing, level: int, rng: np.random.Generator) -> Draft:
+def _draw(thing: Thing, level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     point = (float(rng.uniform(*thing.x)), float(rng.uniform(*thing.y)))
     pose = standing(point, float(rng.uniform(-thing.yaw, thing.yaw)))
     items = [Item("thing", thing.asset, pose, draw_look(rng, thing.asset))]
@@ -114,7 +115,7 @@ def _task(thing: Thing) -> Task:
         name=f"Lift_{thing.name.capitalize()}_Repeat",
         category="RPF",
         levels=LEVELS,
-        draw=lambda level, rng: _draw(thing, level, rng),
+        draw=lambda level, rng, workcell: _draw(thing, level, rng, workcell),
         goal=thing.goal,
         plan=lambda scene: _plan(thing, scene),
         slots=lambda scene: _slots(thing, scene),

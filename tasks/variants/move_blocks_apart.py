@@ -19,7 +19,7 @@ from robospa.tasks.plan import Pick, Place, Skill
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
 from robospa.tasks.variants.tabletop import LAYOUTS, TRIES_PER_POINT, Item, named, standing
-from robospa.workcell import TABLE_TOP
+from robospa.workcell import TABLE_TOP, Workcell
 
 COLORS = {
     "red": (1.0, 0.0, 0.0),
@@ -85,7 +85,7 @@ def _squares(rng: np.random.Generator, count: int, half: float) -> list[Square]:
     raise RuntimeError(f"no free column of {count} blocks in {LAYOUTS} draws; skip this seed")
 
 
-def draw(level: int, rng: np.random.Generator) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """Two colours, the first for the right side (level 1: one colour, either side)."""
     first, second = (list(COLORS)[int(i)] for i in rng.permutation(len(COLORS))[:2])
     right = TO_RIGHT[level] if level > 1 else int(rng.integers(2))

@@ -19,7 +19,7 @@ from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
 from robospa.tasks.variants.picking import drawn_yaw
 from robospa.tasks.variants.tabletop import Item, draw_look, named, shuffled_scatter, side, standing
-from robospa.workcell import TABLE_TOP
+from robospa.workcell import TABLE_TOP, Workcell
 
 X, Y, DISTANCE = (-0.20, 0.20), (-0.20, 0.10), 0.15
 AWAY = 0.23
@@ -33,12 +33,12 @@ PLACE_X, PLACE_Y, SPACING = 0.28, (-0.24, 0.10), 0.08
 LEVELS = {n: Level(candidates=n, subtasks=n, steps=200 * n) for n in range(1, 6)}
 
 
-def draw(level: int, rng: np.random.Generator) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """Boxes anywhere in the region, each turned any way that a gripper can take."""
     items = []
     for i, point in enumerate(shuffled_scatter(rng, level, X, Y, DISTANCE, tries=10)):
         look = draw_look(rng, "playing_cards")
-        yaw = drawn_yaw(rng, "playing_cards", look, point[1], math.pi)
+        yaw = drawn_yaw(rng, workcell, "playing_cards", look, point[1], math.pi)
         items.append(Item(str(i), "playing_cards", standing(point, yaw), look))
     scene_objects, names = named(rng, items)
     return Draft(scene_objects, {"boxes": [names[item.role] for item in items]})

@@ -8,7 +8,7 @@ away from the robot. A layout that does not fit in 200 draws is refused (LayoutE
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
@@ -19,10 +19,10 @@ from robospa.geometry import Array
 from robospa.tasks.goals.pick import Lift
 from robospa.tasks.instructions import words_spatial
 from robospa.tasks.instructions.words import Slots
-from robospa.tasks.layouts import LayoutError, in_head_view
+from robospa.tasks.layouts import LayoutError
 from robospa.tasks.objects import looks, object_model
 from robospa.tasks.scene import Scene, SceneObject
-from robospa.tasks.task import Draft, Level, Task
+from robospa.tasks.task import Draft, Draw, Level, Task
 from robospa.tasks.variants.picking import (
     BLOCK_HALF,
     BLOCK_RADIUS,
@@ -33,6 +33,7 @@ from robospa.tasks.variants.picking import (
     pick_target,
 )
 from robospa.tasks.variants.tabletop import standing
+from robospa.workcell import Workcell
 
 MARGIN = (0.06, 0.08)
 """Centres are this far inside the head image (official)."""
@@ -156,6 +157,7 @@ def least_distances(crowd: Crowd, families: Sequence[Family], scale: float) -> A
 
 
 def _places(
+    workcell: Workcell,
     crowd: Crowd,
     shape: Shape,
     families: Sequence[Family],
@@ -186,16 +188,16 @@ def _places(
         points = np.array([(cx[c] + anchor_x, cy[r] + anchor_y) for c, r in used])
         if (np.hypot(*(points[:, None] - points).T) < least).any():
             continue
-        if _seen(crowd, points):
+        if _seen(workcell, crowd, points):
             return points
     raise LayoutError(f"no grid of {len(used)} objects fits in {DRAWS} draws; skip this seed")
 
 
-def _seen(crowd: Crowd, points: Array) -> bool:
+def _seen(workcell: Workcell, crowd: Crowd, points: Array) -> bool:
     """Whether centres keep the margin and whole footprints and heights are in view."""
     x, y = points.T
-    seen = in_head_view(x, y, 0.0, 0.0, MARGIN) & in_head_view(x, y, crowd.radius)
-    return bool((seen & in_head_view(x, y, 0.0, crowd.tall)).all())
+    seen = workcell.in_view(x, y, 0.0, 0.0, MARGIN) & workcell.in_view(x, y, crowd.radius)
+    return bool((seen & workcell.in_view(x, y, 0.0, crowd.tall)).all())
 
 
 def _label(shape: Shape, slot: tuple[int, int], used: list[tuple[int, int]]) -> str:
@@ -217,10 +219,10 @@ def _in_line(a: tuple[int, int], b: tuple[int, int]) -> bool:
     return a[0] == b[0] or a[1] == b[1]
 
 
-def drawer(crowd: Crowd) -> Callable[[int, np.random.Generator], Draft]:
+def drawer(crowd: Crowd) -> Draw:
     """The draw of `crowd`: direction and target slot, other slots, a straight layout, turns."""
 
-    def draw(level: int, rng: np.random.Generator) -> Draft:
+    def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
         shape = SHAPES[level]
         cells, table = shape.cells, weights(level).ravel()
         pick = min(int(np.searchsorted(np.cumsum(table), rng.random())), len(table) - 1)
@@ -241,12 +243,12 @@ def drawer(crowd: Crowd) -> Callable[[int, np.random.Generator], Draft]:
             order = rng.permutation(len(crowd.families))[: len(used)]
             families = tuple(crowd.families[int(i)] for i in order)
         families = families[: len(used)]
-        points = _places(crowd, shape, families, used, rng)
+        points = _places(workcell, crowd, shape, families, used, rng)
         params = [draw_params(rng, f.asset) for f in families[: 1 if crowd.alike else None]]
         objects = []
         for i, (x, y) in enumerate(points.tolist()):
             asset, own = families[i].asset, params[0 if crowd.alike else i]
-            yaw = drawn_yaw(rng, asset, own, y, families[i].half_range)
+            yaw = drawn_yaw(rng, workcell, asset, own, y, families[i].half_range)
             pose = standing((x, y), yaw, BLOCK_HALF if asset == "block" else 0.0)
             objects.append(SceneObject(f"object_{i}", asset, pose, own))
         facts = {

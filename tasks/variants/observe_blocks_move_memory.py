@@ -16,13 +16,13 @@ from robospa.tasks.goals.cue import AfterCue
 from robospa.tasks.goals.gather import Gather, Region
 from robospa.tasks.instructions.words import Slots
 from robospa.tasks.instructions.words_memory import shown_blocks
-from robospa.tasks.layouts import Area, Mask, in_head_view, scatter
+from robospa.tasks.layouts import Area, Mask, scatter
 from robospa.tasks.plan import Home, Pick, Place, Skill
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
 from robospa.tasks.variants.shown import HOLD_STILL, STAND_TOP, WALL, row, stand, wall
 from robospa.tasks.variants.tabletop import Item, named, side, standing
-from robospa.workcell import TABLE_TOP
+from robospa.workcell import TABLE_TOP, Workcell
 
 COLORS = {
     "red": (1.0, 0.0, 0.0),
@@ -51,12 +51,12 @@ GOAL_Y, GOAL_X = -0.18, 0.16
 LEVELS = {n: Level(candidates=2 * n, subtasks=n, steps=50 + 200 * n) for n in range(1, 6)}
 
 
-def draw(level: int, rng: np.random.Generator) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """Colours on the stand; the same and as many others on the table, all places alike."""
 
     def propose(generator: np.random.Generator) -> tuple[Array, Array, Mask]:
         x, y = AREA.draw(generator, (2 * level, TRIES))
-        seen = in_head_view(x, y, HALF * math.sqrt(2), 2 * HALF, (0.0, 0.0))
+        seen = workcell.in_view(x, y, HALF * math.sqrt(2), 2 * HALF, (0.0, 0.0))
         return x, y, (np.abs(x) >= MIDDLE) & seen
 
     colors = [list(COLORS)[int(i)] for i in rng.permutation(len(COLORS))[: 2 * level]]

@@ -29,6 +29,7 @@ from robospa.tasks.variants.clicking import (
 )
 from robospa.tasks.variants.shown import HOLD_STILL, STAND_TOP, WALL, row, stand, wall
 from robospa.tasks.variants.tabletop import Item, named, standing
+from robospa.workcell import Workcell
 
 KINDS = ("bread", "stapler", "can", "playing_cards", "bell")
 STAND_Y, STAND_HALF, STAND_SHADE, SHOWN_X = 0.15, (0.24, 0.05, 0.01), 0.8, 0.18
@@ -39,11 +40,11 @@ AREA, MIDDLE, DISTANCE = Area((-0.27, 0.27), (-0.21, -0.05)), 0.05, 0.10
 LEVELS = {n: Level(candidates=n, subtasks=n, steps=50 + 200 * n) for n in range(1, 6)}
 
 
-def draw(level: int, rng: np.random.Generator) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """Different kinds, in random order on the stand, at random places on the table."""
     kinds = [KINDS[int(i)] for i in rng.permutation(len(KINDS))[:level]]
     looks = [(kind, clickable_look(rng, kind)) for kind in kinds]
-    points = scattered(rng, AREA, MIDDLE, DISTANCE, looks)
+    points = scattered(rng, workcell, AREA, MIDDLE, DISTANCE, looks)
     items = [wall(WALL_Y, WALL_HALF_X), stand(STAND_Y, STAND_HALF, STAND_SHADE)]
     for (kind, look), x, point in zip(looks, row(level, SHOWN_X), points, strict=True):
         turn = float(rng.uniform(-SHOWN_TURN, SHOWN_TURN)) if kind == "bread" else 0.0

@@ -9,9 +9,9 @@ from __future__ import annotations
 import itertools
 
 from robospa.geometry import Vec3
-from robospa.tasks.layouts import EYE, Points
+from robospa.tasks.layouts import Points
 from robospa.tasks.variants.ranking import LAYOUTS, LEVELS, Measure, diagonal, front, rank_task
-from robospa.workcell import TABLE_TOP
+from robospa.workcell import TABLE_TOP, FixedCamera
 
 HALF_HEIGHTS = (
     (0.077, 0.078),
@@ -58,22 +58,24 @@ LENGTH_LAYOUTS = {
 }
 
 
-def none_hidden(points: Points, halves: list[Vec3]) -> bool:
-    """Whether the head camera sees the top of every block past all blocks that stand before it."""
+def none_hidden(camera: FixedCamera, points: Points, halves: list[Vec3]) -> bool:
+    """Whether the camera sees the top of every block past all blocks that stand before it."""
     blocks = sorted(zip(points, halves, strict=True), key=lambda b: b[0][1])
-    return not any(_hides(a, b) for a, b in itertools.combinations(blocks, 2))
+    return not any(_hides(camera.position, a, b) for a, b in itertools.combinations(blocks, 2))
 
 
-def _hides(near: tuple[tuple[float, float], Vec3], far: tuple[tuple[float, float], Vec3]) -> bool:
+def _hides(
+    eye: Vec3, near: tuple[tuple[float, float], Vec3], far: tuple[tuple[float, float], Vec3]
+) -> bool:
     """Whether the line of sight to the middle of `far`'s top meets `near`'s bounding cylinder."""
     (x, y), half = far
     (nx, ny), near_half = near
     radius = diagonal(near_half)
-    part = (ny + radius - EYE[1]) / (y - EYE[1])  # where the line passes the cylinder's far side
-    if part > 1 or abs(EYE[0] + part * (x - EYE[0]) - nx) > radius + half[0]:
+    part = (ny + radius - eye[1]) / (y - eye[1])  # where the line passes the cylinder's far side
+    if part > 1 or abs(eye[0] + part * (x - eye[0]) - nx) > radius + half[0]:
         return False
     top = TABLE_TOP + 2 * half[2]
-    return EYE[2] + part * (top - EYE[2]) < TABLE_TOP + 2 * near_half[2]
+    return eye[2] + part * (top - eye[2]) < TABLE_TOP + 2 * near_half[2]
 
 
 HEIGHT = Measure(

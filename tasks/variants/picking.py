@@ -15,6 +15,7 @@ from robospa.tasks.plan import Pick, Skill
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Tracker
 from robospa.tasks.variants.tabletop import draw_look
+from robospa.workcell import Workcell
 
 
 def pick_name(kind: str, family: str) -> str:
@@ -56,28 +57,31 @@ def draw_params(rng: np.random.Generator, asset: str) -> dict[str, object]:
     return dict(draw_look(rng, asset))
 
 
-FAR = 0.02
-"""Beyond this y [m] an arm cannot close its fingers along its own direction of reach."""
-ACROSS = math.cos(math.radians(40))
-"""Least x component of a closing direction (unit) that is reached out there."""
 TURNS = 60
 
 
 def drawn_yaw(
-    rng: np.random.Generator, asset: str, params: Mapping[str, Any], y: float, half_range: float
+    rng: np.random.Generator,
+    workcell: Workcell,
+    asset: str,
+    params: Mapping[str, Any],
+    y: float,
+    half_range: float,
 ) -> float:
     """A uniform yaw [rad] in +-`half_range` at which an object at `y` [m] can be grasped.
 
-    Far from the robot one of the object's grasps has to close sideways, within 40 degrees of the
-    x axis. The rule holds for every object, so it tells nothing about the target. LayoutError if
-    60 draws do not meet it.
+    Far from the robot one of the object's grasps has to close sideways, as near to the x axis as
+    the robot needs it there. The rule holds for every object, so it tells nothing about the
+    target. LayoutError if 60 draws do not meet it.
     """
-    closings = [g.closing for g in object_model(asset, params).grasps] if y > FAR else []
+    far = y > workcell.sideways_from
+    closings = [g.closing for g in object_model(asset, params).grasps] if far else []
+    across = math.cos(workcell.sideways_within)  # least x component of the closing direction
     for _ in range(TURNS):
         yaw = float(rng.uniform(-half_range, half_range))
-        if y <= FAR:
+        if not far:
             return yaw
         cos, sin = math.cos(yaw), math.sin(yaw)
-        if any(abs(cos * c[0] - sin * c[1]) >= ACROSS for c in closings):
+        if any(abs(cos * c[0] - sin * c[1]) >= across for c in closings):
             return yaw
     raise LayoutError(f"no turn of {asset} at y = {y:.3f} can be grasped; skip this seed")

@@ -37,6 +37,7 @@ from robospa.tasks.variants.tabletop import (
     side,
     standing,
 )
+from robospa.workcell import Workcell
 
 BOTTLES = {1: 1, 2: 2, 3: 3, 4: 3, 5: 3}
 CUPS = {1: 0, 2: 0, 3: 0, 4: 1, 5: 2}
@@ -64,12 +65,12 @@ LEVELS = {
 }
 
 
-def draw(level: int, rng: np.random.Generator) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """Bottles on the far half, cups and coasters on the near one."""
-    return retry(lambda: _draw(level, rng), f"objects of Place_Bottle_Cup level {level}")
+    return retry(lambda: _draw(level, rng, workcell), f"objects of Place_Bottle_Cup level {level}")
 
 
-def _draw(level: int, rng: np.random.Generator) -> Draft | None:
+def _draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft | None:
     items = [Item("dustbin", "dustbin", BIN, {"look": 0}, fixed=True)]
     points: list[Point] = []
 
@@ -79,11 +80,11 @@ def _draw(level: int, rng: np.random.Generator) -> Draft | None:
         asset = role.split("_")[0]
         look = draw_look(rng, asset)
         wide = radius(asset, look)
-        seen = in_view(asset, look)
+        seen = in_view(workcell, asset, look)
 
         def allowed(point: Point) -> bool:
             on_table = point[0] - wide > TABLE_LEFT + EDGE or asset == "bottle"
-            return on_table and seen(point) and reachable(point)
+            return on_table and seen(point) and reachable(workcell, point)
 
         point = free_point(rng, x, y, far, allowed=allowed)
         if point is not None:

@@ -13,7 +13,7 @@ from robospa.tasks import objects
 from robospa.tasks.goals.nest import Nest
 from robospa.tasks.instructions import words_dishes
 from robospa.tasks.instructions.words import Slots
-from robospa.tasks.layouts import Area, Mask, in_head_view, in_reach, scatter
+from robospa.tasks.layouts import Area, Mask, scatter
 from robospa.tasks.plan import Pick, Place, Skill
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
@@ -24,6 +24,7 @@ from robospa.tasks.variants.tabletop import (
     side,
     standing,
 )
+from robospa.workcell import Workcell
 
 PLATE_X, PLATE_SPREAD, PLATE_Y = 0.12, 0.03, (-0.15, -0.10)
 AREA, MIDDLE = Area((-0.28, 0.28), (-0.05, 0.20), True), 0.08
@@ -34,7 +35,7 @@ DISTANCE, FROM_PLATE = 0.13, 0.135
 LEVELS = {n: Level(candidates=n, subtasks=n, steps=200 * n) for n in range(1, 6)}
 
 
-def draw(level: int, rng: np.random.Generator) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """The plate on either side, then bowls of one look, off the middle, in view and in reach."""
     left = rng.random() < 0.5
     plate_x = (-PLATE_X if left else PLATE_X) + float(rng.uniform(-PLATE_SPREAD, PLATE_SPREAD))
@@ -45,7 +46,9 @@ def draw(level: int, rng: np.random.Generator) -> Draft:
     def propose(rng: np.random.Generator) -> tuple[Array, Array, Mask]:
         x, y = AREA.draw(rng, (level, TRIES))
         usable = (np.abs(x) >= MIDDLE) & (np.hypot(x - plate[0], y - plate[1]) >= FROM_PLATE)
-        usable &= in_head_view(x, y, model.radius, model.size[2], (0.0, 0.0)) & in_reach(x, y)
+        usable &= workcell.in_view(
+            x, y, model.radius, model.size[2], (0.0, 0.0)
+        ) & workcell.in_reach(x, y)
         return x, y, usable
 
     found = scatter(rng, propose, [[DISTANCE] * level] * level, restarts=RESTARTS)

@@ -32,6 +32,7 @@ from robospa.tasks.variants.tabletop import (
     retry,
     standing,
 )
+from robospa.workcell import Workcell
 
 STEPS = {1: "b", 2: "bf", 3: "bfc", 4: "bfcB", 5: "bfcBF"}
 """What is asked for: b burger and f fries onto the tray, c a click, B and F back again."""
@@ -58,13 +59,13 @@ LEVELS = {
 }
 
 
-def draw(level: int, rng: np.random.Generator) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """The tray in the middle, food beside it, the bell behind."""
     what = f"objects of Place_Burger_Fries_Click_Bell level {level}"
-    return retry(lambda: _draw(level, rng), what)
+    return retry(lambda: _draw(level, rng, workcell), what)
 
 
-def _draw(level: int, rng: np.random.Generator) -> Draft | None:
+def _draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft | None:
     look = draw_look(rng, "tray")
     middle = (0.0, float(rng.uniform(*TRAY_Y)))
     items = [Item("tray", "tray", standing(middle), look, fixed=True)]
@@ -73,7 +74,7 @@ def _draw(level: int, rng: np.random.Generator) -> Draft | None:
     for key, (role, asset) in FOOD.items():
         if key in STEPS[level]:
             look = draw_look(rng, asset)
-            point = free_point(rng, X[role], FOOD_Y, [], allowed=in_view(asset, look))
+            point = free_point(rng, X[role], FOOD_Y, [], allowed=in_view(workcell, asset, look))
             room = radius(asset, look)
             if point is None or abs(point[0]) < width / 2 + room + GAP:
                 return None
@@ -82,7 +83,7 @@ def _draw(level: int, rng: np.random.Generator) -> Draft | None:
     if "c" in STEPS[level]:
         look = draw_look(rng, "bell")
         room = radius("bell", look) + GAP
-        seen = in_view("bell", look)
+        seen = in_view(workcell, "bell", look)
 
         def allowed(point: Point) -> bool:
             beyond = point[1] > middle[1] + depth / 2 + room or abs(point[0]) > width / 2 + room

@@ -32,6 +32,7 @@ from robospa.tasks.variants.tabletop import (
     retry,
     standing,
 )
+from robospa.workcell import Workcell
 
 STEPS = {1: "b", 2: "bo", 3: "boc", 4: "bocB", 5: "bocBO"}
 """What is asked for: b bell onto the scale, o thing onto the stand, c a click, B and O back."""
@@ -67,12 +68,14 @@ LEVELS = {
 }
 
 
-def draw(level: int, rng: np.random.Generator) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """This level's things, each in its region."""
-    return retry(lambda: _draw(level, rng), f"objects of Place_Object_Scale_Click level {level}")
+    return retry(
+        lambda: _draw(level, rng, workcell), f"objects of Place_Object_Scale_Click level {level}"
+    )
 
 
-def _draw(level: int, rng: np.random.Generator) -> Draft | None:
+def _draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft | None:
     items: list[Item] = []
     taken: dict[str, tuple[Point, float]] = {}
     thing = THINGS[int(rng.integers(len(THINGS)))]
@@ -83,7 +86,7 @@ def _draw(level: int, rng: np.random.Generator) -> Draft | None:
         look = draw_look(rng, asset)
         room = radius(asset, look)
         far = [(p, max(_least(role, other), r + room + GAP)) for other, (p, r) in taken.items()]
-        point = free_point(rng, x, y, far, allowed=_allowed(role, asset, look))
+        point = free_point(rng, x, y, far, allowed=_allowed(workcell, role, asset, look))
         if point is None:
             return None
         taken[role] = (point, room)
@@ -92,9 +95,11 @@ def _draw(level: int, rng: np.random.Generator) -> Draft | None:
     return Draft(*named(rng, items))
 
 
-def _allowed(role: str, asset: str, look: dict[str, int]) -> Callable[[Point], bool]:
+def _allowed(
+    workcell: Workcell, role: str, asset: str, look: dict[str, int]
+) -> Callable[[Point], bool]:
     """Whether a thing may stand somewhere: in view, and the cards off the middle line."""
-    seen = in_view(asset, look)
+    seen = in_view(workcell, asset, look)
     off = CARDS_OFF if role == "cards" else 0.0
     return lambda point: abs(point[0]) >= off and seen(point)
 

@@ -33,6 +33,7 @@ from robospa.tasks.variants.tabletop import (
     retry,
     standing,
 )
+from robospa.workcell import Workcell
 
 PRESSES = {1: 0, 2: 1, 3: 2, 4: 3, 5: 3}
 DUMP_LEVEL = 5
@@ -61,12 +62,14 @@ LEVELS = {
 }
 
 
-def draw(level: int, rng: np.random.Generator) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """This level's things, each in its region, no two touching."""
-    return retry(lambda: _draw(level, rng), f"objects of Place_Phone_Press_Stapler level {level}")
+    return retry(
+        lambda: _draw(level, rng, workcell), f"objects of Place_Phone_Press_Stapler level {level}"
+    )
 
 
-def _draw(level: int, rng: np.random.Generator) -> Draft | None:
+def _draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft | None:
     items: list[Item] = []
     taken: list[tuple[Point, float]] = []
     wanted = ["phone", "phone_stand", *(["stapler"] if PRESSES[level] else [])]
@@ -76,7 +79,7 @@ def _draw(level: int, rng: np.random.Generator) -> Draft | None:
         room = radius(asset, look)
         least = PHONE_DISTANCE if asset == "phone_stand" else 0.0
         far = [(p, max(least, r + room + GAP)) for p, r in taken]
-        point = free_point(rng, x, y, far, allowed=in_view(asset, look))
+        point = free_point(rng, x, y, far, allowed=in_view(workcell, asset, look))
         if point is None:
             return None
         taken.append((point, room))

@@ -19,6 +19,7 @@ from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
 from robospa.tasks.variants.clicking import click_counter, press_point
 from robospa.tasks.variants.tabletop import Item, draw_look, named, side, standing
+from robospa.workcell import Workcell
 
 ROWS = {
     1: (0.0,),
@@ -37,7 +38,7 @@ MOST = 5
 LEVELS = {n: Level(candidates=n, subtasks=n, steps=200 * n) for n in range(1, 6)}
 
 
-def draw(level: int, rng: np.random.Generator) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """A row of staplers, and how often each is to be pressed."""
     y = float(rng.uniform(*Y))
     items = [

@@ -19,13 +19,14 @@ from robospa.tasks.plan import Press, Skill
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
 from robospa.tasks.variants.tabletop import Item, draw_look, named, side, standing
+from robospa.workcell import Workcell
 
 X, Y = (-0.2, 0.2), (-0.1, 0.05)
 
 LEVELS = {n: Level(candidates=1, subtasks=n, steps=200 * n) for n in range(1, 6)}
 
 
-def draw(level: int, rng: np.random.Generator) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """One stapler anywhere in the region, turned any way."""
     point = (float(rng.uniform(*X)), float(rng.uniform(*Y)))
     pose = standing(point, float(rng.uniform(-math.pi, math.pi)))

@@ -8,6 +8,7 @@ right arm cannot reach the bin, so it hands bottles over by setting them down in
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 
@@ -27,7 +28,7 @@ from robospa.tasks.variants.bins import (
     reachable,
 )
 from robospa.tasks.variants.tabletop import Item, Point, middle_in_view, named, scatter, standing
-from robospa.workcell import TABLE_TOP
+from robospa.workcell import TABLE_TOP, Workcell
 
 X, Y, DISTANCE, MIDDLE = (-0.25, 0.3), (0.03, 0.23), 0.13, 0.05
 HALF_HEIGHT = 0.07
@@ -35,14 +36,18 @@ HALF_HEIGHT = 0.07
 LEVELS = {n: Level(candidates=n, subtasks=n, steps=400 * n) for n in range(1, 6)}
 
 
-def _usable(point: Point) -> bool:
+def _usable(workcell: Workcell, point: Point) -> bool:
     """Off the middle strip, within reach of the arm on that side, a bottle's middle in view."""
-    return abs(point[0]) >= MIDDLE and reachable(point) and middle_in_view(point, HALF_HEIGHT)
+    return (
+        abs(point[0]) >= MIDDLE
+        and reachable(workcell, point)
+        and middle_in_view(workcell, point, HALF_HEIGHT)
+    )
 
 
-def draw(level: int, rng: np.random.Generator) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """Bottles anywhere in the region but the middle strip; different looks up to level 3."""
-    points = scatter(rng, level, X, Y, DISTANCE, _usable)
+    points = scatter(rng, level, X, Y, DISTANCE, partial(_usable, workcell))
     count = objects.looks("bottle")
     looks = rng.choice(count, size=level, replace=level > min(3, count))
     items = [Item("dustbin", "dustbin", BIN, {"look": 0}, fixed=True)]

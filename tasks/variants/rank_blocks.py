@@ -19,7 +19,6 @@ from robospa.tasks.goals.row import Row
 from robospa.tasks.goals.stack import Bring
 from robospa.tasks.instructions import words_ranking
 from robospa.tasks.instructions.words import Slots
-from robospa.tasks.layouts import view_span
 from robospa.tasks.plan import Pick, Place, Skill
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
@@ -34,7 +33,7 @@ from robospa.tasks.variants.tabletop import (
     standing,
 )
 from robospa.tasks.variants.towers import NEAR_BAND, draw_color
-from robospa.workcell import TABLE_TOP
+from robospa.workcell import TABLE_TOP, Workcell
 
 Color = list[float]
 Look = tuple[Vec3, Color]
@@ -108,7 +107,9 @@ def _scattered(points: Sequence[Point]) -> bool:
     return not ordered and not tight
 
 
-def _places(looks: Sequence[Look], rng: np.random.Generator) -> tuple[Point, ...]:
+def _places(
+    looks: Sequence[Look], rng: np.random.Generator, workcell: Workcell
+) -> tuple[Point, ...]:
     """Free places, all wholly in the head camera's view."""
     reach = max(math.hypot(half[0], half[1]) for half, _ in looks)
     height = max(2 * half[2] for half, _ in looks)
@@ -117,7 +118,7 @@ def _places(looks: Sequence[Look], rng: np.random.Generator) -> tuple[Point, ...
         x, y = point
         if abs(x) < BAND or not apart(point, [NEAR_MIDDLE], DISTANCE):
             return False
-        low, high = view_span(y, reach, height)
+        low, high = workcell.view_span(y, reach, height)
         return low <= x <= high
 
     for _ in range(LAYOUTS):
@@ -127,7 +128,7 @@ def _places(looks: Sequence[Look], rng: np.random.Generator) -> tuple[Point, ...
     raise RuntimeError(f"no mixed-up layout of {len(looks)} blocks; skip this seed")
 
 
-def _draw(looks: Sequence[Look], rng: np.random.Generator) -> Draft:
+def _draw(looks: Sequence[Look], rng: np.random.Generator, workcell: Workcell) -> Draft:
     items = [
         Item(
             str(rank),
@@ -135,7 +136,9 @@ def _draw(looks: Sequence[Look], rng: np.random.Generator) -> Draft:
             standing(point, float(rng.uniform(-YAW, YAW)), half[2]),
             {"half": list(half), "color": list(color)},
         )
-        for rank, ((half, color), point) in enumerate(zip(looks, _places(looks, rng), strict=True))
+        for rank, ((half, color), point) in enumerate(
+            zip(looks, _places(looks, rng, workcell), strict=True)
+        )
     ]
     scene_objects, names = named(rng, items)
     return Draft(scene_objects, {"order": [names[item.role] for item in items]})
@@ -205,7 +208,7 @@ def _task(kind: Kind) -> Task:
         name=f"Rank_Blocks_{kind.name}",
         category="OFE",
         levels=LEVELS,
-        draw=lambda level, rng: _draw(kind.looks(level, rng), rng),
+        draw=lambda level, rng, workcell: _draw(kind.looks(level, rng), rng, workcell),
         goal=goal,
         plan=plan,
         slots=lambda scene: kind.words(len(scene.facts["order"])),

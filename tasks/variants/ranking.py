@@ -17,11 +17,11 @@ from robospa.geometry import Array, Pose, Vec3, yaw_rotation
 from robospa.tasks.goals.pick import Lift
 from robospa.tasks.instructions import words_spatial
 from robospa.tasks.instructions.words import Slots
-from robospa.tasks.layouts import Area, Mask, Points, in_head_view, scatter, spread
+from robospa.tasks.layouts import Area, Mask, Points, scatter, spread
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.task import Draft, Level, Task
 from robospa.tasks.variants.picking import lifted, pick_target
-from robospa.workcell import TABLE_TOP
+from robospa.workcell import TABLE_TOP, FixedCamera, Workcell
 
 Range = tuple[float, float]
 
@@ -92,7 +92,7 @@ class Measure:
     `ranges(level)` are the values [m] of ranks 1, 2, ...; `shared` are ranges of values that all
     blocks of a scene have in common; `half(value, shared, level)` makes the half sizes of a block.
     `room` [m] of a block enters the least centre distances, `seen` (radius, height) [m] the view.
-    `visible(points, halves)` refuses layouts in which a block hides another.
+    `visible(camera, points, halves)` refuses layouts in which a block hides another.
     """
 
     word: str
@@ -101,7 +101,7 @@ class Measure:
     room: Callable[[Vec3], float]
     seen: Callable[[Vec3], tuple[float, float]]
     shared: tuple[Range, ...] = ()
-    visible: Callable[[Points, list[Vec3]], bool] = lambda points, halves: True
+    visible: Callable[[FixedCamera, Points, list[Vec3]], bool] = lambda camera, points, halves: True
 
 
 def diagonal(half: Vec3) -> float:
@@ -109,7 +109,9 @@ def diagonal(half: Vec3) -> float:
     return math.hypot(half[0], half[1])
 
 
-def draw(level: int, rng: np.random.Generator, measure: Measure, layout: Layout) -> Draft:
+def draw(
+    level: int, rng: np.random.Generator, workcell: Workcell, measure: Measure, layout: Layout
+) -> Draft:
     """Blocks of the first n ranks in random order, scattered, and a uniform target rank."""
     ranges = measure.ranges(level)
     count = len(ranges)
@@ -125,14 +127,14 @@ def draw(level: int, rng: np.random.Generator, measure: Measure, layout: Layout)
         x[:, :1], y[:, :1] = layout.first.draw(rng, (count, 1))
         (dx, dy), square = DISC
         usable = (np.abs(x) >= layout.band) & ((x - dx) ** 2 + (y - dy) ** 2 >= square)
-        return x, y, usable & in_head_view(x, y, radius, height)
+        return x, y, usable & workcell.in_view(x, y, radius, height)
 
     rooms = [measure.room(h) for h in halves]
     points = scatter(
         rng,
         propose,
         [[a + b + layout.margin for b in rooms] for a in rooms],
-        lambda points: layout.accept(points) and measure.visible(points, halves),
+        lambda points: layout.accept(points) and measure.visible(workcell.head, points, halves),
     )
     yaws = rng.uniform(-layout.yaw, layout.yaw, count)
     objects = tuple(
@@ -162,7 +164,7 @@ def rank_task(measure: Measure, layouts: Mapping[int, Layout]) -> Task:
         name=f"Pick_Blocks_{word.capitalize()}",
         category="GAC",
         levels=LEVELS,
-        draw=lambda level, rng: draw(level, rng, measure, layouts[level]),
+        draw=lambda level, rng, workcell: draw(level, rng, workcell, measure, layouts[level]),
         goal=lifted(Lift(above=0.82)),
         plan=pick_target,
         slots=slots,

@@ -15,7 +15,7 @@ from robospa.tasks.plan import Home, Pick, Place, Skill, Wait
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
 from robospa.tasks.variants.tabletop import Item, named, side, standing
-from robospa.workcell import TABLE_TOP
+from robospa.workcell import TABLE_TOP, Workcell
 
 COLORS = {
     "red": (1.0, 0.0, 0.0),
@@ -51,7 +51,7 @@ OPEN_BELOW = TABLE_TOP + 0.005
 LEVELS = {n: Level(candidates=n, subtasks=n, steps=50 + 200 * n) for n in range(1, 6)}
 
 
-def draw(level: int, rng: np.random.Generator) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """Different colours in a fixed row, opened in a uniformly random order."""
     chosen = [list(COLORS)[int(i)] for i in rng.permutation(len(COLORS))[:level]]
     items = []

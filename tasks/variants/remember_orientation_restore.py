@@ -22,7 +22,7 @@ from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
 from robospa.tasks.variants.shown import HOLD_STILL, WALL, row, wall
 from robospa.tasks.variants.tabletop import Item, named, side, standing
-from robospa.workcell import TABLE_TOP
+from robospa.workcell import TABLE_TOP, Workcell
 
 TURNS = (0.0, -math.pi / 2, math.pi, math.pi / 2)
 """Up, right, down, left: where the bar of the T points, seen from the robot."""
@@ -37,7 +37,7 @@ FULL_TURN = 0.2
 LEVELS = {n: Level(candidates=2 * n, subtasks=n, steps=50 + 200 * n) for n in range(1, 6)}
 
 
-def draw(level: int, rng: np.random.Generator) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """Two rows; a near block never lies as its partner does. All blocks of a row look alike."""
     shown = [int(i) for i in rng.integers(4, size=level)]
     start = [(turn + int(rng.integers(1, 4))) % 4 for turn in shown]

@@ -18,7 +18,7 @@ from robospa.tasks.plan import Pick, Place, Skill
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
 from robospa.tasks.variants.tabletop import Item, draw_look, named, side, standing
-from robospa.workcell import TABLE_TOP
+from robospa.workcell import TABLE_TOP, Workcell
 
 ASSETS = {"bread": "bread", "fries": "french_fries"}
 SLOTS_X = {
@@ -44,7 +44,7 @@ PLACE_Y = {"forward": -0.04, "backward": -0.21}
 LEVELS = {n: Level(candidates=n, subtasks=n, steps=200 * n) for n in range(1, 6)}
 
 
-def draw(level: int, rng: np.random.Generator) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """Which kind goes forward is a fair coin, and so is the direction at level 1."""
     kinds = ["bread", "fries"] if rng.random() < 0.5 else ["fries", "bread"]
     first = FIRST[level] if level > 1 else int(rng.integers(2))

@@ -23,6 +23,7 @@ from robospa.tasks.variants.tabletop import (
     standing,
 )
 from robospa.tasks.variants.towers import building_place, tower_goal, tower_plan
+from robospa.workcell import Workcell
 
 COLORS = {
     "red": (1.0, 0.0, 0.0),
@@ -38,14 +39,14 @@ X, Y, DISTANCE, YAW = (-0.28, 0.28), (-0.08, 0.05), 0.10, 0.75
 LEVELS = {n: Level(candidates=n, subtasks=n, steps=200 * n) for n in range(1, 6)}
 
 
-def draw(level: int, rng: np.random.Generator) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """Scattered cubes; at level 1 the only one starts away from the place it must go to."""
 
     def away(point: Point) -> bool:
         return abs(point[0]) >= 0.05 and apart(point, [(0.0, -0.10)], 0.10)
 
     def allowed(point: Point) -> bool:
-        return (level > 1 or away(point)) and middle_in_view(point, HALF)
+        return (level > 1 or away(point)) and middle_in_view(workcell, point, HALF)
 
     points = scatter(rng, level, X, Y, DISTANCE, allowed, near_middle=True)
     items = [

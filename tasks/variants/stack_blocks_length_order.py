@@ -25,6 +25,7 @@ from robospa.tasks.variants.towers import (
     tower_goal,
     tower_plan,
 )
+from robospa.workcell import Workcell
 
 HALF_LENGTHS = {
     1: ((0.0240, 0.0250),),
@@ -55,13 +56,14 @@ GAP, YAW = 0.045, 0.20
 LEVELS = {n: Level(candidates=n, subtasks=n, steps=200 * n) for n in range(1, 6)}
 
 
-def draw(level: int, rng: np.random.Generator) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """Scattered bars, away from the middle of the near edge."""
     half_y, half_z = (round(float(v), 5) for v in rng.uniform(*SECTION, 2))
     halves = [(round(float(rng.uniform(*ends)), 5), half_y, half_z) for ends in HALF_LENGTHS[level]]
     reach = [math.hypot(half[0], half_y) for half in halves]
     points = scattered_blocks(
         rng,
+        workcell,
         GROUNDS[min(level, 2)],
         halves,
         lambda i, j: reach[i] + reach[j] + GAP,

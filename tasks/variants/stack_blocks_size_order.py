@@ -23,6 +23,7 @@ from robospa.tasks.variants.towers import (
     tower_goal,
     tower_plan,
 )
+from robospa.workcell import Workcell
 
 HALVES = {
     2: (0.0165, 0.01275),
@@ -41,12 +42,12 @@ MIDDLE = (0.0, -0.10)
 LEVELS = {n: Level(candidates=n, subtasks=n, steps=200 * n) for n in range(1, 6)}
 
 
-def draw(level: int, rng: np.random.Generator) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """Scattered cubes, away from the middle of the near edge."""
     halves = HALVES.get(level) or (round(float(rng.uniform(*ONE)), 5),)
     cubes = [(half, half, half) for half in halves]
     ground = Ground(AREA, 0.05, MIDDLE, 0.10 if level == 1 else 0.15)
-    points = scattered_blocks(rng, ground, cubes, lambda i, j: DISTANCE)
+    points = scattered_blocks(rng, workcell, ground, cubes, lambda i, j: DISTANCE)
     color = draw_color(rng)
     items = [
         Item(

@@ -29,6 +29,7 @@ from robospa.tasks.variants.tabletop import (
     side,
     standing,
 )
+from robospa.workcell import Workcell
 
 COLORS = (
     ("red",), ("green",), ("blue", "navy"), ("yellow",), ("cyan",), ("magenta",), ("black",),
@@ -62,12 +63,12 @@ LAYOUTS = 60
 LEVELS = {n: Level(candidates=n, subtasks=n, steps=200 * n) for n in range(1, 6)}
 
 
-def draw(level: int, rng: np.random.Generator) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """Pads of different colours, the seal not too near to any."""
     groups = [COLORS[int(i)] for i in rng.permutation(len(COLORS))[:level]]
     colors = [group[int(rng.integers(len(group)))] for group in groups]
     look = draw_look(rng, "seal")
-    points, seal = _layout(level, rng, look)
+    points, seal = _layout(level, rng, workcell, look)
     items = [Item("seal", "seal", standing(seal), look)]
     for color, point in zip(colors, points, strict=True):
         items.append(Item(color, "pad", standing(point), {"look": PADS.index(color)}, fixed=True))
@@ -77,9 +78,10 @@ def draw(level: int, rng: np.random.Generator) -> Draft:
 
 
 def _layout(
-    level: int, rng: np.random.Generator, look: dict[str, int]
+    level: int, rng: np.random.Generator, workcell: Workcell, look: dict[str, int]
 ) -> tuple[list[Point], Point]:
     """Places of the pads from right to left, and of the seal."""
+    pad_seen, seal_seen = in_view(workcell, "pad", {}), in_view(workcell, "seal", look)
     for _ in range(LAYOUTS):
         if level == 1:
             way = 1 if rng.random() < 0.5 else -1
@@ -93,7 +95,7 @@ def _layout(
             if any(a[0] - b[0] < PADS_APART for a, b in pairwise(pads)):
                 continue
             seal = free_point(rng, SEAL_X, SEAL_Y, [(p, APART) for p in pads], 40)
-        if seal and all(in_view("pad", {})(p) for p in pads) and in_view("seal", look)(seal):
+        if seal and seal_seen(seal) and all(pad_seen(p) for p in pads):
             return pads, seal
     raise LayoutError(f"no free place of the seal beside {level} pads; skip this seed")
 

@@ -29,6 +29,7 @@ from robospa.tasks.variants.tabletop import (
     side,
     standing,
 )
+from robospa.workcell import Workcell
 
 STEPS = {1: "l", 2: "ll", 3: "llr", 4: "llrr", 5: "llrrs"}
 """What is asked for: l a stamp with the left seal, r one with the right seal, s the stapler."""
@@ -48,12 +49,14 @@ LEVELS = {
 }
 
 
-def draw(level: int, rng: np.random.Generator) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """Seals and pads of this level's sides, and the stapler between them."""
-    return retry(lambda: _draw(level, rng), f"objects of Stamp_Seals_Press_Stapler level {level}")
+    return retry(
+        lambda: _draw(level, rng, workcell), f"objects of Stamp_Seals_Press_Stapler level {level}"
+    )
 
 
-def _draw(level: int, rng: np.random.Generator) -> Draft | None:
+def _draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft | None:
     items: list[Item] = []
     taken: list[tuple[tuple[float, float], float]] = []
     for at in ("left", "right")[: 1 + ("r" in STEPS[level])]:

@@ -15,11 +15,10 @@ import numpy as np
 
 from robospa.geometry import Pose, yaw_rotation
 from robospa.tasks import objects
-from robospa.tasks.layouts import in_head_view
 from robospa.tasks.scene import SceneObject
 from robospa.tasks.shapes import ObjectModel
 from robospa.tasks.task import Draft
-from robospa.workcell import TABLE_TOP
+from robospa.workcell import TABLE_TOP, Workcell
 
 Point = tuple[float, float]
 TRIES_PER_POINT = 100
@@ -95,21 +94,21 @@ def free_point(
     return None
 
 
-def in_view(asset: str, params: Mapping[str, Any]) -> Callable[[Point], bool]:
+def in_view(workcell: Workcell, asset: str, params: Mapping[str, Any]) -> Callable[[Point], bool]:
     """Whether the head camera sees the whole asset when it stands at a point."""
     model: ObjectModel = objects.object_model(asset, params)
 
     def seen(point: Point) -> bool:
         x, y = np.array(point[0]), np.array(point[1])
-        return bool(in_head_view(x, y, model.radius, model.size[2], (0.0, 0.0)))
+        return bool(workcell.in_view(x, y, model.radius, model.size[2], (0.0, 0.0)))
 
     return seen
 
 
-def middle_in_view(point: Point, height: float) -> bool:
+def middle_in_view(workcell: Workcell, point: Point, height: float) -> bool:
     """Whether the head camera sees what is `height` [m] above the table at a point."""
     x, y = np.array(point[0]), np.array(point[1])
-    return bool(in_head_view(x, y, 0.0, height, (0.0, 0.0)))
+    return bool(workcell.in_view(x, y, 0.0, height, (0.0, 0.0)))
 
 
 def scatter(

@@ -14,11 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from robospa.tasks.goals.stack import HEIGHT_TOLERANCE, Bring, Stack
-from robospa.tasks.layouts import Area, LayoutError, Points, in_head_view
+from robospa.tasks.layouts import Area, LayoutError, Points
 from robospa.tasks.plan import Pick, Place, Skill
 from robospa.tasks.scene import Scene
 from robospa.tasks.variants.tabletop import Point, apart, side
-from robospa.workcell import TABLE_TOP
+from robospa.workcell import TABLE_TOP, Workcell
 
 NEAR_BAND: tuple[Point, Point] = ((-0.05, 0.05), (-1.0, -0.08))
 """Level 1: the block's centre must come here (x, y)."""
@@ -58,6 +58,7 @@ class Ground:
 
 def scattered_blocks(
     rng: np.random.Generator,
+    workcell: Workcell,
     ground: Ground,
     halves: Sequence[Sequence[float]],
     gaps: Callable[[int, int], float],
@@ -77,7 +78,7 @@ def scattered_blocks(
         x, y = ground.area.draw(rng, (POOL,))
         mx, my = ground.middle
         usable = (np.abs(x) >= ground.off_middle) & (np.hypot(x - mx, y - my) >= ground.free)
-        usable &= in_head_view(x, y, reach, height, (0.0, 0.0))
+        usable &= workcell.in_view(x, y, reach, height, (0.0, 0.0))
         x, y = x[usable], y[usable]
         drawn = rng.integers(len(x), size=(LAYOUTS, count)).T
         xs, ys = x[drawn], y[drawn]  # a row a block, a column a layout

@@ -1,70 +1,14 @@
-"""Layouts: the head camera's projection against official figures, bounded scatter, the pool."""
+"""Layouts: areas, bounded scatter, the pool."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from robospa.tasks.layouts import (
-    EYE,
-    Area,
-    LayoutError,
-    head_pixel,
-    in_head_view,
-    in_reach,
-    scatter,
-    spread,
-    view_span,
-)
+from robospa.tasks.layouts import Area, LayoutError, scatter, spread
 from robospa.tasks.packing import apart, pool, walk
-from robospa.workcell import TABLE_TOP
 
 A = np.array
-
-
-def test_point_on_the_optical_axis_is_the_image_centre() -> None:
-    u, v = head_pixel(A([EYE[0]]), A([EYE[1] + 0.6]), A([EYE[2] - 0.8]))
-    assert (u[0], v[0]) == pytest.approx((160.0, 120.0))
-
-
-@pytest.mark.parametrize(
-    ("x", "y", "axis", "edge"),
-    [
-        (0.0, -0.248, 1, 240.0),
-        (0.0, 0.432, 1, 0.0),
-        (-0.303, -0.248, 0, 0.0),
-        (0.239, -0.248, 0, 320.0),
-        (0.421, 0.432, 0, 320.0),
-    ],
-)
-def test_edges_of_the_visible_table_are_the_official_ones(
-    x: float, y: float, axis: int, edge: float
-) -> None:
-    assert head_pixel(A([x]), A([y]), TABLE_TOP)[axis][0] == pytest.approx(edge, abs=1.0)
-
-
-def test_pixels_per_metre_at_the_table_centre_are_the_official_ones() -> None:
-    u, _ = head_pixel(A([0.0, 0.01]), A([0.0, 0.0]), TABLE_TOP)
-    assert (u[1] - u[0]) / 0.01 == pytest.approx(474, abs=2)
-
-
-def test_tall_object_leaves_the_view_before_a_flat_one() -> None:
-    x, y = A([0.24]), A([-0.1])
-    flat, tall = in_head_view(x, y, 0.0, 0.0), in_head_view(x, y, 0.0, 0.12)
-    assert (bool(flat[0]), bool(tall[0])) == (True, False)
-
-
-@pytest.mark.parametrize("y", [-0.18, 0.0, 0.1])
-def test_view_span_ends_where_the_view_does(y: float) -> None:
-    low, high = view_span(y, 0.03, 0.05)
-    inside = in_head_view(A([low, high]) + A([1e-6, -1e-6]), A([y, y]), 0.03, 0.05)
-    outside = in_head_view(A([low, high]) + A([-1e-3, 1e-3]), A([y, y]), 0.03, 0.05)
-    assert inside.all() and not outside.any()
-
-
-def test_reach_covers_the_work_area_and_not_the_far_edge() -> None:
-    assert in_reach(A([0.0, -0.25, 0.25]), A([0.19, 0.2, 0.2])).all()
-    assert not in_reach(A([0.0]), A([0.34]))[0]
 
 
 def test_area_clears_the_far_middle() -> None:

@@ -16,7 +16,6 @@ from teleport import Teleport
 from robospa.tasks.catalog import build_scene, task
 from robospa.tasks.events import outcome
 from robospa.tasks.instructions import sentences
-from robospa.tasks.layouts import EYE, in_head_view, in_reach
 from robospa.tasks.objects import looks, object_model
 from robospa.tasks.objects.build import PALETTE
 from robospa.tasks.objects.tint import TINTS
@@ -25,7 +24,9 @@ from robospa.tasks.scene import Scene
 from robospa.tasks.variants import object_sets
 from robospa.tasks.variants.basic_color import COLORS
 from robospa.tasks.variants.pick_blocks_measures import none_hidden
-from robospa.workcell import TABLE_TOP
+from robospa.workcell import TABLE_TOP, workcell
+
+CELL = workcell("aloha-agilex")
 
 MEASURES = {"Pick_Blocks_Height": 2, "Pick_Blocks_Length": 0, "Pick_Blocks_Area": 0}
 """Which half size makes the rank."""
@@ -91,8 +92,8 @@ def test_objects_are_apart_in_view_in_reach_and_on_the_table(name: str, level: i
         x, y = places(scene).T
         radius = np.array([m.radius for m in models])
         height = np.array([m.size[2] for m in models])
-        assert in_head_view(x, y, radius, 0.0).all() and in_head_view(x, y, 0.0, height).all()
-        assert in_reach(x, y).all()
+        assert CELL.in_view(x, y, radius, 0.0).all() and CELL.in_view(x, y, 0.0, height).all()
+        assert CELL.in_reach(x, y).all()
         low = [o.pose.position[2] + m.bottom for o, m in zip(scene.objects, models, strict=True)]
         assert low == pytest.approx([TABLE_TOP] * len(low))
         for i, j in itertools.combinations(range(len(models)), 2):
@@ -149,10 +150,11 @@ def test_ranks_are_true_uniform_and_the_only_difference(name: str, level: int) -
 @pytest.mark.parametrize("level", LEVELS)
 def test_no_block_hides_behind_a_taller_one(level: int) -> None:
     # Independent of the layout's own rule: sight lines to the tops, sampled along their length.
+    eye = np.array(CELL.head.position)
     for scene in scenes("Pick_Blocks_Height", level):
         for item, other in itertools.permutations(scene.objects, 2):
             top = np.array(item.pose.position) + np.array([0.0, 0.0, item.params["half"][2]])
-            line = np.array(EYE) + np.linspace(0, 1, 400)[:, None] * (top - np.array(EYE))
+            line = eye + np.linspace(0, 1, 400)[:, None] * (top - eye)
             delta = np.abs(line - np.array(other.pose.position))
             half = other.params["half"]
             inside = (delta[:, :2] < 0.0155).all(axis=1) & (delta[:, 2] < half[2])
@@ -162,9 +164,9 @@ def test_no_block_hides_behind_a_taller_one(level: int) -> None:
 def test_a_short_block_behind_a_tall_one_is_refused() -> None:
     tall, short = (0.016, 0.016, 0.077), (0.016, 0.016, 0.012)
     behind = [(-0.03, -0.05), (-0.03, 0.05)]
-    assert not none_hidden(behind, [tall, short])
-    assert none_hidden(behind, [short, tall])
-    assert none_hidden([(-0.15, -0.05), (0.1, 0.05)], [tall, short])
+    assert not none_hidden(CELL.head, behind, [tall, short])
+    assert none_hidden(CELL.head, behind, [short, tall])
+    assert none_hidden(CELL.head, [(-0.15, -0.05), (0.1, 0.05)], [tall, short])
 
 
 # Distances

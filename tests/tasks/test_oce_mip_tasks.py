@@ -14,10 +14,11 @@ from teleport import Teleport
 from robospa.geometry import rotate
 from robospa.tasks.catalog import build_scene, task
 from robospa.tasks.events import outcome
-from robospa.tasks.layouts import in_head_view, in_reach
 from robospa.tasks.objects import object_model
 from robospa.tasks.scene import Scene, SceneObject
-from robospa.workcell import TABLE_TOP
+from robospa.workcell import TABLE_TOP, workcell
+
+CELL = workcell("aloha-agilex")
 
 STACKS = ("Stack_Blocks_Size_Order", "Stack_Blocks_Length_Order")
 WALLED = (
@@ -63,9 +64,9 @@ def test_things_stand_free_on_the_table_wholly_in_view_and_in_reach(name: str, l
         x, y, z = (np.array([o.pose.position[i] for o in things]) for i in range(3))
         assert np.allclose(z + [m.bottom for m in models], TABLE_TOP)
         radii = np.array([m.radius for m in models])
-        whole = in_head_view(x, y, radii, np.array([m.size[2] for m in models]), (0.0, 0.0))
+        whole = CELL.in_view(x, y, radii, np.array([m.size[2] for m in models]), (0.0, 0.0))
         assert whole.all(), (scene.seed, [o.asset for o in things], whole)
-        assert in_reach(x, y).all() or name == "Remember_Orientation_Restore", scene.seed
+        assert CELL.in_reach(x, y).all() or name == "Remember_Orientation_Restore", scene.seed
         for i, j in itertools.combinations(range(len(models)), 2):
             kinds = {things[i].asset, things[j].asset}
             if kinds == {"pad"}:

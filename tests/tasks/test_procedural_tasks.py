@@ -13,10 +13,11 @@ from teleport import Teleport
 from robospa.geometry import rotate
 from robospa.tasks.catalog import build_scene, task
 from robospa.tasks.events import outcome
-from robospa.tasks.layouts import in_head_view, in_reach
 from robospa.tasks.objects import object_model
 from robospa.tasks.scene import Scene, SceneObject
-from robospa.workcell import TABLE_TOP
+from robospa.workcell import TABLE_TOP, workcell
+
+CELL = workcell("aloha-agilex")
 
 TASKS = (
     "Press_Stapler_Repeat",
@@ -228,5 +229,5 @@ def test_the_head_camera_sees_every_centre_and_an_arm_reaches_it(name: str, leve
     for scene in scenes(name, level, SEEDS[:100]):
         spots = [o.pose.position for o in scene.objects if o.asset != "dustbin"]
         x, y = (np.array([spot[i] for spot in spots]) for i in (0, 1))
-        assert in_head_view(x, y, margin=(0.0, 0.0)).all(), scene.seed
-        assert in_reach(x, y).all(), scene.seed
+        assert CELL.in_view(x, y, margin=(0.0, 0.0)).all(), scene.seed
+        assert CELL.in_reach(x, y).all(), scene.seed

@@ -14,11 +14,12 @@ from teleport import Teleport
 from robospa.geometry import rotate
 from robospa.tasks.catalog import build_scene, task
 from robospa.tasks.events import outcome
-from robospa.tasks.layouts import in_head_view, in_reach
 from robospa.tasks.objects import object_model
 from robospa.tasks.plan import Place
 from robospa.tasks.scene import Scene
-from robospa.workcell import TABLE_TOP
+from robospa.workcell import TABLE_TOP, workcell
+
+CELL = workcell("aloha-agilex")
 
 RANKED = ("Rank_Blocks_Height", "Rank_Blocks_Color", "Rank_Blocks_Size")
 TASKS = (
@@ -54,8 +55,8 @@ def test_things_stand_free_on_the_table_wholly_in_view_and_in_reach(name: str, l
         x, y, z = (np.array([o.pose.position[i] for o in scene.objects]) for i in range(3))
         assert np.allclose(z + [m.bottom for m in models], TABLE_TOP)
         radii = np.array([m.radius for m in models])
-        assert in_head_view(x, y, radii, np.array([m.size[2] for m in models]), (0.0, 0.0)).all()
-        assert in_reach(x, y).all(), scene.seed
+        assert CELL.in_view(x, y, radii, np.array([m.size[2] for m in models]), (0.0, 0.0)).all()
+        assert CELL.in_reach(x, y).all(), scene.seed
         if name != "Move_Blocks_Apart":
             for i, j in itertools.combinations(range(len(models)), 2):
                 assert math.hypot(x[i] - x[j], y[i] - y[j]) > radii[i] + radii[j], scene.seed

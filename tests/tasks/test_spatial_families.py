@@ -12,7 +12,6 @@ from teleport import Teleport
 
 from robospa.tasks.catalog import build_scene, task, tasks
 from robospa.tasks.events import outcome
-from robospa.tasks.layouts import in_head_view, in_reach
 from robospa.tasks.objects import looks, object_model
 from robospa.tasks.plan import Pick
 from robospa.tasks.scene import Scene
@@ -23,6 +22,9 @@ from robospa.tasks.variants.pick_canonical import LINES
 from robospa.tasks.variants.pick_multi_view import SPREADS
 from robospa.tasks.variants.pick_relational import CROWDS
 from robospa.tasks.variants.picking import pick_name
+from robospa.workcell import workcell
+
+CELL = workcell("aloha-agilex")
 
 COUNTS = {
     **dict.fromkeys(("CPI", "SOI"), (3, 6, 8, 9, 12)),
@@ -83,9 +85,9 @@ def test_objects_are_seen_reached_and_apart(name: str, level: int) -> None:
         models = [object_model(o.asset, o.params) for o in scene.objects]
         x, y = places(scene).T
         radius = np.array([m.radius for m in models])
-        assert in_head_view(x, y, radius).all(), scene.seed
-        assert in_head_view(x, y, 0.0, np.array([m.size[2] for m in models])).all(), scene.seed
-        assert in_reach(x, y).all(), scene.seed
+        assert CELL.in_view(x, y, radius).all(), scene.seed
+        assert CELL.in_view(x, y, 0.0, np.array([m.size[2] for m in models])).all(), scene.seed
+        assert CELL.in_reach(x, y).all(), scene.seed
         for i, j in itertools.combinations(range(len(models)), 2):
             circles = math.hypot(x[i] - x[j], y[i] - y[j]) > radius[i] + radius[j]
             assert circles or separate(corners(scene, i), corners(scene, j)), (scene.seed, i, j)

@@ -15,7 +15,7 @@ from teleport import Teleport
 
 from robospa.tasks.catalog import build_scene, task
 from robospa.tasks.events import outcome
-from robospa.tasks.layouts import Area, in_head_view, in_reach
+from robospa.tasks.layouts import Area
 from robospa.tasks.objects import looks, object_model
 from robospa.tasks.plan import Pick
 from robospa.tasks.scene import Scene
@@ -23,7 +23,9 @@ from robospa.tasks.snapshot import Contact
 from robospa.tasks.variants import neighbours, object_sets
 from robospa.tasks.variants.extremes import LEADS
 from robospa.tasks.variants.pick_multi_view import SPREADS
-from robospa.workcell import TABLE_TOP
+from robospa.workcell import TABLE_TOP, workcell
+
+CELL = workcell("aloha-agilex")
 
 BLOCKS, DISTANCE, CANONICAL, SOAPS, VIEWS = TASKS = (
     "Pick_Blocks_Size",
@@ -141,9 +143,9 @@ def test_footprints_and_objects_axes_are_in_view_and_in_reach(name: str, level: 
         x, y = places(scene).T
         radius = np.array([m.radius for m in models])
         height = np.array([m.size[2] for m in models])
-        assert in_head_view(x, y, radius, 0.0).all()
-        assert in_head_view(x, y, 0.0, height).all()
-        assert in_reach(x, y).all()
+        assert CELL.in_view(x, y, radius, 0.0).all()
+        assert CELL.in_view(x, y, 0.0, height).all()
+        assert CELL.in_reach(x, y).all()
 
 
 @each_variant

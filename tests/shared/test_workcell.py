@@ -1,0 +1,99 @@
+"""Workcells: the head camera's projection, reach, grasp points, and that they fit their robot."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from robospa.geometry import Pose, axis_rotation, rotate
+from robospa.harness.robots import embodiment, embodiments
+from robospa.registry import UnknownName
+from robospa.workcell import HEIGHT, TABLE_TOP, WIDTH, Workcell, workcell
+
+A = np.array
+CELL = workcell("aloha-agilex")
+
+
+def test_point_on_the_optical_axis_is_the_image_centre() -> None:
+    eye = CELL.head.position
+    u, v = CELL.head.pixel(A([eye[0]]), A([eye[1] + 0.6]), A([eye[2] - 0.8]))
+    assert (u[0], v[0]) == pytest.approx((160.0, 120.0))
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "axis", "edge"),
+    [
+        (0.0, -0.248, 1, 240.0),
+        (0.0, 0.432, 1, 0.0),
+        (-0.303, -0.248, 0, 0.0),
+        (0.239, -0.248, 0, 320.0),
+        (0.421, 0.432, 0, 320.0),
+    ],
+)
+def test_edges_of_the_visible_table_are_the_official_ones(
+    x: float, y: float, axis: int, edge: float
+) -> None:
+    assert CELL.head.pixel(A([x]), A([y]), TABLE_TOP)[axis][0] == pytest.approx(edge, abs=1.0)
+
+
+def test_pixels_per_metre_at_the_table_centre_are_the_official_ones() -> None:
+    u, _ = CELL.head.pixel(A([0.0, 0.01]), A([0.0, 0.0]), TABLE_TOP)
+    assert (u[1] - u[0]) / 0.01 == pytest.approx(474, abs=2)
+
+
+def test_tall_object_leaves_the_view_before_a_flat_one() -> None:
+    x, y = A([0.24]), A([-0.1])
+    flat, tall = CELL.in_view(x, y, 0.0, 0.0), CELL.in_view(x, y, 0.0, 0.12)
+    assert (bool(flat[0]), bool(tall[0])) == (True, False)
+
+
+@pytest.mark.parametrize("y", [-0.18, 0.0, 0.1])
+def test_view_span_ends_where_the_view_does(y: float) -> None:
+    low, high = CELL.view_span(y, 0.03, 0.05)
+    inside = CELL.in_view(A([low, high]) + A([1e-6, -1e-6]), A([y, y]), 0.03, 0.05)
+    outside = CELL.in_view(A([low, high]) + A([-1e-3, 1e-3]), A([y, y]), 0.03, 0.05)
+    assert inside.all() and not outside.any()
+
+
+def test_reach_covers_the_work_area_and_not_the_far_edge() -> None:
+    assert CELL.in_reach(A([0.0, -0.25, 0.25]), A([0.19, 0.2, 0.2])).all()
+    assert not CELL.in_reach(A([0.0]), A([0.34]))[0]
+
+
+@pytest.mark.parametrize("name", embodiments())
+def test_pixels_are_those_of_a_pinhole_at_the_cameras_pose(name: str) -> None:
+    # by the pose that the renderer uses, not by the axes that `pixel` works with
+    rng = np.random.default_rng(0)
+    for camera in workcell(name).cameras.values():
+        for _ in range(20):
+            local = A([1.0, *rng.uniform(-0.3, 0.3, 2)]) * rng.uniform(0.5, 2.0)
+            x, y, z = camera.pose.apply(tuple(local.tolist()))
+            focal = HEIGHT / 2 / np.tan(camera.fov / 2)
+            u = WIDTH / 2 - focal * local[1] / local[0]
+            v = HEIGHT / 2 - focal * local[2] / local[0]
+            found = camera.pixel(A([x]), A([y]), A([z]))
+            assert np.ravel(found) == pytest.approx([u, v], abs=1e-6)
+
+
+@pytest.mark.parametrize("name", embodiments())
+def test_arms_stand_where_the_workcell_says(name: str) -> None:
+    robot = embodiment(name)
+    for arm, site in zip(robot.arms, robot.workcell.arms, strict=True):
+        # 7 mm: the scenes of this suite were drawn for a right base at 0.300, the mount is at 0.307
+        assert np.hypot(*np.subtract(arm.base.position[:2], site.base)) <= 0.0071
+    left, right = robot.workcell.arms
+    assert left.base[0] < 0 < right.base[0]
+
+
+def test_a_grasp_point_lies_ahead_of_the_end_effector() -> None:
+    end = Pose((0.1, 0.2, 0.9), axis_rotation((1.0, 2.0, 3.0), 1.1))
+    hand = CELL.arms[0].gripper
+    ahead = A(rotate(end.rotation, (hand.grasp_centre, 0.0, 0.0)))
+    assert hand.grasp_point(end) == pytest.approx(tuple(A(end.position) + ahead), abs=1e-12)
+    assert CELL.grasp_points((end, Pose()))[1] == pytest.approx((hand.grasp_centre, 0.0, 0.0))
+
+
+def test_a_workcell_is_found_by_its_robots_name() -> None:
+    assert isinstance(CELL, Workcell) and CELL is embodiment("aloha-agilex").workcell
+    with pytest.raises(UnknownName, match="did you mean aloha-agilex"):
+        workcell("aloha-agile")
