@@ -68,7 +68,7 @@ class TrialParts:
 
 def task_parts(key: TrialKey) -> TrialParts:
     """Scene, goal and instruction of `key` from the catalog; KeyError or ValueError if unknown."""
-    from robospa.tasks.instructions import instruction
+    from robospa.tasks.sentences import instruction
 
     task = find_task(key.task)
     scene = build_scene(key.task, key.level, key.seed, key.embodiment, key.mode)

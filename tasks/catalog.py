@@ -69,8 +69,8 @@ def tasks() -> dict[str, Task]:
 
 
 @cache
-def extensions() -> dict[str, tuple[Task, str]]:
-    """Tasks of other installed packages, and the modules that have their templates.
+def extensions() -> dict[str, Task]:
+    """Tasks of other installed packages.
 
     They are found by name only: what is installed never changes what "all tasks" means. ValueError
     for an entry point that leads to no task, or to one with a name of the benchmark's.
@@ -85,17 +85,8 @@ def extensions() -> dict[str, tuple[Task, str]]:
                 f"entry point {point.name!r} ({point.value}) offers no new task; "
                 "it has to name a Task with a name of its own"
             )
-        found[item.name] = (item, point.module)
+        found[item.name] = item
     return found
-
-
-@cache
-def module_of(name: str) -> str:
-    """The module of `robospa.tasks.variants` that defines the task called `name`."""
-    for module in (*MODULES, *BASIC_MODULES):
-        if any(t.name == name for t in _defined(module)):
-            return module
-    raise KeyError(f"no task {name!r}; see `robospa tasks` for all of them")
 
 
 @cache
@@ -116,7 +107,7 @@ def task(name: str) -> Task:
 
     known = {plain(n): t for n, t in tasks().items()}
     if plain(name) not in known:
-        known |= {plain(n): t for n, (t, _) in extensions().items()}
+        known |= {plain(n): t for n, t in extensions().items()}
     if plain(name) in known:
         return known[plain(name)]
     near = difflib.get_close_matches(plain(name), list(known), n=3, cutoff=0.5)

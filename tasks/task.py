@@ -9,6 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from robospa.tasks.events import Event
+from robospa.tasks.instructions.grammar import Phrasings, Templates
 from robospa.tasks.plan import Skill
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.snapshot import Snapshot
@@ -57,10 +58,11 @@ BASIC = ("CBG", "EPG", "SOI")
 
 @dataclass(frozen=True)
 class Task:
-    """A base task. `draw`, `goal`, `plan` and `slots` are pure functions.
+    """A base task. `draw`, `goal`, `plan`, `templates` and `slots` are pure functions.
 
-    `slots(scene)` gives, for every placeholder of the task's templates, the phrasings that may
-    fill it: `{slot: (train phrasings, held-out phrasings)}`, each a non-empty tuple.
+    `templates(level)` are the sentences with slots, `slots(scene)` gives for every slot of them the
+    phrasings that may fill it: `{slot: (train phrasings, held-out phrasings)}`, each a non-empty
+    tuple.
     """
 
     name: str
@@ -69,7 +71,8 @@ class Task:
     draw: Draw
     goal: Callable[[Scene], Tracker]
     plan: Callable[[Scene], tuple[Skill, ...]]
-    slots: Callable[[Scene], Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]]]
+    templates: Callable[[int], Templates]
+    slots: Callable[[Scene], Mapping[str, Phrasings]]
     summary: str
     success: str
 

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 from robospa.tasks import catalog
-from robospa.tasks.instructions import instruction, sentences
 from robospa.tasks.instructions.grammar import similarity
+from robospa.tasks.sentences import instruction, sentences, templates
 
 ROOT = Path(__file__).resolve().parents[1]
 NAME = "Pick_Leftmost_Block"
@@ -21,8 +21,9 @@ ENTRY = "[robospa.tasks]\nPick_Leftmost_Block = leftmost_block:TASK\n"
 
 
 def package(folder: Path, entry: str = ENTRY) -> Path:
-    """What an installer leaves behind: the module, and a note of what it offers."""
-    shutil.copy(ROOT / "docs" / "examples" / "leftmost_block.py", folder)
+    """What an installer leaves behind: the module, its text, and a note of what it offers."""
+    for name in ("leftmost_block.py", "leftmost_block.toml"):
+        shutil.copy(ROOT / "docs" / "examples" / name, folder)
     note = folder / "leftmost_block-1.0.dist-info"
     note.mkdir()
     (note / "METADATA").write_text("Metadata-Version: 2.1\nName: leftmost-block\nVersion: 1.0\n")
@@ -62,8 +63,8 @@ def test_its_sentences_are_its_own(installed: Path) -> None:
     train, held = sentences(scene, "train"), sentences(scene, "heldout")
     assert len({*train, *held}) == 200
     assert instruction(scene, "train") in train and instruction(scene) in held
-    module = sys.modules["leftmost_block"]
-    assert max(similarity(a, b) for a in module.TRAIN for b in module.HELDOUT) < 0.75
+    own = templates(NAME, 2)
+    assert max(similarity(a, b) for a in own.train for b in own.heldout) < 0.75
 
 
 def test_an_entry_that_is_no_task_is_refused(

@@ -98,7 +98,7 @@ def __getattr__(name: str) -> Any:
 def write_scenes(folder: Path) -> None:
     """One line per scene: its digest and a hash of its sentences."""
     from robospa.tasks import catalog
-    from robospa.tasks.instructions import instruction, sentences
+    from robospa.tasks.sentences import instruction, sentences
 
     lines = []
     for name, task in catalog.tasks().items():

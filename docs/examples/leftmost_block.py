@@ -9,37 +9,17 @@ import numpy as np
 
 from robospa.geometry import Array, Pose, yaw_rotation
 from robospa.tasks.goals.pick import Lift, PickTracker
-from robospa.tasks.instructions.grammar import Templates
-from robospa.tasks.instructions.words import Slots, with_common
+from robospa.tasks.instructions.grammar import Slots
+from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.layouts import Area, Mask, Points, scatter
 from robospa.tasks.plan import Pick, Skill
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.task import Draft, Level, Task, Tracker
 from robospa.workcell import TABLE_TOP, Workcell
 
+TEXT = TaskText.beside(__file__, "leftmost_block.toml")
 HALF = 0.022  # [m]
 AREA = Area(x=(-0.25, 0.25), y=(-0.15, 0.08), clear_middle=True)
-TRAIN_PLACES = (
-    *("the leftmost {}", "the {} farthest left", "the {} at the left end"),
-    *("the {} closest to the left edge", "the {} on the far left"),
-)
-HELDOUT_PLACES = (
-    *("the {} with all others on its right", "the {} that lies left of the rest"),
-    *("the left-hand {}", "the {} nearest to the left side", "the {} that is farthest to the left"),
-)
-TRAIN = (
-    *("pick up {target}.", "lift {target} off {table}.", "grasp {target} with {arm}."),
-    *("take {target} and raise it.", "find {target} and pick it up.", "raise {target} in the air."),
-    *("reach for {target} and lift it.", "use {arm} to lift {target}."),
-    *("close a gripper on {target}, then lift.", "bring {target} up from {table}."),
-)
-HELDOUT = (
-    *("could {target} be lifted?", "what I need is {target} in the air."),
-    *("{target} should leave {table}.", "my request is that {target} be picked up."),
-    *("the goal is for {target} to be raised.", "it is {target} that has to rise."),
-    *("I would like to see {target} picked up.", "what must go up? It is {target}."),
-    *("the task ends once {target} is in the air.", "{arm} ought to hold {target} over {table}."),
-)
 LEVELS = {k: Level(candidates=k + 1, subtasks=1, steps=150) for k in range(1, 6)}
 
 
@@ -83,16 +63,7 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
 
 def slots(scene: Scene) -> Slots:
     """What may stand for {target}: in training, and held out. {arm} and {table} are common ones."""
-    train, held = (
-        tuple(place.format(noun) for place in places for noun in ("block", "cube"))
-        for places in (TRAIN_PLACES, HELDOUT_PLACES)
-    )
-    return with_common({"target": (train, held)})
-
-
-def templates(level: int) -> Templates:
-    """The sentences' patterns, the same at all levels: orders to train on, statements held out."""
-    return Templates(TRAIN, HELDOUT)
+    return TEXT.slots("target")
 
 
 TASK = Task(
@@ -102,6 +73,7 @@ TASK = Task(
     draw=draw,
     goal=goal,
     plan=plan,
+    templates=TEXT.templates,
     slots=slots,
     summary="Pick the leftmost of 2 to 6 equal blocks.",
     success="the leftmost block rises by more than 6 cm while a gripper carries it",

@@ -157,7 +157,7 @@ def _describe(console: Console, scene: Scene, splits: tuple[str, ...]) -> None:
     from rich.table import Table
     from rich.text import Text
 
-    from robospa.tasks.instructions import instruction
+    from robospa.tasks.sentences import instruction
 
     task = _find(scene.task)
     limits = task.levels[scene.level]
@@ -219,7 +219,7 @@ def _gallery(console: Console, name: str | None, seed: int, split: str, path: Pa
     from robospa.harness.sim.sapien_world import SapienWorld
     from robospa.harness.world import RenderUnavailable, SceneUnstable
     from robospa.tasks.catalog import tasks as all_tasks
-    from robospa.tasks.instructions import instruction
+    from robospa.tasks.sentences import instruction
 
     try:
         chosen = [_find(each) for each in (parse_tasks(name) if name else all_tasks())]

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from robospa.tasks.instructions.grammar import Templates, templates_of
-from robospa.tasks.instructions.words import listed
+from robospa.tasks.instructions.grammar import listed
 
 
 def _numbered(steps: Sequence[str]) -> str:
@@ -70,13 +69,3 @@ def statements(results: Sequence[str], events: Sequence[str]) -> tuple[str, ...]
 def _passive(result: str, verb: str) -> str:
     noun, rest = result.split("} ", 1)
     return f"{noun}}} {verb} {rest}"
-
-
-def chained(
-    steps: Sequence[Sequence[str]],
-    results: Sequence[str],
-    events: Sequence[str],
-) -> Templates:
-    """The templates of two or more steps; `steps` has them in five wordings, as clauses."""
-    train = [chain(wording) for wording in steps for chain in CHAINS]
-    return templates_of(train, statements(results, events))

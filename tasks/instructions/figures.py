@@ -17,9 +17,9 @@ from dataclasses import astuple, dataclass
 from itertools import combinations
 
 from robospa.tasks import catalog
-from robospa.tasks.instructions import SPLITS, sentences, templates
 from robospa.tasks.instructions.bleu import bleu, self_bleu
 from robospa.tasks.instructions.grammar import masked_words, similarity
+from robospa.tasks.sentences import SPLITS, sentences, templates
 
 FIRST_SEED = 500_000
 HEAD = (

@@ -8,29 +8,43 @@ every sentence. Nothing here knows a task.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from difflib import SequenceMatcher
 from typing import NamedTuple
 
-TRAIN, HELDOUT = 50, 10
-"""Templates per variant and split (official counts)."""
+SENTENCES = 100
+"""Sentences per scene and split (official count)."""
+
+Phrasings = tuple[tuple[str, ...], tuple[str, ...]]
+"""What may fill a slot: in training sentences, and in held-out ones.
+
+Every phrasing of a slot fits every template that uses the slot; templates never put "a" or "an" in
+front of a slot, so no article can go wrong.
+"""
+
+Slots = dict[str, Phrasings]
+"""{slot: (train phrasings, held-out phrasings)}"""
 
 _SLOT = re.compile(r"\{(\w+)\}")
 
 
 class Templates(NamedTuple):
-    """The templates of one variant: 50 for training, 10 held out."""
+    """The templates of one variant; in the benchmark 50 for training and 10 held out (official)."""
 
     train: tuple[str, ...]
     heldout: tuple[str, ...]
 
 
 def templates_of(train: Iterable[str], heldout: Iterable[str]) -> Templates:
-    """The two lists, checked: the official counts, every template distinct."""
+    """The two lists; ValueError if templates are repeated or cannot share 100 sentences evenly."""
     made = Templates(tuple(train), tuple(heldout))
-    counts = (len(set(made.train)), len(set(made.heldout)))
-    if counts != (TRAIN, HELDOUT) or set(made.train) & set(made.heldout):
-        raise ValueError(f"{counts} distinct templates instead of {(TRAIN, HELDOUT)}")
+    if len({*made.train, *made.heldout}) != len(made.train) + len(made.heldout):
+        raise ValueError("a template is there twice; every one of both splits has to be different")
+    for split in made:
+        if not split or SENTENCES % len(split):
+            raise ValueError(
+                f"{len(split)} templates cannot share {SENTENCES} sentences evenly; give 50, 20, 10"
+            )
     return made
 
 
@@ -53,6 +67,11 @@ def fill(template: str, values: Mapping[str, str]) -> str:
 def sentence_case(text: str) -> str:
     """`text` with a capital at the start of every sentence (not after a colon)."""
     return re.sub(r"(^|[.?!] )([a-z])", lambda m: m.group(1) + m.group(2).upper(), text)
+
+
+def listed(items: Sequence[str], last: str = " and ") -> str:
+    """ "a", "a and b", "a, b and c"."""
+    return items[0] if len(items) == 1 else ", ".join(items[:-1]) + last + items[-1]
 
 
 def masked_words(template: str) -> tuple[str, ...]:

@@ -1,19 +1,11 @@
-"""Small pieces of English that several tasks' slots are made of.
-
-A slot maps to two tuples of phrasings: those for training sentences and those for held-out ones.
-Every phrasing of a slot fits every template that uses the slot; templates never put "a" or "an"
-in front of a slot, so no article can go wrong.
-"""
+"""Small pieces of English that are computed: numbers, lists, and what follows from a count."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
-Phrasings = tuple[tuple[str, ...], tuple[str, ...]]
-"""Train phrasings and held-out phrasings."""
-
-Slots = dict[str, Phrasings]
-"""{slot: (train phrasings, held-out phrasings)}"""
+from robospa.tasks.instructions.grammar import Phrasings, Slots, listed
+from robospa.tasks.instructions.text import COMMON
 
 NUMBERS = ("zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
 _ORDINALS = (
@@ -21,27 +13,10 @@ _ORDINALS = (
     *("seventh", "eighth", "ninth", "tenth", "eleventh", "twelfth"),
 )
 
-COMMON: Slots = {
-    "arm": (
-        ("one arm", "a single arm", "either arm"),
-        ("just one arm", "any one arm", "one of the arms"),
-    ),
-    "table": (
-        ("the table", "the tabletop"),
-        ("the work surface", "the table surface", "this table"),
-    ),
-}
-"""Slots that any task may use: they change the wording and carry no information."""
 
-
-def acting_arm(side: str) -> Slots:
-    """{arm} where the rule wants the gripper on one `side` ("left" or "right") to be closed."""
-    return {
-        "arm": (
-            (f"the {side} arm", f"your {side} arm", f"the robot's {side} arm"),
-            (f"the arm on the {side}", f"the {side}-hand arm", f"the {side} one of the two arms"),
-        )
-    }
+def by_count(count: int) -> str:
+    """Which of the entries "one", "two" and "many" of a slot's phrasings is for `count`."""
+    return {1: "one", 2: "two"}.get(count, "many")
 
 
 def ordinal(rank: int) -> tuple[str, str]:
@@ -52,11 +27,37 @@ def ordinal(rank: int) -> tuple[str, str]:
     return f"{rank}{suffix}", _ORDINALS[rank - 1]
 
 
-def listed(items: Sequence[str], last: str = " and ") -> str:
-    """ "a", "a and b", "a, b and c"."""
-    return items[0] if len(items) == 1 else ", ".join(items[:-1]) + last + items[-1]
+def times(count: int) -> Phrasings:
+    """How often, as an adverb, for 1 to 3 times."""
+    return COMMON.phrasings(f"times.{('once', 'twice', 'thrice')[count - 1]}")
 
 
-def with_common(slots: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]]) -> Slots:
-    """`slots` and the common ones."""
-    return {**COMMON, **slots}
+def acting_arm(side: str) -> Slots:
+    """{arm} where the rule wants the gripper on one `side` ("left" or "right") to be closed."""
+    return {"arm": COMMON.phrasings("acting_arm", side=side)}
+
+
+def color_orders(colors: Sequence[str]) -> Phrasings:
+    """How the order of two or more colours is said, from the first to the last."""
+    steps = (", then " if len(colors) > 2 else " and then ").join(colors)
+    places = (*("first", "second", "third", "fourth")[: len(colors) - 1], "last")
+    placed = ", ".join(f"{c} {p}" for c, p in zip(colors, places, strict=True))
+    return (
+        (listed(colors, ", then "), steps),
+        (placed, " followed by ".join(colors), ", next ".join(colors)),
+    )
+
+
+_TRAIN_LINKS = (", then ", ", and then ")
+_HELDOUT_LINKS = (" followed by ", ", next ", ", after that ")
+
+
+def one_after_another(nouns: Sequence[Phrasings]) -> Phrasings:
+    """How things are said in their order; each noun has two train and four held-out phrasings."""
+    train = tuple(
+        link.join(noun[0][k] for noun in nouns) for k in range(2) for link in _TRAIN_LINKS
+    )
+    held = tuple(
+        link.join(noun[1][k] for noun in nouns) for k in range(4) for link in _HELDOUT_LINKS
+    )
+    return train, held

@@ -12,14 +12,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from robospa.tasks.goals.pick import Lift
-from robospa.tasks.instructions import words_spatial
-from robospa.tasks.instructions.words import Slots
+from robospa.tasks.instructions.grammar import Slots
+from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Task
 from robospa.tasks.variants import object_sets as sets
 from robospa.tasks.variants.distances import Family, Thing, layouts, put_down, shifted
 from robospa.tasks.variants.picking import lifted, pick_target
 from robospa.workcell import Workcell
+
+TEXT = TaskText.beside(__file__, "basic_color.toml")
 
 COLORS = ("red", "green", "blue", "yellow", "orange", "purple", "pink", "black", "brown")
 """Colours of modelled objects that nobody takes for one another. White is left out: the table and
@@ -104,7 +106,7 @@ def color_task(family: Family, colored: Colored, what: str) -> Task:
         return Draft(objects, {"target": f"object_{target}", "color": words[order[target]]})
 
     def slots(scene: Scene) -> Slots:
-        return words_spatial.by_color(str(scene.facts["color"]), family.noun)
+        return TEXT.slots("target", color=scene.facts["color"], noun=family.noun)
 
     return Task(
         name=f"Basic_Color_{family.name}",
@@ -113,6 +115,7 @@ def color_task(family: Family, colored: Colored, what: str) -> Task:
         draw=draw,
         goal=lifted(Lift(above=0.82)),
         plan=pick_target,
+        templates=TEXT.templates,
         slots=slots,
         summary=f"Pick the one of the named colour among {what}.",
         success="the target's origin is higher than 0.82 m while a gripper carries it",

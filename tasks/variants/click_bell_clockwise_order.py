@@ -12,15 +12,19 @@ from collections.abc import Callable
 import numpy as np
 
 from robospa.tasks.goals.clicks import ClickInOrder
-from robospa.tasks.instructions.words import Slots, acting_arm
-from robospa.tasks.instructions.words_clicking import ring_of_bells
+from robospa.tasks.instructions.grammar import Slots, Templates
+from robospa.tasks.instructions.text import TaskText
+from robospa.tasks.instructions.words import NUMBERS, acting_arm, one_after_another
 from robospa.tasks.layouts import LayoutError
 from robospa.tasks.plan import Skill
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
+from robospa.tasks.variants import click_objects_order
 from robospa.tasks.variants.clicking import click, click_counter, clickable_look
 from robospa.tasks.variants.tabletop import Item, Point, apart, in_view, named, side, standing
 from robospa.workcell import Workcell
+
+TEXT = TaskText.beside(__file__, "click_bell_clockwise_order.toml")
 
 X, Y = (-0.255, 0.255), (-0.225, 0.055)
 APART = {1: 0.0, 2: 0.12, 3: 0.080, 4: 0.085, 5: 0.085}
@@ -114,7 +118,20 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
 def slots(scene: Scene) -> Slots:
     """How the bells and their order are said, and the arm on the side of the first."""
     first = scene.object(scene.facts["order"][0])
-    return ring_of_bells(scene.level) | acting_arm(side(first.pose.position[0]))
+    count = len(scene.facts["order"])
+    if count == 1:
+        said = click_objects_order.TEXT.slots("thing.bell")
+    elif count == 2:
+        pair = TEXT.phrasings("far"), TEXT.phrasings("near")
+        said = TEXT.slots() | {"order": one_after_another(pair)}
+    else:
+        said = TEXT.slots("bells", "way", count=count, word=NUMBERS[count])
+    return said | acting_arm(side(first.pose.position[0]))
+
+
+def templates(level: int) -> Templates:
+    """One bell, two bells by distance, a ring."""
+    return (click_objects_order.TEXT if level < 3 else TEXT).templates(level)
 
 
 TASK = Task(
@@ -124,6 +141,7 @@ TASK = Task(
     draw=draw,
     goal=goal,
     plan=plan,
+    templates=templates,
     slots=slots,
     summary="Click the bells clockwise, beginning with the one farthest from the robot.",
     success=(

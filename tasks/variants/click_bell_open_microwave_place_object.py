@@ -17,8 +17,8 @@ from robospa.tasks import objects
 from robospa.tasks.goals.checklist import Checklist, Counter, Part, Rests
 from robospa.tasks.goals.opening import Opened
 from robospa.tasks.goals.repeat import PressCounter
-from robospa.tasks.instructions import words_opening
-from robospa.tasks.instructions.words import Slots
+from robospa.tasks.instructions.grammar import Slots
+from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.plan import Open, Pick, Place, Press, Skill
 from robospa.tasks.scene import Scene
 from robospa.tasks.shapes import Hinge
@@ -35,6 +35,8 @@ from robospa.tasks.variants.tabletop import (
     standing,
 )
 from robospa.workcell import TABLE_TOP, Workcell
+
+TEXT = TaskText.beside(__file__, "click_bell_open_microwave_place_object.toml")
 
 STEPS = {1: "c", 2: "co", 3: "coc", 4: "cocp", 5: "cocpc"}
 """What is asked for: c a click, o the microwave opened, p one thing placed left of another."""
@@ -181,7 +183,10 @@ def slots(scene: Scene) -> Slots:
     """How the things are said."""
     things = [scene.object(scene.facts[r]) for r in ("object", "reference") if r in scene.facts]
     phrasings = [look_phrasings(objects.object_model(o.asset, o.params)) for o in things]
-    return words_opening.click_open_place(scene.level, phrasings)
+    said = TEXT.slots("arm", "bell", *(("microwave",) if scene.level >= 2 else ()))
+    for role, (train, held) in zip(("object", "reference"), phrasings, strict=False):
+        said[role] = tuple(f"the {p}" for p in train), tuple(f"the {p}" for p in held)
+    return said
 
 
 TASK = Task(
@@ -191,6 +196,7 @@ TASK = Task(
     draw=draw,
     goal=goal,
     plan=plan,
+    templates=TEXT.templates,
     slots=slots,
     summary="Click the bell, open the microwave, and put one thing to the left of another.",
     success=(

@@ -11,14 +11,17 @@ import numpy as np
 
 from robospa.tasks import objects
 from robospa.tasks.goals.repeat import PressCounter, Repeat
-from robospa.tasks.instructions import words_repeating
-from robospa.tasks.instructions.words import Slots, acting_arm
+from robospa.tasks.instructions.grammar import Slots
+from robospa.tasks.instructions.text import TaskText
+from robospa.tasks.instructions.words import NUMBERS, acting_arm, by_count
 from robospa.tasks.plan import Press, Skill
 from robospa.tasks.scene import Scene
 from robospa.tasks.snapshot import ARMS
 from robospa.tasks.task import Draft, Level, Task
 from robospa.tasks.variants.tabletop import Item, draw_look, named, side, standing
 from robospa.workcell import Workcell
+
+TEXT = TaskText.beside(__file__, "click_bell_repeat.toml")
 
 FAR, Y, MIDDLE = 0.25, (-0.2, 0.0), 0.05
 BOX = (0.025, 0.025, 0.03)
@@ -64,7 +67,11 @@ def slots(scene: Scene) -> Slots:
     """How the bell, the arm on its side and the count are said."""
     bell = scene.object(scene.facts["bell"])
     arm = acting_arm(side(bell.pose.position[0]))
-    return words_repeating.clicks(int(scene.facts["count"])) | arm
+    count = int(scene.facts["count"])
+    if count == 1:
+        return TEXT.slots("bell", "closed") | arm
+    times = f"times.{by_count(count)}"
+    return TEXT.slots("bell", "closed", times, "clicks", count=count, word=NUMBERS[count]) | arm
 
 
 TASK = Task(
@@ -74,6 +81,7 @@ TASK = Task(
     draw=draw,
     goal=goal,
     plan=plan,
+    templates=TEXT.templates,
     slots=slots,
     summary="Click the bell the given number of times.",
     success=(

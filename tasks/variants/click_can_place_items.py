@@ -14,8 +14,8 @@ import numpy as np
 from robospa.tasks import objects
 from robospa.tasks.goals.composite import ClickAndPlace, Placement
 from robospa.tasks.goals.repeat import PressCounter
-from robospa.tasks.instructions import words_procedural
-from robospa.tasks.instructions.words import Slots
+from robospa.tasks.instructions.grammar import Slots
+from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.plan import Home, Pick, Place, Press, Skill
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
@@ -30,6 +30,8 @@ from robospa.tasks.variants.tabletop import (
     standing,
 )
 from robospa.workcell import TABLE_TOP, Workcell
+
+TEXT = TaskText.beside(__file__, "click_can_place_items.toml")
 
 STEPS = {1: "c", 2: "cb", 3: "cbc", 4: "cbcp", 5: "cbcpc"}
 """What is asked for: c a click, b the bread into the basket, p the pill bottle onto the pad."""
@@ -129,7 +131,8 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
 
 def slots(scene: Scene) -> Slots:
     """How the things are said."""
-    return words_procedural.click(scene.level)
+    things = ("can", "bread", "basket", "bottle", "pad")
+    return TEXT.slots(*things[: {1: 1, 2: 3, 3: 3}.get(scene.level, 5)])
 
 
 TASK = Task(
@@ -139,6 +142,7 @@ TASK = Task(
     draw=draw,
     goal=goal,
     plan=plan,
+    templates=TEXT.templates,
     slots=slots,
     summary="Click the can, put the bread into the basket and the pill bottle onto the blue pad.",
     success=(

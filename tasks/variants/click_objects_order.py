@@ -9,8 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from robospa.tasks.goals.clicks import ClickInOrder
-from robospa.tasks.instructions.words import Slots, acting_arm
-from robospa.tasks.instructions.words_clicking import click_in_order
+from robospa.tasks.instructions.grammar import Slots
+from robospa.tasks.instructions.text import TaskText
+from robospa.tasks.instructions.words import acting_arm, one_after_another
 from robospa.tasks.layouts import Area
 from robospa.tasks.plan import Skill
 from robospa.tasks.scene import Scene
@@ -24,6 +25,8 @@ from robospa.tasks.variants.clicking import (
 )
 from robospa.tasks.variants.tabletop import Item, named, side, standing
 from robospa.workcell import Workcell
+
+TEXT = TaskText.beside(__file__, "click_objects_order.toml")
 
 ORDER = ("alarm_clock", "stapler", "can", "playing_cards", "bread")
 AREA, MIDDLE, DISTANCE = Area((-0.25, 0.25), (-0.20, 0.0)), 0.05, 0.14
@@ -56,9 +59,11 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
 def slots(scene: Scene) -> Slots:
     """How the things are said, and the arm on the side of the first."""
     order = [scene.object(name) for name in scene.facts["order"]]
-    return click_in_order([item.asset for item in order]) | acting_arm(
-        side(order[0].pose.position[0])
-    )
+    arm = acting_arm(side(order[0].pose.position[0]))
+    if len(order) == 1:
+        return TEXT.slots(f"thing.{order[0].asset}") | arm
+    nouns = [TEXT.phrasings(f"thing.{item.asset}") for item in order]
+    return TEXT.slots() | {"order": one_after_another(nouns)} | arm
 
 
 TASK = Task(
@@ -68,6 +73,7 @@ TASK = Task(
     draw=draw,
     goal=goal,
     plan=plan,
+    templates=TEXT.templates,
     slots=slots,
     summary="Click the objects in the given order.",
     success=(

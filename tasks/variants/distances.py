@@ -18,8 +18,9 @@ import numpy as np
 
 from robospa.geometry import Array
 from robospa.tasks.goals.pick import Lift
-from robospa.tasks.instructions import words_spatial
-from robospa.tasks.instructions.words import Phrasings, Slots
+from robospa.tasks.instructions.grammar import Phrasings, Slots
+from robospa.tasks.instructions.text import TaskText
+from robospa.tasks.instructions.words import ordinal
 from robospa.tasks.layouts import LayoutError, Mask
 from robospa.tasks.objects import object_model
 from robospa.tasks.packing import Fits, apart, pool, walk
@@ -28,6 +29,8 @@ from robospa.tasks.task import Draft, Level, Task
 from robospa.tasks.variants.picking import drawn_yaw, lifted, pick_target
 from robospa.tasks.variants.tabletop import draw_look, standing
 from robospa.workcell import Workcell
+
+TEXT = TaskText.beside(__file__, "distances.toml")
 
 Thing = tuple[str, Mapping[str, Any] | None]
 """Asset and parameters of an object; None for a look to be drawn."""
@@ -264,7 +267,11 @@ def distance_task(family: Family, name: str, what: str) -> Task:
 
     def slots(scene: Scene) -> Slots:
         names = family.reference(scene.object(str(scene.facts["reference"])))
-        return words_spatial.distance(int(scene.facts["distance_rank"]), names, family.noun)
+        rank = int(scene.facts["distance_rank"])
+        number, word = ordinal(rank)
+        entry = "rank.first" if rank == 1 else "rank.other"
+        said = TEXT.slots(entry, "object", number=number, word=word, noun=family.noun)
+        return {**said, "reference": names}
 
     return Task(
         name=name,
@@ -273,6 +280,7 @@ def distance_task(family: Family, name: str, what: str) -> Task:
         draw=lambda level, rng, workcell: draw(level, rng, workcell, family),
         goal=lifted(Lift(above=0.82)),
         plan=pick_target,
+        templates=TEXT.templates,
         slots=slots,
         summary=f"Pick the k-th farthest of {what} from a named one.",
         success="the target's origin is higher than 0.82 m while a gripper carries it",

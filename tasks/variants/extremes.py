@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from robospa.geometry import Array
 from robospa.tasks.goals.pick import Lift
-from robospa.tasks.instructions import words_spatial
-from robospa.tasks.instructions.words import Slots
+from robospa.tasks.instructions.grammar import Slots
+from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.layouts import LayoutError, Mask
 from robospa.tasks.packing import Fits, pool, walk
 from robospa.tasks.scene import Scene, SceneObject
@@ -33,6 +33,8 @@ from robospa.tasks.variants.picking import (
 )
 from robospa.tasks.variants.tabletop import standing
 from robospa.workcell import TABLE_TOP, Workcell
+
+TEXT = TaskText.beside(__file__, "extremes.toml")
 
 OBJECTS = {1: 3, 2: 4, 3: 5, 4: 6, 5: 7}
 """How many objects lie there; the paper's n counts the at most four extreme ones."""
@@ -233,7 +235,9 @@ def drawer(spread: Spread, views: tuple[str, ...]) -> Draw:
 
 def slots(scene: Scene) -> Slots:
     """What the instruction says: the extreme in the viewer's words, and the viewer."""
-    return words_spatial.multi_view(scene.facts["position"], scene.facts["viewpoint"])
+    position, view = scene.facts["position"], scene.facts["viewpoint"]
+    side = position.removesuffix("most")
+    return TEXT.slots("target", f"view.{view}", "convention", position=position, side=side)
 
 
 def spread_task(spread: Spread, basic: bool = False) -> Task:
@@ -247,6 +251,7 @@ def spread_task(spread: Spread, basic: bool = False) -> Task:
         draw=drawer(spread, VIEWS[:1] if basic else VIEWS),
         goal=lifted(Lift(rise=0.06, closed=True, touching=True)),
         plan=pick_target,
+        templates=TEXT.templates,
         slots=slots,
         summary=f"Pick the extreme one of 3 to 7 {spread.what} as seen from {seen}.",
         success="the target rose by more than 6 cm, touched by a gripper and carried by a closed "

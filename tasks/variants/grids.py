@@ -16,14 +16,17 @@ import numpy as np
 
 from robospa.geometry import Array
 from robospa.tasks.goals.pick import Lift
-from robospa.tasks.instructions import words_spatial
-from robospa.tasks.instructions.words import Slots
+from robospa.tasks.instructions.grammar import Slots
+from robospa.tasks.instructions.text import TaskText
+from robospa.tasks.instructions.words import ordinal
 from robospa.tasks.layouts import LayoutError
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.task import Draft, Draw, Level, Task
 from robospa.tasks.variants.picking import lifted, pick_name, pick_target
 from robospa.tasks.variants.tabletop import draw_look, standing
 from robospa.workcell import Workcell
+
+TEXT = TaskText.beside(__file__, "grids.toml")
 
 Thing = tuple[str, Mapping[str, Any]]
 """Asset and parameters."""
@@ -182,7 +185,8 @@ class Line:
     """The data of one task: `kind` is what its objects are called in the task's name.
 
     Objects stand straight; those of `sideways` show their narrow side, across which a far one is
-    grasped. `steady` is how far [m] the others may move up or down.
+    grasped. `steady` is how far [m] the others may move up or down. `wording` is the set of
+    templates: "noun", or "object" where everything is called an object (not in the basic tasks).
     """
 
     kind: str
@@ -192,6 +196,7 @@ class Line:
     steady: float
     what: str
     sideways: tuple[str, ...] = ()
+    wording: str = "noun"
 
 
 def drawer(line: Line, fixed: bool) -> Draw:
@@ -233,11 +238,24 @@ def line_task(line: Line, basic: bool = False) -> Task:
 
     def slots(scene: Scene) -> Slots:
         facts = scene.facts
-        row, row_direction = facts.get("row"), facts.get("row_direction")
-        return words_spatial.canonical(
-            facts["column"], facts["column_direction"], row, row_direction, line.noun
-        )
+        number, word = ordinal(facts["column"])
+        a, b = facts["column_direction"].split("_to_")
+        said = {
+            **TEXT.slots("viewer", f"noun.{line.noun}"),
+            "column": TEXT.phrasings("rank", number=number, word=word),
+            "column_direction": TEXT.phrasings("column_direction", a=a, b=b),
+        }
+        if "row" in facts:
+            number, word = ordinal(facts["row"])
+            a, b = facts["row_direction"].split("_to_")
+            most = {"near": "nearest", "far": "farthest"}
+            said["row"] = TEXT.phrasings("rank", number=number, word=word)
+            said["row_direction"] = TEXT.phrasings(
+                "row_direction", a=a, b=b, most_a=most[a], most_b=most[b]
+            )
+        return said
 
+    wording = "noun" if basic else line.wording
     counted = ", counted from the left and from the far side" if basic else ""
     return Task(
         name=f"Basic_Ordinal_{line.kind}" if basic else pick_name(line.kind, "Canonical"),
@@ -246,6 +264,7 @@ def line_task(line: Line, basic: bool = False) -> Task:
         draw=drawer(line, basic),
         goal=lifted(Lift(rise=0.04, steady=line.steady)),
         plan=pick_target,
+        templates=lambda level: TEXT.templates(level, wording),
         slots=slots,
         summary=f"Pick the one at a counted place of a grid of 3 to 12 {line.what}{counted}.",
         success="the target rose by more than 4 cm while all others are within "

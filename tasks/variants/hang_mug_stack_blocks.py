@@ -15,8 +15,8 @@ import numpy as np
 
 from robospa.geometry import Pose
 from robospa.tasks.goals.checklist import Checklist, Counter, Near, Part, Rests
-from robospa.tasks.instructions import words_cac
-from robospa.tasks.instructions.words import Slots
+from robospa.tasks.instructions.grammar import Slots
+from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.plan import Hang, Pick, Place, Skill
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
@@ -34,6 +34,8 @@ from robospa.tasks.variants.tabletop import (
     standing,
 )
 from robospa.workcell import TABLE_TOP, Workcell
+
+TEXT = TaskText.beside(__file__, "hang_mug_stack_blocks.toml")
 
 COLORS = {
     "red": (1.0, 0.0, 0.0),
@@ -181,7 +183,9 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
 
 def slots(scene: Scene) -> Slots:
     """How mug, rack and blocks are said."""
-    return words_cac.mug(list(COLORS)[: scene.level - 1])
+    colors = list(COLORS)[: scene.level - 1]
+    blocks = {color: TEXT.phrasings("block", color=color) for color in colors}
+    return TEXT.slots("mug", "rack", *(("area",) if colors else ())) | blocks
 
 
 TASK = Task(
@@ -191,6 +195,7 @@ TASK = Task(
     draw=draw,
     goal=goal,
     plan=plan,
+    templates=TEXT.templates,
     slots=slots,
     summary="Hang the mug on the rack, then stack the blocks in the near left area.",
     success=(

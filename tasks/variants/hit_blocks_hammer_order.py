@@ -14,8 +14,9 @@ import numpy as np
 from robospa.geometry import Array
 from robospa.tasks import objects
 from robospa.tasks.goals.tools import HitCounter, UseInOrder
-from robospa.tasks.instructions import words_tools
-from robospa.tasks.instructions.words import Slots
+from robospa.tasks.instructions.grammar import Slots
+from robospa.tasks.instructions.text import TaskText
+from robospa.tasks.instructions.words import color_orders
 from robospa.tasks.layouts import Area, Mask, scatter
 from robospa.tasks.plan import Hit, Skill
 from robospa.tasks.scene import Scene
@@ -23,6 +24,8 @@ from robospa.tasks.task import Draft, Level, Task
 from robospa.tasks.variants.stack_blocks_color_order import COLORS
 from robospa.tasks.variants.tabletop import Item, Point, draw_look, named, side, standing
 from robospa.workcell import Workcell
+
+TEXT = TaskText.beside(__file__, "hit_blocks_hammer_order.toml")
 
 HALF, YAW, DISTANCE, TRIES = 0.025, 0.5, 0.12, 60
 HAMMER: Point = (0.0, -0.06)
@@ -99,7 +102,10 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
 
 def slots(scene: Scene) -> Slots:
     """How the order of the colours is said."""
-    return words_tools.hammer(scene.facts["colors"])
+    colors = scene.facts["colors"]
+    if len(colors) == 1:
+        return TEXT.slots("hammer", "block", color=colors[0])
+    return TEXT.slots("hammer") | {"order": color_orders(colors)}
 
 
 TASK = Task(
@@ -109,6 +115,7 @@ TASK = Task(
     draw=draw,
     goal=goal,
     plan=plan,
+    templates=TEXT.templates,
     slots=slots,
     summary="Hit the blocks with the hammer in the given order of colours.",
     success=(

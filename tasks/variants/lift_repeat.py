@@ -14,13 +14,16 @@ import numpy as np
 
 from robospa.tasks import objects
 from robospa.tasks.goals.cycles import Cycles, back_home, held_up, put_down, raised
-from robospa.tasks.instructions import words_repeating
-from robospa.tasks.instructions.words import Slots
+from robospa.tasks.instructions.grammar import Slots
+from robospa.tasks.instructions.text import TaskText
+from robospa.tasks.instructions.words import NUMBERS, by_count
 from robospa.tasks.plan import RaiseLower, Skill
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
 from robospa.tasks.variants.tabletop import Item, draw_look, named, side, standing
 from robospa.workcell import Workcell
+
+TEXT = TaskText.beside(__file__, "lift_repeat.toml")
 
 LEVELS = {n: Level(candidates=1, subtasks=n, steps=200 * n) for n in range(1, 6)}
 
@@ -107,7 +110,12 @@ def _plan(thing: Thing, scene: Scene) -> tuple[Skill, ...]:
 
 
 def _slots(thing: Thing, scene: Scene) -> Slots:
-    return words_repeating.lifts(thing.name, int(scene.facts["count"]))
+    count = int(scene.facts["count"])
+    own = f"thing.{thing.name}", f"hands.{thing.name}"
+    if count == 1:
+        return TEXT.slots(*own)
+    times = f"times.{by_count(count)}"
+    return TEXT.slots(*own, times, "lifts", count=count, word=NUMBERS[count])
 
 
 def _task(thing: Thing) -> Task:
@@ -118,6 +126,7 @@ def _task(thing: Thing) -> Task:
         draw=lambda level, rng, workcell: _draw(thing, level, rng, workcell),
         goal=thing.goal,
         plan=lambda scene: _plan(thing, scene),
+        templates=TEXT.templates,
         slots=lambda scene: _slots(thing, scene),
         summary=f"Lift the {thing.name} and put it back, the given number of times.",
         success=thing.success,

@@ -13,13 +13,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from robospa.tasks.goals.regions import Part, Region, Regions
-from robospa.tasks.instructions import words_moving
-from robospa.tasks.instructions.words import Slots
+from robospa.tasks.instructions.grammar import Phrasings, Slots
+from robospa.tasks.instructions.text import TaskText
+from robospa.tasks.instructions.words import NUMBERS
 from robospa.tasks.plan import Pick, Place, Skill
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
 from robospa.tasks.variants.tabletop import LAYOUTS, TRIES_PER_POINT, Item, named, standing
 from robospa.workcell import TABLE_TOP, Workcell
+
+TEXT = TaskText.beside(__file__, "move_blocks_apart.toml")
 
 COLORS = {
     "red": (1.0, 0.0, 0.0),
@@ -136,9 +139,14 @@ def slots(scene: Scene) -> Slots:
     facts = scene.facts
     if scene.level == 1:
         side = "right" if facts["right"] else "left"
-        return words_moving.one_block(facts[f"{side}_color"], side)
-    groups = [(facts[f"{side}_color"], len(facts[side])) for side in ("right", "left")]
-    return words_moving.blocks_apart(*groups)
+        return TEXT.slots("block", "to", "at", color=facts[f"{side}_color"], side=side)
+    blocks = {side: _blocks(facts[f"{side}_color"], len(facts[side])) for side in ("right", "left")}
+    return TEXT.slots() | blocks
+
+
+def _blocks(color: str, count: int) -> Phrasings:
+    entry = "blocks.one" if count == 1 else "blocks.many"
+    return TEXT.phrasings(entry, color=color, count=count, word=NUMBERS[count])
 
 
 TASK = Task(
@@ -148,6 +156,7 @@ TASK = Task(
     draw=draw,
     goal=goal,
     plan=plan,
+    templates=TEXT.templates,
     slots=slots,
     summary="Move the blocks of one colour to the right and those of the other to the left.",
     success=(

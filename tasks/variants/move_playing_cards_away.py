@@ -12,14 +12,17 @@ import numpy as np
 
 from robospa.tasks import objects
 from robospa.tasks.goals.regions import Part, Region, Regions
-from robospa.tasks.instructions import words_moving
-from robospa.tasks.instructions.words import Slots
+from robospa.tasks.instructions.grammar import Slots
+from robospa.tasks.instructions.text import TaskText
+from robospa.tasks.instructions.words import NUMBERS, by_count
 from robospa.tasks.plan import Pick, Place, Skill
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
 from robospa.tasks.variants.picking import drawn_yaw
 from robospa.tasks.variants.tabletop import Item, draw_look, named, shuffled_scatter, side, standing
 from robospa.workcell import TABLE_TOP, Workcell
+
+TEXT = TaskText.beside(__file__, "move_playing_cards_away.toml")
 
 X, Y, DISTANCE = (-0.20, 0.20), (-0.20, 0.10), 0.15
 AWAY = 0.23
@@ -92,10 +95,13 @@ def _rows(wanted: list[float]) -> list[float]:
 def slots(scene: Scene) -> Slots:
     """How the boxes are said."""
     boxes = scene.facts["boxes"]
-    if len(boxes) > 1:
-        return words_moving.cards_away(len(boxes))
+    count = len(boxes)
+    if count > 1:
+        entry = f"boxes.{by_count(count)}"
+        return TEXT.slots(entry, "out.many", "at.many", count=count, word=NUMBERS[count])
     box = scene.object(boxes[0])
-    return words_moving.one_card_box(objects.object_model(box.asset, box.params))
+    color = objects.object_model(box.asset, box.params).phrases[0].split()[0]
+    return TEXT.slots("box", "out.one", "at.one", color=color)
 
 
 TASK = Task(
@@ -105,6 +111,7 @@ TASK = Task(
     draw=draw,
     goal=goal,
     plan=plan,
+    templates=TEXT.templates,
     slots=slots,
     summary="Move all boxes of playing cards out to the sides of the table.",
     success=(

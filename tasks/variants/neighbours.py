@@ -17,8 +17,8 @@ import numpy as np
 
 from robospa.geometry import Array
 from robospa.tasks.goals.pick import Lift
-from robospa.tasks.instructions import words_spatial
-from robospa.tasks.instructions.words import Slots
+from robospa.tasks.instructions.grammar import Slots
+from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.layouts import LayoutError
 from robospa.tasks.objects import looks, object_model
 from robospa.tasks.scene import Scene, SceneObject
@@ -34,6 +34,8 @@ from robospa.tasks.variants.picking import (
 )
 from robospa.tasks.variants.tabletop import standing
 from robospa.workcell import Workcell
+
+TEXT = TaskText.beside(__file__, "neighbours.toml")
 
 MARGIN = (0.06, 0.08)
 """Centres are this far inside the head image (official)."""
@@ -103,7 +105,8 @@ class Crowd:
 
     `pitches`: ranges of the distances of columns and of rows [m] on 2 x 2, 3 x 2 and 3 x 3 slots.
     Any two objects keep apart, by their spacing and so that the circles around their footprints do
-    not meet. `radius` and `tall` bound the objects for the view.
+    not meet. `radius` and `tall` bound the objects for the view. `wording` is the set of templates:
+    "noun" or, for the official sentences about soap, "soap".
     """
 
     kind: str
@@ -113,6 +116,7 @@ class Crowd:
     what: str
     radius: float
     tall: float
+    wording: str = "noun"
 
     @property
     def alike(self) -> bool:
@@ -262,14 +266,37 @@ def drawer(crowd: Crowd) -> Draw:
     return draw
 
 
+def _slots(direction: str, reference: str, level: int, noun: str) -> Slots:
+    """How the neighbour in `direction` of the object at the place called `reference` is said.
+
+    From level 2 on an axis neighbour is "directly" there (official wording); from level 4 on a
+    diagonal neighbour is "immediately" there, because another object may lie further out on the
+    same side.
+    """
+    side = direction.replace("_", "-")
+    how = ""
+    if "-" in side:
+        how = "immediately " if level >= 4 else ""
+    elif level >= 2:
+        how = "directly "
+    label = reference.replace("_", "-")
+    where = label.replace("-", " ")
+    at = {"left": "on the left", "right": "on the right", "center": "in the center"}.get(
+        where, f"at the {where}"
+    )
+    plain = TEXT.phrasings(f"noun.{noun}")[0][0]
+    return TEXT.slots("convention", f"noun.{noun}") | {
+        "relation": TEXT.phrasings("relation", how=how, side=side),
+        "reference": TEXT.phrasings("reference", label=label, at=at, noun=plain),
+    }
+
+
 def crowd_task(crowd: Crowd) -> Task:
     """The RRR task of `crowd`."""
 
     def slots(scene: Scene) -> Slots:
         facts = scene.facts
-        return words_spatial.relational(
-            facts["relation"], facts["reference_label"], scene.level, crowd.noun
-        )
+        return _slots(facts["relation"], facts["reference_label"], scene.level, crowd.noun)
 
     return Task(
         name=pick_name(crowd.kind, "Relational"),
@@ -278,6 +305,7 @@ def crowd_task(crowd: Crowd) -> Task:
         draw=drawer(crowd),
         goal=lifted(Lift(rise=0.06, closed=True)),
         plan=pick_target,
+        templates=lambda level: TEXT.templates(level, crowd.wording),
         slots=slots,
         summary=f"Pick the one next to a named one among 2 to 9 {crowd.what}, in one of eight "
         "directions.",

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from robospa.tasks.instructions import words_spatial
-from robospa.tasks.instructions.words import Phrasings
+from robospa.tasks.instructions.grammar import Phrasings
 from robospa.tasks.objects import object_model
 from robospa.tasks.scene import SceneObject
 from robospa.tasks.shapes import Color
-from robospa.tasks.variants.distances import Family, Rules, Thing
+from robospa.tasks.variants.distances import TEXT, Family, Rules, Thing
 from robospa.tasks.variants.tabletop import look_phrasings
 
 REGION = ((-0.22, 0.22), (-0.18, 0.08))
@@ -52,7 +51,7 @@ def block_color(item: SceneObject) -> str:
 
 
 def _block_names(item: SceneObject) -> Phrasings:
-    return words_spatial.colored("block", block_color(item))
+    return TEXT.phrasings("colored.block", color=block_color(item))
 
 
 BLOCKS = Family(
@@ -102,7 +101,7 @@ def one_unlike(asset: str, models: dict[str, tuple[int, ...]], rng: np.random.Ge
 
 
 def _tinted_names(item: SceneObject) -> Phrasings:
-    return words_spatial.colored(item.asset.replace("_", " "), str(item.params["tint"]))
+    return TEXT.phrasings(f"colored.{item.asset}", color=item.params["tint"])
 
 
 STARTS = tuple((x, y) for y, xs in (
@@ -147,9 +146,21 @@ def _mixed(assets: tuple[str, ...], level: int, rng: np.random.Generator) -> lis
     return [(assets[int(i)], None) for i in rng.permutation(COUNTS[level - 1])]
 
 
+MODIFIERS = {"with", "that", "in", "on", "wrapped"}
+"""Words that start a modifier behind a noun."""
+
+
 def _category_names(item: SceneObject) -> Phrasings:
-    names = look_phrasings(object_model(item.asset, item.params))
-    return words_spatial.reference_names(item.asset, names)
+    """Names of a reference by its category, and those of this very object.
+
+    Those with a modifier behind the noun are left out: "the object farthest from the bowl that is
+    blue" could be read as a blue object.
+    """
+    own = look_phrasings(object_model(item.asset, item.params))
+    usable = ([p for p in some if not MODIFIERS & set(p.split())] for some in own)
+    plain = TEXT.phrasings(f"reference.{item.asset}")
+    train, held = (tuple(dict.fromkeys((*a, *b))) for a, b in zip(plain, usable, strict=True))
+    return train, tuple(name for name in held if name not in train)
 
 
 ASSETS_A = ("cup", "bread", "can", "stapler", "bell", "apple", "payment_sign")

@@ -14,8 +14,9 @@ import numpy as np
 from robospa.geometry import Array, Pose
 from robospa.tasks.goals.cue import AfterCue
 from robospa.tasks.goals.gather import Gather, Region
-from robospa.tasks.instructions.words import Slots
-from robospa.tasks.instructions.words_memory import shown_blocks
+from robospa.tasks.instructions.grammar import Slots
+from robospa.tasks.instructions.text import TaskText
+from robospa.tasks.instructions.words import NUMBERS, by_count
 from robospa.tasks.layouts import Area, Mask, scatter
 from robospa.tasks.plan import Home, Pick, Place, Skill
 from robospa.tasks.scene import Scene
@@ -23,6 +24,8 @@ from robospa.tasks.task import Draft, Level, Task
 from robospa.tasks.variants.shown import HOLD_STILL, STAND_TOP, WALL, row, stand, wall
 from robospa.tasks.variants.tabletop import Item, named, side, standing
 from robospa.workcell import TABLE_TOP, Workcell
+
+TEXT = TaskText.beside(__file__, "observe_blocks_move_memory.toml")
 
 COLORS = {
     "red": (1.0, 0.0, 0.0),
@@ -101,7 +104,8 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
 
 def slots(scene: Scene) -> Slots:
     """What is shown, and where the blocks have to go; no colour is named."""
-    return shown_blocks(len(scene.facts["targets"]))
+    count = len(scene.facts["targets"])
+    return TEXT.slots("wall", f"blocks.{by_count(count)}", "strip", word=NUMBERS[count])
 
 
 TASK = Task(
@@ -111,6 +115,7 @@ TASK = Task(
     draw=draw,
     goal=goal,
     plan=plan,
+    templates=TEXT.templates,
     slots=slots,
     summary="Remember the colours shown and bring the blocks of these colours near the robot.",
     success=(

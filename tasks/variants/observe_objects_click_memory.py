@@ -14,8 +14,9 @@ import numpy as np
 from robospa.geometry import Pose, yaw_rotation
 from robospa.tasks.goals.clicks import ClickInOrder
 from robospa.tasks.goals.cue import AfterCue
-from robospa.tasks.instructions.words import Slots
-from robospa.tasks.instructions.words_memory import shown_objects
+from robospa.tasks.instructions.grammar import Slots
+from robospa.tasks.instructions.text import TaskText
+from robospa.tasks.instructions.words import NUMBERS, by_count
 from robospa.tasks.layouts import Area
 from robospa.tasks.plan import Skill
 from robospa.tasks.scene import Scene
@@ -30,6 +31,8 @@ from robospa.tasks.variants.clicking import (
 from robospa.tasks.variants.shown import HOLD_STILL, STAND_TOP, WALL, row, stand, wall
 from robospa.tasks.variants.tabletop import Item, named, standing
 from robospa.workcell import Workcell
+
+TEXT = TaskText.beside(__file__, "observe_objects_click_memory.toml")
 
 KINDS = ("bread", "stapler", "can", "playing_cards", "bell")
 STAND_Y, STAND_HALF, STAND_SHADE, SHOWN_X = 0.15, (0.24, 0.05, 0.01), 0.8, 0.18
@@ -70,7 +73,8 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
 
 def slots(scene: Scene) -> Slots:
     """What is shown and which way round to go; no object is named."""
-    return shown_objects(len(scene.facts["order"]))
+    count = len(scene.facts["order"])
+    return TEXT.slots("wall", f"objects.{by_count(count)}", word=NUMBERS[count])
 
 
 TASK = Task(
@@ -80,6 +84,7 @@ TASK = Task(
     draw=draw,
     goal=goal,
     plan=plan,
+    templates=TEXT.templates,
     slots=slots,
     summary="Remember the row of objects shown and click the same ones in that order.",
     success=(

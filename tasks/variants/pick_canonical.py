@@ -92,7 +92,7 @@ GRIDS_B = {
 LINES = (
     Line("Blocks", "block", blocks, BLOCKS, 0.025, "equal blocks"),
     Line("Cups", "cup", alike("cup"), CUPS, 0.03, "equal cups"),
-    Line("Rubik_Cubes", "rubik cube", alike("rubikscube"), CUBES, 0.03, "equal Rubik's cubes"),
+    Line("Rubik_Cubes", "rubik_cube", alike("rubikscube"), CUBES, 0.03, "equal Rubik's cubes"),
     Line(
         "Mixed_Objects_A",
         "object",
@@ -101,6 +101,7 @@ LINES = (
         0.03,
         "different objects",
         ("alarm_clock",),
+        "object",
     ),
     Line("Mixed_Objects_B", "object", different(SET_B), GRIDS_B, 0.03, "different objects"),
 )

@@ -24,7 +24,7 @@ REMOTE = Family("remote_control", (0.124, 0.078, 0.104))
 CROWDS = (
     Crowd(
         kind="Tea_Box",
-        noun="tea box",
+        noun="tea_box",
         families=(TEA_BOX,),
         pitches=(
             ((0.0902, 0.185), (0.085, 0.17)),
@@ -50,7 +50,7 @@ CROWDS = (
     ),
     Crowd(
         kind="Soaps",
-        noun="soap bar",
+        noun="soap_bar",
         families=(SOAP,),
         pitches=(
             ((0.09, 0.185), (0.085, 0.17)),
@@ -60,6 +60,7 @@ CROWDS = (
         what="equal soap bars",
         radius=0.036,
         tall=0.0,
+        wording="soap",
     ),
     Crowd(
         kind="Mixed_Objects_A",

@@ -11,11 +11,13 @@ import numpy as np
 
 from robospa.geometry import Pose
 from robospa.tasks.goals.checklist import Checklist, Counter, Inside, Part, Rests, on_spot
-from robospa.tasks.instructions import words_cac
-from robospa.tasks.instructions.words import Slots
+from robospa.tasks.instructions.grammar import Slots, Templates
+from robospa.tasks.instructions.text import TaskText
+from robospa.tasks.instructions.words import by_count
 from robospa.tasks.plan import Pick, Place, Skill
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
+from robospa.tasks.variants import put_bottles_dustbin
 from robospa.tasks.variants.bins import (
     BIN,
     TABLE_SHIFT,
@@ -38,6 +40,8 @@ from robospa.tasks.variants.tabletop import (
     standing,
 )
 from robospa.workcell import Workcell
+
+TEXT = TaskText.beside(__file__, "place_bottle_cup.toml")
 
 BOTTLES = {1: 1, 2: 2, 3: 3, 4: 3, 5: 3}
 CUPS = {1: 0, 2: 0, 3: 0, 4: 1, 5: 2}
@@ -143,7 +147,15 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
 
 def slots(scene: Scene) -> Slots:
     """How bottles, bin, cups and coasters are said."""
-    return words_cac.bottles_and_cups(BOTTLES[scene.level], CUPS[scene.level])
+    said, cups = put_bottles_dustbin.bottle_slots(BOTTLES[scene.level]), CUPS[scene.level]
+    return said | (
+        TEXT.slots(*(f"{w}.{by_count(cups)}" for w in ("cup", "coaster"))) if cups else {}
+    )
+
+
+def templates(level: int) -> Templates:
+    """Bottles alone up to level 3, cups too from level 4 on."""
+    return (TEXT if CUPS[level] else put_bottles_dustbin.TEXT).templates(level)
 
 
 TASK = Task(
@@ -153,6 +165,7 @@ TASK = Task(
     draw=draw,
     goal=goal,
     plan=plan,
+    templates=templates,
     slots=slots,
     summary="Throw the bottles into the dustbin, then put the cups on the coasters.",
     success=(

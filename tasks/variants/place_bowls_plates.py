@@ -11,8 +11,9 @@ import numpy as np
 from robospa.geometry import Array, Vec3
 from robospa.tasks import objects
 from robospa.tasks.goals.nest import Nest
-from robospa.tasks.instructions import words_dishes
-from robospa.tasks.instructions.words import Slots
+from robospa.tasks.instructions.grammar import Slots
+from robospa.tasks.instructions.text import TaskText
+from robospa.tasks.instructions.words import NUMBERS, by_count
 from robospa.tasks.layouts import Area, Mask, scatter
 from robospa.tasks.plan import Pick, Place, Skill
 from robospa.tasks.scene import Scene
@@ -25,6 +26,8 @@ from robospa.tasks.variants.tabletop import (
     standing,
 )
 from robospa.workcell import Workcell
+
+TEXT = TaskText.beside(__file__, "place_bowls_plates.toml")
 
 PLATE_X, PLATE_SPREAD, PLATE_Y = 0.12, 0.03, (-0.15, -0.10)
 AREA, MIDDLE = Area((-0.28, 0.28), (-0.05, 0.20), True), 0.08
@@ -94,7 +97,9 @@ def _nested(scene: Scene, below: str) -> Vec3:
 
 def slots(scene: Scene) -> Slots:
     """How the bowls and the plate are said."""
-    return words_dishes.bowls_on_plate(len(scene.facts["bowls"]))
+    count = len(scene.facts["bowls"])
+    bowls = "bowl" if count == 1 else f"bowls.{by_count(count)}"
+    return TEXT.slots("plate", bowls, count=count, word=NUMBERS[count])
 
 
 TASK = Task(
@@ -104,6 +109,7 @@ TASK = Task(
     draw=draw,
     goal=goal,
     plan=plan,
+    templates=TEXT.templates,
     slots=slots,
     summary="Stack all bowls on the plate.",
     success=(

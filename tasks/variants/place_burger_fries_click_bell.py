@@ -15,8 +15,8 @@ import numpy as np
 from robospa.geometry import Pose
 from robospa.tasks import objects
 from robospa.tasks.goals.checklist import Checklist, Counter, Part, Rests, on_spot
-from robospa.tasks.instructions import words_cac
-from robospa.tasks.instructions.words import Slots
+from robospa.tasks.instructions.grammar import Slots
+from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.plan import Place, Skill
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
@@ -33,6 +33,8 @@ from robospa.tasks.variants.tabletop import (
     standing,
 )
 from robospa.workcell import Workcell
+
+TEXT = TaskText.beside(__file__, "place_burger_fries_click_bell.toml")
 
 STEPS = {1: "b", 2: "bf", 3: "bfc", 4: "bfcB", 5: "bfcBF"}
 """What is asked for: b burger and f fries onto the tray, c a click, B and F back again."""
@@ -137,7 +139,7 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
 
 def slots(scene: Scene) -> Slots:
     """How food, tray and bell are said."""
-    return words_cac.meal(scene.level)
+    return TEXT.slots(*("burger", "tray", "fries", "bell")[: scene.level + 1])
 
 
 TASK = Task(
@@ -147,6 +149,7 @@ TASK = Task(
     draw=draw,
     goal=goal,
     plan=plan,
+    templates=TEXT.templates,
     slots=slots,
     summary="Put burger and fries on the tray, ring the bell, and take them back to their places.",
     success=(

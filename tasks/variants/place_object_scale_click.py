@@ -15,8 +15,8 @@ import numpy as np
 
 from robospa.geometry import Pose
 from robospa.tasks.goals.checklist import Checklist, Counter, Part, Rests, on_spot
-from robospa.tasks.instructions import words_cac
-from robospa.tasks.instructions.words import Slots
+from robospa.tasks.instructions.grammar import Slots
+from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.plan import Place, Skill
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
@@ -33,6 +33,8 @@ from robospa.tasks.variants.tabletop import (
     standing,
 )
 from robospa.workcell import Workcell
+
+TEXT = TaskText.beside(__file__, "place_object_scale_click.toml")
 
 STEPS = {1: "b", 2: "bo", 3: "boc", 4: "bocB", 5: "bocBO"}
 """What is asked for: b bell onto the scale, o thing onto the stand, c a click, B and O back."""
@@ -145,8 +147,10 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
 
 def slots(scene: Scene) -> Slots:
     """How the things are said."""
-    thing = scene.object(scene.facts["object"]).asset if scene.level > 1 else ""
-    return words_cac.scale(scene.level, thing)
+    said = TEXT.slots("bell", "scale")
+    if scene.level >= 2:
+        said |= TEXT.slots(f"object.{scene.object(scene.facts['object']).asset}", "stand")
+    return said | (TEXT.slots("cards") if scene.level >= 3 else {})
 
 
 TASK = Task(
@@ -156,6 +160,7 @@ TASK = Task(
     draw=draw,
     goal=goal,
     plan=plan,
+    templates=TEXT.templates,
     slots=slots,
     summary="Put the bell on the scale and an object on the stand, click the cards, and undo both.",
     success=(

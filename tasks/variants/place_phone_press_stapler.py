@@ -15,8 +15,9 @@ import numpy as np
 from robospa.geometry import Pose
 from robospa.tasks.goals.checklist import Checklist, Counter, Inside, Near, Part, Rests
 from robospa.tasks.goals.flags import inside_box
-from robospa.tasks.instructions import words_cac
-from robospa.tasks.instructions.words import Slots
+from robospa.tasks.instructions.grammar import Slots
+from robospa.tasks.instructions.text import TaskText
+from robospa.tasks.instructions.words import times
 from robospa.tasks.plan import Dock, Home, Pour, Press, Skill
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
@@ -34,6 +35,8 @@ from robospa.tasks.variants.tabletop import (
     standing,
 )
 from robospa.workcell import Workcell
+
+TEXT = TaskText.beside(__file__, "place_phone_press_stapler.toml")
 
 PRESSES = {1: 0, 2: 1, 3: 2, 4: 3, 5: 3}
 DUMP_LEVEL = 5
@@ -132,7 +135,10 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
 
 def slots(scene: Scene) -> Slots:
     """How the things are said."""
-    return words_cac.phone(PRESSES[scene.level], scene.level == DUMP_LEVEL)
+    said = TEXT.slots("phone", "stand")
+    if PRESSES[scene.level]:
+        said |= TEXT.slots("stapler") | {"times": times(PRESSES[scene.level])}
+    return said | (TEXT.slots("bin", "dustbin") if scene.level == DUMP_LEVEL else {})
 
 
 TASK = Task(
@@ -142,6 +148,7 @@ TASK = Task(
     draw=draw,
     goal=goal,
     plan=plan,
+    templates=TEXT.templates,
     slots=slots,
     summary="Put the phone on its stand, press the stapler, empty the small bin.",
     success=(

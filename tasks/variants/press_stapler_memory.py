@@ -12,14 +12,17 @@ import math
 import numpy as np
 
 from robospa.tasks.goals.clicks import PressCounts
-from robospa.tasks.instructions.words import Slots
-from robospa.tasks.instructions.words_clicking import staplers_in_a_row
+from robospa.tasks.instructions.grammar import Phrasings, Slots, listed
+from robospa.tasks.instructions.text import TaskText
+from robospa.tasks.instructions.words import NUMBERS, by_count, ordinal
 from robospa.tasks.plan import Press, Skill
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
 from robospa.tasks.variants.clicking import click_counter, press_point
 from robospa.tasks.variants.tabletop import Item, draw_look, named, side, standing
 from robospa.workcell import Workcell
+
+TEXT = TaskText.beside(__file__, "press_stapler_memory.toml")
 
 ROWS = {
     1: (0.0,),
@@ -73,7 +76,23 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
 
 def slots(scene: Scene) -> Slots:
     """How the counts are said."""
-    return staplers_in_a_row([int(n) for n in scene.facts["counts"]])
+    counts = [int(n) for n in scene.facts["counts"]]
+    if len(counts) == 1:
+        return TEXT.slots("stapler") | {"times": _times(counts[0])}
+    words = [_times(n)[0][0] for n in counts]
+    ranks = [f"the {ordinal(i)[1]} {word}" for i, word in enumerate(words, 1)]
+    places = [f"number {i} {word}" for i, word in enumerate(words, 1)]
+    each = [f"the {ordinal(i)[1]} one {word}" for i, word in enumerate(words, 1)]
+    return TEXT.slots("row") | {
+        "counts": (
+            (listed(ranks), ", ".join(ranks)),
+            (listed(places), ", ".join(places), listed(each)),
+        )
+    }
+
+
+def _times(count: int) -> Phrasings:
+    return TEXT.phrasings(f"times.{by_count(count)}", count=count, word=NUMBERS[count])
 
 
 TASK = Task(
@@ -83,6 +102,7 @@ TASK = Task(
     draw=draw,
     goal=goal,
     plan=plan,
+    templates=TEXT.templates,
     slots=slots,
     summary="Press each stapler of the row as often as asked.",
     success=(

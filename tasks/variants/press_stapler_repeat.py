@@ -13,13 +13,16 @@ import numpy as np
 
 from robospa.tasks import objects
 from robospa.tasks.goals.repeat import PressCounter, Repeat
-from robospa.tasks.instructions import words_procedural
-from robospa.tasks.instructions.words import Slots
+from robospa.tasks.instructions.grammar import Slots
+from robospa.tasks.instructions.text import TaskText
+from robospa.tasks.instructions.words import NUMBERS, by_count
 from robospa.tasks.plan import Press, Skill
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
 from robospa.tasks.variants.tabletop import Item, draw_look, named, side, standing
 from robospa.workcell import Workcell
+
+TEXT = TaskText.beside(__file__, "press_stapler_repeat.toml")
 
 X, Y = (-0.2, 0.2), (-0.1, 0.05)
 
@@ -52,7 +55,11 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
 
 def slots(scene: Scene) -> Slots:
     """How the stapler and the count are said."""
-    return words_procedural.press(int(scene.facts["count"]))
+    count = int(scene.facts["count"])
+    if count == 1:
+        return TEXT.slots("stapler")
+    times = f"times.{by_count(count)}"
+    return TEXT.slots("stapler", times, "presses", count=count, word=NUMBERS[count])
 
 
 TASK = Task(
@@ -62,6 +69,7 @@ TASK = Task(
     draw=draw,
     goal=goal,
     plan=plan,
+    templates=TEXT.templates,
     slots=slots,
     summary="Press the stapler the given number of times.",
     success=(

@@ -14,8 +14,9 @@ import numpy as np
 
 from robospa.tasks import objects
 from robospa.tasks.goals.anyorder import Collect
-from robospa.tasks.instructions import words_procedural
-from robospa.tasks.instructions.words import Slots
+from robospa.tasks.instructions.grammar import Slots
+from robospa.tasks.instructions.text import TaskText
+from robospa.tasks.instructions.words import NUMBERS, by_count
 from robospa.tasks.plan import Skill
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
@@ -29,6 +30,8 @@ from robospa.tasks.variants.bins import (
 )
 from robospa.tasks.variants.tabletop import Item, Point, middle_in_view, named, scatter, standing
 from robospa.workcell import TABLE_TOP, Workcell
+
+TEXT = TaskText.beside(__file__, "put_bottles_dustbin.toml")
 
 X, Y, DISTANCE, MIDDLE = (-0.25, 0.3), (0.03, 0.23), 0.13, 0.05
 HALF_HEIGHT = 0.07
@@ -87,9 +90,15 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
     return tuple(skills)
 
 
+def bottle_slots(count: int) -> Slots:
+    """How so many bottles and the bin are said."""
+    bottles = f"bottles.{by_count(count)}"
+    return TEXT.slots(bottles, "bin", "side", count=count, word=NUMBERS[count])
+
+
 def slots(scene: Scene) -> Slots:
     """How the bottles and the bin are said."""
-    return words_procedural.dustbin(len(scene.facts["bottles"]))
+    return bottle_slots(len(scene.facts["bottles"]))
 
 
 TASK = Task(
@@ -99,6 +108,7 @@ TASK = Task(
     draw=draw,
     goal=goal,
     plan=plan,
+    templates=TEXT.templates,
     slots=slots,
     summary="Throw all bottles into the dustbin.",
     success="Every bottle is inside the bin's walls, below its rim, and came to rest there.",

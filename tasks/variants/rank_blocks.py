@@ -17,8 +17,9 @@ import numpy as np
 from robospa.geometry import Vec3
 from robospa.tasks.goals.row import Row
 from robospa.tasks.goals.stack import Bring
-from robospa.tasks.instructions import words_ranking
-from robospa.tasks.instructions.words import Slots
+from robospa.tasks.instructions.grammar import Phrasings, Slots, listed
+from robospa.tasks.instructions.text import COMMON, TaskText
+from robospa.tasks.instructions.words import NUMBERS, by_count
 from robospa.tasks.plan import Pick, Place, Skill
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
@@ -34,6 +35,8 @@ from robospa.tasks.variants.tabletop import (
 )
 from robospa.tasks.variants.towers import NEAR_BAND, draw_color
 from robospa.workcell import TABLE_TOP, Workcell
+
+TEXT = TaskText.beside(__file__, "rank_blocks.toml")
 
 Color = list[float]
 Look = tuple[Vec3, Color]
@@ -167,13 +170,42 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
     return tuple(skills)
 
 
+def _falling(count: int, ends: tuple[str, str], measure: str) -> Phrasings:
+    """How an order by a measure is said: comparatives for two blocks, superlatives for more."""
+    ending = "er" if count == 2 else "est"
+    most, least = (word.removesuffix("e") + ending for word in ends)
+    return TEXT.phrasings("order.falling", most=most, least=least, measure=measure)
+
+
+def _color_order(colors: list[str]) -> Phrasings:
+    return TEXT.phrasings(
+        "order.colors",
+        colors=listed(colors),
+        steps=(", then " if len(colors) > 2 else " and then ").join(colors),
+        first=colors[0],
+        rest=listed(colors[1:]),
+    )
+
+
+def _slots(kind: Kind, count: int) -> Slots:
+    if count == 1:
+        return TEXT.slots(kind.single) | {"middle": COMMON.phrasings("middle.near")}
+    blocks = TEXT.slots(f"blocks.{by_count(count)}", count=count, word=NUMBERS[count])
+    return blocks | {"order": kind.said(count)}
+
+
 @dataclass(frozen=True)
 class Kind:
-    """What distinguishes the three tasks: how the blocks look and how their order is said."""
+    """What distinguishes the three tasks: how the blocks look and how their order is said.
+
+    `single` is the entry of the phrasings for the only block of level 1, `said(count)` are those of
+    the order of several.
+    """
 
     name: str
     looks: Callable[[int, np.random.Generator], list[Look]]
-    words: Callable[[int], Slots]
+    single: str
+    said: Callable[[int], Phrasings]
     summary: str
     order: str
 
@@ -182,21 +214,24 @@ KINDS = (
     Kind(
         "Height",
         _heights,
-        words_ranking.by_height,
+        "block.plain",
+        lambda count: _falling(count, ("tall", "short"), "height"),
         "Line the blocks up from left to right, from the tallest to the shortest.",
         "the next shorter",
     ),
     Kind(
         "Color",
         _colors,
-        words_ranking.by_color,
+        "block.red",
+        lambda count: _color_order(list(COLORS)[:count]),
         "Line the blocks up from left to right: red, green, blue, yellow, purple.",
         "the next colour's",
     ),
     Kind(
         "Size",
         _sizes,
-        words_ranking.by_size,
+        "block.plain",
+        lambda count: _falling(count, ("large", "small"), "size"),
         "Line the blocks up from left to right, from the largest to the smallest.",
         "the next smaller",
     ),
@@ -211,7 +246,8 @@ def _task(kind: Kind) -> Task:
         draw=lambda level, rng, workcell: _draw(kind.looks(level, rng), rng, workcell),
         goal=goal,
         plan=plan,
-        slots=lambda scene: kind.words(len(scene.facts["order"])),
+        templates=TEXT.templates,
+        slots=lambda scene: _slots(kind, len(scene.facts["order"])),
         summary=kind.summary,
         success=(
             f"From left to right every block is followed by {kind.order} block, at most 3 cm "

@@ -15,15 +15,46 @@ import numpy as np
 
 from robospa.geometry import Array, Pose, Vec3, yaw_rotation
 from robospa.tasks.goals.pick import Lift
-from robospa.tasks.instructions import words_spatial
-from robospa.tasks.instructions.words import Slots
+from robospa.tasks.instructions.grammar import Slots
+from robospa.tasks.instructions.text import TaskText
+from robospa.tasks.instructions.words import ordinal
 from robospa.tasks.layouts import Area, Mask, Points, scatter, spread
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.task import Draft, Level, Task
 from robospa.tasks.variants.picking import lifted, pick_target
 from robospa.workcell import TABLE_TOP, FixedCamera, Workcell
 
+TEXT = TaskText.beside(__file__, "ranking.toml")
+
 Range = tuple[float, float]
+
+WORDS: Mapping[str, Mapping[str, str]] = {
+    "size": {
+        "measure": "size",
+        "how": "big each block is",
+        "most": "largest",
+        "least": "smallest",
+    },
+    "height": {
+        "measure": "height",
+        "how": "tall each block is",
+        "most": "tallest",
+        "least": "shortest",
+    },
+    "length": {
+        "measure": "length",
+        "how": "long each block is from left to right",
+        "most": "longest",
+        "least": "shortest",
+    },
+    "area": {
+        "measure": "base area",
+        "how": "much table each block covers",
+        "most": "largest base",
+        "least": "smallest base",
+    },
+}
+"""How a measure of blocks is called, how it is looked at, and its two ends, by slot."""
 
 DISC = ((0.0, -0.12), 0.015)
 """No block lies within this squared radius [m2] of this point."""
@@ -157,8 +188,14 @@ def rank_task(measure: Measure, layouts: Mapping[int, Layout]) -> Task:
     word = measure.word
 
     def slots(scene: Scene) -> Slots:
-        rank = int(scene.facts[f"{word}_rank"])
-        return words_spatial.measured(word, rank, len(scene.objects))
+        rank, count = int(scene.facts[f"{word}_rank"]), len(scene.objects)
+        if count == 2:
+            which = "larger" if rank == 1 else "smaller"
+        else:
+            which = "first" if rank == 1 else "other"
+        number, spelled = ordinal(rank)
+        fixed: Slots = {slot: ((said,), (said,)) for slot, said in WORDS[word].items()}
+        return fixed | TEXT.slots(f"block.{word}.{which}", number=number, word=spelled)
 
     return Task(
         name=f"Pick_Blocks_{word.capitalize()}",
@@ -167,6 +204,7 @@ def rank_task(measure: Measure, layouts: Mapping[int, Layout]) -> Task:
         draw=lambda level, rng, workcell: draw(level, rng, workcell, measure, layouts[level]),
         goal=lifted(Lift(above=0.82)),
         plan=pick_target,
+        templates=TEXT.templates,
         slots=slots,
         summary=f"Pick the block of the named {word} rank among 2 to 6 blocks of one colour.",
         success="the target's centre is higher than 0.82 m while a gripper carries it",

@@ -9,13 +9,16 @@ from __future__ import annotations
 import numpy as np
 
 from robospa.tasks.goals.memory import Cover, UncoverInOrder
-from robospa.tasks.instructions import words_procedural
-from robospa.tasks.instructions.words import Slots
+from robospa.tasks.instructions.grammar import Slots
+from robospa.tasks.instructions.text import TaskText
+from robospa.tasks.instructions.words import color_orders
 from robospa.tasks.plan import Home, Pick, Place, Skill, Wait
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
 from robospa.tasks.variants.tabletop import Item, named, side, standing
 from robospa.workcell import TABLE_TOP, Workcell
+
+TEXT = TaskText.beside(__file__, "remember_color_cover.toml")
 
 COLORS = {
     "red": (1.0, 0.0, 0.0),
@@ -96,7 +99,10 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
 
 def slots(scene: Scene) -> Slots:
     """How the order of the colours is said, and where a cover goes."""
-    return words_procedural.memory(list(scene.facts["colors"]))
+    colors = list(scene.facts["colors"])
+    if len(colors) == 1:
+        return TEXT.slots("where", "block", color=colors[0])
+    return TEXT.slots("where") | {"order": color_orders(colors)}
 
 
 TASK = Task(
@@ -106,6 +112,7 @@ TASK = Task(
     draw=draw,
     goal=goal,
     plan=plan,
+    templates=TEXT.templates,
     slots=slots,
     summary="Remember the colours under the covers and open them in the asked order.",
     success=(

@@ -15,14 +15,17 @@ from robospa.geometry import yaw_rotation
 from robospa.tasks import objects
 from robospa.tasks.goals.cue import AfterCue
 from robospa.tasks.goals.restore import Restore, Wanted
-from robospa.tasks.instructions.words import Slots
-from robospa.tasks.instructions.words_memory import turned_blocks
+from robospa.tasks.instructions.grammar import Slots
+from robospa.tasks.instructions.text import TaskText
+from robospa.tasks.instructions.words import NUMBERS
 from robospa.tasks.plan import Home, Pick, Place, Skill
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
 from robospa.tasks.variants.shown import HOLD_STILL, WALL, row, wall
 from robospa.tasks.variants.tabletop import Item, named, side, standing
 from robospa.workcell import TABLE_TOP, Workcell
+
+TEXT = TaskText.beside(__file__, "remember_orientation_restore.toml")
 
 TURNS = (0.0, -math.pi / 2, math.pi, math.pi / 2)
 """Up, right, down, left: where the bar of the T points, seen from the robot."""
@@ -87,7 +90,9 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
 
 def slots(scene: Scene) -> Slots:
     """Which blocks are to be turned like which; no direction is named."""
-    return turned_blocks(len(scene.facts["near"]))
+    count = len(scene.facts["near"])
+    some = "one" if count == 1 else "many"
+    return TEXT.slots(*(f"{slot}.{some}" for slot in ("wall", "near", "far")), word=NUMBERS[count])
 
 
 TASK = Task(
@@ -97,6 +102,7 @@ TASK = Task(
     draw=draw,
     goal=goal,
     plan=plan,
+    templates=TEXT.templates,
     slots=slots,
     summary="Remember how the far blocks lie and turn the near ones the same way.",
     success=(

@@ -12,13 +12,16 @@ import math
 import numpy as np
 
 from robospa.tasks.goals.regions import Part, Region, Regions
-from robospa.tasks.instructions import words_moving
-from robospa.tasks.instructions.words import Slots
+from robospa.tasks.instructions.grammar import Phrasings, Slots
+from robospa.tasks.instructions.text import TaskText
+from robospa.tasks.instructions.words import NUMBERS
 from robospa.tasks.plan import Pick, Place, Skill
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
 from robospa.tasks.variants.tabletop import Item, draw_look, named, side, standing
 from robospa.workcell import TABLE_TOP, Workcell
+
+TEXT = TaskText.beside(__file__, "separate_fries_bread.toml")
 
 ASSETS = {"bread": "bread", "fries": "french_fries"}
 SLOTS_X = {
@@ -97,9 +100,18 @@ def slots(scene: Scene) -> Slots:
     facts = scene.facts
     if scene.level == 1:
         way = "forward" if facts["forward"] else "backward"
-        return words_moving.one_food(facts[f"{way}_kind"], way)
-    groups = [(facts[f"{way}_kind"], len(facts[way])) for way in ("forward", "backward")]
-    return words_moving.foods_apart(*groups)
+        return TEXT.slots(f"way.{way}") | {"food": _food(facts[f"{way}_kind"], 1)}
+    return TEXT.slots() | {
+        "first": _food(facts["forward_kind"], len(facts["forward"])),
+        "second": _food(facts["backward_kind"], len(facts["backward"])),
+        "ahead": TEXT.phrasings("way.forward"),
+        "back": TEXT.phrasings("way.backward"),
+    }
+
+
+def _food(kind: str, count: int) -> Phrasings:
+    entry = f"{kind}.one" if count == 1 else f"{kind}.many"
+    return TEXT.phrasings(entry, count=count, word=NUMBERS[count])
 
 
 TASK = Task(
@@ -109,6 +121,7 @@ TASK = Task(
     draw=draw,
     goal=goal,
     plan=plan,
+    templates=TEXT.templates,
     slots=slots,
     summary="Move one kind of food forward and the other backward.",
     success=(

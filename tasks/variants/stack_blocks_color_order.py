@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from robospa.tasks.instructions import words_procedural
-from robospa.tasks.instructions.words import Slots
+from robospa.tasks.instructions.grammar import Slots, listed
+from robospa.tasks.instructions.text import COMMON, TaskText
+from robospa.tasks.instructions.words import NUMBERS, by_count, color_orders
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
 from robospa.tasks.variants.tabletop import (
@@ -24,6 +25,8 @@ from robospa.tasks.variants.tabletop import (
 )
 from robospa.tasks.variants.towers import building_place, tower_goal, tower_plan
 from robospa.workcell import Workcell
+
+TEXT = TaskText.beside(__file__, "stack_blocks_color_order.toml")
 
 COLORS = {
     "red": (1.0, 0.0, 0.0),
@@ -70,7 +73,29 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
 
 def slots(scene: Scene) -> Slots:
     """How the order of the colours is said."""
-    return words_procedural.stack(list(scene.facts["colors"]))
+    colors, count = list(scene.facts["colors"]), len(scene.facts["colors"])
+    if count == 1:
+        middle = COMMON.phrasings("middle.near")
+        return TEXT.slots("block", color=colors[0]) | {"middle": middle}
+    onto = list(zip(colors[1:], colors[:-1], strict=True))
+    number = f"number.{by_count(count)}"
+    return TEXT.slots(number, count=count, word=NUMBERS[count]) | {
+        "order": color_orders(colors),
+        "pairs": (
+            (
+                listed([f"{a} on {b}" for a, b in onto]),
+                listed([f"{a} onto {b}" for a, b in onto], ", then "),
+            ),
+            (
+                listed([f"{a} over {b}" for a, b in onto]),
+                listed([f"{a} on top of {b}" for a, b in onto]),
+                listed([f"{a} above {b}" for a, b in onto]),
+            ),
+        ),
+        "bottom": TEXT.phrasings("end", color=colors[0]),
+        "top": TEXT.phrasings("end", color=colors[-1]),
+        "middle": COMMON.phrasings("middle.table"),
+    }
 
 
 TASK = Task(
@@ -80,6 +105,7 @@ TASK = Task(
     draw=draw,
     goal=tower_goal,
     plan=tower_plan,
+    templates=TEXT.templates,
     slots=slots,
     summary="Stack the blocks in the given order of colours.",
     success=(

@@ -11,19 +11,21 @@ import math
 
 import numpy as np
 
-from robospa.tasks.instructions.words import Slots
-from robospa.tasks.instructions.words_stacking import stack_by_length
+from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.layouts import Area, Points, spread
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
 from robospa.tasks.variants.tabletop import Item, named, standing
 from robospa.tasks.variants.towers import (
+    LENGTH,
+    TEXT,
     Ground,
     building_place,
     draw_color,
     scattered_blocks,
     tower_goal,
     tower_plan,
+    tower_slots,
 )
 from robospa.workcell import Workcell
 
@@ -87,7 +89,7 @@ def _wide(level: int, points: Points) -> bool:
 
 def slots(scene: Scene) -> Slots:
     """How the order of the lengths is said."""
-    return stack_by_length(len(scene.facts["order"]))
+    return tower_slots(LENGTH, len(scene.facts["order"]))
 
 
 TASK = Task(
@@ -97,6 +99,7 @@ TASK = Task(
     draw=draw,
     goal=tower_goal,
     plan=tower_plan,
+    templates=TEXT.templates,
     slots=slots,
     summary="Stack the blocks from the longest at the bottom to the shortest on top.",
     success=(

@@ -9,19 +9,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from robospa.tasks.instructions.words import Slots
-from robospa.tasks.instructions.words_stacking import stack_by_size
+from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.layouts import Area
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
 from robospa.tasks.variants.tabletop import Item, named, standing
 from robospa.tasks.variants.towers import (
+    SIZE,
+    TEXT,
     Ground,
     building_place,
     draw_color,
     scattered_blocks,
     tower_goal,
     tower_plan,
+    tower_slots,
 )
 from robospa.workcell import Workcell
 
@@ -66,7 +68,7 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
 
 def slots(scene: Scene) -> Slots:
     """How the order of the sizes is said."""
-    return stack_by_size(len(scene.facts["order"]))
+    return tower_slots(SIZE, len(scene.facts["order"]))
 
 
 TASK = Task(
@@ -76,6 +78,7 @@ TASK = Task(
     draw=draw,
     goal=tower_goal,
     plan=tower_plan,
+    templates=TEXT.templates,
     slots=slots,
     summary="Stack the blocks from the largest at the bottom to the smallest on top.",
     success=(

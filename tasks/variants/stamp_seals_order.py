@@ -13,11 +13,13 @@ import numpy as np
 from robospa.tasks import objects
 from robospa.tasks.goals.stamping import StampCounter
 from robospa.tasks.goals.tools import UseInOrder
-from robospa.tasks.instructions import words_tools
-from robospa.tasks.instructions.words import Slots
+from robospa.tasks.instructions.grammar import Phrasings, Slots, listed
+from robospa.tasks.instructions.text import TaskText
+from robospa.tasks.instructions.words import NUMBERS, by_count, color_orders
 from robospa.tasks.layouts import LayoutError
 from robospa.tasks.plan import Pick, Place, Skill
 from robospa.tasks.scene import Scene
+from robospa.tasks.shapes import ObjectModel
 from robospa.tasks.task import Draft, Level, Task
 from robospa.tasks.variants.tabletop import (
     Item,
@@ -30,6 +32,8 @@ from robospa.tasks.variants.tabletop import (
     standing,
 )
 from robospa.workcell import Workcell
+
+TEXT = TaskText.beside(__file__, "stamp_seals_order.toml")
 
 COLORS = (
     ("red",), ("green",), ("blue", "navy"), ("yellow",), ("cyan",), ("magenta",), ("black",),
@@ -122,8 +126,24 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
 
 def slots(scene: Scene) -> Slots:
     """How the seal, the pads and their order are said."""
-    seal = scene.object(scene.facts["seal"])
-    return words_tools.stamps(scene.facts["colors"], objects.object_model(seal.asset, seal.params))
+    colors, seal = list(scene.facts["colors"]), scene.object(scene.facts["seal"])
+    count = len(colors)
+    own: Slots = {"seal": _seal_names(objects.object_model(seal.asset, seal.params))}
+    if count == 1:
+        return TEXT.slots("pad", color=colors[0]) | own
+    train, held = color_orders(colors)
+    own["order"] = (
+        (f"from right to left, {train[0]}", f"right to left: {listed(colors)}"),
+        tuple(f"{text}, that is, from the rightmost to the leftmost" for text in held),
+    )
+    return TEXT.slots(f"pads.{by_count(count)}", count=count, word=NUMBERS[count]) | own
+
+
+def _seal_names(model: ObjectModel) -> Phrasings:
+    """Plain names and the model's own, of which the last third is held out."""
+    cut = len(model.phrases) - max(2, len(model.phrases) // 3)
+    own = tuple(f"the {p}" for p in model.phrases)
+    return ("the stamp", *own[:cut]), ("the hand seal", *own[cut:])
 
 
 TASK = Task(
@@ -133,6 +153,7 @@ TASK = Task(
     draw=draw,
     goal=goal,
     plan=plan,
+    templates=TEXT.templates,
     slots=slots,
     summary="Stamp the pads with the seal from right to left.",
     success=(

@@ -13,8 +13,9 @@ import numpy as np
 
 from robospa.tasks.goals.checklist import Checklist, Counter, Part
 from robospa.tasks.goals.stamping import StampCounter
-from robospa.tasks.instructions import words_cac
-from robospa.tasks.instructions.words import Slots
+from robospa.tasks.instructions.grammar import Slots
+from robospa.tasks.instructions.text import TaskText
+from robospa.tasks.instructions.words import times
 from robospa.tasks.plan import Press, Skill, Stamp
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
@@ -30,6 +31,8 @@ from robospa.tasks.variants.tabletop import (
     standing,
 )
 from robospa.workcell import Workcell
+
+TEXT = TaskText.beside(__file__, "stamp_seals_press_stapler.toml")
 
 STEPS = {1: "l", 2: "ll", 3: "llr", 4: "llrr", 5: "llrrs"}
 """What is asked for: l a stamp with the left seal, r one with the right seal, s the stapler."""
@@ -113,7 +116,15 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
 
 def slots(scene: Scene) -> Slots:
     """How the things are said."""
-    return words_cac.stamps(scene.level)
+    level = scene.level
+    if level < 3:
+        return TEXT.slots("seal", "pad") | {"times": times(level)}
+    said = TEXT.slots(*(("stapler",) if level == 5 else ()))
+    said |= {"left_times": times(2), "right_times": times(1 if level == 3 else 2)}
+    for at in ("left", "right"):
+        said[f"{at}_seal"] = TEXT.phrasings("side_seal", side=at)
+        said[f"{at}_pad"] = TEXT.phrasings("side_pad", side=at)
+    return said
 
 
 TASK = Task(
@@ -123,6 +134,7 @@ TASK = Task(
     draw=draw,
     goal=goal,
     plan=plan,
+    templates=TEXT.templates,
     slots=slots,
     summary="Stamp the pads with the seals as often as asked, then press the stapler.",
     success=(

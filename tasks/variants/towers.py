@@ -14,11 +14,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from robospa.tasks.goals.stack import HEIGHT_TOLERANCE, Bring, Stack
+from robospa.tasks.instructions.grammar import Slots
+from robospa.tasks.instructions.text import COMMON, TaskText
+from robospa.tasks.instructions.words import NUMBERS, by_count
 from robospa.tasks.layouts import Area, LayoutError, Points
 from robospa.tasks.plan import Pick, Place, Skill
 from robospa.tasks.scene import Scene
 from robospa.tasks.variants.tabletop import Point, apart, side
 from robospa.workcell import TABLE_TOP, Workcell
+
+TEXT = TaskText.beside(__file__, "towers.toml")
 
 NEAR_BAND: tuple[Point, Point] = ((-0.05, 0.05), (-1.0, -0.08))
 """Level 1: the block's centre must come here (x, y)."""
@@ -90,6 +95,46 @@ def scattered_blocks(
             if accept(points):
                 return points
     raise LayoutError(f"no free layout of {count} blocks in {POOLS * LAYOUTS} draws; skip the seed")
+
+
+@dataclass(frozen=True)
+class Scale:
+    """What is compared: its two ends for two blocks and for more, and other words held out."""
+
+    two: tuple[str, str]
+    more: tuple[str, str]
+    held_two: tuple[str, str]
+    held_more: tuple[str, str]
+
+
+SIZE = Scale(
+    ("larger", "smaller"), ("largest", "smallest"), ("bigger", "smaller"), ("biggest", "tiniest")
+)
+LENGTH = Scale(
+    ("longer", "shorter"), ("longest", "shortest"), ("longer", "shorter"), ("longest", "shortest")
+)
+
+
+def tower_slots(scale: Scale, count: int) -> Slots:
+    """How a tower by size or length is said, largest or longest at the bottom."""
+    if count == 1:
+        return TEXT.slots("block") | {"middle": COMMON.phrasings("middle.near")}
+    most, least = scale.two if count == 2 else scale.more
+    held_most, held_least = scale.held_two if count == 2 else scale.held_more
+    more, less = (f"{word.removesuffix('st')}r" for word in (most, least))
+    some = by_count(count)
+    order = TEXT.phrasings(
+        f"order.{some}",
+        most=most,
+        least=least,
+        held_most=held_most,
+        held_least=held_least,
+        more=more,
+        less=less,
+    )
+    middle = COMMON.phrasings("middle.table")
+    number = TEXT.slots(f"number.{some}", count=count, word=NUMBERS[count])
+    return number | {"order": order, "middle": middle}
 
 
 def draw_color(rng: np.random.Generator) -> list[float]:

@@ -18,9 +18,9 @@ import pytest
 from scene_checks import targets_of
 
 from robospa.tasks import catalog
-from robospa.tasks.instructions import sentences, templates
 from robospa.tasks.instructions.grammar import slot_names
 from robospa.tasks.scene import Scene
+from robospa.tasks.sentences import sentences, templates
 
 VARIANTS = [(name.lower(), level) for name in catalog.tasks() for level in catalog.LEVELS]
 SLOW = {"pick_mixed_objects_distance_b", "pick_mixed_objects_multi_view_a"}

@@ -9,9 +9,9 @@ from functools import cache
 import pytest
 
 from robospa.tasks import catalog
-from robospa.tasks.instructions import instruction, sentences, templates
 from robospa.tasks.instructions.grammar import fill, masked_words, similarity
 from robospa.tasks.scene import Scene
+from robospa.tasks.sentences import instruction, sentences, templates
 
 VARIANTS = [(name.lower(), level) for name in catalog.tasks() for level in catalog.LEVELS]
 LONGEST = {

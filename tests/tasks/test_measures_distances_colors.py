@@ -15,12 +15,12 @@ from teleport import Teleport
 
 from robospa.tasks.catalog import build_scene, task
 from robospa.tasks.events import outcome
-from robospa.tasks.instructions import sentences
 from robospa.tasks.objects import looks, object_model
 from robospa.tasks.objects.build import PALETTE
 from robospa.tasks.objects.tint import TINTS
 from robospa.tasks.plan import Pick, Skill
 from robospa.tasks.scene import Scene
+from robospa.tasks.sentences import sentences
 from robospa.tasks.variants import object_sets
 from robospa.tasks.variants.basic_color import COLORS
 from robospa.tasks.variants.pick_blocks_measures import none_hidden

@@ -1,0 +1,79 @@
+"""Shorter ways to write fifty templates: clauses in frames, deeds after a wait, steps in a chain.
+
+A group of templates in a task's file has one of these sets of keys for its training sentences:
+
+| keys | sentences |
+|---|---|
+| `train`, perhaps `all_levels` | as they stand |
+| `deeds`, `frames` | every frame ("please <D>.") around every deed |
+| `deeds`, `waits` | every wait ("wait until {wall}, then <D>.") twice, around all deeds by turns |
+| `clauses`, `wrappers`, `names` | clauses around names ("<X>") in wrappers ("<C>."), by turns |
+| `first_steps` | ten ways to chain that many of the file's steps, in five wordings |
+
+`heldout` are the ten others, in which "<X>" stands for `heldout_names` by turns; a chain states its
+steps in ten ways instead. `replace` gives further markers, such as X, in both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from robospa.tasks.instructions.chains import CHAINS, statements
+from robospa.tasks.instructions.grammar import Templates, templates_of
+
+
+def composed(group: Mapping[str, Any]) -> Templates:
+    """The templates that a group of a task's file stands for; ValueError for wrong counts."""
+    markers = group.get("replace", {})
+    heldout = named(group.get("heldout", ()), group.get("heldout_names", ("<X>",)))
+    if "first_steps" in group:
+        steps = group["steps"][: group["first_steps"]]
+        wordings = zip(*(step["clauses"] for step in steps), strict=True)
+        train = tuple(chain(wording) for wording in wordings for chain in CHAINS)
+        heldout = statements([s["result"] for s in steps], [s["event"] for s in steps])
+    elif "waits" in group:
+        train = after_waits(group["deeds"], group["waits"])
+    elif "frames" in group:
+        train = tuple(f.replace("<D>", deed) for f in group["frames"] for deed in group["deeds"])
+    elif "clauses" in group:
+        train = wrapped(group["clauses"], group["wrappers"], group.get("names", ("<X>",)))
+    else:
+        train = (*group.get("all_levels", ()), *group["train"])
+    return templates_of(_replaced(train, markers), _replaced(heldout, markers))
+
+
+def wrapped(
+    clauses: Sequence[str], wrappers: Sequence[str], names: Sequence[str]
+) -> tuple[str, ...]:
+    """Clause i inside a wrapper ("<C>") and around a noun phrase ("<X>"), each by turns.
+
+    Steps of 3 and 1 through lists of co-prime lengths spread the combinations evenly.
+    """
+    made = []
+    for i, clause in enumerate(clauses):
+        sentence = wrappers[3 * i % len(wrappers)].replace("<C>", clause)
+        made.append(sentence.replace("<X>", names[(i + i // len(names)) % len(names)]))
+    return tuple(made)
+
+
+def named(templates: Sequence[str], names: Sequence[str]) -> tuple[str, ...]:
+    """`templates` with "<X>" replaced by the noun phrases by turns."""
+    return tuple(t.replace("<X>", names[i % len(names)]) for i, t in enumerate(templates))
+
+
+def after_waits(deeds: Sequence[str], waits: Sequence[str]) -> tuple[str, ...]:
+    """Fifty of the combinations: every wait and every deed twice (25 of each)."""
+    return tuple(
+        wait.replace("<D>", deeds[(i + 12 * turn) % len(deeds)])
+        for turn in range(2)
+        for i, wait in enumerate(waits)
+    )
+
+
+def _replaced(sentences: Sequence[str], markers: Mapping[str, str]) -> tuple[str, ...]:
+    """Sentences with every marker ("<X>") replaced by its text."""
+    made = tuple(sentences)
+    for marker, text in markers.items():
+        made = tuple(sentence.replace(f"<{marker}>", text) for sentence in made)
+    return made

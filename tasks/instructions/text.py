@@ -1,0 +1,103 @@
+"""The words of a task: templates and phrasings, written in a TOML file beside its module.
+
+    [[templates]]                       # of some levels; see `compose` for shorter ways to write 50
+    levels = [1, 2]
+    train = ["pick up {block}.", ...]   # 50 sentences with slots in braces
+    heldout = ["what I need is {block} raised off {table}.", ...]      # 10
+
+    [phrasings.block]                   # what may fill the slot {block}
+    train = ["the {color} block", "the {color} cube"]
+    heldout = ["the block colored {color}", ...]
+
+A phrasing may have values of the scene in braces ({color}); the task's `slots` gives them. What
+several phrasings of one slot have to be chosen from has names of two parts, such as
+`[phrasings.blocks.two]`. What a group of templates leaves out is taken from the top of the file.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from robospa.tasks.instructions.compose import composed
+from robospa.tasks.instructions.grammar import Phrasings, Slots, Templates
+
+SHARED = Path(__file__).with_name("shared.toml")
+"""Clauses and phrasings that many tasks use."""
+
+
+@dataclass(frozen=True)
+class TaskText:
+    """A file of templates and phrasings, read when something of it is first asked for."""
+
+    path: Path
+
+    @staticmethod
+    def beside(module: str, name: str) -> TaskText:
+        """The file called `name` in the folder of a module, given as its `__file__`."""
+        return TaskText(Path(module).with_name(name))
+
+    def templates(self, level: int, name: str = "") -> Templates:
+        """The templates of a level; of several sets in the file those called `name`.
+
+        KeyError if the file has none.
+        """
+        return _templates(self.path, level, name)
+
+    def phrasings(self, entry: str, **values: object) -> Phrasings:
+        """The phrasings called `entry` ("block", "blocks.two"), with the values filled in.
+
+        KeyError for an unknown entry or a missing value.
+        """
+        train, heldout = _phrasings(self.path, entry)
+        return _filled(train, values), _filled(heldout, values)
+
+    def slots(self, *entries: str, **values: object) -> Slots:
+        """The phrasings of several entries by slot, and those that every task may use.
+
+        The slot of an entry is the first part of its name: "blocks.two" fills {blocks}.
+        """
+        own = {entry.split(".")[0]: self.phrasings(entry, **values) for entry in entries}
+        return {**COMMON.shared("arm", "table"), **own}
+
+    def shared(self, *entries: str, **values: object) -> Slots:
+        """The phrasings of several entries by slot, without further ones."""
+        return {entry.split(".")[0]: self.phrasings(entry, **values) for entry in entries}
+
+
+COMMON = TaskText(SHARED)
+"""Phrasings of slots that any task may use."""
+
+
+def _filled(texts: tuple[str, ...], values: Mapping[str, object]) -> tuple[str, ...]:
+    return tuple(text.format_map(values) for text in texts)
+
+
+@cache
+def _read(path: Path) -> Mapping[str, Any]:
+    return tomllib.loads(path.read_text(encoding="utf-8"))
+
+
+@cache
+def _templates(path: Path, level: int, name: str) -> Templates:
+    data = _read(path)
+    for group in data.get("templates", ()):
+        if level in group["levels"] and group.get("name", "") == name:
+            own = {**data, **group}
+            shared = _read(SHARED)["groups"][own["shared"]] if "shared" in own else {}
+            return composed({**shared, **own})
+    raise KeyError(f"{path} has no templates {name!r} for level {level}")
+
+
+@cache
+def _phrasings(path: Path, entry: str) -> Phrasings:
+    found: Any = _read(path)["phrasings"]
+    for part in entry.split("."):
+        if part not in found:
+            raise KeyError(f"{path} has no phrasings {entry!r}; {part!r} is none of {list(found)}")
+        found = found[part]
+    return tuple(found["train"]), tuple(found["heldout"])

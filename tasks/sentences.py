@@ -1,0 +1,89 @@
+"""The instructions: 50 + 10 templates a variant, 100 + 100 sentences a scene, one a trial.
+
+`templates` are those of the task. `sentences` fills them with the phrasings that the task's
+`slots(scene)` offers for a split. `instruction` picks the one sentence of a trial. All three are
+pure functions; the pick depends on suite, task, level, seed and split only, so that every robot
+gets the same sentence.
+
+The held-out templates differ from the training ones in structure, not in words alone: training
+sentences give orders, held-out ones ask, wish, state a goal or a condition. The phrasings that fill
+them are split too.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from itertools import product
+
+import numpy as np
+
+from robospa.tasks import catalog
+from robospa.tasks.instructions.grammar import SENTENCES, Templates, fill, slot_names
+from robospa.tasks.scene import Scene
+
+SPLITS = ("train", "heldout")
+
+
+def templates(task: str, level: int) -> Templates:
+    """The templates of one variant; KeyError for an unknown task, ValueError for a level."""
+    if level not in catalog.LEVELS:
+        raise ValueError(f"no level {level}; there are {list(catalog.LEVELS)}")
+    return catalog.task(task).templates(level)
+
+
+def sentences(scene: Scene, split: str) -> tuple[str, ...]:
+    """The 100 distinct sentences of a scene and split ("train" or "heldout").
+
+    Every template of the split is used equally often, with different phrasings in its slots.
+    ValueError if the split is unknown or the slots have too few phrasings.
+    """
+    which = _split_index(split)
+    slots = catalog.task(scene.task).slots(scene)
+    phrasings = {name: both[which] for name, both in slots.items()}
+    chosen = templates(scene.task, scene.level)[which]
+    share = SENTENCES // len(chosen)
+    rng = _generator(scene, split, "sentences")
+    made = [s for template in chosen for s in _fillings(template, phrasings, share, rng)]
+    if len(set(made)) != SENTENCES:
+        raise ValueError(
+            f"{scene.task} level {scene.level} seed {scene.seed} has {len(set(made))} distinct "
+            f"{split} sentences instead of {SENTENCES}; add phrasings to its slots"
+        )
+    return tuple(made)
+
+
+def instruction(scene: Scene, split: str = "heldout") -> str:
+    """The sentence of this trial: one of `sentences(scene, split)`, each equally likely."""
+    index = int(_generator(scene, split, "instruction").integers(SENTENCES))
+    return sentences(scene, split)[index]
+
+
+def _fillings(
+    template: str,
+    phrasings: Mapping[str, tuple[str, ...]],
+    count: int,
+    rng: np.random.Generator,
+) -> list[str]:
+    names = slot_names(template)
+    missing = [name for name in names if name not in phrasings]
+    if missing:
+        raise ValueError(f"template {template!r} needs slot {missing[0]!r}; got {list(phrasings)}")
+    choices = list(product(*(dict.fromkeys(phrasings[name]) for name in names)))
+    if len(choices) < count:
+        raise ValueError(f"only {len(choices)} of {count} fillings of {template!r}; add phrasings")
+    picked = rng.permutation(len(choices))[:count]
+    return [fill(template, dict(zip(names, choices[int(i)], strict=True))) for i in picked]
+
+
+def _split_index(split: str) -> int:
+    if split not in SPLITS:
+        raise ValueError(f"no instruction split {split!r}; use one of {list(SPLITS)}")
+    return SPLITS.index(split)
+
+
+def _generator(scene: Scene, split: str, purpose: str) -> np.random.Generator:
+    _split_index(split)
+    text = f"{scene.suite}/{scene.task}/{scene.level}/{scene.seed}/{split}/{purpose}"
+    entropy = int.from_bytes(hashlib.sha256(text.encode()).digest()[:16], "big")
+    return np.random.Generator(np.random.PCG64(entropy))
