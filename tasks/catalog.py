@@ -14,47 +14,46 @@ from robospa.trial import REFERENCE
 from robospa.workcell import workcell
 
 MODULES = (
-    "pick_blocks_size",
-    "pick_blocks_measures",
-    "pick_distances",
-    "pick_canonical",
-    "pick_relational",
-    "pick_multi_view",
-    "press_stapler_repeat",
-    "lift_repeat",
-    "click_bell_repeat",
-    "put_bottles_dustbin",
-    "move_blocks_apart",
-    "move_playing_cards_away",
-    "place_bowls_plates",
-    "separate_fries_bread",
-    "rank_blocks",
-    "hit_blocks_hammer_order",
-    "click_objects_order",
-    "stamp_seals_order",
-    "click_bell_clockwise_order",
-    "stack_blocks_color_order",
-    "stack_blocks_size_order",
-    "stack_blocks_length_order",
-    "place_phone_press_stapler",
-    "place_bottle_cup",
-    "hang_mug_stack_blocks",
-    "place_object_scale_click",
-    "place_burger_fries_click_bell",
-    "click_can_place_items",
-    "stamp_seals_press_stapler",
-    "click_bell_open_microwave_place_object",
-    "observe_blocks_move_memory",
-    "observe_objects_click_memory",
-    "remember_color_cover",
-    "remember_orientation_restore",
-    "press_stapler_memory",
+    "block_measures.task",
+    "distance.task",
+    "canonical_index.task",
+    "relational.task",
+    "cross_view.task",
+    "repeat.press_stapler",
+    "repeat.lift",
+    "repeat.click_bell",
+    "dustbin.bottles",
+    "move_apart.blocks",
+    "move_apart.cards",
+    "nest_bowls.task",
+    "move_apart.food",
+    "rank_blocks.task",
+    "tool_order.hammer",
+    "click_order.objects",
+    "tool_order.seal",
+    "click_order.bells",
+    "stack_blocks.color",
+    "stack_blocks.size",
+    "stack_blocks.length",
+    "action_chain.phone_stapler",
+    "dustbin.bottles_and_cups",
+    "action_chain.mug_tower",
+    "action_chain.scale",
+    "action_chain.tray",
+    "action_chain.can_basket",
+    "action_chain.seals_stapler",
+    "action_chain.microwave",
+    "memory_wall.blocks",
+    "memory_wall.objects",
+    "memory_cover.task",
+    "memory_wall.orientation",
+    "memory_counts.task",
 )
-"""Modules of `robospa.tasks.variants`, in the paper's order; each defines TASK, or TASKS for
+"""Modules of `robospa.tasks.families`, in the paper's order; each defines TASK, or TASKS for
 several that differ in data alone."""
 
-BASIC_MODULES: tuple[str, ...] = ("basic_color", "basic_position", "basic_ordinal")
-"""The appendix's basic grounding tasks, outside the 280 variants; each defines TASKS."""
+BASIC_MODULES = ("basic_color.task", "cross_view.basic", "canonical_index.basic")
+"""The appendix's basic grounding tasks, outside the 280 variants."""
 
 LEVELS = (1, 2, 3, 4, 5)
 
@@ -91,7 +90,7 @@ def extensions() -> dict[str, Task]:
 
 @cache
 def _defined(module: str) -> tuple[Task, ...]:
-    found = importlib.import_module(f"robospa.tasks.variants.{module}")
+    found = importlib.import_module(f"robospa.tasks.families.{module}")
     return tuple(found.TASKS) if hasattr(found, "TASKS") else (found.TASK,)
 
 

@@ -21,11 +21,11 @@ from robospa.harness.robots.kinematics import chain_of, end_effector, inverse
 from robospa.harness.skills.grasping import LEANS, LEVEL, candidate_poses, grasps_now
 from robospa.harness.skills.workspace import Workspace
 from robospa.tasks import catalog
+from robospa.tasks.families.distance import object_sets
 from robospa.tasks.objects import object_model
 from robospa.tasks.plan import Pick
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.snapshot import ARMS, Snapshot
-from robospa.tasks.variants import object_sets
 from robospa.workcell import HEIGHT, TABLE_TOP, WIDTH
 
 TOUCH = 5e-4

@@ -15,15 +15,15 @@ from teleport import Teleport
 
 from robospa.tasks.catalog import build_scene, task
 from robospa.tasks.events import outcome
+from robospa.tasks.families.basic_color.task import COLORS
+from robospa.tasks.families.block_measures.task import none_hidden
+from robospa.tasks.families.distance import object_sets
 from robospa.tasks.objects import looks, object_model
 from robospa.tasks.objects.build import PALETTE
 from robospa.tasks.objects.tint import TINTS
 from robospa.tasks.plan import Pick, Skill
 from robospa.tasks.scene import Scene
 from robospa.tasks.sentences import sentences
-from robospa.tasks.variants import object_sets
-from robospa.tasks.variants.basic_color import COLORS
-from robospa.tasks.variants.pick_blocks_measures import none_hidden
 from robospa.workcell import TABLE_TOP, workcell
 
 CELL = workcell("aloha-agilex")

@@ -44,7 +44,9 @@ COUNTED = {"while len(drawn) < count - 1"}
 
 
 @pytest.mark.parametrize(
-    "path", sorted((ROOT / "tasks/variants").glob("*.py")), ids=lambda p: p.stem
+    "path",
+    sorted((ROOT / "tasks/families").rglob("*.py")),
+    ids=lambda p: f"{p.parent.name}.{p.stem}",
 )
 def test_no_draw_is_repeated_without_a_bound(path: Path) -> None:
     for file in (path, ROOT / "tasks/layouts.py", ROOT / "tasks/packing.py"):

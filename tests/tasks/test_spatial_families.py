@@ -12,16 +12,16 @@ from teleport import Teleport
 
 from robospa.tasks.catalog import build_scene, task, tasks
 from robospa.tasks.events import outcome
+from robospa.tasks.families.canonical_index.task import LINES
+from robospa.tasks.families.cross_view.scenes import LEADS, VIEWS, leaders
+from robospa.tasks.families.cross_view.task import SPREADS
+from robospa.tasks.families.picking import pick_name
+from robospa.tasks.families.relational import scenes as relational
+from robospa.tasks.families.relational.task import CROWDS
 from robospa.tasks.objects import looks, object_model
 from robospa.tasks.plan import Pick
 from robospa.tasks.scene import Scene
 from robospa.tasks.snapshot import Contact
-from robospa.tasks.variants import neighbours
-from robospa.tasks.variants.extremes import LEADS, VIEWS, leaders
-from robospa.tasks.variants.pick_canonical import LINES
-from robospa.tasks.variants.pick_multi_view import SPREADS
-from robospa.tasks.variants.pick_relational import CROWDS
-from robospa.tasks.variants.picking import pick_name
 from robospa.workcell import workcell
 
 CELL = workcell("aloha-agilex")
@@ -128,7 +128,7 @@ def beside(scene: Scene) -> int:
     reference = [o.name for o in scene.objects].index(scene.facts["reference"])
     delta = places(scene) - places(scene)[reference]
     step = np.where(np.abs(delta) < 0.03, 0, np.sign(delta))
-    wanted = neighbours.DIRECTIONS[scene.facts["relation"]]
+    wanted = relational.DIRECTIONS[scene.facts["relation"]]
     there = [i for i in range(len(step)) if tuple(step[i]) == wanted]
     return min(there, key=lambda i: float(np.hypot(*delta[i])))
 

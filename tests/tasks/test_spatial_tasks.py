@@ -15,14 +15,15 @@ from teleport import Teleport
 
 from robospa.tasks.catalog import build_scene, task
 from robospa.tasks.events import outcome
+from robospa.tasks.families.cross_view.scenes import LEADS
+from robospa.tasks.families.cross_view.task import SPREADS
+from robospa.tasks.families.distance import object_sets
+from robospa.tasks.families.relational import scenes as relational
 from robospa.tasks.layouts import Area
 from robospa.tasks.objects import looks, object_model
 from robospa.tasks.plan import Pick
 from robospa.tasks.scene import Scene
 from robospa.tasks.snapshot import Contact
-from robospa.tasks.variants import neighbours, object_sets
-from robospa.tasks.variants.extremes import LEADS
-from robospa.tasks.variants.pick_multi_view import SPREADS
 from robospa.workcell import TABLE_TOP, workcell
 
 CELL = workcell("aloha-agilex")
@@ -270,7 +271,7 @@ def test_grid_position_is_counted_right(level: int) -> None:
 
 @each_level
 def test_directions_and_target_slots_are_both_uniform(level: int) -> None:
-    table = neighbours.weights(level)
+    table = relational.weights(level)
     assert table.sum() == pytest.approx(1.0)
     assert table.sum(axis=1) == pytest.approx(1 / 8, rel=1e-4)
     assert table.sum(axis=0) == pytest.approx(1 / table.shape[1], rel=1e-4)
@@ -283,7 +284,7 @@ def test_target_is_the_nearest_soap_in_its_direction(level: int) -> None:
         step = np.sign(places(scene) - places(scene)[index_of(scene, "reference")])
         delta = places(scene) - places(scene)[index_of(scene, "reference")]
         step = np.where(np.abs(delta) < 0.03, 0, step)
-        wanted = neighbours.DIRECTIONS[scene.facts["relation"]]
+        wanted = relational.DIRECTIONS[scene.facts["relation"]]
         there = [i for i in range(len(step)) if tuple(step[i]) == wanted]
         nearest = min(there, key=lambda i: float(np.hypot(*delta[i])))
         assert nearest == index_of(scene)

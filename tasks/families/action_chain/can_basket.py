@@ -1,0 +1,152 @@
+"""Click_Can_Place_Items: clicks on a can, with things to put away in between.
+
+Draw: a fixed can on the left, a fixed bread basket with bread on the right (from level 2), a pill
+bottle and a blue pad on the left (from level 4). Success: all clicks done, the bread in the basket,
+the pill bottle on the pad, both grippers open. The order is asked for, but not enforced.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from robospa.tasks import objects
+from robospa.tasks.families.tabletop import (
+    Item,
+    Point,
+    draw_look,
+    free_point,
+    named,
+    radius,
+    retry,
+    standing,
+)
+from robospa.tasks.goals.composite import ClickAndPlace, Placement
+from robospa.tasks.goals.repeat import PressCounter
+from robospa.tasks.instructions.grammar import Slots
+from robospa.tasks.instructions.text import TaskText
+from robospa.tasks.plan import Home, Pick, Place, Press, Skill
+from robospa.tasks.scene import Scene
+from robospa.tasks.task import Draft, Level, Task
+from robospa.workcell import TABLE_TOP, Workcell
+
+TEXT = TaskText.beside(__file__, "can_basket.toml")
+
+STEPS = {1: "c", 2: "cb", 3: "cbc", 4: "cbcp", 5: "cbcpc"}
+"""What is asked for: c a click, b the bread into the basket, p the pill bottle onto the pad."""
+
+CAN_BOX = (0.03, 0.03, 0.04)
+"""Half sizes [m] of the box around the can's press point in which a touch counts."""
+
+CAN_X, CAN_FIRST_Y, CAN_Y = (-0.25, -0.05), (-0.2, -0.15), (-0.2, 0.1)
+BASKET = (0.10, -0.2)
+BREAD_X, BREAD_Y, BREAD_YAW = (0.15, 0.27), (-0.10, 0.05), math.pi / 4
+BOTTLE_X, PAD_X, LEFT_Y = (-0.25, -0.10), (-0.25, -0.05), (-0.1, 0.1)
+PAD_HALF = (0.04, 0.04, 0.0005)
+GAP = 0.005
+"""Free space [m] between the footprints of things that must not touch."""
+
+LEVELS = {
+    n: Level(candidates=1 + len(set(steps) - {"c"}), subtasks=n, steps=200 * n)
+    for n, steps in STEPS.items()
+}
+
+
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
+    """The things of this level, each in its region, no two touching."""
+    return retry(
+        lambda: _draw(level, rng, workcell), f"objects of Click_Can_Place_Items level {level}"
+    )
+
+
+def _draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft | None:
+    can = draw_look(rng, "can")
+    items: list[Item] = []
+    far: list[tuple[Point, float]] = []  # what the can must keep away from, and how far [m]
+    if level >= 2:
+        basket, bread = draw_look(rng, "bread_basket"), draw_look(rng, "bread")
+        between = max(0.1, radius("bread_basket", basket) + radius("bread", bread) + GAP)
+        at = free_point(rng, BREAD_X, BREAD_Y, [(BASKET, between)])
+        if at is None:
+            return None
+        turn = float(rng.uniform(-math.pi, math.pi))
+        items.append(Item("basket", "bread_basket", standing(BASKET, turn), basket, fixed=True))
+        turn = float(rng.uniform(-BREAD_YAW, BREAD_YAW))
+        items.append(Item("bread", "bread", standing(at, turn), bread))
+        far += [(BASKET, 0.18), (at, 0.18)]
+    if level >= 4:
+        look = draw_look(rng, "pill_bottle")
+        bottle = free_point(rng, BOTTLE_X, LEFT_Y, [])
+        pad = free_point(rng, PAD_X, LEFT_Y, [(bottle, 0.1)] if bottle else [])
+        if bottle is None or pad is None:
+            return None
+        square = {"half": list(PAD_HALF), "color": [0.0, 0.0, 1.0]}
+        items.append(Item("pill_bottle", "pill_bottle", standing(bottle), look))
+        items.append(Item("pad", "block", standing(pad, 0.0, PAD_HALF[2]), square, fixed=True))
+        far += [(bottle, 0.1), (pad, 0.1)]
+    first_y = CAN_FIRST_Y if level >= 2 else CAN_Y
+    place = free_point(rng, CAN_X, first_y, far, tries=1) or free_point(rng, CAN_X, CAN_Y, far)
+    if place is None:
+        return None
+    items.append(Item("can", "can", standing(place), can, fixed=True))
+    return Draft(*named(rng, items))
+
+
+def goal(scene: Scene) -> ClickAndPlace:
+    """Clicks and placements in the asked order."""
+    facts = scene.facts
+    can = scene.object(facts["can"])
+    model = objects.object_model(can.asset, can.params)
+    subtasks: list[Placement | None] = []
+    for step in STEPS[scene.level]:
+        if step == "b":
+            basket = scene.object(facts["basket"])
+            rim = TABLE_TOP + objects.object_model(basket.asset, basket.params).size[2]
+            height = (TABLE_TOP - 0.01, rim + 0.01)
+            subtasks.append(Placement(facts["bread"], facts["basket"], 0.05, height))
+        elif step == "p":
+            height = (TABLE_TOP - 0.004, TABLE_TOP + 0.006)
+            subtasks.append(Placement(facts["pill_bottle"], facts["pad"], 0.03, height))
+        else:
+            subtasks.append(None)
+    return ClickAndPlace(PressCounter(can.name, model.frames["press"], CAN_BOX), subtasks)
+
+
+def plan(scene: Scene) -> tuple[Skill, ...]:
+    """The asked steps in the asked order; home at the end, which opens the grippers."""
+    facts = scene.facts
+    skills: list[Skill] = []
+    for step in STEPS[scene.level]:
+        if step == "c":
+            skills.append(Press(facts["can"], arm="left"))
+        elif step == "b":
+            skills.append(Pick(facts["bread"], arm="right"))
+            skills.append(Place(facts["bread"], on=facts["basket"], drop=0.02, arm="right"))
+        else:
+            skills.append(Pick(facts["pill_bottle"], lift=0.08, arm="left"))
+            skills.append(Place(facts["pill_bottle"], on=facts["pad"], arm="left"))
+    return (*skills, Home())
+
+
+def slots(scene: Scene) -> Slots:
+    """How the things are said."""
+    things = ("can", "bread", "basket", "bottle", "pad")
+    return TEXT.slots(*things[: {1: 1, 2: 3, 3: 3}.get(scene.level, 5)])
+
+
+TASK = Task(
+    name="Click_Can_Place_Items",
+    category="CAC",
+    levels=LEVELS,
+    draw=draw,
+    goal=goal,
+    plan=plan,
+    templates=TEXT.templates,
+    slots=slots,
+    summary="Click the can, put the bread into the basket and the pill bottle onto the blue pad.",
+    success=(
+        "The can was clicked as often as asked, the bread lies in the basket, the pill bottle "
+        "stands on the pad (as far as the level asks), and both grippers are open."
+    ),
+)

@@ -1,0 +1,205 @@
+"""Hang_Mug_Stack_Blocks: hang the mug on the rack, then stack coloured blocks near the left.
+
+Draw: a mug and a fixed rack on the right, from level 2 on red, green, blue and yellow blocks (one
+more a level) on the left. Success: the mug hangs on the rack's peg, the red block lies in the near
+left area, every further block on the one before it.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from itertools import pairwise
+
+import numpy as np
+
+from robospa.geometry import Pose
+from robospa.tasks.families.action_chain.stations import frame_of
+from robospa.tasks.families.dustbin.floor_bin import reachable
+from robospa.tasks.families.tabletop import (
+    Item,
+    Point,
+    draw_look,
+    free_point,
+    in_view,
+    named,
+    radius,
+    retry,
+    standing,
+)
+from robospa.tasks.goals.checklist import Checklist, Counter, Near, Part, Rests
+from robospa.tasks.instructions.grammar import Slots
+from robospa.tasks.instructions.text import TaskText
+from robospa.tasks.plan import Hang, Pick, Place, Skill
+from robospa.tasks.scene import Scene
+from robospa.tasks.task import Draft, Level, Task
+from robospa.workcell import TABLE_TOP, Workcell
+
+TEXT = TaskText.beside(__file__, "mug_tower.toml")
+
+COLORS = {
+    "red": (1.0, 0.0, 0.0),
+    "green": (0.0, 1.0, 0.0),
+    "blue": (0.0, 0.0, 1.0),
+    "yellow": (1.0, 1.0, 0.0),
+}
+"""Bottom to top; level n has the first n - 1."""
+
+HALF = 0.015
+MUG_X, MUG_Y, MUG_YAW = (0.05, 0.20), (-0.20, -0.05), 1.57
+RACK_X, RACK_Y, RACK_YAW = (0.10, 0.30), (0.13, 0.17), 0.2
+RACK_SEEN = (0.055, 0.10)
+"""Radius and height [m] of the part of the rack that has to be in view."""
+BLOCK_X, BLOCK_YAW, DISTANCE = (-0.28, -0.05), 0.75, 0.1
+BLOCK_Y = {2: (0.0, 0.2), 3: (-0.2, 0.2), 4: (-0.2, 0.2), 5: (-0.2, 0.2)}
+MIDDLE = 0.15
+"""Nearer to the table's middle than this a block lies no farther away than y = 0."""
+PLACE = (-0.16, -0.13)
+"""Where the expert builds; no block starts within DISTANCE of it."""
+AREA = {2: (-0.05, -0.1), 3: (0.0, -0.05), 4: (0.0, -0.05), 5: (0.0, -0.05)}
+"""The near left area: x and y below these [m]."""
+LOW = 0.02  # [m] how much higher than on the table the red block may be
+ON_PEG, HANGING = 0.02, 0.86
+"""Offset [m] of the handle from the peg's place in x and in y, and its least height [m, world]."""
+MUG_GRIP = (0.0, 0.0, 0.045)
+STACKED = (0.015, 0.015, 0.007)
+"""Allowed offset [m] in x, y, z of a block from straight on top of the one below."""
+HELD_RADIUS = 0.03
+
+LEVELS = {n: Level(candidates=n, subtasks=n, steps=200 + 200 * n) for n in range(1, 6)}
+
+
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
+    """Mug and rack on the right, blocks on the left."""
+    return retry(
+        lambda: _draw(level, rng, workcell), f"objects of Hang_Mug_Stack_Blocks level {level}"
+    )
+
+
+def _draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft | None:
+    mug, rack = draw_look(rng, "mug"), draw_look(rng, "mug_rack")
+    at = free_point(rng, MUG_X, MUG_Y, [], allowed=in_view(workcell, "mug", mug))
+    stand = free_point(rng, RACK_X, RACK_Y, [], allowed=partial(_rack_seen, workcell))
+    if at is None or stand is None:
+        return None
+    if math.dist(at, stand) < radius("mug", mug) + radius("mug_rack", rack):
+        return None
+    turn = float(rng.uniform(-MUG_YAW, MUG_YAW))
+    items = [Item("mug", "mug", standing(at, turn), mug)]
+    turn = float(rng.uniform(-RACK_YAW, RACK_YAW))
+    items.append(Item("rack", "mug_rack", standing(stand, turn), rack, fixed=True))
+    points: list[Point] = [PLACE]
+    for color in list(COLORS)[: level - 1]:
+        point = _block_point(rng, workcell, BLOCK_Y[level], points)
+        if point is None:
+            return None
+        points.append(point)
+        pose = standing(point, float(rng.uniform(-BLOCK_YAW, BLOCK_YAW)), HALF)
+        paint = {"half": [HALF] * 3, "color": list(COLORS[color])}
+        items.append(Item(color, "block", pose, paint))
+    return Draft(*named(rng, items))
+
+
+def _rack_seen(workcell: Workcell, point: Point) -> bool:
+    """Whether foot and peg are in the head image; the head of the post is above it."""
+    x, y = np.array(point[0]), np.array(point[1])
+    return bool(workcell.in_view(x, y, *RACK_SEEN, margin=(0.0, 0.0)))
+
+
+def _block_point(
+    rng: np.random.Generator, workcell: Workcell, y: tuple[float, float], others: list[Point]
+) -> Point | None:
+    """A free place: off the far middle, where the official scenes draw another y."""
+    far = [(other, DISTANCE) for other in others]
+    allowed = partial(reachable, workcell)
+    point = free_point(rng, BLOCK_X, y, far, allowed=allowed)
+    if point is None or abs(point[0]) >= MIDDLE or point[1] <= 0:
+        return point
+    x = (point[0], point[0])
+    return free_point(rng, x, (y[0], 0.0), far, 1, allowed)
+
+
+def _blocks(scene: Scene) -> list[str]:
+    """Names of the blocks, bottom to top."""
+    return [scene.facts[color] for color in COLORS if color in scene.facts]
+
+
+def _hangs(handle: Pose, peg: Pose) -> Near:
+    """The middle of the handle is at the peg's place, high above the table."""
+
+    def near(mug: Pose, rack: Pose) -> bool:
+        x, y, z = mug.apply(handle.position)
+        px, py, _ = rack.apply(peg.position)
+        return abs(x - px) < ON_PEG and abs(y - py) < ON_PEG and z > HANGING
+
+    return near
+
+
+def _in_area(level: int) -> Near:
+    """The object lies in the near left area, on the table."""
+    right, far = AREA[level]
+
+    def near(pose: Pose, start: Pose) -> bool:
+        x, y, z = pose.position
+        return x < right and y < far and z < TABLE_TOP + HALF + LOW
+
+    return near
+
+
+def _on_top(pose: Pose, below: Pose) -> bool:
+    """A block straight on another one."""
+    offsets = zip(pose.position, below.position, (0.0, 0.0, 2 * HALF), STACKED, strict=True)
+    return all(abs(a - b - up) < most for a, b, up, most in offsets)
+
+
+def goal(scene: Scene) -> Checklist:
+    """The mug on the peg, the red block in its area, the others on top; nothing latches."""
+    facts = scene.facts
+    mug, rack = facts["mug"], facts["rack"]
+    near = _hangs(frame_of(scene, mug, "handle"), frame_of(scene, rack, "hang"))
+    parts: list[Counter | Part] = [Rests(mug, (rack,), near, grip=MUG_GRIP)]
+    blocks = _blocks(scene)
+    if blocks:
+        parts.append(Rests(blocks[0], (), _in_area(scene.level), held_radius=HELD_RADIUS))
+    parts += [
+        Rests(upper, (lower,), _on_top, held_radius=HELD_RADIUS)
+        for lower, upper in pairwise(blocks)
+    ]
+    return Checklist(parts)
+
+
+def plan(scene: Scene) -> tuple[Skill, ...]:
+    """The right arm hangs the mug, the left one builds."""
+    blocks = _blocks(scene)
+    skills: list[Skill] = [Hang(scene.facts["mug"], on=scene.facts["rack"], arm="right")]
+    for i, name in enumerate(blocks):
+        skills.append(Pick(name, lift=0.07 + 2 * HALF * i, arm="left"))
+        if i == 0:
+            skills.append(Place(name, (*PLACE, TABLE_TOP + HALF), arm="left"))
+        else:
+            skills.append(Place(name, on=blocks[i - 1], arm="left"))
+    return tuple(skills)
+
+
+def slots(scene: Scene) -> Slots:
+    """How mug, rack and blocks are said."""
+    colors = list(COLORS)[: scene.level - 1]
+    blocks = {color: TEXT.phrasings("block", color=color) for color in colors}
+    return TEXT.slots("mug", "rack", *(("area",) if colors else ())) | blocks
+
+
+TASK = Task(
+    name="Hang_Mug_Stack_Blocks",
+    category="CAC",
+    levels=LEVELS,
+    draw=draw,
+    goal=goal,
+    plan=plan,
+    templates=TEXT.templates,
+    slots=slots,
+    summary="Hang the mug on the rack, then stack the blocks in the near left area.",
+    success=(
+        "The mug hangs on the rack's peg, the red block lies in the near left area and the green, "
+        "blue and yellow blocks straight on the one before (as far as the level asks), all let go."
+    ),
+)

@@ -1,0 +1,158 @@
+"""Place_Phone_Press_Stapler: phone onto its stand, press the stapler, empty the small bin.
+
+Draw: a phone and a fixed stand on the right, from level 2 on a fixed stapler, at level 5 a small
+bin with a ball in it on the left and the bin on the floor; the table stands 0.3 m farther right.
+Success: the phone is on the stand, the stapler was pressed as often as asked, the ball lies in the
+bin on the floor. The order is asked for, but not enforced.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from robospa.geometry import Pose
+from robospa.tasks.families.action_chain.stations import button, frame_of
+from robospa.tasks.families.dustbin.floor_bin import BIN, TABLE_SHIFT, container
+from robospa.tasks.families.tabletop import (
+    Item,
+    Point,
+    draw_look,
+    free_point,
+    in_view,
+    named,
+    radius,
+    retry,
+    standing,
+)
+from robospa.tasks.goals.checklist import Checklist, Counter, Inside, Near, Part, Rests
+from robospa.tasks.goals.flags import inside_box
+from robospa.tasks.instructions.grammar import Slots
+from robospa.tasks.instructions.text import TaskText
+from robospa.tasks.instructions.words import times
+from robospa.tasks.plan import Dock, Home, Pour, Press, Skill
+from robospa.tasks.scene import Scene
+from robospa.tasks.task import Draft, Level, Task
+from robospa.workcell import Workcell
+
+TEXT = TaskText.beside(__file__, "phone_stapler.toml")
+
+PRESSES = {1: 0, 2: 1, 3: 2, 4: 3, 5: 3}
+DUMP_LEVEL = 5
+"""The level at which the small bin has to be emptied."""
+
+Region = tuple[tuple[float, float], tuple[float, float], float]
+REGIONS: dict[str, Region] = {
+    "phone": ((0.05, 0.25), (-0.2, 0.0), 0.7),
+    "phone_stand": ((0.0, 0.15), (0.0, 0.2), 0.0),
+    "stapler": ((0.0, 0.2), (-0.2, -0.05), math.pi),
+    "table_trash_bin": ((-0.2, -0.07), (-0.2, 0.0), math.pi / 8.5),
+}
+"""x, y and the largest turn about z of each thing."""
+
+PHONE_DISTANCE = 0.15
+"""Least distance [m] from phone to stand."""
+GAP = 0.01
+BOX = (0.045, 0.04, 0.04)
+"""Half sizes [m] of the box around the stand's place in which the phone's origin counts."""
+GARBAGE_XY, GARBAGE_Z = 0.01, 0.78
+"""How far off the small bin's axis the ball starts, and how high [m]."""
+
+LEVELS = {
+    n: Level(candidates=1 + (n > 1) + (n == DUMP_LEVEL), subtasks=n, steps=steps)
+    for n, steps in {1: 400, 2: 600, 3: 800, 4: 1000, 5: 1300}.items()
+}
+
+
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
+    """This level's things, each in its region, no two touching."""
+    return retry(
+        lambda: _draw(level, rng, workcell), f"objects of Place_Phone_Press_Stapler level {level}"
+    )
+
+
+def _draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft | None:
+    items: list[Item] = []
+    taken: list[tuple[Point, float]] = []
+    wanted = ["phone", "phone_stand", *(["stapler"] if PRESSES[level] else [])]
+    for asset in (*wanted, *(["table_trash_bin"] if level == DUMP_LEVEL else [])):
+        x, y, turn = REGIONS[asset]
+        look = draw_look(rng, asset)
+        room = radius(asset, look)
+        least = PHONE_DISTANCE if asset == "phone_stand" else 0.0
+        far = [(p, max(least, r + room + GAP)) for p, r in taken]
+        point = free_point(rng, x, y, far, allowed=in_view(workcell, asset, look))
+        if point is None:
+            return None
+        taken.append((point, room))
+        pose = standing(point, float(rng.uniform(-turn, turn)))
+        items.append(Item(asset, asset, pose, look, fixed=asset in ("phone_stand", "stapler")))
+    if level == DUMP_LEVEL:
+        dx, dy = (float(rng.uniform(-GARBAGE_XY, GARBAGE_XY)) for _ in range(2))
+        (bin_x, bin_y), _ = taken[-1]
+        start = Pose((bin_x + dx, bin_y + dy, GARBAGE_Z))
+        items.append(Item("garbage", "garbage", start, {"look": 0}))
+        items.append(Item("dustbin", "dustbin", BIN, {"look": 0}, fixed=True))
+    return Draft(*named(rng, items), TABLE_SHIFT)
+
+
+def _within(box: tuple[float, float, float], frame: Pose) -> Near:
+    """The object's origin lies in the box around `frame` of the target."""
+
+    def near(pose: Pose, target: Pose) -> bool:
+        return inside_box(pose.position, target.apply(frame.position), box)
+
+    return near
+
+
+def goal(scene: Scene) -> Checklist:
+    """Phone on the stand, presses, and the ball in the bin; only the presses latch."""
+    facts = scene.facts
+    stand = facts["phone_stand"]
+    near = _within(BOX, frame_of(scene, stand))
+    subtasks: list[Counter | Part] = [Rests(facts["phone"], (stand,), near)]
+    if "stapler" in facts:
+        subtasks += [button(scene, facts["stapler"])] * PRESSES[scene.level]
+    if scene.level == DUMP_LEVEL:
+        inside = container(scene.object(facts["dustbin"]))
+        subtasks.append(Inside(facts["garbage"], facts["dustbin"], inside, latched=False))
+        tools = {facts["table_trash_bin"]: DUMP_LEVEL - 1}
+        return Checklist(subtasks, may_fall=inside.over, tools=tools)
+    return Checklist(subtasks)
+
+
+def plan(scene: Scene) -> tuple[Skill, ...]:
+    """The right arm docks the phone and presses, the left one empties the small bin."""
+    facts = scene.facts
+    skills: list[Skill] = [Dock(facts["phone"], on=facts["phone_stand"], arm="right")]
+    if "stapler" in facts:
+        skills += [Press(facts["stapler"], arm="right")] * PRESSES[scene.level]
+    if scene.level == DUMP_LEVEL:
+        skills += [Home("right"), Pour(facts["table_trash_bin"], into=facts["dustbin"], arm="left")]
+    return tuple(skills)
+
+
+def slots(scene: Scene) -> Slots:
+    """How the things are said."""
+    said = TEXT.slots("phone", "stand")
+    if PRESSES[scene.level]:
+        said |= TEXT.slots("stapler") | {"times": times(PRESSES[scene.level])}
+    return said | (TEXT.slots("bin", "dustbin") if scene.level == DUMP_LEVEL else {})
+
+
+TASK = Task(
+    name="Place_Phone_Press_Stapler",
+    category="CAC",
+    levels=LEVELS,
+    draw=draw,
+    goal=goal,
+    plan=plan,
+    templates=TEXT.templates,
+    slots=slots,
+    summary="Put the phone on its stand, press the stapler, empty the small bin.",
+    success=(
+        "The phone was let go on the stand and is there, the stapler was pressed as often as "
+        "asked, and the ball lies inside the bin on the floor (as far as the level asks)."
+    ),
+)

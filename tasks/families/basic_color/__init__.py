@@ -1,0 +1,1 @@
+"""Basic_Color_*: the object of a named colour."""

@@ -1,0 +1,1 @@
+"""Click_Objects_Order and Click_Bell_Clockwise_Order: clicks in a given order."""

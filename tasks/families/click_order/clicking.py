@@ -1,0 +1,95 @@
+"""What the click tasks share: objects to be pressed, their counters, and the presses of a plan."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from robospa.geometry import Array, Vec3
+from robospa.tasks import objects
+from robospa.tasks.families.tabletop import Point, side
+from robospa.tasks.goals.repeat import PRESS_BOX, PressCounter
+from robospa.tasks.layouts import Area, Mask, scatter
+from robospa.tasks.plan import Press
+from robospa.tasks.scene import Scene, SceneObject
+from robospa.tasks.snapshot import ARMS
+from robospa.workcell import Workcell
+
+Look = tuple[str, Mapping[str, Any]]
+"""An asset and its parameters."""
+
+TRIES = 60
+"""Candidate places per object and draw."""
+
+BOXES: Mapping[str, Vec3] = {"can": (0.03, 0.03, 0.04), "bell": (0.025, 0.025, 0.03)}
+"""Half sizes [m] of the box around the press point in which a touch counts, where not usual."""
+
+LOOKS: Mapping[str, tuple[int, ...]] = {"bread": (0, 1, 2, 5, 6), "bell": (0, 1)}
+"""Looks that are used, where not all: a croissant has no crust under its middle."""
+
+TURNS: Mapping[str, float] = {
+    "alarm_clock": math.pi, "stapler": math.pi, "playing_cards": math.pi, "bread": math.pi / 4,
+}  # fmt: skip
+"""How far either way an object may be turned about its upright axis [rad]; others are not."""
+
+
+def clickable_look(rng: np.random.Generator, asset: str) -> dict[str, Any]:
+    """Parameters of one of the looks of `asset` that click tasks use, each equally likely."""
+    looks = LOOKS.get(asset) or range(objects.looks(asset))
+    return {"look": int(looks[int(rng.integers(len(looks)))])}
+
+
+def turned(rng: np.random.Generator, asset: str) -> float:
+    """A yaw [rad] as this asset is turned in click tasks."""
+    most = TURNS.get(asset, 0.0)
+    return float(rng.uniform(-most, most)) if most else 0.0
+
+
+def scattered(
+    rng: np.random.Generator,
+    workcell: Workcell,
+    area: Area,
+    middle: float,
+    distance: float,
+    items: Sequence[Look],
+) -> list[Point]:
+    """A free place [m] for each item (asset and parameters), seen whole by the head camera.
+
+    Off the middle line by `middle` [m], pairwise at least `distance` [m] apart; no item has the
+    first choice.
+    """
+    order = [int(i) for i in rng.permutation(len(items))]
+    models = [objects.object_model(*items[i]) for i in order]
+    radius, height = (np.array([[v] for v in row]) for row in zip(
+        *((m.radius, m.size[2]) for m in models), strict=True
+    ))  # fmt: skip
+
+    def propose(generator: np.random.Generator) -> tuple[Array, Array, Mask]:
+        x, y = area.draw(generator, (len(items), TRIES))
+        return x, y, (np.abs(x) >= middle) & workcell.in_view(x, y, radius, height, (0.0, 0.0))
+
+    found = scatter(rng, propose, [[distance] * len(items)] * len(items))
+    return [found[order.index(i)] for i in range(len(items))]
+
+
+def press_point(item: SceneObject) -> Vec3:
+    """Where an object is pressed [m, world], as it was placed."""
+    frame = objects.object_model(item.asset, item.params).frames["press"]
+    return item.pose.apply(frame.position)
+
+
+def click_counter(scene: Scene, name: str, closed: bool = True) -> PressCounter:
+    """Counts clicks of an object; `closed`: only while the gripper on its side is closed."""
+    item = scene.object(name)
+    model = objects.object_model(item.asset, item.params)
+    arm = ARMS.index(side(item.pose.position[0])) if closed else None
+    box = BOXES.get(item.asset, PRESS_BOX)
+    return PressCounter(name, model.frames["press"], box, arm=arm)
+
+
+def click(scene: Scene, name: str) -> Press:
+    """A press by the arm on the object's side."""
+    return Press(name, arm=side(scene.object(name).pose.position[0]))

@@ -1,0 +1,259 @@
+"""Extreme positions: objects lie free on the table, one is extreme as seen from a named side.
+
+Shared by Pick_*_Multi_View (CVR) and Basic_Position_* (EPG). One of four extremes (leftmost,
+rightmost, farthest, nearest) is asked for in the words of a viewer: the robot, one opposite, one
+at the left and one at the right of the table; in the basic tasks always the robot. Viewpoints
+exist in words only; no image shows them.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robospa.geometry import Array
+from robospa.tasks.families.picking import (
+    BLOCK_HALF,
+    draw_params,
+    drawn_yaw,
+    lifted,
+    pick_name,
+    pick_target,
+)
+from robospa.tasks.families.tabletop import standing
+from robospa.tasks.goals.pick import Lift
+from robospa.tasks.instructions.grammar import Slots
+from robospa.tasks.instructions.text import TaskText
+from robospa.tasks.layouts import LayoutError, Mask
+from robospa.tasks.packing import Fits, pool, walk
+from robospa.tasks.scene import Scene, SceneObject
+from robospa.tasks.task import Draft, Draw, Level, Task
+from robospa.workcell import TABLE_TOP, Workcell
+
+TEXT = TaskText.beside(__file__, "instructions.toml")
+
+OBJECTS = {1: 3, 2: 4, 3: 5, 4: 6, 5: 7}
+"""How many objects lie there; the paper's n counts the at most four extreme ones."""
+PIXELS = 60.0
+"""Least distance of two different objects' centres in the head image [px]."""
+MARGIN = (0.05, 0.05)
+LEADS = {1: 0.04, 2: 0.03, 3: 0.025, 4: 0.025, 5: 0.02}
+"""Every extreme object leads the next one by at least this [m], whichever is asked for: if only
+the asked one had to lead (officially, by 0.06), its place alone would tell the answer."""
+SHIFT = 0.02
+"""A layout's places are moved once more by up to this [m] in each trial, where they fit."""
+CHAINS = 256
+"""Random walks that the layouts of a level come from."""
+STARTS = (
+    ((-0.1816, -0.1308), (0.1759, -0.0708), (0.1112, 0.0423), (0.0899, -0.1705),
+     (-0.0155, -0.022), (-0.1462, -0.0043), (-0.0536, -0.1493)),
+    ((-0.1846, -0.0574), (0.1858, 0.003), (-0.0787, 0.0425), (-0.1259, -0.1729),
+     (0.0488, 0.0074), (0.0254, -0.1362), (0.1546, -0.1412)),
+    ((-0.1874, 0.0087), (0.1801, -0.0598), (0.0922, 0.0419), (0.1056, -0.1729),
+     (-0.0213, -0.1311), (-0.1558, -0.1418), (-0.049, 0.0167)),
+    ((-0.1856, -0.0736), (0.165, -0.1157), (-0.1157, 0.042), (-0.0948, -0.1723),
+     (0.0319, -0.1432), (0.0127, 0.0098), (0.1423, 0.0179)),
+)  # fmt: skip
+"""Layouts of seven, the four of EXTREMES first, where the pools start; found by annealing."""
+
+EXTREMES = ("leftmost", "rightmost", "frontmost", "backmost")
+"""In the robot's frame: least x, largest x, largest y (far), least y (near)."""
+VIEWS = ("robot", "opposite", "left", "right")
+SEEN_AS = {
+    "robot": EXTREMES,
+    "opposite": ("rightmost", "leftmost", "backmost", "frontmost"),
+    "left": ("backmost", "frontmost", "leftmost", "rightmost"),
+    "right": ("frontmost", "backmost", "rightmost", "leftmost"),
+}
+"""How a viewer names the four extremes; front is the side away from the viewer."""
+
+
+@dataclass(frozen=True)
+class Spread:
+    """The data of one task: equal objects if there is one asset, else different ones.
+
+    `radius` and `tall` bound the objects [m]. Two of them are apart by `spacing`: in x or in y,
+    and in any case. `inset` keeps the origins that far inside the region. In the head image
+    centres of different objects are 60 px apart; equal ones, taken to be of radius `seen`, do
+    not overlap.
+    """
+
+    kind: str
+    assets: tuple[str, ...]
+    what: str
+    radius: float
+    tall: float
+    spacing: tuple[float, float, float]
+    inset: float = 0.0
+    seen: float = 0.0
+
+    @property
+    def alike(self) -> bool:
+        """Whether all objects of a scene are equal."""
+        return len(self.assets) == 1
+
+    def allowed(self, workcell: Workcell, x: Array, y: Array) -> Mask:
+        """Whether origins are in the official region with the whole object in view."""
+        inside = (np.abs(x) <= 0.24 - self.inset) & (y >= -0.225 + self.inset)
+        inside &= y <= 0.095 - self.inset
+        return inside & workcell.in_view(x, y, self.radius, self.tall, MARGIN)
+
+    def apart(self, workcell: Workcell, points: Array, wanted: Array, i: int) -> Mask:
+        """Whether `wanted` is far enough from its chain's other places, on table and image."""
+        dx = np.abs(points[..., 0] - wanted[:, None, 0])
+        dy = np.abs(points[..., 1] - wanted[:, None, 1])
+        free = ((dx >= self.spacing[0]) | (dy >= self.spacing[1])) & (
+            dx**2 + dy**2 >= self.spacing[2] ** 2
+        )
+        if self.alike:
+            free &= self._separate(workcell, points, wanted)
+        else:
+            u, v = workcell.head.pixel(points[..., 0], points[..., 1], TABLE_TOP + self.tall / 2)
+            wu, wv = workcell.head.pixel(wanted[:, :1], wanted[:, 1:], TABLE_TOP + self.tall / 2)
+            free &= (u - wu) ** 2 + (v - wv) ** 2 >= PIXELS**2
+        free[:, i] = True
+        return np.asarray(free.all(axis=1))
+
+    def _separate(self, workcell: Workcell, points: Array, wanted: Array) -> Mask:
+        """Whether the bounding boxes in the head image do not overlap."""
+        left, right, top, bottom = self._box(workcell, points[..., 0], points[..., 1])
+        wl, wr, wt, wb = self._box(workcell, wanted[:, :1], wanted[:, 1:])
+        return np.asarray((left >= wr) | (wl >= right) | (top >= wb) | (wt >= bottom))
+
+    def _box(self, workcell: Workcell, x: Array, y: Array) -> tuple[Array, Array, Array, Array]:
+        """Left, right, top and bottom [px] of the upright cylinders that bound the objects."""
+        high = TABLE_TOP + self.tall
+        left = workcell.head.column(x - self.seen, y, high)
+        right = workcell.head.column(x + self.seen, y, high)
+        top = workcell.head.row(x, y + self.seen, high)
+        bottom = workcell.head.row(x, y - self.seen, TABLE_TOP)
+        return left, right, top, bottom
+
+
+AXES = np.array([0, 0, 1, 1])
+SIGNS = np.array([-1.0, 1.0, 1.0, -1.0])
+"""For each of EXTREMES the axis along which it leads, and which way."""
+
+
+def leaders(points: Array) -> tuple[NDArray[np.int64], Array]:
+    """Which place each of EXTREMES is in layouts (..., n, 2), and by how much [m] it leads."""
+    along = SIGNS * points[..., AXES]
+    ordered = np.sort(along, axis=-2)
+    return along.argmax(axis=-2), ordered[..., -1, :] - ordered[..., -2, :]
+
+
+def fits(workcell: Workcell, spread: Spread, level: int, roles: NDArray[np.int64]) -> Fits:
+    """The rule of layouts in which place `roles[chain, e]` is the e-th of EXTREMES.
+
+    It must be so in the head image as well, where perspective could put another object outermost.
+    """
+    middle = TABLE_TOP + spread.tall / 2
+
+    def rule(points: Array, wanted: Array, i: int) -> Mask:
+        moved = points.copy()
+        moved[:, i] = wanted
+        place, lead = leaders(moved)
+        u, v = workcell.head.pixel(moved[..., 0], moved[..., 1], middle)
+        seen = leaders(np.stack([u, -v], axis=-1))[0]
+        clear = ((place == roles) & (seen == roles) & (lead >= LEADS[level])).all(axis=1)
+        allowed = spread.allowed(workcell, wanted[:, 0], wanted[:, 1])
+        return np.asarray(clear & allowed & spread.apart(workcell, points, wanted, i))
+
+    return rule
+
+
+def _starts(workcell: Workcell, spread: Spread, level: int) -> list[Array]:
+    """Start layouts of the level's size, no object extreme more often than it must be.
+
+    LayoutError if none keeps to the rule.
+    """
+    count = OBJECTS[level]
+    good = []
+    for layout in np.array(STARTS):
+        parts = [layout[:count]] if count > 3 else [np.delete(layout[:4], k, 0) for k in range(4)]
+        for part in parts:
+            roles = leaders(part)[0]
+            rule = fits(workcell, spread, level, roles[None])
+            whole = len(set(roles.tolist())) == min(count, 4)
+            if whole and all(rule(part[None], part[None, i], i).all() for i in range(count)):
+                good.append(part)
+    if not good:
+        raise LayoutError(f"no start layout fits {spread.kind} level {level}; add one to STARTS")
+    return good
+
+
+@cache
+def layouts(workcell: Workcell, spread: Spread, level: int) -> Array:
+    """The level's layouts (many, n, 2) [m]; which place is extreme differs between them."""
+    good = _starts(workcell, spread, level)
+    starts = np.stack([good[k % len(good)] for k in range(CHAINS)])
+    found = pool(starts, fits(workcell, spread, level, leaders(starts)[0]))
+    return found.reshape(-1, *starts.shape[1:])
+
+
+def drawer(spread: Spread, views: tuple[str, ...]) -> Draw:
+    """The draw of `spread`: a uniform viewpoint of `views`, a layout, what lies where, and one of
+    the objects that are extreme there, each equally likely: the scene does not tell which.
+    """
+
+    def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
+        count = OBJECTS[level]
+        view = views[int(rng.integers(len(views)))]
+        known = layouts(workcell, spread, level)
+        points = known[int(rng.integers(len(known)))][None].copy()
+        roles = leaders(points)[0]
+        walk(rng, points, fits(workcell, spread, level, roles), SHIFT)
+        asked = int(rng.choice(np.unique(roles)))
+        extreme = int(rng.choice(np.flatnonzero(roles[0] == asked)))
+        order = [int(i) for i in rng.permutation(count)]
+        if spread.alike:
+            assets, common = list(spread.assets) * count, draw_params(rng, spread.assets[0])
+        else:
+            assets = [spread.assets[int(i)] for i in rng.permutation(len(spread.assets))[:count]]
+        objects = []
+        for k, i in enumerate(order):
+            is_block = assets[k] == "block"
+            x, y = points[0, i].tolist()
+            params = common if spread.alike else draw_params(rng, assets[k])
+            yaw = drawn_yaw(rng, workcell, assets[k], params, y, 0.75 if is_block else math.pi)
+            pose = standing((x, y), yaw, BLOCK_HALF if is_block else 0.0)
+            objects.append(SceneObject(f"object_{k}", assets[k], pose, params))
+        facts = {
+            "target": f"object_{order.index(asked)}",
+            "extreme": EXTREMES[extreme],
+            "viewpoint": view,
+            "position": SEEN_AS[view][extreme],
+        }
+        return Draft(tuple(objects), facts)
+
+    return draw
+
+
+def slots(scene: Scene) -> Slots:
+    """What the instruction says: the extreme in the viewer's words, and the viewer."""
+    position, view = scene.facts["position"], scene.facts["viewpoint"]
+    side = position.removesuffix("most")
+    return TEXT.slots("target", f"view.{view}", "convention", position=position, side=side)
+
+
+def spread_task(spread: Spread, basic: bool = False) -> Task:
+    """The CVR task of `spread` or, if `basic`, the EPG one, where the robot is the viewer."""
+    kind = spread.kind
+    seen = "the robot" if basic else "a named side"
+    return Task(
+        name=f"Basic_Position_{kind}" if basic else pick_name(kind, "Multi_View"),
+        category="EPG" if basic else "CVR",
+        levels={k: Level(min(n, 4), 1, 150) for k, n in OBJECTS.items()},
+        draw=drawer(spread, VIEWS[:1] if basic else VIEWS),
+        goal=lifted(Lift(rise=0.06, closed=True, touching=True)),
+        plan=pick_target,
+        templates=TEXT.templates,
+        slots=slots,
+        summary=f"Pick the extreme one of 3 to 7 {spread.what} as seen from {seen}.",
+        success="the target rose by more than 6 cm, touched by a gripper and carried by a closed "
+        "one",
+    )

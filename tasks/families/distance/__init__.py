@@ -1,0 +1,1 @@
+"""Pick_*_Distance: the k-th farthest object from a named one."""

@@ -1,0 +1,287 @@
+"""What the tasks of Spatial Distance Estimation share: pick the k-th farthest from a reference.
+
+The reference is named, the target is not: it is the k-th farthest from the reference, with k
+uniform over the n - 1 ranks. All distances from the reference differ by the level's gap, not only
+those beside the asked one, so that nothing in a scene tells which one is asked for. The five sets
+of objects also serve the basic tasks that name the target's colour.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from robospa.geometry import Array
+from robospa.tasks.families.picking import drawn_yaw, lifted, pick_target
+from robospa.tasks.families.tabletop import draw_look, standing
+from robospa.tasks.goals.pick import Lift
+from robospa.tasks.instructions.grammar import Phrasings, Slots
+from robospa.tasks.instructions.text import TaskText
+from robospa.tasks.instructions.words import ordinal
+from robospa.tasks.layouts import LayoutError, Mask
+from robospa.tasks.objects import object_model
+from robospa.tasks.packing import Fits, apart, pool, walk
+from robospa.tasks.scene import Scene, SceneObject
+from robospa.tasks.task import Draft, Level, Task
+from robospa.workcell import Workcell
+
+TEXT = TaskText.beside(__file__, "instructions.toml")
+
+Thing = tuple[str, Mapping[str, Any] | None]
+"""Asset and parameters of an object; None for a look to be drawn."""
+
+CHAINS = 256
+"""Random walks that make up the pool; each gives eight layouts."""
+SEARCHES = 512
+"""Random walks that look for layouts with clear distances, ROUNDS times SWEEPS moves long."""
+ROUNDS, SWEEPS = 12, 20
+ENOUGH = 64
+"""So many of them have to get there, or all rounds have to be over."""
+SHIFT = 0.02
+"""A layout's places are moved once more by up to this [m] in each trial, where there is room."""
+
+
+@dataclass(frozen=True)
+class Rules:
+    """Where things may lie; the tuples have one value per level.
+
+    `region` is the x and y range [m] of the origins, `radius` and `tall` [m] bound the objects for
+    the view. Origins are at least `apart` [m] from each other and extend over at least `extent`
+    (x, y) [m]; distances from the reference differ by `gap` [m]. Layouts are found from subsets of
+    the places `starts`.
+    """
+
+    counts: tuple[int, ...]
+    apart: tuple[float, ...]
+    gap: tuple[float, ...]
+    region: tuple[tuple[float, float], tuple[float, float]]
+    radius: float
+    tall: float
+    starts: tuple[tuple[float, float], ...]
+    extent: tuple[tuple[float, float], ...] = ((0.0, 0.0),) * 5
+
+    @property
+    def levels(self) -> dict[int, Level]:
+        """The five levels."""
+        return {k: Level(count, 1, 150) for k, count in enumerate(self.counts, 1)}
+
+
+@dataclass(frozen=True)
+class Family:
+    """A set of objects and what is drawn with it.
+
+    `things(level, rng)` says what lies at each of the places, the first of which is the
+    reference's; `yaw` [rad] bounds the turns. `reference(object)` are the names of the reference
+    without article, `noun` is the plain noun of any of the objects.
+    """
+
+    name: str
+    rules: Rules
+    things: Callable[[int, np.random.Generator], Sequence[Thing]]
+    reference: Callable[[SceneObject], Phrasings]
+    noun: str
+    yaw: float = math.pi / 2
+
+
+def allowed(workcell: Workcell, rules: Rules, x: Array, y: Array) -> Mask:
+    """Whether origins are in the region, with the footprint and the object's axis in view."""
+    (left, right), (near, far) = rules.region
+    inside = (x >= left) & (x <= right) & (y >= near) & (y <= far)
+    return (
+        inside & workcell.in_view(x, y, rules.radius, 0.0) & workcell.in_view(x, y, 0.0, rules.tall)
+    )
+
+
+def fits(workcell: Workcell, rules: Rules, level: int) -> Fits:
+    """The rule of the level's layouts."""
+    least = rules.apart[level - 1]
+
+    def good(points: Array, wanted: Array, i: int) -> Mask:
+        mask = apart(points, wanted, i, least)
+        return mask & allowed(workcell, rules, wanted[:, 0], wanted[:, 1]) if mask.any() else mask
+
+    return good
+
+
+def starts(rules: Rules, level: int, chains: int) -> Array:
+    """(chains, n, 2): random choices of the places to start from."""
+    rng = np.random.Generator(np.random.PCG64(level))
+    subsets = np.argsort(rng.random((chains, len(rules.starts))), axis=1)
+    return np.array(rules.starts)[subsets[:, : rules.counts[level - 1]]]
+
+
+@cache
+def layouts(workcell: Workcell, rules: Rules, level: int) -> Array:
+    """The level's layouts (N, n, 2) [m], evenly from all there are."""
+    found = np.concatenate(pool(starts(rules, level, CHAINS), fits(workcell, rules, level)))
+    return found[[wide(rules, level, points) for points in found]]
+
+
+def unclear(points: Array, gap: float) -> Array:
+    """How much [m] is missing, for layouts (..., n, 2), until all distances from place 0 are clear.
+
+    0 if they differ by at least `gap` [m].
+    """
+    far = np.sort(distances(points), axis=-1)
+    missing: Array = np.maximum(gap - (far[..., 1:] - far[..., :-1]), 0.0).sum(axis=-1)
+    return missing
+
+
+def distances(points: Array) -> Array:
+    """(..., n - 1) distances [m] of all places of layouts (..., n, 2) but the first, from it."""
+    delta = points[..., 1:, :] - points[..., :1, :]
+    x, y = delta[..., 0], delta[..., 1]
+    apart: Array = np.sqrt(x * x + y * y)
+    return apart
+
+
+def clearing(workcell: Workcell, rules: Rules, level: int) -> Fits:
+    """As `fits`, and no move makes the distances from place 0 less clear than they are."""
+    valid, gap = fits(workcell, rules, level), rules.gap[level - 1]
+
+    def good(points: Array, wanted: Array, i: int) -> Mask:
+        mask = valid(points, wanted, i)
+        if mask.any():
+            moved = points.copy()
+            moved[:, i] = wanted
+            mask &= unclear(moved, gap) <= unclear(points, gap)
+        return mask
+
+    return good
+
+
+@cache
+def clear_layouts(workcell: Workcell, rules: Rules, level: int) -> Array:
+    """Layouts (N, n, 2) [m] in which all distances from place 0, the reference, are clear.
+
+    Few layouts are like that by chance. Walks that never become less clear find some, from each of
+    the likelier references of a start; copies of these, half of them mirrored, walk on.
+    """
+    points = _likelier_references(starts(rules, level, SEARCHES), rules.gap[level - 1])
+    for k in range(ROUNDS):
+        points = pool(points, clearing(workcell, rules, level), SWEEPS, 1, seed=k)[0]
+        found = points[unclear(points, rules.gap[level - 1]) == 0.0]
+        if len(found) >= ENOUGH:
+            break
+    mirrored = found * (-1.0, 1.0)
+    seen = allowed(workcell, rules, mirrored[..., 0], mirrored[..., 1]).all(axis=1)
+    found = np.concatenate([found, mirrored[seen]])
+    if not len(found):
+        raise LayoutError(f"no layout of {points.shape[1]} objects has clear distances")
+    copies = found[np.arange(CHAINS) % len(found)]
+    walked = np.concatenate(pool(copies, clearing(workcell, rules, level)))
+    return walked[[wide(rules, level, layout) for layout in walked]]
+
+
+LIKELY = 3
+"""So many of a start's places are tried as the reference."""
+
+
+def _likelier_references(points: Array, gap: float) -> Array:
+    """Layouts (chains, n, 2) turned so that one of the LIKELY clearest places comes first."""
+    turned = np.stack([np.roll(points, -k, axis=1) for k in range(points.shape[1])], axis=1)
+    best = np.argsort(unclear(turned, gap), axis=1, kind="stable")[:, :LIKELY]
+    chain = np.arange(len(points))
+    return np.asarray(turned[chain, best[chain, chain % best.shape[1]]])
+
+
+def wide(rules: Rules, level: int, points: Array) -> bool:
+    """Whether a layout (n, 2) has the level's extent."""
+    return bool((np.ptp(points, axis=0) >= rules.extent[level - 1]).all())
+
+
+def shifted(
+    rng: np.random.Generator, workcell: Workcell, rules: Rules, level: int, points: Array
+) -> Array:
+    """The layout (n, 2) after one more sweep of small moves, if that keeps its extent."""
+    moved = points[None].copy()
+    walk(rng, moved, fits(workcell, rules, level), SHIFT)
+    return moved[0] if wide(rules, level, moved[0]) else points
+
+
+JITTERS = SHIFT * np.repeat(0.5 ** np.arange(6), 2)[:, None, None]
+"""How far [m] places are moved together; the first that leaves them apart and clear is taken."""
+
+
+def jittered(
+    rng: np.random.Generator, workcell: Workcell, rules: Rules, level: int, points: Array
+) -> Array:
+    """A layout (n, 2) with clear distances, all places moved a little, if there is room."""
+    count, x, y = len(points), *np.triu_indices(len(points), 1)
+    tried = points + JITTERS * (2 * rng.random((len(JITTERS), count, 2)) - 1)
+    delta = tried[:, x] - tried[:, y]
+    near = (delta[..., 0] ** 2 + delta[..., 1] ** 2).min(axis=1) < rules.apart[level - 1] ** 2
+    seen = allowed(workcell, rules, tried[..., 0], tried[..., 1]).all(axis=1)
+    wide = (np.ptp(tried, axis=1) >= rules.extent[level - 1]).all(axis=1)
+    good = seen & wide & ~near & (unclear(tried, rules.gap[level - 1]) == 0.0)
+    return tried[int(np.argmax(good))] if good.any() else points
+
+
+def put_down(
+    rng: np.random.Generator,
+    workcell: Workcell,
+    points: Array,
+    things: Sequence[Thing],
+    yaw: float,
+) -> tuple[tuple[SceneObject, ...], list[int]]:
+    """The things at their places, in random order, and the place of each object."""
+    order = [int(i) for i in rng.permutation(len(points))]
+    objects = []
+    for k, i in enumerate(order):
+        x, y = points[i].tolist()
+        asset, given = things[i]
+        params = draw_look(rng, asset) if given is None else given
+        turn = drawn_yaw(rng, workcell, asset, params, y, yaw)
+        height = -object_model(asset, params).bottom
+        objects.append(
+            SceneObject(f"object_{k}", asset, standing((x, y), turn, height), dict(params))
+        )
+    return tuple(objects), order
+
+
+def draw(level: int, rng: np.random.Generator, workcell: Workcell, family: Family) -> Draft:
+    """A layout with clear distances, a uniform rank, then what lies where."""
+    rules = family.rules
+    found = clear_layouts(workcell, rules, level)
+    layout = found[int(rng.integers(len(found)))]
+    points = jittered(rng, workcell, rules, level, layout)
+    rank = int(rng.integers(len(points) - 1)) + 1
+    target = 1 + int(np.argsort(-distances(points))[rank - 1])
+    things = family.things(level, rng)
+    objects, order = put_down(rng, workcell, points, things, family.yaw)
+    facts = {
+        "target": f"object_{order.index(target)}",
+        "reference": f"object_{order.index(0)}",
+        "distance_rank": rank,
+    }
+    return Draft(objects, facts)
+
+
+def distance_task(family: Family, name: str, what: str) -> Task:
+    """The task that asks for the k-th farthest of `what` from a reference."""
+
+    def slots(scene: Scene) -> Slots:
+        names = family.reference(scene.object(str(scene.facts["reference"])))
+        rank = int(scene.facts["distance_rank"])
+        number, word = ordinal(rank)
+        entry = "rank.first" if rank == 1 else "rank.other"
+        said = TEXT.slots(entry, "object", number=number, word=word, noun=family.noun)
+        return {**said, "reference": names}
+
+    return Task(
+        name=name,
+        category="SDE",
+        levels=family.rules.levels,
+        draw=lambda level, rng, workcell: draw(level, rng, workcell, family),
+        goal=lifted(Lift(above=0.82)),
+        plan=pick_target,
+        templates=TEXT.templates,
+        slots=slots,
+        summary=f"Pick the k-th farthest of {what} from a named one.",
+        success="the target's origin is higher than 0.82 m while a gripper carries it",
+    )

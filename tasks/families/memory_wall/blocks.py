@@ -1,0 +1,126 @@
+"""Observe_Blocks_Move_Memory: see which colours are shown, then bring those blocks nearer.
+
+Draw: k blocks of different colours on a stand at the back; 2 k blocks on the table, among them one
+of each colour shown. After 2.0 s a wall hides the stand. Success: the blocks of the shown colours
+lie in the strip nearest to the robot, no other block has ever been there, both grippers open.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from robospa.geometry import Array, Pose
+from robospa.tasks.families.memory_wall.wall import HOLD_STILL, STAND_TOP, WALL, row, stand, wall
+from robospa.tasks.families.tabletop import Item, named, side, standing
+from robospa.tasks.goals.cue import AfterCue
+from robospa.tasks.goals.gather import Gather, Region
+from robospa.tasks.instructions.grammar import Slots
+from robospa.tasks.instructions.text import TaskText
+from robospa.tasks.instructions.words import NUMBERS, by_count
+from robospa.tasks.layouts import Area, Mask, scatter
+from robospa.tasks.plan import Home, Pick, Place, Skill
+from robospa.tasks.scene import Scene
+from robospa.tasks.task import Draft, Level, Task
+from robospa.workcell import TABLE_TOP, Workcell
+
+TEXT = TaskText.beside(__file__, "blocks.toml")
+
+COLORS = {
+    "red": (1.0, 0.0, 0.0),
+    "green": (0.0, 1.0, 0.0),
+    "blue": (0.0, 0.0, 1.0),
+    "yellow": (1.0, 1.0, 0.0),
+    "cyan": (0.0, 1.0, 1.0),
+    "magenta": (1.0, 0.0, 1.0),
+    "orange": (1.0, 0.5, 0.0),
+    "purple": (0.5, 0.0, 0.5),
+    "white": (1.0, 1.0, 1.0),
+    "black": (0.1, 0.1, 0.1),
+    "brown": (0.6, 0.3, 0.1),
+    "pink": (1.0, 0.75, 0.8),
+}
+HALF = 0.015
+STAND_Y, STAND_HALF, STAND_SHADE, SHOWN_X = 0.20, (0.26, 0.055, 0.01), 0.85, 0.18
+WALL_Y = 0.12
+AREA, MIDDLE, DISTANCE, TRIES = Area((-0.25, 0.25), (-0.10, 0.08)), 0.04, 0.06, 100
+NEAR = Region((-0.26, 0.26), (-1.0, -0.11))
+"""Where the shown blocks have to go, and no others may be."""
+
+GOAL_Y, GOAL_X = -0.18, 0.16
+"""Where the expert puts them."""
+
+LEVELS = {n: Level(candidates=2 * n, subtasks=n, steps=50 + 200 * n) for n in range(1, 6)}
+
+
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
+    """Colours on the stand; the same and as many others on the table, all places alike."""
+
+    def propose(generator: np.random.Generator) -> tuple[Array, Array, Mask]:
+        x, y = AREA.draw(generator, (2 * level, TRIES))
+        seen = workcell.in_view(x, y, HALF * math.sqrt(2), 2 * HALF, (0.0, 0.0))
+        return x, y, (np.abs(x) >= MIDDLE) & seen
+
+    colors = [list(COLORS)[int(i)] for i in rng.permutation(len(COLORS))[: 2 * level]]
+    found = scatter(rng, propose, [[DISTANCE] * 2 * level] * (2 * level))
+    points = [found[int(i)] for i in rng.permutation(2 * level)]
+    items = [wall(WALL_Y), stand(STAND_Y, STAND_HALF, STAND_SHADE)]
+    for color, x in zip(colors[:level], row(level, SHOWN_X), strict=True):
+        pose = Pose((x, STAND_Y, STAND_TOP + HALF))
+        items.append(Item(f"{color} shown", "block", pose, _look(color), fixed=True))
+    for color, point in zip(colors, points, strict=True):
+        items.append(Item(color, "block", standing(point, height=HALF), _look(color)))
+    scene_objects, names = named(rng, items)
+    facts = {
+        "colors": colors[:level],
+        "targets": [names[color] for color in colors[:level]],
+        "others": [names[color] for color in colors[level:]],
+        "wall": names[WALL],
+    }
+    return Draft(scene_objects, facts)
+
+
+def _look(color: str) -> dict[str, list[float]]:
+    return {"half": [HALF, HALF, HALF], "color": list(COLORS[color])}
+
+
+def goal(scene: Scene) -> AfterCue:
+    """The shown colours' blocks in the strip near the robot, after the wall has come."""
+    gather = Gather(scene.facts["targets"], scene.facts["others"], NEAR)
+    return AfterCue(gather, [scene.facts["wall"]])
+
+
+def plan(scene: Scene) -> tuple[Skill, ...]:
+    """Hold still, then bring the blocks of each side to the nearest free place of the strip."""
+    targets = sorted(scene.facts["targets"], key=lambda n: scene.object(n).pose.position[0])
+    skills: list[Skill] = [HOLD_STILL]
+    for name, x in zip(targets, row(len(targets), GOAL_X), strict=True):
+        arm = side(scene.object(name).pose.position[0])
+        skills.append(Pick(name, lift=0.08, arm=arm))
+        skills.append(Place(name, (x, GOAL_Y, TABLE_TOP + HALF), arm=arm))
+    return (*skills, Home())
+
+
+def slots(scene: Scene) -> Slots:
+    """What is shown, and where the blocks have to go; no colour is named."""
+    count = len(scene.facts["targets"])
+    return TEXT.slots("wall", f"blocks.{by_count(count)}", "strip", word=NUMBERS[count])
+
+
+TASK = Task(
+    name="Observe_Blocks_Move_Memory",
+    category="MIP",
+    levels=LEVELS,
+    draw=draw,
+    goal=goal,
+    plan=plan,
+    templates=TEXT.templates,
+    slots=slots,
+    summary="Remember the colours shown and bring the blocks of these colours near the robot.",
+    success=(
+        "After the wall has come, the blocks of all colours that were shown lie in the strip "
+        "nearest to the robot and both grippers are open; moving before, or bringing another block "
+        "there, fails for good."
+    ),
+)

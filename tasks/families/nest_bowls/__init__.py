@@ -1,0 +1,1 @@
+"""Place_Bowls_Plates: a stack of bowls on a plate."""

@@ -1,0 +1,119 @@
+"""Place_Bowls_Plates: stack all bowls on the plate.
+
+Draw: one fixed plate left or right of the middle, k equal bowls farther away. Success: all bowls
+stand in each other on the plate, in any order, and both grippers are open.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from robospa.geometry import Array, Vec3
+from robospa.tasks import objects
+from robospa.tasks.families.tabletop import (
+    Item,
+    draw_look,
+    named,
+    side,
+    standing,
+)
+from robospa.tasks.goals.nest import Nest
+from robospa.tasks.instructions.grammar import Slots
+from robospa.tasks.instructions.text import TaskText
+from robospa.tasks.instructions.words import NUMBERS, by_count
+from robospa.tasks.layouts import Area, Mask, scatter
+from robospa.tasks.plan import Pick, Place, Skill
+from robospa.tasks.scene import Scene
+from robospa.tasks.task import Draft, Level, Task
+from robospa.workcell import Workcell
+
+TEXT = TaskText.beside(__file__, "instructions.toml")
+
+PLATE_X, PLATE_SPREAD, PLATE_Y = 0.12, 0.03, (-0.15, -0.10)
+AREA, MIDDLE = Area((-0.28, 0.28), (-0.05, 0.20), True), 0.08
+TRIES, RESTARTS = 100, 80
+DISTANCE, FROM_PLATE = 0.13, 0.135
+"""Least distance [m] of bowls from each other and from the plate, which is a little wider."""
+
+LEVELS = {n: Level(candidates=n, subtasks=n, steps=200 * n) for n in range(1, 6)}
+
+
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
+    """The plate on either side, then bowls of one look, off the middle, in view and in reach."""
+    left = rng.random() < 0.5
+    plate_x = (-PLATE_X if left else PLATE_X) + float(rng.uniform(-PLATE_SPREAD, PLATE_SPREAD))
+    plate = (plate_x, float(rng.uniform(*PLATE_Y)))
+    look = draw_look(rng, "bowl")
+    model = objects.object_model("bowl", look)
+
+    def propose(rng: np.random.Generator) -> tuple[Array, Array, Mask]:
+        x, y = AREA.draw(rng, (level, TRIES))
+        usable = (np.abs(x) >= MIDDLE) & (np.hypot(x - plate[0], y - plate[1]) >= FROM_PLATE)
+        usable &= workcell.in_view(
+            x, y, model.radius, model.size[2], (0.0, 0.0)
+        ) & workcell.in_reach(x, y)
+        return x, y, usable
+
+    found = scatter(rng, propose, [[DISTANCE] * level] * level, restarts=RESTARTS)
+    points = [found[int(i)] for i in rng.permutation(level)]
+    items = [Item("plate", "plate", standing(plate), draw_look(rng, "plate"), fixed=True)]
+    items += [Item(str(i), "bowl", standing(point), look) for i, point in enumerate(points)]
+    scene_objects, names = named(rng, items)
+    return Draft(
+        scene_objects,
+        {"plate": names["plate"], "bowls": [names[str(i)] for i in range(level)]},
+    )
+
+
+def goal(scene: Scene) -> Nest:
+    """All bowls in one stack on the plate."""
+    return Nest(scene.facts["bowls"], scene.facts["plate"])
+
+
+def plan(scene: Scene) -> tuple[Skill, ...]:
+    """One bowl after the other, those on the plate's side and the near ones first."""
+    plate = scene.facts["plate"]
+    at = {name: scene.object(name).pose.position for name in scene.facts["bowls"]}
+    here = side(scene.object(plate).pose.position[0])
+    skills: list[Skill] = []
+    below: str | None = None
+    for name in sorted(at, key=lambda n: (side(at[n][0]) != here, at[n][1])):
+        arm = side(at[name][0])
+        skills.append(Pick(name, lift=0.10, arm=arm))
+        if below is None:
+            skills.append(Place(name, on=plate, arm=arm))
+        else:
+            skills.append(Place(name, _nested(scene, below), on=below, arm=arm))
+        below = name
+    return tuple(skills)
+
+
+def _nested(scene: Scene, below: str) -> Vec3:
+    """Where the next bowl's origin goes, from the "support" frame of the one below."""
+    bowl = scene.object(below)
+    frames = objects.object_model(bowl.asset, bowl.params).frames
+    return (0.0, 0.0, frames["nest"].position[2] - frames["support"].position[2])
+
+
+def slots(scene: Scene) -> Slots:
+    """How the bowls and the plate are said."""
+    count = len(scene.facts["bowls"])
+    bowls = "bowl" if count == 1 else f"bowls.{by_count(count)}"
+    return TEXT.slots("plate", bowls, count=count, word=NUMBERS[count])
+
+
+TASK = Task(
+    name="Place_Bowls_Plates",
+    category="OFE",
+    levels=LEVELS,
+    draw=draw,
+    goal=goal,
+    plan=plan,
+    templates=TEXT.templates,
+    slots=slots,
+    summary="Stack all bowls on the plate.",
+    success=(
+        "All bowls stand in one stack on the plate, each within 4 cm of the one below it, and both "
+        "grippers are open. Level 1: the bowl is within 5 cm of the plate's centre."
+    ),
+)

@@ -1,0 +1,87 @@
+"""What the pick tasks share: names, plan, goal, and turns at which every object can be grasped."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from robospa.tasks.families.tabletop import draw_look
+from robospa.tasks.goals.pick import Lift, PickTracker
+from robospa.tasks.layouts import LayoutError
+from robospa.tasks.objects import object_model
+from robospa.tasks.plan import Pick, Skill
+from robospa.tasks.scene import Scene
+from robospa.tasks.task import Tracker
+from robospa.workcell import Workcell
+
+
+def pick_name(kind: str, family: str) -> str:
+    """The official name: ("Cups", "Canonical") -> "Pick_Cups_Canonical"; the letter of a set of
+    mixed objects comes last.
+    """
+    head, _, letter = kind.rpartition("_")
+    return f"Pick_{head}_{family}_{letter}" if letter in ("A", "B") else f"Pick_{kind}_{family}"
+
+
+def lifted(lift: Lift) -> Callable[[Scene], Tracker]:
+    """The goal that the scene's target is picked as `lift` says."""
+
+    def goal(scene: Scene) -> Tracker:
+        return PickTracker(str(scene.facts["target"]), tuple(o.name for o in scene.objects), lift)
+
+    return goal
+
+
+def pick_target(scene: Scene) -> tuple[Skill, ...]:
+    """The plan: pick the target."""
+    return (Pick(str(scene.facts["target"])),)
+
+
+BLOCK_HALF = 0.015
+BLOCK_RADIUS = 0.0213
+"""Half an edge [m] of a block among mixed objects, and the radius of its footprint."""
+BLOCK_COLORS = (
+    (0.84, 0.22, 0.18), (0.16, 0.58, 0.82), (0.22, 0.67, 0.28),
+    (0.90, 0.74, 0.18), (0.58, 0.34, 0.80), (0.28, 0.28, 0.28),
+)  # fmt: skip
+
+
+def draw_params(rng: np.random.Generator, asset: str) -> dict[str, object]:
+    """One of the looks of `asset`; for a block among mixed objects one of six colours."""
+    if asset == "block":
+        color = BLOCK_COLORS[int(rng.integers(len(BLOCK_COLORS)))]
+        return {"half": [BLOCK_HALF] * 3, "color": list(color)}
+    return dict(draw_look(rng, asset))
+
+
+TURNS = 60
+
+
+def drawn_yaw(
+    rng: np.random.Generator,
+    workcell: Workcell,
+    asset: str,
+    params: Mapping[str, Any],
+    y: float,
+    half_range: float,
+) -> float:
+    """A uniform yaw [rad] in +-`half_range` at which an object at `y` [m] can be grasped.
+
+    Far from the robot one of the object's grasps has to close sideways, as near to the x axis as
+    the robot needs it there. The rule holds for every object, so it tells nothing about the
+    target. LayoutError if 60 draws do not meet it.
+    """
+    far = y > workcell.sideways_from
+    closings = [g.closing for g in object_model(asset, params).grasps] if far else []
+    across = math.cos(workcell.sideways_within)  # least x component of the closing direction
+    for _ in range(TURNS):
+        yaw = float(rng.uniform(-half_range, half_range))
+        if not far:
+            return yaw
+        cos, sin = math.cos(yaw), math.sin(yaw)
+        if any(abs(cos * c[0] - sin * c[1]) >= across for c in closings):
+            return yaw
+    raise LayoutError(f"no turn of {asset} at y = {y:.3f} can be grasped; skip this seed")

@@ -1,0 +1,260 @@
+"""Rank_Blocks_Height, _Color and _Size: line blocks up from left to right in a given order.
+
+Draw: k blocks scattered in front of the robot, never in the right order already. Success: each
+block lies farther right than the one before it, hardly nearer or farther away, and both grippers
+are open. Level 1 has one block, to be brought to the middle of the near edge.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from robospa.geometry import Vec3
+from robospa.tasks.families.stack_blocks.towers import NEAR_BAND, draw_color
+from robospa.tasks.families.tabletop import (
+    LAYOUTS,
+    Item,
+    Point,
+    apart,
+    named,
+    shuffled_scatter,
+    side,
+    standing,
+)
+from robospa.tasks.goals.row import Row
+from robospa.tasks.goals.stack import Bring
+from robospa.tasks.instructions.grammar import Phrasings, Slots, listed
+from robospa.tasks.instructions.text import COMMON, TaskText
+from robospa.tasks.instructions.words import NUMBERS, by_count
+from robospa.tasks.plan import Pick, Place, Skill
+from robospa.tasks.scene import Scene
+from robospa.tasks.task import Draft, Level, Task
+from robospa.workcell import TABLE_TOP, Workcell
+
+TEXT = TaskText.beside(__file__, "instructions.toml")
+
+Color = list[float]
+Look = tuple[Vec3, Color]
+"""Half sizes [m] and colour of one block."""
+
+COLORS = {
+    "red": [1.0, 0.0, 0.0],
+    "green": [0.0, 1.0, 0.0],
+    "blue": [0.0, 0.0, 1.0],
+    "yellow": [1.0, 1.0, 0.0],
+    "purple": [1.0, 0.0, 1.0],
+}
+"""Left to right."""
+
+HALF_HEIGHTS = ((0.058, 0.060), (0.042, 0.044), (0.028, 0.030), (0.016, 0.018), (0.006, 0.008))
+HALF_SIZES = ((0.032, 0.034), (0.027, 0.029), (0.022, 0.024), (0.017, 0.019), (0.012, 0.014))
+"""Ranges [m] by rank at level 5; the levels below leave out the first."""
+
+X, Y, DISTANCE, YAW = (-0.28, 0.28), (-0.08, 0.05), 0.10, 0.75
+TRIES = 14
+"""Draws per block before a layout is started again: five blocks nearly fill the region."""
+
+BAND, NEAR_MIDDLE = 0.05, (0.0, -0.10)
+"""No block starts with |x| below the band, or within DISTANCE of that point."""
+
+TIGHT = (0.12, 0.03)
+"""A layout whose neighbours in rank are all this near [m] in x and y is drawn anew."""
+
+ROWS = {
+    1: (0.0,),
+    2: (-0.07, 0.07),
+    3: (-0.11, 0.0, 0.11),
+    4: (-0.15, -0.05, 0.05, 0.15),
+    5: (-0.19, -0.095, 0.0, 0.095, 0.19),
+}
+ROW_Y = -0.175
+"""Where the expert lines them up; not part of the rule."""
+
+LEVELS = {n: Level(candidates=n, subtasks=n, steps=200 * n) for n in range(1, 6)}
+
+
+def _heights(level: int, rng: np.random.Generator) -> list[Look]:
+    half, color = float(rng.uniform(0.013, 0.015)), draw_color(rng)
+    if level == 1:
+        return [((half, half, half), color)]
+    ranges = HALF_HEIGHTS if level == 5 else HALF_HEIGHTS[1 : level + 1]
+    return [((half, half, float(rng.uniform(*ends))), color) for ends in ranges]
+
+
+def _colors(level: int, rng: np.random.Generator) -> list[Look]:
+    half = float(rng.uniform(0.015, 0.025))
+    return [((half, half, half), color) for color in list(COLORS.values())[:level]]
+
+
+def _sizes(level: int, rng: np.random.Generator) -> list[Look]:
+    color = draw_color(rng)
+    ranges = HALF_SIZES if level == 5 else HALF_SIZES[1 : level + 1]
+    halves = [float(rng.uniform(*ends)) for ends in ranges]
+    if level == 1:
+        halves = [float(rng.uniform(0.015, 0.025))]
+    return [((half, half, half), color) for half in halves]
+
+
+def _scattered(points: Sequence[Point]) -> bool:
+    """Neither in the right order already nor all in one tight row (one block always passes)."""
+    pairs = list(pairwise(points))
+    if not pairs:
+        return True
+    ordered = all(b[0] > a[0] for a, b in pairs)
+    tight = all(abs(b[0] - a[0]) < TIGHT[0] and abs(b[1] - a[1]) < TIGHT[1] for a, b in pairs)
+    return not ordered and not tight
+
+
+def _places(
+    looks: Sequence[Look], rng: np.random.Generator, workcell: Workcell
+) -> tuple[Point, ...]:
+    """Free places, all wholly in the head camera's view."""
+    reach = max(math.hypot(half[0], half[1]) for half, _ in looks)
+    height = max(2 * half[2] for half, _ in looks)
+
+    def allowed(point: Point) -> bool:
+        x, y = point
+        if abs(x) < BAND or not apart(point, [NEAR_MIDDLE], DISTANCE):
+            return False
+        low, high = workcell.view_span(y, reach, height)
+        return low <= x <= high
+
+    for _ in range(LAYOUTS):
+        points = shuffled_scatter(rng, len(looks), X, Y, DISTANCE, allowed, True, TRIES)
+        if _scattered(points):
+            return points
+    raise RuntimeError(f"no mixed-up layout of {len(looks)} blocks; skip this seed")
+
+
+def _draw(looks: Sequence[Look], rng: np.random.Generator, workcell: Workcell) -> Draft:
+    items = [
+        Item(
+            str(rank),
+            "block",
+            standing(point, float(rng.uniform(-YAW, YAW)), half[2]),
+            {"half": list(half), "color": list(color)},
+        )
+        for rank, ((half, color), point) in enumerate(
+            zip(looks, _places(looks, rng, workcell), strict=True)
+        )
+    ]
+    scene_objects, names = named(rng, items)
+    return Draft(scene_objects, {"order": [names[item.role] for item in items]})
+
+
+def goal(scene: Scene) -> Row | Bring:
+    """The row from left to right, or at level 1 a block in the near band."""
+    order = scene.facts["order"]
+    return Row(order) if scene.level > 1 else Bring(order[0], *NEAR_BAND)
+
+
+def plan(scene: Scene) -> tuple[Skill, ...]:
+    """Each block to its place, first those on the left, from the outside in.
+
+    In that order the arms change only once, and no block is set down beside one not yet moved.
+    """
+    order = list(scene.facts["order"])
+    at = {name: scene.object(name).pose.position for name in order}
+    skills: list[Skill] = []
+    for name in sorted(order, key=lambda n: (at[n][0] > 0, -abs(at[n][0]))):
+        arm = side(at[name][0])
+        x = ROWS[scene.level][order.index(name)]
+        half = float(scene.object(name).params["half"][2])
+        skills.append(Pick(name, lift=0.08, arm=arm))
+        skills.append(Place(name, (x, ROW_Y, TABLE_TOP + half), arm=arm))
+    return tuple(skills)
+
+
+def _falling(count: int, ends: tuple[str, str], measure: str) -> Phrasings:
+    """How an order by a measure is said: comparatives for two blocks, superlatives for more."""
+    ending = "er" if count == 2 else "est"
+    most, least = (word.removesuffix("e") + ending for word in ends)
+    return TEXT.phrasings("order.falling", most=most, least=least, measure=measure)
+
+
+def _color_order(colors: list[str]) -> Phrasings:
+    return TEXT.phrasings(
+        "order.colors",
+        colors=listed(colors),
+        steps=(", then " if len(colors) > 2 else " and then ").join(colors),
+        first=colors[0],
+        rest=listed(colors[1:]),
+    )
+
+
+def _slots(kind: Kind, count: int) -> Slots:
+    if count == 1:
+        return TEXT.slots(kind.single) | {"middle": COMMON.phrasings("middle.near")}
+    blocks = TEXT.slots(f"blocks.{by_count(count)}", count=count, word=NUMBERS[count])
+    return blocks | {"order": kind.said(count)}
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What distinguishes the three tasks: how the blocks look and how their order is said.
+
+    `single` is the entry of the phrasings for the only block of level 1, `said(count)` are those of
+    the order of several.
+    """
+
+    name: str
+    looks: Callable[[int, np.random.Generator], list[Look]]
+    single: str
+    said: Callable[[int], Phrasings]
+    summary: str
+    order: str
+
+
+KINDS = (
+    Kind(
+        "Height",
+        _heights,
+        "block.plain",
+        lambda count: _falling(count, ("tall", "short"), "height"),
+        "Line the blocks up from left to right, from the tallest to the shortest.",
+        "the next shorter",
+    ),
+    Kind(
+        "Color",
+        _colors,
+        "block.red",
+        lambda count: _color_order(list(COLORS)[:count]),
+        "Line the blocks up from left to right: red, green, blue, yellow, purple.",
+        "the next colour's",
+    ),
+    Kind(
+        "Size",
+        _sizes,
+        "block.plain",
+        lambda count: _falling(count, ("large", "small"), "size"),
+        "Line the blocks up from left to right, from the largest to the smallest.",
+        "the next smaller",
+    ),
+)
+
+
+def _task(kind: Kind) -> Task:
+    return Task(
+        name=f"Rank_Blocks_{kind.name}",
+        category="OFE",
+        levels=LEVELS,
+        draw=lambda level, rng, workcell: _draw(kind.looks(level, rng), rng, workcell),
+        goal=goal,
+        plan=plan,
+        templates=TEXT.templates,
+        slots=lambda scene: _slots(kind, len(scene.facts["order"])),
+        summary=kind.summary,
+        success=(
+            f"From left to right every block is followed by {kind.order} block, at most 3 cm "
+            "nearer or farther, all lie on the table and both grippers are open. Level 1: the "
+            "block lies near the robot in the middle."
+        ),
+    )
+
+
+TASKS = tuple(_task(kind) for kind in KINDS)

@@ -1,0 +1,1 @@
+"""Pick_*_Relational: the object on a named side of another one."""

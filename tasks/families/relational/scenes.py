@@ -1,0 +1,313 @@
+"""Relational picking (RRR): objects in straight rows and columns, one named from another.
+
+Shared by the tasks of `pick_relational`. The reference is named by its place in the layout, the
+target by its direction from there; it is always the next one in that direction. Front is the side
+away from the robot. A layout that does not fit in 200 draws is refused (LayoutError).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from itertools import pairwise
+
+import numpy as np
+
+from robospa.geometry import Array
+from robospa.tasks.families.picking import (
+    BLOCK_HALF,
+    BLOCK_RADIUS,
+    draw_params,
+    drawn_yaw,
+    lifted,
+    pick_name,
+    pick_target,
+)
+from robospa.tasks.families.tabletop import standing
+from robospa.tasks.goals.pick import Lift
+from robospa.tasks.instructions.grammar import Slots
+from robospa.tasks.instructions.text import TaskText
+from robospa.tasks.layouts import LayoutError
+from robospa.tasks.objects import looks, object_model
+from robospa.tasks.scene import Scene, SceneObject
+from robospa.tasks.task import Draft, Draw, Level, Task
+from robospa.workcell import Workcell
+
+TEXT = TaskText.beside(__file__, "instructions.toml")
+
+MARGIN = (0.06, 0.08)
+"""Centres are this far inside the head image (official)."""
+DRAWS = 200
+CLEAR = 0.002
+"""Footprints' circles stay this far apart [m]."""
+DIRECTIONS: Mapping[str, tuple[int, int]] = {
+    "left": (-1, 0),
+    "right": (1, 0),
+    "front": (0, 1),
+    "back": (0, -1),
+    "front_left": (-1, 1),
+    "front_right": (1, 1),
+    "back_left": (-1, -1),
+    "back_right": (1, -1),
+}
+"""Steps in columns (to the right) and rows (away from the robot)."""
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A level's slots: how many are used, and ranges [m] that all tasks share.
+
+    `jitter` is that of a whole column or row, `scale` the factor on the spacings of the objects.
+    """
+
+    count: int
+    columns: int
+    rows: int
+    jitter: tuple[float, float]
+    x: tuple[float, float]
+    y: tuple[float, float]
+    scale: float
+
+    @property
+    def cells(self) -> list[tuple[int, int]]:
+        """(column, row) of every slot, row by row from the robot."""
+        return [(c, r) for r in range(self.rows) for c in range(self.columns)]
+
+
+_SMALL = (2, 2, (0.014, 0.012), (-0.205, 0.205), (-0.195, 0.035), 0.78)
+SHAPES = {
+    1: Shape(2, *_SMALL),
+    2: Shape(3, *_SMALL),
+    3: Shape(4, *_SMALL),
+    4: Shape(6, 3, 2, (0.018, 0.012), (-0.225, 0.225), (-0.205, 0.045), 0.92),
+    5: Shape(9, 3, 3, (0.016, 0.014), (-0.228, 0.228), (-0.215, 0.075), 0.86),
+}
+
+Pitches = tuple[tuple[float, float], tuple[float, float]]
+Spacing = tuple[float, float, float]
+"""Least distance [m] of columns, of rows and of any two objects."""
+
+
+@dataclass(frozen=True)
+class Family:
+    """One kind of object and its official spacing; yaws are uniform in +-`half_range` [rad]."""
+
+    asset: str
+    spacing: Spacing
+    half_range: float = math.pi
+
+
+@dataclass(frozen=True)
+class Crowd:
+    """The data of one task. With one family all objects look alike, else each is of another one.
+
+    `pitches`: ranges of the distances of columns and of rows [m] on 2 x 2, 3 x 2 and 3 x 3 slots.
+    Any two objects keep apart, by their spacing and so that the circles around their footprints do
+    not meet. `radius` and `tall` bound the objects for the view. `wording` is the set of templates:
+    "noun" or, for the official sentences about soap, "soap".
+    """
+
+    kind: str
+    noun: str
+    families: tuple[Family, ...]
+    pitches: tuple[Pitches, Pitches, Pitches]
+    what: str
+    radius: float
+    tall: float
+    wording: str = "noun"
+
+    @property
+    def alike(self) -> bool:
+        """Whether all objects of a scene are equal."""
+        return len(self.families) == 1
+
+
+@cache
+def weights(level: int) -> Array:
+    """How likely each (direction, target slot) is: uniform over directions and over slots.
+
+    Balanced by alternate scaling. The official draw (direction, then reference) favours the
+    middle of the grid, so that a guess without reading could beat chance.
+    """
+    shape = SHAPES[level]
+    table = np.array(
+        [
+            [float((c - dx, r - dy) in shape.cells) for c, r in shape.cells]
+            for dx, dy in DIRECTIONS.values()
+        ]
+    )
+    for _ in range(200):
+        table /= table.sum(axis=1, keepdims=True) * table.shape[0]
+        table /= table.sum(axis=0, keepdims=True) * table.shape[1]
+    return table
+
+
+@cache
+def widest(asset: str) -> float:
+    """Radius [m] of the largest footprint among an asset's looks."""
+    return max(object_model(asset, {"look": k}).radius for k in range(looks(asset)))
+
+
+def least_distances(crowd: Crowd, families: Sequence[Family], scale: float) -> Array:
+    """How far apart [m] the centres of each two objects have to be, (count, count); 0 on i = j."""
+    spacing = np.array([f.spacing[2] for f in families]) * (scale if crowd.alike else 1.0)
+    radius = np.array([BLOCK_RADIUS if f.asset == "block" else widest(f.asset) for f in families])
+    circles = radius[:, None] + radius + CLEAR
+    least: Array = np.maximum(np.maximum(spacing[:, None], spacing), circles)
+    np.fill_diagonal(least, 0.0)
+    return least
+
+
+def _places(
+    workcell: Workcell,
+    crowd: Crowd,
+    shape: Shape,
+    families: Sequence[Family],
+    used: list[tuple[int, int]],
+    rng: np.random.Generator,
+) -> Array:
+    """Where the used slots lie: (count, 2) [m]; LayoutError if nothing fits."""
+    pitch_x, pitch_y = crowd.pitches[shape.columns + shape.rows - 4]
+    gap_x, gap_y = (round(shape.scale * max(f.spacing[k] for f in families), 4) for k in (0, 1))
+    least = least_distances(crowd, families, shape.scale)
+    columns, rows = sorted({c for c, _ in used}), sorted({r for _, r in used})
+    for _ in range(DRAWS):
+        px, py = rng.uniform(*pitch_x), rng.uniform(*pitch_y)
+        shift_x = rng.uniform(-shape.jitter[0], shape.jitter[0], len(columns))
+        shift_y = rng.uniform(-shape.jitter[1], shape.jitter[1], len(rows))
+        cx = {c: c * px + float(s) for c, s in zip(columns, shift_x, strict=True)}
+        cy = {r: r * py + float(s) for r, s in zip(rows, shift_y, strict=True)}
+        xs, ys = sorted(cx.values()), sorted(cy.values())
+        room_x, room_y = shape.x[1] - shape.x[0], shape.y[1] - shape.y[0]
+        if xs[-1] - xs[0] > room_x or ys[-1] - ys[0] > room_y:
+            continue
+        anchor_x = rng.uniform(shape.x[0] - xs[0], shape.x[1] - xs[-1])
+        anchor_y = rng.uniform(shape.y[0] - ys[0], shape.y[1] - ys[-1])
+        if any(b - a < gap_x for a, b in pairwise(xs)) or any(
+            b - a < gap_y for a, b in pairwise(ys)
+        ):
+            continue
+        points = np.array([(cx[c] + anchor_x, cy[r] + anchor_y) for c, r in used])
+        if (np.hypot(*(points[:, None] - points).T) < least).any():
+            continue
+        if _seen(workcell, crowd, points):
+            return points
+    raise LayoutError(f"no grid of {len(used)} objects fits in {DRAWS} draws; skip this seed")
+
+
+def _seen(workcell: Workcell, crowd: Crowd, points: Array) -> bool:
+    """Whether centres keep the margin and whole footprints and heights are in view."""
+    x, y = points.T
+    seen = workcell.in_view(x, y, 0.0, 0.0, MARGIN) & workcell.in_view(x, y, crowd.radius)
+    return bool((seen & workcell.in_view(x, y, 0.0, crowd.tall)).all())
+
+
+def _label(shape: Shape, slot: tuple[int, int], used: list[tuple[int, int]]) -> str:
+    """Name of a slot in the layout, unique in it: "front_left", "center", "left"..."""
+    columns, rows = {c for c, _ in used}, {r for _, r in used}
+    side = ("left", "middle", "right") if shape.columns == 3 else ("left", "right")
+    depth = ("back", "middle", "front") if shape.rows == 3 else ("back", "front")
+    if len(rows) == 1:
+        return side[slot[0]]
+    if len(columns) == 1:
+        return depth[slot[1]]
+    if side[slot[0]] == depth[slot[1]] == "middle":
+        return "center"
+    return f"{depth[slot[1]]}_{side[slot[0]]}"
+
+
+def _in_line(a: tuple[int, int], b: tuple[int, int]) -> bool:
+    """Whether two slots share a column or a row."""
+    return a[0] == b[0] or a[1] == b[1]
+
+
+def drawer(crowd: Crowd) -> Draw:
+    """The draw of `crowd`: direction and target slot, other slots, a straight layout, turns."""
+
+    def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
+        shape = SHAPES[level]
+        cells, table = shape.cells, weights(level).ravel()
+        pick = min(int(np.searchsorted(np.cumsum(table), rng.random())), len(table) - 1)
+        direction = list(DIRECTIONS)[pick // len(cells)]
+        target = cells[pick % len(cells)]
+        dx, dy = DIRECTIONS[direction]
+        reference = (target[0] - dx, target[1] - dy)
+        rest = [s for s in cells if s not in (target, reference)]
+        others = [rest[int(i)] for i in rng.permutation(len(rest))]
+        # Three in a corner shape: a diagonal never asks for the corner, so the other directions
+        # have to, in two of three scenes; else a guesser would leave the corner out.
+        if shape.count == 3 and not _in_line(target, others[0]) and rng.random() < 1 / 3:
+            others.reverse()
+        used = [target, reference, *others][: shape.count]
+        used = [used[int(i)] for i in rng.permutation(len(used))]
+        families = crowd.families * len(used)
+        if not crowd.alike:
+            order = rng.permutation(len(crowd.families))[: len(used)]
+            families = tuple(crowd.families[int(i)] for i in order)
+        families = families[: len(used)]
+        points = _places(workcell, crowd, shape, families, used, rng)
+        params = [draw_params(rng, f.asset) for f in families[: 1 if crowd.alike else None]]
+        objects = []
+        for i, (x, y) in enumerate(points.tolist()):
+            asset, own = families[i].asset, params[0 if crowd.alike else i]
+            yaw = drawn_yaw(rng, workcell, asset, own, y, families[i].half_range)
+            pose = standing((x, y), yaw, BLOCK_HALF if asset == "block" else 0.0)
+            objects.append(SceneObject(f"object_{i}", asset, pose, own))
+        facts = {
+            "target": f"object_{used.index(target)}",
+            "reference": f"object_{used.index(reference)}",
+            "relation": direction,
+            "reference_label": _label(shape, reference, used),
+        }
+        return Draft(tuple(objects), facts)
+
+    return draw
+
+
+def _slots(direction: str, reference: str, level: int, noun: str) -> Slots:
+    """How the neighbour in `direction` of the object at the place called `reference` is said.
+
+    From level 2 on an axis neighbour is "directly" there (official wording); from level 4 on a
+    diagonal neighbour is "immediately" there, because another object may lie further out on the
+    same side.
+    """
+    side = direction.replace("_", "-")
+    how = ""
+    if "-" in side:
+        how = "immediately " if level >= 4 else ""
+    elif level >= 2:
+        how = "directly "
+    label = reference.replace("_", "-")
+    where = label.replace("-", " ")
+    at = {"left": "on the left", "right": "on the right", "center": "in the center"}.get(
+        where, f"at the {where}"
+    )
+    plain = TEXT.phrasings(f"noun.{noun}")[0][0]
+    return TEXT.slots("convention", f"noun.{noun}") | {
+        "relation": TEXT.phrasings("relation", how=how, side=side),
+        "reference": TEXT.phrasings("reference", label=label, at=at, noun=plain),
+    }
+
+
+def crowd_task(crowd: Crowd) -> Task:
+    """The RRR task of `crowd`."""
+
+    def slots(scene: Scene) -> Slots:
+        facts = scene.facts
+        return _slots(facts["relation"], facts["reference_label"], scene.level, crowd.noun)
+
+    return Task(
+        name=pick_name(crowd.kind, "Relational"),
+        category="RRR",
+        levels={k: Level(s.count, 1, 150) for k, s in SHAPES.items()},
+        draw=drawer(crowd),
+        goal=lifted(Lift(rise=0.06, closed=True)),
+        plan=pick_target,
+        templates=lambda level: TEXT.templates(level, crowd.wording),
+        slots=slots,
+        summary=f"Pick the one next to a named one among 2 to 9 {crowd.what}, in one of eight "
+        "directions.",
+        success="the target rose by more than 6 cm, carried by a closed gripper",
+    )

@@ -1,0 +1,116 @@
+"""Stack_Blocks_Color_Order: build a tower of coloured blocks, colours in a fixed order.
+
+Draw: k equal cubes scattered in front of the robot, coloured red, green, blue, yellow, purple
+(the first k). Success: each block rests on the one before it in that order, both grippers open.
+Level 1 has one block, to be brought to the middle of the near edge.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from robospa.tasks.families.stack_blocks.towers import building_place, tower_goal, tower_plan
+from robospa.tasks.families.tabletop import (
+    Item,
+    Point,
+    apart,
+    middle_in_view,
+    named,
+    scatter,
+    standing,
+)
+from robospa.tasks.instructions.grammar import Slots, listed
+from robospa.tasks.instructions.text import COMMON, TaskText
+from robospa.tasks.instructions.words import NUMBERS, by_count, color_orders
+from robospa.tasks.scene import Scene
+from robospa.tasks.task import Draft, Level, Task
+from robospa.workcell import Workcell
+
+TEXT = TaskText.beside(__file__, "color.toml")
+
+COLORS = {
+    "red": (1.0, 0.0, 0.0),
+    "green": (0.0, 1.0, 0.0),
+    "blue": (0.0, 0.0, 1.0),
+    "yellow": (1.0, 1.0, 0.0),
+    "purple": (0.6, 0.2, 0.8),
+}
+"""Bottom to top."""
+
+HALF = 0.018
+X, Y, DISTANCE, YAW = (-0.28, 0.28), (-0.08, 0.05), 0.10, 0.75
+LEVELS = {n: Level(candidates=n, subtasks=n, steps=200 * n) for n in range(1, 6)}
+
+
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
+    """Scattered cubes; at level 1 the only one starts away from the place it must go to."""
+
+    def away(point: Point) -> bool:
+        return abs(point[0]) >= 0.05 and apart(point, [(0.0, -0.10)], 0.10)
+
+    def allowed(point: Point) -> bool:
+        return (level > 1 or away(point)) and middle_in_view(workcell, point, HALF)
+
+    points = scatter(rng, level, X, Y, DISTANCE, allowed, near_middle=True)
+    items = [
+        Item(
+            color,
+            "block",
+            standing(point, float(rng.uniform(-YAW, YAW)), HALF),
+            {"half": [HALF, HALF, HALF], "color": list(rgb)},
+        )
+        for (color, rgb), point in zip(COLORS.items(), points, strict=False)
+    ]
+    place = building_place(level, rng, points)
+    scene_objects, names = named(rng, items)
+    facts = {
+        "order": [names[item.role] for item in items],
+        "colors": [item.role for item in items],
+        "place": list(place),
+    }
+    return Draft(scene_objects, facts)
+
+
+def slots(scene: Scene) -> Slots:
+    """How the order of the colours is said."""
+    colors, count = list(scene.facts["colors"]), len(scene.facts["colors"])
+    if count == 1:
+        middle = COMMON.phrasings("middle.near")
+        return TEXT.slots("block", color=colors[0]) | {"middle": middle}
+    onto = list(zip(colors[1:], colors[:-1], strict=True))
+    number = f"number.{by_count(count)}"
+    return TEXT.slots(number, count=count, word=NUMBERS[count]) | {
+        "order": color_orders(colors),
+        "pairs": (
+            (
+                listed([f"{a} on {b}" for a, b in onto]),
+                listed([f"{a} onto {b}" for a, b in onto], ", then "),
+            ),
+            (
+                listed([f"{a} over {b}" for a, b in onto]),
+                listed([f"{a} on top of {b}" for a, b in onto]),
+                listed([f"{a} above {b}" for a, b in onto]),
+            ),
+        ),
+        "bottom": TEXT.phrasings("end", color=colors[0]),
+        "top": TEXT.phrasings("end", color=colors[-1]),
+        "middle": COMMON.phrasings("middle.table"),
+    }
+
+
+TASK = Task(
+    name="Stack_Blocks_Color_Order",
+    category="OCE",
+    levels=LEVELS,
+    draw=draw,
+    goal=tower_goal,
+    plan=tower_plan,
+    templates=TEXT.templates,
+    slots=slots,
+    summary="Stack the blocks in the given order of colours.",
+    success=(
+        "Every block rests straight on the one before it, in the order red, green, blue, yellow, "
+        "purple from the bottom, and both grippers are open. Level 1: the block lies near the "
+        "robot in the middle."
+    ),
+)
