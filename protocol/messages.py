@@ -13,21 +13,30 @@ versions may add some), missing fields and wrong types are refused with DecodeEr
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from dataclasses import dataclass, field, fields
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import NDArray
 
 from robospa.protocol.codec import DEFAULT_LIMITS, Buffer, Limits, decode, encode
 from robospa.protocol.errors import DecodeError, VersionMismatch
-from robospa.protocol.policy import Observation, PolicySpec, TrialInfo
-from robospa.protocol.validate import Fields, kind
+from robospa.protocol.policy import (
+    Observation,
+    PolicySpec,
+    TrialInfo,
+    Whole,
+    check_spec,
+    is_printable,
+)
+from robospa.schema import describe, read
 
 VERSION = "1.0"
 SUBPROTOCOL = "robospa.v1"
 MAX_ID = 2**53
 """Request ids stay exact in languages whose only number is a double."""
+RequestId = Annotated[int, Meta(ge=0, le=MAX_ID)]
 
 # Codes of `error`. The list is open; a client must cope with others.
 BAD_MESSAGE = "bad_message"  # the request could not be understood
@@ -43,23 +52,10 @@ class Hello:
     """Server's first message. `server` is a name for people and records."""
 
     type: ClassVar[str] = "hello"
-    id: int
+    id: RequestId
     version: str
     server: str
     spec: PolicySpec
-
-    def fields(self) -> dict[str, Any]:
-        return {"version": self.version, "server": self.server, "spec": self.spec.to_json()}
-
-    @classmethod
-    def read(cls, id: int, fields: Fields) -> Hello:
-        version = fields.text("version")
-        if major(version) != major(VERSION):
-            raise VersionMismatch(
-                f"the server speaks robospa protocol {version} and this is {VERSION}: "
-                "install the same major version at both ends"
-            )
-        return cls(id, version, fields.name("server", ""), PolicySpec.from_json(fields.raw("spec")))
 
 
 @dataclass(frozen=True)
@@ -67,15 +63,8 @@ class Reset:
     """A trial begins; nothing of the one before may survive."""
 
     type: ClassVar[str] = "reset"
-    id: int
+    id: RequestId
     trial: TrialInfo
-
-    def fields(self) -> dict[str, Any]:
-        return {"trial": self.trial.to_json()}
-
-    @classmethod
-    def read(cls, id: int, fields: Fields) -> Reset:
-        return cls(id, TrialInfo.from_json(fields.raw("trial")))
 
 
 @dataclass(frozen=True)
@@ -83,14 +72,7 @@ class Ready:
     """Answer to reset: the policy is ready for the first observation."""
 
     type: ClassVar[str] = "ready"
-    id: int
-
-    def fields(self) -> dict[str, Any]:
-        return {}
-
-    @classmethod
-    def read(cls, id: int, fields: Fields) -> Ready:
-        return cls(id)
+    id: RequestId
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,17 +80,8 @@ class Infer:
     """An observation; see `robospa.protocol.policy` for its keys."""
 
     type: ClassVar[str] = "infer"
-    id: int
+    id: RequestId
     observation: Observation
-
-    def fields(self) -> dict[str, Any]:
-        return {"observation": self.observation}
-
-    @classmethod
-    def read(cls, id: int, fields: Fields) -> Infer:
-        observation = fields.map("observation")
-        Fields("observation", observation).whole("step", low=0)
-        return cls(id, observation)
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,23 +89,9 @@ class Actions:
     """Answer to infer: `chunk` float32 (T, D). `timing`: queue_ms, infer_ms, batch."""
 
     type: ClassVar[str] = "actions"
-    id: int
+    id: RequestId
     chunk: NDArray[np.float32]
-    timing: Mapping[str, float] = field(default_factory=dict)
-
-    def fields(self) -> dict[str, Any]:
-        return {"chunk": self.chunk, "timing": self.timing}
-
-    @classmethod
-    def read(cls, id: int, fields: Fields) -> Actions:
-        chunk = fields.raw("chunk")
-        if not isinstance(chunk, np.ndarray):
-            raise fields.refuse("chunk", "an array", chunk)
-        timing = fields.map("timing", {})
-        for name, number in timing.items():
-            if type(number) not in (int, float):
-                raise DecodeError(f"actions: timing {name!r} must be a number, not {kind(number)}")
-        return cls(id, chunk, timing)
+    timing: Mapping[str, int | float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -141,17 +100,10 @@ class Error:
     may succeed when it is repeated from its reset."""
 
     type: ClassVar[str] = "error"
-    id: int
+    id: RequestId
     code: str
     message: str
     retriable: bool = False
-
-    def fields(self) -> dict[str, Any]:
-        return {"code": self.code, "message": self.message, "retriable": self.retriable}
-
-    @classmethod
-    def read(cls, id: int, fields: Fields) -> Error:
-        return cls(id, fields.text("code"), fields.text("message"), fields.flag("retriable", False))
 
 
 @dataclass(frozen=True)
@@ -159,15 +111,8 @@ class End:
     """The trial is over. `outcome` holds JSON values such as success, end and steps."""
 
     type: ClassVar[str] = "end"
-    id: int
+    id: RequestId
     outcome: Mapping[str, Any] = field(default_factory=dict)
-
-    def fields(self) -> dict[str, Any]:
-        return {"outcome": self.outcome}
-
-    @classmethod
-    def read(cls, id: int, fields: Fields) -> End:
-        return cls(id, fields.map("outcome", {}))
 
 
 @dataclass(frozen=True)
@@ -175,14 +120,22 @@ class Ended:
     """Answer to end."""
 
     type: ClassVar[str] = "ended"
-    id: int
+    id: RequestId
 
-    def fields(self) -> dict[str, Any]:
-        return {}
 
-    @classmethod
-    def read(cls, id: int, fields: Fields) -> Ended:
-        return cls(id)
+@dataclass(frozen=True)
+class _Head:
+    """What every message has."""
+
+    type: str
+    id: RequestId
+
+
+@dataclass(frozen=True)
+class _Step:
+    """What every observation has."""
+
+    step: Whole
 
 
 Message = Hello | Reset | Ready | Infer | Actions | Error | End | Ended
@@ -193,7 +146,11 @@ TYPES: dict[str, type[Message]] = {
 
 def pack(message: Message, limits: Limits = DEFAULT_LIMITS) -> bytes:
     """The message as one buffer. Raises EncodeError."""
-    return encode({"type": message.type, "id": message.id, **message.fields()}, limits)
+    sent: dict[str, Any] = {"type": message.type}
+    for one in fields(message):
+        value = getattr(message, one.name)
+        sent[one.name] = value.to_json() if isinstance(value, PolicySpec | TrialInfo) else value
+    return encode(sent, limits)
 
 
 def unpack(buffer: Buffer, limits: Limits = DEFAULT_LIMITS) -> Message:
@@ -203,13 +160,32 @@ def unpack(buffer: Buffer, limits: Limits = DEFAULT_LIMITS) -> Message:
 
 def read_message(value: Any) -> Message:
     """The checked message in a decoded map (see `unpack`)."""
-    fields = Fields("message", value)
-    name = fields.text("type")
-    found = TYPES.get(name)
-    if found is None:
-        raise DecodeError(f"message type {name[:40]!r} is not one of {', '.join(TYPES)}")
-    fields.what = f"{name} message"
-    return found.read(fields.whole("id", low=0, high=MAX_ID), fields)
+    kind = read(_Head, value, "message", DecodeError).type
+    if kind not in TYPES:
+        raise DecodeError(f"message type {kind[:40]!r} is not one of {', '.join(TYPES)}")
+    if kind == Hello.type:
+        _check_version(value)
+        value = {"server": "", **value}  # may be left out
+    message = read(TYPES[kind], value, f"{kind} message", DecodeError)
+    if isinstance(message, Hello):
+        check_spec(message.spec)
+        if not is_printable(message.server):
+            raise DecodeError("hello message: 'server' must be printable text")
+    elif isinstance(message, Infer):
+        read(_Step, message.observation, "observation", DecodeError)
+    return message
+
+
+def _check_version(hello: Any) -> None:
+    """Raises VersionMismatch before anything is read that another version may write otherwise."""
+    version = hello.get("version")
+    if not isinstance(version, str):
+        raise DecodeError(f"hello message: 'version' must be text, not {describe(version)}")
+    if major(version) != major(VERSION):
+        raise VersionMismatch(
+            f"the server speaks robospa protocol {version} and this is {VERSION}: "
+            "install the same major version at both ends"
+        )
 
 
 def major(version: str) -> str:

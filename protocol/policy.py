@@ -16,14 +16,15 @@ An action chunk is float32 (T, D): T actions to execute one after the other.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
-from typing import Any, Protocol
+from dataclasses import asdict, dataclass, field, fields
+from typing import Annotated, Any, Protocol
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import NDArray
 
 from robospa.protocol.errors import DecodeError
-from robospa.protocol.validate import Fields, is_name
+from robospa.schema import Identifier, one_of, read
 
 CAMERAS = ("head", "left_wrist", "right_wrist", "front", "third")
 STATES = ("commanded", "measured", "none")
@@ -31,15 +32,19 @@ SPACES = ("joint", "ee", "delta_ee")
 CODECS = ("raw", "jpeg")
 
 Observation = Mapping[str, Any]
+Whole = Annotated[int, Meta(ge=0, le=2**63 - 1)]
+Seed = Annotated[int, Meta(ge=0)]  # up to 2^64 - 1: more does not fit into a message
+Pixels = Annotated[int, Meta(ge=1, le=8192)]
+Offset = Annotated[int, Meta(ge=-10_000, lt=0)]
 
 
 @dataclass(frozen=True)
 class CameraSpec:
     """One wanted image; `width` and `height` [px]."""
 
-    name: str
-    width: int = 320
-    height: int = 240
+    name: Annotated[str, one_of(CAMERAS)]
+    width: Pixels = 320
+    height: Pixels = 240
 
 
 DEFAULT_CAMERAS = (CameraSpec("head"), CameraSpec("left_wrist"), CameraSpec("right_wrist"))
@@ -60,17 +65,17 @@ class PolicySpec:
 
     name: str
     cameras: tuple[CameraSpec, ...] = DEFAULT_CAMERAS
-    state: str = "commanded"
-    action: str = "joint"
-    horizon: int = 50
-    execute: int | None = None
-    history: tuple[int, ...] = ()
-    image_codec: str = "raw"
-    batch: int = 1
+    state: Annotated[str, one_of(STATES)] = "commanded"
+    action: Annotated[str, one_of(SPACES)] = "joint"
+    horizon: Annotated[int, Meta(ge=1, le=10_000)] = 50
+    execute: Annotated[int, Meta(ge=1)] | None = None
+    history: Annotated[tuple[Offset, ...], Meta(max_length=64)] = ()
+    image_codec: Annotated[str, one_of(CODECS)] = "raw"
+    batch: Annotated[int, Meta(ge=1, le=4096)] = 1
     seeded: bool = False
     privileged: bool = False
     embodiments: tuple[str, ...] = ()
-    action_dim: int | None = None
+    action_dim: Annotated[int, Meta(ge=1, le=256)] | None = None
 
     def to_json(self) -> dict[str, Any]:
         """Plain JSON values; `from_json` is the inverse."""
@@ -80,36 +85,9 @@ class PolicySpec:
     @classmethod
     def from_json(cls, value: Any) -> PolicySpec:
         """The spec in a decoded map; unknown fields are ignored. Raises DecodeError."""
-        fields = Fields("spec", value)
-        cameras = tuple(_camera(item) for item in fields.items("cameras", DEFAULT_CAMERAS))
-        if len({camera.name for camera in cameras}) != len(cameras):
-            raise DecodeError("spec: 'cameras' names a camera twice")
-        horizon = fields.whole("horizon", 50, 1, 10_000)
-        execute = fields.raw("execute", None)
-        action_dim = fields.raw("action_dim", None)
-        history = fields.items("history", ())
-        if len(history) > 64 or not all(type(n) is int and -10_000 <= n < 0 for n in history):
-            raise DecodeError(
-                "spec: 'history' must be a list of at most 64 negative whole numbers from -10000 up"
-            )
-        embodiments = fields.items("embodiments", ())
-        if not all(is_name(name) for name in embodiments):
-            raise DecodeError("spec: 'embodiments' must be a list of text that can be printed")
-        return cls(
-            name=fields.name("name"),
-            cameras=cameras,
-            state=fields.text("state", "commanded", STATES),
-            action=fields.text("action", "joint", SPACES),
-            horizon=horizon,
-            execute=None if execute is None else fields.whole("execute", None, 1, horizon),
-            history=tuple(history),
-            image_codec=fields.text("image_codec", "raw", CODECS),
-            batch=fields.whole("batch", 1, 1, 4096),
-            seeded=fields.flag("seeded", False),
-            privileged=fields.flag("privileged", False),
-            embodiments=tuple(embodiments),
-            action_dim=None if action_dim is None else fields.whole("action_dim", None, 1, 256),
-        )
+        spec = read(cls, value, "spec", DecodeError)
+        check_spec(spec)
+        return spec
 
     @property
     def action_dims(self) -> tuple[int, ...]:
@@ -120,50 +98,46 @@ class PolicySpec:
         return (16,) if self.action == "ee" else (14, 16)
 
 
-def _camera(value: Any) -> CameraSpec:
-    if isinstance(value, CameraSpec):
-        return value
-    fields = Fields("spec camera", value)
-    return CameraSpec(
-        fields.text("name", choices=CAMERAS),
-        fields.whole("width", 320, 1, 8192),
-        fields.whole("height", 240, 1, 8192),
-    )
+def check_spec(spec: PolicySpec) -> None:
+    """Raises DecodeError if the parts of a spec that was read do not fit together."""
+    if len({camera.name for camera in spec.cameras}) != len(spec.cameras):
+        raise DecodeError("spec: 'cameras' names a camera twice")
+    if spec.execute is not None and spec.execute > spec.horizon:
+        raise DecodeError(
+            f"spec: 'execute' must be at most the horizon {spec.horizon}, not {spec.execute}"
+        )
+    for field_, names in (("name", (spec.name,)), ("embodiments", spec.embodiments)):
+        if not all(is_printable(name) for name in names):
+            raise DecodeError(f"spec: {field_!r} must be printable text of at most 200 characters")
+
+
+def is_printable(text: str) -> bool:
+    """Whether `text` can stand in a table or on a terminal as it is."""
+    return len(text) <= 200 and text.isprintable()
 
 
 @dataclass(frozen=True)
 class TrialInfo:
     """What a policy learns at reset. `policy_seed` makes a stochastic policy repeatable."""
 
-    task: str
-    level: int
-    seed: int
-    embodiment: str
-    mode: str
-    split: str
+    task: Identifier
+    level: Whole
+    seed: Seed
+    embodiment: Identifier
+    mode: Identifier
+    split: Identifier
     instruction: str
-    policy_seed: int = 0
+    policy_seed: Seed = 0
     extra: Mapping[str, Any] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, Any]:
         """Plain JSON values; `from_json` is the inverse."""
-        return {**{k: v for k, v in self.__dict__.items() if k != "extra"}, "extra": self.extra}
+        return {one.name: getattr(self, one.name) for one in fields(self)}
 
     @classmethod
     def from_json(cls, value: Any) -> TrialInfo:
         """The trial in a decoded map; unknown fields are ignored. Raises DecodeError."""
-        fields = Fields("trial", value)
-        return cls(
-            task=fields.identifier("task"),
-            level=fields.whole("level", low=0),
-            seed=fields.whole("seed", low=0, high=2**64 - 1),
-            embodiment=fields.identifier("embodiment"),
-            mode=fields.identifier("mode"),
-            split=fields.identifier("split"),
-            instruction=fields.text("instruction"),
-            policy_seed=fields.whole("policy_seed", 0, 0, 2**64 - 1),
-            extra=fields.map("extra", {}),
-        )
+        return read(cls, value, "trial", DecodeError)
 
 
 class Policy(Protocol):

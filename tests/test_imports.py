@@ -141,7 +141,7 @@ def test_importing_robospa_loads_no_folder_of_it() -> None:
     assert {name for name in loaded if name.split(".")[0] == "robospa"} == {"robospa"}
 
 
-def test_protocol_loads_only_its_three_dependencies() -> None:
+def test_protocol_loads_only_its_four_dependencies() -> None:
     statement = (
         "import importlib, pkgutil, robospa.protocol as p\n"
         "for m in pkgutil.iter_modules(p.__path__): importlib.import_module(p.__name__+'.'+m.name)"

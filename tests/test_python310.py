@@ -14,6 +14,7 @@ ROOT = Path(__file__).resolve().parents[1]
 SERVING = sorted(
     [
         *(ROOT / "protocol").glob("*.py"),
+        *(ROOT / "robospa").glob("*.py"),
         *(ROOT / "clients").rglob("*.py"),
         *(ROOT / "baselines").glob("*.py"),
         *(ROOT / "harness").glob("__init__.py"),
@@ -62,7 +63,9 @@ def test_the_check_sees_newer_names() -> None:
 def test_it_imports_on_python_310_where_there_is_one() -> None:
     python = os.environ.get("ROBOSPA_PYTHON310") or shutil.which("python3.10")
     if python is None or not _usable(python):
-        pytest.skip("no Python 3.10 with numpy, msgpack, websockets and typer (ROBOSPA_PYTHON310)")
+        pytest.skip(
+            "no Python 3.10 with numpy, msgpack, msgspec, websockets, typer (ROBOSPA_PYTHON310)"
+        )
     vendors = ("rdt", "lerobot", "go1", "xvla", "openpi")
     imports = "".join(f"from robospa.clients.{vendor} import serve\n" for vendor in vendors)
     code = (
@@ -86,7 +89,8 @@ def test_it_imports_on_python_310_where_there_is_one() -> None:
 
 def _usable(python: str) -> bool:
     code = (
-        "import sys, numpy, msgpack, websockets, typer; sys.exit(sys.version_info[:2] != (3, 10))"
+        "import sys, numpy, msgpack, msgspec, websockets, typer\n"
+        "sys.exit(sys.version_info[:2] != (3, 10))"
     )
     done = subprocess.run([python, "-c", code], capture_output=True, timeout=60)
     return done.returncode == 0

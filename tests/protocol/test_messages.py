@@ -117,11 +117,14 @@ def test_actions_survive() -> None:
         ({"id": True}, "'id'"),
         ({"id": 2**53 + 1}, "'id'"),
         ({"id": "3"}, "'id'"),
-        ({"trial": []}, "trial is not a map"),
-        ({"trial": {**TRIAL.to_json(), "level": "1"}}, "'level'"),
-        ({"trial": {**TRIAL.to_json(), "task": None}}, "'task'"),
-        ({"trial": {**TRIAL.to_json(), "extra": [1]}}, "'extra'"),
-        ({"trial": {"task": "x"}}, "lacks the field 'level'"),
+        ({"trial": []}, "'trial' must be a map"),
+        (
+            {"trial": {**TRIAL.to_json(), "level": "1"}},
+            "'trial.level' must be a whole number, not '1'",
+        ),
+        ({"trial": {**TRIAL.to_json(), "task": None}}, "'trial.task' must be text, not None"),
+        ({"trial": {**TRIAL.to_json(), "extra": [1]}}, "'trial.extra' must be a map, not a list"),
+        ({"trial": {"task": "x"}}, "'trial' lacks the field 'level'"),
     ],
 )
 def test_wrong_fields_are_refused_by_name(changes: dict[str, Any], reason: str) -> None:
@@ -133,17 +136,23 @@ def test_wrong_fields_are_refused_by_name(changes: dict[str, Any], reason: str) 
 @pytest.mark.parametrize(
     ("changes", "reason"),
     [
-        ({"cameras": [{"name": "ceiling"}]}, "one of head"),
+        (
+            {"cameras": [{"name": "top"}]},
+            r"'cameras\[0\].name' must be one of head, left.*, not 'top'",
+        ),
         ({"cameras": [{"name": "head"}, {"name": "head"}]}, "twice"),
-        ({"cameras": [{"name": "head", "width": 0}]}, "'width'"),
+        (
+            {"cameras": [{"name": "head", "width": 0}]},
+            r"'cameras\[0\].width' must be a whole number >= 1, not 0",
+        ),
         ({"horizon": 0}, "'horizon'"),
         ({"execute": 99}, "'execute'"),
-        ({"history": [1]}, "negative"),
+        ({"history": [1]}, r"'history\[0\]' must be a whole number <= -1, not 1"),
         ({"action": "fly"}, "joint, ee"),
         ({"image_codec": "png"}, "raw, jpeg"),
         ({"batch": 0}, "'batch'"),
         ({"seeded": 1}, "true or false"),
-        ({"embodiments": [1]}, "list of text"),
+        ({"embodiments": [1]}, r"'embodiments\[0\]' must be text, not 1"),
         ({"action_dim": 0}, "'action_dim'"),
         ({"name": 3}, "'name'"),
     ],

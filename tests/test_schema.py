@@ -1,0 +1,126 @@
+"""Typed objects from values of outside, and the sentence about each kind of refusal."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Annotated, Any
+
+import msgspec
+import numpy as np
+import pytest
+from msgspec import Meta
+from numpy.typing import NDArray
+
+from robospa.schema import Identifier, describe, one_of, pattern, read
+
+
+class Refused(Exception):
+    """The caller's own error."""
+
+
+@dataclass(frozen=True)
+class Camera:
+    name: Annotated[str, one_of(("head", "front"))]
+    width: Annotated[int, Meta(ge=1, le=8192)] = 320
+
+
+@dataclass(frozen=True)
+class Card:
+    """Every kind of field."""
+
+    title: Annotated[str, Meta(max_length=5)]
+    cameras: Annotated[tuple[Camera, ...], Meta(max_length=2)] = ()
+    file: Identifier = ""
+    day: Annotated[str, pattern(r"\d{4}-\d\d-\d\d", "a date such as 2026-01-31")] = "2026-01-31"
+    share: float = 0.5
+    times: Mapping[str, int | float] = field(default_factory=dict)
+    execute: int | None = None
+    flag: bool = False
+    more: Mapping[str, Any] = field(default_factory=dict)
+    array: NDArray[np.float32] | None = None
+
+    def __post_init__(self) -> None:
+        if self.flag and not self.cameras:
+            raise ValueError("a card with a flag needs a camera")
+
+
+class Struct(msgspec.Struct, frozen=True):
+    number: int
+
+
+def test_what_fits_is_read() -> None:
+    array = np.zeros(2, np.float32)
+    value = {
+        "title": "a",
+        "cameras": [{"name": "front"}, {"name": "head", "width": 8}],
+        "share": 1,
+        "times": {"a": 1, "b": 1.5},
+        "more": {"x": [1, None]},
+        "array": array,
+        "of a later version": True,
+    }
+    card = read(Card, value, "card")
+    assert card.cameras == (Camera("front"), Camera("head", 8))
+    assert (card.share, dict(card.times), card.more) == (1.0, {"a": 1, "b": 1.5}, {"x": [1, None]})
+    assert type(card.times["a"]) is int
+    assert card.array is array
+    assert read(Struct, {"number": 3}, "struct") == Struct(3)
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"title": 3}, "card: 'title' must be text, not 3"),
+        ({"title": "toolong"}, "card: 'title' must be text of length <= 5, not 'toolong'"),
+        ({"cameras": None}, "card: 'cameras' must be a list, not None"),
+        ({"cameras": [1]}, "card: 'cameras[0]' must be a map, not 1"),
+        ({"cameras": [{}]}, "card: 'cameras[0]' lacks the field 'name'"),
+        (
+            {"cameras": [{"name": "top"}]},
+            "card: 'cameras[0].name' must be one of head, front, not 'top'",
+        ),
+        (
+            {"cameras": [{"name": "head", "width": 0}]},
+            "card: 'cameras[0].width' must be a whole number >= 1, not 0",
+        ),
+        ({"cameras": [{}] * 3}, "card: 'cameras' must be a list of length <= 2, not a list"),
+        (
+            {"file": "../x"},
+            "card: 'file' must be at most 128 letters, digits and _ - . +, and not begin with a "
+            "dot, not '../x'",
+        ),
+        ({"file": "x\n"}, "card: 'file' must be at most 128 letters"),
+        ({"day": "today"}, "card: 'day' must be a date such as 2026-01-31, not 'today'"),
+        ({"share": "1"}, "card: 'share' must be a number, not '1'"),
+        ({"times": {"a": "x"}}, "card: 'times' must be a number"),
+        ({"times": {1: 1}}, "card: 'times' must be a map with text keys, not a dict"),
+        ({"execute": 1.5}, "card: 'execute' must be a whole number or null, not 1.5"),
+        ({"flag": 1}, "card: 'flag' must be true or false, not 1"),
+        ({"flag": True}, "card: a card with a flag needs a camera"),
+        ({"array": [1]}, "card: 'array' must be an array, not a list"),
+        ({3: 3}, "card must be a map with text keys, not a dict"),
+    ],
+)
+def test_a_refusal_names_field_expectation_and_value(changes: Any, sentence: str) -> None:
+    with pytest.raises(Refused) as caught:
+        read(Card, {"title": "a", **changes}, "card", Refused)
+    assert str(caught.value).startswith(sentence)
+
+
+@pytest.mark.parametrize(
+    ("value", "sentence"),
+    [
+        ({}, "lacks the field 'title'"),
+        ([], "must be a map, not a list"),
+        (None, "must be a map, not None"),
+    ],
+)
+def test_a_value_that_is_no_such_thing(value: Any, sentence: str) -> None:
+    with pytest.raises(ValueError, match=f"^card {sentence}$"):
+        read(Card, value, "card")
+
+
+def test_values_are_described_shortly() -> None:
+    assert describe("x" * 500) == repr("x" * 500)[:60]
+    assert describe(b"x") == "a bytes"
