@@ -13,8 +13,11 @@ import types
 import typing
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, TypeVar
 from urllib.parse import parse_qsl
+
+from robospa.registry import did_you_mean
 
 T = TypeVar("T")
 
@@ -43,7 +46,8 @@ def read_options(cls: type[T], given: Mapping[str, Any]) -> T:
     values: dict[str, Any] = {}
     for name, value in given.items():
         if name not in known:
-            raise ValueError(f"there is no option {name!r}; known are {', '.join(known)}")
+            near = did_you_mean(name, known)
+            raise ValueError(f"there is no option {name!r}; {near}known are {', '.join(known)}")
         values[name] = _read(name, value, hints[name])
         choices = known[name].metadata.get("choices", ())
         if choices and values[name] not in choices:
@@ -63,10 +67,13 @@ def url_options(query: str) -> dict[str, str]:
 
 def plain_options(options: Any) -> dict[str, Any]:
     """All options as JSON values, the defaults too."""
-    return {
-        name: list(value) if isinstance(value, tuple) else value
-        for name, value in dataclasses.asdict(options).items()
-    }
+    return {name: _plain(value) for name, value in dataclasses.asdict(options).items()}
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, tuple):
+        return list(value)
+    return str(value) if isinstance(value, Path) else value
 
 
 def option_table(cls: type[Any]) -> list[Row]:
@@ -111,6 +118,11 @@ def _convert(value: Any, kind: Any) -> Any:
         if not isinstance(value, str):
             raise TypeError
         return value
+    if kind is Path:
+        return Path(value)
+    if kind == tuple[str, ...]:
+        texts = (value,) if isinstance(value, str) else tuple(value)
+        return tuple(_convert(text, str) for text in texts)
     raise TypeError
 
 
@@ -122,6 +134,13 @@ def _alternatives(hint: Any) -> tuple[Any, ...]:
 
 
 def _type_name(hint: Any) -> str:
-    names = {bool: "yes or no", int: "whole number", float: "number", str: "text"}
+    names = {
+        bool: "yes or no",
+        int: "whole number",
+        float: "number",
+        str: "text",
+        Path: "path",
+        tuple[str, ...]: "list of texts",
+    }
     kinds = [k for k in _alternatives(hint) if k is not type(None)]
     return " or ".join(names.get(kind, str(kind)) for kind in kinds)

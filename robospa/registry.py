@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import difflib
 import importlib
+from collections.abc import Collection
 from importlib import metadata
 from typing import Any
 
@@ -50,7 +51,11 @@ def find(group: str, name: str, what: str) -> Any:
         if point.name == name:
             return load(point.value)
     known = names(group)
-    near = difflib.get_close_matches(name, known, n=1)
-    hint = f"did you mean {near[0]}? " if near else ""
     listed = ", ".join(known) or "none (is robospa installed?)"
-    raise UnknownName(f"no {what} {name!r}; {hint}known are {listed}")
+    raise UnknownName(f"no {what} {name!r}; {did_you_mean(name, known)}known are {listed}")
+
+
+def did_you_mean(name: str, known: Collection[str]) -> str:
+    """The question "did you mean NAME? " about the nearest of `known`; empty if none is near."""
+    near = difflib.get_close_matches(name, known, n=1)
+    return f"did you mean {near[0]}? " if near else ""

@@ -1,25 +1,32 @@
 """`robospa check URL`: is this policy server fit to be evaluated?
 
-Four looks: the protocol (`robospa.protocol.conformance`), the first actions
-(`robospa.harness.replays.first_actions`), a real trial done twice (`robospa.harness.real_trials`),
-and with --demo the replay of a demonstration (`robospa.harness.replays.replay_check`). Exit code 1
-if a check of the protocol or a real trial failed, or if the replay names a mistake; hints and a
-replay that does not fit are only told.
+Four parts: the protocol (`robospa.protocol.conformance`), the first actions
+(`robospa.harness.replays.first_actions`), a real trial run twice
+(`robospa.harness.conformance_rollout`), and with --demo the replay of a demonstration
+(`robospa.harness.replays.replay_check`). Exit code 1 if a check of the protocol or a real trial
+failed, or if the replay names a mistake; hints, and a replay that does not fit, are only reported.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from robospa.harness.replays.episodes import Episode
     from robospa.harness.replays.replay_check import Findings
     from robospa.protocol.client import RemotePolicy
+    from robospa.protocol.conformance import CheckResult
+    from robospa.protocol.transport import Timeouts
+
+    Connect = Callable[[], RemotePolicy]
 
 MARKS = {True: "[green]ok[/]", False: "[red]FAILED[/]", None: "[dim]n/a[/]"}
 SHOWN = 6
@@ -67,67 +74,91 @@ def check(
     """Talk to a policy server in every way that an evaluation will, and say what it gets wrong."""
     from rich.console import Console
     from rich.markup import escape
-    from rich.table import Table
 
-    from robospa.clients import connect, find
-    from robospa.harness.cli.running import client_options
-    from robospa.protocol.conformance import check as run_checks
     from robospa.protocol.transport import Timeouts
 
-    try:
-        target = find(url)
-    except ValueError as error:
-        raise typer.BadParameter(str(error)) from error
-    options = client_options(url, client)
-    episode = None
-    if demo is not None:
-        from robospa.harness.replays.episodes import EpisodeError, read_episode
-
-        episode = read_episode(demo, instruction)  # before the server is troubled
-        if not episode.instruction:
-            raise EpisodeError(f"{demo} does not say what it was told; add --instruction TEXT")
     limits = Timeouts(wait=wait, hello=timeout, reset=timeout, first_infer=timeout, infer=timeout)
-    bare = url.partition("?")[0]
-    own = target.scheme in ("ws", "wss") and not options
-
-    def opened() -> RemotePolicy:
-        return connect(url, token, limits, options=options)
-
-    results = run_checks(bare, token, timeouts=limits, connector=None if own else opened)
-    table = Table("check", "", "seen", box=None)
-    for result in results:
-        table.add_row(result.name, MARKS[result.passed], escape(result.detail))
+    target = _target(url, token, limits, client)
+    episode = None if demo is None else _episode(demo, instruction)  # before the server is asked
     console = Console()
+    results = _run_checks(console, target, trials)
     failed = [result.name for result in results if result.passed is False]
-    if "handshake" not in failed and "actions" not in failed:
-        table.add_row("first actions", *_first_actions(opened))
-    count = len(results)
-    if not failed and trials:
-        from robospa.harness.real_trials import real_trials
-
-        for tried in real_trials(opened, trials):
-            count += 1
-            table.add_row(tried.name, MARKS[tried.passed], escape(tried.detail))
-            failed += [tried.name] if tried.passed is False else []
-    console.print(table)
     if "handshake" not in failed:
-        for warning in _warnings(opened):
+        for warning in _warnings(target.connect):
             console.print(f"[yellow]note[/] {escape(warning)}")
     if failed:
-        console.print(f"{escape(url)} failed {len(failed)} of {count} checks.", style="red")
+        console.print(f"{escape(url)} failed {len(failed)} of {len(results)} checks.", style="red")
         raise typer.Exit(1)
-    if episode is not None:
-        from robospa.harness.replays.replay_check import replay
-
-        with opened() as policy:
-            findings = replay(policy, episode, points)
-            show(console, findings, episode.name, policy.dialect)
-        if findings.kind == "mistaken":
-            raise typer.Exit(1)
+    if episode is not None and not _replay(console, target.connect, episode, points):
+        raise typer.Exit(1)
     console.print(f"{escape(url)} can be evaluated.", style="green")
 
 
-def _first_actions(opened: Any) -> tuple[str, str]:
+@dataclass(frozen=True)
+class _Target:
+    """The server under test: its URL without options, and how to connect in its dialect."""
+
+    url: str
+    token: str | None
+    timeouts: Timeouts
+    connect: Connect
+    native: bool
+    """Whether it may speak `robospa.v1`."""
+
+
+def _target(url: str, token: str | None, timeouts: Timeouts, client: Path | None) -> _Target:
+    """Raises BadParameter for a URL that is none, SettingsError for options that do not fit."""
+    from robospa.clients import connect, find
+    from robospa.harness.running.request import client_options
+
+    try:
+        scheme = find(url).scheme
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from error
+    options = client_options(url, client)
+    native = scheme in ("ws", "wss") and not options
+    connector = partial(connect, url, token, timeouts, options=options)
+    return _Target(url.partition("?")[0], token, timeouts, connector, native)
+
+
+def _episode(demo: Path, instruction: str | None) -> Episode:
+    from robospa.harness.replays.episodes import EpisodeError, read_episode
+
+    episode = read_episode(demo, instruction)
+    if not episode.instruction:
+        raise EpisodeError(f"{demo} has no instruction; add --instruction TEXT")
+    return episode
+
+
+def _run_checks(console: Console, target: _Target, trials: int) -> list[CheckResult]:
+    """Check protocol, first actions and, if all is well, real trials; print them in one table."""
+    from rich.markup import escape
+    from rich.table import Table
+
+    from robospa.harness.conformance_rollout import rollouts
+    from robospa.protocol.conformance import check as check_protocol
+
+    results = check_protocol(
+        target.url,
+        target.token,
+        timeouts=target.timeouts,
+        connector=None if target.native else target.connect,
+    )
+    failed = {result.name for result in results if result.passed is False}
+    table = Table("check", "", "seen", box=None)
+    for result in results:
+        table.add_row(result.name, MARKS[result.passed], escape(result.detail))
+    if not failed & {"handshake", "actions"}:
+        table.add_row("first actions", *_first_actions(target.connect))
+    if not failed and trials:
+        for result in rollouts(target.connect, trials):
+            results.append(result)
+            table.add_row(result.name, MARKS[result.passed], escape(result.detail))
+    console.print(table)
+    return results
+
+
+def _first_actions(connect: Connect) -> tuple[str, str]:
     """Mark and text of the row about the first actions."""
     from rich.markup import escape
 
@@ -135,7 +166,7 @@ def _first_actions(opened: Any) -> tuple[str, str]:
     from robospa.protocol.errors import WireError
 
     try:
-        with opened() as policy:
+        with connect() as policy:
             found, seen = hints(policy)
     except WireError as error:
         found, seen = [str(error)], ""
@@ -144,15 +175,25 @@ def _first_actions(opened: Any) -> tuple[str, str]:
     return "[green]ok[/]", escape(seen)
 
 
-def _warnings(opened: Callable[[], RemotePolicy]) -> list[str]:
-    """What the dialect cannot see on the wire, in sentences; none if the server is gone."""
+def _warnings(connect: Connect) -> list[str]:
+    """What cannot be seen on the wire of this dialect, in sentences; none if the server is gone."""
     from robospa.protocol.errors import WireError
 
     try:
-        with opened() as policy:
+        with connect() as policy:
             return [str(text) for text in policy.hello.get("warnings", ())]
     except WireError:
         return []
+
+
+def _replay(console: Console, connect: Connect, episode: Episode, points: int) -> bool:
+    """Compare the policy's answers with a demonstration; False if a mistake was found."""
+    from robospa.harness.replays.replay_check import replay
+
+    with connect() as policy:
+        findings = replay(policy, episode, points)
+        show(console, findings, episode.name, policy.dialect)
+    return findings.kind != "mistaken"
 
 
 def show(console: Console, findings: Findings, name: str, dialect: str) -> None:

@@ -12,10 +12,14 @@ import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import IO, TYPE_CHECKING, Annotated
 
 import typer
+
+if TYPE_CHECKING:
+    from robospa.harness.settings import Selection
 
 START_SECONDS = 60.0
 SAMPLE = (
@@ -41,65 +45,53 @@ def demo(
     seconds: Annotated[float, typer.Option(help="leave the contrast out after that time")] = 75.0,
 ) -> None:
     """See a policy server evaluated: trials of each category, a table, a report with videos."""
-    from robospa.harness.cli import selection
+    from robospa.harness.selection import parse_levels, parse_tasks
 
     begun = time.monotonic()
     folder = out or Path("runs") / f"demo-{time.strftime('%Y%m%d-%H%M%S')}"
-    wanted = ",".join(SAMPLE) if tasks == "sample" else tasks
-    names, numbers = selection.parse_tasks(wanted), selection.parse_levels(levels)
-    keys = _keys(names, numbers, trials)
-    page = _evaluate("oracle", keys, folder / "oracle", workers, video)
-    if contrast and time.monotonic() - begun < seconds:
-        lowest = [k for k in keys if k.level == min(numbers) and k.task in _spatial()]
-        if lowest:
-            print("\nFor contrast, some of the same trials with arms that move at random:")
-            _evaluate(CONTRAST, lowest, folder / CONTRAST, workers, "none")
+    names = parse_tasks(",".join(SAMPLE) if tasks == "sample" else tasks)
+    page = _evaluate("oracle", _select(names, levels, trials), folder / "oracle", workers, video)
+    # The tasks with the shortest trials: one pick each.
+    short = [name for name in names if name in parse_tasks("spatial")]
+    if contrast and short and time.monotonic() - begun < seconds:
+        chosen = _select(short, str(min(parse_levels(levels))), trials)
+        print("\nFor contrast, some of the same trials with arms that move at random:")
+        _evaluate(CONTRAST, chosen, folder / CONTRAST, workers, "none")
     print(f"\nDone in {time.monotonic() - begun:.0f} s. Open {page} in a browser.")
 
 
-def _spatial() -> set[str]:
-    """The tasks with the shortest trials: one pick each."""
-    from robospa.harness.cli import selection
+def _select(names: Sequence[str], levels: str, trials: int) -> Selection:
+    """The first accepted seeds of every variant; the first of all where no list is shipped."""
+    from robospa.harness.selection import list_trials
+    from robospa.harness.settings import Selection, SettingsError
 
-    return set(selection.parse_tasks("spatial"))
-
-
-def _keys(names: Sequence[str], levels: Sequence[int], trials: int) -> Any:
-    from robospa.harness.cli import selection
-
+    shipped = Selection(tasks=",".join(names), levels=levels, trials=trials)
     try:
-        seeds = selection.parse_seeds(None)
-        return _list(names, levels, trials, seeds)
-    except selection.BadChoice:  # lists are not shipped for these variants: the first numbers do
-        return _list(names, levels, trials, selection.parse_seeds(f"100000-{99999 + trials}"))
+        list_trials(shipped)
+    except SettingsError:
+        return replace(shipped, seeds=f"100000-{99999 + trials}")
+    return shipped
 
 
-def _list(names: Sequence[str], levels: Sequence[int], trials: int, seeds: Any) -> Any:
-    from robospa.harness.cli import selection
-
-    return selection.list_trials(
-        names, levels, trials, seeds, embodiment="aloha-agilex", mode="clean", split="heldout"
-    )
-
-
-def _evaluate(policy: str, keys: Any, folder: Path, workers: int, video: str) -> Path:
+def _evaluate(policy: str, chosen: Selection, folder: Path, workers: int, video: str) -> Path:
     """Serve `policy`, evaluate it over the wire, print its table; returns the report's page."""
-    from robospa.harness.cli import running
+    from robospa.harness.cli.running import run_and_show
+    from robospa.harness.running.request import make_request
+    from robospa.harness.settings import Compute, Connection, EvaluationSettings, Recording
     from robospa.results.records.run_io import read_run
     from robospa.results.report.report import write_report
 
     with server(policy) as url:
         print(f"`robospa serve {policy}` listens at {url}; evaluating it over the wire", flush=True)
-        request = running.make_request(
-            url,
-            keys,
-            folder,
-            connection={"timeout": 60.0, "first_timeout": 60.0, "wait": 10.0, "patience": 10.0},
-            workers=workers,
-            video=video,
-            arguments={"command": "demo"},
+        settings = EvaluationSettings(
+            policy=(url,),
+            out=folder,
+            selection=chosen,
+            connection=Connection(timeout=60.0, first_timeout=60.0, wait=10.0, patience=10.0),
+            compute=Compute(workers=workers),
+            recording=Recording(video=video),
         )
-        running.run_and_show(request)
+        run_and_show(make_request(settings, arguments={"command": "demo"}))
     return write_report(read_run(folder), folder / "report") / "report.html"
 
 
@@ -120,7 +112,7 @@ def server(policy: str) -> Iterator[str]:
                 process.wait()
 
 
-def _url(process: subprocess.Popen[bytes], output: Any) -> str:
+def _url(process: subprocess.Popen[bytes], output: IO[str]) -> str:
     """The address that the server prints once clients can connect."""
     until = time.monotonic() + START_SECONDS
     while time.monotonic() < until:

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+if TYPE_CHECKING:
+    from robospa.harness.replays.episodes import Episode
+    from robospa.trial import TrialKey
 
 
 def record(
@@ -25,30 +30,37 @@ def record(
 
     The file is in RoboTwin's HDF5 layout and can be given to `robospa check URL --demo`.
     """
-    from robospa.harness.cli.selection import (
-        BadChoice,
-        list_trials,
-        parse_levels,
-        parse_seeds,
-        parse_tasks,
-    )
-    from robospa.harness.factory import open_policy
-    from robospa.harness.replays.episodes import EpisodeRecorder, require, write_episode
-    from robospa.harness.trial import policy_seed, run_trial
-    from robospa.trial import TrialKey
+    from robospa.harness.replays.episodes import require, write_episode
+    from robospa.harness.settings import SettingsError
 
     require()
-    names, levels = parse_tasks(task), parse_levels(str(level))
-    if len(names) != 1:
-        raise BadChoice(f"{task!r} names {len(names)} tasks; record one at a time")
-    seeds = parse_seeds(None if seed is None else str(seed))
-    key: TrialKey = list_trials(
-        names, levels, 1, seeds, embodiment="aloha-agilex", mode=mode, split=split
-    )[0]
+    key = _one_trial(task, level, seed, mode, split)
     path = out or Path(f"{key.task}-L{key.level}-{key.seed}.hdf5")
     if path.exists():
-        raise BadChoice(f"{path} exists already; choose another --out")
+        raise SettingsError(f"{path} exists already; choose another --out")
+    episode, end = _recorded(key, policy, path.name)
+    write_episode(path, episode)
+    how = "success" if end == "success" else f"no success ({end})"
+    print(f"{path}: {len(episode)} frames, {how}; instruction {episode.instruction!r}")
+
+
+def _one_trial(task: str, level: int, seed: int | None, mode: str, split: str) -> TrialKey:
+    from robospa.harness.selection import list_trials, parse_tasks
+    from robospa.harness.settings import Selection, SettingsError
+
+    names = parse_tasks(task)
+    if len(names) != 1:
+        raise SettingsError(f"{task!r} names {len(names)} tasks; record one at a time")
+    seeds = None if seed is None else str(seed)
+    return list_trials(Selection(names[0], str(level), 1, seeds, split, mode=mode))[0]
+
+
+def _recorded(key: TrialKey, policy: str, name: str) -> tuple[Episode, str]:
+    """The trial `key` of a policy as an episode called `name`, and how it ended."""
+    from robospa.harness.factory import open_policy
+    from robospa.harness.replays.episodes import EpisodeRecorder
     from robospa.harness.sim.sapien_world import SapienWorld
+    from robospa.harness.trial import policy_seed, run_trial
 
     recorder, world = EpisodeRecorder(), SapienWorld()
     try:
@@ -57,9 +69,4 @@ def record(
         )
     finally:
         world.close()
-    about = {"task": key.task, "level": key.level, "seed": key.seed, "embodiment": key.embodiment}
-    about |= {"mode": key.mode, "split": key.split}
-    episode = recorder.episode(path.name, done.instruction, about)
-    write_episode(path, episode)
-    how = "success" if done.success else f"no success ({done.end})"
-    print(f"{path}: {len(episode)} frames, {how}; told {done.instruction!r}")
+    return recorder.episode(name, done.instruction, asdict(key)), done.end

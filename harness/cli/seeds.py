@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -21,26 +22,20 @@ def seeds(
     fresh: Annotated[bool, typer.Option(help="make lists anew that are already there")] = False,
 ) -> None:
     """Accept the first `count` seeds from `start` that settle and that the expert solves."""
-    from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn
 
-    from robospa.harness import seeds as lists
-    from robospa.harness.cli.selection import parse_levels, parse_tasks
+    from robospa.harness.seeds import Sweep, save, stored_levels
+    from robospa.harness.selection import parse_levels, parse_tasks
 
-    console = Console()
-    names, wanted = parse_tasks(tasks), parse_levels(levels)
-    variants = [(n, k) for n in names for k in wanted]
+    variants = [(name, k) for name in parse_tasks(tasks) for k in parse_levels(levels)]
     if not check and not fresh:
-        variants = [(n, k) for n, k in variants if k not in lists.stored_levels(out, n)]
+        variants = [(name, k) for name, k in variants if k not in stored_levels(out, name)]
     bar = Progress("{task.description}", BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    failed = 0
-    with bar, lists.Sweep(workers) as sweep:
+    failed = False
+    with bar, Sweep(workers) as sweep:
         for name, level in variants:
             row = bar.add_task(f"{name} L{level}", total=count)
-
-            def advance(n: int, row: object = row) -> None:
-                bar.advance(row, n)  # type: ignore[arg-type]
-
+            advance = partial(bar.advance, row)
             if check:
                 tried = sweep.try_seeds(name, level, list(range(start, start + count)), advance)
                 refused = [a for a in tried if not a.accepted]
@@ -48,15 +43,15 @@ def seeds(
             else:
                 try:
                     found, refused = sweep.first_accepted(name, level, start, count, advance)
-                except RuntimeError as trouble:
-                    console.print(f"[red]{trouble}")
-                    failed += 1
+                except RuntimeError as error:
+                    bar.console.print(f"[red]{error}")
+                    failed = True
                     continue
-                lists.save(out, name, level, found)
+                save(out, name, level, found)
                 text = f"{name} L{level}: {count} of {count + len(refused)} accepted"
             bar.remove_task(row)
-            console.print(text)
+            bar.console.print(text)
             for item in refused:
-                console.print(f"  seed {item.seed}: {item.why}")
+                bar.console.print(f"  seed {item.seed}: {item.why}")
     if failed:
         raise typer.Exit(1)

@@ -6,10 +6,14 @@ simulator.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+
+if TYPE_CHECKING:
+    from ssl import SSLContext
 
 
 class BadOptions(Exception):
@@ -65,24 +69,31 @@ def serve(
     logging.basicConfig(level=logging.WARNING, format="robospa: %(message)s")
     make = policy_factory(policy)
     if show_options:
-        return _show(policy, make)
-    served = _served(policy, make, {**_from_file(options), **_pairs(option or [])}, connections)
-    tls = None
-    if certificate is not None:
-        import ssl
-
-        tls = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
-        tls.load_cert_chain(certificate, key)
-
-    def ready(url: str) -> None:
-        print(f"serving {policy} at {url} (Ctrl-C stops)", flush=True)
-
-    run_server(host=host, port=port, token=token, ssl=tls, on_ready=ready, **served)
+        return _show_options(policy, make)
+    given = {**_from_file(options), **_pairs(option or [])}
+    run_server(
+        host=host,
+        port=port,
+        token=token,
+        ssl=_tls(certificate, key),
+        on_ready=lambda url: print(f"serving {policy} at {url} (Ctrl-C stops)", flush=True),
+        **_hosted(policy, make, given, connections),
+    )
 
 
-def options_class(make: Any) -> Any:
-    """The dataclass of options that a policy's function asks for by the annotation of its only
-    parameter; None if it takes plain texts."""
+def _tls(certificate: Path | None, key: Path | None) -> SSLContext | None:
+    if certificate is None:
+        return None
+    import ssl
+
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    context.load_cert_chain(certificate, key)
+    return context
+
+
+def options_class(make: Callable[..., object]) -> type[Any] | None:
+    """The dataclass of options that annotates the only parameter of a policy's function; None if
+    the function takes plain texts."""
     import dataclasses
     import inspect
     import typing
@@ -91,13 +102,13 @@ def options_class(make: Any) -> Any:
     if len(names) != 1:
         return None
     found = typing.get_type_hints(make).get(names[0])
-    return found if dataclasses.is_dataclass(found) else None
+    return found if isinstance(found, type) and dataclasses.is_dataclass(found) else None
 
 
-def _served(
-    policy: str, make: Any, given: dict[str, Any], connections: int = 256
+def _hosted(
+    policy: str, make: Callable[..., Any], given: dict[str, object], connections: int
 ) -> dict[str, Any]:
-    """What the server is to run: a shared policy, or a factory of one per connection."""
+    """What the server runs: a shared policy or a factory of one per connection, and its options."""
     from functools import partial
 
     from robospa.protocol.options import read_options
@@ -120,7 +131,7 @@ def _served(
         hint = f"see robospa serve {policy} --show-options"
         raise BadOptions(f"{policy} cannot be served: {error} ({hint})") from error
     made = make(chosen)
-    name = " ".join(["robospa", _version(), policy, *_told(chosen)])
+    name = " ".join(["robospa", _version(), policy, *_changed(chosen)])
     return {
         "policy_factory" if callable(made) else "policy": made,
         # The name reaches every client, and so a run's manifest.
@@ -128,7 +139,7 @@ def _served(
     }
 
 
-def _told(options: Any) -> list[str]:
+def _changed(options: Any) -> list[str]:
     """The options that are not at their defaults, as NAME=VALUE."""
     import dataclasses
 
@@ -145,7 +156,7 @@ def _version() -> str:
         return "(not installed)"
 
 
-def _show(policy: str, make: Any) -> None:
+def _show_options(policy: str, make: Callable[..., object]) -> None:
     """Print the options, one per line."""
     from robospa.protocol.options import option_table
 
@@ -161,7 +172,7 @@ def _show(policy: str, make: Any) -> None:
         print(f"{row.name:<{width}}  {row.help} [{row.values}; default {row.default or 'needed'}]")
 
 
-def _from_file(path: Path | None) -> dict[str, Any]:
+def _from_file(path: Path | None) -> dict[str, object]:
     if path is None:
         return {}
     import json

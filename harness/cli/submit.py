@@ -124,16 +124,11 @@ def block(
     workers: Annotated[int, typer.Option(help="processes; 0 for one per core")] = 0,
 ) -> None:
     """Draw fresh seeds that the expert solves, and print the commitment to publish beforehand."""
-    from robospa.harness.cli import running, selection
+    from robospa.harness.running.staffing import cores
+    from robospa.harness.selection import parse_levels, parse_tasks
 
-    variants = [
-        (task, level)
-        for task in selection.parse_tasks(tasks)
-        for level in selection.parse_levels(levels)
-    ]
-    made = _reach("hidden_seeds:draw_block")(
-        variants, trials, workers or running.cores(), note=print
-    )
+    variants = [(task, level) for task in parse_tasks(tasks) for level in parse_levels(levels)]
+    made = _reach("hidden_seeds:draw_block")(variants, trials, workers or cores(), note=print)
     _reach("hidden_seeds:write_block")(made, out)
     print(f"Keep {out} secret until the trials begin. Publish now:")
     print(f"commitment {made.commitment}")
@@ -162,26 +157,22 @@ def reproduce(
     parts: Hidden = None,
 ) -> None:
     """Run hidden seeds against the submitter's server and test exactly whether they agree."""
-    from robospa.harness.cli import running
     from robospa.harness.running.evaluate import evaluate
+    from robospa.harness.running.request import make_request
+    from robospa.harness.settings import EvaluationSettings, updated
     from robospa.results.records.run_io import read_run
 
     reference = _reach("reference:shipped")(world, parts)
     valid = _reach("verify:verify")(bundle, reference, practice)
     seeds = _reach("hidden_seeds:read_block")(block, commitment)
     keys = _reach("reproduce:hidden_keys")(valid, seeds, reference)
-    limits = {"timeout": 120.0, "first_timeout": 600.0, "wait": 0.0, "patience": 60.0}
-    request = running.make_request(
-        policy,
-        keys,
-        out,
-        connection=limits,
+    run_seed = valid.run.manifest["settings"]["run_seed"]
+    asked = {"policy": policy, "out": out, "workers": workers, "run_seed": run_seed}
+    request = make_request(
+        updated(EvaluationSettings(), {**asked, "world": world, "parts": parts}),
         token=token,
-        workers=workers,
-        run_seed=valid.run.manifest["settings"]["run_seed"],
-        world=world,
-        parts=parts,
         resume=resume,
+        keys=keys,
         arguments={"command": "submit reproduce", "commitment": commitment},
     )
     _reach("reproduce:check_policy")(valid, request)
@@ -197,8 +188,8 @@ def reproduce(
 
 def _replayed(valid: Any, challenge: str, fraction: float, workers: int, reference: Any) -> Any:
     """The replayed sample, with a bar while it is made."""
-    from robospa.harness.cli.running import cores
     from robospa.harness.running.progress import Progress
+    from robospa.harness.running.staffing import cores
 
     count = _reach("sampling:sample_size")(fraction, len(valid.keys))
     with Progress(count) as progress:

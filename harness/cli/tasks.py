@@ -214,8 +214,9 @@ def _draw(console: Console, scene: Scene, camera: str, size: tuple[int, int], pa
 def _gallery(console: Console, name: str | None, seed: int, split: str, path: Path) -> None:
     from rich.progress import track
 
-    from robospa.harness.cli.selection import BadChoice, parse_tasks
     from robospa.harness.pictures import gallery
+    from robospa.harness.selection import parse_tasks
+    from robospa.harness.settings import SettingsError
     from robospa.harness.sim.sapien_world import SapienWorld
     from robospa.harness.world import RenderUnavailable, SceneUnstable
     from robospa.tasks.catalog import tasks as all_tasks
@@ -223,7 +224,7 @@ def _gallery(console: Console, name: str | None, seed: int, split: str, path: Pa
 
     try:
         chosen = [_find(each) for each in (parse_tasks(name) if name else all_tasks())]
-    except BadChoice as error:
+    except SettingsError as error:
         raise typer.BadParameter(str(error)) from None
     world = SapienWorld()
     try:

@@ -21,8 +21,10 @@ from robospa.harness.running.progress import Progress, summary
 from robospa.harness.running.ray_bridge import RaySettings
 from robospa.harness.running.ray_executor import far_away, joined
 from robospa.harness.running.runner import RunAborted, Runner, RunOptions
-from robospa.harness.running.store import drop_parts, tidy
+from robospa.harness.running.store import drop_parts, replace_file, tidy
 from robospa.harness.running.worker import WorkerConfig, describe
+from robospa.harness.settings import EvaluationSettings
+from robospa.harness.settings_file import FILE, to_toml
 from robospa.results.records.run_io import finished, read_records
 from robospa.trial import TrialKey
 
@@ -33,14 +35,15 @@ PROBE_SECONDS = 120.0
 class Request:
     """What to evaluate: `keys` with the policy and world of `config`, as `options` say.
 
-    `settings` decide the result beside the policy's spec; `arguments` are only kept. `wait`: how
-    long the policy's server may take to come up at the start [s].
+    `settings` are what all of this was made from, saved with the run to be used again;
+    `arguments` are only kept in the manifest. `wait`: how long the policy's server may take to come
+    up at the start [s].
     """
 
     config: WorkerConfig
     keys: Sequence[TrialKey]
     options: RunOptions = field(default_factory=RunOptions)
-    settings: Mapping[str, Any] = field(default_factory=dict)
+    settings: EvaluationSettings | None = None
     arguments: Mapping[str, Any] = field(default_factory=dict)
     resume: bool = False
     wait: float = 0.0
@@ -106,7 +109,7 @@ def make_manifest(request: Request, policies: Mapping[str, Probed]) -> Manifest:
     found = {task: parts(key) for task, key in first.items()}
     one = next(iter(policies.values()))
     settings = {
-        **request.settings,
+        **_shared(request.keys),
         "policy": one.settings(),
         "privileged": any(spec.privileged for spec in specs),
         "run_seed": config.run_seed,
@@ -123,6 +126,15 @@ def make_manifest(request: Request, policies: Mapping[str, Probed]) -> Manifest:
     about["warnings"] = warnings_of(policies, told, config.step_scale)
     categories = {task: part.task.category for task, part in found.items()}
     return Manifest(settings, tuple(request.keys), about, categories)
+
+
+def _shared(keys: Sequence[TrialKey]) -> dict[str, list[str]]:
+    """What trials have in common; they are compared one by one as well."""
+    return {
+        "embodiment": sorted({key.embodiment for key in keys}),
+        "mode": sorted({key.mode for key in keys}),
+        "split": sorted({key.split for key in keys}),
+    }
 
 
 def _renders(config: WorkerConfig, policies: Mapping[str, Probed]) -> bool:
@@ -162,6 +174,8 @@ def evaluate(request: Request) -> None:
     with joined(request.ray, config, _renders(config, policies)) as executor, locked(folder):
         tidy(folder)
         open_run(folder, manifest, request.resume)
+        if request.settings is not None:
+            replace_file(folder / FILE, to_toml(request.settings).encode())
         known = read_records(folder)
         owed = [key for key in request.keys if not finished(known.get(key))]
         with Progress(len(request.keys), len(request.keys) - len(owed)) as progress:

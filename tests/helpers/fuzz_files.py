@@ -31,11 +31,12 @@ from typing import Any
 import bundle_fakes as fakes
 import numpy as np
 
-from robospa.harness.cli.running import client_options
-from robospa.harness.cli.selection import BadChoice, parse_seeds
 from robospa.harness.running.manifest import changed_settings, seed_hash
 from robospa.harness.running.policies import read_map
+from robospa.harness.running.request import client_options
 from robospa.harness.running.store import read_actions, write_actions
+from robospa.harness.selection import parse_seeds
+from robospa.harness.settings import SettingsError
 from robospa.leaderboard import bundle as layout
 from robospa.leaderboard.action_traces import decode, encode
 from robospa.leaderboard.archive import Archive
@@ -57,7 +58,7 @@ from robospa.trial import TrialKey
 
 ROOM = 512 * 2**20
 SLOW = 10
-ALLOWED = (RunError, BundleError, BadChoice)
+ALLOWED = (RunError, BundleError, SettingsError)
 DOCUMENTED: dict[str, tuple[type[Exception], ...]] = {"line": (ValueError,)}
 TOKENS: list[Any] = [None, True, False, 0, -1, 1, 2**31, 2**63, 10**400, 0.5, -0.0, 1e308]
 TOKENS += ["", "x", "../../x", "a/b", "\x00", "\ud800", "é", "A" * 5000, [], {}, [[]], [1, "a"]]

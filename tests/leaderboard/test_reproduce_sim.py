@@ -12,8 +12,9 @@ import pytest
 from bundle_fakes import CARD
 from shadow import HORIZON, Shadow
 
-from robospa.harness.cli.running import make_request
-from robospa.harness.running.evaluate import evaluate
+from robospa.harness.running.evaluate import Request, evaluate
+from robospa.harness.running.request import make_request
+from robospa.harness.settings import EvaluationSettings, updated
 from robospa.leaderboard.hidden_seeds import draw_block, read_block, write_block
 from robospa.leaderboard.packing import pack
 from robospa.leaderboard.reference import shipped
@@ -25,13 +26,18 @@ from robospa.trial import TrialKey
 
 pytestmark = pytest.mark.sim
 TASK, LEVEL, TRIALS = "Pick_Blocks_Size", 1, 5
-LIMITS = {"timeout": 60.0, "first_timeout": 60.0, "wait": 0.0, "patience": 5.0}
+LIMITS = {"timeout": 60.0, "first_timeout": 60.0, "patience": 5.0}
+
+
+def request(url: str, keys: list[TrialKey], out: Path) -> Request:
+    settings = updated(EvaluationSettings(), {"policy": url, "out": out, "workers": 1, **LIMITS})
+    return make_request(settings, keys=keys)
 
 
 def run(folder: Path, keys: list[TrialKey], clumsy: bool) -> Run:
     """The run of the shadow, served over the wire."""
     with ServerThread(policy_factory=lambda: Shadow(clumsy)) as server:
-        evaluate(make_request(server.url, keys, folder, connection=LIMITS, workers=1))
+        evaluate(request(server.url, keys, folder))
     return read_run(folder)
 
 
@@ -50,8 +56,7 @@ def test_a_claim_is_reproduced_and_an_inflated_one_is_caught(tmp_path: Path) -> 
     keys = hidden_keys(valid, block, reference)
 
     with ServerThread(policy_factory=Shadow) as server:
-        request = make_request(server.url, keys, tmp_path / "x", connection=LIMITS)
-        check_policy(valid, request)
+        check_policy(valid, request(server.url, keys, tmp_path / "x"))
     honest = compare(valid, run(tmp_path / "honest", keys, False), keys, block)
     assert honest.holds
     assert honest.overall.fresh == TRIALS

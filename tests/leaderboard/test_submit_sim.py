@@ -19,16 +19,15 @@ pytestmark = pytest.mark.sim
 
 
 def test_a_real_run_replays_to_the_bit(tmp_path: Path) -> None:
-    from robospa.harness.cli.running import make_request
     from robospa.harness.running.evaluate import evaluate
+    from robospa.harness.running.request import make_request
+    from robospa.harness.settings import EvaluationSettings, updated
     from robospa.tasks.seeds import accepted
 
     seeds = accepted("Pick_Blocks_Size", 1)[:2]
     keys = [TrialKey("Pick_Blocks_Size", 1, seed) for seed in seeds]
-    request = make_request(
-        "hold", keys, tmp_path / "run", connection={"wait": 0.0, "patience": 0.0}, workers=1
-    )
-    evaluate(request)
+    asked = {"policy": "hold", "out": tmp_path / "run", "workers": 1}
+    evaluate(make_request(updated(EvaluationSettings(), asked), keys=keys))
     card = deepcopy(CARD)
     spec = json.loads((tmp_path / "run" / "run.json").read_text())
     card["actions"]["chunk"] = spec["settings"]["policy"]["spec"]["horizon"]

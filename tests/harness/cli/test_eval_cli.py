@@ -206,8 +206,9 @@ def test_a_torn_line_is_owed_again(tmp_path: Path) -> None:
         (["run_fakes:FakePolicy", "--tasks", "Pick_Block_Size"], "did you mean Pick_Blocks_Size"),
         (["run_fakes:FakePolicy", "--seeds", "nowhere.json"], "neither a file nor a list"),
         (["run_fakes:FakePolicy", "--trials", "9"], "has 4 seeds, not 9"),
+        (["run_fakes:FakePolicy", "--config", "no.toml"], "no.toml: it cannot be read"),
         (["run_fakes:FakePolicy", "--video", "some"], "none of none, failures, first, all"),
-        (["run_fakes:FakePolicy", "--split", "test"], "heldout and train"),
+        (["run_fakes:FakePolicy", "--split", "test"], "none of heldout, train"),
         (["run_fakes:FakePolicy", "--world", "run_fakes:Broken"], "robospa doctor"),
         (["run_fakes:FakePolicy", "--embodiment", "nobot"], "drives only-me, not nobot"),
     ],
@@ -225,6 +226,49 @@ def test_every_refusal_is_one_sentence_and_writes_nothing(
     assert sentence in err
     assert len(err.strip().splitlines()) == 1
     assert not out.exists()
+
+
+def test_a_run_is_repeated_from_the_settings_that_it_keeps(tmp_path: Path) -> None:
+    first, again = tmp_path / "first", tmp_path / "again"
+    code, _, err = run([*command("run_fakes:FakePolicy", first, trials=2), "--token", "secret"])
+    assert code == 0, err
+    kept = first / "settings.toml"
+    assert "secret" not in kept.read_text()
+    words = [*ROBOSPA, "eval", "--config", str(kept)]
+    code, _, err = run(words)
+    assert code == 1 and "already holds a run" in err
+    assert run([*words, "--resume"])[0] == 0
+    code, _, err = run([*words, "--out", str(again), "--workers", "1"])
+    assert code == 0, err
+    before, after = read_run(first), read_run(again)
+    assert before.keys == after.keys
+    assert {key: record.digest for key, record in before.records.items()} == {
+        key: record.digest for key, record in after.records.items()
+    }
+    assert (
+        before.manifest["about"]["arguments"] | {"out": str(again), "workers": 1}
+        == (after.manifest["about"]["arguments"])
+    )
+
+
+def test_flags_win_over_the_file(tmp_path: Path) -> None:
+    path = tmp_path / "run.toml"
+    path.write_text(
+        'policy = "nobody"\n[selection]\ntasks = "Pick_Blocks_Size"\nlevels = [3]\ntrials = 1\n'
+    )
+    words = command("run_fakes:FakePolicy", tmp_path / "run", "--config", str(path), trials=2)
+    code, _, err = run(words)
+    assert code == 0, err
+    assert sorted((r.key.level, r.key.seed) for r in lines(tmp_path / "run")) == [
+        (1, 100000), (1, 100001), (2, 100000), (2, 100001)
+    ]  # fmt: skip
+
+
+def test_a_policy_on_the_command_line_takes_the_place_of_a_map_in_the_file(tmp_path: Path) -> None:
+    path = tmp_path / "run.toml"
+    path.write_text('policy_map = "nowhere.json"\n')
+    words = command("run_fakes:FakePolicy", tmp_path / "run", "--config", str(path), trials=1)
+    assert run(words)[0] == 0
 
 
 def test_seeds_from_a_file(tmp_path: Path) -> None:

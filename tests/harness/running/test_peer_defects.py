@@ -19,12 +19,13 @@ from numpy.typing import NDArray
 from run_fakes import SPEC, FakePolicy, FakeWorld, parts
 
 from robospa.clients import connect
-from robospa.harness.cli.running import make_request
 from robospa.harness.running import manifest
 from robospa.harness.running.evaluate import Request, evaluate
+from robospa.harness.running.request import make_request
 from robospa.harness.running.runner import RunOptions
 from robospa.harness.running.store import RecordWriter, action_path, read_actions
 from robospa.harness.running.worker import Worker, WorkerConfig
+from robospa.harness.settings import EvaluationSettings, updated
 from robospa.harness.trial import run_trial
 from robospa.protocol.errors import ServerError, TransportError
 from robospa.protocol.policy import TrialInfo
@@ -173,13 +174,12 @@ def test_4_a_slow_first_call_costs_an_episode(tmp_path: Path) -> None:
 )
 def test_5_a_resume_mixes_configurations(tmp_path: Path, changed: dict[str, Any]) -> None:
     """There: no warning, and the sum states the first configuration for all episodes."""
-    times = {"timeout": 1.0, "first_timeout": 1.0, "wait": 0.0, "patience": 1.0}
 
     def settings(**change: Any) -> manifest.Manifest:
-        asked = make_request("hold", keys(4), tmp_path, connection=times, **change)
+        chosen = updated(EvaluationSettings(), {"policy": "hold", "out": tmp_path, **change})
+        asked = make_request(chosen, keys=keys(4))
         config = asked.config
         found = {
-            **asked.settings,
             "run_seed": config.run_seed,
             "step_scale": config.step_scale,
             "world": config.world_arguments,

@@ -1,4 +1,4 @@
-"""What the user means by `--tasks`, `--levels` and `--seeds`."""
+"""The trials of an evaluation: what `tasks`, `levels` and `seeds` of its settings name."""
 
 from __future__ import annotations
 
@@ -6,16 +6,12 @@ import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from robospa.harness.settings import Selection, SettingsError
 from robospa.results.records.schema import MOST, parse
 from robospa.results.scoring.scores import BASIC, CATEGORIES, DIMENSIONS
 from robospa.trial import TrialKey
 
-SPLITS = ("heldout", "train")
 GROUPS = {"all": CATEGORIES, **DIMENSIONS, "basic": BASIC}
-
-
-class BadChoice(Exception):
-    """The user asked for something that does not exist."""
 
 
 def parse_tasks(text: str) -> list[str]:
@@ -35,30 +31,30 @@ def parse_tasks(text: str) -> list[str]:
             try:
                 chosen.append(task(word).name)
             except KeyError as error:
-                raise BadChoice(str(error.args[0])) from error
+                raise SettingsError(str(error.args[0])) from error
     if not chosen:
-        raise BadChoice(f"--tasks {text!r} names no task; see `robospa tasks`")
+        raise SettingsError(f"tasks {text!r} names no task; see `robospa tasks`")
     return list(dict.fromkeys(chosen))
 
 
 def parse_numbers(text: str, what: str) -> list[int]:
-    """The numbers of a list like `1,3-5`, in order, each once; raises BadChoice."""
+    """The numbers of a list like `1,3-5`, in order, each once; raises SettingsError."""
     numbers: list[int] = []
     for word in (w.strip() for w in text.split(",")):
         found = re.fullmatch(r"(\d+)(?:-(\d+))?", word)
         first, last = (int(found[1]), int(found[2] or found[1])) if found else (1, 0)
         if last < first or last - first > 1_000_000:
-            raise BadChoice(f"{word!r} in {what} is neither a number nor a range such as 3-5")
+            raise SettingsError(f"{word!r} in {what} is neither a number nor a range such as 3-5")
         numbers += range(first, last + 1)
     return list(dict.fromkeys(numbers))
 
 
 def parse_levels(text: str) -> list[int]:
-    """Levels of a list like `1,3-5`; raises BadChoice beyond 1 to 5."""
-    levels = parse_numbers(text, "--levels")
+    """Levels of a list like `1,3-5`; raises SettingsError beyond 1 to 5."""
+    levels = parse_numbers(text, "levels")
     wrong = [n for n in levels if n not in range(1, 6)]
     if wrong:
-        raise BadChoice(f"there is no level {wrong[0]}; levels are 1 to 5")
+        raise SettingsError(f"there is no level {wrong[0]}; levels are 1 to 5")
     return levels
 
 
@@ -75,19 +71,21 @@ def parse_seeds(text: str | None) -> Seeds:
         return _shipped
     if not Path(text).exists():
         if not re.fullmatch(r"[\d,\s-]+", text):
-            raise BadChoice(f"--seeds {text!r} is neither a file nor a list such as 100000-100099")
-        numbers = parse_numbers(text, "--seeds")
+            raise SettingsError(
+                f"seeds {text!r} is neither a file nor a list such as 100000-100099"
+            )
+        numbers = parse_numbers(text, "seeds")
         return lambda task, level: numbers
     try:
         data = parse(Path(text).read_text())
     except (OSError, ValueError) as error:
-        raise BadChoice(f"cannot read the seeds in {text}: {error}") from error
+        raise SettingsError(f"cannot read the seeds in {text}: {error}") from error
 
     def look_up(task: str, level: int) -> Sequence[int]:
         levels = data.get(task) if isinstance(data, dict) else {str(level): data}
         found = levels.get(str(level)) if isinstance(levels, dict) else None
         if not isinstance(found, list) or not all(type(n) is int and 0 <= n <= MOST for n in found):
-            raise BadChoice(f"{text} has no list of seeds for {task} level {level}")
+            raise SettingsError(f"{text} has no list of seeds for {task} level {level}")
         return found
 
     return look_up
@@ -99,35 +97,32 @@ def _shipped(task: str, level: int) -> Sequence[int]:
     try:
         found: Sequence[int] = accepted(task, level)
     except LookupError as error:
-        raise BadChoice(
-            f"no accepted seeds of {task} level {level} are shipped; name some with --seeds"
+        raise SettingsError(
+            f"no accepted seeds of {task} level {level} are shipped; name some with seeds"
         ) from error
     return found
 
 
-def list_trials(
-    tasks: Sequence[str],
-    levels: Sequence[int],
-    trials: int,
-    seeds: Seeds,
-    *,
-    embodiment: str,
-    mode: str,
-    split: str,
-) -> list[TrialKey]:
-    """The first `trials` seeds of every variant; raises BadChoice if a variant has fewer."""
-    if split not in SPLITS:
-        raise BadChoice(f"{split!r} is no instruction split; there are {' and '.join(SPLITS)}")
-    if trials < 1:
-        raise BadChoice("--trials must be at least 1")
-    keys = []
-    for task in tasks:
-        for level in levels:
-            found = list(dict.fromkeys(seeds(task, level)))
-            if len(found) < trials:
-                raise BadChoice(
-                    f"{task} level {level} has {len(found)} seeds, not {trials}; "
-                    "lower --trials or name more with --seeds"
-                )
-            keys += [TrialKey(task, level, s, embodiment, mode, split) for s in found[:trials]]
-    return keys
+def list_trials(selection: Selection) -> list[TrialKey]:
+    """The trials that `selection` names: every variant with the first of its seeds.
+
+    Raises SettingsError if a name is unknown or a variant has fewer seeds than asked for.
+    """
+    seeds = parse_seeds(selection.seeds)
+    return [
+        TrialKey(task, level, seed, selection.embodiment, selection.mode, selection.split)
+        for task in parse_tasks(selection.tasks)
+        for level in parse_levels(selection.levels)
+        for seed in first_seeds(seeds, task, level, selection.trials)
+    ]
+
+
+def first_seeds(seeds: Seeds, task: str, level: int, count: int) -> Sequence[int]:
+    """The first `count` different seeds of a variant; raises SettingsError if it has fewer."""
+    found = list(dict.fromkeys(seeds(task, level)))
+    if len(found) < count:
+        raise SettingsError(
+            f"{task} level {level} has {len(found)} seeds, not {count}; "
+            "choose fewer trials or name more seeds"
+        )
+    return found[:count]

@@ -7,14 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from robospa.harness.cli.selection import (
-    BadChoice,
+from robospa.harness.selection import (
     list_trials,
     parse_levels,
     parse_numbers,
     parse_seeds,
     parse_tasks,
 )
+from robospa.harness.settings import Selection, SettingsError
 from robospa.tasks import catalog
 from robospa.tasks.task import Task
 
@@ -47,7 +47,7 @@ def test_basic_grounding_is_no_part_of_all(monkeypatch: pytest.MonkeyPatch) -> N
 
 @pytest.mark.parametrize("text", ["", "Pick_Nothing_At_All", "XYZ"])
 def test_unknown_tasks_are_refused(text: str) -> None:
-    with pytest.raises(BadChoice):
+    with pytest.raises(SettingsError):
         parse_tasks(text)
 
 
@@ -57,31 +57,32 @@ def test_levels() -> None:
 
 @pytest.mark.parametrize("text", ["0", "6", "", "2-1", "1-", "-1", "a", "1,,2", "1-99999999"])
 def test_levels_that_do_not_exist_are_refused(text: str) -> None:
-    with pytest.raises(BadChoice):
+    with pytest.raises(SettingsError):
         parse_levels(text)
 
 
 def test_numbers_keep_their_order_and_lose_repetitions() -> None:
-    assert parse_numbers("5,3-4,5", "--seeds") == [5, 3, 4]
+    assert parse_numbers("5,3-4,5", "seeds") == [5, 3, 4]
 
 
 @pytest.mark.parametrize("text", ["{", '{"A": {"1": [1.5]}}', '{"A": {"1": [-1]}}', "{}"])
 def test_bad_seed_files_are_named(tmp_path: Path, text: str) -> None:
     path = tmp_path / "seeds.json"
     path.write_text(text)
-    with pytest.raises(BadChoice, match=r"seeds\.json"):
+    with pytest.raises(SettingsError, match=r"seeds\.json"):
         parse_seeds(str(path))("A", 1)
 
 
 def test_the_first_seeds_of_every_variant() -> None:
-    keys = list_trials(
-        ["A", "B"],
-        [1, 2],
-        2,
-        lambda task, level: [7, 8, 9],
-        embodiment="e",
-        mode="m",
-        split="train",
-    )
-    assert [(k.task, k.level, k.seed) for k in keys][:3] == [("A", 1, 7), ("A", 1, 8), ("A", 2, 7)]
+    tasks = "Pick_Blocks_Size,Press_Stapler_Repeat"
+    keys = list_trials(Selection(tasks, "1,2", 2, "7-9", "train", "e", "m"))
+    assert [(k.task, k.level, k.seed) for k in keys][:3] == [
+        ("Pick_Blocks_Size", 1, 7), ("Pick_Blocks_Size", 1, 8), ("Pick_Blocks_Size", 2, 7)
+    ]  # fmt: skip
     assert len(keys) == 8
+    assert {(k.embodiment, k.mode, k.split) for k in keys} == {("e", "m", "train")}
+
+
+def test_a_variant_with_too_few_seeds_is_named() -> None:
+    with pytest.raises(SettingsError, match="Pick_Blocks_Size level 1 has 3 seeds, not 4"):
+        list_trials(Selection("Pick_Blocks_Size", "1", 4, "7-9,7"))

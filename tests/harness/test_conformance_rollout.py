@@ -13,15 +13,16 @@ from run_fakes import SPEC, FakePolicy, FakeWorld, NanPolicy, parts
 
 from robospa.harness import doctor
 from robospa.harness.cli.main import main
-from robospa.harness.real_trials import Tried, real_trials, trial_for
+from robospa.harness.conformance_rollout import rollouts, trial_for
 from robospa.protocol.client import connect
+from robospa.protocol.conformance import CheckResult
 from robospa.protocol.policy import PolicySpec
 from robospa.protocol.server import ServerThread
 
 
-def tried(make: Callable[[], Any], world: Any = FakeWorld) -> list[Tried]:
+def results(make: Callable[[], Any], world: Any = FakeWorld) -> list[CheckResult]:
     with ServerThread(policy_factory=make) as server:
-        return list(real_trials(lambda: connect(server.url), 2, make_world=world, parts=parts))
+        return list(rollouts(lambda: connect(server.url), 2, make_world=world, parts=parts))
 
 
 class Moody(FakePolicy):
@@ -33,33 +34,33 @@ class Moody(FakePolicy):
         return super().infer(observation) + 0.1 * next(self.count)
 
 
-def test_a_right_policy_does_the_same_twice() -> None:
-    first, second = tried(FakePolicy)
+def test_a_correct_policy_gives_the_same_result_twice() -> None:
+    first, second = results(FakePolicy)
     assert (first.passed, second.passed) == (True, True)
     assert "success after" in first.detail and "equal to the first to the bit" in second.detail
 
 
 def test_a_broken_promise_of_seeds_fails() -> None:
-    found = tried(lambda: Moody(replace(SPEC, seeded=True)))
+    found = results(lambda: Moody(replace(SPEC, seeded=True)))
     assert [row.passed for row in found] == [True, False]
     assert "though seeds are honoured" in found[1].detail
 
 
-def test_without_a_promise_it_is_only_told() -> None:
-    assert "seeds are not honoured" in tried(Moody)[1].detail
+def test_without_a_promise_it_is_only_reported() -> None:
+    assert "seeds are not honoured" in results(Moody)[1].detail
 
 
 def test_a_policy_error_fails_and_ends_it() -> None:
-    (row,) = tried(NanPolicy)
+    (row,) = results(NanPolicy)
     assert row.passed is False and "nan" in row.detail
 
 
-def test_a_server_that_fails_is_told() -> None:
+def test_a_server_that_fails_is_reported() -> None:
     class Fails(FakePolicy):
         def infer(self, observation: Any) -> Any:
             raise RuntimeError("out of memory")
 
-    (row,) = tried(Fails)
+    (row,) = results(Fails)
     assert row.passed is False and "out of memory" in row.detail
 
 
@@ -70,8 +71,8 @@ def test_a_machine_that_cannot_simulate_is_not_the_servers_fault() -> None:
     def broken() -> Any:
         raise RuntimeError("no device")
 
-    assert [row.passed for row in tried(FakePolicy, missing)] == [None]
-    (row,) = tried(FakePolicy, lambda: Unhappy())
+    assert [row.passed for row in results(FakePolicy, missing)] == [None]
+    (row,) = results(FakePolicy, lambda: Unhappy())
     assert row.passed is None and "robospa doctor" in row.detail
 
 
@@ -85,9 +86,10 @@ def test_the_trial_fits_the_robot_of_the_policy() -> None:
     assert trial_for(PolicySpec("p", embodiments=("franka-panda",))).embodiment == "franka-panda"
 
 
-def rows(*verdicts: bool | None) -> Callable[..., Iterator[Tried]]:
+def rows(*verdicts: bool | None) -> Callable[..., Iterator[CheckResult]]:
     return lambda opened, count: (
-        Tried(f"real trial {n}", passed, "seen") for n, passed in enumerate(verdicts[:count], 1)
+        CheckResult(f"real trial {n}", passed, "seen")
+        for n, passed in enumerate(verdicts[:count], 1)
     )
 
 
@@ -100,7 +102,7 @@ def test_the_command_counts_them(
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("robospa.harness.real_trials.real_trials", rows(*verdicts))
+    monkeypatch.setattr("robospa.harness.conformance_rollout.rollouts", rows(*verdicts))
     with ServerThread(policy_factory=FakePolicy) as server, pytest.raises(SystemExit) as end:
         main(["check", server.url])
     assert (end.value.code or 0) == code
@@ -110,7 +112,7 @@ def test_the_command_counts_them(
 @pytest.mark.parametrize(
     ("machine", "bad", "code"), [(True, False, 0), (False, False, 1), (True, True, 1)]
 )
-def test_the_doctor_looks_at_the_policy_too(
+def test_the_doctor_checks_the_policy_too(
     machine: bool,
     bad: bool,
     code: int,
@@ -119,7 +121,7 @@ def test_the_doctor_looks_at_the_policy_too(
 ) -> None:
     found = [doctor.Check("simulator", machine, "seen", "" if machine else "install it")]
     monkeypatch.setattr(doctor, "run_checks", lambda: iter(found))
-    monkeypatch.setattr("robospa.harness.real_trials.real_trials", rows(True, True))
+    monkeypatch.setattr("robospa.harness.conformance_rollout.rollouts", rows(True, True))
     make = NanPolicy if bad else FakePolicy
     with ServerThread(policy_factory=make) as server, pytest.raises(SystemExit) as end:
         main(["doctor", "--policy", server.url])
@@ -135,6 +137,6 @@ def test_a_real_world_and_a_policy_that_holds_still(monkeypatch: pytest.MonkeyPa
             return np.tile(observation["state"], (50, 1))
 
     with ServerThread(policy_factory=lambda: Still(replace(SPEC, horizon=50))) as server:
-        found = list(real_trials(lambda: connect(server.url), 2))
+        found = list(rollouts(lambda: connect(server.url), 2))
     assert [row.passed for row in found] == [True, True]
     assert "step_limit" in found[0].detail and "to the bit" in found[1].detail

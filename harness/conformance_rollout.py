@@ -1,0 +1,95 @@
+"""The last part of `robospa check`: a real trial in the simulator, run twice.
+
+The checks before it use synthetic observations: noise for images, random postures. Here the policy
+sees a scene and its actions move a robot. If the server promises to honour seeds, a second run of
+the trial with the same policy seed must end in the same state, to the bit. Success is not required.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import closing
+
+from robospa.harness.trial import TrialParts, policy_seed, run_trial, task_parts
+from robospa.harness.world import World
+from robospa.protocol.client import RemotePolicy
+from robospa.protocol.conformance import CheckResult
+from robospa.protocol.errors import WireError
+from robospa.protocol.policy import PolicySpec
+from robospa.results.records.trial_record import TrialRecord
+from robospa.tasks.seeds import accepted
+from robospa.trial import TrialKey
+
+TASK, LEVEL = "Pick_Blocks_Size", 1
+ROBOT = "aloha-agilex"
+NO_SIMULATOR = "not run: there is no simulator here (pip install 'robospa[sim]'); robospa doctor"
+
+
+def trial_for(spec: PolicySpec) -> TrialKey:
+    """A real trial that a policy with this `spec` can be asked to do."""
+    robot = ROBOT if not spec.embodiments or ROBOT in spec.embodiments else spec.embodiments[0]
+    return TrialKey(TASK, LEVEL, accepted(TASK, LEVEL)[0], robot)
+
+
+def rollouts(
+    connect: Callable[[], RemotePolicy],
+    count: int,
+    *,
+    make_world: Callable[[], World] | None = None,
+    parts: Callable[[TrialKey], TrialParts] = task_parts,
+) -> Iterator[CheckResult]:
+    """Run the same trial `count` times, each on a connection of its own; a result for each.
+
+    Raises nothing of the server's or the simulator's making, and stops at the first failure.
+    """
+    records: list[TrialRecord] = []
+    for number in range(1, count + 1):
+        name = f"real trial {number}"
+        try:
+            world = (make_world or _sapien_world)()
+        except ImportError:
+            yield CheckResult(name, None, NO_SIMULATOR)
+            return
+        try:
+            with closing(world), connect() as policy:
+                spec, key = policy.spec, trial_for(policy.spec)
+                record = run_trial(world, policy, key, policy_seed=policy_seed(key), parts=parts)
+        except WireError as error:
+            yield CheckResult(name, False, str(error))
+            return
+        except Exception as error:  # the machine's, not the server's
+            reason = f"{type(error).__name__}: {error}"
+            yield CheckResult(name, None, f"could not be run here ({reason}); see robospa doctor")
+            return
+        records.append(record)
+        yield _result(name, records, spec)
+        if record.end == "policy_error":
+            return
+
+
+def _sapien_world() -> World:
+    from robospa.harness.sim.sapien_world import SapienWorld
+
+    return SapienWorld()
+
+
+def _result(name: str, records: list[TrialRecord], spec: PolicySpec) -> CheckResult:
+    """The check of the last record: that it ended, and as the first one did."""
+    first, last = records[0], records[-1]
+    if last.end == "policy_error":
+        return CheckResult(name, False, last.message)
+    median = last.latency.get("p50")
+    calls = f"{last.policy_calls} policy calls" + (f" of {median:.0f} ms" if median else "")
+    text = (
+        f"{last.key.task} level {last.key.level} seed {last.key.seed}: {last.end} after "
+        f"{last.steps} actions, {calls}, {last.wall_time:.1f} s"
+    )
+    if len(records) == 1:
+        return CheckResult(name, True, text)
+    if (last.digest, last.actions_digest) == (first.digest, first.actions_digest):
+        return CheckResult(name, True, f"{text}; equal to the first to the bit")
+    if spec.seeded:
+        return CheckResult(
+            name, False, f"{text}; it differs from the first, though seeds are honoured"
+        )
+    return CheckResult(name, True, f"{text}; it differs from the first: seeds are not honoured")

@@ -1,0 +1,185 @@
+"""From settings to what the driver runs: trials, workers and how their policies are reached."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from robospa.harness.factory import is_url
+from robospa.harness.running.evaluate import Request
+from robospa.harness.running.policies import read_map
+from robospa.harness.running.runner import RunOptions
+from robospa.harness.running.staffing import cores, most_workers
+from robospa.harness.running.worker import TASK_PARTS, Targets, WorkerConfig
+from robospa.harness.selection import list_trials
+from robospa.harness.settings import (
+    Compute,
+    Connection,
+    EvaluationSettings,
+    SettingsError,
+    Simulation,
+    flat,
+)
+from robospa.trial import TrialKey
+
+if TYPE_CHECKING:
+    from robospa.harness.running.ray_bridge import RaySettings
+
+RUNS = Path("runs")
+"""Where runs go that are not told where."""
+
+
+def make_request(
+    settings: EvaluationSettings,
+    *,
+    token: str | None = None,
+    resume: bool = False,
+    keys: Sequence[TrialKey] | None = None,
+    arguments: Mapping[str, Any] | None = None,
+) -> Request:
+    """What the driver runs for `settings`.
+
+    `token` is the bearer token of the policy's servers. `keys` are other trials than those that
+    the settings select; `arguments` then say in the manifest where they come from.
+    Raises SettingsError, and RunError for a policy map that does not fit.
+    """
+    if settings.recording.video != "none":
+        import av  # noqa: F401  (fails now rather than after the first trial)
+    trials = list_trials(settings.selection) if keys is None else keys
+    servers = check_servers(settings)
+    policies = _policy_map(settings.policy_map, trials)
+    found = [*servers, *(t for ts in policies.values() for t in _each(ts))]
+    folder = run_folder(settings, resume)
+    config = WorkerConfig(
+        folder=folder,
+        policy=servers or str(settings.policy_map),
+        options=connect_arguments(found, settings.connection, token),
+        run_seed=settings.simulation.run_seed,
+        policies=policies,
+        step_scale=settings.simulation.step_scale,
+        video=settings.recording.video,
+        parts=settings.simulation.parts or TASK_PARTS,
+        **_world(settings.simulation),
+    )
+    return Request(
+        config,
+        trials,
+        _run_options(settings),
+        replace(settings, out=folder) if keys is None else None,
+        arguments=flat(settings) if arguments is None else arguments,
+        resume=resume,
+        wait=settings.connection.wait,
+        ray=_on_ray(settings.compute),
+    )
+
+
+def check_servers(settings: EvaluationSettings) -> tuple[str, ...]:
+    """The policy's servers, or its name; empty if there is a policy map.
+
+    Raises SettingsError unless there is either one policy or a map of policies.
+    """
+    servers = settings.policy
+    if bool(servers) == (settings.policy_map is not None):
+        raise SettingsError("give either the policy or --policy-map")
+    if twice := next((s for s in servers if servers.count(s) > 1), None):
+        raise SettingsError(f"{twice} is named twice; several workers share a server without that")
+    if len(servers) > 1 and (name := next((s for s in servers if not is_url(s)), None)):
+        raise SettingsError(f"{name!r} is no URL of a server: it cannot be one of several")
+    return servers
+
+
+def run_folder(settings: EvaluationSettings, resume: bool = False) -> Path:
+    """Where the run goes; by default a new folder under RUNS, named after the policy."""
+    if settings.out is not None:
+        return settings.out
+    if resume:
+        raise SettingsError("to resume a run, say with out which one")
+    first = settings.policy[0] if settings.policy else (settings.policy_map or Path()).stem
+    name = first.rpartition("/")[2] if is_url(first) else first
+    safe = "".join(c if c.isalnum() else "-" for c in name)
+    return RUNS / f"{safe}-{time.strftime('%Y%m%d-%H%M%S')}"
+
+
+def connect_arguments(
+    targets: Sequence[str], connection: Connection, token: str | None
+) -> dict[str, Any]:
+    """Keyword arguments of `robospa.clients.connect` for `targets`; empty without a server.
+
+    Raises SettingsError if a server's dialect does not have the options that it is given.
+    """
+    urls = [target for target in dict.fromkeys(targets) if is_url(target)]
+    if not urls:
+        return {}
+    from robospa.protocol.transport import Timeouts
+
+    timeouts = Timeouts(
+        infer=connection.timeout,
+        first_infer=connection.first_timeout,
+        reset=connection.first_timeout,
+        wait=connection.patience,
+    )
+    options = [client_options(url, connection.client) for url in urls]
+    return {"timeouts": timeouts, "token": token, "options": options[0]}
+
+
+def client_options(url: str, file: Path | None) -> dict[str, Any]:
+    """The options of the JSON `file`, checked with those of the URL; raises SettingsError."""
+    from robospa.clients import check_options
+    from robospa.results.records.schema import parse
+
+    try:
+        given = parse(file.read_text()) if file is not None else {}
+        if not isinstance(given, dict):
+            raise ValueError("it is no JSON map")
+        check_options(url, given)
+    except (OSError, ValueError) as error:
+        where = f"--client {file}: " if file is not None else ""
+        raise SettingsError(f"{where}{str(error)[:300]}") from error
+    return given
+
+
+def _policy_map(file: Path | None, keys: Sequence[TrialKey]) -> dict[str, Targets]:
+    """The policy, or the policies, of every task of `keys`; raises RunError."""
+    if file is None:
+        return {}
+    from robospa.tasks.catalog import tasks
+
+    return read_map(file, list(dict.fromkeys(key.task for key in keys)), tasks())
+
+
+def _each(targets: Targets) -> tuple[str, ...]:
+    return (targets,) if isinstance(targets, str) else targets
+
+
+def _world(simulation: Simulation) -> dict[str, Any]:
+    """Which world, as arguments of WorkerConfig."""
+    if simulation.world is not None:
+        return {"world": simulation.world, "world_arguments": {}}
+    return {"world_arguments": {"render": None, "control": simulation.control}}
+
+
+def _run_options(settings: EvaluationSettings) -> RunOptions:
+    retries, workers = settings.retries, settings.compute.workers
+    return RunOptions(
+        workers or cores(),
+        retries.attempts,
+        retries.backoff,
+        retries.trial_timeout,
+        stuck_seconds=retries.stuck_timeout,
+        most=workers or most_workers(),
+        patience=settings.connection.patience,
+    )
+
+
+def _on_ray(compute: Compute) -> RaySettings | None:
+    """How the workers are placed on a Ray cluster; None if they run on this machine."""
+    if compute.executor != "ray":
+        return None
+    from robospa.harness.running.ray_bridge import RaySettings
+
+    return RaySettings(
+        compute.address or "auto", compute.workers, compute.cpus_per_worker, compute.gpus_per_worker
+    )

@@ -1,0 +1,253 @@
+"""The settings of an evaluation: one definition for the command line, a file and the driver.
+
+Every field is a flag of `robospa eval`, a key of a settings file (`harness.settings_file`), a
+keyword of `robospa.evaluate`, and an entry of what a run keeps. Its name is unique among all
+groups, so flags and keywords need no group. Secrets are no settings: a server's token is passed
+beside them and written nowhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields, is_dataclass, replace
+from pathlib import Path
+from typing import TypeVar
+
+from robospa.protocol.options import option, plain_options, read_options
+from robospa.registry import did_you_mean
+
+CONTROLS = ("rest_to_rest", "fixed_rate")
+EXECUTORS = ("local", "ray")
+SPLITS = ("heldout", "train")
+VIDEO = ("none", "failures", "first", "all")
+LEAST_STUCK_SECONDS = 3.0
+"""A worker tells once a second that it gets on; fewer of these seconds would be no evidence."""
+
+Value = bool | int | float | str | list[str] | None
+"""A setting in JSON."""
+G = TypeVar("G")
+
+
+LISTS = ("tasks", "levels", "seeds")
+"""Texts that may also be given as lists: ["GAC", "RPF"] is "GAC,RPF"."""
+
+
+class SettingsError(ValueError):
+    """A setting that is unknown or impossible; the message names it."""
+
+
+@dataclass(frozen=True)
+class Selection:
+    """Which trials."""
+
+    tasks: str = option(
+        "all",
+        "task names, categories (GAC), spatial, procedural, basic, or all (without basic)",
+    )
+    levels: str = option("1-5", "such as 1,3-5")
+    trials: int = option(100, "trials per variant")
+    seeds: str | None = option(
+        None, "JSON file or 100000-100099; default: the shipped lists of accepted seeds"
+    )
+    split: str = option("heldout", "instructions: heldout or train", SPLITS)
+    embodiment: str = option("aloha-agilex", "robot")
+    mode: str = option("clean", "scene mode")
+
+    def __post_init__(self) -> None:
+        _check(self.trials >= 1, f"trials is {self.trials}, and must be at least 1")
+        _check_choices(self)
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """How a trial runs; part of what decides its result."""
+
+    control: str = option("rest_to_rest", "rest_to_rest or fixed_rate", CONTROLS)
+    run_seed: int = option(0, "enters the policy's seed of every trial")
+    step_scale: float = option(1.0, "multiplies the official step limits; 1 is the benchmark")
+    world: str | None = option(None, "for tests: module:function of another world")
+    parts: str | None = option(None, "for tests: module:function of a trial's scene and goal")
+
+    def __post_init__(self) -> None:
+        scale = self.step_scale
+        _check(0 < scale <= 100, f"step_scale is {scale:g}, and must be between 0 and 100")
+        _check_choices(self)
+
+
+@dataclass(frozen=True)
+class Connection:
+    """How policy servers are spoken to; times in seconds."""
+
+    timeout: float = option(120.0, "seconds for one answer")
+    first_timeout: float = option(600.0, "seconds for the first answer")
+    wait: float = option(0.0, "seconds to wait at the start for the server to listen")
+    patience: float = option(60.0, "seconds that a worker waits for a server that went away")
+    client: Path | None = option(
+        None, "JSON file with options of the server's dialect; those in the URL win"
+    )
+
+    def __post_init__(self) -> None:
+        for name in ("timeout", "first_timeout"):
+            seconds: float = getattr(self, name)
+            _check(seconds > 0, f"{name} is {seconds:g} s, and must be more than 0 s")
+        for name in ("wait", "patience"):
+            seconds = getattr(self, name)
+            _check(seconds >= 0, f"{name} is {seconds:g} s, and must be at least 0 s")
+
+
+@dataclass(frozen=True)
+class Retries:
+    """When an attempt at a trial is given up, and how often it is repeated."""
+
+    trial_timeout: float = option(1800.0, "seconds for one trial before its worker is killed")
+    stuck_timeout: float = option(
+        300.0, "seconds without progress, other than waiting for the policy, before that"
+    )
+    attempts: int = option(3, "times a trial is tried if it cannot be run")
+    backoff: float = option(2.0, "seconds before the first retry")
+
+    def __post_init__(self) -> None:
+        _check(self.attempts >= 1, f"attempts is {self.attempts}, and must be at least 1")
+        _check(self.backoff >= 0, f"backoff is {self.backoff:g} s, and must be at least 0 s")
+        limit = self.trial_timeout
+        _check(limit > 0, f"trial_timeout is {limit:g} s, and must be more than 0 s")
+        stuck, least = self.stuck_timeout, LEAST_STUCK_SECONDS
+        _check(stuck >= least, f"stuck_timeout is {stuck:g} s, and must be at least {least:g} s")
+
+
+@dataclass(frozen=True)
+class Compute:
+    """Where trials run, and how many at once."""
+
+    workers: int = option(0, "worker processes; 0 for as many as keep the cores busy")
+    executor: str = option(
+        "local", "where the workers are: local (here) or ray (a Ray cluster)", EXECUTORS
+    )
+    address: str | None = option(
+        None, "Ray cluster: auto, local (one for this run), HOST:PORT, ray://HOST:PORT"
+    )
+    cpus_per_worker: float = option(1.0, "with ray: CPUs of its node that a worker takes")
+    gpus_per_worker: float = option(
+        0.0, "with ray: GPUs, only taken by runs that render; such as 0.1"
+    )
+
+    def __post_init__(self) -> None:
+        _check(self.workers >= 0, f"workers is {self.workers}, and must be at least 0")
+        _check_choices(self)
+        _check(self.executor == "ray" or self.address is None, "address goes with executor ray")
+        cpus, gpus = self.cpus_per_worker, self.gpus_per_worker
+        _check(cpus > 0, f"cpus_per_worker is {cpus:g}, and must be more than 0")
+        _check(gpus >= 0, f"gpus_per_worker is {gpus:g}, and must be at least 0")
+
+
+@dataclass(frozen=True)
+class Recording:
+    """What a run keeps beside its records."""
+
+    video: str = option(
+        "none", "which trials to film: none, failures, first (of each task), all", VIDEO
+    )
+
+    def __post_init__(self) -> None:
+        _check_choices(self)
+
+
+@dataclass(frozen=True)
+class EvaluationSettings:
+    """Everything that `robospa eval` can be told. Raises SettingsError if a value is impossible."""
+
+    policy: tuple[str, ...] = option((), "URLs of a policy's servers, or one name or module:Class")
+    policy_map: Path | None = option(
+        None, "JSON file with a URL for every base task, or a list of them"
+    )
+    out: Path | None = option(None, "folder of the run")
+    selection: Selection = field(default_factory=Selection)
+    simulation: Simulation = field(default_factory=Simulation)
+    connection: Connection = field(default_factory=Connection)
+    retries: Retries = field(default_factory=Retries)
+    compute: Compute = field(default_factory=Compute)
+    recording: Recording = field(default_factory=Recording)
+
+
+GROUPS: dict[str, type] = {
+    "selection": Selection,
+    "simulation": Simulation,
+    "connection": Connection,
+    "retries": Retries,
+    "compute": Compute,
+    "recording": Recording,
+}
+"""The groups of EvaluationSettings: tables of a settings file."""
+
+
+def group_of() -> dict[str, str]:
+    """The group of every setting, in their order; empty for those that stand in none."""
+    top = {f.name: "" for f in fields(EvaluationSettings) if f.name not in GROUPS}
+    return top | {f.name: group for group, kind in GROUPS.items() for f in fields(kind)}
+
+
+def updated(settings: EvaluationSettings, given: Mapping[str, object]) -> EvaluationSettings:
+    """`settings` with the values in `given`, by name without a group.
+
+    Raises SettingsError for a name that is none (with near matches), a value of another type, and
+    what is impossible.
+    """
+    groups = group_of()
+    if unknown := next((name for name in given if name not in groups), None):
+        near = did_you_mean(unknown, groups)
+        raise SettingsError(f"there is no setting {unknown!r}; {near}known are {', '.join(groups)}")
+    changes: dict[str, object] = {}
+    for group, kind in GROUPS.items():
+        inside = {name: value for name, value in given.items() if groups[name] == group}
+        if inside:
+            changes[group] = _changed(getattr(settings, group), kind, inside)
+    top = {name: value for name, value in given.items() if not groups[name]}
+    return replace(_changed(settings, EvaluationSettings, top), **changes)  # type: ignore[arg-type]
+
+
+def _changed(old: G, kind: type[G], given: Mapping[str, object]) -> G:
+    """`old` with the values in `given`, each read as its field's type."""
+    try:
+        read = read_options(kind, {name: _text(name, value) for name, value in given.items()})
+    except SettingsError:
+        raise
+    except ValueError as error:
+        raise SettingsError(str(error)) from error
+    return replace(old, **{name: getattr(read, name) for name in given})  # type: ignore[type-var]
+
+
+def _text(name: str, value: object) -> object:
+    """`value`, but one text for a list of names or numbers, or a number, where LISTS allow that."""
+    if name not in LISTS or value is None or isinstance(value, str):
+        return value
+    return ",".join(map(str, value)) if isinstance(value, Sequence) else str(value)
+
+
+def plain(settings: EvaluationSettings) -> dict[str, dict[str, Value]]:
+    """All settings as JSON values by group and name; those in no group under ""."""
+    found: dict[str, dict[str, Value]] = {"": {}}
+    for item in fields(settings):
+        value = getattr(settings, item.name)
+        if is_dataclass(value):
+            found[item.name] = plain_options(value)
+    top = plain_options(settings)
+    found[""] = {name: top[name] for name, group in group_of().items() if not group}
+    return found
+
+
+def flat(settings: EvaluationSettings) -> dict[str, Value]:
+    """All settings as JSON values by name, without groups."""
+    return {name: value for group in plain(settings).values() for name, value in group.items()}
+
+
+def _check(holds: bool, sentence: str) -> None:
+    if not holds:
+        raise SettingsError(sentence)
+
+
+def _check_choices(group: object) -> None:
+    """Raises SettingsError if a setting that has choices is none of them."""
+    for item in fields(group):  # type: ignore[arg-type]
+        choices = item.metadata.get("choices", ())
+        if choices and (value := getattr(group, item.name)) not in choices:
+            raise SettingsError(f"{item.name} {value!r} is none of {', '.join(choices)}")

@@ -1,0 +1,94 @@
+"""From settings to what the driver runs."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from robospa.harness.running.request import client_options, make_request, run_folder
+from robospa.harness.settings import EvaluationSettings, SettingsError, updated
+from robospa.harness.settings_file import to_toml
+from robospa.trial import TrialKey
+
+KEYS = [TrialKey("A", 1, 0)]
+
+
+def settings(policy: str, **given: Any) -> EvaluationSettings:
+    return updated(EvaluationSettings(), {"policy": policy, **given})
+
+
+def test_a_server_gets_its_deadlines_and_its_token() -> None:
+    asked = settings("ws://h:1", timeout=1, first_timeout=2, wait=3, patience=4, workers=3)
+    request = make_request(asked, token="t", keys=KEYS)
+    timeouts = request.config.options["timeouts"]
+    assert (timeouts.infer, timeouts.first_infer, timeouts.wait) == (1.0, 2.0, 4.0)
+    assert request.wait == 3.0
+    assert request.config.options["token"] == "t"
+    assert request.options.workers == 3
+
+
+def test_the_token_is_nowhere_in_what_is_kept() -> None:
+    asked = settings("ws://h:1", tasks="Pick_Blocks_Size", levels=1, trials=1)
+    request = make_request(asked, token="hidden")
+    assert request.settings is not None
+    kept = json.dumps([request.arguments]) + to_toml(request.settings)
+    assert "ws://h:1" in kept and "hidden" not in kept
+
+
+def test_the_trials_are_those_of_the_settings() -> None:
+    request = make_request(settings("hold", tasks="Pick_Blocks_Size", levels=[1, 3], trials=2))
+    assert [(key.level, key.task) for key in request.keys] == [
+        (1, "Pick_Blocks_Size"), (1, "Pick_Blocks_Size"),
+        (3, "Pick_Blocks_Size"), (3, "Pick_Blocks_Size"),
+    ]  # fmt: skip
+
+
+def test_the_saved_settings_name_the_folder_that_was_chosen() -> None:
+    request = make_request(settings("hold", tasks="Pick_Blocks_Size", trials=1))
+    assert request.settings is not None
+    assert request.settings.out == request.config.folder
+
+
+def test_settings_that_do_not_describe_the_trials_are_not_saved() -> None:
+    assert make_request(settings("hold"), keys=KEYS).settings is None
+
+
+def test_client_options_from_a_file(tmp_path: Path) -> None:
+    path = tmp_path / "client.json"
+    path.write_text('{"horizon": 25, "execute": 10, "names": "head:cam"}')
+    assert client_options("openpi://h:1", path)["execute"] == 10
+
+
+@pytest.mark.parametrize("text", ["{", "[]", '{"horizn": 5}', '{"horizon": "x"}', '{"extra": "["}'])
+def test_broken_client_options_are_named(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "client.json"
+    path.write_text(text)
+    with pytest.raises(SettingsError, match=r"--client .*client\.json"):
+        client_options("openpi://h:1", path)
+
+
+def test_options_in_a_url_are_checked_before_the_run() -> None:
+    with pytest.raises(SettingsError, match="no option 'horizn'"):
+        make_request(settings("openpi://h:1?horizn=5"), keys=KEYS)
+
+
+@pytest.mark.parametrize(
+    ("policy", "reason"),
+    [
+        ((), "either the policy or --policy-map"),
+        (("ws://a", "ws://a"), "ws://a is named twice"),
+        (("ws://a", "hold"), "'hold' is no URL"),
+    ],
+)
+def test_servers_that_do_not_go_together_are_refused(policy: tuple[str, ...], reason: str) -> None:
+    with pytest.raises(SettingsError, match=reason):
+        make_request(EvaluationSettings(policy=policy), keys=KEYS)
+
+
+def test_the_default_folder_is_named_after_the_policy() -> None:
+    assert run_folder(settings("ws://host:8000")).name.startswith("host-8000-")
+    with pytest.raises(SettingsError, match="say with out which one"):
+        run_folder(settings("hold"), resume=True)

@@ -1,0 +1,147 @@
+"""One definition of an evaluation's settings: as flags, as a file, as keywords."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import pytest
+import typer
+from hypothesis import given
+from hypothesis import strategies as st
+
+from robospa.harness.cli.eval import evaluate
+from robospa.harness.running.watchdog import BEAT_SECONDS
+from robospa.harness.settings import (
+    GROUPS,
+    LEAST_STUCK_SECONDS,
+    EvaluationSettings,
+    Recording,
+    Selection,
+    SettingsError,
+    flat,
+    group_of,
+    updated,
+)
+from robospa.harness.settings_file import read_settings, to_toml
+
+DEFAULTS = EvaluationSettings()
+
+
+def write(folder: Path, text: str, name: str = "run.toml") -> Path:
+    path = folder / name
+    path.write_text(text)
+    return path
+
+
+def test_a_settings_name_is_unique_and_has_help() -> None:
+    named = [f for kind in (EvaluationSettings, *GROUPS.values()) for f in fields(kind)]
+    names = [f.name for f in named if f.name not in GROUPS]
+    assert len(names) == len(set(names)) == len(group_of()) == len(flat(DEFAULTS))
+    assert all(f.metadata["help"] for f in named if f.name not in GROUPS)
+
+
+def test_every_setting_is_a_flag_with_its_default() -> None:
+    app = typer.Typer(add_completion=False)
+    app.command()(evaluate)
+    flags = {p.name: p for p in typer.main.get_command(app).params}
+    assert set(group_of()) < set(flags)
+    for name, value in flat(DEFAULTS).items():
+        if name != "policy":
+            assert flags[name].default == value
+            assert flags[name].opts == ["--" + name.replace("_", "-")]
+    assert set(flags) - set(group_of()) == {"more", "config", "resume", "token"}
+
+
+def test_what_is_written_is_read_back(tmp_path: Path) -> None:
+    changed = updated(
+        DEFAULTS,
+        {
+            "policy": ["ws://a:1", "ws://b:2"],
+            "out": tmp_path,
+            "tasks": ["GAC", "RPF"],
+            "levels": [1, 3],
+            "seeds": 'odd "name"\n\x7f.json',
+            "backoff": 1e-05,
+            "patience": float("inf"),
+            "gpus_per_worker": 0.1,
+            "client": "client.json",
+            "world": "a:b",
+        },
+    )
+    assert changed.selection.tasks == "GAC,RPF" and changed.selection.levels == "1,3"
+    for settings in (changed, DEFAULTS):
+        assert read_settings(write(tmp_path, to_toml(settings))) == settings
+
+
+@given(st.text())
+def test_any_text_survives_the_file(tmp_path_factory: pytest.TempPathFactory, text: str) -> None:
+    settings = updated(DEFAULTS, {"tasks": text.encode(errors="ignore").decode()})
+    path = write(tmp_path_factory.getbasetemp(), to_toml(settings))
+    assert read_settings(path) == settings
+
+
+def test_json_has_the_same_form(tmp_path: Path) -> None:
+    text = json.dumps({"policy": "ws://a:1", "selection": {"levels": [1, 3], "trials": 5}})
+    found = read_settings(write(tmp_path, text, "run.json"))
+    assert found.policy == ("ws://a:1",)
+    assert found.selection == Selection(levels="1,3", trials=5)
+    assert found.retries == DEFAULTS.retries
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("trials = 3", r"no setting 'trials'; did you mean trials of \[selection\]\?"),
+        ("[selection]\ntrails = 3", r"\[selection\] has no setting 'trails'; did you mean trials"),
+        ("[conection]\nwait = 3", r"no setting 'conection'; did you mean \[connection\]\?"),
+        ("[recording]\nattempts = 3", r"did you mean attempts of \[retries\]\?"),
+        ("selection = 3", r"write a table \[selection\]"),
+        ("[compute]\nworkers = 'many'", "workers='many' is not a whole number"),
+        ("[compute]\nworkers = -1", "workers is -1, and must be at least 0"),
+        ("[compute]\naddress = 'auto'", "address goes with executor ray"),
+        ("[recording]\nvideo = 'some'", "none of none, failures, first, all"),
+        ("token = 'secret'", "a token does not belong in a file"),
+        ("[connection]\ntoken = 'secret'", "a token does not belong in a file"),
+        ("a = [", "it is no TOML"),
+    ],
+)
+def test_a_wrong_file_is_named_in_one_sentence(tmp_path: Path, text: str, reason: str) -> None:
+    with pytest.raises(SettingsError, match=rf"run\.toml: .*{reason}") as error:
+        read_settings(write(tmp_path, text))
+    assert "\n" not in str(error.value) and "secret" not in str(error.value)
+
+
+def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
+    with pytest.raises(SettingsError, match=r"none\.toml: it cannot be read \(No such file"):
+        read_settings(tmp_path / "none.toml")
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"trials": 0}, {"workers": -1}, {"attempts": 0}, {"backoff": -1}, {"trial_timeout": 0},
+        {"stuck_timeout": 1}, {"step_scale": 0}, {"step_scale": 101}, {"timeout": 0},
+        {"first_timeout": -1}, {"wait": -1}, {"patience": -1}, {"executor": "slurm"},
+        {"cpus_per_worker": 0}, {"gpus_per_worker": -1}, {"control": "free"}, {"split": "test"},
+    ],
+)  # fmt: skip
+def test_impossible_values_are_refused(wrong: dict[str, Any]) -> None:
+    with pytest.raises(SettingsError, match=next(iter(wrong))):
+        updated(DEFAULTS, wrong)
+
+
+def test_choices_hold_for_settings_made_in_python_too() -> None:
+    with pytest.raises(SettingsError, match="video 'some' is none of none, failures, first, all"):
+        Recording(video="some")
+
+
+def test_an_unknown_keyword_is_answered_with_the_nearest() -> None:
+    with pytest.raises(SettingsError, match="no setting 'trails'; did you mean trials"):
+        updated(DEFAULTS, {"trails": 3})
+
+
+def test_a_worker_that_gets_on_is_not_taken_for_stuck() -> None:
+    assert LEAST_STUCK_SECONDS >= 3 * BEAT_SECONDS
