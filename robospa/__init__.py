@@ -17,10 +17,15 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from robospa.clients import connect as connect
     from robospa.geometry import Pose as Pose
+    from robospa.harness.running.api import evaluate as evaluate
+    from robospa.harness.settings import EvaluationSettings as EvaluationSettings
+    from robospa.protocol.policy import CameraSpec as CameraSpec
+    from robospa.protocol.policy import Observation as Observation
     from robospa.protocol.policy import Policy as Policy
     from robospa.protocol.policy import PolicySpec as PolicySpec
     from robospa.protocol.policy import TrialInfo as TrialInfo
     from robospa.protocol.server import serve as serve
+    from robospa.results.records.run_io import Run as Run
     from robospa.results.records.run_io import read_run as load_run
     from robospa.results.records.trial_record import TrialRecord as TrialRecord
     from robospa.tasks.catalog import build_scene as build_scene
@@ -28,24 +33,33 @@ if TYPE_CHECKING:
     from robospa.trial import TrialKey as TrialKey
 
 _HOMES = {
+    "CameraSpec": "robospa.protocol.policy:CameraSpec",
+    "EvaluationSettings": "robospa.harness.settings:EvaluationSettings",
+    "Observation": "robospa.protocol.policy:Observation",
     "Policy": "robospa.protocol.policy:Policy",
     "PolicySpec": "robospa.protocol.policy:PolicySpec",
     "Pose": "robospa.geometry:Pose",
+    "Run": "robospa.results.records.run_io:Run",
     "Scene": "robospa.tasks.scene:Scene",
     "TrialInfo": "robospa.protocol.policy:TrialInfo",
     "TrialKey": "robospa.trial:TrialKey",
     "TrialRecord": "robospa.results.records.trial_record:TrialRecord",
     "build_scene": "robospa.tasks.catalog:build_scene",
     "connect": "robospa.clients:connect",
+    "evaluate": "robospa.harness.running.api:evaluate",
     "load_run": "robospa.results.records.run_io:read_run",
     "serve": "robospa.protocol.server:serve",
 }
 """Where each public name is defined."""
 
 __all__ = [
+    "CameraSpec",
+    "EvaluationSettings",
+    "Observation",
     "Policy",
     "PolicySpec",
     "Pose",
+    "Run",
     "Scene",
     "TrialInfo",
     "TrialKey",
@@ -53,6 +67,7 @@ __all__ = [
     "__version__",
     "build_scene",
     "connect",
+    "evaluate",
     "load_run",
     "serve",
 ]

@@ -9,8 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.protocol.policy import CameraSpec, Observation, PolicySpec, TrialInfo
-from robospa.protocol.server import serve
+from robospa import CameraSpec, Observation, PolicySpec, TrialInfo, serve
 
 
 class MyPolicy:

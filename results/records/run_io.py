@@ -199,7 +199,8 @@ def manifest_keys(manifest: Mapping[str, Any]) -> tuple[TrialKey, ...]:
     return tuple(keys)
 
 
-def read_run(folder: Path) -> Run:
+def read_run(folder: str | Path) -> Run:
     """The run in `folder`; raises RunError (or RepeatabilityError) if it cannot be trusted."""
+    folder = Path(folder)
     manifest = read_manifest(folder)
     return Run(folder, manifest, manifest_keys(manifest), read_records(folder))

@@ -1,0 +1,133 @@
+"""`robospa.evaluate`: an evaluation as one call, with every setting as a keyword."""
+
+from __future__ import annotations
+
+import secrets
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import cast
+
+from robospa.harness.running.evaluate import evaluate as run_request
+from robospa.harness.running.request import make_request, run_folder
+from robospa.harness.settings import EvaluationSettings, SettingsError, updated
+from robospa.harness.settings_file import read_settings
+from robospa.protocol.policy import Policy
+from robospa.protocol.server import ServerThread
+from robospa.results.records.run_io import Run, read_run
+
+PolicyFactory = Callable[[], Policy]
+
+
+def evaluate(
+    policy: str | Sequence[str] | Policy | PolicyFactory | None = None,
+    *,
+    tasks: str | Sequence[str] | None = None,
+    levels: str | int | Sequence[int] | None = None,
+    trials: int | None = None,
+    workers: int | None = None,
+    out: str | Path | None = None,
+    resume: bool = False,
+    token: str | None = None,
+    config: EvaluationSettings | str | Path | None = None,
+    **settings: object,
+) -> Run:
+    """Evaluate a policy on a fixed list of seeded trials, and return the run.
+
+        run = robospa.evaluate("ws://gpu:8000", tasks="spatial", levels=[1, 3], trials=20)
+        rate = sum(record.success for record in run.records.values()) / len(run.records)
+
+    Trials run in worker processes, so a script calls this under `if __name__ == "__main__":`.
+
+    Args:
+        policy: One of
+            the URL of a policy server, or a list of URLs of equal servers;
+            the name of an installed policy or "module:Class": every worker makes its own;
+            a class or function without arguments that makes policies, one for every worker;
+            a policy object.
+            The last two stay in this process, which serves them to its workers over loopback, so
+            nothing is pickled and a model is loaded once. An object has the state of one trial, so
+            it gets one worker unless it has `infer_batch`.
+        tasks: Names of tasks, categories or dimensions; "all" by default.
+        levels: From 1 to 5; all by default.
+        trials: Trials per variant; 100 by default.
+        workers: Worker processes; by default, or 0, as many as keep the cores busy.
+        out: Folder of the run; by default a new one under `runs`.
+        resume: Go on with the run in `out`.
+        token: Bearer token of the policy's servers; kept nowhere.
+        config: Settings, or a file of them, that the other arguments win over.
+        settings: Any other setting of `robospa eval`, such as video="failures" or timeout=30.
+
+    Returns:
+        What `robospa.load_run(out)` returns. Trials that could not be run are in `missing`.
+
+    Raises:
+        SettingsError: A setting is unknown or impossible; nothing was written.
+        RunError: `out` holds another run, or what it holds cannot be read.
+        RunAborted: The run cannot go on; what is finished is kept, and `resume` goes on from there.
+        WireError: No policy answers there, or not as the protocol says.
+    """
+    named = {"tasks": tasks, "levels": levels, "trials": trials, "workers": workers, "out": out}
+    given = {name: value for name, value in named.items() if value is not None}
+    asked = updated(_base(config), {**given, **settings})
+    if policy is None or isinstance(policy, str | Sequence):
+        if policy is not None:
+            asked = updated(asked, {"policy": policy, "policy_map": None})
+        request = make_request(asked, token=token, resume=resume)
+        run_request(request)
+        return read_run(request.config.folder)
+    if token is not None:
+        raise SettingsError("token goes with policy servers, and this policy is in this process")
+    instance, factory = _object_or_factory(policy)
+    asked = _for_one_process(policy, instance, asked, resume)
+    secret = secrets.token_urlsafe()
+    with ServerThread(instance, policy_factory=factory, token=secret) as server:
+        request = make_request(replace(asked, policy=(server.url,)), token=secret, resume=resume)
+        # The address ends with this call: whoever uses these settings again names a policy.
+        run_request(replace(request, settings=asked))
+    return read_run(request.config.folder)
+
+
+def _base(config: EvaluationSettings | str | Path | None) -> EvaluationSettings:
+    if config is None:
+        return EvaluationSettings()
+    return config if isinstance(config, EvaluationSettings) else read_settings(Path(config))
+
+
+def _object_or_factory(
+    policy: Policy | PolicyFactory,
+) -> tuple[Policy | None, PolicyFactory | None]:
+    """`policy` as an object or as what makes one; raises SettingsError if it is neither.
+
+    A class has the methods of its objects, so they do not tell them apart.
+    """
+    if not isinstance(policy, type) and hasattr(policy, "infer"):
+        return cast(Policy, policy), None
+    if callable(policy):
+        return None, policy
+    raise SettingsError(
+        f"a {type(policy).__name__} is no policy: give a URL, a name, a class, a function that "
+        "makes a policy, or an object with spec, reset and infer"
+    )
+
+
+def _for_one_process(
+    policy: Policy | PolicyFactory,
+    instance: Policy | None,
+    settings: EvaluationSettings,
+    resume: bool,
+) -> EvaluationSettings:
+    """`settings` for a policy of this process; raises SettingsError if they do not fit one."""
+    compute = settings.compute
+    if compute.executor != "local":
+        raise SettingsError("a policy in this process has its workers here: executor must be local")
+    if instance is not None and not hasattr(instance, "infer_batch"):
+        if compute.workers > 1:
+            raise SettingsError(
+                f"workers is {compute.workers}, but a policy object has the state of one trial: "
+                "give its class, give it infer_batch, or leave workers out"
+            )
+        compute = replace(compute, workers=1)
+    name = getattr(policy, "__name__", type(policy).__name__)
+    folder = run_folder(replace(settings, policy=(name,)), resume)
+    return replace(settings, policy=(), policy_map=None, out=folder, compute=compute)
