@@ -1,4 +1,5 @@
-"""Find things by name: policies, robots, dialects and tasks are entry points of a package.
+"""Find things by name: policies, robots, dialects, scene modes and tasks are entry points.
+
 
 A package adds one by a line in its pyproject.toml, ours and others' alike:
 
@@ -20,6 +21,8 @@ ROBOTS = "robospa.robots"
 """Objects of `robospa.harness.robots.embodiment.Embodiment`."""
 DIALECTS = "robospa.dialects"
 """Objects of `robospa.clients.dialect.Dialect`: servers that speak something else than ours."""
+SCENE_MODES = "robospa.scene_modes"
+"""Functions `robospa.tasks.modes.Mode`."""
 TASKS = "robospa.tasks"
 """Objects of `robospa.tasks.task.Task`."""
 

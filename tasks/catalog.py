@@ -8,6 +8,7 @@ from functools import cache
 
 import numpy as np
 
+from robospa.tasks.modes import mode as scene_mode
 from robospa.tasks.scene import SUITE, Scene
 from robospa.tasks.task import Task
 from robospa.trial import REFERENCE
@@ -123,18 +124,18 @@ def build_scene(
 ) -> Scene:
     """The scene of one trial: a pure function of its arguments.
 
-    All randomness comes from one generator seeded by (suite, task, level, seed); they are drawn
-    for the workcell of the suite's own robot, so that every robot meets the same scenes.
+    The task's objects are drawn by one generator seeded by (suite, task, level, seed), for the
+    workcell of the suite's own robot: every robot and every mode meets the same ones. What the
+    mode varies has generators of its own, seeded by the part's name too. KeyError for an unknown
+    task, ValueError for an unknown level or mode.
     """
     found = task(name)
     if level not in found.levels:
         raise ValueError(f"{found.name} has levels {sorted(found.levels)}, not {level}")
-    if mode != "clean":
-        raise ValueError(f"scene mode {mode!r} is not built yet; use 'clean'")
-    text = f"{SUITE}/{found.name}/{level}/{seed}".encode()
-    entropy = int.from_bytes(hashlib.sha256(text).digest()[:16], "big")
-    draft = found.draw(level, np.random.Generator(np.random.PCG64(entropy)), workcell(REFERENCE))
-    return Scene(
+    vary = scene_mode(mode)
+    identity = f"{SUITE}/{found.name}/{level}/{seed}"
+    draft = found.draw(level, _generator(identity), workcell(REFERENCE))
+    scene = Scene(
         task=found.name,
         level=level,
         seed=seed,
@@ -144,3 +145,10 @@ def build_scene(
         facts=draft.facts,
         table_shift=draft.table_shift,
     )
+    return vary(scene, lambda part: _generator(f"{identity}/{part}"))
+
+
+def _generator(text: str) -> np.random.Generator:
+    """A generator seeded by `text`."""
+    entropy = int.from_bytes(hashlib.sha256(text.encode()).digest()[:16], "big")
+    return np.random.Generator(np.random.PCG64(entropy))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -27,10 +28,12 @@ def pick_name(kind: str, family: str) -> str:
 
 
 def lifted(lift: Lift) -> Callable[[Scene], Tracker]:
-    """The goal that the scene's target is picked as `lift` says."""
+    """The goal that the scene's target is picked as `lift` says of a table at its usual height."""
 
     def goal(scene: Scene) -> Tracker:
-        return PickTracker(str(scene.facts["target"]), tuple(o.name for o in scene.objects), lift)
+        above = None if lift.above is None else lift.above + scene.table_rise
+        names = tuple(o.name for o in scene.objects)
+        return PickTracker(str(scene.facts["target"]), names, replace(lift, above=above))
 
     return goal
 

@@ -16,10 +16,9 @@ from robospa.tasks.goals.flags import Flags, both_open, closed_near
 from robospa.tasks.goals.handling import Handling
 from robospa.tasks.goals.hands import Role
 from robospa.tasks.snapshot import Snapshot
-from robospa.workcell import TABLE_TOP
 
-FALLEN = TABLE_TOP - 0.05
-"""An origin below this [m] has left the table."""
+FALLEN = 0.05
+"""An origin so far [m] below the top of the table has left it."""
 
 
 @dataclass(frozen=True)
@@ -46,14 +45,16 @@ class Part:
 class Regions:
     """Subtask i is part i, not latched. Success: all hold and, if `opened`, both grippers are open.
 
-    An object in a region of `astray` is a diagnostic, no failure.
+    `table_top` is the height of the table [m]. An object in a region of `astray` is a diagnostic,
+    no failure.
     """
 
     needs_contacts = False
 
-    def __init__(self, parts: Sequence[Part], opened: bool = False) -> None:
+    def __init__(self, parts: Sequence[Part], table_top: float, opened: bool = False) -> None:
         self.total = len(parts)
         self._parts = tuple(parts)
+        self._lowest = table_top - FALLEN
         self._opened = opened
         self._flags = Flags(self.total)
         self._handling = Handling((part.name for part in parts), radius=HELD_RADIUS)
@@ -81,12 +82,12 @@ class Regions:
         events: tuple[Event, ...] = ()
         for i, part in enumerate(self._parts):
             x, y, z = snapshot.poses[part.name].position
-            if z < FALLEN and part.name not in self._fallen:
+            if z < self._lowest and part.name not in self._fallen:
                 self._fallen.add(part.name)
                 events += (Event(snapshot.time, "dropped", part.name, i, "off the table"),)
             if any(region.holds(x, y) for region in part.astray):
                 self._astray.add(part.name)
-            now = z >= FALLEN and any(region.holds(x, y) for region in part.to)
+            now = z >= self._lowest and any(region.holds(x, y) for region in part.to)
             if now == self._flags.held[i]:
                 continue
             if not now or not closed_near(snapshot, (x, y, z), HELD_RADIUS):

@@ -10,6 +10,7 @@ from snapshots_by_hand import TICK, held, kinds, run, snap
 from robospa.geometry import Vec3
 from robospa.tasks.events import outcome
 from robospa.tasks.goals.regions import Part, Region, Regions
+from robospa.workcell import TABLE_TOP
 
 RIGHT, LEFT = Region(x=(0.1, math.inf)), Region(x=(-math.inf, -0.1))
 START: dict[str, Vec3] = {"a": (0.0, 0.05, 0.755), "b": (0.03, -0.1, 0.755)}
@@ -17,7 +18,7 @@ APART: dict[str, Vec3] = {"a": (0.17, 0.05, 0.755), "b": (-0.17, -0.1, 0.755)}
 
 
 def goal(opened: bool = False) -> Regions:
-    return Regions([Part("a", (RIGHT,), (LEFT,)), Part("b", (LEFT,), (RIGHT,))], opened)
+    return Regions([Part("a", (RIGHT,), (LEFT,)), Part("b", (LEFT,), (RIGHT,))], TABLE_TOP, opened)
 
 
 def play(*scenes: dict[str, Vec3]):  # type: ignore[no-untyped-def]

@@ -29,7 +29,7 @@ from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.plan import Home, Pick, Place, Press, Skill
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
-from robospa.workcell import TABLE_TOP, Workcell
+from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "can_basket.toml")
 
@@ -102,11 +102,11 @@ def goal(scene: Scene) -> ClickAndPlace:
     for step in STEPS[scene.level]:
         if step == "b":
             basket = scene.object(facts["basket"])
-            rim = TABLE_TOP + objects.object_model(basket.asset, basket.params).size[2]
-            height = (TABLE_TOP - 0.01, rim + 0.01)
+            rim = scene.table_top + objects.object_model(basket.asset, basket.params).size[2]
+            height = (scene.table_top - 0.01, rim + 0.01)
             subtasks.append(Placement(facts["bread"], facts["basket"], 0.05, height))
         elif step == "p":
-            height = (TABLE_TOP - 0.004, TABLE_TOP + 0.006)
+            height = (scene.table_top - 0.004, scene.table_top + 0.006)
             subtasks.append(Placement(facts["pill_bottle"], facts["pad"], 0.03, height))
         else:
             subtasks.append(None)

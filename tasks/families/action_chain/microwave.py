@@ -34,7 +34,7 @@ from robospa.tasks.plan import Open, Pick, Place, Press, Skill
 from robospa.tasks.scene import Scene
 from robospa.tasks.shapes import Hinge
 from robospa.tasks.task import Draft, Level, Task
-from robospa.workcell import TABLE_TOP, Workcell
+from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "microwave.toml")
 
@@ -175,7 +175,7 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
             x, y, _ = other.pose.position
             arm = side(thing.pose.position[0])
             skills.append(Pick(name, arm=arm))
-            skills.append(Place(name, (x - SHIFT, y, TABLE_TOP - bottom), arm=arm))
+            skills.append(Place(name, (x - SHIFT, y, scene.table_top - bottom), arm=arm))
     return tuple(skills)
 
 

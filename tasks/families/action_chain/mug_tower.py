@@ -33,7 +33,7 @@ from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.plan import Hang, Pick, Place, Skill
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
-from robospa.workcell import TABLE_TOP, Workcell
+from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "mug_tower.toml")
 
@@ -60,7 +60,8 @@ AREA = {2: (-0.05, -0.1), 3: (0.0, -0.05), 4: (0.0, -0.05), 5: (0.0, -0.05)}
 """The near left area: x and y below these [m]."""
 LOW = 0.02  # [m] how much higher than on the table the red block may be
 ON_PEG, HANGING = 0.02, 0.86
-"""Offset [m] of the handle from the peg's place in x and in y, and its least height [m, world]."""
+"""Offset [m] of the handle from the peg's place in x and in y, and its least height [m, world]
+over a table at its usual height."""
 MUG_GRIP = (0.0, 0.0, 0.045)
 STACKED = (0.015, 0.015, 0.007)
 """Allowed offset [m] in x, y, z of a block from straight on top of the one below."""
@@ -124,24 +125,24 @@ def _blocks(scene: Scene) -> list[str]:
     return [scene.facts[color] for color in COLORS if color in scene.facts]
 
 
-def _hangs(handle: Pose, peg: Pose) -> Near:
-    """The middle of the handle is at the peg's place, high above the table."""
+def _hangs(handle: Pose, peg: Pose, above: float) -> Near:
+    """The middle of the handle is at the peg's place, higher than `above` [m, world]."""
 
     def near(mug: Pose, rack: Pose) -> bool:
         x, y, z = mug.apply(handle.position)
         px, py, _ = rack.apply(peg.position)
-        return abs(x - px) < ON_PEG and abs(y - py) < ON_PEG and z > HANGING
+        return abs(x - px) < ON_PEG and abs(y - py) < ON_PEG and z > above
 
     return near
 
 
-def _in_area(level: int) -> Near:
+def _in_area(level: int, table_top: float) -> Near:
     """The object lies in the near left area, on the table."""
     right, far = AREA[level]
 
     def near(pose: Pose, start: Pose) -> bool:
         x, y, z = pose.position
-        return x < right and y < far and z < TABLE_TOP + HALF + LOW
+        return x < right and y < far and z < table_top + HALF + LOW
 
     return near
 
@@ -156,11 +157,14 @@ def goal(scene: Scene) -> Checklist:
     """The mug on the peg, the red block in its area, the others on top; nothing latches."""
     facts = scene.facts
     mug, rack = facts["mug"], facts["rack"]
-    near = _hangs(frame_of(scene, mug, "handle"), frame_of(scene, rack, "hang"))
+    handle, peg = frame_of(scene, mug, "handle"), frame_of(scene, rack, "hang")
+    near = _hangs(handle, peg, HANGING + scene.table_rise)
     parts: list[Counter | Part] = [Rests(mug, (rack,), near, grip=MUG_GRIP)]
     blocks = _blocks(scene)
     if blocks:
-        parts.append(Rests(blocks[0], (), _in_area(scene.level), held_radius=HELD_RADIUS))
+        parts.append(
+            Rests(blocks[0], (), _in_area(scene.level, scene.table_top), held_radius=HELD_RADIUS)
+        )
     parts += [
         Rests(upper, (lower,), _on_top, held_radius=HELD_RADIUS)
         for lower, upper in pairwise(blocks)
@@ -175,7 +179,7 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
     for i, name in enumerate(blocks):
         skills.append(Pick(name, lift=0.07 + 2 * HALF * i, arm="left"))
         if i == 0:
-            skills.append(Place(name, (*PLACE, TABLE_TOP + HALF), arm="left"))
+            skills.append(Place(name, (*PLACE, scene.table_top + HALF), arm="left"))
         else:
             skills.append(Place(name, on=blocks[i - 1], arm="left"))
     return tuple(skills)

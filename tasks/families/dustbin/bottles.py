@@ -29,7 +29,7 @@ from robospa.tasks.instructions.words import NUMBERS, by_count
 from robospa.tasks.plan import Skill
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
-from robospa.workcell import TABLE_TOP, Workcell
+from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "bottles.toml")
 
@@ -68,7 +68,7 @@ def goal(scene: Scene) -> Collect:
     """All bottles inside the bin's walls."""
     dustbin = scene.object(scene.facts["dustbin"])
     names = scene.facts["bottles"]
-    return Collect(names, container(dustbin), lost_below=TABLE_TOP - 0.1)
+    return Collect(names, container(dustbin), lost_below=scene.table_top - 0.1)
 
 
 def plan(scene: Scene) -> tuple[Skill, ...]:
@@ -86,7 +86,7 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
     dustbin = scene.facts["dustbin"]
     skills: list[Skill] = []
     for name in sorted(scene.facts["bottles"], key=turn):
-        skills += discard(name, turn(name)[0], dustbin)
+        skills += discard(scene, name, dustbin)
     return tuple(skills)
 
 

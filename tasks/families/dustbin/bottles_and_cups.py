@@ -138,7 +138,7 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
     middle = exchange_place(taken)
     skills: list[Skill] = []
     for name in _roles(scene, "bottle"):
-        skills += discard(name, scene.object(name).pose.position[0] > 0, dustbin, middle)
+        skills += discard(scene, name, dustbin, middle)
     for cup, coaster in zip(cups, coasters, strict=True):
         arm = side(scene.object(cup).pose.position[0])
         skills += [Pick(cup, lift=0.08, arm=arm), Place(cup, on=coaster, arm=arm)]

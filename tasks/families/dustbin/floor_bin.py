@@ -13,8 +13,8 @@ from robospa.tasks import objects
 from robospa.tasks.families.tabletop import Point, apart
 from robospa.tasks.goals.anyorder import Container
 from robospa.tasks.plan import Drop, Pick, Place, Skill
-from robospa.tasks.scene import SceneObject
-from robospa.workcell import TABLE_TOP, Workcell
+from robospa.tasks.scene import Scene, SceneObject
+from robospa.workcell import Workcell
 
 BIN = Pose((-0.45, 0.0, 0.0))
 TABLE_SHIFT = (0.3, 0.0)
@@ -41,11 +41,12 @@ def reachable(workcell: Workcell, point: Point) -> bool:
     return not apart(point, [arm.base], arm.reach)
 
 
-def discard(name: str, right: bool, dustbin: str, exchange: Point = EXCHANGE) -> tuple[Skill, ...]:
+def discard(scene: Scene, name: str, dustbin: str, exchange: Point = EXCHANGE) -> tuple[Skill, ...]:
     """Bring `name` into the bin; one on the right goes through the hands of both arms."""
+    right = scene.object(name).pose.position[0] > 0
     hand_over: tuple[Skill, ...] = (
         Pick(name, lift=LIFT, arm="right"),
-        Place(name, (*exchange, TABLE_TOP), arm="right"),
+        Place(name, (*exchange, scene.table_top), arm="right"),
     )
     throw = (Pick(name, lift=LIFT, arm="left"), Drop(name, into=dustbin, arm="left"))
     return (*hand_over, *throw) if right else throw

@@ -16,7 +16,7 @@ from robospa.tasks.instructions.words import color_orders
 from robospa.tasks.plan import Home, Pick, Place, Skill, Wait
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
-from robospa.workcell import TABLE_TOP, Workcell
+from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "instructions.toml")
 
@@ -48,7 +48,7 @@ COVERED_AT = 2.0
 BEHIND = 0.13
 """An opened cover's place lies this far [m] behind its block, away from the robot."""
 
-OPEN_BELOW = TABLE_TOP + 0.005
+OPEN_BELOW = 0.005
 """An opened cover's origin is lower than this [m]."""
 
 LEVELS = {n: Level(candidates=n, subtasks=n, steps=50 + 200 * n) for n in range(1, 6)}
@@ -83,7 +83,7 @@ def goal(scene: Scene) -> UncoverInOrder:
     """The covers in the asked order."""
     pairs = zip(scene.facts["covers"], scene.facts["blocks"], strict=True)
     covers = [Cover(cover, _open_place(scene, block)) for cover, block in pairs]
-    return UncoverInOrder(covers, OPEN_BELOW)
+    return UncoverInOrder(covers, scene.table_top + OPEN_BELOW)
 
 
 def plan(scene: Scene) -> tuple[Skill, ...]:
@@ -93,7 +93,7 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
         x, y = _open_place(scene, block)
         arm = side(x)
         skills.append(Pick(cover, lift=0.08, arm=arm))
-        skills.append(Place(cover, (x, y, TABLE_TOP), arm=arm))
+        skills.append(Place(cover, (x, y, scene.table_top), arm=arm))
     return (*skills, Home())
 
 

@@ -23,7 +23,7 @@ from robospa.tasks.layouts import Area, Mask, scatter
 from robospa.tasks.plan import Home, Pick, Place, Skill
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
-from robospa.workcell import TABLE_TOP, Workcell
+from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "blocks.toml")
 
@@ -98,7 +98,7 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
     for name, x in zip(targets, row(len(targets), GOAL_X), strict=True):
         arm = side(scene.object(name).pose.position[0])
         skills.append(Pick(name, lift=0.08, arm=arm))
-        skills.append(Place(name, (x, GOAL_Y, TABLE_TOP + HALF), arm=arm))
+        skills.append(Place(name, (x, GOAL_Y, scene.table_top + HALF), arm=arm))
     return (*skills, Home())
 
 

@@ -23,7 +23,7 @@ from robospa.tasks.instructions.words import NUMBERS
 from robospa.tasks.plan import Home, Pick, Place, Skill
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
-from robospa.workcell import TABLE_TOP, Workcell
+from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "orientation.toml")
 
@@ -67,7 +67,9 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
 def goal(scene: Scene) -> AfterCue:
     """The near blocks turned like the far ones, after the wall has come."""
     pairs = zip(scene.facts["near"], scene.facts["turns"], strict=True)
-    wanted = [Wanted(name, yaw_rotation(TURNS[turn]), TABLE_TOP + LOW) for name, turn in pairs]
+    wanted = [
+        Wanted(name, yaw_rotation(TURNS[turn]), scene.table_top + LOW) for name, turn in pairs
+    ]
     return AfterCue(Restore(wanted, scene.facts["far"]), [scene.facts["wall"]])
 
 

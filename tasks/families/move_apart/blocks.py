@@ -20,7 +20,7 @@ from robospa.tasks.instructions.words import NUMBERS
 from robospa.tasks.plan import Pick, Place, Skill
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
-from robospa.workcell import TABLE_TOP, Workcell
+from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "blocks.toml")
 
@@ -118,7 +118,8 @@ def goal(scene: Scene) -> Regions:
     """Every block on its colour's side; the other side is astray."""
     facts = scene.facts
     parts = [Part(name, (RIGHT,), (LEFT,)) for name in facts["right"]]
-    return Regions([*parts, *(Part(name, (LEFT,), (RIGHT,)) for name in facts["left"])])
+    parts += [Part(name, (LEFT,), (RIGHT,)) for name in facts["left"]]
+    return Regions(parts, scene.table_top)
 
 
 def plan(scene: Scene) -> tuple[Skill, ...]:
@@ -130,7 +131,7 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
         for name, y in zip(sorted(at, key=lambda n: -at[n][1]), rows, strict=True):
             half = float(scene.object(name).params["half"][2])
             skills.append(Pick(name, lift=0.08, arm=arm))
-            skills.append(Place(name, (x, y, TABLE_TOP + half), arm=arm))
+            skills.append(Place(name, (x, y, scene.table_top + half), arm=arm))
     return tuple(skills)
 
 

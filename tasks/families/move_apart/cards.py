@@ -20,7 +20,7 @@ from robospa.tasks.instructions.words import NUMBERS, by_count
 from robospa.tasks.plan import Pick, Place, Skill
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
-from robospa.workcell import TABLE_TOP, Workcell
+from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "cards.toml")
 
@@ -59,12 +59,11 @@ def goal(scene: Scene) -> Regions:
     """Every box far out on either side; the farther side is a diagnostic."""
     start = {name: where for where, names in _sides(scene).items() for name in names}
     both = tuple(SIDES.values())
-    return Regions(
-        [
-            Part(name, both, (SIDES["left" if start[name] == "right" else "right"],))
-            for name in scene.facts["boxes"]
-        ]
-    )
+    parts = [
+        Part(name, both, (SIDES["left" if start[name] == "right" else "right"],))
+        for name in scene.facts["boxes"]
+    ]
+    return Regions(parts, scene.table_top)
 
 
 def plan(scene: Scene) -> tuple[Skill, ...]:
@@ -77,7 +76,7 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
         for name in sorted(names, key=lambda n: -abs(at[n][0])):
             x = PLACE_X if arm == "right" else -PLACE_X
             skills.append(Pick(name, lift=0.08, arm=arm))
-            skills.append(Place(name, (x, places[name], TABLE_TOP), arm=arm))
+            skills.append(Place(name, (x, places[name], scene.table_top), arm=arm))
     return tuple(skills)
 
 

@@ -19,7 +19,7 @@ from robospa.tasks.instructions.words import NUMBERS
 from robospa.tasks.plan import Pick, Place, Skill
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
-from robospa.workcell import TABLE_TOP, Workcell
+from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "food.toml")
 
@@ -77,7 +77,7 @@ def goal(scene: Scene) -> Regions:
     """Every object beyond its line, and both grippers open."""
     parts = [Part(name, (FORWARD,), (BACKWARD,)) for name in scene.facts["forward"]]
     parts += [Part(name, (BACKWARD,), (FORWARD,)) for name in scene.facts["backward"]]
-    return Regions(parts, opened=True)
+    return Regions(parts, scene.table_top, opened=True)
 
 
 def plan(scene: Scene) -> tuple[Skill, ...]:
@@ -91,7 +91,7 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
     for x, name, y in sorted(moves):
         arm = side(x)
         skills.append(Pick(name, lift=0.08, arm=arm))
-        skills.append(Place(name, (x, y, TABLE_TOP), arm=arm))
+        skills.append(Place(name, (x, y, scene.table_top), arm=arm))
     return tuple(skills)
 
 

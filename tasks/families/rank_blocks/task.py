@@ -34,7 +34,7 @@ from robospa.tasks.instructions.words import NUMBERS, by_count
 from robospa.tasks.plan import Pick, Place, Skill
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
-from robospa.workcell import TABLE_TOP, Workcell
+from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "instructions.toml")
 
@@ -166,7 +166,7 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
         x = ROWS[scene.level][order.index(name)]
         half = float(scene.object(name).params["half"][2])
         skills.append(Pick(name, lift=0.08, arm=arm))
-        skills.append(Place(name, (x, ROW_Y, TABLE_TOP + half), arm=arm))
+        skills.append(Place(name, (x, ROW_Y, scene.table_top + half), arm=arm))
     return tuple(skills)
 
 

@@ -41,7 +41,7 @@ def _pot_goal(scene: Scene) -> Cycles:
     pot = scene.object(scene.facts["thing"])
     model = objects.object_model(pot.asset, pot.params)
     handles = [model.frames[arm].position for arm in ("left", "right")]
-    up, down = held_up(pot.name, UP, handles), put_down(pot.name, DOWN, ASIDE)
+    up, down = held_up(pot.name, UP + scene.table_rise, handles), put_down(pot.name, DOWN, ASIDE)
     return Cycles(pot.name, int(scene.facts["count"]), up, down, radius=0.2)
 
 

@@ -21,7 +21,7 @@ from robospa.tasks.instructions.words import NUMBERS, by_count
 from robospa.tasks.layouts import Area, LayoutError, Points
 from robospa.tasks.plan import Pick, Place, Skill
 from robospa.tasks.scene import Scene
-from robospa.workcell import TABLE_TOP, Workcell
+from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "towers.toml")
 
@@ -165,7 +165,7 @@ def tower_plan(scene: Scene) -> tuple[Skill, ...]:
         half = _half_height(scene, name)
         skills.append(Pick(name, lift=0.10 + height, arm=arm))
         if i == 0:
-            skills.append(Place(name, (x, y, TABLE_TOP + half), arm=arm))
+            skills.append(Place(name, (x, y, scene.table_top + half), arm=arm))
         else:
             skills.append(Place(name, on=order[i - 1], arm=arm))
         height += 2 * half
