@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from robospa.categories import CATEGORIES
 from robospa.harness.grid import on_grid
 from robospa.harness.running.manifest import about_machine, group_keys, seed_hash
 from robospa.harness.trial import policy_seed
@@ -34,7 +35,6 @@ from robospa.leaderboard.sampling import announced
 from robospa.leaderboard.verify import verify
 from robospa.results.records.run_io import Run
 from robospa.results.records.trial_record import TrialRecord
-from robospa.results.scoring.scores import CATEGORIES
 from robospa.tasks.catalog import tasks
 from robospa.trial import TrialKey
 

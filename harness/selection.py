@@ -6,9 +6,9 @@ import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from robospa.categories import BASIC, CATEGORIES, DIMENSIONS
 from robospa.harness.settings import Selection, SettingsError
 from robospa.results.records.schema import MOST, parse
-from robospa.results.scoring.scores import BASIC, CATEGORIES, DIMENSIONS
 from robospa.trial import TrialKey
 
 GROUPS = {"all": CATEGORIES, **DIMENSIONS, "basic": BASIC}

@@ -22,7 +22,8 @@ from typing import Any
 from urllib.parse import unquote
 
 from robospa.results.figures.series import Drawing
-from robospa.results.records.run_io import MANIFEST, TRIALS, Run, RunError, read_run
+from robospa.results.records.manifest import MANIFEST, RunError
+from robospa.results.records.run_io import TRIALS, Run, read_run
 from robospa.results.report.page import FIGURES, page
 from robospa.results.report.report import draw_figures, gather
 from robospa.results.report.tables import for_page

@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from robospa.categories import CATEGORIES, DIMENSIONS, SPATIAL
 from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.scores import compare_scores
 from robospa.leaderboard.submission import Submission, slug_of
@@ -17,7 +18,7 @@ from robospa.results.paper import rounding
 from robospa.results.paper.columns import Column, published_column, table_values
 from robospa.results.paper.published import LEVELS, load
 from robospa.results.report.score_table import to_json
-from robospa.results.scoring.scores import CATEGORIES, DIMENSIONS, SPATIAL, Cell, combine
+from robospa.results.scoring.scores import Cell, combine
 from robospa.results.statistics.intervals import Estimate
 
 BADGES = {

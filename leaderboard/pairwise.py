@@ -17,7 +17,7 @@ from robospa.leaderboard import bundle as layout
 from robospa.leaderboard.entries import Entry
 from robospa.leaderboard.trial_outcomes import paired, side_of
 from robospa.results.comparison.operands import Side
-from robospa.results.records.run_io import manifest_keys
+from robospa.results.records.manifest import manifest_keys
 from robospa.results.report.page import own_version
 
 FOLDER = "pairs"

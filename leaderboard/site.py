@@ -19,6 +19,7 @@ from pathlib import Path
 from statistics import NormalDist
 from typing import Any
 
+from robospa.categories import CATEGORIES, CATEGORY_NAMES, DIMENSIONS
 from robospa.harness.running.store import replace_file
 from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.entries import BADGES, Entry, all_entries, page_values
@@ -32,7 +33,6 @@ from robospa.results.paper.published import load
 from robospa.results.report.page import FIGURES, card, figure, own_version, render
 from robospa.results.report.report import method_notes
 from robospa.results.report.tables import Shown, for_page, report_tables
-from robospa.results.scoring.scores import CATEGORIES, CATEGORY_NAMES, DIMENSIONS
 
 MARK = ".robospa-site"
 """A file that says a folder is ours to write over."""

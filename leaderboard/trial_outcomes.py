@@ -12,12 +12,12 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from robospa.categories import METRICS
 from robospa.leaderboard.bundle import BundleError
 from robospa.results.comparison.compare import Difference, compare, over_levels
 from robospa.results.comparison.operands import COMPARED, CompareError, Side, Variant, sample_of
 from robospa.results.records.run_io import Run
 from robospa.results.records.trial_record import TrialRecord
-from robospa.results.scoring.scores import METRICS
 from robospa.trial import TrialKey
 
 DIGITS = "0123456789abcdefghijklmnopqrstuvwxyz"

@@ -37,7 +37,8 @@ from robospa.leaderboard.scores import compare_scores, scores_of, tables_of
 from robospa.leaderboard.strict_json import parse, parse_map
 from robospa.leaderboard.trial_outcomes import outcomes_of
 from robospa.results.records.lint import lint_run
-from robospa.results.records.run_io import Run, RunError, manifest_keys
+from robospa.results.records.manifest import RunError, manifest_keys
+from robospa.results.records.run_io import Run
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 

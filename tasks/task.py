@@ -8,6 +8,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from robospa.categories import BASIC, SPATIAL
 from robospa.tasks.events import Event
 from robospa.tasks.instructions.grammar import Phrasings, Templates
 from robospa.tasks.plan import Skill
@@ -52,9 +53,6 @@ class Level:
 Draw = Callable[[int, np.random.Generator, Workcell], Draft]
 """A level's draw. Scenes are the same for every robot: the workcell is that of the suite's own."""
 
-BASIC = ("CBG", "EPG", "SOI")
-"""Color-Based Grounding, Egocentric Position Grounding, Simple Ordinal Indexing."""
-
 
 @dataclass(frozen=True)
 class Task:
@@ -81,4 +79,4 @@ class Task:
         """ "spatial", "procedural" or "basic" (the appendix's references, outside the 280)."""
         if self.category in BASIC:
             return "basic"
-        return "spatial" if self.category in ("GAC", "SDE", "CPI", "RRR", "CVR") else "procedural"
+        return "spatial" if self.category in SPATIAL else "procedural"

@@ -97,7 +97,7 @@ def _side(name: str, metric: str) -> Side:
 
 
 def _print(found: Comparison, variants: bool) -> None:
-    from robospa.results.scoring.scores import METRIC_NAMES
+    from robospa.categories import METRIC_NAMES
     from robospa.results.statistics.significance import ALPHA
 
     print(f"{METRIC_NAMES[found.metric]} of {found.first} minus {found.second}, percentage points")

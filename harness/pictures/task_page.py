@@ -14,8 +14,8 @@ from itertools import groupby, pairwise
 from pathlib import Path
 from typing import Any
 
+from robospa.categories import CATEGORY_NAMES
 from robospa.harness.world import RenderUnavailable, SceneUnstable
-from robospa.results.scoring.scores import CATEGORY_NAMES
 from robospa.tasks.catalog import build_scene, tasks
 from robospa.tasks.objects import object_model
 from robospa.tasks.scene import Scene, SceneObject

@@ -19,7 +19,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from robospa.harness.running.store import storing
-from robospa.results.records.run_io import RunError
+from robospa.results.records.manifest import RunError
 
 LOCK = ".lock"
 BEAT = 5.0

@@ -22,11 +22,15 @@ from typing import Any
 from robospa.harness.running.code_hash import code_hash
 from robospa.harness.running.locking import LOCK
 from robospa.harness.running.store import PART, replace_file
-from robospa.results.records.run_io import MANIFEST, RunError, manifest_keys, read_manifest
+from robospa.results.records.manifest import (
+    FORMAT,
+    MANIFEST,
+    RunError,
+    manifest_keys,
+    read_manifest,
+)
 from robospa.tasks.scene import SUITE
 from robospa.trial import TrialKey
-
-FORMAT = 1
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from robospa.harness.factory import open_policy
 from robospa.protocol.policy import PolicySpec
-from robospa.results.records.run_io import RunError
+from robospa.results.records.manifest import RunError
 from robospa.results.records.schema import parse
 from robospa.trial import TrialKey
 

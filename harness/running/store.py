@@ -25,7 +25,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.results.records.run_io import TRIALS, RunError, to_line
+from robospa.results.records.manifest import RunError
+from robospa.results.records.run_io import TRIALS, to_line
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 

@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
+from robospa.categories import CATEGORIES
 from robospa.results.comparison.operands import (
     COMPARED,
     CompareError,
@@ -25,7 +26,6 @@ from robospa.results.comparison.operands import (
     weights_of,
 )
 from robospa.results.records.trial_record import TrialRecord
-from robospa.results.scoring.scores import CATEGORIES
 from robospa.results.statistics.bootstrap import Sample
 from robospa.results.statistics.intervals import (
     METHODS,

@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from robospa.categories import BASIC, CATEGORIES, DIMENSIONS, PROCEDURAL, SPATIAL
 from robospa.results.paper.published import load, title
 from robospa.results.records.run_io import Run, finished
 from robospa.results.records.trial_record import TrialRecord
-from robospa.results.scoring.scores import BASIC, CATEGORIES, DIMENSIONS, PROCEDURAL, SPATIAL
 from robospa.results.statistics.bootstrap import Sample, progress, rate
 
 Variant = tuple[str, int]
@@ -53,7 +53,7 @@ def side_of_run(run: Run, name: str = "", metric: str = "sr") -> Side:
                 f"{label} mixes the {what} {' and '.join(mixed)}, whose mean means nothing: "
                 "run them apart"
             )
-    category = dict(run.manifest.get("categories", {}))
+    category = dict(run.info.categories)
     trials: dict[Variant, dict[int, TrialRecord]] = {}
     listed: dict[Variant, int] = {}
     for key in run.keys:
@@ -68,11 +68,9 @@ def side_of_run(run: Run, name: str = "", metric: str = "sr") -> Side:
     for v, found in trials.items():
         if category.get(v[0]) in COMPARED[metric]:
             samples[v] = sample_of(list(found.values()), metric, f"{label}, {v[0]} L{v[1]}")
-    about = run.manifest.get("about", {})
-    versions = {**about.get("versions", {}), "code": about.get("code", "")}
-    spec = run.manifest.get("settings", {}).get("policy", {}).get("spec", {})
-    seeded = bool(spec.get("seeded", True))
-    scale = float(run.manifest.get("settings", {}).get("step_scale", 1.0))
+    versions = {**run.info.versions, "code": run.info.code}
+    seeded = run.info.seeded is not False
+    scale = run.info.step_scale
     return Side(label, settings.pop(), category, samples, trials, listed, versions, seeded, scale)
 
 

@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from robospa.categories import SPATIAL
 from robospa.results.failures.attribution import Cause, roles_of, root_of
 from robospa.results.records.trial_record import TrialRecord
 
@@ -32,8 +33,6 @@ NAMES = {
 KINDS = tuple(NAMES)
 OURS = ("no_attempt", "invalid_action")
 """Kinds that the paper does not have."""
-
-SPATIAL = ("GAC", "SDE", "CPI", "RRR", "CVR")
 
 SIMULATED_PER_FILM = 2.0
 """Simulated seconds in a second of video: a frame every 0.2 s, ten frames a second."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from robospa.categories import CATEGORY_NAMES, PROCEDURAL, SPATIAL
 from robospa.results.figures.series import (
     COLOURS,
     DASHES,
@@ -16,7 +17,7 @@ from robospa.results.figures.series import (
     plain,
     series_handles,
 )
-from robospa.results.scoring.scores import CATEGORY_NAMES, PROCEDURAL, SPATIAL, Scores
+from robospa.results.scoring.scores import Scores
 
 
 def chance_levels(scores: Scores) -> dict[tuple[str, int], float]:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+from robospa.categories import CATEGORIES
 from robospa.results.figures.series import (
     COLOURS,
     DASHES,
@@ -17,7 +18,6 @@ from robospa.results.figures.series import (
     percent_of,
     series_handles,
 )
-from robospa.results.scoring.scores import CATEGORIES
 
 LEVELS = (1, 5)
 

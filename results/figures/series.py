@@ -12,8 +12,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from robospa.categories import BASIC, CATEGORIES
 from robospa.results.records.trial_record import TrialRecord
-from robospa.results.scoring.scores import BASIC, CATEGORIES, Average, Cell, Scores
+from robospa.results.scoring.scores import Average, Cell, Scores
 
 WIDTH = 3.4
 """Width of a column [inch]."""

@@ -12,11 +12,11 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 
+from robospa.categories import DIMENSIONS, METRIC_CATEGORIES
 from robospa.results.paper import rounding
-from robospa.results.paper.columns import METRIC_CATEGORIES, Column, published_column
+from robospa.results.paper.columns import Column, published_column
 from robospa.results.paper.published import LEVELS, Published, Table, load
 from robospa.results.paper.rounding import rounded
-from robospa.results.scoring.scores import DIMENSIONS
 from robospa.results.statistics.intervals import interval_of
 
 ENDS = 0.1

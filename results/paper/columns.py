@@ -11,19 +11,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from robospa.categories import BASIC, DIMENSIONS, METRIC_CATEGORIES, SPATIAL
 from robospa.results.paper import rounding
 from robospa.results.paper.published import LEVELS, Published, load, title
 from robospa.results.records.run_io import Run
-from robospa.results.scoring.scores import (
-    BASIC,
-    DIMENSIONS,
-    SPATIAL,
-    Average,
-    Cell,
-    Scores,
-    combine,
-    score_run,
-)
+from robospa.results.scoring.scores import Average, Cell, Scores, combine, score_run
 from robospa.results.statistics.bootstrap import Sample, rate
 from robospa.results.statistics.intervals import (
     METHODS,
@@ -33,13 +25,6 @@ from robospa.results.statistics.intervals import (
     wilson,
 )
 from robospa.results.tables.table import MISSING
-
-METRIC_CATEGORIES = {
-    "sr": (*DIMENSIONS["spatial"], *DIMENSIONS["procedural"]),
-    "onta": DIMENSIONS["spatial"],
-    "ps": DIMENSIONS["procedural"],
-}
-"""The categories that a metric is defined for."""
 
 
 class TableError(ValueError):
@@ -226,10 +211,7 @@ def published_column(model: str, name: str | None = None, ci: str = METHODS[0]) 
 def run_column(run: Run, name: str | None = None, ci: str = METHODS[0]) -> Column:
     """A run as a column; TableError if it mixes what one column cannot hold, or fits no table."""
     data = load()
-    policy = run.manifest.get("settings", {}).get("policy", {}).get("spec", {}).get("name", "")
-    label = name or str(policy) or run.folder.name
-    privileged = bool(run.manifest.get("settings", {}).get("privileged"))
-    label += " (privileged)" * privileged
+    label = (name or run.info.policy or run.folder.name) + " (privileged)" * run.info.privileged
     keys = run.keys
     if not keys:
         raise TableError(f"the run {label} lists no trials; there is nothing to show")
@@ -239,7 +221,7 @@ def run_column(run: Run, name: str | None = None, ci: str = METHODS[0]) -> Colum
             raise TableError(
                 f"the run {label} mixes {what}s ({_names(several)}); evaluate one at a time"
             )
-    basic = {t for t, c in dict(run.manifest.get("categories", {})).items() if c in BASIC}
+    basic = {t for t, c in run.info.categories.items() if c in BASIC}
     unknown = sorted(
         {
             f"{k.task} L{k.level}"
@@ -259,10 +241,10 @@ def run_column(run: Run, name: str | None = None, ci: str = METHODS[0]) -> Colum
         table_values(scores.cells),
         keys[0].embodiment,
         keys[0].mode,
-        suite=str(run.manifest.get("suite", "")),
+        suite=run.info.suite,
         split=keys[0].split,
         trials=max(cell.listed for cell in scores.cells.values()),
-        privileged=privileged,
+        privileged=run.info.privileged,
     )
 
 

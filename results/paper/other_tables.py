@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from robospa.categories import BASIC, CATEGORY_NAMES, DIMENSIONS
 from robospa.results.paper import rounding
 from robospa.results.paper.check import checks, errata
 from robospa.results.paper.columns import Column, check_columns
 from robospa.results.paper.published import load, title
 from robospa.results.paper.result_tables import DASH, DIMENSION_NAMES, not_run_note
-from robospa.results.scoring.scores import BASIC, CATEGORY_NAMES, DIMENSIONS
 from robospa.results.statistics.intervals import interval_of
 from robospa.results.tables.table import MISSING, Entry, Grid, Line
 

@@ -10,11 +10,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from robospa.categories import CATEGORY_NAMES, DIMENSIONS, METRIC_CATEGORIES, METRIC_NAMES
 from robospa.results.paper import rounding
 from robospa.results.paper.check import Check, errata
-from robospa.results.paper.columns import METRIC_CATEGORIES, Column, check_columns
+from robospa.results.paper.columns import Column, check_columns
 from robospa.results.paper.published import LEVELS, load
-from robospa.results.scoring.scores import CATEGORY_NAMES, DIMENSIONS, METRIC_NAMES
 from robospa.results.statistics.significance import separable
 from robospa.results.tables.table import MISSING, PRINTED_OTHERWISE, Entry, Grid, Line
 

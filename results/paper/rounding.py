@@ -12,10 +12,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 
-DIMENSION_OF = {
-    **dict.fromkeys(("GAC", "SDE", "CPI", "RRR", "CVR"), "spatial"),
-    **dict.fromkeys(("RPF", "OFE", "OCE", "CAC", "MIP"), "procedural"),
-}
+from robospa.categories import DIMENSIONS
+
 OVERALL = "overall"
 
 
@@ -85,8 +83,8 @@ def summary(
     means: dict[str, float | None] = {
         category: mean(tasks.get(task) for task in names) for category, names in members.items()
     }
-    for dimension in dict.fromkeys(DIMENSION_OF[c] for c in members):
-        parts = [c for c in members if DIMENSION_OF[c] == dimension]
-        means[dimension] = mean(means[c] for c in parts)
+    for dimension, categories in DIMENSIONS.items():
+        if parts := [means[c] for c in members if c in categories]:
+            means[dimension] = mean(parts)
     means[OVERALL] = mean(means[c] for c in members)
     return means

@@ -13,11 +13,11 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
+from robospa.categories import PROCEDURAL
 from robospa.results.paper.published import load
 from robospa.results.paper.rounding import onta, rounded
 from robospa.results.records.run_io import TRIALS, Run, finished, read_file
 from robospa.results.records.trial_record import TrialRecord
-from robospa.results.scoring.scores import PROCEDURAL
 from robospa.trial import TrialKey
 
 FASTEST_STEP = 4e-6
@@ -169,13 +169,13 @@ def lint_runs(runs: Sequence[Run]) -> list[Finding]:
     """What keeps several runs from standing in one table."""
     found: list[Finding] = []
     for title, read in (
-        ("code", lambda r: r.manifest.get("about", {}).get("code")),
-        ("versions", lambda r: r.manifest.get("about", {}).get("versions")),
-        ("list of trials", lambda r: r.manifest.get("seed_hash")),
+        ("code", lambda r: r.info.code),
+        ("versions", lambda r: r.info.versions),
+        ("list of trials", lambda r: r.info.seed_hash),
         ("embodiments", lambda r: sorted({k.embodiment for k in r.keys})),
         ("scene modes", lambda r: sorted({k.mode for k in r.keys})),
         ("instruction splits", lambda r: sorted({k.split for k in r.keys})),
-        ("step limits", step_scale),
+        ("step limits", lambda r: r.info.step_scale),
     ):
         if len({repr(read(run)) for run in runs}) > 1:
             names = ", ".join(run.folder.name for run in runs)
@@ -239,14 +239,9 @@ def _lint_listing(
             yield Finding("mixed-suites", "warning", name, text)
 
 
-def step_scale(run: Run) -> float:
-    """How many times the official step limits the run allowed."""
-    return float(run.manifest.get("settings", {}).get("step_scale", 1.0))
-
-
 def _lint_limits(run: Run, name: str) -> Iterator[Finding]:
     """What a run allowed beyond the benchmark."""
-    if (scale := step_scale(run)) != 1:
+    if (scale := run.info.step_scale) != 1:
         text = f"step limits are {scale:g} times the official ones: not the benchmark's numbers"
         yield Finding("step-limits", "warning", name, text)
 

@@ -1,9 +1,9 @@
 """Trial records as lines of JSON, and whole runs read back from their folder.
 
-A line that was torn off at the end of a file (the writer was killed) is dropped: that trial is owed
-again. Anything else that is not a record is refused, naming file and line. Two records of one trial
-must agree on everything that a repeatable world decides; if not, that is a `RepeatabilityError`.
-A run may come from strangers: names become paths, so they are plain; see `results.strangers`.
+A line that was torn off at the end of a file (the writer was killed) is dropped: that trial has
+to be run again. Anything else that is not a record is refused, naming file and line. Two records of
+one trial must agree on everything that a repeatable world decides; if not, that is a
+`RepeatabilityError`. A run may come from anywhere: `records.schema` says what its files may hold.
 """
 
 from __future__ import annotations
@@ -11,16 +11,24 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, fields
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from robospa.results.records.schema import check_key, check_manifest, check_record, parse
+from robospa.results.records.manifest import (
+    RunError,
+    RunInfo,
+    manifest_keys,
+    read_bytes,
+    read_manifest,
+    run_info,
+)
+from robospa.results.records.schema import check_record, parse
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
 TRIALS = "trials"
 """Folder inside a run that holds the record files."""
-MANIFEST = "run.json"
 
 DECIDED = (
     "instruction",
@@ -37,15 +45,8 @@ DECIDED = (
 )
 """Fields that have to be equal in every record of one trial."""
 FIELDS = frozenset(f.name for f in fields(TrialRecord))
-FORMAT = 1
-"""Version of a run's folder. A newer one is refused."""
-MOST_RECORDS = 2**30
-MOST_MANIFEST = 2**26
-"""Bytes of a file of records and of `run.json`, at most: more is read of neither."""
-
-
-class RunError(Exception):
-    """A run's folder cannot be read; the message names file and line."""
+MAX_FILE_BYTES = 2**30
+"""More than this is read of no file of records."""
 
 
 class RepeatabilityError(RunError):
@@ -60,6 +61,11 @@ class Run:
     manifest: Mapping[str, Any]
     keys: tuple[TrialKey, ...]
     records: Mapping[TrialKey, TrialRecord]
+
+    @cached_property
+    def info(self) -> RunInfo:
+        """What the manifest says of the run."""
+        return run_info(self.manifest)
 
     @property
     def missing(self) -> tuple[TrialKey, ...]:
@@ -100,7 +106,7 @@ def from_data(data: Any) -> TrialRecord:
 
 def read_file(path: Path) -> list[TrialRecord]:
     """All whole records of one file, in order; raises RunError at the first corrupt line."""
-    lines = read_bytes(path, MOST_RECORDS).split(b"\n")
+    lines = read_bytes(path, MAX_FILE_BYTES).split(b"\n")
     whole = lines[:-1]  # what follows the last newline was torn off, or is empty
     records = []
     for number, raw in enumerate(whole, 1):
@@ -109,16 +115,6 @@ def read_file(path: Path) -> list[TrialRecord]:
         except ValueError as error:
             raise RunError(f"{path}, line {number}: {error}") from error
     return records
-
-
-def read_bytes(path: Path, most: int) -> bytes:
-    """All of `path`; raises RunError if it cannot be read or has more than `most` bytes."""
-    try:
-        if path.stat().st_size > most:
-            raise RunError(f"cannot read {path}: it has more than {most} bytes")
-        return path.read_bytes()
-    except OSError as error:
-        raise RunError(f"cannot read {path}: {error.strerror}") from error
 
 
 def differences(first: TrialRecord, second: TrialRecord) -> list[str]:
@@ -154,49 +150,6 @@ def read_records(folder: Path) -> dict[TrialKey, TrialRecord]:
     for path in sorted((folder / TRIALS).glob("*.jsonl")):
         merged = merge(read_file(path), merged)
     return merged
-
-
-def read_manifest(folder: Path) -> dict[str, Any]:
-    """The run's `run.json`; raises RunError if there is none or it is broken."""
-    path = folder / MANIFEST
-    if not path.exists():
-        raise RunError(f"{folder} is not a run: it has no {MANIFEST}")
-    try:
-        data = parse(read_bytes(path, MOST_MANIFEST).decode())
-    except ValueError as error:
-        raise RunError(f"cannot read {path}: {error}") from error
-    if not isinstance(data, dict) or not isinstance(data.get("trials"), list):
-        raise RunError(f"{path} is no run manifest: it has no list of trials")
-    version = data.get("format", FORMAT)
-    if type(version) is not int or version > FORMAT:
-        raise RunError(
-            f"{path} has format {str(version)[:20]}, and this robospa reads up to {FORMAT}: "
-            "use the version that wrote it or a newer one"
-        )
-    try:
-        check_manifest(data)
-    except ValueError as error:
-        raise RunError(f"{path} is no run manifest: {error}") from error
-    return data
-
-
-def manifest_keys(manifest: Mapping[str, Any]) -> tuple[TrialKey, ...]:
-    """The trials that a manifest lists; raises RunError if one of them is malformed."""
-    keys: list[TrialKey] = []
-    try:
-        for row in manifest["trials"]:
-            names = (row["task"], row["level"], row["embodiment"], row["mode"], row["split"])
-            task, level, embodiment, mode, split = names
-            if not isinstance(row["seeds"], list):
-                raise ValueError("its seeds are no list")
-            for seed in row["seeds"]:
-                keys.append(TrialKey(task, level, seed, embodiment, mode, split))
-                check_key(keys[-1])
-    except (KeyError, TypeError, ValueError) as error:
-        raise RunError(
-            f"the manifest's list of trials is malformed: {repr(error)[:200]}"
-        ) from error
-    return tuple(keys)
 
 
 def read_run(folder: str | Path) -> Run:

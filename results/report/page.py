@@ -13,13 +13,14 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from robospa.categories import BASIC, CATEGORY_NAMES
 from robospa.results.failures.labels import NAMES, SIMULATED_PER_FILM
 from robospa.results.figures.series import FORMATS, GRID, INK, Drawing
 from robospa.results.records.run_io import Run
-from robospa.results.report.run_card import facts, is_privileged
+from robospa.results.report.run_card import facts
 from robospa.results.report.score_table import percent
 from robospa.results.report.trials import failure_counts, trial_rows
-from robospa.results.scoring.scores import BASIC, CATEGORY_NAMES, Scores
+from robospa.results.scoring.scores import Scores
 
 FIGURES = "figures"
 
@@ -90,7 +91,7 @@ def badges(runs: Sequence[Run], names: Sequence[str]) -> list[str]:
     made = []
     for run, name in zip(runs, names, strict=True):
         of = f"{name}: " if len(runs) > 1 else ""
-        if is_privileged(run):
+        if run.info.privileged:
             made.append(f"{of}privileged, sees the exact state")
         if run.missing:
             made.append(f"{of}{len(run.missing)} of {len(run.keys)} trials are missing")

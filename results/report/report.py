@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from robospa.categories import METRIC_NAMES
 from robospa.results.figures.draw import draw
 from robospa.results.figures.series import FORMATS, Drawing, Series
 from robospa.results.paper.columns import (
@@ -29,7 +30,7 @@ from robospa.results.report.page import FIGURES, page
 from robospa.results.report.run_card import about, ends, facts, names_of
 from robospa.results.report.score_table import loss_lines, missing_lines, to_json
 from robospa.results.report.tables import Shown, for_page, report_tables, write_files
-from robospa.results.scoring.scores import METRIC_NAMES, Scores, score_run
+from robospa.results.scoring.scores import Scores, score_run
 from robospa.results.tables.table import escape_markdown, to_markdown
 
 TABLES = "tables"

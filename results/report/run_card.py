@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from robospa.results.records.manifest import RunInfo
 from robospa.results.records.run_io import Run
 from robospa.results.records.trial_record import PROCESSOR
 
@@ -20,20 +21,9 @@ ACTIONS = {"action": "", "horizon": "chunks of at most ", "execute": "executed o
 """What the spec says of actions, and the words before it."""
 
 
-def spec_of(run: Run) -> Mapping[str, Any]:
-    """What the policy said about itself."""
-    found: Mapping[str, Any] = run.manifest.get("settings", {}).get("policy", {}).get("spec", {})
-    return found
-
-
-def is_privileged(run: Run) -> bool:
-    """Whether the policy saw the exact state."""
-    return bool(run.manifest.get("settings", {}).get("privileged"))
-
-
 def names_of(runs: Sequence[Run]) -> list[str]:
     """A name for every run: its policy's, with the run's folder where two would be equal."""
-    policies = [str(spec_of(run).get("name", "unknown")) for run in runs]
+    policies = [run.info.policy or "unknown" for run in runs]
     names: list[str] = []
     for run, policy in zip(runs, policies, strict=True):
         name = policy if policies.count(policy) == 1 else f"{policy} ({run.folder.name})"
@@ -45,24 +35,21 @@ def names_of(runs: Sequence[Run]) -> list[str]:
 
 def about(run: Run) -> dict[str, Any]:
     """The facts of the manifest that a reader needs."""
-    manifest = run.manifest
-    settings = manifest.get("settings", {})
-    machine = manifest.get("about", {})
-    spec = spec_of(run)
+    info = run.info
     return {
-        "policy": spec.get("name", "unknown"),
-        "privileged": is_privileged(run),
-        "seeded": bool(spec.get("seeded")),
-        "spec": spec,
+        "policy": info.policy or "unknown",
+        "privileged": info.privileged,
+        "seeded": bool(info.seeded),
+        "spec": info.spec,
         "trials": len(run.keys),
         "results": len(run.keys) - len(run.missing),
         "missing": len(run.missing),
-        "settings": settings,
-        "seed_hash": manifest.get("seed_hash", ""),
-        "versions": machine.get("versions", {}),
-        "git": machine.get("git", {}),
-        "machine": machine.get("machine", {}),
-        "world": machine.get("world", {}),
+        "settings": info.settings,
+        "seed_hash": info.seed_hash,
+        "versions": info.versions,
+        "git": info.git,
+        "machine": info.machine,
+        "world": info.world,
     }
 
 
@@ -109,26 +96,26 @@ def timing(run: Run) -> dict[str, float]:
 
 def facts(run: Run) -> list[tuple[str, str]]:
     """The run's card, as name and text; facts that are not known are left out."""
-    info = about(run)
-    settings, spec = info["settings"], info["spec"]
-    seeded = "honours the trial's policy seed" if info["seeded"] else "ignores the policy seed"
+    info = run.info
+    settings, spec = info.settings, info.spec
+    seeded = "honours the trial's policy seed" if info.seeded else "ignores the policy seed"
     asked = ", ".join(str(c.get("name", c)) if isinstance(c, Mapping) else str(c)
                       for c in spec.get("cameras") or ()) or "no camera"  # fmt: skip
-    sees = "the exact state (privileged)" if info["privileged"] else f"observations: {asked}"
+    sees = "the exact state (privileged)" if info.privileged else f"observations: {asked}"
     found = [
-        ("policy", info["policy"]),
+        ("policy", info.policy or "unknown"),
         ("sees", sees),
         ("actions", _words(f"{said}{spec[n]}" for n, said in ACTIONS.items() if spec.get(n))),
         ("seeding", f"{seeded}; seed {settings.get('policy_seed', 0)}" if spec else ""),
-        ("trials", f"{info['results']} of {info['trials']} with a result"),
+        ("trials", f"{len(run.keys) - len(run.missing)} of {len(run.keys)} with a result"),
         ("ends", _words(f"{count} {name}" for name, count in ends(run).items())),
         ("setting", _words(_line(settings.get(n)) for n in ("embodiment", "mode", "split")
                            if settings.get(n))),
-        ("departure", _departure(settings)),
-        ("list of trials", f"hash {info['seed_hash']}" if info["seed_hash"] else ""),
+        ("departure", _step_limits(info.step_scale)),
+        ("list of trials", f"hash {info.seed_hash}" if info.seed_hash else ""),
         ("software", _software(info)),
-        ("machine", _pairs(info["machine"])),
-        ("world", _pairs(info["world"])),
+        ("machine", _pairs(info.machine)),
+        ("world", _pairs(info.world)),
         ("policy latency", _latency(run)),
         ("time spent on", _words(f"{name} {100 * share:.0f} %" for name, share in
                                  timing(run).items() if share >= 0.005)),
@@ -137,16 +124,15 @@ def facts(run: Run) -> list[tuple[str, str]]:
     return [(name, text) for name, text in found if text]
 
 
-def _departure(settings: Mapping[str, Any]) -> str:
-    scale = float(settings.get("step_scale", 1))
+def _step_limits(scale: float) -> str:
     return f"step limits are {scale:g} times the official ones" if scale != 1 else ""
 
 
-def _software(info: Mapping[str, Any]) -> str:
-    git = info["git"]
-    commit = str(git.get("commit", ""))[:12] + (" with changes" if git.get("dirty") else "")
-    parts = [f"{name} {version}" for name, version in info["versions"].items()]
-    return _words([*parts, f"commit {commit}"] if git.get("commit") else parts)
+def _software(info: RunInfo) -> str:
+    parts = [f"{name} {version}" for name, version in info.versions.items()]
+    if commit := str(info.git.get("commit", "")):
+        parts.append(f"commit {commit[:12]}" + " with changes" * bool(info.git.get("dirty")))
+    return _words(parts)
 
 
 def _latency(run: Run) -> str:
@@ -170,7 +156,7 @@ def _pairs(values: Mapping[str, Any]) -> str:
     return _words(f"{name} {_line(v)}" for name, v in values.items() if v not in (None, "", {}))
 
 
-def _words(parts: Any) -> str:
+def _words(parts: Iterable[str]) -> str:
     return ", ".join(parts)
 
 

@@ -6,20 +6,10 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from robospa.categories import BASIC, CATEGORIES, CATEGORY_NAMES, DIMENSIONS, METRIC_NAMES, METRICS
 from robospa.results.records.run_io import Run
 from robospa.results.report.run_card import ends
-from robospa.results.scoring.scores import (
-    BASIC,
-    CATEGORIES,
-    CATEGORY_NAMES,
-    DIMENSIONS,
-    METRIC_NAMES,
-    METRICS,
-    Average,
-    Cell,
-    Scores,
-    score_run,
-)
+from robospa.results.scoring.scores import Average, Cell, Scores, score_run
 from robospa.results.statistics.intervals import Estimate
 from robospa.results.tables.table import MISSING
 
@@ -204,8 +194,8 @@ def terminal(run: Run, ci: str = "wilson") -> None:
     shown = rows(scores)
     if all(category_size(scores, row) < 2 for row in shown):
         shown = [row for row in shown if row.kind != "category"]  # they would repeat their task
-    name = run.manifest.get("settings", {}).get("policy", {}).get("spec", {}).get("name", "policy")
-    privileged = " (privileged: sees the exact state)" if is_privileged(run) else ""
+    name = run.info.policy or "policy"
+    privileged = " (privileged: sees the exact state)" if run.info.privileged else ""
     table = Table(title=f"{name}{privileged}", title_justify="left", box=None, pad_edge=False)
     table.add_column("")
     for level in scores.levels:
@@ -254,8 +244,3 @@ def _ends_line(run: Run) -> str:
     counts = ", ".join(f"{count} {name}" for name, count in ends(run).items())
     note = f" ({MISSING} lacks trials)" if run.missing else ""
     return f"{len(run.keys)} trials: {counts}{note}"
-
-
-def is_privileged(run: Run) -> bool:
-    """Whether the policy saw the exact state."""
-    return bool(run.manifest.get("settings", {}).get("privileged"))

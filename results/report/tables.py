@@ -12,7 +12,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from robospa.results.paper.columns import METRIC_CATEGORIES, Column
+from robospa.categories import METRIC_CATEGORIES
+from robospa.results.paper.columns import Column
 from robospa.results.paper.other_tables import basic_table
 from robospa.results.paper.result_tables import DASH, summary_table, task_table
 from robospa.results.paper.tables import write_tables

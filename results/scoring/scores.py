@@ -15,6 +15,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from robospa.categories import BASIC, CATEGORIES, DIMENSIONS, METRICS, PROCEDURAL, SPATIAL
 from robospa.results.records.run_io import Run, finished
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.statistics.bootstrap import Sample, progress, rate
@@ -27,31 +28,6 @@ from robospa.results.statistics.intervals import (
     wilson,
 )
 from robospa.trial import TrialKey
-
-SPATIAL = ("GAC", "SDE", "CPI", "RRR", "CVR")
-PROCEDURAL = ("RPF", "OFE", "OCE", "CAC", "MIP")
-CATEGORIES = SPATIAL + PROCEDURAL
-BASIC = ("CBG", "EPG", "SOI")
-"""The appendix's references: scored by category, part of no dimension, not of the overall value."""
-CATEGORY_NAMES = {
-    "GAC": "Geometric Attribute Cognition",
-    "SDE": "Spatial Distance Estimation",
-    "CPI": "Canonical Position Indexing",
-    "RRR": "Referential Relational Reasoning",
-    "CVR": "Cross-View Reasoning",
-    "RPF": "Repetitive Procedure Following",
-    "OFE": "Order-Free Execution",
-    "OCE": "Order-Constrained Execution",
-    "CAC": "Composite Action Coordination",
-    "MIP": "Memory-Intensive Planning",
-    "CBG": "Color-Based Grounding",
-    "EPG": "Egocentric Position Grounding",
-    "SOI": "Simple Ordinal Indexing",
-}
-DIMENSIONS = {"spatial": SPATIAL, "procedural": PROCEDURAL}
-METRICS = ("sr", "onta", "ps")
-METRIC_NAMES = {"sr": "SR", "onta": "ONTA", "ps": "PS"}
-
 
 Weighted = tuple[tuple[Sample, float], ...]
 Range = tuple[float, float]
@@ -297,4 +273,4 @@ def combine(cells: Mapping[tuple[str, int], Cell], ci: str = METHODS[0]) -> Scor
 
 def score_run(run: Run, ci: str = METHODS[0]) -> Scores:
     """All scores of `run`, with intervals by the method `ci`."""
-    return score(run.keys, run.records, run.manifest.get("categories"), ci)
+    return score(run.keys, run.records, run.info.categories, ci)

@@ -12,7 +12,8 @@ from report_runs import EVIL, make_run, record
 
 from robospa.harness import viewing
 from robospa.harness.viewing import Server, View, part_of, serving
-from robospa.results.records.run_io import RunError, to_line
+from robospa.results.records.manifest import RunError
+from robospa.results.records.run_io import to_line
 
 FILM = bytes(range(200))
 RECORDS = [record("Pick_Blocks_Size", 1, n, n < 3, candidates=2) for n in range(4)]

@@ -43,17 +43,8 @@ from robospa.leaderboard.archive import Archive
 from robospa.leaderboard.bundle import BundleError, canonical
 from robospa.leaderboard.packing import pack
 from robospa.leaderboard.verify import verify
-from robospa.results.records.run_io import (
-    RunError,
-    finished,
-    from_line,
-    manifest_keys,
-    merge,
-    read_file,
-    read_manifest,
-    read_run,
-    to_line,
-)
+from robospa.results.records.manifest import RunError, manifest_keys, read_manifest
+from robospa.results.records.run_io import finished, from_line, merge, read_file, read_run, to_line
 from robospa.trial import TrialKey
 
 ROOM = 512 * 2**20

@@ -17,7 +17,8 @@ from robospa.leaderboard.replay import Replay, replay
 from robospa.leaderboard.scores import scores_of, tables_of
 from robospa.leaderboard.trial_outcomes import outcomes_of
 from robospa.leaderboard.verify import verify
-from robospa.results.records.run_io import Run, from_data, manifest_keys
+from robospa.results.records.manifest import manifest_keys
+from robospa.results.records.run_io import Run, from_data
 
 CHALLENGE = "a value nobody knew"
 

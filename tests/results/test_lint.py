@@ -18,7 +18,8 @@ from robospa.results.records.lint import (
     lint_table,
     run_rows,
 )
-from robospa.results.records.run_io import RunError, read_run, to_line
+from robospa.results.records.manifest import RunError
+from robospa.results.records.run_io import read_run, to_line
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 

@@ -9,12 +9,12 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
+from robospa.categories import CATEGORIES, CATEGORY_NAMES, SPATIAL
 from robospa.results.paper import published
 from robospa.results.paper.check import Check, checks, errata
 from robospa.results.paper.columns import published_column
 from robospa.results.paper.published import LEVELS, load
 from robospa.results.paper.tables import make_tables
-from robospa.results.scoring.scores import CATEGORIES, CATEGORY_NAMES, SPATIAL
 from robospa.results.tables.table import to_csv
 
 FOLDER = Path(published.__file__).parent

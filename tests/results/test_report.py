@@ -10,7 +10,8 @@ from typing import Any
 import pytest
 from report_runs import EVIL, KNOWN, RECORDS, make_run
 
-from robospa.results.records.run_io import RunError, read_run
+from robospa.results.records.manifest import RunError
+from robospa.results.records.run_io import read_run
 from robospa.results.report import score_table as tables
 from robospa.results.report.report import write_report
 from robospa.results.report.trials import event_row

@@ -18,7 +18,8 @@ from robospa.harness.running.store import (
     tidy,
 )
 from robospa.harness.running.worker import Worker, WorkerConfig
-from robospa.results.records.run_io import RunError, read_file, read_records
+from robospa.results.records.manifest import RunError
+from robospa.results.records.run_io import read_file, read_records
 from robospa.results.records.trial_record import TrialRecord
 
 

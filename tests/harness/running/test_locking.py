@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from robospa.harness.running.locking import LOCK, WIDTH, locked
-from robospa.results.records.run_io import RunError
+from robospa.results.records.manifest import RunError
 
 ELSEWHERE = b"process 12 on node7 #%d 0000-another-kernel"
 

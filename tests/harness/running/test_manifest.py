@@ -16,7 +16,7 @@ from robospa.harness.running.manifest import (
     seed_hash,
     write_manifest,
 )
-from robospa.results.records.run_io import RunError, manifest_keys, read_manifest
+from robospa.results.records.manifest import RunError, manifest_keys, read_manifest
 from robospa.trial import TrialKey
 
 KEYS = tuple(TrialKey("Pick_Fake", level, seed) for level in (1, 2) for seed in (5, 6))

@@ -31,7 +31,8 @@ from robospa.protocol.errors import ServerError, TransportError
 from robospa.protocol.policy import TrialInfo
 from robospa.protocol.server import ServerThread
 from robospa.protocol.transport import Timeouts
-from robospa.results.records.run_io import RunError, read_file, read_run
+from robospa.results.records.manifest import RunError
+from robospa.results.records.run_io import read_file, read_run
 from robospa.results.scoring.scores import score_run
 from robospa.trial import TrialKey
 

@@ -24,7 +24,8 @@ from robospa.harness.running.policies import (
 from robospa.harness.running.worker import WorkerConfig
 from robospa.protocol.server import ServerThread
 from robospa.results.records.lint import lint_run
-from robospa.results.records.run_io import RunError, read_run
+from robospa.results.records.manifest import RunError
+from robospa.results.records.run_io import read_run
 from robospa.trial import TrialKey
 
 KNOWN = {"Pick_A", "Pick_B", "Pick_C", "Pick_D", "Pick_E"}

@@ -12,7 +12,8 @@ import pytest
 from robospa.harness.running.manifest import Manifest, check_folder, open_run, write_manifest
 from robospa.harness.running.runner import Runner, RunOptions
 from robospa.harness.running.worker import WorkerConfig
-from robospa.results.records.run_io import RunError, manifest_keys, read_manifest, read_records
+from robospa.results.records.manifest import RunError, manifest_keys, read_manifest
+from robospa.results.records.run_io import read_records
 from robospa.trial import TrialKey
 
 KEYS = tuple(TrialKey("Pick_Fake", level, seed) for level in (1, 2) for seed in (5, 6))

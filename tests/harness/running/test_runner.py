@@ -14,7 +14,8 @@ import pytest
 
 from robospa.harness.running.runner import RunAborted, Runner, RunOptions
 from robospa.harness.running.worker import WorkerConfig
-from robospa.results.records.run_io import RunError, finished, read_file, read_records
+from robospa.results.records.manifest import RunError
+from robospa.results.records.run_io import finished, read_file, read_records
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 

@@ -17,9 +17,9 @@ from robospa.harness.running.store import (
     replace_file,
     write_actions,
 )
+from robospa.results.records.manifest import RunError
 from robospa.results.records.run_io import (
     RepeatabilityError,
-    RunError,
     from_line,
     read_file,
     read_records,

@@ -1,0 +1,122 @@
+"""`run.json` read back: the list of trials, and what the rest says of policy, code and machine."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from robospa.results.records.schema import check_key, check_manifest, parse
+from robospa.trial import TrialKey
+
+MANIFEST = "run.json"
+FORMAT = 1
+"""Version of a run's folder. A newer one is refused."""
+MAX_MANIFEST_BYTES = 2**26
+
+
+class RunError(Exception):
+    """A run's folder cannot be read; the message names file and line."""
+
+
+@dataclass(frozen=True)
+class RunInfo:
+    """What a manifest says of a run, with a default for whatever an older version left out.
+
+    `policy` is the name that the policy gave itself, `spec` its whole specification; `seeded` is
+    None where that does not say whether the policy honours the trial's seed. `step_scale`
+    multiplied the official step limits. `settings` decide the results; `versions`, `code` (a hash),
+    `git`, `machine` and `world` say what made them.
+    """
+
+    policy: str = ""
+    seeded: bool | None = None
+    privileged: bool = False
+    step_scale: float = 1.0
+    suite: str = ""
+    seed_hash: str = ""
+    categories: Mapping[str, str] = field(default_factory=dict)
+    spec: Mapping[str, Any] = field(default_factory=dict)
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    versions: Mapping[str, Any] = field(default_factory=dict)
+    code: str = ""
+    git: Mapping[str, Any] = field(default_factory=dict)
+    machine: Mapping[str, Any] = field(default_factory=dict)
+    world: Mapping[str, Any] = field(default_factory=dict)
+
+
+def run_info(manifest: Mapping[str, Any]) -> RunInfo:
+    """What `manifest`, checked by `read_manifest`, says."""
+    settings, about = manifest.get("settings", {}), manifest.get("about", {})
+    spec = settings.get("policy", {}).get("spec", {})
+    seeded = spec.get("seeded")
+    return RunInfo(
+        policy=str(spec.get("name", "")),
+        seeded=None if seeded is None else bool(seeded),
+        privileged=bool(settings.get("privileged")),
+        step_scale=float(settings.get("step_scale", 1.0)),
+        suite=str(manifest.get("suite", "")),
+        seed_hash=str(manifest.get("seed_hash", "")),
+        categories=manifest.get("categories", {}),
+        spec=spec,
+        settings=settings,
+        versions=about.get("versions", {}),
+        code=str(about.get("code", "")),
+        git=about.get("git", {}),
+        machine=about.get("machine", {}),
+        world=about.get("world", {}),
+    )
+
+
+def read_manifest(folder: Path) -> dict[str, Any]:
+    """The run's `run.json`; raises RunError if there is none or it is broken."""
+    path = folder / MANIFEST
+    if not path.exists():
+        raise RunError(f"{folder} is not a run: it has no {MANIFEST}")
+    try:
+        data = parse(read_bytes(path, MAX_MANIFEST_BYTES).decode())
+    except ValueError as error:
+        raise RunError(f"cannot read {path}: {error}") from error
+    if not isinstance(data, dict) or not isinstance(data.get("trials"), list):
+        raise RunError(f"{path} is no run manifest: it has no list of trials")
+    version = data.get("format", FORMAT)
+    if type(version) is not int or version > FORMAT:
+        raise RunError(
+            f"{path} has format {str(version)[:20]}, and this robospa reads up to {FORMAT}: "
+            "use the version that wrote it or a newer one"
+        )
+    try:
+        check_manifest(data)
+    except ValueError as error:
+        raise RunError(f"{path} is no run manifest: {error}") from error
+    return data
+
+
+def read_bytes(path: Path, most: int) -> bytes:
+    """All of `path`; raises RunError if it cannot be read or has more than `most` bytes."""
+    try:
+        if path.stat().st_size > most:
+            raise RunError(f"cannot read {path}: it has more than {most} bytes")
+        return path.read_bytes()
+    except OSError as error:
+        raise RunError(f"cannot read {path}: {error.strerror}") from error
+
+
+def manifest_keys(manifest: Mapping[str, Any]) -> tuple[TrialKey, ...]:
+    """The trials that a manifest lists; raises RunError if one of them is malformed."""
+    keys: list[TrialKey] = []
+    try:
+        for row in manifest["trials"]:
+            names = (row["task"], row["level"], row["embodiment"], row["mode"], row["split"])
+            task, level, embodiment, mode, split = names
+            if not isinstance(row["seeds"], list):
+                raise ValueError("its seeds are no list")
+            for seed in row["seeds"]:
+                keys.append(TrialKey(task, level, seed, embodiment, mode, split))
+                check_key(keys[-1])
+    except (KeyError, TypeError, ValueError) as error:
+        raise RunError(
+            f"the manifest's list of trials is malformed: {repr(error)[:200]}"
+        ) from error
+    return tuple(keys)
