@@ -279,8 +279,8 @@ def _films(
 
 def _film(world: Any, run: Run, key: TrialKey, reference: Reference, home: Path) -> bytes:
     """A video of `key`, played from its recorded actions; BundleError if it ends differently."""
+    from robospa.harness.convention_check.rerun import rerun
     from robospa.harness.pictures.video import TrialRecorder
-    from robospa.harness.replays.rerun import rerun
 
     record = run.records[key]
     actions, _ = read_actions(action_path(home, key))

@@ -176,7 +176,7 @@ def _start(world: str, parts: str) -> None:
 
 def _again(claimed: TrialRecord, trace: Trace, space: str) -> Replayed:
     """Play one trial again and compare."""
-    from robospa.harness.replays.rerun import rerun
+    from robospa.harness.convention_check.rerun import rerun
 
     world, parts = _WORLD
     try:

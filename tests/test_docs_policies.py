@@ -20,8 +20,8 @@ import typer
 from robospa.clients import check_options
 from robospa.harness.cli.main import COMMANDS, NAMES
 from robospa.harness.cli.serve import options_class
+from robospa.harness.convention_check.episodes import Episode, write_episode
 from robospa.harness.factory import load_function
-from robospa.harness.replays.episodes import Episode, write_episode
 from robospa.harness.selection import parse_tasks
 from robospa.protocol.options import option_table, read_options, url_options
 from robospa.protocol.policy import CAMERAS

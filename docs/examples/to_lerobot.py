@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
-from robospa.harness.replays.episodes import read_episode
+from robospa.harness.convention_check.episodes import read_episode
 from robospa.protocol.policy import CameraSpec
 
 CAMERAS = [CameraSpec("head"), CameraSpec("left_wrist"), CameraSpec("right_wrist")]

@@ -1,9 +1,9 @@
 """`robospa check URL`: is this policy server fit to be evaluated?
 
 Four parts: the protocol (`robospa.protocol.conformance`), the first actions
-(`robospa.harness.replays.first_actions`), a real trial run twice
+(`robospa.harness.convention_check.initial_actions`), a real trial run twice
 (`robospa.harness.conformance_rollout`), and with --demo the replay of a demonstration
-(`robospa.harness.replays.replay_check`). Exit code 1 if a check of the protocol or a real trial
+(`robospa.harness.convention_check.check`). Exit code 1 if a check of the protocol or a real trial
 failed, or if the replay names a mistake; hints, and a replay that does not fit, are only reported.
 """
 
@@ -20,8 +20,8 @@ import typer
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from robospa.harness.replays.episodes import Episode
-    from robospa.harness.replays.replay_check import Findings
+    from robospa.harness.convention_check.check import Findings
+    from robospa.harness.convention_check.episodes import Episode
     from robospa.protocol.client import RemotePolicy
     from robospa.protocol.conformance import CheckResult
     from robospa.protocol.transport import Timeouts
@@ -122,7 +122,7 @@ def _target(url: str, token: str | None, timeouts: Timeouts, client: Path | None
 
 
 def _episode(demo: Path, instruction: str | None) -> Episode:
-    from robospa.harness.replays.episodes import EpisodeError, read_episode
+    from robospa.harness.convention_check.episodes import EpisodeError, read_episode
 
     episode = read_episode(demo, instruction)
     if not episode.instruction:
@@ -162,7 +162,7 @@ def _first_actions(connect: Connect) -> tuple[str, str]:
     """Mark and text of the row about the first actions."""
     from rich.markup import escape
 
-    from robospa.harness.replays.first_actions import hints
+    from robospa.harness.convention_check.initial_actions import hints
     from robospa.protocol.errors import WireError
 
     try:
@@ -188,7 +188,7 @@ def _warnings(connect: Connect) -> list[str]:
 
 def _replay(console: Console, connect: Connect, episode: Episode, points: int) -> bool:
     """Compare the policy's answers with a demonstration; False if a mistake was found."""
-    from robospa.harness.replays.replay_check import replay
+    from robospa.harness.convention_check.check import replay
 
     with connect() as policy:
         findings = replay(policy, episode, points)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from robospa.harness.replays.episodes import Episode
+    from robospa.harness.convention_check.episodes import Episode
     from robospa.trial import TrialKey
 
 
@@ -30,7 +30,7 @@ def record(
 
     The file is in RoboTwin's HDF5 layout and can be given to `robospa check URL --demo`.
     """
-    from robospa.harness.replays.episodes import require, write_episode
+    from robospa.harness.convention_check.episodes import require, write_episode
     from robospa.harness.settings import SettingsError
 
     require()
@@ -57,8 +57,8 @@ def _one_trial(task: str, level: int, seed: int | None, mode: str, split: str) -
 
 def _recorded(key: TrialKey, policy: str, name: str) -> tuple[Episode, str]:
     """The trial `key` of a policy as an episode called `name`, and how it ended."""
+    from robospa.harness.convention_check.episodes import EpisodeRecorder
     from robospa.harness.factory import open_policy
-    from robospa.harness.replays.episodes import EpisodeRecorder
     from robospa.harness.sim.sapien_world import SapienWorld
     from robospa.harness.trial import policy_seed, run_trial
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.geometry import axis_rotation
-from robospa.harness.replays.episodes import Episode
+from robospa.harness.convention_check.episodes import Episode
 from robospa.protocol.policy import CameraSpec, PolicySpec, TrialInfo
 
 Array = NDArray[np.float64]

@@ -11,8 +11,8 @@ import pytest
 from replay_fakes import CHUNK, SPEC, Learned, episode, grippers, joints
 
 from robospa.harness.cli.main import main
-from robospa.harness.replays.episodes import write_episode
-from robospa.harness.replays.first_actions import hints
+from robospa.harness.convention_check.episodes import write_episode
+from robospa.harness.convention_check.initial_actions import hints
 from robospa.protocol.server import ServerThread
 
 MADE = episode()

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from replay_fakes import FRAMES, SPEC, episode
 
-from robospa.harness.replays import episodes
-from robospa.harness.replays.episodes import (
+from robospa.harness.convention_check import episodes
+from robospa.harness.convention_check.episodes import (
     EpisodeError,
     EpisodeRecorder,
     read_episode,

@@ -17,7 +17,7 @@ WORST = 20.0
 
 
 @dataclass(frozen=True)
-class Case:
+class Sample:
     """One answer: `given` (K, D) beside what came next in the record, `wanted` (K, D).
 
     `now` (D,) is the command at that frame, `track` (T, D) the whole record of which `now` is row
@@ -54,7 +54,7 @@ def groups(space: str) -> list[str]:
     return [f"{arm} {kind}" for arm in ("left", "right") for kind in kinds]
 
 
-def errors(case: Case) -> Array:
+def errors(case: Sample) -> Array:
     """Mean error of each of `groups`: [rad] over joints, [m], [rad] of turning, gripper 0..1."""
     found = []
     for arm in (0, 1):
@@ -69,7 +69,7 @@ def errors(case: Case) -> Array:
     return np.array(found)
 
 
-def score(case: Case) -> float:
+def score(case: Sample) -> float:
     """All errors in one number: about 1 for an answer as good as it should be."""
     scales = np.array([SCALES[name.split()[1]] for name in groups(case.space)])
     return float(np.minimum(errors(case) / scales, WORST).mean())

@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from robospa.harness.replays.replay_cases import Case
-from robospa.harness.replays.replay_check import judge
+from robospa.harness.convention_check.check import judge
+from robospa.harness.convention_check.samples import Sample
 from robospa.harness.robots import embodiment
 from robospa.harness.robots.kinematics import chain_of, end_effector
 from robospa.protocol.conformance import TRIAL, synthetic_observation
@@ -75,7 +75,7 @@ def hints(policy: Policy) -> tuple[list[str], str]:
     return odd(cases, spec.action)
 
 
-def _case(policy: Policy, seen: dict[str, Any]) -> Case | None:
+def _case(policy: Policy, seen: dict[str, Any]) -> Sample | None:
     space = policy.spec.action
     policy.reset(TRIAL)
     chunk = np.asarray(policy.infer(seen), dtype=float)
@@ -86,10 +86,10 @@ def _case(policy: Policy, seen: dict[str, Any]) -> Case | None:
         now = np.tile([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0], 2)
     first = chunk[:1].copy()
     wanted = now[None].copy()
-    return Case("joint" if space == "joint" else "ee", first, wanted, now)
+    return Sample("joint" if space == "joint" else "ee", first, wanted, now)
 
 
-def odd(cases: Sequence[Case], action: str = "joint") -> tuple[list[str], str]:
+def odd(cases: Sequence[Sample], action: str = "joint") -> tuple[list[str], str]:
     """The same for first actions `given` (1, D) at the postures `wanted` (1, D)."""
     given = np.concatenate([case.given for case in cases])
     wanted = np.concatenate([case.wanted for case in cases])
@@ -131,7 +131,7 @@ def odd(cases: Sequence[Case], action: str = "joint") -> tuple[list[str], str]:
     return found, f"at most {seen}"
 
 
-def _jump(given: Any, wanted: Any, case: Case) -> float:
+def _jump(given: Any, wanted: Any, case: Sample) -> float:
     """The longest way that a first action asks for: of a joint [rad] or a hand [m]."""
     gap = given - wanted
     if case.space == "joint":

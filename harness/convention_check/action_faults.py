@@ -1,6 +1,6 @@
 """Mistakes in what a policy answers, each as something to undo.
 
-`robospa.harness.replays.replay_check` undoes them one by one and in pairs and looks which brings
+`robospa.harness.convention_check.check` undoes them one by one and in pairs and looks which brings
 the answers nearest to a recorded demonstration. Order, signs and origin are fitted to the answers.
 """
 
@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from robospa.geometry import Array
-from robospa.harness.replays.replay_cases import Case
+from robospa.harness.convention_check.samples import Sample
 from robospa.rotations import product, quaternion_to_matrix
 
 TCP_AHEAD = 0.12
@@ -24,18 +24,18 @@ PI_SIGNS = (1, 2)
 
 
 @dataclass(frozen=True)
-class Part:
+class ActionFault:
     """One mistake in what a policy answers. `phrase` completes "it looks as if ..."; only one part
     of a `family` can be true at a time. `undo` gives None where it makes no sense."""
 
     name: str
     phrase: str
     family: str
-    undo: Callable[[Case], Case | None]
+    undo: Callable[[Sample], Sample | None]
 
 
-def _given(change: Callable[[Case], Array], space: str = "") -> Callable[[Case], Case | None]:
-    def undo(case: Case) -> Case | None:
+def _given(change: Callable[[Sample], Array], space: str = "") -> Callable[[Sample], Sample | None]:
+    def undo(case: Sample) -> Sample | None:
         if space and case.space != space:
             return None
         return replace(case, given=change(case))
@@ -49,7 +49,7 @@ def _columns(order: Callable[[int], Sequence[int]], space: str = "") -> Any:
 
 
 def _grippers(change: Callable[[Array], Array]) -> Any:
-    def changed(case: Case) -> Array:
+    def changed(case: Sample) -> Array:
         given = case.given.copy()
         given[:, case.grippers] = change(given[:, case.grippers])
         return given
@@ -57,8 +57,8 @@ def _grippers(change: Callable[[Array], Array]) -> Any:
     return _given(changed)
 
 
-def _joints(change: Callable[[Case, Array], Array]) -> Any:
-    def changed(case: Case) -> Array:
+def _joints(change: Callable[[Sample, Array], Array]) -> Any:
+    def changed(case: Sample) -> Array:
         given = case.given.copy()
         given[:, case.joints] = change(case, given[:, case.joints])
         return given
@@ -66,10 +66,10 @@ def _joints(change: Callable[[Case, Array], Array]) -> Any:
     return _given(changed, "joint")
 
 
-def _later(shift: int, stride: int = 1) -> Callable[[Case], Case | None]:
+def _later(shift: int, stride: int = 1) -> Callable[[Sample], Sample | None]:
     """Compare action k with frame t + shift + (k + 1) * stride."""
 
-    def undo(case: Case) -> Case | None:
+    def undo(case: Sample) -> Sample | None:
         if case.track is None:
             return None
         rows = case.t + shift + (np.arange(len(case.given)) + 1) * stride
@@ -81,20 +81,20 @@ def _later(shift: int, stride: int = 1) -> Callable[[Case], Case | None]:
     return undo
 
 
-def _slower(case: Case) -> Case | None:
+def _slower(case: Sample) -> Sample | None:
     """Two actions for every recorded frame."""
     given = case.given[1::2]
     return replace(case, given=given, wanted=case.wanted[: len(given)]) if len(given) > 1 else None
 
 
-def _measured(case: Case) -> Case | None:
+def _measured(case: Sample) -> Sample | None:
     if case.measured is None:
         return None
     rows = case.t + 1 + np.arange(len(case.given))
     return replace(case, wanted=case.measured[rows])
 
 
-def _moved(case: Case, along: float) -> Array:
+def _moved(case: Sample, along: float) -> Array:
     """Positions shifted by `along` [m] on the x axis of each rotation."""
     given = case.given.copy()
     for arm in (0, 8):
@@ -105,7 +105,7 @@ def _moved(case: Case, along: float) -> Array:
     return given
 
 
-def _pose_delta(case: Case, each: bool) -> Array:
+def _pose_delta(case: Sample, each: bool) -> Array:
     """Differences of position added to the pose at the start; rotations turned on from it."""
     given = case.given.copy()
     for arm in (0, 8):
@@ -120,14 +120,14 @@ def _pose_delta(case: Case, each: bool) -> Array:
 
 ORDER, HAND, TIME = "order", "grippers", "time"
 
-PARTS: tuple[Part, ...] = (
-    Part(
+PARTS: tuple[ActionFault, ...] = (
+    ActionFault(
         "arms swapped",
         "its actions name the right arm first",
         "arms",
         _columns(lambda h: [*range(h, 2 * h), *range(h)]),
     ),
-    Part(
+    ActionFault(
         "grippers last",
         "its actions have both grippers at the end",
         ORDER,
@@ -135,19 +135,19 @@ PARTS: tuple[Part, ...] = (
             lambda h: [*range(h - 1), 2 * h - 2, *range(h - 1, 2 * h - 2), 2 * h - 1], "joint"
         ),
     ),
-    Part(
+    ActionFault(
         "grippers first",
         "its actions have each gripper before its arm",
         ORDER,
         _columns(lambda h: [*range(1, h), 0, *range(h + 1, 2 * h), h], "joint"),
     ),
-    Part(
+    ActionFault(
         "arms interleaved",
         "its actions alternate between left and right",
         ORDER,
         _columns(lambda h: [*range(0, 2 * h, 2), *range(1, 2 * h, 2)]),
     ),
-    Part(
+    ActionFault(
         "joints reversed",
         "its joints run from the hand to the shoulder",
         ORDER,
@@ -156,19 +156,19 @@ PARTS: tuple[Part, ...] = (
             "joint",
         ),
     ),
-    Part(
+    ActionFault(
         "degrees",
         "its joints are in degrees, not radians",
         "units",
         _joints(lambda case, joints: np.radians(joints)),
     ),
-    Part(
+    ActionFault(
         "millimetres",
         "its positions are in millimetres, not metres",
         "units",
         _given(lambda case: case.given / np.where(np.arange(16) % 8 < 3, 1000.0, 1.0), "ee"),
     ),
-    Part(
+    ActionFault(
         "quaternion x y z w",
         "its quaternions are x y z w, not w x y z",
         "quaternion",
@@ -176,7 +176,7 @@ PARTS: tuple[Part, ...] = (
             lambda case: case.given[:, [0, 1, 2, 6, 3, 4, 5, 7, 8, 9, 10, 14, 11, 12, 13, 15]], "ee"
         ),
     ),
-    Part(
+    ActionFault(
         "quaternion slip",
         "its quaternions come from w x y z read as x y z w, as in X-VLA's official data",
         "quaternion",
@@ -184,87 +184,91 @@ PARTS: tuple[Part, ...] = (
             lambda case: case.given[:, [0, 1, 2, 4, 5, 6, 3, 7, 8, 9, 10, 12, 13, 14, 11, 15]], "ee"
         ),
     ),
-    Part(
+    ActionFault(
         "gripper inverted",
         "1 is a closed gripper in its actions, not an open one",
         HAND,
         _grippers(lambda g: 1 - g),
     ),
-    Part(
+    ActionFault(
         "gripper 0..0.1",
         "its grippers go from 0 to 0.1 (an opening in metres), not to 1",
         HAND,
         _grippers(lambda g: g / 0.1),
     ),
-    Part(
+    ActionFault(
         "gripper 0..0.045",
         "its grippers go from 0 to 0.045 (a finger's way in metres), not to 1",
         HAND,
         _grippers(lambda g: g / 0.045),
     ),
-    Part(
+    ActionFault(
         "gripper 0..100",
         "its grippers are in percent",
         HAND,
         _grippers(lambda g: g / 100),
     ),
-    Part(
+    ActionFault(
         "gripper 0..255",
         "its grippers go from 0 to 255, not to 1",
         HAND,
         _grippers(lambda g: g / 255),
     ),
-    Part(
+    ActionFault(
         "gripper -1..1",
         "its grippers go from -1 (closed) to 1, not from 0",
         HAND,
         _grippers(lambda g: (g + 1) / 2),
     ),
-    Part(
+    ActionFault(
         "gripper 1..-1",
         "its grippers go from -1 (open) to 1 (closed), not from 1 (open) to 0",
         HAND,
         _grippers(lambda g: (1 - g) / 2),
     ),
-    Part(
+    ActionFault(
         "delta from the start",
         "its actions are differences to the state at the query, not absolute targets",
         "delta",
         _joints(lambda case, joints: case.now[case.joints] + joints),
     ),
-    Part(
+    ActionFault(
         "delta from the last",
         "each of its actions is a difference to the one before, not an absolute target",
         "delta",
         _joints(lambda case, joints: case.now[case.joints] + np.cumsum(joints, axis=0)),
     ),
-    Part(
+    ActionFault(
         "pose delta from the start",
         "its poses are differences to the pose at the query, not absolute",
         "delta",
         _given(lambda case: _pose_delta(case, False), "ee"),
     ),
-    Part(
+    ActionFault(
         "pose delta from the last",
         "each of its poses is a difference to the one before, not absolute",
         "delta",
         _given(lambda case: _pose_delta(case, True), "ee"),
     ),
-    Part(
+    ActionFault(
         "tool centre",
         "its poses are those of the tool centre point, 0.12 m ahead of the frame in use here",
         "frame",
         _given(lambda case: _moved(case, -TCP_AHEAD), "ee"),
     ),
-    Part("a frame late", "its first action is the present command, not the next", TIME, _later(-1)),
-    Part("a frame early", "its first action is one frame too far ahead", TIME, _later(1)),
-    Part("three early", "its first action is three frames too far ahead", TIME, _later(3)),
-    Part("twice as fast", "each of its actions spans two recorded frames", TIME, _later(0, 2)),
-    Part(
+    ActionFault(
+        "a frame late", "its first action is the present command, not the next", TIME, _later(-1)
+    ),
+    ActionFault("a frame early", "its first action is one frame too far ahead", TIME, _later(1)),
+    ActionFault("three early", "its first action is three frames too far ahead", TIME, _later(3)),
+    ActionFault(
+        "twice as fast", "each of its actions spans two recorded frames", TIME, _later(0, 2)
+    ),
+    ActionFault(
         "three times as fast", "each of its actions spans three recorded frames", TIME, _later(0, 3)
     ),
-    Part("half as fast", "it gives two actions for every recorded frame", TIME, _slower),
-    Part(
+    ActionFault("half as fast", "it gives two actions for every recorded frame", TIME, _slower),
+    ActionFault(
         "measured joints",
         "it predicts what the robot will measure, not what it is commanded",
         "measured",
@@ -273,7 +277,7 @@ PARTS: tuple[Part, ...] = (
 )
 
 
-def fitted(cases: Sequence[Case]) -> list[Part]:
+def fitted(cases: Sequence[Sample]) -> list[ActionFault]:
     """Parts that depend on all `cases`: order and signs of an arm's joints, origin of positions."""
     if cases[0].space == "ee":
         return [_offset(cases)]
@@ -291,7 +295,7 @@ def fitted(cases: Sequence[Case]) -> list[Part]:
         told = " ".join(str(i + 1) for i in best)
         order = [*best, size, *(i + size + 1 for i in best), 2 * size + 1]
         found.append(
-            Part(
+            ActionFault(
                 "joint order",
                 f"the joints of an arm are in another order (ours are its {told})",
                 ORDER,
@@ -307,12 +311,12 @@ def fitted(cases: Sequence[Case]) -> list[Part]:
     return found
 
 
-def _signs(name: str, flips: tuple[int, ...], size: int) -> Part:
+def _signs(name: str, flips: tuple[int, ...], size: int) -> ActionFault:
     told = " and ".join(str(i + 1) for i in flips)
     pi = " (as if openpi's adapt_to_pi were on)" if flips == PI_SIGNS else ""
     columns = [i + arm * (size + 1) for arm in (0, 1) for i in flips]
 
-    def changed(case: Case) -> Array:
+    def changed(case: Sample) -> Array:
         given = case.given.copy()
         about = case.now[columns] if name == "signs of motion" else 0.0
         given[:, columns] = 2 * about - given[:, columns]
@@ -320,16 +324,16 @@ def _signs(name: str, flips: tuple[int, ...], size: int) -> Part:
 
     kind = "the motion of" if name == "signs of motion" else ""
     phrase = " ".join(f"{kind} joint {told} of each arm has the wrong sign{pi}".split())
-    return Part(name, phrase, "signs", _given(changed, "joint"))
+    return ActionFault(name, phrase, "signs", _given(changed, "joint"))
 
 
-def _offset(cases: Sequence[Case]) -> Part:
+def _offset(cases: Sequence[Sample]) -> ActionFault:
     gap = np.concatenate([c.given - c.wanted for c in cases])
     middle = np.median(gap, axis=0)
     shift = np.where(np.arange(16) % 8 < 3, middle, 0.0)
     told = ", ".join(f"{v:+.2f}" for v in shift[:3])
     right = ", ".join(f"{v:+.2f}" for v in shift[8:11])
-    return Part(
+    return ActionFault(
         "another origin",
         f"its positions are off by ({told}) m left and ({right}) m right: another origin",
         "frame",

@@ -2,8 +2,8 @@
 
 A policy is shown frames of a demonstration and answers chunks; what the demonstrator commanded next
 is known. A policy that has learned from such data comes close. If it does not, the usual mistakes
-are undone one by one (`replay_parts`, `replay_views`), and one that brings it much closer, at
-nearly every frame, is most likely the mistake. Success in a simulator cannot tell them apart.
+are undone one by one (`action_faults`, `observation_faults`), and one that brings it much closer,
+at nearly every frame, is most likely the mistake. Success in a simulator cannot tell them apart.
 
 A wrong convention is named only if undoing it takes away most of the error: noise and a mediocre
 policy do not look like that. A policy that fits nothing gets no name, but is said not to fit.
@@ -19,10 +19,10 @@ from typing import Any
 import numpy as np
 
 from robospa.geometry import Array
-from robospa.harness.replays.episodes import Episode, EpisodeError
-from robospa.harness.replays.replay_cases import UNITS, Case, errors, groups, score
-from robospa.harness.replays.replay_parts import PARTS, Part, fitted
-from robospa.harness.replays.replay_views import VIEWS, View
+from robospa.harness.convention_check.action_faults import PARTS, ActionFault, fitted
+from robospa.harness.convention_check.episodes import Episode, EpisodeError
+from robospa.harness.convention_check.observation_faults import VIEWS, ObservationFault
+from robospa.harness.convention_check.samples import UNITS, Sample, errors, groups, score
 from robospa.protocol.policy import Policy, PolicySpec, TrialInfo
 from robospa.rotations import product
 
@@ -56,8 +56,8 @@ class Guess:
     `still` is what holding still would score against the same record.
     """
 
-    parts: tuple[Part, ...]
-    view: View | None
+    parts: tuple[ActionFault, ...]
+    view: ObservationFault | None
     errors: Array
     score: float
     helped: float
@@ -118,7 +118,7 @@ def replay(policy: Policy, episode: Episode, points: int = POINTS) -> Findings:
     frames = _frames(len(episode), spec, points)
     plain = [_case(policy, episode, t, None) for t in frames]
     cases = [case for case in plain if case is not None]
-    shown: dict[str, list[Case]] = {}
+    shown: dict[str, list[Sample]] = {}
     untried = [] if episode.measured is not None else ["measured joints: not in this file"]
     for view in (view for view in VIEWS if _shown(spec, view)):
         answers = [_case(policy, episode, t, view) for t in frames]
@@ -137,7 +137,7 @@ def _frames(length: int, spec: PolicySpec, points: int) -> list[int]:
     return list(dict.fromkeys(round(float(t)) for t in chosen))
 
 
-def _case(policy: Policy, episode: Episode, t: int, view: View | None) -> Case | None:
+def _case(policy: Policy, episode: Episode, t: int, view: ObservationFault | None) -> Sample | None:
     """The answer at frame `t`, seen as `view` undoes it; None if there is nothing to undo."""
     spec = policy.spec
     seen: Any = episode.observation(spec, t)
@@ -162,10 +162,10 @@ def _case(policy: Policy, episode: Episode, t: int, view: View | None) -> Case |
     if spec.action == "delta_ee":
         given = absolute(given, track[t])
     measured = episode.measured if joint else None
-    return Case("joint" if joint else "ee", given, wanted, track[t], track, t, measured)
+    return Sample("joint" if joint else "ee", given, wanted, track[t], track, t, measured)
 
 
-def _shown(spec: PolicySpec, view: View) -> bool:
+def _shown(spec: PolicySpec, view: ObservationFault) -> bool:
     """Whether the policy is shown what `view` changes."""
     poses = spec.action != "joint"
     return {
@@ -207,13 +207,13 @@ def absolute(chunk: Array, now: Array) -> Array:
 
 
 def judge(
-    cases: Sequence[Case],
-    shown: dict[str, list[Case]],
+    cases: Sequence[Sample],
+    shown: dict[str, list[Sample]],
     frames: tuple[int, ...] = (),
     untried: tuple[str, ...] = (),
     gain: float = GAIN,
 ) -> Findings:
-    """What explains `cases`, the answers as they are; `shown` has those to every View by name."""
+    """What explains `cases`, the answers as they are; `shown` has those to faulty views by name."""
     before = [score(case) for case in cases]
     base = _guess((), None, cases, before)
     still = _guess((), None, [_held(case) for case in cases], before)
@@ -236,9 +236,9 @@ def judge(
 
 
 def _tried(
-    cases: Sequence[Case],
-    view: View | None,
-    parts: Iterable[Part],
+    cases: Sequence[Sample],
+    view: ObservationFault | None,
+    parts: Iterable[ActionFault],
     before: Sequence[float],
     size: int,
 ) -> Iterator[Guess]:
@@ -246,9 +246,9 @@ def _tried(
     for chosen in combinations(parts, size):
         if len({part.family for part in chosen}) < size:
             continue
-        undone: list[Case] = []
+        undone: list[Sample] = []
         for case in cases:
-            now: Case | None = case
+            now: Sample | None = case
             for part in chosen:
                 now = part.undo(now) if now is not None else None
             if now is not None:
@@ -258,7 +258,10 @@ def _tried(
 
 
 def _guess(
-    parts: tuple[Part, ...], view: View | None, cases: Sequence[Case], before: Sequence[float]
+    parts: tuple[ActionFault, ...],
+    view: ObservationFault | None,
+    cases: Sequence[Sample],
+    before: Sequence[float],
 ) -> Guess:
     each = np.array([errors(case) for case in cases])
     after = [score(case) for case in cases]
@@ -269,7 +272,7 @@ def _guess(
     return Guess(parts, view, each.mean(axis=0), float(np.mean(after)), float(helped), held)
 
 
-def _held(case: Case) -> Case:
+def _held(case: Sample) -> Sample:
     """The same with a policy that does not move."""
     return replace(case, given=np.tile(case.now, (len(case.wanted), 1)))
 

@@ -12,7 +12,7 @@ from robospa.geometry import Array
 
 
 @dataclass(frozen=True)
-class View:
+class ObservationFault:
     """One mistake in what a policy is shown. `undo` gives the observation that it may have been
     trained on, or None where that cannot be told; `extra` has what else is known of the frame.
     `touches` is what it changes: a policy that is not shown that need not be asked again."""
@@ -80,45 +80,47 @@ def _shown_measured(seen: Mapping[str, Any], extra: Mapping[str, Any]) -> Mappin
     return {**seen, "state": np.asarray(extra["measured"], np.float32)}
 
 
-VIEWS: tuple[View, ...] = (
-    View("wrist images swapped", "left and right wrist images are swapped", "images", _wrists),
-    View(
+VIEWS: tuple[ObservationFault, ...] = (
+    ObservationFault(
+        "wrist images swapped", "left and right wrist images are swapped", "images", _wrists
+    ),
+    ObservationFault(
         "blue for red",
         "it was trained on images with red and blue swapped",
         "images",
         _images(lambda name, image: np.ascontiguousarray(image[..., ::-1])),
     ),
-    View(
+    ObservationFault(
         "images upside down",
         "it was trained on images turned by 180 degrees",
         "images",
         _images(lambda name, image: np.ascontiguousarray(image[::-1, ::-1])),
     ),
-    View(
+    ObservationFault(
         "arms of the state swapped",
         "it expects the right arm first in the state",
         "robot",
         _state(lambda rows: rows[::-1], lambda rows: rows[::-1]),
     ),
-    View(
+    ObservationFault(
         "grippers of the state inverted",
         "1 is a closed gripper in the state that it expects",
         "robot",
         _state(_hands, _hands),
     ),
-    View(
+    ObservationFault(
         "state in degrees",
         "it expects the state in degrees",
         "state",
         _state(lambda rows: np.hstack([np.degrees(rows[:, :-1]), rows[:, -1:]])),
     ),
-    View(
+    ObservationFault(
         "quaternions of the state x y z w",
         "it expects quaternions x y z w in the state",
         "poses",
         _state(lambda rows: rows, lambda rows: rows[:, [0, 1, 2, 4, 5, 6, 3, 7]]),
     ),
-    View(
+    ObservationFault(
         "measured state",
         "it expects the measured joints, not the commanded ones",
         "state",

@@ -13,7 +13,7 @@ from replay_fakes import CHUNK, FRAMES, Learned, episode
 
 from robospa.clients.ee6d import poses_to_ee6d
 from robospa.harness.cli.main import main
-from robospa.harness.replays.episodes import write_episode
+from robospa.harness.convention_check.episodes import write_episode
 
 MADE = episode()
 KNOWS = Learned(MADE)

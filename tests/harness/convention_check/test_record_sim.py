@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from robospa.harness.cli.main import main
+from robospa.harness.convention_check.check import replay
+from robospa.harness.convention_check.episodes import Episode, read_episode
 from robospa.harness.factory import policy_names
-from robospa.harness.replays.episodes import Episode, read_episode
-from robospa.harness.replays.replay_check import replay
 from robospa.protocol.policy import DEFAULT_CAMERAS, PolicySpec, TrialInfo
 
 pytestmark = [

@@ -24,8 +24,8 @@ from replay_fakes import (
 )
 
 from robospa.geometry import Pose
-from robospa.harness.replays.episodes import EpisodeError
-from robospa.harness.replays.replay_check import Findings, absolute, replay
+from robospa.harness.convention_check.check import Findings, absolute, replay
+from robospa.harness.convention_check.episodes import EpisodeError
 
 MADE = episode()
 
