@@ -107,7 +107,8 @@ def _unused(*_: Any) -> Any:
 def fake_task(name: str) -> Task:
     levels = {n: Level(candidates=n + 1, subtasks=2, steps=LIMIT) for n in range(1, 6)}
     category = "GAC" if "Pick" in name else "RPF"
-    return Task(name, category, levels, _unused, _unused, _unused, _unused, "fake", "fake")
+    functions = (_unused,) * 5
+    return Task(name, category, levels, *functions, summary="fake", success="fake")
 
 
 def parts(key: TrialKey) -> TrialParts:
