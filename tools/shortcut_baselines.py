@@ -1,4 +1,4 @@
-"""Can the answer be told from the scene alone? `python -m robospa.tasks.leaks` prints a table.
+"""Does a scene alone tell the answer? `python tools/shortcut_baselines.py` prints a table.
 
 A guesser sees everything of a scene but the instruction: which object was created when and under
 which name, what it is, its exact colour, size and pose, and how all this compares with the others.

@@ -6,8 +6,7 @@ import math
 import random
 
 import pytest
-
-from robospa.tasks.instructions.bleu import bleu, self_bleu
+from bleu import bleu, self_bleu
 
 CAT = ["the", "cat", "sat", "on", "the", "mat"]
 

@@ -13,13 +13,14 @@ from functools import cache
 
 import numpy as np
 import pytest
+import shortcut_baselines as guessers
+from shortcut_baselines import Sample
 
-from robospa.tasks import catalog, leaks
-from robospa.tasks.leaks import Sample
+from robospa.tasks import catalog
 from robospa.tasks.scene import Scene
 
 SCENES = int(os.environ.get("ROBOSPA_SCENES", "40"))
-SEEDS = range(leaks.FIRST_SEED, leaks.FIRST_SEED + SCENES)
+SEEDS = range(guessers.FIRST_SEED, guessers.FIRST_SEED + SCENES)
 LEVELS = catalog.LEVELS if SCENES > 100 else (2, 5)
 ERROR = 1e-3
 """Probability that a suite without leaks fails, shared by all variants (Bonferroni)."""
@@ -28,7 +29,7 @@ ASKED = [
     (name, level)
     for name, task in catalog.tasks().items()
     for level in LEVELS
-    if leaks.question_of(name) is not None and task.levels[level].candidates > 1
+    if guessers.question_of(name) is not None and task.levels[level].candidates > 1
 ]
 LISTING = [
     (name, level)
@@ -40,13 +41,13 @@ LISTING = [
 
 @pytest.mark.parametrize(("name", "level"), ASKED)
 def test_the_scene_alone_does_not_tell_the_answer(name: str, level: int) -> None:
-    verdict = leaks.examine(name, level, SEEDS)
+    verdict = guessers.examine(name, level, SEEDS)
     assert verdict.p > ERROR / len(ASKED), verdict
 
 
 @pytest.mark.parametrize(("name", "level"), LISTING)
 def test_objects_are_not_created_in_the_order_that_is_asked_for(name: str, level: int) -> None:
-    lists = [leaks.order_lists(catalog.build_scene(name, level, seed)) for seed in SEEDS]
+    lists = [guessers.order_lists(catalog.build_scene(name, level, seed)) for seed in SEEDS]
     for fact in lists[0]:
         questions = [asked.get(fact) for asked in lists]
         firsts = Counter(q.names.index(q.answer) / len(q.names) for q in questions if q)
@@ -54,7 +55,7 @@ def test_objects_are_not_created_in_the_order_that_is_asked_for(name: str, level
         alike = min(len(q.names) for q in questions if q)
         found = max(firsts.values())
         if most == alike:
-            p = most * leaks.tail(found, len(SEEDS), 1 / most)
+            p = most * guessers.tail(found, len(SEEDS), 1 / most)
             assert p > ERROR / len(LISTING), (fact, firsts)
 
 
@@ -63,16 +64,16 @@ def test_objects_are_not_created_in_the_order_that_is_asked_for(name: str, level
 
 def guessed(seen: Sample) -> float:
     """Probability of what the better guesser got, if it knew nothing."""
-    return 2 * leaks.tail(max(leaks.hits(seen).values()), len(seen.answers), seen.chance)
+    return 2 * guessers.tail(max(guessers.hits(seen).values()), len(seen.answers), seen.chance)
 
 
 @cache
 def honest() -> Sample:
     """Scenes of a variant that gives nothing away."""
     made = [catalog.build_scene("Pick_Blocks_Size", 3, s) for s in range(600_000, 600_300)]
-    ask = leaks.question_of("Pick_Blocks_Size")
+    ask = guessers.question_of("Pick_Blocks_Size")
     assert ask is not None
-    return leaks.sample(made, ask)
+    return guessers.sample(made, ask)
 
 
 def test_guessers_find_nothing_where_nothing_is() -> None:
@@ -82,9 +83,9 @@ def test_guessers_find_nothing_where_nothing_is() -> None:
 @pytest.mark.parametrize("off", [1e-6, 1e-2])
 def test_a_color_that_is_off_by_little_is_found(off: float) -> None:
     made = [catalog.build_scene("Pick_Blocks_Size", 3, s) for s in range(600_000, 600_100)]
-    ask = leaks.question_of("Pick_Blocks_Size")
+    ask = guessers.question_of("Pick_Blocks_Size")
     assert ask is not None
-    assert guessed(leaks.sample([_tinted(scene, off) for scene in made], ask)) < 1e-9
+    assert guessed(guessers.sample([_tinted(scene, off) for scene in made], ask)) < 1e-9
 
 
 def _tinted(scene: Scene, off: float) -> Scene:
@@ -102,10 +103,10 @@ def test_a_target_that_is_often_created_first_is_found() -> None:
     rng = np.random.default_rng(1)
     scenes = [catalog.build_scene("Pick_Blocks_Size", 3, s) for s in range(600_000, 600_300)]
     moved = [_target_first(scene) if rng.random() < 0.4 else scene for scene in scenes]
-    ask = leaks.question_of("Pick_Blocks_Size")
+    ask = guessers.question_of("Pick_Blocks_Size")
     assert ask is not None
-    assert guessed(leaks.sample(moved, ask)) < 1e-6
-    assert guessed(leaks.sample(moved, ask, leaks.creation)) < 1e-6
+    assert guessed(guessers.sample(moved, ask)) < 1e-6
+    assert guessed(guessers.sample(moved, ask, guessers.creation)) < 1e-6
 
 
 def _target_first(scene: Scene) -> Scene:
@@ -118,11 +119,11 @@ def test_a_target_that_is_never_at_the_rim_is_found_by_the_bent_guesser() -> Non
     rng = np.random.default_rng(2)
     features = rng.uniform(-1, 1, (400, 4, 3))
     answers = np.argmin(np.abs(features[:, :, 0]), axis=1)
-    found = leaks.hits(Sample(features, answers))
+    found = guessers.hits(Sample(features, answers))
     assert found["random"] > 200 > 1.4 * found["linear"]
 
 
 def test_the_tail_of_the_binomial_by_hand() -> None:
-    assert leaks.tail(0, 10, 0.3) == 1.0
-    assert leaks.tail(3, 3, 0.5) == pytest.approx(0.125)
-    assert leaks.tail(2, 4, 0.5) == pytest.approx(11 / 16)
+    assert guessers.tail(0, 10, 0.3) == 1.0
+    assert guessers.tail(3, 3, 0.5) == pytest.approx(0.125)
+    assert guessers.tail(2, 4, 0.5) == pytest.approx(11 / 16)

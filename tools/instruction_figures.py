@@ -1,4 +1,4 @@
-"""How diverse instructions are: `python -m robospa.tasks.instructions.figures` prints the table.
+"""How diverse instructions are: `python tools/instruction_figures.py` prints the table.
 
 Of templates, slots masked: "mean" is the mean pairwise similarity of the train ones, "self-BLEU"
 their BLEU-4 against each other, "held-out BLEU" that of the held-out ones against the train ones,
@@ -16,8 +16,9 @@ from collections.abc import Sequence
 from dataclasses import astuple, dataclass
 from itertools import combinations
 
+from bleu import bleu, self_bleu
+
 from robospa.tasks import catalog
-from robospa.tasks.instructions.bleu import bleu, self_bleu
 from robospa.tasks.instructions.grammar import masked_words, similarity
 from robospa.tasks.sentences import SPLITS, sentences, templates
 
