@@ -16,8 +16,9 @@ import ssl as ssl_module
 import threading
 import time
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from robospa.clients.dialect import ConnectionParams, Endpoint
 from robospa.protocol.errors import (
     CallTimeout,
     ConnectFailed,
@@ -28,9 +29,6 @@ from robospa.protocol.errors import (
     Unauthorized,
     printable,
 )
-
-if TYPE_CHECKING:
-    from robospa.clients import Line, Target
 
 MAX_ANSWER = 64 * 2**20
 """Bytes of an answer; a chunk as JSON is some kilobytes."""
@@ -45,22 +43,22 @@ STALE = (http.client.RemoteDisconnected, ConnectionResetError, BrokenPipeError)
 
 
 def open_http(
-    target: Target, timeout: float, ssl: ssl_module.SSLContext | None
+    endpoint: Endpoint, timeout: float, ssl: ssl_module.SSLContext | None
 ) -> http.client.HTTPConnection:
     """A connection to be made, with TLS if the scheme asks for it."""
-    if target.secure:
-        return http.client.HTTPSConnection(target.host, target.port, timeout=timeout, context=ssl)
-    return http.client.HTTPConnection(target.host, target.port, timeout=timeout)
+    host, port = endpoint.host, endpoint.port
+    if endpoint.secure:
+        return http.client.HTTPSConnection(host, port, timeout=timeout, context=ssl)
+    return http.client.HTTPConnection(host, port, timeout=timeout)
 
 
 class JsonServer:
-    """The HTTP server at `line.target`. Not thread-safe."""
+    """The HTTP server at `params.endpoint`. Not thread-safe."""
 
-    def __init__(self, line: Line) -> None:
-        target, timeouts, token = line.target, line.timeouts, line.token
-        host = f"[{target.host}]" if ":" in target.host else target.host
-        self.url = f"{'https' if target.secure else 'http'}://{host}:{target.port}"
-        self._connection = open_http(target, timeouts.connect, line.ssl)
+    def __init__(self, params: ConnectionParams) -> None:
+        endpoint, timeouts, token = params.endpoint, params.timeouts, params.token
+        self.url = f"{'https' if endpoint.secure else 'http'}://{endpoint.authority}"
+        self._connection = open_http(endpoint, timeouts.connect, params.ssl)
         self._headers = {"Content-Type": "application/json", "Accept": "application/json"}
         if token is not None:
             self._headers["Authorization"] = f"Bearer {token}"

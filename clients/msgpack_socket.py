@@ -5,25 +5,23 @@ What the two dialects of this form, XPolicyLab's and vla-eval's, have in common.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from robospa.clients.dialect import ConnectionParams
 from robospa.clients.numpy_msgpack import Form, pack, unpack
-from robospa.clients.openpi.client import websocket_address
 from robospa.protocol.client import violation
 from robospa.protocol.errors import DecodeError, TransportError, printable
 from robospa.protocol.transport import Transport
 
-if TYPE_CHECKING:
-    from robospa.clients import Line
 
-
-class Frames:
+class MsgpackSocket:
     """Sends and receives maps; `form` is how arrays are written."""
 
-    def __init__(self, line: Line, form: Form) -> None:
-        self._transport = Transport(websocket_address(line), line.timeouts, line.limits, None)
-        self._form, self._limits = form, line.limits
-        self.url = line.target.url
+    def __init__(self, params: ConnectionParams, form: Form) -> None:
+        address = params.websocket_address()
+        self._transport = Transport(address, params.timeouts, params.limits, None)
+        self._form, self._limits = form, params.limits
+        self.url = params.endpoint.url
 
     def send(self, message: dict[str, Any]) -> None:
         """Raises EncodeError and ConnectionLost."""

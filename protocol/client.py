@@ -1,10 +1,10 @@
 """The synchronous client: a `Policy` whose model runs behind a WebSocket.
 
-`connect(url)` offers `robospa.v1`; a server that does not select it is spoken to in openpi's
-dialect (`robospa.protocol.openpi`). Requests are answered one by one; an answer with the wrong id
-ends the connection, because from then on every action could belong to another observation. There
-is no reconnect inside a trial: `reconnect()` is for the harness, between trials, and refuses a
-server whose spec has changed meanwhile. Errors: see `robospa.protocol.errors`.
+`connect(url)` speaks `robospa.v1`; `robospa.clients.connect` also reaches servers of other
+dialects, each by a `WireClient` of its own. Requests are answered one by one; an answer with the
+wrong id ends the connection, because from then on every action could belong to another observation.
+There is no reconnect inside a trial: `reconnect()` is for the harness, between trials, and refuses
+a server whose spec has changed meanwhile. Errors: see `robospa.protocol.errors`.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from robospa.protocol.codec import DEFAULT_LIMITS, Limits
 from robospa.protocol.errors import (
     ConnectionLost,
     DecodeError,
+    HandshakeError,
     PolicyAnswerError,
     ProtocolViolation,
     ServerError,
@@ -47,7 +48,6 @@ from robospa.protocol.messages import (
     pack,
     unpack,
 )
-from robospa.protocol.openpi import OpenPiOptions, OpenPiSession
 from robospa.protocol.policy import Observation, PolicySpec, TrialInfo
 from robospa.protocol.transport import Address, Timeouts, Transport
 from robospa.protocol.validation import check_chunk, check_size, compare_specs
@@ -105,12 +105,12 @@ class RemotePolicy:
 
     @property
     def hello(self) -> dict[str, Any]:
-        """Dialect, version, server name and spec (or openpi's metadata) as JSON values."""
+        """Dialect, version, server name, spec and what else it says of itself as JSON values."""
         return self._session.hello
 
     @property
     def dialect(self) -> str:
-        """`robospa.v1`, `openpi`, or another name of `robospa.clients`."""
+        """`robospa.v1`, or the name of another dialect in `robospa.clients`."""
         return str(self._session.hello["dialect"])
 
     def reset(self, trial: TrialInfo) -> None:
@@ -260,20 +260,17 @@ def connect(
     limits: Limits = DEFAULT_LIMITS,
     ssl: ssl_module.SSLContext | None = None,
     expect: PolicySpec | None = None,
-    openpi: OpenPiOptions | None = None,
-    force_openpi: bool = False,
 ) -> RemotePolicy:
-    """Connect to a policy server at a ws:// or wss:// URL and check that both ends fit.
+    """Connect to a `robospa.v1` server at a ws:// or wss:// URL and check that both ends fit.
 
-    `expect`: refuse (SpecMismatch) a server with another spec. `openpi`: how to treat a server
-    that speaks openpi's dialect, which `force_openpi` assumes without offering ours. Raises
-    ConnectFailed, HandshakeError and its children, ProtocolViolation; ValueError for a wrong URL.
+    `expect`: refuse (SpecMismatch) a server with another spec. Raises ConnectFailed, HandshakeError
+    and its children, ProtocolViolation; ValueError for a wrong URL.
     """
     allowed = timeouts or Timeouts()
-    opener = websocket_opener(
-        Address(url, token, ssl), allowed, limits, openpi or OpenPiOptions(), force_openpi
+    address = Address(url, token, ssl)
+    return expecting(
+        RemotePolicy(url, lambda: open_wire(address, allowed, limits), allowed), expect
     )
-    return expecting(RemotePolicy(url, opener, allowed), expect)
 
 
 def expecting(policy: RemotePolicy, expect: PolicySpec | None) -> RemotePolicy:
@@ -285,24 +282,26 @@ def expecting(policy: RemotePolicy, expect: PolicySpec | None) -> RemotePolicy:
     return policy
 
 
-def websocket_opener(
+def open_wire(
     address: Address,
     timeouts: Timeouts,
     limits: Limits,
-    openpi: OpenPiOptions,
-    force_openpi: bool = False,
-) -> Callable[[], WireClient]:
-    """What opens a session of `robospa.v1`, or of openpi's dialect if the server speaks that."""
+    other: Callable[[Transport], WireClient] | None = None,
+) -> WireClient:
+    """A connection in `robospa.v1`; `other` makes one with a server that does not select it.
 
-    def opened() -> WireClient:
-        offer = None if force_openpi else SUBPROTOCOL
-        transport = Transport(address, timeouts, limits, offer)
-        try:
-            if transport.subprotocol is None:
-                return OpenPiSession(transport, openpi, timeouts, limits)
+    Without `other` such a server is a HandshakeError.
+    """
+    transport = Transport(address, timeouts, limits, SUBPROTOCOL)
+    try:
+        if transport.subprotocol is not None:
             return _RobospaClient(transport, timeouts, limits)
-        except BaseException:
-            transport.close()
-            raise
-
-    return opened
+        if other is not None:
+            return other(transport)
+        raise HandshakeError(
+            f"{address.url} does not speak {SUBPROTOCOL}: if it is the server of another project, "
+            "connect with robospa.connect and the scheme of its dialect"
+        )
+    except BaseException:
+        transport.close()
+        raise

@@ -16,20 +16,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from robospa.clients.chunks import check_horizon
 from robospa.clients.detect import explained
+from robospa.clients.dialect import ConnectionParams, Dialect
 from robospa.clients.http import JsonServer
 from robospa.clients.numpy_json import chunk_of, dumps
+from robospa.clients.probe import Probe
 from robospa.protocol.errors import ServerError
 from robospa.protocol.options import option, plain_options
 from robospa.protocol.policy import Observation, PolicySpec, TrialInfo
-
-if TYPE_CHECKING:
-    from robospa.clients import Line
 
 VIEWS = {"top": "head", "right": "right_wrist", "left": "left_wrist"}
 
@@ -46,7 +45,7 @@ SWAPPED = (
 
 
 @dataclass(frozen=True)
-class Options:
+class Go1ClientOptions:
     """What GO-1's server does not say."""
 
     wrists: str = option(
@@ -66,7 +65,7 @@ class Options:
         check_horizon(self.horizon, self.execute)
 
 
-def body(observation: Observation, options: Options) -> bytes:
+def body(observation: Observation, options: Go1ClientOptions) -> bytes:
     """The JSON body of one request."""
     images = observation["images"]
     views = dict(VIEWS)
@@ -79,12 +78,12 @@ def body(observation: Observation, options: Options) -> bytes:
     return dumps(sent).encode()
 
 
-class Session:
+class Go1Session:
     """One kept-alive HTTP connection."""
 
-    def __init__(self, line: Line, options: Options) -> None:
-        self._line, self._options, self._answered = line, options, False
-        self._path = line.target.path if line.target.path.strip("/") else "/act"
+    def __init__(self, params: ConnectionParams, options: Go1ClientOptions) -> None:
+        self._params, self._options, self._answered = params, options, False
+        self._path = params.endpoint.path if params.endpoint.path.strip("/") else "/act"
         self.spec = PolicySpec(
             name="go1",
             state=options.state,
@@ -99,8 +98,8 @@ class Session:
             "options": plain_options(options),
             "warnings": warnings,
         }
-        self._server = JsonServer(line)
-        self._server.greet(self._path, line.timeouts.hello)
+        self._server = JsonServer(params)
+        self._server.greet(self._path, params.timeouts.hello)
 
     def reset(self, id: int, trial: TrialInfo) -> None:
         """Nothing to send: the server keeps no state between calls."""
@@ -111,7 +110,7 @@ class Session:
         try:
             answer = self._server.post(self._path, body(observation, self._options), timeout)
         except ServerError as error:
-            raise error if self._answered else explained(error, self._line) from error
+            raise error if self._answered else explained(error, self._params) from error
         self._answered = True
         return chunk_of(answer), {}
 
@@ -122,6 +121,19 @@ class Session:
         self._server.close()
 
 
-def open_session(line: Line, options: Options) -> Session:
-    """A session with the server at `line.target`."""
-    return Session(line, options)
+def recognise(probe: Probe) -> bool:
+    """Any failure inside GO-1's server is a bare HTTP 500."""
+    return probe.http("POST", "/act", b"{}").status == 500
+
+
+DIALECT = Dialect(
+    server="GO-1's server",
+    scheme="go1+http",
+    secure_scheme="go1+https",
+    wire="http",
+    port=9000,
+    options=Go1ClientOptions,
+    open_session=Go1Session,
+    recognise=recognise,
+    weak_sign=True,
+)

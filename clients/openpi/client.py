@@ -1,24 +1,28 @@
 """openpi's dialect: pi0, pi0.5 and whatever else runs behind `serve_policy`.
 
-The translation itself is `robospa.protocol.openpi`, because our server speaks this dialect too.
+Our own server speaks this dialect too, for clients of openpi: `robospa.protocol.openpi`.
 """
 
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Any
 
+import numpy as np
+
+from robospa.clients.dialect import ConnectionParams, Dialect
+from robospa.clients.openpi.conventions import to_openpi
+from robospa.clients.probe import Probe
 from robospa.clients.token_budget import check_budget
-from robospa.protocol.errors import DecodeError
-from robospa.protocol.openpi import CAMERA_NAMES, OpenPiOptions, OpenPiSession
+from robospa.protocol.codec import Limits, decode, encode
+from robospa.protocol.errors import DecodeError, ProtocolViolation, ServerError
+from robospa.protocol.openpi import CAMERA_NAMES
 from robospa.protocol.options import option, plain_options
-from robospa.protocol.policy import CameraSpec, PolicySpec
-from robospa.protocol.transport import Address, Transport
-
-if TYPE_CHECKING:
-    from robospa.clients import Line
-    from robospa.protocol.client import WireClient
+from robospa.protocol.policy import CameraSpec, Observation, PolicySpec, TrialInfo
+from robospa.protocol.transport import Timeouts, Transport
+from robospa.protocol.validate import as_said
 
 WARNINGS = (
     "adapt_to_pi is invisible on the wire: the served config must have adapt_to_pi=False for "
@@ -29,7 +33,7 @@ WARNINGS = (
 
 
 @dataclass(frozen=True)
-class Options:
+class OpenPiClientOptions:
     """What `serve_policy` does not say."""
 
     cameras: str = option("head,left_wrist,right_wrist", "our cameras to send, comma separated")
@@ -48,20 +52,16 @@ class Options:
     def __post_init__(self) -> None:
         """ValueError for options that cannot be."""
         check_budget(self.text_budget)
+        self.camera_names, self.extra_fields  # noqa: B018
         try:
-            self.convention()
+            PolicySpec.from_json(self.spec.to_json())
         except DecodeError as error:
             raise ValueError(f"options that cannot be: {error}") from error
 
-    def convention(self) -> OpenPiOptions:
-        """The same as the translation wants it."""
-        try:
-            extra = json.loads(self.extra)
-        except (ValueError, RecursionError):
-            extra = None
-        if not isinstance(extra, dict):
-            raise ValueError(f"option extra={self.extra[:80]!r} is not a JSON map")
-        spec = PolicySpec(
+    @property
+    def spec(self) -> PolicySpec:
+        """What these options make of a server that says nothing of itself."""
+        return PolicySpec(
             name="openpi",
             cameras=tuple(CameraSpec(name) for name in self.cameras.split(",") if name),
             state=self.state,
@@ -69,33 +69,132 @@ class Options:
             execute=self.execute,
             action_dim=self.action_dim,
         )
+
+    @property
+    def camera_names(self) -> dict[str, str]:
+        """The server's name of each of our cameras."""
         names = dict(CAMERA_NAMES)
         for pair in filter(None, self.names.split(",")):
             ours, colon, theirs = pair.partition(":")
             if ours not in CAMERA_NAMES or not colon or not theirs:
                 raise ValueError(f"option names: {pair!r} is not of the form camera:name")
             names[ours] = theirs
-        return OpenPiOptions(PolicySpec.from_json(spec.to_json()), names, extra)
+        return names
+
+    @property
+    def extra_fields(self) -> dict[str, Any]:
+        """Option `extra` as a map."""
+        try:
+            extra = json.loads(self.extra)
+        except (ValueError, RecursionError):
+            extra = None
+        if not isinstance(extra, dict):
+            raise ValueError(f"option extra={self.extra[:80]!r} is not a JSON map")
+        return extra
 
 
-def open_session(line: Line, options: Options) -> WireClient:
-    """A session with the server at `line.target`."""
-    convention = options.convention()
-    transport = Transport(websocket_address(line), line.timeouts, line.limits, None)
+class OpenPiSession:
+    """One connection to an openpi server, over an open `transport`.
+
+    The server sends one metadata map, then answers each observation map with a map that has
+    `actions`. A text frame is an error with the server's traceback. There is no reset, no request
+    id and no spec on the wire.
+    """
+
+    def __init__(
+        self,
+        transport: Transport,
+        options: OpenPiClientOptions,
+        timeouts: Timeouts,
+        limits: Limits,
+    ) -> None:
+        self._transport, self._limits = transport, limits
+        self._cameras, self._extra = options.camera_names, options.extra_fields
+        metadata = self._receive(timeouts.hello, "metadata")
+        self.spec = options.spec
+        self.hello = {
+            "dialect": "openpi",
+            "metadata": as_said(metadata),
+            "spec": self.spec.to_json(),
+            "options": plain_options(options),
+            "warnings": list(WARNINGS),
+            "text_budget": options.text_budget,
+        }
+
+    def reset(self, id: int, trial: TrialInfo) -> None:
+        """Nothing to send: openpi policies keep no state between calls."""
+
+    def infer(
+        self, id: int, observation: Observation, timeout: float
+    ) -> tuple[Any, Mapping[str, float]]:
+        if self._transport.has_more():
+            self.close()
+            raise ProtocolViolation(f"{self._transport.url} sent what nobody asked for")
+        request = to_openpi(observation, self._cameras, self._extra)
+        self._transport.send(encode(request, self._limits))
+        answer = self._receive(timeout, "actions")
+        actions = answer.get("actions")
+        if isinstance(actions, np.ndarray) and actions.dtype.kind == "f":
+            with np.errstate(over="ignore"):
+                actions = actions.astype(np.float32)
+        return actions, _timing(answer)
+
+    def end(self, id: int, outcome: Mapping[str, Any]) -> None:
+        """Nothing to send."""
+
+    def close(self) -> None:
+        self._transport.close()
+
+    def _receive(self, timeout: float, what: str) -> dict[str, Any]:
+        data = self._transport.receive(timeout, what)
+        if isinstance(data, str):
+            self.close()
+            lines = data.strip().splitlines() or ["no text"]
+            error = ServerError("openpi", lines[-1], True, self._transport.url)
+            error.add_note(data)
+            raise error
+        try:
+            value = decode(data, self._limits)
+        except DecodeError as error:
+            self.close()
+            raise ProtocolViolation(f"{self._transport.url}: unreadable {what}: {error}") from error
+        if not isinstance(value, dict):
+            self.close()
+            raise ProtocolViolation(f"{self._transport.url}: {what} is no map")
+        return value
+
+
+def _timing(answer: Mapping[str, Any]) -> dict[str, float]:
+    for name in ("policy_timing", "server_timing"):
+        times = answer.get(name)
+        if isinstance(times, dict) and isinstance(times.get("infer_ms"), (int, float)):
+            return {"infer_ms": float(times["infer_ms"])}
+    return {}
+
+
+def open_session(params: ConnectionParams, options: OpenPiClientOptions) -> OpenPiSession:
+    """A session with the server at `params.endpoint`."""
+    transport = Transport(params.websocket_address(), params.timeouts, params.limits, None)
     try:
-        session = OpenPiSession(transport, convention, line.timeouts, line.limits)
+        return OpenPiSession(transport, options, params.timeouts, params.limits)
     except BaseException:
         transport.close()
         raise
-    session.hello["options"] = plain_options(options)
-    session.hello["warnings"] = list(WARNINGS)
-    session.hello["text_budget"] = options.text_budget
-    return session
 
 
-def websocket_address(line: Line) -> Address:
-    """The ws:// or wss:// address behind any WebSocket dialect's URL."""
-    target = line.target
-    host = f"[{target.host}]" if ":" in target.host else target.host
-    scheme = "wss" if target.secure else "ws"
-    return Address(f"{scheme}://{host}:{target.port}{target.path}", line.token, line.ssl)
+def recognise(probe: Probe) -> bool:
+    """It greets unasked, with a map; so may others."""
+    open_session(probe.params, OpenPiClientOptions()).close()
+    return True
+
+
+DIALECT = Dialect(
+    server="an openpi server",
+    scheme="openpi",
+    wire="websocket",
+    options=OpenPiClientOptions,
+    open_session=open_session,
+    recognise=recognise,
+    weak_sign=True,
+    also_reaches=("ws",),  # our own server also answers an openpi client
+)

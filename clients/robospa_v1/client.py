@@ -3,30 +3,44 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-from robospa.clients.openpi import client as openpi
-from robospa.protocol.client import websocket_opener
-from robospa.protocol.options import plain_options
-
-if TYPE_CHECKING:
-    from robospa.clients import Line
-    from robospa.protocol.client import WireClient
+from robospa.clients.dialect import ConnectionParams, Dialect
+from robospa.clients.openpi.client import OpenPiClientOptions, OpenPiSession
+from robospa.clients.probe import Probe
+from robospa.protocol.client import WireClient, open_wire
+from robospa.protocol.transport import Transport
 
 
 @dataclass(frozen=True)
-class Options(openpi.Options):
+class RobospaClientOptions(OpenPiClientOptions):
     """Used only if the server turns out to speak openpi's dialect; ours tells everything."""
 
 
-def open_session(line: Line, options: Options) -> WireClient:
-    """A session in the dialect that the server selects."""
-    opener = websocket_opener(
-        openpi.websocket_address(line), line.timeouts, line.limits, options.convention()
+def open_session(params: ConnectionParams, options: RobospaClientOptions) -> WireClient:
+    """A connection in the dialect that the server selects."""
+    return open_wire(
+        params.websocket_address(),
+        params.timeouts,
+        params.limits,
+        lambda transport: OpenPiSession(transport, options, params.timeouts, params.limits),
     )
-    session = opener()
-    if session.hello["dialect"] == "openpi":
-        session.hello["options"] = plain_options(options)
-        session.hello["warnings"] = list(openpi.WARNINGS)
-        session.hello["text_budget"] = options.text_budget
-    return session
+
+
+def recognise(probe: Probe) -> bool:
+    """It selects our subprotocol."""
+    params = probe.params
+    transport = Transport(params.websocket_address(), params.timeouts, params.limits)
+    transport.close()
+    return transport.subprotocol is not None
+
+
+DIALECT = Dialect(
+    server="a robospa.v1 server",
+    scheme="ws",
+    secure_scheme="wss",
+    wire="websocket",
+    options=RobospaClientOptions,
+    open_session=open_session,
+    recognise=recognise,
+    also_reaches=("openpi",),
+)

@@ -18,14 +18,16 @@ import socket
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from robospa.clients.chunks import as_chunk, check_horizon
 from robospa.clients.detect import explained
+from robospa.clients.dialect import ConnectionParams, Dialect
 from robospa.clients.http import left_over
 from robospa.clients.numpy_json import array_of
+from robospa.clients.probe import Probe
 from robospa.protocol.errors import (
     CallTimeout,
     ConnectFailed,
@@ -37,9 +39,6 @@ from robospa.protocol.errors import (
 )
 from robospa.protocol.options import option, plain_options
 from robospa.protocol.policy import Observation, PolicySpec, TrialInfo
-
-if TYPE_CHECKING:
-    from robospa.clients import Line
 
 CAMERAS = {"head": "head_camera", "left_wrist": "left_camera", "right_wrist": "right_camera"}
 DP_CAMERAS = {"head": "head_cam", "left_wrist": "left_cam", "right_wrist": "right_cam"}
@@ -54,7 +53,7 @@ WARNINGS = (
 
 
 @dataclass(frozen=True)
-class Options:
+class RoboTwinClientOptions:
     """What RoboTwin's TCP server does not say."""
 
     layout: str = option(
@@ -145,17 +144,17 @@ LAYOUTS = {"robotwin": robotwin_observation, "dp": dp_observation}
 class Wire:
     """Framed JSON over one TCP connection, with limits and deadlines."""
 
-    def __init__(self, line: Line) -> None:
-        self.url = f"robotwin+tcp://{line.target.host}:{line.target.port}"
-        self._limit = line.limits.message
-        self._socket = self._connect(line)
+    def __init__(self, params: ConnectionParams) -> None:
+        self.url = f"robotwin+tcp://{params.endpoint.host}:{params.endpoint.port}"
+        self._limit = params.limits.message
+        self._socket = self._connect(params)
 
-    def _connect(self, line: Line) -> socket.socket | None:
-        address = (line.target.host, line.target.port)
-        give_up = time.monotonic() + line.timeouts.wait
+    def _connect(self, params: ConnectionParams) -> socket.socket | None:
+        address = (params.endpoint.host, params.endpoint.port)
+        give_up = time.monotonic() + params.timeouts.wait
         while True:
             try:
-                found = socket.create_connection(address, line.timeouts.connect)
+                found = socket.create_connection(address, params.timeouts.connect)
                 found.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
                 return found
             except ConnectionRefusedError as error:
@@ -250,11 +249,11 @@ def _read(sock: socket.socket, size: int, deadline: float) -> bytes:
     return bytes(data)
 
 
-class Session:
+class RoboTwinSession:
     """One TCP connection."""
 
-    def __init__(self, line: Line, options: Options) -> None:
-        self._line, self._options, self._answered = line, options, False
+    def __init__(self, params: ConnectionParams, options: RoboTwinClientOptions) -> None:
+        self._params, self._options, self._answered = params, options, False
         self._given = -1
         self.spec = PolicySpec(
             name="robotwin",
@@ -271,12 +270,12 @@ class Session:
             "options": plain_options(options),
             "warnings": list(WARNINGS),
         }
-        self._wire = Wire(line)
+        self._wire = Wire(params)
 
     def reset(self, id: int, trial: TrialInfo) -> None:
         self._given = -1
         if self._options.reset != "none":
-            self._call(self._options.reset, None, self._line.timeouts.reset)
+            self._call(self._options.reset, None, self._params.timeouts.reset)
 
     def infer(
         self, id: int, observation: Observation, timeout: float
@@ -304,7 +303,7 @@ class Session:
             # Nothing is said at a handshake, so this may be another server altogether.
             if self._answered:
                 raise
-            raise explained(error, self._line) from error.__cause__
+            raise explained(error, self._params) from error.__cause__
         self._answered = True
         return result
 
@@ -315,6 +314,24 @@ class Session:
         self._wire.close()
 
 
-def open_session(line: Line, options: Options) -> Session:
-    """A session with the server at `line.target`."""
-    return Session(line, options)
+def recognise(probe: Probe) -> bool:
+    """A command without a name is refused in a framed JSON map."""
+    wire = Wire(probe.params)
+    try:
+        wire.call("", None, probe.params.timeouts.infer)
+    except ServerError:
+        return True
+    finally:
+        wire.close()
+    return False
+
+
+DIALECT = Dialect(
+    server="RoboTwin's model server",
+    scheme="robotwin+tcp",
+    wire="tcp",
+    port=9999,
+    options=RoboTwinClientOptions,
+    open_session=RoboTwinSession,
+    recognise=recognise,
+)

@@ -18,20 +18,19 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from robospa.clients.chunks import WIDTHS, as_chunk, check_horizon, turned
-from robospa.clients.msgpack_socket import Frames
+from robospa.clients.dialect import ConnectionParams, Dialect
+from robospa.clients.msgpack_socket import MsgpackSocket
 from robospa.clients.numpy_msgpack import text_form
+from robospa.clients.probe import Probe
 from robospa.protocol.errors import HandshakeError, ServerError, printable
 from robospa.protocol.options import option, plain_options
 from robospa.protocol.policy import CameraSpec, Observation, PolicySpec, TrialInfo
 from robospa.protocol.validate import as_said
-
-if TYPE_CHECKING:
-    from robospa.clients import Line
 
 CAMERAS = {"head": "head_camera", "left_wrist": "left_camera", "right_wrist": "right_camera"}
 PROTOCOL = 1
@@ -46,7 +45,7 @@ WARNINGS = (
 
 
 @dataclass(frozen=True)
-class Options:
+class VlaEvalClientOptions:
     """What a vla-eval server does not say."""
 
     space: str = option("joint", "what the model answers", ("joint", "ee"))
@@ -70,7 +69,7 @@ class Options:
         return tuple(name for name in self.cameras.split(",") if name)
 
 
-def encode(observation: Observation, options: Options) -> dict[str, Any]:
+def encode(observation: Observation, options: VlaEvalClientOptions) -> dict[str, Any]:
     """The payload of one `observation`."""
     images = observation["images"]
     sent: dict[str, Any] = {
@@ -81,13 +80,13 @@ def encode(observation: Observation, options: Options) -> dict[str, Any]:
     return {**sent, **{key: state for key in options.state_keys.split(",") if key}}
 
 
-class Session:
+class VlaEvalSession:
     """One WebSocket, which is one session of the server."""
 
-    def __init__(self, line: Line, options: Options) -> None:
+    def __init__(self, params: ConnectionParams, options: VlaEvalClientOptions) -> None:
         self._options = options
         self._number = 0
-        self._frames = Frames(line, text_form)
+        self._socket = MsgpackSocket(params, text_form)
         self.spec = PolicySpec(
             name="vla-eval",
             cameras=tuple(CameraSpec(name) for name in options.views),
@@ -98,12 +97,12 @@ class Session:
             action_dim=WIDTHS[options.space],
         )
         number = self._send("hello", {"harness_version": "robospa", "protocol_version": PROTOCOL})
-        greeting = self._answer("hello", number, line.timeouts.hello)
+        greeting = self._answer("hello", number, params.timeouts.hello)
         theirs = greeting.get("protocol_version")
         if theirs != PROTOCOL:
             self.close()
             raise HandshakeError(
-                f"{line.target.url} speaks version {str(theirs)[:40]} of vla-eval's protocol, "
+                f"{params.endpoint.url} speaks version {str(theirs)[:40]} of vla-eval's protocol, "
                 f"not {PROTOCOL}"
             )
         name = str(greeting.get("model_server", ""))
@@ -143,38 +142,38 @@ class Session:
         self._send("episode_end", {"metrics": {"success": bool(outcome.get("success"))}})
 
     def close(self) -> None:
-        self._frames.close()
+        self._socket.close()
 
     def _send(self, kind: str, payload: dict[str, Any]) -> int:
         self._number += 1
         message = {"type": kind, "payload": payload, "seq": self._number, "timestamp": time.time()}
-        self._frames.send(message)
+        self._socket.send(message)
         return self._number
 
     def _answer(self, wanted: str, number: int, timeout: float) -> Mapping[str, Any]:
         """The payload of the answer of type `wanted` to message `number`."""
-        answer = self._frames.receive(timeout, wanted)
+        answer = self._socket.receive(timeout, wanted)
         kind, body = answer.get("type"), answer.get("payload")
         if not isinstance(body, Mapping):
-            raise self._frames.violation("its answer is no message of vla-eval")
+            raise self._socket.violation("its answer is no message of vla-eval")
         if kind == "error":
             text = str(body.get("error", "no reason given"))
             late = answer.get("seq") != number
             if late:  # of `episode_start`: this observation's own answer is still to come
                 self.close()
             what = "an error" if not late else "an error of an earlier message"
-            raise ServerError(what, text, True, self._frames.url)
+            raise ServerError(what, text, True, self._socket.url)
         if answer.get("seq") != number:
-            raise self._frames.violation(f"answer {answer.get('seq')} came to message {number}")
+            raise self._socket.violation(f"answer {answer.get('seq')} came to message {number}")
         if kind != wanted:
-            raise self._frames.violation(f"{kind} came where {wanted} was due")
+            raise self._socket.violation(f"{kind} came where {wanted} was due")
         return body
 
 
 SAID = ("observation_params", "action_spec", "observation_spec", "capabilities")
 
 
-def _doubts(said: Mapping[str, Any], options: Options) -> list[str]:
+def _doubts(said: Mapping[str, Any], options: VlaEvalClientOptions) -> list[str]:
     """What the server says of its actions and does not fit the options."""
     parts = said.get("action_spec")
     if not isinstance(parts, Mapping):
@@ -191,6 +190,17 @@ def _doubts(said: Mapping[str, Any], options: Options) -> list[str]:
     ]
 
 
-def open_session(line: Line, options: Options) -> Session:
-    """A session with the server at `line.target`."""
-    return Session(line, options)
+def recognise(probe: Probe) -> bool:
+    """Its health page is like no other's."""
+    answer = probe.http("GET", "/health")
+    return answer.status == 200 and answer.json() == {"status": "ok"}
+
+
+DIALECT = Dialect(
+    server="a vla-eval model server",
+    scheme="vla-eval",
+    wire="websocket",
+    options=VlaEvalClientOptions,
+    open_session=VlaEvalSession,
+    recognise=recognise,
+)

@@ -19,21 +19,20 @@ import contextlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime, timezone
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robospa.clients.chunks import as_chunk, check_horizon, turned
-from robospa.clients.msgpack_socket import Frames
+from robospa.clients.dialect import ConnectionParams, Dialect
+from robospa.clients.msgpack_socket import MsgpackSocket
 from robospa.clients.numpy_msgpack import binary_form
+from robospa.clients.probe import Probe
 from robospa.protocol.errors import PolicyAnswerError, ServerError, printable
 from robospa.protocol.options import option, plain_options
 from robospa.protocol.policy import Observation, PolicySpec, TrialInfo
 from robospa.rotations import quaternion_to_matrix
-
-if TYPE_CHECKING:
-    from robospa.clients import Line
 
 CAMERAS = {"head": "cam_head", "left_wrist": "cam_left_wrist", "right_wrist": "cam_right_wrist"}
 ARMS = ("left", "right")
@@ -52,7 +51,7 @@ WARNINGS = (
 
 
 @dataclass(frozen=True)
-class Options:
+class XPolicyLabClientOptions:
     """What XPolicyLab's server does not say."""
 
     space: str = option(
@@ -72,7 +71,7 @@ class Options:
             raise ValueError(f"option frequency={self.frequency} is no frequency in Hz")
 
 
-def encode(observation: Observation, options: Options) -> dict[str, Any]:
+def encode(observation: Observation, options: XPolicyLabClientOptions) -> dict[str, Any]:
     """`payload.observation` of one query."""
     instruction = observation.get("instruction", "")
     images = observation["images"]
@@ -105,7 +104,7 @@ def robot_state(observation: Observation) -> dict[str, NDArray[np.float32]]:
     return found
 
 
-def decode(answer: Any, observation: Observation, options: Options) -> Any:
+def decode(answer: Any, observation: Observation, options: XPolicyLabClientOptions) -> Any:
     """The chunk in `payload.actions`; raises PolicyAnswerError for an action that names nothing."""
     if isinstance(answer, Mapping):
         answer = [answer]
@@ -138,11 +137,11 @@ def _action(item: Any, seen: Mapping[str, NDArray[np.float32]], space: str) -> l
     return row
 
 
-class Session:
+class XPolicyLabSession:
     """One WebSocket."""
 
-    def __init__(self, line: Line, options: Options) -> None:
-        self._options, self._timeouts = options, line.timeouts
+    def __init__(self, params: ConnectionParams, options: XPolicyLabClientOptions) -> None:
+        self._options, self._timeouts = options, params.timeouts
         self._trial: dict[str, Any] = {}
         self._ids: dict[str, Any] = {}
         self.spec = PolicySpec(
@@ -153,8 +152,8 @@ class Session:
             execute=options.execute,
             action_dim=16 if options.space == "ee" else 14,
         )
-        self._frames = Frames(line, binary_form)
-        greeting = self._call(0, "hello", "hello_ack", {}, line.timeouts.hello)
+        self._socket = MsgpackSocket(params, binary_form)
+        greeting = self._call(0, "hello", "hello_ack", {}, params.timeouts.hello)
         self.hello: dict[str, Any] = {
             "dialect": "xpolicylab",
             "server": printable(str(greeting.get("server", "")), 200),
@@ -194,7 +193,7 @@ class Session:
         self._call(id, "trial_end", "trial_end_ack", payload, self._timeouts.end)
 
     def close(self) -> None:
-        self._frames.close()
+        self._socket.close()
 
     def _call(
         self, id: int, kind: str, wanted: str, payload: Any, timeout: float, step: int = 0
@@ -210,21 +209,33 @@ class Session:
             "sent_at": datetime.now(timezone.utc).isoformat(),
             "payload": payload,
         }
-        self._frames.send(message)
-        answer = self._frames.receive(timeout, wanted)
+        self._socket.send(message)
+        answer = self._socket.receive(timeout, wanted)
         body = answer.get("payload")
         if not isinstance(body, Mapping) or "message_type" not in answer:
-            raise self._frames.violation("its answer is no message of XPolicyLab")
+            raise self._socket.violation("its answer is no message of XPolicyLab")
         if answer.get("message_id") != name:
-            raise self._frames.violation(f"answer {answer.get('message_id')!r} came to {name!r}")
+            raise self._socket.violation(f"answer {answer.get('message_id')!r} came to {name!r}")
         if answer["message_type"] == "error":
             text = str(body.get("message", "no reason given"))
-            raise ServerError(str(body.get("code", "an error")), text, True, self._frames.url)
+            raise ServerError(str(body.get("code", "an error")), text, True, self._socket.url)
         if answer["message_type"] != wanted:
-            raise self._frames.violation(f"{answer['message_type']} came where {wanted} was due")
+            raise self._socket.violation(f"{answer['message_type']} came where {wanted} was due")
         return body
 
 
-def open_session(line: Line, options: Options) -> Session:
-    """A session with the server at `line.target`."""
-    return Session(line, options)
+def recognise(probe: Probe) -> bool:
+    """It answers a greeting."""
+    XPolicyLabSession(probe.params, XPolicyLabClientOptions()).close()
+    return True
+
+
+DIALECT = Dialect(
+    server="an XPolicyLab policy server",
+    scheme="xpolicylab",
+    wire="websocket",
+    port=19000,
+    options=XPolicyLabClientOptions,
+    open_session=XPolicyLabSession,
+    recognise=recognise,
+)

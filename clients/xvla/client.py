@@ -18,24 +18,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robospa.clients.chunks import turned
 from robospa.clients.detect import explained
+from robospa.clients.dialect import ConnectionParams, Dialect
 from robospa.clients.ee6d import ARM, closed_to_open, ee6d_to_actions, poses_to_ee6d
 from robospa.clients.http import JsonServer
 from robospa.clients.numpy_json import chunk_of, dumps
+from robospa.clients.probe import Probe
 from robospa.clients.token_budget import check_budget
 from robospa.clients.xvla.conventions import Conventions
 from robospa.protocol.errors import PolicyAnswerError, ProtocolViolation, ServerError
 from robospa.protocol.options import option, plain_options
 from robospa.protocol.policy import CameraSpec, Observation, PolicySpec, TrialInfo
-
-if TYPE_CHECKING:
-    from robospa.clients import Line
 
 WARNINGS = (
     "whether a checkpoint was trained with red and blue swapped is invisible on the wire: if it "
@@ -51,7 +50,7 @@ SILENT = (
 
 
 @dataclass(frozen=True)
-class Options(Conventions):
+class XvlaClientOptions(Conventions):
     """What X-VLA's server does not say."""
 
     joint_grippers: str = option(
@@ -76,12 +75,12 @@ class Options(Conventions):
         check_budget(self.text_budget)
 
 
-def to_ee6d(poses: NDArray[np.floating[Any]], options: Options) -> NDArray[np.float64]:
+def to_ee6d(poses: NDArray[np.floating[Any]], options: XvlaClientOptions) -> NDArray[np.float64]:
     """(2, 8) poses with gripper 0..1 open, to the 20 numbers; grippers become 1 - 2 g."""
     return poses_to_ee6d(poses, options.quaternions, options.rotation)
 
 
-def from_ee6d(chunk: NDArray[np.floating[Any]], options: Options) -> NDArray[np.float32]:
+def from_ee6d(chunk: NDArray[np.floating[Any]], options: XvlaClientOptions) -> NDArray[np.float32]:
     """(T, 20) to our `ee` actions (T, 16), grippers open (1) or closed (0).
 
     Raises PolicyAnswerError if six numbers name no rotation.
@@ -89,18 +88,18 @@ def from_ee6d(chunk: NDArray[np.floating[Any]], options: Options) -> NDArray[np.
     return ee6d_to_actions(chunk, options.quaternions, options.rotation, options.closed_above)
 
 
-def from_joint(chunk: NDArray[np.float32], options: Options) -> NDArray[np.float32]:
+def from_joint(chunk: NDArray[np.float32], options: XvlaClientOptions) -> NDArray[np.float32]:
     """(T, 14) of a joint-space model to our actions: its gripper numbers say closed, ours open."""
     return closed_to_open(chunk, options.closed_above)
 
 
-class Session:
+class XvlaSession:
     """One kept-alive HTTP connection, and the last chunk of the trial in progress."""
 
-    def __init__(self, line: Line, options: Options) -> None:
-        self._line, self._options, self._answered = line, options, False
+    def __init__(self, params: ConnectionParams, options: XvlaClientOptions) -> None:
+        self._params, self._options, self._answered = params, options, False
         self._task = ""
-        self._path = line.target.path if line.target.path.strip("/") else "/act"
+        self._path = params.endpoint.path if params.endpoint.path.strip("/") else "/act"
         self._chunk: NDArray[np.float32] | None = None
         self._asked_at = 0
         joint = options.space == "joint"
@@ -119,8 +118,8 @@ class Session:
             "warnings": list(WARNINGS),
             "text_budget": options.text_budget if options.text == "instruction" else None,
         }
-        self._server = JsonServer(line)
-        self._server.greet(self._path, line.timeouts.hello)
+        self._server = JsonServer(params)
+        self._server.greet(self._path, params.timeouts.hello)
 
     def reset(self, id: int, trial: TrialInfo) -> None:
         """Nothing to send; the command of the trial before is forgotten."""
@@ -135,7 +134,7 @@ class Session:
         except ServerError as error:
             if error.code == "HTTP 400":  # all that its server ever says, of any failure
                 error = ServerError(error.code, f"{error.message}; {SILENT}", True)
-            raise error if self._answered else explained(error, self._line) from error
+            raise error if self._answered else explained(error, self._params) from error
         self._answered = True
         if not isinstance(answer, Mapping) or "action" not in answer:
             raise ProtocolViolation(
@@ -199,6 +198,18 @@ class Session:
         self._server.close()
 
 
-def open_session(line: Line, options: Options) -> Session:
-    """A session with the server at `line.target`."""
-    return Session(line, options)
+def recognise(probe: Probe) -> bool:
+    """A request without images is refused with a reason in `error`."""
+    answer = probe.http("POST", "/act", b"{}")
+    return answer.status == 400 and "error" in (answer.json() or {})
+
+
+DIALECT = Dialect(
+    server="X-VLA's server",
+    scheme="xvla+http",
+    secure_scheme="xvla+https",
+    wire="http",
+    options=XvlaClientOptions,
+    open_session=XvlaSession,
+    recognise=recognise,
+)

@@ -102,23 +102,20 @@ class _Target:
     token: str | None
     timeouts: Timeouts
     connect: Connect
-    native: bool
-    """Whether it may speak `robospa.v1`."""
 
 
 def _target(url: str, token: str | None, timeouts: Timeouts, client: Path | None) -> _Target:
     """Raises BadParameter for a URL that is none, SettingsError for options that do not fit."""
-    from robospa.clients import connect, find
+    from robospa.clients import connect, find_endpoint
     from robospa.harness.running.request import client_options
 
     try:
-        scheme = find(url).scheme
+        find_endpoint(url)
     except ValueError as error:
         raise typer.BadParameter(str(error)) from error
     options = client_options(url, client)
-    native = scheme in ("ws", "wss") and not options
     connector = partial(connect, url, token, timeouts, options=options)
-    return _Target(url.partition("?")[0], token, timeouts, connector, native)
+    return _Target(url.partition("?")[0], token, timeouts, connector)
 
 
 def _episode(demo: Path, instruction: str | None) -> Episode:
@@ -142,7 +139,7 @@ def _run_checks(console: Console, target: _Target, trials: int) -> list[CheckRes
         target.url,
         target.token,
         timeouts=target.timeouts,
-        connector=None if target.native else target.connect,
+        connector=target.connect,
     )
     failed = {result.name for result in results if result.passed is False}
     table = Table("check", "", "seen", box=None)

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from robospa.clients import SCHEMES, connect
+from robospa.clients import connect
+from robospa.clients.dialect import dialects
 from robospa.protocol.policy import Observation, PolicySpec, TrialInfo
 from robospa.protocol.server import ServerThread
 
@@ -50,7 +51,8 @@ def test_openpi_forces_openpis_dialect(url: str) -> None:
 def test_unknown_schemes_are_told_what_exists(url: str) -> None:
     with pytest.raises(ValueError, match="no address of a policy server") as caught:
         connect(url)
-    assert all(f"{scheme}://" in str(caught.value) for scheme in SCHEMES)
+    known = [scheme for dialect in dialects() for scheme in dialect.schemes]
+    assert all(f"{scheme}://" in str(caught.value) for scheme in known)
 
 
 def test_a_url_without_host() -> None:

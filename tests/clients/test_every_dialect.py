@@ -11,7 +11,8 @@ import pytest
 from standin_base import QUICK, TRIAL, joint_chunk, observation
 from standins import Go1, OpenPi, RoboTwin, Status, VlaEval, XPolicyLab, XVla
 
-from robospa.clients import SCHEMES, connect, detect
+from robospa.clients import connect, detect
+from robospa.clients.dialect import dialects
 from robospa.protocol.errors import (
     CallTimeout,
     ConnectFailed,
@@ -84,7 +85,7 @@ def test_a_model_that_fails_is_the_servers_error(name: str) -> None:
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("scheme", [s for s in SCHEMES if not s.endswith(("wss", "https"))])
+@pytest.mark.parametrize("scheme", [dialect.scheme for dialect in dialects()])
 def test_a_server_that_is_down(scheme: str) -> None:
     port = free_port()
     with pytest.raises(ConnectFailed, match=f"nobody listens at .*{port}: start the policy server"):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import importlib
+import re
 from pathlib import Path
 
 import numpy as np
@@ -10,19 +10,24 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robospa.clients import SCHEMES, check_options, find
+from robospa.clients import check_options, find_endpoint
 from robospa.clients.chunks import as_chunk, turned
+from robospa.clients.dialect import Dialect, dialects
 from robospa.clients.ee6d import LAYOUTS, ORDERS, decode_rotation, encode_rotation
 from robospa.clients.token_budget import budget_warning, least_tokens
 from robospa.protocol.options import option_table, plain_options, read_options, url_options
 
-MODULES = sorted({dialect.module for dialect in SCHEMES.values()})
+DIALECTS = dialects()
 ROOT = Path(__file__).resolve().parents[2]
 
 
-@pytest.mark.parametrize("module", MODULES)
-def test_every_option_is_explained_and_round_trips(module: str) -> None:
-    options = importlib.import_module(f"robospa.clients.{module}").Options
+def by_scheme(dialect: Dialect) -> str:
+    return dialect.scheme
+
+
+@pytest.mark.parametrize("dialect", DIALECTS, ids=by_scheme)
+def test_every_option_is_explained_and_round_trips(dialect: Dialect) -> None:
+    options = dialect.options
     rows = option_table(options)
     assert {"horizon", "execute", "state"} - {row.name for row in rows} in (set(), {"state"})
     assert all(row.help and row.help[0] != " " for row in rows)
@@ -64,9 +69,10 @@ def test_options_that_cannot_be(url: str) -> None:
 
 
 def test_the_url_overrules_the_file() -> None:
-    target = find("go1+http://gpu?wrists=swapped", {"wrists": "correct", "ctrl_freq": 15})
-    assert target.options == {"wrists": "swapped", "ctrl_freq": 15}
-    assert (target.host, target.port) == ("gpu", 9000)
+    given = {"wrists": "correct", "ctrl_freq": 15}
+    endpoint = find_endpoint("go1+http://gpu?wrists=swapped", given)
+    assert endpoint.options == {"wrists": "swapped", "ctrl_freq": 15}
+    assert (endpoint.host, endpoint.port) == ("gpu", 9000)
 
 
 def test_none_and_flags_and_numbers_from_a_url() -> None:
@@ -129,25 +135,32 @@ def test_grippers_are_turned_and_nothing_else() -> None:
 # ---------------------------------------------------------------- the page of options
 
 
-def page_table(module: str) -> str:
+def page_table(dialect: Dialect) -> str:
     """The table of one dialect as docs/clients.md must have it."""
-    options = importlib.import_module(f"robospa.clients.{module}").Options
     rows = ["| option | default | values | meaning |", "|---|---|---|---|"]
     rows += [
         f"| `{r.name}` | {f'`{r.default}`' if r.default else 'empty'} | {r.values} | {r.help} |"
-        for r in option_table(options)
+        for r in option_table(dialect.options)
     ]
     return "\n".join(rows)
 
 
-@pytest.mark.parametrize("module", [m for m in MODULES if m != "robospa_v1.client"])
-def test_the_page_lists_every_option(module: str) -> None:
-    page = (ROOT / "docs/clients.md").read_text()
-    assert page_table(module) in page, (
-        f"docs/clients.md has another table for {module}; it must be:\n{page_table(module)}"
+@pytest.mark.parametrize("dialect", [d for d in DIALECTS if d.scheme != "ws"], ids=by_scheme)
+def test_the_page_lists_every_option(dialect: Dialect) -> None:
+    table = page_table(dialect)
+    assert table in (ROOT / "docs/clients.md").read_text(), (
+        f"docs/clients.md has another table for {dialect.scheme}; it must be:\n{table}"
     )
 
 
-def test_the_page_names_every_scheme() -> None:
+def test_the_page_lists_every_dialect() -> None:
     page = (ROOT / "docs/clients.md").read_text()
-    assert [scheme for scheme in SCHEMES if f"{scheme}://" not in page] == []
+    rows = re.findall(r"^\| (`[^|]*://`) \| [^|]* \| (\w+), \w+ \| ([\d, ]+) \|$", page, re.M)
+    assert sorted(rows) == sorted(
+        (
+            ", ".join(f"`{scheme}://`" for scheme in dialect.schemes),
+            {"websocket": "WebSocket", "http": "HTTP", "tcp": "TCP"}[dialect.wire],
+            ", ".join([str(dialect.port), *(["443"] if dialect.secure_scheme else [])]),
+        )
+        for dialect in DIALECTS
+    )

@@ -30,6 +30,7 @@ from typing import Any
 
 import numpy as np
 
+from robospa.clients.openpi.conventions import to_openpi
 from robospa.protocol.codec import decode, encode
 from robospa.protocol.errors import DecodeError, PolicyAnswerError, VersionMismatch
 from robospa.protocol.messages import (
@@ -45,7 +46,7 @@ from robospa.protocol.messages import (
     pack,
     read_message,
 )
-from robospa.protocol.openpi import OpenPiOptions, from_openpi, to_openpi
+from robospa.protocol.openpi import CAMERA_NAMES, from_openpi
 from robospa.protocol.policy import CameraSpec, PolicySpec, TrialInfo
 from robospa.protocol.validation import check_chunk, check_observation
 
@@ -84,7 +85,7 @@ def corpus() -> list[bytes]:
         End(4, {"success": True, "steps": 12}),
         Ended(4),
     ]
-    openpi = to_openpi(_observation(), OpenPiOptions())
+    openpi = to_openpi(_observation(), CAMERA_NAMES, {})
     return [*map(pack, messages), encode(openpi), encode([np.zeros(s) for s in ((), (0,), (2, 2))])]
 
 

@@ -26,14 +26,11 @@ def test_our_server_passes_everything(start: Any) -> None:
 
 
 def test_our_server_passes_in_openpis_dialect(start: Any) -> None:
-    from robospa.protocol.client import connect
-    from robospa.protocol.openpi import OpenPiOptions
+    from robospa.clients import connect
 
-    url = start(policy_factory=Recall).url
-    found = verdicts(
-        url,
-        connector=lambda: connect(url, force_openpi=True, openpi=OpenPiOptions(spec=SPEC)),
-    )
+    url = start(policy_factory=lambda: Recall(replace(SPEC, cameras=(CameraSpec("head"),)))).url
+    address = url.replace("ws://", "openpi://") + "?cameras=head"
+    found = verdicts(url, connector=lambda: connect(address))
     assert found["handshake"] and found["actions"] and found["two sessions"]
     assert False not in found.values()
 

@@ -1,141 +1,15 @@
-"""openpi's dialect: its real client against our server, servers of its form against our client."""
+"""openpi's real client against our server."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Any
 
-import msgpack
 import numpy as np
 import pytest
-from wire_helpers import CAMERA, HELLO, QUICK, TRIAL, Recall, Scripted, observation
+from wire_helpers import Recall, observation
 
-from robospa.protocol.client import RemotePolicy, connect
-from robospa.protocol.codec import decode
-from robospa.protocol.errors import (
-    ConnectionLost,
-    DecodeError,
-    EncodeError,
-    PolicyAnswerError,
-    ProtocolViolation,
-    ServerError,
-)
-from robospa.protocol.openpi import OpenPiOptions, from_openpi
-from robospa.protocol.policy import PolicySpec
-
-SPEC = PolicySpec("pi", cameras=(CAMERA,), horizon=4, action_dim=14)
-OPTIONS = OpenPiOptions(spec=SPEC)
-
-
-def array(value: Any) -> dict[bytes, Any]:
-    """An array as openpi's format writes it, from its public description alone."""
-    value = np.asarray(value)
-    return {
-        b"__ndarray__": True,
-        b"data": value.tobytes(),
-        b"dtype": value.dtype.str,
-        b"shape": value.shape,
-    }
-
-
-METADATA = msgpack.packb({"reset_pose": [0.0, -1.5, 1.5, 0.0, 0.0, 0.0], "offset": array([1.0])})
-
-
-def reply(actions: Any) -> bytes:
-    timing = {"infer_ms": {b"__npgeneric__": True, b"data": 2.5, b"dtype": "<f8"}}
-    packed: bytes = msgpack.packb({"actions": array(actions), "server_timing": timing})
-    return packed
-
-
-@contextmanager
-def openpi_server(*answers: Any) -> Iterator[RemotePolicy]:
-    """Our client, connected to a scripted server in openpi's dialect."""
-    with (
-        Scripted(METADATA, answers, v1=False) as url,
-        connect(url, timeouts=QUICK, openpi=OPTIONS) as remote,
-    ):
-        yield remote
-
-
-# ---------------------------------------------------------------- an openpi server, our client
-
-
-def test_a_server_that_does_not_select_our_protocol_is_spoken_to_in_openpis() -> None:
-    requests = []
-
-    def infer(request: bytes) -> bytes:
-        requests.append(decode(request))
-        return reply(np.full((4, 14), 0.5))
-
-    with openpi_server(infer) as remote:
-        assert remote.dialect == "openpi"
-        assert remote.hello["metadata"]["offset"] == [1.0]
-        assert remote.spec == SPEC
-        remote.reset(TRIAL)
-        chunk = remote.infer(observation(2))
-        remote.end()
-    assert chunk.dtype == np.float32
-    assert chunk.tolist() == [[0.5] * 14] * 4
-    assert remote.last_timing["infer_ms"] == 2.5
-    sent = requests[0]
-    assert sent.keys() == {"images", "state", "prompt"}
-    assert sent["prompt"] == "pick it"
-    assert sent["state"].shape == (14,)
-    assert np.array_equal(
-        sent["images"]["cam_high"], np.moveaxis(observation()["images"]["head"], -1, 0)
-    )
-
-
-def test_our_protocol_need_not_be_offered() -> None:
-    with (
-        Scripted(METADATA, [reply(np.zeros((1, 14)))]) as url,
-        connect(url, timeouts=QUICK, openpi=OPTIONS, force_openpi=True) as remote,
-    ):
-        assert remote.dialect == "openpi"
-        assert remote.infer(observation()).shape == (1, 14)
-
-
-def test_a_text_frame_is_the_servers_traceback() -> None:
-    trace = 'Traceback (most recent call last):\n  File "policy.py"\nKeyError: "cam_high"\n'
-    with openpi_server(trace) as remote:
-        with pytest.raises(ServerError, match=r'KeyError: "cam_high"$') as caught:
-            remote.infer(observation())
-        assert caught.value.retriable
-        assert "policy.py" in caught.value.__notes__[0]
-        with pytest.raises(ConnectionLost):
-            remote.infer(observation())
-
-
-@pytest.mark.parametrize("actions", [np.zeros((4, 7)), np.full((2, 14), np.nan), np.zeros(14)])
-def test_a_bad_chunk_is_the_policys_fault(actions: Any) -> None:
-    with openpi_server(reply(actions)) as remote, pytest.raises(PolicyAnswerError):
-        remote.infer(observation())
-
-
-@pytest.mark.parametrize("frame", [b"\xc1", msgpack.packb([1])])
-def test_an_unreadable_answer(frame: bytes) -> None:
-    with openpi_server(frame) as remote, pytest.raises(ProtocolViolation):
-        remote.infer(observation())
-
-
-def test_an_answer_without_actions() -> None:
-    with openpi_server(msgpack.packb({"a": 1})) as remote, pytest.raises(PolicyAnswerError):
-        remote.infer(observation())
-
-
-def test_a_camera_without_openpi_name_is_named() -> None:
-    seen = observation(images={"third": np.zeros((6, 8, 3), np.uint8)})
-    with openpi_server() as remote, pytest.raises(EncodeError, match="'third'"):
-        remote.infer(seen)
-
-
-def test_a_server_that_selects_our_protocol_is_not_spoken_to_in_openpis() -> None:
-    with Scripted(HELLO) as url, connect(url, timeouts=QUICK, openpi=OPTIONS) as remote:
-        assert remote.dialect == "robospa.v1"
-
-
-# ---------------------------------------------------------------- an openpi client, our server
+from robospa.protocol.errors import DecodeError
+from robospa.protocol.openpi import from_openpi
 
 
 def openpi_client(url: str) -> Any:

@@ -1,0 +1,117 @@
+"""A dialect: how the policy servers of one project are spoken to and recognised.
+
+A package adds one by a `Dialect` and a line in its pyproject.toml, ours and others' alike:
+
+    [project.entry-points."robospa.dialects"]
+    mine = "my_package.client:DIALECT"
+
+docs/adding-a-dialect.md has a whole example.
+"""
+
+from __future__ import annotations
+
+import ssl as ssl_module
+import warnings
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from importlib import metadata
+from typing import TYPE_CHECKING, Any, Literal
+
+from robospa.protocol.codec import DEFAULT_LIMITS, Limits
+from robospa.protocol.transport import Address, Timeouts
+from robospa.registry import DIALECTS, UnknownName, load
+
+if TYPE_CHECKING:
+    from robospa.clients.probe import Probe
+    from robospa.protocol.client import WireClient
+
+TLS_PORT = 443
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """A way to talk to policy servers.
+
+    server: completes "it looks like ...", as "an openpi server".
+    scheme: of its URLs; `secure_scheme` the same through TLS, "" where there is none.
+    wire: what its messages travel in.
+    port: used where a URL names none; through TLS it is 443.
+    options: frozen dataclass of what its servers do not say (`robospa.protocol.options`).
+    open_session: connects and greets; raises the errors of `robospa.protocol.errors`.
+    recognise: whether a server speaks this dialect, by a few harmless questions that run no model.
+    weak_sign: whether other servers may pass `recognise` too, so that it is asked after the others.
+    also_reaches: schemes of other dialects whose servers this one gets on with.
+    """
+
+    server: str
+    scheme: str
+    wire: Literal["websocket", "http", "tcp"]
+    options: type[Any]
+    open_session: Callable[[ConnectionParams, Any], WireClient]
+    port: int = 8000
+    secure_scheme: str = ""
+    recognise: Callable[[Probe], bool] | None = None
+    weak_sign: bool = False
+    also_reaches: tuple[str, ...] = ()
+
+    @property
+    def schemes(self) -> tuple[str, ...]:
+        """All its URL schemes, the plain one first."""
+        return (self.scheme, self.secure_scheme) if self.secure_scheme else (self.scheme,)
+
+
+@dataclass(frozen=True)
+class Endpoint:
+    """A server's address taken apart. `options` are as given, `path` has no query."""
+
+    url: str
+    dialect: Dialect
+    scheme: str
+    host: str
+    port: int
+    path: str
+    options: Mapping[str, Any]
+
+    @property
+    def secure(self) -> bool:
+        """Whether the scheme asks for TLS."""
+        return self.scheme == self.dialect.secure_scheme
+
+    @property
+    def authority(self) -> str:
+        """host:port as it stands in a URL."""
+        host = f"[{self.host}]" if ":" in self.host else self.host
+        return f"{host}:{self.port}"
+
+
+@dataclass(frozen=True)
+class ConnectionParams:
+    """What every dialect's `open_session` gets beside its options."""
+
+    endpoint: Endpoint
+    timeouts: Timeouts
+    limits: Limits = DEFAULT_LIMITS
+    token: str | None = None
+    ssl: ssl_module.SSLContext | None = None
+
+    def websocket_address(self) -> Address:
+        """The ws:// or wss:// address of the endpoint, whatever its own scheme."""
+        scheme = "wss" if self.endpoint.secure else "ws"
+        url = f"{scheme}://{self.endpoint.authority}{self.endpoint.path}"
+        return Address(url, self.token, self.ssl)
+
+
+def dialects() -> list[Dialect]:
+    """Every dialect that a package registers, by scheme; one that cannot be loaded is warned of."""
+    found: dict[str, Dialect] = {}
+    for point in metadata.entry_points(group=DIALECTS):
+        try:
+            dialect = load(point.value)
+        except UnknownName as error:
+            warnings.warn(f"dialect {point.name!r} is left out: {error}", stacklevel=2)
+            continue
+        for scheme in dialect.schemes:
+            if scheme in found and found[scheme] != dialect:
+                raise ValueError(f"two packages register a dialect for {scheme}://; remove one")
+            found[scheme] = dialect
+    return [found[scheme] for scheme in sorted(found) if scheme == found[scheme].scheme]

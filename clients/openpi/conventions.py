@@ -1,0 +1,41 @@
+"""Our observation as openpi's Aloha configurations take it.
+
+    ours               openpi
+    images.head        images.cam_high            uint8 (3, H, W) RGB
+    images.left_wrist  images.cam_left_wrist
+    images.right_wrist images.cam_right_wrist
+    images.front       images.cam_low
+    state (14,)        state
+    instruction        prompt
+
+The way back, which our own server needs for a client of openpi, is `robospa.protocol.openpi`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from robospa.protocol.errors import EncodeError
+from robospa.protocol.policy import Observation
+
+
+def to_openpi(
+    observation: Observation, cameras: Mapping[str, str], extra: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Our observation as an openpi Aloha observation, `extra` beside it at the top level.
+
+    `cameras` maps our names to the server's; raises EncodeError for a camera that it lacks.
+    """
+    images = {}
+    for name, image in observation.get("images", {}).items():
+        if name not in cameras:
+            known = ", ".join(cameras)
+            raise EncodeError(f"camera {name!r} has no openpi name; cameras with one: {known}")
+        images[cameras[name]] = np.moveaxis(image, -1, 0)
+    sent = {**extra, "images": images, "prompt": observation.get("instruction", "")}
+    if "state" in observation:
+        sent["state"] = observation["state"]
+    return sent
