@@ -38,9 +38,8 @@ def find_endpoint(url: str, options: Mapping[str, Any] | None = None) -> Endpoin
     dialect = by_scheme.get(parts.scheme)
     if dialect is None:
         known = ", ".join(f"{scheme}:// ({d.server})" for scheme, d in by_scheme.items())
-        raise ValueError(
-            f"{url!r} is no address of a policy server; known are {known or 'none (is robospa installed?)'}"
-        )
+        known = known or "none (is robospa installed?)"
+        raise ValueError(f"{url!r} is no address of a policy server; known are {known}")
     if not parts.hostname:
         raise ValueError(
             f"{url!r} names no host: write for example {parts.scheme}://localhost:{dialect.port}"
