@@ -133,9 +133,3 @@ def existing(path: str, what: str) -> str:
     if not found.exists():
         raise ModelMissing(f"there is no {found}: option {what} must name a file or a folder")
     return str(found)
-
-
-def check_horizon(horizon: int, execute: int | None) -> None:
-    """ValueError unless 1 <= execute <= horizon."""
-    if horizon < 1 or (execute is not None and not 1 <= execute <= horizon):
-        raise ValueError("options horizon and execute: 1 <= execute <= horizon is needed")

@@ -1,15 +1,8 @@
 """GO-1 (AgiBot World) behind its own `deploy.py`: POST /act, JSON with arrays inside.
 
-    ours                   sent
-    images.head            top     (240, 320, 3) uint8 RGB
-    images.right_wrist     right   (swapped with left if `wrists=swapped`)
-    images.left_wrist      left
-    state (14,)            state   (1, 14) float32
-    instruction            instruction
-    option ctrl_freq       ctrl_freqs (1,) float32
-
-The answer is a bare list (T, 14) of absolute joint targets. There is no reset, no spec and no
-reason in its errors: every failure inside the server is a bare HTTP 500.
+Sent is what `robospa.clients.go1.conventions` lists. The answer is a bare list (T, 14) of absolute
+joint targets. There is no reset, no spec and no reason in its errors: every failure inside the
+server is a bare HTTP 500.
 """
 
 from __future__ import annotations
@@ -18,19 +11,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
-from robospa.clients.chunks import check_horizon
 from robospa.clients.detect import explained
 from robospa.clients.dialect import ConnectionParams, Dialect
+from robospa.clients.go1.conventions import Go1Conventions
 from robospa.clients.http import JsonServer
 from robospa.clients.numpy_json import chunk_of, dumps
 from robospa.clients.probe import Probe
 from robospa.protocol.errors import ServerError
 from robospa.protocol.options import option, plain_options
 from robospa.protocol.policy import Observation, PolicySpec, TrialInfo
-
-VIEWS = {"top": "head", "right": "right_wrist", "left": "left_wrist"}
 
 WARNINGS = (
     "the control frequency that the model was trained with is invisible on the wire: `ctrl_freq` "
@@ -45,37 +34,10 @@ SWAPPED = (
 
 
 @dataclass(frozen=True)
-class Go1ClientOptions:
+class Go1ClientOptions(Go1Conventions):
     """What GO-1's server does not say."""
 
-    wrists: str = option(
-        "correct",
-        "`swapped` sends each wrist image under the other's name, as RoboTwin's client does",
-        ("correct", "swapped"),
-    )
-    ctrl_freq: float = option(30.0, "control frequency [Hz] given to the network")
-    horizon: int = option(30, "actions in a chunk, at most")
-    execute: int | None = option(None, "actions executed before the next query; none for all")
     state: str = option("commanded", "which joints to send", ("commanded", "measured"))
-
-    def __post_init__(self) -> None:
-        """ValueError for options that cannot be."""
-        if not 0 < self.ctrl_freq < 10_000:
-            raise ValueError(f"option ctrl_freq={self.ctrl_freq:g} is no frequency in Hz")
-        check_horizon(self.horizon, self.execute)
-
-
-def body(observation: Observation, options: Go1ClientOptions) -> bytes:
-    """The JSON body of one request."""
-    images = observation["images"]
-    views = dict(VIEWS)
-    if options.wrists == "swapped":
-        views["right"], views["left"] = views["left"], views["right"]
-    sent: dict[str, Any] = {theirs: images[ours] for theirs, ours in views.items()}
-    sent["instruction"] = observation.get("instruction", "")
-    sent["state"] = np.asarray(observation["state"], np.float32)[None]
-    sent["ctrl_freqs"] = np.array([options.ctrl_freq], np.float32)
-    return dumps(sent).encode()
 
 
 class Go1Session:
@@ -108,7 +70,8 @@ class Go1Session:
         self, id: int, observation: Observation, timeout: float
     ) -> tuple[Any, Mapping[str, float]]:
         try:
-            answer = self._server.post(self._path, body(observation, self._options), timeout)
+            body = dumps(self._options.inputs(observation)).encode()
+            answer = self._server.post(self._path, body, timeout)
         except ServerError as error:
             raise error if self._answered else explained(error, self._params) from error
         self._answered = True

@@ -15,11 +15,11 @@ from typing import Any
 
 import numpy as np
 
+from robospa.clients.go1.conventions import Go1Conventions
 from robospa.clients.model_policy import (
     Ask,
     Chunk,
     ModelPolicy,
-    check_horizon,
     existing,
     import_code,
     import_torch,
@@ -28,39 +28,26 @@ from robospa.clients.seeded_noise import seeded_rows
 from robospa.protocol.options import option
 from robospa.protocol.policy import PolicySpec
 
-VIEWS = {"top": "head", "right": "right_wrist", "left": "left_wrist"}
-"""Our camera for each image of the model."""
-
 
 @dataclass(frozen=True)
-class Options:
-    """How GO-1 is loaded and fed."""
+class Go1ServerOptions(Go1Conventions):
+    """How GO-1 is loaded; the conventions are those of the client `go1+http`."""
 
     checkpoint: str = option("", "folder of the fine-tuned model")
     stats: str | None = option(None, "dataset_stats.json of its training run, if it normalises")
     code: str | None = option(None, "checkout of AgiBot-World, or set PYTHONPATH")
-    wrists: str = option(
-        "correct",
-        "`swapped` shows each wrist image as the other's, as RoboTwin's client does",
-        ("correct", "swapped"),
-    )
-    ctrl_freq: float = option(30.0, "ctrl_freq [Hz] of its training config")
-    horizon: int = option(30, "actions in a chunk, at most")
-    execute: int | None = option(None, "actions executed before the next query; none for all")
 
     def __post_init__(self) -> None:
         """ValueError for options that cannot be."""
-        check_horizon(self.horizon, self.execute)
+        super().__post_init__()
         if not self.checkpoint:
             raise ValueError("option checkpoint is needed: the folder of the fine-tuned model")
-        if not 0 < self.ctrl_freq < 10_000:
-            raise ValueError(f"option ctrl_freq={self.ctrl_freq:g} is no frequency in Hz")
 
 
 class Go1(ModelPolicy):
     """The official class, one observation at a time."""
 
-    def __init__(self, model: Any, options: Options) -> None:
+    def __init__(self, model: Any, options: Go1ServerOptions) -> None:
         super().__init__()
         self.model, self.options = model, options
         self.spec = PolicySpec(
@@ -81,18 +68,12 @@ class Go1(ModelPolicy):
         return chunks
 
     def _payload(self, ask: Ask) -> dict[str, Any]:
-        """What its server would have read from the wire; the class adds to it."""
-        images, views = ask.observation["images"], dict(VIEWS)
-        if self.options.wrists == "swapped":
-            views["right"], views["left"] = views["left"], views["right"]
-        payload: dict[str, Any] = {theirs: np.array(images[ours]) for theirs, ours in views.items()}
-        payload["instruction"] = ask.observation["instruction"]
-        payload["state"] = np.array(ask.observation["state"], np.float32)[None]
-        payload["ctrl_freqs"] = np.array([self.options.ctrl_freq], np.float32)
-        return payload
+        """What its server would have read from the wire, in arrays of its own."""
+        inputs = self.options.inputs(ask.observation)
+        return {k: np.array(v) if isinstance(v, np.ndarray) else v for k, v in inputs.items()}
 
 
-def create(options: Options) -> Go1:
+def create(options: Go1ServerOptions) -> Go1:
     """Load the model. Raises ModelMissing."""
     import_torch()
     source = import_code("evaluate.deploy", options.code, "a checkout of AgiBot-World")

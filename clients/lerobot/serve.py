@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from robospa.clients.chunks import check_horizon
 from robospa.clients.ee6d import LAYOUTS, ORDERS
 from robospa.clients.image_preprocessing import resize
 from robospa.clients.model_policy import (
@@ -25,7 +26,6 @@ from robospa.clients.model_policy import (
     Chunk,
     ModelMissing,
     ModelPolicy,
-    check_horizon,
     import_installed,
     import_torch,
 )
@@ -46,7 +46,7 @@ STATE_STEP = "Pi05PrepareStateTokenizerProcessorStep"
 
 
 @dataclass(frozen=True)
-class Options:
+class LeRobotServerOptions:
     """How a LeRobot policy is loaded and fed."""
 
     path: str = option("", "folder of the checkpoint (`pretrained_model`), or a hub name")
@@ -153,7 +153,7 @@ def _camera_named(key: str) -> str:
 class LeRobot(ModelPolicy):
     """A LeRobot policy with its processors."""
 
-    def __init__(self, policy: Any, before: Any, after: Any, options: Options) -> None:
+    def __init__(self, policy: Any, before: Any, after: Any, options: LeRobotServerOptions) -> None:
         """Raises ValueError for a policy whose inputs or outputs are none of ours."""
         super().__init__()
         self.policy, self.before, self.after, self.options = policy, before, after, options
@@ -288,7 +288,7 @@ def print_state(before: Any, width: int) -> None:
     before.steps = steps
 
 
-def create(options: Options) -> LeRobot:
+def create(options: LeRobotServerOptions) -> LeRobot:
     """Load a policy and its processors. Raises ModelMissing, ValueError."""
     import_torch()
     configs = import_installed("lerobot.configs.policies")

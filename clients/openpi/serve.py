@@ -15,7 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from robospa.clients.model_policy import Ask, Chunk, ModelPolicy, check_horizon, import_code
+from robospa.clients.chunks import check_horizon
+from robospa.clients.model_policy import Ask, Chunk, ModelPolicy, import_code
 from robospa.protocol.options import option
 from robospa.protocol.policy import PolicySpec
 
@@ -24,7 +25,7 @@ VIEWS = {"cam_high": "head", "cam_left_wrist": "left_wrist", "cam_right_wrist": 
 
 
 @dataclass(frozen=True)
-class Options:
+class OpenPiServerOptions:
     """How the policy is loaded."""
 
     config: str = option("", "name of the training configuration in openpi")
@@ -49,7 +50,7 @@ class Options:
 class OpenPi(ModelPolicy):
     """A policy of openpi's `create_trained_policy`."""
 
-    def __init__(self, policy: Any, horizon: int, width: int, options: Options) -> None:
+    def __init__(self, policy: Any, horizon: int, width: int, options: OpenPiServerOptions) -> None:
         """`horizon` and `width`: the shape of the model's noise."""
         super().__init__()
         check_horizon(horizon, options.execute)
@@ -91,7 +92,7 @@ def _observation(ask: Ask) -> dict[str, Any]:
     }
 
 
-def create(options: Options) -> OpenPi:
+def create(options: OpenPiServerOptions) -> OpenPi:
     """Load the policy. Raises ModelMissing, and ValueError for a configuration that is refused."""
     configs = import_code("openpi.training.config", options.code, "openpi's sources")
     loading = import_code("openpi.policies.policy_config", options.code, "openpi's sources")

@@ -18,13 +18,13 @@ from typing import Any
 
 import numpy as np
 
+from robospa.clients.chunks import check_horizon
 from robospa.clients.image_preprocessing import jpeg_round_trip, pictures, resize
 from robospa.clients.model_policy import (
     Ask,
     Chunk,
     ModelMissing,
     ModelPolicy,
-    check_horizon,
     existing,
     import_code,
     import_installed,
@@ -45,7 +45,7 @@ ACTION_FACTORS = (11.8997, 13.9231)
 
 
 @dataclass(frozen=True)
-class Options:
+class RdtServerOptions:
     """How RDT is loaded and fed."""
 
     checkpoint: str = option("", "folder or file (.pt, .safetensors) with the fine-tuned weights")
@@ -83,7 +83,7 @@ class Options:
 class Rdt(ModelPolicy):
     """The official class, one observation at a time: it stacks images of one sample only."""
 
-    def __init__(self, model: Any, embeddings: Embeddings, options: Options) -> None:
+    def __init__(self, model: Any, embeddings: Embeddings, options: RdtServerOptions) -> None:
         super().__init__()
         self.model, self.embeddings, self.options = model, embeddings, options
         self.spec = PolicySpec(
@@ -128,7 +128,7 @@ class Rdt(ModelPolicy):
         return pictures().fromarray(jpeg_round_trip(large) if self.options.jpeg else large)
 
 
-def create(options: Options) -> Rdt:
+def create(options: RdtServerOptions) -> Rdt:
     """Load the model. Raises ModelMissing."""
     torch = import_torch()
     source = import_code(

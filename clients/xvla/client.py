@@ -31,7 +31,7 @@ from robospa.clients.http import JsonServer
 from robospa.clients.numpy_json import chunk_of, dumps
 from robospa.clients.probe import Probe
 from robospa.clients.token_budget import check_budget
-from robospa.clients.xvla.conventions import Conventions
+from robospa.clients.xvla.conventions import XvlaConventions
 from robospa.protocol.errors import PolicyAnswerError, ProtocolViolation, ServerError
 from robospa.protocol.options import option, plain_options
 from robospa.protocol.policy import CameraSpec, Observation, PolicySpec, TrialInfo
@@ -50,7 +50,7 @@ SILENT = (
 
 
 @dataclass(frozen=True)
-class XvlaClientOptions(Conventions):
+class XvlaClientOptions(XvlaConventions):
     """What X-VLA's server does not say."""
 
     joint_grippers: str = option(

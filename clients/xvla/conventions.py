@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from robospa.clients.chunks import check_horizon
 from robospa.clients.ee6d import LAYOUTS, ORDERS
 from robospa.protocol.options import option
 
@@ -15,7 +16,7 @@ VIEWS = ("head", "left_wrist", "right_wrist")
 
 
 @dataclass(frozen=True)
-class Conventions:
+class XvlaConventions:
     """What neither the checkpoint nor X-VLA's server says."""
 
     space: str = option("ee6d", "what the model answers", ("ee6d", "joint"))
@@ -44,8 +45,7 @@ class Conventions:
             raise ValueError(f"option domain_id={self.domain_id} is not one of 0 to 29")
         if self.steps < 1:
             raise ValueError(f"option steps={self.steps}: at least one is needed")
-        if self.horizon < 1 or (self.execute is not None and not 0 < self.execute <= self.horizon):
-            raise ValueError("options horizon and execute: 1 <= execute <= horizon is needed")
+        check_horizon(self.horizon, self.execute)
         wrong = [name for name in self.views if name not in VIEWS]
         if wrong or len(set(self.views)) != len(self.views) or not self.views:
             raise ValueError(f"option cameras={self.cameras!r}: one to three of {', '.join(VIEWS)}")

@@ -26,7 +26,7 @@ from robospa.clients.model_policy import (
 )
 from robospa.clients.seeded_noise import seeded_rows
 from robospa.clients.state_encoding import Style
-from robospa.clients.xvla.conventions import Conventions
+from robospa.clients.xvla.conventions import XvlaConventions
 from robospa.protocol.options import option
 from robospa.protocol.policy import CameraSpec, PolicySpec
 
@@ -34,7 +34,7 @@ CHECKOUT = "a checkout of X-VLA"
 
 
 @dataclass(frozen=True)
-class Options(Conventions):
+class XvlaServerOptions(XvlaConventions):
     """How X-VLA is loaded; the conventions are those of the client `xvla+http`."""
 
     checkpoint: str = option("", "folder or hub name of the model and its processor")
@@ -54,7 +54,7 @@ class Options(Conventions):
 class Xvla(ModelPolicy):
     """The official model and its processor."""
 
-    def __init__(self, model: Any, processor: Any, options: Options) -> None:
+    def __init__(self, model: Any, processor: Any, options: XvlaServerOptions) -> None:
         super().__init__()
         self.model, self.processor, self.options = model, processor, options
         joint = options.space == "joint"
@@ -109,7 +109,7 @@ class Xvla(ModelPolicy):
         return dict(inputs)
 
 
-def create(options: Options) -> Xvla:
+def create(options: XvlaServerOptions) -> Xvla:
     """Load the model. Raises ModelMissing."""
     torch = import_torch()
     modeling = import_code("models.modeling_xvla", options.code, CHECKOUT)

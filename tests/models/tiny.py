@@ -258,14 +258,14 @@ def make(name: str, folder: Path) -> None:
     print(json.dumps({"name": name, "parameters": parameters}))
 
 
-def options(name: str, folder: str) -> served.Options:
+def options(name: str, folder: str) -> served.LeRobotServerOptions:
     """How the tests serve the checkpoint."""
     words = str(Path(folder) / "tokenizer") if name in ("pi05", "xvla") else None
     domain = 6 if name == "xvla" else None
-    return served.Options(path=folder, device="cpu", tokenizer=words, domain_id=domain)
+    return served.LeRobotServerOptions(path=folder, device="cpu", tokenizer=words, domain_id=domain)
 
 
-def serve_pi05(options: served.Options) -> served.LeRobot:
+def serve_pi05(options: served.LeRobotServerOptions) -> served.LeRobot:
     """The tiny pi0.5 as `robospa serve lerobot` would serve a large one."""
     shrink_pi05()
     return served.create(options)

@@ -29,7 +29,7 @@ class OfficialGo1:
 
 
 def served(torch: Any, **given: Any) -> go1.Go1:
-    return go1.Go1(OfficialGo1(torch), go1.Options(checkpoint="x", **given))
+    return go1.Go1(OfficialGo1(torch), go1.Go1ServerOptions(checkpoint="x", **given))
 
 
 @pytest.mark.parametrize(
@@ -81,14 +81,14 @@ def test_the_class_is_made_with_its_files(
     install(monkeypatch, "evaluate.deploy", GO1Infer=lambda *given: made.append(given))
     stats = tmp_path / "dataset_stats.json"
     stats.write_text("{}")
-    go1.create(go1.Options(checkpoint=str(tmp_path), stats=str(stats)))
-    go1.create(go1.Options(checkpoint=str(tmp_path)))
+    go1.create(go1.Go1ServerOptions(checkpoint=str(tmp_path), stats=str(stats)))
+    go1.create(go1.Go1ServerOptions(checkpoint=str(tmp_path)))
     assert made == [(str(tmp_path), str(stats)), (str(tmp_path), None)]
     with pytest.raises(ModelMissing, match="option stats must name"):
-        go1.create(go1.Options(checkpoint=str(tmp_path), stats=str(tmp_path / "no.json")))
+        go1.create(go1.Go1ServerOptions(checkpoint=str(tmp_path), stats=str(tmp_path / "no.json")))
 
 
 @pytest.mark.parametrize("given", [{"ctrl_freq": 0.0}, {"execute": 31}, {"horizon": 0}])
 def test_options_that_cannot_be(given: dict[str, Any]) -> None:
     with pytest.raises(ValueError, match="option"):
-        go1.Options(checkpoint="x", **given)
+        go1.Go1ServerOptions(checkpoint="x", **given)

@@ -81,7 +81,7 @@ def config(views: Any = VIEWS, state: int = 14, action: int = 14, **more: Any) -
 
 def served(torch: Any, chosen: Any = None, **given: Any) -> lerobot.LeRobot:
     policy = OfficialPolicy(torch, chosen or config())
-    options = lerobot.Options(path="x", **given)
+    options = lerobot.LeRobotServerOptions(path="x", **given)
     return lerobot.LeRobot(policy, Processor(), Processor(), options)
 
 
@@ -266,7 +266,9 @@ def test_loading_offline(torch: Any, monkeypatch: pytest.MonkeyPatch) -> None:
         get_policy_class=lambda name: Policies,
         make_pre_post_processors=processors,
     )
-    lerobot.create(lerobot.Options(path="x", device="cpu", tokenizer="words", domain_id=6))
+    lerobot.create(
+        lerobot.LeRobotServerOptions(path="x", device="cpu", tokenizer="words", domain_id=6)
+    )
     assert asked["device"] == "cpu" and domain.domain_id == 6
     assert chosen.tokenizer_name == "words"
     assert asked["overrides"] == {
@@ -274,7 +276,7 @@ def test_loading_offline(torch: Any, monkeypatch: pytest.MonkeyPatch) -> None:
         "tokenizer_processor": {"tokenizer_name": "words"},
     }
     with pytest.raises(ValueError, match=r"state_prompt is for pi0\.5"):
-        lerobot.create(lerobot.Options(path="x", state_prompt=32))
+        lerobot.create(lerobot.LeRobotServerOptions(path="x", state_prompt=32))
 
 
 def test_a_checkpoint_that_is_not_there(torch: Any, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -285,7 +287,7 @@ def test_a_checkpoint_that_is_not_there(torch: Any, monkeypatch: pytest.MonkeyPa
     install(monkeypatch, "lerobot.configs.policies", PreTrainedConfig=configs)
     install(monkeypatch, "lerobot.policies.factory")
     with pytest.raises(ModelMissing, match=r"cannot load x: no config\.json"):
-        lerobot.create(lerobot.Options(path="x"))
+        lerobot.create(lerobot.LeRobotServerOptions(path="x"))
 
 
 @pytest.mark.parametrize(

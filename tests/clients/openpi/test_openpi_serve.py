@@ -32,7 +32,7 @@ class BatchingPolicy(OfficialPolicy):
 
 
 def served(policy: Any) -> openpi.OpenPi:
-    return openpi.OpenPi(policy, 50, 32, openpi.Options(config="c", checkpoint="x"))
+    return openpi.OpenPi(policy, 50, 32, openpi.OpenPiServerOptions(config="c", checkpoint="x"))
 
 
 def test_the_observation_is_openpis() -> None:
@@ -81,14 +81,16 @@ def test_several_are_one_call_where_the_class_allows() -> None:
 def test_adapt_to_pi_is_refused_unless_accepted(monkeypatch: pytest.MonkeyPatch) -> None:
     configure(monkeypatch, adapt_to_pi=True)
     with pytest.raises(ValueError, match="adapt_to_pi on"):
-        openpi.create(openpi.Options(config="c", checkpoint="x"))
-    accepted = openpi.create(openpi.Options(config="c", checkpoint="x", adapt_to_pi="accept"))
+        openpi.create(openpi.OpenPiServerOptions(config="c", checkpoint="x"))
+    accepted = openpi.create(
+        openpi.OpenPiServerOptions(config="c", checkpoint="x", adapt_to_pi="accept")
+    )
     assert accepted.spec.horizon == 50
 
 
 def test_a_configuration_of_robotwin_is_served(monkeypatch: pytest.MonkeyPatch) -> None:
     configure(monkeypatch, adapt_to_pi=False)
-    policy = openpi.create(openpi.Options(config="c", checkpoint="x", execute=25))
+    policy = openpi.create(openpi.OpenPiServerOptions(config="c", checkpoint="x", execute=25))
     assert (policy.spec.name, policy.spec.execute, policy.shape) == ("openpi:c", 25, (50, 32))
 
 

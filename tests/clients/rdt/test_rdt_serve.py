@@ -43,7 +43,7 @@ def embeddings(folder: Path, torch: Any) -> Path:
 
 @pytest.fixture
 def served(torch: Any, tmp_path: Path) -> rdt.Rdt:
-    options = rdt.Options(checkpoint="x")
+    options = rdt.RdtServerOptions(checkpoint="x")
     texts = Embeddings(embeddings(tmp_path / "e", torch), None, "cpu", np.float32, 1024)
     return rdt.Rdt(OfficialRdt(torch), texts, options)
 
@@ -77,7 +77,9 @@ def test_gripper_factors_cancel(served: rdt.Rdt) -> None:
 
 def test_a_fork_without_factors_gets_none(torch: Any, tmp_path: Path) -> None:
     texts = Embeddings(embeddings(tmp_path / "e", torch), None, "cpu", np.float32, 1024)
-    policy = rdt.Rdt(OfficialRdt(torch), texts, rdt.Options(checkpoint="x", grippers="none"))
+    policy = rdt.Rdt(
+        OfficialRdt(torch), texts, rdt.RdtServerOptions(checkpoint="x", grippers="none")
+    )
     policy.reset(trial())
     policy.infer(seen(policy.spec))
     assert float(policy.model.calls[0][0][0, 13]) == 1.0
@@ -159,7 +161,9 @@ def test_the_model_is_made_as_its_own_script_does(
     weights.write_text("")
     folder = embeddings(tmp_path / "e", torch)
     rdt.create(
-        rdt.Options(checkpoint=str(weights), config=str(config), embeddings=str(folder), t5=None)
+        rdt.RdtServerOptions(
+            checkpoint=str(weights), config=str(config), embeddings=str(folder), t5=None
+        )
     )
     assert made == {
         "args": {"dataset": {"tokenizer_max_length": 7}},
@@ -181,11 +185,11 @@ def test_the_model_is_made_as_its_own_script_does(
 )
 def test_options_that_cannot_be(given: dict[str, Any], words: str) -> None:
     with pytest.raises(ValueError, match=words):
-        rdt.Options(**given)
+        rdt.RdtServerOptions(**given)
 
 
 def test_missing_code_is_named(torch: Any, tmp_path: Path) -> None:
     with pytest.raises(ModelMissing, match=r"cannot import scripts\.agilex_model"):
-        rdt.create(rdt.Options(checkpoint="x", code=str(tmp_path)))
+        rdt.create(rdt.RdtServerOptions(checkpoint="x", code=str(tmp_path)))
     with pytest.raises(ModelMissing, match="there is no folder"):
-        rdt.create(rdt.Options(checkpoint="x", code=str(tmp_path / "none")))
+        rdt.create(rdt.RdtServerOptions(checkpoint="x", code=str(tmp_path / "none")))

@@ -56,7 +56,9 @@ class Processor:
 
 
 def served(torch: Any, **given: Any) -> xvla.Xvla:
-    return xvla.Xvla(OfficialXvla(torch), Processor(), xvla.Options(checkpoint="x", **given))
+    return xvla.Xvla(
+        OfficialXvla(torch), Processor(), xvla.XvlaServerOptions(checkpoint="x", **given)
+    )
 
 
 def test_one_call_holds_what_the_official_server_would_send(torch: Any) -> None:
@@ -184,7 +186,7 @@ def test_the_model_is_loaded_as_its_own_server_does(
 
     install(monkeypatch, "models.modeling_xvla", XVLA=Loads)
     install(monkeypatch, "models.processing_xvla", XVLAProcessor=Loads)
-    xvla.create(xvla.Options(checkpoint="here"))
+    xvla.create(xvla.XvlaServerOptions(checkpoint="here"))
     assert asked == [("here", {}), ("here", {"torch_dtype": np.float32})]
 
 
@@ -193,4 +195,4 @@ def test_the_model_is_loaded_as_its_own_server_does(
 )
 def test_options_that_cannot_be(given: dict[str, Any]) -> None:
     with pytest.raises(ValueError, match=r"option"):
-        xvla.Options(checkpoint="x", **given)
+        xvla.XvlaServerOptions(checkpoint="x", **given)
