@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from robospa.harness.skills import Expert
 from robospa.protocol.policy import Observation, PolicySpec, TrialInfo
+from robospa.registry import ROBOTS, names
 from robospa.tasks.catalog import build_scene
 from robospa.tasks.scene import Scene
 from robospa.tasks.snapshot import snapshot_from_json
@@ -33,7 +34,7 @@ class Oracle:
         horizon=HORIZON,
         seeded=True,
         privileged=True,
-        embodiments=("aloha-agilex",),
+        embodiments=names(ROBOTS),
     )
 
     def __init__(self) -> None:

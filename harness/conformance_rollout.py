@@ -18,16 +18,17 @@ from robospa.protocol.errors import WireError
 from robospa.protocol.policy import PolicySpec
 from robospa.results.records.trial_record import TrialRecord
 from robospa.tasks.seeds import accepted
-from robospa.trial import TrialKey
+from robospa.trial import REFERENCE, TrialKey
 
 TASK, LEVEL = "Pick_Blocks_Size", 1
-ROBOT = "aloha-agilex"
 NO_SIMULATOR = "not run: there is no simulator here (pip install 'robospa[sim]'); robospa doctor"
 
 
 def trial_for(spec: PolicySpec) -> TrialKey:
     """A real trial that a policy with this `spec` can be asked to do."""
-    robot = ROBOT if not spec.embodiments or ROBOT in spec.embodiments else spec.embodiments[0]
+    robot = (
+        REFERENCE if not spec.embodiments or REFERENCE in spec.embodiments else spec.embodiments[0]
+    )
     return TrialKey(TASK, LEVEL, accepted(TASK, LEVEL)[0], robot)
 
 

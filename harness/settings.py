@@ -15,6 +15,7 @@ from typing import TypeVar
 
 from robospa.protocol.options import option, plain_options, read_options
 from robospa.registry import did_you_mean
+from robospa.trial import REFERENCE
 
 CONTROLS = ("rest_to_rest", "fixed_rate")
 EXECUTORS = ("local", "ray")
@@ -50,7 +51,7 @@ class Selection:
         None, "JSON file or 100000-100099; default: the shipped lists of accepted seeds"
     )
     split: str = option("heldout", "instructions: heldout or train", SPLITS)
-    embodiment: str = option("aloha-agilex", "robot")
+    embodiment: str = option(REFERENCE, "robot")
     mode: str = option("clean", "scene mode")
 
     def __post_init__(self) -> None:

@@ -36,12 +36,13 @@ from robospa.protocol.messages import (
 from robospa.protocol.policy import PolicySpec, TrialInfo
 from robospa.protocol.transport import Address, Timeouts, Transport
 from robospa.protocol.validation import compare_specs
+from robospa.trial import REFERENCE
 
 TRIAL = TrialInfo(
     task="Pick_Blocks_Size",  # a real one: a server may load a checkpoint by this name
     level=1,
     seed=100_000,
-    embodiment="aloha-agilex",
+    embodiment=REFERENCE,
     mode="clean",
     split="train",
     instruction="Pick up the red block.",

@@ -45,6 +45,7 @@ from robospa.protocol.policy import PolicySpec, TrialInfo
 from robospa.protocol.policy_host import PolicySession
 from robospa.protocol.validation import check_chunk, check_observation
 from robospa.protocol.waiting import within
+from robospa.trial import REFERENCE
 
 log = logging.getLogger("robospa.server")
 
@@ -179,7 +180,7 @@ async def refuse(socket: ServerConnection, ours: bool, error: Exception) -> None
 
 
 def _openpi_trial(prompt: str, spec: PolicySpec) -> TrialInfo:
-    embodiment = spec.embodiments[0] if spec.embodiments else "aloha-agilex"
+    embodiment = spec.embodiments[0] if spec.embodiments else REFERENCE
     return TrialInfo("", 0, 0, embodiment, "", "", prompt)
 
 

@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from robospa.geometry import Pose
+from robospa.geometry import Pose, Vec3
 from robospa.workcell import TABLE_TOP
 
 SUITE = "robospa-1"
@@ -59,6 +59,11 @@ class Scene:
     table_shift: tuple[float, float] = (0.0, 0.0)
     suite: str = SUITE
     table_rise: float = 0.0
+
+    @property
+    def table_at(self) -> Vec3:
+        """How far the table is moved from its usual place, x, y and z [m]."""
+        return (*self.table_shift, self.table_rise)
 
     @property
     def table_top(self) -> float:

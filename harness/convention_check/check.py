@@ -25,6 +25,7 @@ from robospa.harness.convention_check.observation_faults import VIEWS, Observati
 from robospa.harness.convention_check.samples import UNITS, Sample, errors, groups, score
 from robospa.protocol.policy import Policy, PolicySpec, TrialInfo
 from robospa.rotations import product
+from robospa.trial import REFERENCE
 
 POINTS = 8
 """Frames at which the policy is asked."""
@@ -182,7 +183,7 @@ def _trial(episode: Episode) -> TrialInfo:
         task=str(about.get("task", "")) or "Pick_Blocks_Size",
         level=int(about.get("level", 1)),
         seed=int(about.get("seed", 0)),
-        embodiment=str(about.get("embodiment", "aloha-agilex")),
+        embodiment=str(about.get("embodiment", REFERENCE)),
         mode=str(about.get("mode", "clean")),
         split=str(about.get("split", "train")),
         instruction=episode.instruction,

@@ -20,9 +20,9 @@ from robospa.harness.robots import embodiment
 from robospa.harness.robots.kinematics import chain_of, end_effector
 from robospa.protocol.conformance import TRIAL, synthetic_observation
 from robospa.protocol.policy import Policy, PolicySpec
+from robospa.trial import REFERENCE
 
 POSTURES = 4
-ROBOT = "aloha-agilex"
 JUMP = {"joint": 1.0, "ee": 0.3}
 """A first action that asks one joint for a way [rad], or a hand for one [m], as long as this."""
 TURNED = 0.25
@@ -36,7 +36,7 @@ GAIN = 0.8
 def postures(spec: PolicySpec, count: int = POSTURES) -> list[dict[str, Any]]:
     """Observations of the form of `spec`: noise, and postures that no mistake leaves the same."""
     rng = np.random.default_rng(5)
-    arms = embodiment(ROBOT).arms
+    arms = embodiment(REFERENCE).arms
     seen = []
     for i in range(count):
         observation = synthetic_observation(spec, seed=i)
@@ -62,10 +62,10 @@ def hints(policy: Policy) -> tuple[list[str], str]:
     """What looks odd about the first actions, a sentence each; and what was seen.
 
     Raises what the policy raises. Nothing is said of policies that need the exact state, or drive
-    another robot than Aloha-AgileX.
+    another robot than REFERENCE.
     """
     spec = policy.spec
-    if spec.privileged or (spec.embodiments and ROBOT not in spec.embodiments):
+    if spec.privileged or (spec.embodiments and REFERENCE not in spec.embodiments):
         return [], "not for this policy"
     if spec.action == "joint" and spec.state == "none":
         return [], "the policy is not shown its joints"

@@ -4,25 +4,23 @@ from __future__ import annotations
 
 from robospa.geometry import Pose
 from robospa.tasks.shapes import Box, Color, Shape
-from robospa.workcell import TABLE_TOP
+from robospa.workcell import Table
 
 WHITE: Color = (0.86, 0.86, 0.85)
 WALL: Color = (1.0, 0.9, 0.9)
 FLOOR: Color = (0.42, 0.42, 0.44)
 
-TABLE_SIZE = (1.2, 0.7)
-TABLE_THICKNESS = 0.05
 LEG = 0.05
 """Side of the square legs, and how far they stand in from the edge [m]."""
 
 
-def table() -> tuple[Shape, ...]:
+def table(dimensions: Table) -> tuple[Shape, ...]:
     """Top and four legs; the frame's origin is on the floor below the table's centre."""
-    width, depth = TABLE_SIZE
-    under = TABLE_TOP - TABLE_THICKNESS
+    width, depth = dimensions.size
+    under = dimensions.top - dimensions.thickness
     top = Shape(
-        Box((width / 2, depth / 2, TABLE_THICKNESS / 2)),
-        Pose((0.0, 0.0, TABLE_TOP - TABLE_THICKNESS / 2)),
+        Box((width / 2, depth / 2, dimensions.thickness / 2)),
+        Pose((0.0, 0.0, dimensions.top - dimensions.thickness / 2)),
         WHITE,
     )
     x, y = width / 2 - LEG - LEG / 2, depth / 2 - LEG - LEG / 2

@@ -16,7 +16,7 @@ import sapien
 from numpy.typing import NDArray
 from sapien import physx
 
-from robospa.geometry import Pose
+from robospa.geometry import Pose, Vec3
 from robospa.harness.robots.embodiment import Embodiment
 from robospa.harness.sim import bodies, furniture
 from robospa.harness.sim.lazy_snapshot import NO_HINGES
@@ -32,7 +32,8 @@ FURNITURE = ("ground", "table", "wall")
 class Physics:
     """The physics of one trial; `step` is SAPIEN's own."""
 
-    def __init__(self, embodiment: Embodiment, table_at: tuple[float, float]) -> None:
+    def __init__(self, embodiment: Embodiment, table_at: Vec3) -> None:
+        """`table_at` is how far [m] the table is moved from where the robot's workcell has it."""
         self.system: Any = physx.PhysxCpuSystem()
         self.system.timestep = 1.0 / RATE
         self.scene: Any = sapien.Scene([self.system])
@@ -44,8 +45,8 @@ class Physics:
         self._moving: dict[str, Any] = {}
         self._hinged: dict[str, Any] = {}
         self._add(bodies.ground_body("ground"))
-        x, y = table_at
-        self._add(bodies.static_body(furniture.table(), "table", Pose((x, y, 0.0))))
+        table = furniture.table(embodiment.workcell.table)
+        self._add(bodies.static_body(table, "table", Pose(table_at)))
         self._add(bodies.static_body(furniture.wall(), "wall", Pose()))
         self.arms: list[Any] = []
         for name, arm in zip(ARMS, embodiment.arms, strict=True):

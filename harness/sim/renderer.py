@@ -68,8 +68,8 @@ class Renderer:
         self._loaded: Scene | None = None
         self._embodiment: Embodiment | None = None
         self._stand: Any = None
+        self._table: Any = None
         self._light()
-        self._table = self._draw(furniture.table(), "table")
         self._draw(furniture.wall(), "wall")
         self._draw(furniture.floor(), "floor")
 
@@ -105,20 +105,21 @@ class Renderer:
         model: Callable[[str, Mapping[str, Any]], ObjectModel],
     ) -> None:
         """Take the objects of `scene` and the robot; costs nothing if they are here already."""
-        if self._embodiment is not embodiment:
+        new_robot = self._embodiment is not embodiment
+        if new_robot:
             self._set_robot(embodiment)
-        if self._loaded is not scene:
+        if self._loaded is not scene or new_robot:
             for entity in (*self._objects.values(), *(part for part, _ in self._parts.values())):
                 if entity is not None:
                     self._scene.remove_entity(entity)
             self._objects, self._parts = {}, {}
             self._loaded = scene
             self._model = model
-            self._place(self._table, Pose((*scene.table_shift, 0.0)))
+            self._place(self._table, Pose(scene.table_at))
 
     def _set_robot(self, embodiment: Embodiment) -> None:
         old = [e for links in self._robot for e in links.values()]
-        for entity in [*old, *([self._stand] if self._stand else [])]:
+        for entity in [*old, *(e for e in (self._stand, self._table) if e is not None)]:
             self._scene.remove_entity(entity)
         drawn = (
             {link: self._draw(arm.shapes[link], f"{name} {link}") for link in arm.links}
@@ -126,6 +127,7 @@ class Renderer:
         )
         self._robot = [{k: v for k, v in links.items() if v is not None} for links in drawn]
         self._stand = self._draw(embodiment.body, "stand")
+        self._table = self._draw(furniture.table(embodiment.workcell.table), "table")
         self._cameras = {}
         self._embodiment = embodiment
 

@@ -83,7 +83,7 @@ class SapienWorld:
         self._scene = scene
         self._contacts = contacts
         self._steps = 0
-        physics = self._physics = Physics(self._embodiment, scene.table_shift)
+        physics = self._physics = Physics(self._embodiment, scene.table_at)
         self._drives = Drives(self._embodiment, physics.arms)
         self._layout = StateLayout(
             tuple(
