@@ -1,0 +1,102 @@
+"""Acme's policy server: POST /predict, JSON.
+
+    ours                 sent
+    images.head          camera     (240, 320, 3) uint8 RGB, as json_numpy writes an array
+    state (14,)          joints     list; grippers in per cent, 100 = open
+    instruction          text
+
+Answered is {"joints": (T, 14)} in the same units.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from robospa.clients.chunks import as_chunk, check_horizon
+from robospa.clients.dialect import ConnectionParams, Dialect
+from robospa.clients.http import JsonServer
+from robospa.clients.numpy_json import dumps
+from robospa.clients.probe import Probe
+from robospa.protocol.errors import ProtocolViolation
+from robospa.protocol.options import option, plain_options
+from robospa.protocol.policy import CameraSpec, Observation, PolicySpec, TrialInfo
+
+SCALE = np.where(np.isin(np.arange(14), [6, 13]), 100, 1).astype(np.float32)
+"""Their numbers are ours times this."""
+
+
+@dataclass(frozen=True)
+class AcmeOptions:
+    """What Acme's server does not say."""
+
+    horizon: int = option(20, "actions in a chunk, at most")
+    execute: int | None = option(None, "actions executed before the next query; none for all")
+
+    def __post_init__(self) -> None:
+        check_horizon(self.horizon, self.execute)
+
+
+class AcmeSession:
+    """One connection."""
+
+    def __init__(self, params: ConnectionParams, options: AcmeOptions) -> None:
+        self.spec = PolicySpec(
+            "acme",
+            cameras=(CameraSpec("head"),),
+            horizon=options.horizon,
+            execute=options.execute,
+            action_dim=14,
+        )
+        self.hello: dict[str, Any] = {
+            "dialect": "acme",
+            "spec": self.spec.to_json(),
+            "options": plain_options(options),
+            "warnings": ["Acme's server does not say which tasks its model was trained on"],
+        }
+        self._server = JsonServer(params)
+        self._server.greet("/predict", params.timeouts.hello)
+
+    def reset(self, id: int, trial: TrialInfo) -> None:
+        """Nothing to send: the server keeps no state between calls."""
+
+    def infer(
+        self, id: int, observation: Observation, timeout: float
+    ) -> tuple[Any, Mapping[str, float]]:
+        sent = {
+            "camera": observation["images"]["head"],
+            "joints": (observation["state"] * SCALE).tolist(),
+            "text": observation["instruction"],
+        }
+        answer = self._server.post("/predict", dumps(sent).encode(), timeout)
+        if not isinstance(answer, Mapping) or "joints" not in answer:
+            raise ProtocolViolation(f"{self._server.url}/predict did not answer 'joints'")
+        chunk = as_chunk(answer["joints"])
+        fits = isinstance(chunk, np.ndarray) and chunk.shape[-1:] == SCALE.shape
+        return chunk / SCALE if fits else chunk, {}  # what does not fit is refused by the caller
+
+    def end(self, id: int, outcome: Mapping[str, Any]) -> None:
+        """Nothing to send."""
+
+    def close(self) -> None:
+        self._server.close()
+
+
+def recognise(probe: Probe) -> bool:
+    """Its start page gives its name."""
+    return (probe.http("GET", "/").json() or {}).get("server") == "acme"
+
+
+DIALECT = Dialect(
+    server="Acme's server",
+    scheme="acme+http",
+    secure_scheme="acme+https",
+    wire="http",
+    port=7000,
+    options=AcmeOptions,
+    open_session=AcmeSession,
+    recognise=recognise,
+)
