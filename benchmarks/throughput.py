@@ -32,8 +32,8 @@ from common import Result, Row, argument_parser, finish, line
 from numpy.typing import NDArray
 
 from robospa.geometry import Pose
+from robospa.harness.running.autoscaling import cores, most_workers
 from robospa.harness.running.runner import Runner, RunOptions
-from robospa.harness.running.staffing import cores, most_workers
 from robospa.harness.running.status import Status
 from robospa.harness.running.worker import WorkerConfig
 from robospa.harness.trial import TrialParts

@@ -124,7 +124,7 @@ def block(
     workers: Annotated[int, typer.Option(help="processes; 0 for one per core")] = 0,
 ) -> None:
     """Draw fresh seeds that the expert solves, and print the commitment to publish beforehand."""
-    from robospa.harness.running.staffing import cores
+    from robospa.harness.running.autoscaling import cores
     from robospa.harness.selection import parse_levels, parse_tasks
 
     variants = [(task, level) for task in parse_tasks(tasks) for level in parse_levels(levels)]
@@ -188,8 +188,8 @@ def reproduce(
 
 def _replayed(valid: Any, challenge: str, fraction: float, workers: int, reference: Any) -> Any:
     """The replayed sample, with a bar while it is made."""
+    from robospa.harness.running.autoscaling import cores
     from robospa.harness.running.progress import Progress
-    from robospa.harness.running.staffing import cores
 
     count = _reach("sampling:sample_size")(fraction, len(valid.keys))
     with Progress(count) as progress:

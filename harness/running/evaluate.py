@@ -14,13 +14,14 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from robospa.harness.factory import is_url, load_function
+from robospa.harness.running.executor import RunAborted
 from robospa.harness.running.locking import locked
 from robospa.harness.running.manifest import Manifest, about_machine, check_folder, open_run
 from robospa.harness.running.policies import Probed, probe_policies, warnings_of
 from robospa.harness.running.progress import Progress, summary
-from robospa.harness.running.ray_bridge import RaySettings
-from robospa.harness.running.ray_executor import far_away, joined
-from robospa.harness.running.runner import RunAborted, Runner, RunOptions
+from robospa.harness.running.ray_cluster import RaySettings
+from robospa.harness.running.ray_executor import loopback_warnings, ray_executor
+from robospa.harness.running.runner import Runner, RunOptions
 from robospa.harness.running.store import drop_parts, replace_file, tidy
 from robospa.harness.running.worker import WorkerConfig, describe
 from robospa.harness.settings import EvaluationSettings
@@ -171,7 +172,7 @@ def evaluate(request: Request) -> None:
             if is_url(p.target)
         },
     )
-    with joined(request.ray, config, _renders(config, policies)) as executor, locked(folder):
+    with ray_executor(request.ray, config, _renders(config, policies)) as executor, locked(folder):
         tidy(folder)
         open_run(folder, manifest, request.resume)
         if request.settings is not None:
@@ -179,14 +180,14 @@ def evaluate(request: Request) -> None:
         known = read_records(folder)
         owed = [key for key in request.keys if not finished(known.get(key))]
         with Progress(len(request.keys), len(request.keys) - len(owed)) as progress:
-            for text in [*manifest.about["warnings"], *far_away(executor, config)]:
+            for text in [*manifest.about["warnings"], *loopback_warnings(executor, config)]:
                 progress.note(f"warning: {text}")
             runner = Runner(config, owed, request.options, progress.add, progress.note)
             runner.executor = executor
             runner.on_status = progress.show
             runner.run()
         drop_parts(folder)
-        for text in summary(runner.shares.overall(), runner.status(time.monotonic())):
+        for text in summary(runner.times.overall_shares(), runner.status(time.monotonic())):
             progress.note(text)
 
 

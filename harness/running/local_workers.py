@@ -8,47 +8,48 @@ import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from multiprocessing.connection import Connection, wait
-from typing import Any
+from multiprocessing.context import SpawnProcess
 
-from robospa.harness.running.executor import Hand, Message
+from robospa.harness.running.executor import WorkerHandle
+from robospa.harness.running.messages import Command, Message
 from robospa.harness.running.worker import WorkerConfig
 from robospa.harness.running.worker import main as worker_main
 
 
-class LocalHand:
+class LocalWorker:
     """One worker process."""
 
-    def __init__(self, process: Any, pipe: Connection, name: str) -> None:
+    def __init__(self, process: SpawnProcess, pipe: Connection, name: str) -> None:
         self.process = process
         self.pipe = pipe
         self.name = name
 
-    def send(self, message: Message) -> None:
-        """Tell it something; nothing happens if it is gone."""
+    def send(self, command: Command) -> None:
+        """Send it a command; nothing happens if it has ended."""
         try:
-            self.pipe.send(message)
+            self.pipe.send(command)
         except OSError:
-            return  # it has just died: `gone` tells so
+            return  # it has just died, which `exit_status` reports
 
     def messages(self) -> list[Message]:
-        """What it has said since the last call; also after it has gone."""
-        heard: list[Message] = []
+        """What it has sent since the last call; also after it has ended."""
+        received: list[Message] = []
         try:
             while self.pipe.poll():
-                heard.append(self.pipe.recv())
+                received.append(self.pipe.recv())
         except (EOFError, OSError):
             pass  # closed: it is dying
-        return heard
+        return received
 
-    def gone(self) -> str | None:
-        """How it ended; None while it lives."""
+    def exit_status(self) -> str | None:
+        """How it ended; None while it runs."""
         if self.process.is_alive():
             return None
         code = self.process.exitcode
         return f"signal {-code}" if code is not None and code < 0 else f"exit code {code}"
 
-    def waiting(self) -> bool:
-        """Never: a process has its place at once."""
+    def pending(self) -> bool:
+        """Never: a process starts at once."""
         return False
 
     def kill(self) -> None:
@@ -57,7 +58,7 @@ class LocalHand:
         self.process.join()
 
     def join(self, seconds: float) -> None:
-        """Wait until it has gone, `seconds` at most."""
+        """Wait until it has ended, `seconds` at most."""
         self.process.join(max(0.0, seconds))
 
     def close(self) -> None:
@@ -73,38 +74,38 @@ class LocalExecutor:
         self.config = config
         self.workers = workers
 
-    def room(self) -> int:
+    def capacity(self) -> int:
         """As many as were asked for."""
         return self.workers
 
-    def hire(self, name: str) -> LocalHand:
+    def start(self, name: str) -> LocalWorker:
         """Start one more process."""
         spawn = multiprocessing.get_context("spawn")
         ours, theirs = spawn.Pipe()
         process = spawn.Process(
             target=worker_main, args=(theirs, self.config, name), name=name, daemon=True
         )
-        with deaf():
+        with sigint_ignored():
             process.start()
         theirs.close()
-        return LocalHand(process, ours, name)
+        return LocalWorker(process, ours, name)
 
-    def wait(self, hands: Sequence[Hand], seconds: float) -> None:
-        """Return as soon as one of `hands` has spoken or gone, after `seconds` at most."""
-        ours = [hand for hand in hands if isinstance(hand, LocalHand)]
-        wait([source for h in ours for source in (h.pipe, h.process.sentinel)], timeout=seconds)
+    def wait(self, workers: Sequence[WorkerHandle], seconds: float) -> None:
+        """Return as soon as one of `workers` has sent something or ended, or after `seconds`."""
+        ours = [worker for worker in workers if isinstance(worker, LocalWorker)]
+        wait([source for w in ours for source in (w.pipe, w.process.sentinel)], timeout=seconds)
 
-    def news(self) -> list[str]:
-        """Nothing ever happens to one machine."""
+    def notes(self) -> list[str]:
+        """None: nothing ever happens to one machine."""
         return []
 
     def close(self) -> None:
-        """Nothing is left once the hands have gone."""
+        """Nothing is left once the workers have ended."""
 
 
 @contextmanager
-def deaf() -> Iterator[None]:
-    """Start processes that Ctrl-C does not reach, not even while they are starting."""
+def sigint_ignored() -> Iterator[None]:
+    """Processes started within it ignore Ctrl-C, even while they are starting."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

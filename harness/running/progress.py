@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from types import TracebackType
 from typing import Any, TextIO
 
-from robospa.harness.running.servers import Server
+from robospa.harness.running.server_stats import ServerStats
 from robospa.harness.running.status import Status, server_text, shares_text
 from robospa.results.records.trial_record import TrialRecord
 
@@ -195,7 +195,7 @@ def _table(status: Status) -> Any:
     return table
 
 
-def _busiest(servers: Sequence[Server]) -> list[Server]:
+def _busiest(servers: Sequence[ServerStats]) -> list[ServerStats]:
     """At most ROWS of them, in their own order; those that are away first of all."""
     if len(servers) <= ROWS:
         return list(servers)

@@ -28,8 +28,8 @@ class Pending:
 
 
 @dataclass(frozen=True)
-class Facts:
-    """What is known of a variant before any of its trials has run."""
+class VariantInfo:
+    """What the catalog says of a variant, before any of its trials has run."""
 
     category: str = ""
     candidates: int = 0
@@ -37,11 +37,11 @@ class Facts:
     steps: int = 0
 
 
-class Costs:
-    """Expected seconds of a trial. `steps` is the step limit of a key's variant.
+class DurationEstimates:
+    """Expected seconds of a trial. `steps` gives the step limit of a key's variant.
 
-    What was measured for a variant is averaged with one trial's worth of the guess from its step
-    limit, which is worth as many seconds a step as the run's trials have taken so far.
+    The estimate for a variant is the mean of its measured trials and of one guess: its step limit
+    times the seconds that the run's trials have taken for each step of theirs.
     """
 
     def __init__(self, steps: Callable[[TrialKey], int]) -> None:
@@ -51,10 +51,10 @@ class Costs:
 
     @property
     def known(self) -> bool:
-        """Whether any trial was measured; until then `expect` only compares."""
+        """Whether any trial was measured; until then `expect` is in steps, not seconds."""
         return self._limits > 0
 
-    def learn(self, key: TrialKey, seconds: float) -> None:
+    def add(self, key: TrialKey, seconds: float) -> None:
         """A trial of the variant of `key` took `seconds`."""
         total, count = self._measured.get(key.variant, (0.0, 0))
         self._measured[key.variant] = (total + seconds, count + 1)
@@ -63,9 +63,9 @@ class Costs:
 
     def expect(self, key: TrialKey) -> float:
         """Seconds that a trial of the variant of `key` should take."""
-        a_step = self._seconds / self._limits if self.known else 1.0
+        per_step = self._seconds / self._limits if self.known else 1.0
         total, count = self._measured.get(key.variant, (0.0, 0))
-        return (total + a_step * max(1, self._steps(key))) / (count + 1)
+        return (total + per_step * max(1, self._steps(key))) / (count + 1)
 
 
 @dataclass
@@ -84,26 +84,26 @@ class TrialQueue:
 
     def __init__(self, keys: Sequence[TrialKey], task_of: Callable[[TrialKey], Task]) -> None:
         self._task_of = task_of
-        self._facts: dict[tuple[str, int], Facts] = {}
+        self._info: dict[tuple[str, int], VariantInfo] = {}
         self._groups: dict[str, _Group] = {}
         self._count = 0
-        self.costs = Costs(lambda key: self.facts(key).steps)
+        self.durations = DurationEstimates(lambda key: self.info(key).steps)
         self.unsettled = len(keys)
         for key in sorted(keys):
-            levels = self._groups.setdefault(key.task, _Group()).fresh
-            levels.setdefault(key.level, deque()).append(Pending(key))
+            by_level = self._groups.setdefault(key.task, _Group()).fresh
+            by_level.setdefault(key.level, deque()).append(Pending(key))
 
-    def facts(self, key: TrialKey) -> Facts:
-        """Facts of the variant of `key`; all empty if its task cannot be found."""
-        if key.variant not in self._facts:
+    def info(self, key: TrialKey) -> VariantInfo:
+        """The variant of `key`; all fields empty if its task cannot be found."""
+        if key.variant not in self._info:
             try:
                 task = self._task_of(key)
                 level = task.levels[key.level]
-                found = Facts(task.category, level.candidates, level.subtasks, level.steps)
+                found = VariantInfo(task.category, level.candidates, level.subtasks, level.steps)
             except Exception:  # the worker will meet the same error and report it
-                found = Facts()
-            self._facts[key.variant] = found
-        return self._facts[key.variant]
+                found = VariantInfo()
+            self._info[key.variant] = found
+        return self._info[key.variant]
 
     @property
     def tasks(self) -> tuple[str, ...]:
@@ -112,19 +112,23 @@ class TrialQueue:
 
     def due(self, now: float) -> dict[str, float]:
         """Expected seconds of what waits, for every task that has something to run at `now`."""
-        return {task: self._left(group) for task, group in self._groups.items() if group.due(now)}
+        return {
+            task: self._seconds_left(group)
+            for task, group in self._groups.items()
+            if group.due(now)
+        }
 
     def waiting(self) -> tuple[str, ...]:
         """Every base task that still has a trial to start, now or after its pause."""
         return tuple(task for task, g in self._groups.items() if g.fresh or g.retries)
 
     def left(self) -> float:
-        """Expected seconds of everything that waits."""
-        return sum(map(self._left, self._groups.values()))
+        """Expected seconds of all trials that wait."""
+        return sum(map(self._seconds_left, self._groups.values()))
 
-    def _left(self, group: _Group) -> float:
-        fresh = sum(len(line) * self.costs.expect(line[0].key) for line in group.fresh.values())
-        return fresh + sum(self.costs.expect(work.key) for _, _, work in group.retries)
+    def _seconds_left(self, group: _Group) -> float:
+        fresh = sum(len(q) * self.durations.expect(q[0].key) for q in group.fresh.values())
+        return fresh + sum(self.durations.expect(work.key) for _, _, work in group.retries)
 
     def take(self, task: str, now: float) -> Pending | None:
         """The next trial of `task`: a retry whose pause is over, or the longest; None if none."""
@@ -133,20 +137,20 @@ class TrialQueue:
             return heapq.heappop(group.retries)[2]
         if not group.fresh:
             return None
-        level = max(group.fresh, key=lambda n: (self.costs.expect(group.fresh[n][0].key), -n))
-        line = group.fresh[level]
-        work = line.popleft()
-        if not line:
+        level = max(group.fresh, key=lambda n: (self.durations.expect(group.fresh[n][0].key), -n))
+        pending = group.fresh[level]
+        work = pending.popleft()
+        if not pending:
             del group.fresh[level]
         return work
 
-    def again(self, work: Pending, due: float) -> None:
+    def requeue(self, work: Pending, due: float) -> None:
         """Run `work` (as it is: the caller counts attempts), not before time `due`."""
         self._count += 1
         heapq.heappush(self._groups[work.key.task].retries, (due, self._count, work))
 
     def next_due(self, now: float) -> float | None:
-        """When the next pause after `now` is over; None if nobody pauses."""
+        """When the next retry after `now` is due; None if there is none."""
         dues = [due for g in self._groups.values() for due, _, _ in g.retries if due > now]
         return min(dues, default=None)
 

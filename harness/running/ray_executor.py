@@ -1,260 +1,340 @@
-"""Workers on a Ray cluster, as the driver of a run sees them.
+"""Workers on a Ray cluster, one actor each, as the driver of a run sees them.
 
-One actor a worker; their records, actions and videos come back over Ray and are written here, by
-one writer, so a trial is recorded once wherever it ran. What a worker says after it was given up
-is not heard. The cluster is behind a process of its own (`harness.ray_bridge`).
+Records, actions and videos come back over Ray and are written here, by one writer, so a trial is
+recorded once wherever it ran. What a worker sends after it was killed is dropped.
 """
 
 from __future__ import annotations
 
-import importlib.util
-import multiprocessing
-import os
-import socket
+import pickle
+import sys
 import time
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
-from multiprocessing.connection import wait
-from pathlib import Path
+from importlib import import_module
+from typing import Any
 from urllib.parse import urlsplit
 
-from robospa.harness.running.executor import Hand, Message, RunAborted
-from robospa.harness.running.local_workers import deaf
-from robospa.harness.running.ray_bridge import RaySettings, main
-from robospa.harness.running.ray_messages import Heard, pack_config
+from robospa.harness.running.executor import RunAborted, WorkerHandle
+from robospa.harness.running.messages import Command, Message, Ready, TrialDone
+from robospa.harness.running.ray_cluster import (
+    NoCluster,
+    RaySettings,
+    error_line,
+    join_cluster,
+    unreachable,
+)
+from robospa.harness.running.ray_node import Report, WorkerActor, versions
 from robospa.harness.running.store import RecordWriter, replace_file
 from robospa.harness.running.worker import LOGS, WorkerConfig
-from robospa.protocol.errors import EncodeError
-from robospa.results.records.trial_record import TrialRecord
 
-CONNECT_SECONDS = 60.0
-KNOCK_SECONDS = 5.0
-CLOSE_SECONDS = 15.0
-NONE_HERE = (
-    "no Ray cluster runs on this machine; `ray start --head` starts one, "
-    "--address local makes one for this run only"
-)
-
-
-class NoCluster(Exception):
-    """There is no Ray, or no Ray cluster that can be used."""
+NODES_SECONDS = 1.0
+"""How often the nodes are counted."""
+REPORT_SECONDS = 5.0
+"""A worker that sends nothing but heartbeats reports this often."""
+NO_NODE_SECONDS = 600.0
+"""How long a run waits for a node if it has lost them all."""
+NO_HEAD_SECONDS = 10.0
+"""How long the cluster's head may not answer; Ray ends this process after 60 s."""
+CLOSE_SECONDS = 2.0
 
 
-class RayHand:
-    """One worker somewhere in the cluster."""
+class RayWorker:
+    """One worker: an actor, once a node has room for it."""
 
     def __init__(self, name: str, executor: RayExecutor) -> None:
         self.name = name
-        self.placed = False
+        self.node = ""
+        self.actor: Any = None
+        self.call: Any = None
+        """The call of the actor whose result is awaited."""
+        self.started = False
+        self.ready = False
         self.inbox: list[Message] = []
-        self.end: str | None = None
+        self.ended: str | None = None
         self._executor = executor
 
-    def send(self, message: Message) -> None:
-        """Tell it something; nothing happens if it is gone."""
-        if self.end is None:
-            self._executor.tell(("send", self.name, message))
+    def send(self, command: Command) -> None:
+        """Send it a command; nothing happens if it has ended."""
+        if self.ended is None and self.actor is not None:
+            self.actor.send.remote(command)
 
     def messages(self) -> list[Message]:
-        """What it has said since the last call."""
-        heard, self.inbox = self.inbox, []
-        return heard
+        """What it has sent since the last call."""
+        received, self.inbox = self.inbox, []
+        return received
 
-    def gone(self) -> str | None:
-        """How it ended; None while it lives."""
-        return self.end
+    def exit_status(self) -> str | None:
+        """How it ended; None while it runs."""
+        return self.ended
 
-    def waiting(self) -> bool:
-        """Whether it has no node yet."""
-        return not self.placed
+    def pending(self) -> bool:
+        """Whether no node has started it yet."""
+        return not self.started
 
     def kill(self) -> None:
-        """End it now. What it says from now on is not heard."""
-        self._executor.tell(("kill", self.name))
-        self.end, self.inbox = self.end or "killed", []
-        self._executor.forget(self)
+        """End it now; what it sends from now on is dropped."""
+        self.ended, self.inbox = self.ended or "killed", []
+        self.close()
 
     def join(self, seconds: float) -> None:
-        """Wait until it has gone, `seconds` at most."""
+        """Wait until it has ended, `seconds` at most."""
         until = time.monotonic() + seconds
-        while self.end is None and self.placed and time.monotonic() < until:
+        while self.ended is None and self.started and time.monotonic() < until:
             self._executor.wait([self], until - time.monotonic())
 
     def close(self) -> None:
-        """Nothing is left of it."""
-        self._executor.forget(self)
+        """Give its place on the node back."""
+        self._executor.remove(self)
 
 
 class RayExecutor:
-    """As many workers as the cluster of `wish` has room for, at most `wish.workers`."""
+    """As many workers as the cluster of `settings` has room for, at most `settings.workers`."""
 
-    def __init__(self, config: WorkerConfig, wish: RaySettings) -> None:
-        """Join the cluster; raises NoCluster."""
+    def __init__(self, config: WorkerConfig, settings: RaySettings) -> None:
+        """Join the cluster; raises NoCluster, also if no node is large enough for a worker."""
         self._folder = config.folder
-        self._wish = wish
-        self._hands: dict[str, RayHand] = {}
-        self._room = 0
-        self._news: list[str] = []
+        self._config = pickle.dumps(config)
+        self._settings = settings
+        self._versions = versions()
+        self._workers: list[RayWorker] = []
+        self._addresses: dict[str, str] = {}
+        self._slots: dict[str, int] = {}
+        self._left_out: dict[str, str] = {}
+        self._notes: list[str] = []
         self._writer: RecordWriter | None = None
-        self._logging = False
-        self.nodes: list[str] = []
-        """Addresses of the nodes at the start."""
-        check_address(wish.address)
+        self._counted = 0.0
+        self._no_node_since: float | None = None
+        self._gone = False
+        self._ray = join_cluster(settings.address)
         try:
-            packed = pack_config(config)
-        except EncodeError as error:
-            raise NoCluster(
-                f"this run's settings cannot be sent to its workers: {error}"
-            ) from error
-        spawn = multiprocessing.get_context("spawn")
-        self._pipe, theirs = spawn.Pipe()
-        self._bridge = spawn.Process(
-            target=main, args=(theirs, packed, wish), name="ray-bridge", daemon=True
-        )
-        with deaf():
-            self._bridge.start()
-        theirs.close()
-        try:
-            self._join()
+            remote = settings.address.startswith("ray://")
+            self._head = settings.address if remote else self._ray.get_runtime_context().gcs_address
+            self._actor_class = self._ray.remote(WorkerActor)
+            self._affinity = import_module("ray.util.scheduling_strategies")
+            self._count_nodes()
+            if not self.capacity():
+                raise NoCluster(self._too_small())
         except BaseException:
             self.close()
             raise
 
-    def _join(self) -> None:
-        until = time.monotonic() + CONNECT_SECONDS
-        while not self.nodes:
-            if not self._pipe.poll(max(0.0, until - time.monotonic())):
-                raise NoCluster(
-                    f"the Ray cluster at {self._wish.address} did not answer within "
-                    f"{CONNECT_SECONDS:g} s; is this machine one of its nodes? If not, use "
-                    "ray://HOST:10001"
-                )
-            try:
-                what, *rest = self._pipe.recv()
-            except (EOFError, OSError):
-                self._bridge.join()
-                raise NoCluster(
-                    f"Ray ended while joining the cluster at {self._wish.address} "
-                    f"(exit code {self._bridge.exitcode})"
-                ) from None
-            if what == "trouble":
-                raise NoCluster(_explained(rest[0]))
-            if what == "room":
-                self._room = rest[0]
-            elif what == "connected":
-                self.nodes = rest[0]
+    def nodes(self) -> list[str]:
+        """Addresses of the cluster's nodes."""
+        return sorted(set(self._addresses.values()))
 
-    def room(self) -> int:
+    def capacity(self) -> int:
         """How many workers fit into the cluster now."""
-        return self._room
+        return min(sum(self._slots.values()), self._settings.workers or sys.maxsize)
 
-    def hire(self, name: str) -> RayHand:
-        """One more actor; it waits if its node has just gone."""
-        if not self._logging:
-            self._logging = True
-            self.tell(("log", str((self._folder / LOGS / "ray.log").resolve())))
-        hand = self._hands[name] = RayHand(name, self)
-        self.tell(("hire", name))
-        return hand
+    def start(self, name: str) -> RayWorker:
+        """One more worker; it is pending until a node has room for it."""
+        worker = RayWorker(name, self)
+        self._workers.append(worker)
+        return worker
 
-    def tell(self, message: Message) -> None:
-        """Send `message` to the bridge; if that has ended, `wait` says so."""
-        with suppress(OSError):
-            self._pipe.send(message)
-
-    def forget(self, hand: RayHand) -> None:
-        """Hear no more of `hand`."""
-        if self._hands.get(hand.name) is hand:
-            del self._hands[hand.name]
-
-    def wait(self, hands: Sequence[Hand], seconds: float) -> None:
-        """Return as soon as something was heard, after `seconds` at most."""
-        if any(isinstance(hand, RayHand) and hand.inbox for hand in hands):
-            seconds = 0.0
-        wait([self._pipe, self._bridge.sentinel], timeout=seconds)
+    def wait(self, workers: Sequence[WorkerHandle], seconds: float) -> None:
+        """Return as soon as one has reported, after `seconds` at most."""
         try:
-            while self._pipe.poll():
-                self._hear(self._pipe.recv())
-        except (EOFError, OSError) as error:
-            raise RunAborted(
-                "the connection to the Ray cluster broke; Ray's last words are in "
-                f"{self._folder / LOGS / 'ray.log'}"
-            ) from error
+            self._update_nodes()
+            self._place_workers()
+            waiting = {worker.call: worker for worker in self._workers if worker.call is not None}
+            if not waiting:
+                time.sleep(max(0.0, seconds))
+                return
+            if any(isinstance(worker, RayWorker) and worker.inbox for worker in workers):
+                seconds = 0.0
+            self._ray.wait(list(waiting), timeout=max(0.0, seconds))
+            done, _ = self._ray.wait(list(waiting), num_returns=len(waiting), timeout=0)
+        except (OSError, RuntimeError) as error:
+            self._gone = True
+            raise RunAborted(f"the connection to the Ray cluster broke: {error}") from error
+        for call in done:
+            self._receive(waiting[call])
 
-    def _hear(self, message: Message) -> None:
-        what, *rest = message
-        if what == "trouble":
-            raise RunAborted(rest[0])
-        if what == "room":
-            self._room = rest[0]
-        elif what == "news":
-            self._news.append(rest[0])
-        elif hand := self._hands.get(rest[0]):
-            if what == "said":
-                self._listen(hand, rest[1])
-            elif what == "gone":
-                hand.end = rest[1]
-            else:
-                hand.placed = what == "placed"
-
-    def _listen(self, hand: RayHand, heard: Heard) -> None:
-        """Put what came with a message on disk, then pass the message on."""
-        if heard.output:
-            path = self._folder / LOGS / f"{hand.name}.log"
-            with suppress(OSError), path.open("ab") as file:
-                file.write(heard.output)
-        for message, files in heard.said:
-            if message[0] == "done":
-                self._keep(message[1], files)
-            hand.inbox.append(message)
-
-    def _keep(self, record: TrialRecord, files: Mapping[str, bytes]) -> None:
-        """Files first: a record promises that they are there. Raises StorageError."""
-        for name, data in files.items():
-            replace_file(self._folder / name, data)
-        if self._writer is None:
-            self._writer = RecordWriter(self._folder)
-        self._writer.write(record)
-
-    def news(self) -> list[str]:
+    def notes(self) -> list[str]:
         """Lines about nodes that were left out or are missing."""
-        told, self._news = self._news, []
-        return told
+        notes, self._notes = self._notes, []
+        return notes
+
+    def remove(self, worker: RayWorker) -> None:
+        """End the actor of `worker`, if it has one."""
+        if worker in self._workers:
+            self._workers.remove(worker)
+        actor, worker.actor, worker.call = worker.actor, None, None
+        if actor is not None and not self._gone:
+            with suppress(Exception):  # it may be gone already
+                self._ray.wait([actor.close.remote()], timeout=CLOSE_SECONDS)
+            with suppress(Exception):
+                self._ray.kill(actor)
 
     def close(self) -> None:
         """Leave the cluster, or end the one that was started; may be called twice."""
-        if self._pipe.closed:
-            return
-        self.tell(("stop",))
-        self._bridge.join(CLOSE_SECONDS)
-        if self._bridge.is_alive():
-            self._bridge.kill()
-            self._bridge.join()
-        self._pipe.close()
+        if not self._gone:
+            self._gone = True
+            self._ray.shutdown()
         if self._writer is not None:
             self._writer.close()
             self._writer = None
 
+    # --- nodes ------------------------------------------------------------------------------------
+
+    def _update_nodes(self) -> None:
+        """Count the nodes now and then; raises RunAborted if there will be none."""
+        now = time.monotonic()
+        if now - self._counted < NODES_SECONDS:
+            return
+        if reason := unreachable(self._head):
+            if now - self._counted > NO_HEAD_SECONDS:
+                self._gone = True
+                raise RunAborted(f"the head of the Ray cluster does not answer: {reason}")
+            return  # Ray would wait for it
+        self._count_nodes()
+        if self.capacity() or any(worker.actor for worker in self._workers):
+            self._no_node_since = None
+            return
+        for node in self._addresses:
+            if node in self._left_out:
+                raise RunAborted(self._left_out[node])
+        if self._no_node_since is None:
+            self._no_node_since = now
+            self._notes.append("no node of the Ray cluster is left; waiting for one")
+        elif now - self._no_node_since > NO_NODE_SECONDS:
+            raise RunAborted(f"for {NO_NODE_SECONDS:g} s no node of the Ray cluster had room")
+
+    def _count_nodes(self) -> None:
+        alive = [node for node in self._ray.nodes() if node["Alive"]]
+        self._counted = time.monotonic()
+        self._addresses = {node["NodeID"]: node["NodeManagerAddress"] for node in alive}
+        self._slots = {
+            node["NodeID"]: self._fitting(node["Resources"])
+            for node in alive
+            if node["NodeID"] not in self._left_out
+        }
+
+    def _fitting(self, resources: Mapping[str, float]) -> int:
+        """How many workers a node with `resources` holds."""
+        needs = (("CPU", self._settings.cpus), ("GPU", self._settings.gpus))
+        return int(min(resources.get(name, 0.0) / n + 1e-6 for name, n in needs if n > 0))
+
+    def _leave_out(self, node: str, reason: str) -> None:
+        if node not in self._left_out:
+            self._left_out[node] = (
+                f"the Ray node {self._address(node)} cannot be used: {reason}; "
+                "install on all nodes what this machine has"
+            )
+            self._notes.append(self._left_out[node])
+            self._slots.pop(node, None)
+
+    def _address(self, node: str) -> str:
+        return self._addresses.get(node, "a node that is gone")
+
+    def _too_small(self) -> str:
+        needs = f"{self._settings.cpus:g} CPUs"
+        needs += f" and {self._settings.gpus:g} GPUs" if self._settings.gpus else ""
+        cpus = [node["Resources"].get("CPU", 0.0) for node in self._ray.nodes() if node["Alive"]]
+        return (
+            f"no node of the Ray cluster at {self._settings.address} has the {needs} that a worker "
+            f"takes (the largest has {max(cpus, default=0.0):g} CPUs); lower --cpus-per-worker or "
+            "--gpus-per-worker, or start larger nodes"
+        )
+
+    # --- workers ----------------------------------------------------------------------------------
+
+    def _place_workers(self) -> None:
+        """Start those that have no actor yet, each on the node with most room."""
+        for worker in self._workers:
+            if worker.actor is None:
+                used = Counter(w.node for w in self._workers if w.actor is not None)
+                free = {node: slots - used[node] for node, slots in self._slots.items()}
+                worker.node = max(free, key=lambda node: free[node], default="")
+                if free.get(worker.node, 0) <= 0:
+                    return
+                node = self._affinity.NodeAffinitySchedulingStrategy(worker.node, soft=False)
+                worker.actor = self._actor_class.options(
+                    num_cpus=self._settings.cpus,
+                    num_gpus=self._settings.gpus,
+                    max_concurrency=4,
+                    scheduling_strategy=node,
+                ).remote()
+                worker.call = worker.actor.start.remote(self._versions, self._config, worker.name)
+
+    def _receive(self, worker: RayWorker) -> None:
+        """Take the result of a worker's last call and make the next one. Raises StorageError."""
+        try:
+            result = self._ray.get(worker.call)
+        except Exception as error:
+            where = self._address(worker.node)
+            if worker.ready:
+                self.remove(worker)
+                worker.ended = f"Ray lost it on {where}"
+            else:
+                self._start_elsewhere(worker, f"workers do not start there ({error_line(error)})")
+            return
+        if isinstance(result, Report):
+            self._keep(worker, result)
+        elif result:
+            self._start_elsewhere(worker, result)
+            return
+        worker.started = True
+        if worker.ended is None:
+            worker.call = worker.actor.report.remote(REPORT_SECONDS)
+        else:
+            self.remove(worker)
+
+    def _start_elsewhere(self, worker: RayWorker, reason: str) -> None:
+        """A worker that never was ready gets another node; no trial is lost."""
+        self._leave_out(worker.node, reason)
+        self.remove(worker)
+        worker.started = False
+        self._workers.append(worker)
+
+    def _keep(self, worker: RayWorker, report: Report) -> None:
+        """Put what came with a message on disk, then pass the message on.
+
+        Files first, because a record promises that they are there.
+        """
+        if report.output:
+            path = self._folder / LOGS / f"{worker.name}.log"
+            with suppress(OSError):
+                path.parent.mkdir(parents=True, exist_ok=True)
+                with path.open("ab") as file:
+                    file.write(report.output)
+        for name, data in report.files.items():
+            replace_file(self._folder / name, data)
+        for message in report.messages:
+            worker.ready |= isinstance(message, Ready)
+            if isinstance(message, TrialDone):
+                if self._writer is None:
+                    self._writer = RecordWriter(self._folder)
+                self._writer.write(message.record)
+        worker.inbox += report.messages
+        worker.ended = report.exit_status
+
 
 @contextmanager
-def joined(
-    wish: RaySettings | None, config: WorkerConfig, renders: bool
+def ray_executor(
+    settings: RaySettings | None, config: WorkerConfig, renders: bool
 ) -> Iterator[RayExecutor | None]:
-    """The cluster of `wish`, None for this machine. GPUs are only taken by a run that `renders`."""
-    if wish is None:
+    """Workers on the cluster of `settings`, None for this machine.
+
+    GPUs are only taken by a run that `renders`.
+    """
+    if settings is None:
         yield None
         return
-    executor = RayExecutor(config, wish if renders else replace(wish, gpus=0.0))
+    executor = RayExecutor(config, settings if renders else replace(settings, gpus=0.0))
     try:
         yield executor
     finally:
         executor.close()
 
 
-def far_away(executor: RayExecutor | None, config: WorkerConfig) -> list[str]:
+def loopback_warnings(executor: RayExecutor | None, config: WorkerConfig) -> list[str]:
     """A warning for every server that each node of the cluster would look for on itself."""
-    if executor is None or len(executor.nodes) < 2:
+    if executor is None or len(executor.nodes()) < 2:
         return []
     here = ("localhost", "127.0.0.1", "::1")
     return [
@@ -262,55 +342,3 @@ def far_away(executor: RayExecutor | None, config: WorkerConfig) -> list[str]:
         for url in config.expects
         if urlsplit(url).hostname in here
     ]
-
-
-def check_address(address: str) -> None:
-    """Raises NoCluster if Ray is not installed or nothing listens at `address`."""
-    if importlib.util.find_spec("ray") is None:
-        raise NoCluster("Ray is not installed; `pip install 'robospa[ray]'` adds it")
-    if address == "local":
-        return
-    if address == "auto":
-        last = _last_cluster()
-        if last and (why := _deaf_at(last)):
-            raise NoCluster(f"{NONE_HERE} (the last one was at {last}: {why})")
-        return
-    host, _, port = address.removeprefix("ray://").rpartition(":")
-    if not host or not port.isdigit():
-        raise NoCluster(
-            f"--address {address!r} is none of auto, local, HOST:PORT and ray://HOST:PORT"
-        )
-    if why := _deaf_at(address):
-        raise NoCluster(
-            f"no Ray cluster answers at {address} ({why}); `ray start --head` starts one"
-        )
-
-
-def _last_cluster() -> str:
-    """Where `auto` looks: Ray writes it down here and waits for minutes if that is outdated."""
-    written = Path(os.environ.get("RAY_TMPDIR", "/tmp")) / "ray" / "ray_current_cluster"
-    try:
-        return os.environ.get("RAY_ADDRESS") or written.read_text().strip()
-    except OSError:
-        return ""
-
-
-def _deaf_at(address: str) -> str:
-    """Why nobody can be reached at `address`; empty if somebody listens, or it is none."""
-    host, _, port = address.removeprefix("ray://").rpartition(":")
-    if not host or not port.isdigit():
-        return ""
-    try:
-        socket.create_connection((host, int(port)), timeout=KNOCK_SECONDS).close()
-    except (OSError, OverflowError) as error:
-        return str(error)
-    return ""
-
-
-def _explained(text: str) -> str:
-    """What Ray says, with what helps."""
-    if "Could not find any running Ray instance" in text:
-        return NONE_HERE
-    if any(hint in text for hint in ("uthenticat", "Failed to connect", "connection timeout")):
-        text += "; if the cluster asks for a token, set RAY_AUTH_MODE=token here"
-    return text

@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from robospa.harness.factory import is_url
+from robospa.harness.running.autoscaling import cores, most_workers
 from robospa.harness.running.evaluate import Request
 from robospa.harness.running.policies import read_map
 from robospa.harness.running.runner import RunOptions
-from robospa.harness.running.staffing import cores, most_workers
 from robospa.harness.running.worker import TASK_PARTS, Targets, WorkerConfig
 from robospa.harness.selection import list_trials
 from robospa.harness.settings import (
@@ -26,7 +26,7 @@ from robospa.harness.settings import (
 from robospa.trial import TrialKey
 
 if TYPE_CHECKING:
-    from robospa.harness.running.ray_bridge import RaySettings
+    from robospa.harness.running.ray_cluster import RaySettings
 
 RUNS = Path("runs")
 """Where runs go that are not told where."""
@@ -178,7 +178,7 @@ def _on_ray(compute: Compute) -> RaySettings | None:
     """How the workers are placed on a Ray cluster; None if they run on this machine."""
     if compute.executor != "ray":
         return None
-    from robospa.harness.running.ray_bridge import RaySettings
+    from robospa.harness.running.ray_cluster import RaySettings
 
     return RaySettings(
         compute.address or "auto", compute.workers, compute.cpus_per_worker, compute.gpus_per_worker

@@ -1,9 +1,9 @@
-"""The driver of a run: hands a fixed list of trials to worker processes until every one is settled.
+"""The driver of a run: hands a fixed list of trials to workers until every one has a record.
 
 Every listed trial is finished, whatever the order in which they end. A trial that could not be run
 is tried again from its seed a bounded number of times with growing pauses, then recorded as lost
-("infrastructure"): missing, never a failure. A worker that dies or hangs gives its trial back and
-is replaced. Which worker runs a trial, and when, does not enter the record.
+("infrastructure"): missing, never a failure. A worker that dies or hangs is replaced, and its trial
+is run again. Which worker runs a trial, and when, does not enter the record.
 """
 
 from __future__ import annotations
@@ -14,16 +14,24 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from robospa.harness.factory import is_url
-from robospa.harness.running.executor import Executor, Hand, Message
-from robospa.harness.running.executor import RunAborted as RunAborted
+from robospa.harness.running.autoscaling import Autoscaler
+from robospa.harness.running.executor import Executor, RunAborted, WorkerHandle
+from robospa.harness.running.heartbeat import HeartbeatMonitor
 from robospa.harness.running.local_workers import LocalExecutor
+from robospa.harness.running.messages import (
+    Fatal,
+    Heartbeat,
+    Message,
+    Ready,
+    RunTrial,
+    Stop,
+    TrialDone,
+    TrialLost,
+)
 from robospa.harness.running.queue import TrialQueue
 from robospa.harness.running.scheduler import Job, Scheduler
-from robospa.harness.running.servers import UNFIT
-from robospa.harness.running.staffing import Staffing
-from robospa.harness.running.status import Shares, Status
+from robospa.harness.running.status import Status, TimeBreakdown
 from robospa.harness.running.store import RecordWriter, StorageError
-from robospa.harness.running.watchdog import Watch
 from robospa.harness.running.worker import LOGS, WorkerConfig, task_finder
 from robospa.results.records.run_io import read_file
 from robospa.results.records.trial_record import TrialRecord
@@ -31,19 +39,28 @@ from robospa.trial import TrialKey
 
 START_SECONDS = 120.0
 """A worker that is not ready by then is replaced."""
-TELL_SECONDS = 0.25
-STOPPED_SECONDS = 5.0
-"""The driver looks at its workers at least twice a second; if not, it was stopped itself."""
+FALSE_STARTS = 3
+"""After so many workers in a row that ended before they were ready the run stops."""
+STATUS_SECONDS = 0.25
+STOP_SECONDS = 5.0
+"""How long workers may take to close their connections at the end of a run."""
+SUSPENDED_SECONDS = 5.0
+"""The driver looks at its workers at least twice a second; if not, it was suspended itself."""
 
 
 @dataclass(frozen=True)
 class RunOptions:
-    """How stubborn a run is. `trial_seconds` is the most one attempt may take before its worker is
-    killed, `stuck_seconds` the most without getting on though no policy is waited for; pauses
-    before retries are `backoff` * 2^k seconds; after `give_up` trials lost in a row the run stops,
-    because the server is gone rather than a trial unlucky. There may be `most` workers if `workers`
-    of them wait for their policies while cores idle. A server that is away beside others is tried
-    for `patience` seconds before that counts as an attempt at a trial."""
+    """Limits and retries of a run.
+
+    workers: worker processes at the start, on this machine.
+    attempts: how often a trial is tried before it is recorded as missing.
+    backoff: the pause before attempt k + 2 is `backoff` * 2^k [s].
+    trial_seconds: after so long one attempt's worker is killed [s].
+    give_up: after so many lost trials in a row the run stops, because the server is gone.
+    stuck_seconds: the same for a worker that does not advance though it waits for no policy [s].
+    most: how many workers there may be if they wait for their policies while cores idle.
+    patience: for so long a trial that cannot reach its server, of several, is charged nothing [s].
+    """
 
     workers: int = 1
     attempts: int = 3
@@ -56,33 +73,34 @@ class RunOptions:
 
 
 @dataclass
-class _Seat:
+class _Slot:
     """One worker and what the driver knows of it."""
 
-    hand: Hand
+    worker: WorkerHandle
     deadline: float
-    file: Path | None = None
+    records: Path | None = None
     job: Job | None = None
-    at: str = ""
+    target: str = ""
     """The policy that it is connected to."""
-    begun: float = 0.0
+    started: float = 0.0
+    """When it was sent its trial."""
     trials: int = 0
     ready: bool = False
-    watch: Watch | None = None
+    monitor: HeartbeatMonitor | None = None
 
     def due(self) -> float:
-        """When it has to have got further; infinite while it has nothing to do."""
+        """When it has to have advanced; infinite while it has nothing to do."""
         if self.ready and self.job is None:
             return float("inf")
-        return self.deadline if self.watch is None else min(self.deadline, self.watch.deadline)
+        return self.deadline if self.monitor is None else min(self.deadline, self.monitor.deadline)
 
 
 @dataclass
 class Runner:
     """Runs `keys` with workers of `executor`, by default processes here as `config` describes.
 
-    `on_record` sees every settled trial, `on_note` one line for every mishap, `on_status` every now
-    and then how things are.
+    `on_record` gets every record, `on_note` one line for every mishap, `on_status` the state of the
+    run a few times a second.
     """
 
     config: WorkerConfig
@@ -94,7 +112,7 @@ class Runner:
     on_status: Callable[[Status], None] = lambda status: None
 
     def run(self) -> None:
-        """Settle every trial. Raises RunAborted; on KeyboardInterrupt workers are killed first."""
+        """Record every trial. Raises RunAborted; on KeyboardInterrupt workers are killed first."""
         self._queue = TrialQueue(self.keys, task_finder(self.config.parts))
         most = max(self.options.workers, self.options.most)
         self._scheduler = Scheduler(
@@ -104,111 +122,179 @@ class Runner:
             pause=self.options.backoff,
             patience=self.options.patience,
         )
-        self._crew = self.executor or LocalExecutor(self.config, most)
-        self._staffing = Staffing(self.options.workers if self.executor is None else most, most)
-        self.shares = Shares()
-        self._seats: list[_Seat] = []
+        self._workers = self.executor or LocalExecutor(self.config, most)
+        self._autoscaler = Autoscaler(self.options.workers if self.executor is None else most, most)
+        self.times = TimeBreakdown()
+        self._slots: list[_Slot] = []
         self._started = 0
         self._false_starts = 0
         self._lost_in_a_row = 0
         self._writer: RecordWriter | None = None
-        self._looked = time.monotonic()
-        self._told = 0.0
+        self._checked = time.monotonic()
+        self._reported = 0.0
         try:
             while self._queue.unsettled:
-                self._staff()
+                self._start_workers()
                 self._assign()
-                self._listen()
+                self._receive()
                 self._check_deadlines()
-                self._tell()
-            self._dismiss()
+                self._report_status()
+            self._stop_workers()
         except StorageError as error:
             raise RunAborted(str(error)) from error
         finally:
-            self._kill_all()
+            self._kill_workers()
             if self._writer is not None:
                 self._writer.close()
 
-    def _staff(self) -> None:
-        """Replace workers that are gone, but never have more than there are trials left."""
-        wanted = self._crew.room() if self.executor is not None else self._staffing.wanted
-        wanted = min(wanted, self._queue.unsettled)
-        while len(self._seats) < wanted:
-            hand = self._crew.hire(f"worker-{self._started:03d}")
+    # --- workers ----------------------------------------------------------------------------------
+
+    def _start_workers(self) -> None:
+        """Replace workers that have ended, but never have more than there are trials left."""
+        local = self.executor is None
+        wanted = self._autoscaler.target if local else self._workers.capacity()
+        while len(self._slots) < min(wanted, self._queue.unsettled):
+            worker = self._workers.start(f"worker-{self._started:03d}")
             self._started += 1
-            self._seats.append(_Seat(hand, time.monotonic() + START_SECONDS))
+            self._slots.append(_Slot(worker, time.monotonic() + START_SECONDS))
 
     def _assign(self) -> None:
-        for seat in self._seats:
-            if seat.ready and seat.job is None:
+        """Give every idle worker its next trial, as far as there are any."""
+        for slot in self._slots:
+            if slot.ready and slot.job is None:
                 now = time.monotonic()
-                job = self._scheduler.next(now, seat.at)
+                job = self._scheduler.next(now, slot.target)
                 if job is None:
                     return
-                seat.job, seat.at, seat.begun = job, job.target, now
-                seat.deadline = now + self.options.trial_seconds
-                seat.watch = Watch(now, self.options.stuck_seconds)
-                seat.hand.send(("run", job.work.key, job.work.attempt, job.target))
+                slot.job, slot.target, slot.started = job, job.target, now
+                slot.deadline = now + self.options.trial_seconds
+                slot.monitor = HeartbeatMonitor(now, self.options.stuck_seconds)
+                slot.worker.send(RunTrial(job.work.key, job.work.attempt, job.target))
 
-    def _listen(self) -> None:
-        """Wait until a worker says something, dies, or a pause is over."""
-        self._crew.wait([seat.hand for seat in self._seats], self._patience())
-        for text in self._crew.news():
+    def _receive(self) -> None:
+        """Wait until a worker sends something or ends, or a pause is over."""
+        self._workers.wait([slot.worker for slot in self._slots], self._timeout())
+        for text in self._workers.notes():
             self.on_note(text)
-        for seat in list(self._seats):
-            gone = seat.hand.gone()  # asked first: what it said before it went is still heard
-            for message in seat.hand.messages():
-                self._hear(seat, message)
-            if gone is not None:
-                self._bury(seat, f"its worker died ({gone})")
+        for slot in list(self._slots):
+            ended = slot.worker.exit_status()  # asked first, so that its last messages are handled
+            for message in slot.worker.messages():
+                self._handle(slot, message)
+            if ended is not None:
+                self._reap(slot, f"its worker died ({ended})")
 
-    def _patience(self) -> float:
-        """Seconds until something has to be looked at, at most half a second."""
+    def _timeout(self) -> float:
+        """Seconds until something has to be checked, at most half a second."""
         now = time.monotonic()
-        deadlines = [seat.due() for seat in self._seats]
-        idle = any(s.ready and s.job is None for s in self._seats)
+        deadlines = [slot.due() for slot in self._slots]
+        idle = any(slot.ready and slot.job is None for slot in self._slots)
         if idle and (due := self._scheduler.next_time(now)) is not None:
             deadlines.append(due)
-        return max(0.0, min([0.5, *(d - now for d in deadlines)]))
+        return max(0.0, min([0.5, *(deadline - now for deadline in deadlines)]))
 
-    def _hear(self, seat: _Seat, message: Message) -> None:
-        if message[0] == "ready":
-            seat.ready, seat.file = True, message[1]
-            self._false_starts = 0
-        elif message[0] == "beat":
-            if seat.watch is not None:
-                seat.watch.heard(message, time.monotonic())
-        elif message[0] == "done":
-            self._finish(seat, message[1])
-        elif message[0] == "fatal":
-            raise RunAborted(message[1])
-        else:
-            _, _, text, retry, fault = message
-            job, seat.job = seat.job, None
-            if job is not None:
-                self._lose(job, text, retry, fault)
+    def _handle(self, slot: _Slot, message: Message) -> None:
+        match message:
+            case Ready():
+                slot.ready, slot.records = True, message.records
+                self._false_starts = 0
+            case Heartbeat():
+                if slot.monitor is not None:
+                    slot.monitor.receive(message, time.monotonic())
+            case TrialDone():
+                self._complete(slot, message.record)
+            case Fatal():
+                raise RunAborted(message.message)
+            case TrialLost():
+                job, slot.job = slot.job, None
+                if job is not None:
+                    self._retry(job, message)
 
-    def _finish(self, seat: _Seat, record: TrialRecord) -> None:
-        """The trial of `seat` has its record."""
-        job, seat.job = seat.job, None
+    def _reap(self, slot: _Slot, text: str) -> None:
+        """Take the trial of a dead worker back, unless its record had reached the disk."""
+        self._slots.remove(slot)
+        slot.worker.close()
+        if not slot.ready:
+            self._false_starts += 1
+            if self._false_starts >= FALSE_STARTS:
+                log = self.config.folder / LOGS / f"{slot.worker.name}.log"
+                raise RunAborted(f"workers do not start; the last one's output is in {log}")
+        if slot.job is None:
+            return
+        key = slot.job.work.key
+        exists = slot.records is not None and slot.records.exists()
+        for record in read_file(slot.records) if slot.records is not None and exists else []:
+            if record.key == key:
+                self._complete(slot, record)
+                return
+        self._retry(slot.job, TrialLost(key, text, retry=True))
+
+    def _check_deadlines(self) -> None:
+        """Kill workers that are late."""
+        now = time.monotonic()
+        self._extend_deadlines(now - self._checked)
+        self._checked = now
+        for slot in list(self._slots):
+            if not slot.ready and slot.worker.pending():
+                slot.deadline = now + START_SECONDS
+            if now <= slot.due():
+                continue
+            slot.worker.kill()
+            if not slot.ready:
+                text = f"was not ready after {START_SECONDS:g} s"
+            elif now > slot.deadline:
+                text = f"was stuck for {self.options.trial_seconds:g} s"
+            else:
+                text = f"did not advance for {self.options.stuck_seconds:g} s"
+            self._reap(slot, f"its worker {text} and was killed")
+
+    def _extend_deadlines(self, gap: float) -> None:
+        """After the driver itself was suspended (Ctrl-Z, a machine asleep) no worker is late."""
+        if gap < SUSPENDED_SECONDS:
+            return
+        for slot in self._slots:
+            slot.deadline += gap
+            if slot.monitor is not None:
+                slot.monitor.extend(gap)
+
+    def _scale_up(self, target: str) -> None:
+        """Start more workers if those there are wait for servers with room, as that at `target`."""
+        servers = self._scheduler.servers.values()
+        used = [s for s in servers if is_url(s.target) and (s.running or s.target == target)]
+        if more := self._autoscaler.scale_up(all(s.saturated for s in used)):
+            total = self._autoscaler.target
+            self.on_note(f"workers wait while cores idle: {more} more, {total} now")
+
+    def _stop_workers(self) -> None:
+        """Give idle workers a moment to close their connections."""
+        for slot in self._slots:
+            slot.worker.send(Stop())
+        until = time.monotonic() + STOP_SECONDS
+        for slot in self._slots:
+            slot.worker.join(until - time.monotonic())
+
+    def _kill_workers(self) -> None:
+        for slot in self._slots:
+            if slot.worker.exit_status() is None:
+                slot.worker.kill()
+            slot.worker.close()
+        self._workers.close()
+
+    # --- trials -----------------------------------------------------------------------------------
+
+    def _complete(self, slot: _Slot, record: TrialRecord) -> None:
+        """The trial of `slot` has its record."""
+        job, slot.job = slot.job, None
         if job is not None:
             now = time.monotonic()
             # A worker's first trial waits until its world and connection are there.
-            seconds = now - seat.begun if seat.trials else record.wall_time
-            seat.trials += 1
+            seconds = now - slot.started if slot.trials else record.wall_time
+            slot.trials += 1
             self._scheduler.done(job, record, now, seconds)
-        self.shares.add(record)
-        self._staffing.heard(record)
+        self.times.add(record)
+        self._autoscaler.add(record)
         self._settle(record)
-        if self.executor is None and self._queue.unsettled > 2 * self._staffing.wanted:
-            self._grow(seat.at)
-
-    def _grow(self, at: str) -> None:
-        """More workers if those that are there wait for servers that have room, as at `at`."""
-        servers = self._scheduler.servers.values()
-        asked = [s for s in servers if is_url(s.target) and (s.running or s.target == at)]
-        if more := self._staffing.review(all(s.saturated for s in asked)):
-            self.on_note(f"workers wait while cores idle: {more} more, {self._staffing.wanted} now")
+        if self.executor is None and self._queue.unsettled > 2 * self._autoscaler.target:
+            self._scale_up(slot.target)
 
     def _settle(self, record: TrialRecord) -> None:
         self._queue.settle()
@@ -216,31 +302,35 @@ class Runner:
             self._lost_in_a_row = 0
         self.on_record(record)
 
-    def _lose(self, job: Job, text: str, retry: bool, fault: str = "") -> None:
+    def _retry(self, job: Job, lost: TrialLost) -> None:
         """Queue another attempt at the trial of `job`, or record it as missing."""
-        work, now = job.work, time.monotonic()
-        if fault == UNFIT and len(self._scheduler.servers) == 1:
+        work, text, now = job.work, lost.message, time.monotonic()
+        unfit = lost.fault == "incompatible"
+        server = self._scheduler.servers[job.target]
+        if unfit and len(self._scheduler.servers) == 1:
             raise RunAborted(text)
-        before = self._scheduler.servers[job.target].up
-        charged = self._scheduler.lost(job, now, fault, text)
-        if orphans := self._scheduler.orphans():
-            raise RunAborted(f"no policy server is left for {orphans[0]}: {text}")
-        if fault == UNFIT:
-            self.on_note(f"{job.target} takes part no more: {text}")
-        elif before and not self._scheduler.servers[job.target].up:
+        was_up = server.up
+        charged = self._scheduler.lost(job, now, lost.fault, text)
+        if tasks := self._scheduler.tasks_without_server():
+            raise RunAborted(f"no policy server is left for {tasks[0]}: {text}")
+        if unfit:
+            self.on_note(f"{job.target} is left out from now on: {text}")
+        elif was_up and not server.up:
             self.on_note(f"{job.target} is away ({text}); other trials run until it is back")
         if not charged:
-            self._scheduler.again(job, now, charged)
-            return
-        if retry and work.attempt < self.options.attempts:
+            self._scheduler.requeue(job, now, charged)
+        elif lost.retry and work.attempt < self.options.attempts:
             pause = self.options.backoff * 2.0 ** (work.attempt - 1)
             self.on_note(f"{work.key.slug}: {text}; trying again in {pause:g} s")
-            self._scheduler.again(job, now + pause, charged)
-            return
-        self.on_note(f"{work.key.slug}: {text}; recorded as missing")
+            self._scheduler.requeue(job, now + pause, charged)
+        else:
+            self._record_missing(work.key, text, work.attempt)
+
+    def _record_missing(self, key: TrialKey, text: str, attempts: int) -> None:
+        self.on_note(f"{key.slug}: {text}; recorded as missing")
         if self._writer is None:
             self._writer = RecordWriter(self.config.folder)
-        record = lost_record(work.key, text, work.attempt, self._queue)
+        record = lost_record(key, text, attempts, self._queue)
         self._writer.write(record)
         self._lost_in_a_row += 1
         self._settle(record)
@@ -249,109 +339,48 @@ class Runner:
                 f"{self._lost_in_a_row} trials in a row could not be run, the last because: {text}"
             )
 
-    def _bury(self, seat: _Seat, text: str) -> None:
-        """Take back the trial of a dead worker, unless its record had reached the disk."""
-        self._seats.remove(seat)
-        seat.hand.close()
-        if not seat.ready:
-            self._false_starts += 1
-            if self._false_starts >= 3:
-                log = self.config.folder / LOGS / f"{seat.hand.name}.log"
-                raise RunAborted(f"workers do not start; the last one's output is in {log}")
-        if seat.job is None:
-            return
-        written = read_file(seat.file) if seat.file is not None and seat.file.exists() else []
-        for record in written:
-            if record.key == seat.job.work.key:
-                self._finish(seat, record)
-                return
-        self._lose(seat.job, text, True)
+    # --- status -----------------------------------------------------------------------------------
 
-    def _check_deadlines(self) -> None:
+    def _report_status(self) -> None:
+        """Report the state of the run a few times a second and at its end."""
         now = time.monotonic()
-        self._forgive(now - self._looked)
-        self._looked = now
-        for seat in list(self._seats):
-            if not seat.ready and seat.hand.waiting():
-                seat.deadline = now + START_SECONDS
-            if now <= seat.due():
-                continue
-            seat.hand.kill()
-            if not seat.ready:
-                text = f"its worker was not ready after {START_SECONDS:g} s and was killed"
-            elif now > seat.deadline:
-                text = f"its worker was stuck for {self.options.trial_seconds:g} s and was killed"
-            else:
-                text = (
-                    f"its worker did not get on for {self.options.stuck_seconds:g} s and was killed"
-                )
-            self._bury(seat, text)
-
-    def _tell(self) -> None:
-        """Say how things are, a few times a second and at the end."""
-        now = time.monotonic()
-        if now - self._told >= TELL_SECONDS or not self._queue.unsettled:
-            self._told = now
+        if now - self._reported >= STATUS_SECONDS or not self._queue.unsettled:
+            self._reported = now
             self.on_status(self.status(now))
 
     def status(self, now: float) -> Status:
-        """How things are at time `now`."""
-        costs, ready = self._queue.costs, [s for s in self._seats if s.ready]
-        running = [s for s in ready if s.job is not None]
+        """The state of the run at time `now`."""
+        durations, ready = self._queue.durations, [slot for slot in self._slots if slot.ready]
+        running = [(slot.job, slot.started) for slot in ready if slot.job is not None]
         left = self._queue.left()
-        for seat in running:
-            assert seat.job is not None
-            left += max(0.0, costs.expect(seat.job.work.key) - (now - seat.begun))
+        for job, started in running:
+            left += max(0.0, durations.expect(job.work.key) - (now - started))
         return Status(
             now,
-            workers=len(self._seats),
+            workers=len(self._slots),
             running=len(running),
-            starting=len(self._seats) - len(ready),
-            cores=self._staffing.cores if self.executor is None else self._crew.room(),
+            starting=len(self._slots) - len(ready),
+            cores=self._autoscaler.cores if self.executor is None else self._workers.capacity(),
             servers=tuple(self._scheduler.servers.values()),
-            shares=self.shares.now(),
-            left=left / max(1, len(ready)) if costs.known else None,
+            shares=self.times.recent_shares(),
+            left=left / max(1, len(ready)) if durations.known else None,
         )
-
-    def _forgive(self, gap: float) -> None:
-        """A driver that was stopped itself (Ctrl-Z, a machine put to sleep) blames nobody."""
-        if gap < STOPPED_SECONDS:
-            return
-        for seat in self._seats:
-            seat.deadline += gap
-            if seat.watch is not None:
-                seat.watch.forgive(gap)
-
-    def _dismiss(self) -> None:
-        """Let idle workers close their connections, for a moment."""
-        for seat in self._seats:
-            seat.hand.send(("stop",))
-        until = time.monotonic() + 5.0
-        for seat in self._seats:
-            seat.hand.join(until - time.monotonic())
-
-    def _kill_all(self) -> None:
-        for seat in self._seats:
-            if seat.hand.gone() is None:
-                seat.hand.kill()
-            seat.hand.close()
-        self._crew.close()
 
 
 def lost_record(key: TrialKey, message: str, attempts: int, queue: TrialQueue) -> TrialRecord:
     """The record of a trial that could not be run."""
-    facts = queue.facts(key)
+    variant = queue.info(key)
     return TrialRecord(
         key=key,
-        category=facts.category,
+        category=variant.category,
         instruction="",
         scene_digest="",
         end="infrastructure",
         success=False,
         done=0,
         best=0,
-        total=facts.subtasks,
-        candidates=facts.candidates,
+        total=variant.subtasks,
+        candidates=variant.candidates,
         steps=0,
         physics_steps=0,
         policy_calls=0,

@@ -11,8 +11,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from robospa.harness.factory import is_url
-from robospa.harness.running.servers import Server
-from robospa.harness.running.staffing import FULL
+from robospa.harness.running.autoscaling import FULL
+from robospa.harness.running.server_stats import ServerStats
 from robospa.results.records.trial_record import TrialRecord
 
 RECENT = 200
@@ -27,7 +27,7 @@ PURPOSES = {
 
 
 @dataclass
-class Shares:
+class TimeBreakdown:
     """Where the time of the last trials went, and of all."""
 
     recent: deque[Mapping[str, float]] = field(default_factory=lambda: deque(maxlen=RECENT))
@@ -39,11 +39,11 @@ class Shares:
         self.recent.append(spent)
         self.whole = _sum((self.whole, spent))
 
-    def now(self) -> dict[str, float]:
+    def recent_shares(self) -> dict[str, float]:
         """Shares of the last trials; empty before the first."""
         return _shares(_sum(self.recent))
 
-    def overall(self) -> dict[str, float]:
+    def overall_shares(self) -> dict[str, float]:
         """Shares of all trials."""
         return _shares(self.whole)
 
@@ -80,7 +80,7 @@ class Status:
     workers: int
     running: int
     cores: int
-    servers: Sequence[Server] = ()
+    servers: Sequence[ServerStats] = ()
     shares: Mapping[str, float] = field(default_factory=dict)
     left: float | None = None
     starting: int = 0
@@ -95,7 +95,7 @@ class Status:
             waiting = 0.0  # a policy in the worker's own process takes its core as well
         busy = (self.workers - self.starting) * (1.0 - waiting)
         asked = [s for s in self.servers if s.running and s.means]
-        if away := [s for s in self.servers if not s.up and not s.retired]:
+        if away := [s for s in self.servers if not s.up and not s.excluded]:
             others = "" if len(away) == len(self.servers) else "; the others get its workers"
             return f"{_some(len(away))} away{others}"
         if busy >= FULL * self.cores:
@@ -104,8 +104,8 @@ class Status:
         if asked and len(full) == len(asked):
             who = "the policy server is" if len(asked) == 1 else "the policy servers are"
             return f"{who} the bottleneck: workers wait {100 * waiting:.0f} % of their time"
-        told = f"they wait {100 * waiting:.0f} % of their time"
-        return f"room for more workers: {told}, no queue is long"
+        share = f"{100 * waiting:.0f} %"
+        return f"room for more workers: they wait {share} of their time, no queue is long"
 
     @property
     def staff(self) -> str:
@@ -130,12 +130,12 @@ def shares_text(shares: Mapping[str, float]) -> str:
     return ", ".join(f"{name} {100 * s:.0f} %" for name, s in shares.items() if s >= 0.005)
 
 
-def server_text(server: Server, now: float) -> str:
+def server_text(server: ServerStats, now: float) -> str:
     """Answer time, queue and batch of one server, or that it is away."""
-    if server.retired:
-        return f"left out: {server.retired}"
+    if server.excluded:
+        return f"left out: {server.excluded}"
     if server.failures:
-        pause = server.back - now
+        pause = server.retry_at - now
         return f"away, next try in {pause:.0f} s" if pause > 0 else "away, being tried"
     if not server.means:
         return "no answer measured yet"

@@ -1,12 +1,10 @@
 """One worker process: one world, one policy connection, one trial at a time, one record file.
 
-The driver sends ("run", key, attempt, policy) or ("stop",); the worker answers ("ready", file),
-then per trial ("done", record) once the record is on disk, ("lost", key, message, retry, fault) if
-it could not be run (`fault`: see `harness.servers`), or ("fatal", message) if no trial could ever
-be run. After a loss the world is rebuilt and the policy reconnected before the next trial, never
-within one. In between a thread sends ("beat", number, state): see `harness.watchdog`. A worker
-whose driver has died ends at once, even if it is stopped or stuck in native code (on Linux, where
-the kernel sees to it).
+It answers the driver's commands with the messages of `harness.running.messages`: Ready, then
+TrialDone for each trial once the record is on disk, TrialLost if it could not be run, or Fatal if
+no trial could ever be run. After a loss the world is rebuilt and the policy reconnected before the
+next trial, never within one. A thread sends heartbeats. A worker whose driver has died ends at
+once, even if it is stopped or stuck in native code (on Linux, where the kernel sees to it).
 """
 
 from __future__ import annotations
@@ -27,21 +25,33 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from robospa.harness.factory import load_function, open_policy
+from robospa.harness.running.heartbeat import HeartbeatSender, MonitoredPolicy
+from robospa.harness.running.messages import (
+    Command,
+    Fatal,
+    Message,
+    Ready,
+    RunTrial,
+    Stop,
+    TrialDone,
+    TrialLost,
+)
 from robospa.harness.running.policies import over_budget
 from robospa.harness.running.store import RecordWriter, StorageError, storing, write_actions
-from robospa.harness.running.watchdog import Attended, Pulse
 from robospa.protocol.errors import printable
 from robospa.protocol.policy import PolicySpec
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
 if TYPE_CHECKING:
+    from robospa.harness.trial import TrialParts
+    from robospa.harness.world import World
     from robospa.tasks.task import Task
 
 LOGS = "logs"
 PR_SET_PDEATHSIG = 1
 Targets = str | tuple[str, ...]
-"""A policy's URL or name, or several that are one as good as the other."""
+"""A policy's URL or name, or those of several equal servers."""
 SENTENCE = 1000
 """Characters that an error may have in a record."""
 VIDEO = ("none", "failures", "first", "all")
@@ -107,15 +117,17 @@ class Worker:
     """Runs trials; builds its world and policy when first needed and again after a loss."""
 
     def __init__(
-        self, config: WorkerConfig, writer: RecordWriter, pulse: Pulse | None = None
+        self,
+        config: WorkerConfig,
+        writer: RecordWriter,
+        heartbeat: HeartbeatSender | None = None,
     ) -> None:
         self.config = config
         self.writer = writer
-        self.pulse = pulse or Pulse()
-        self.parts: Callable[[TrialKey], Any] = load_function(config.parts)
-        self._world: Any = None
-        self._policy: Any = None
-        self._target = ""
+        self.heartbeat = heartbeat or HeartbeatSender()
+        self.parts: Callable[[TrialKey], TrialParts] = load_function(config.parts)
+        self._world: World | None = None
+        self._policy: MonitoredPolicy | None = None
         self._stale = False
 
     def run(self, key: TrialKey, attempt: int, target: str) -> TrialRecord:
@@ -123,43 +135,40 @@ class Worker:
         from robospa.harness.pictures.video import TrialRecorder
         from robospa.harness.trial import policy_seed, run_trial
 
-        self._prepare(target)
-        recorder = TrialRecorder(video=self.config.filmed(key), on_step=self.pulse.on)
-        seed = policy_seed(key, self.config.run_seed)
+        world, policy = self._open_world(), self._open_policy(target)
+        recorder = TrialRecorder(video=self.config.filmed(key), on_step=self.heartbeat.advance)
         record = run_trial(
-            self._world,
-            self._policy,
+            world,
+            policy,
             key,
-            policy_seed=seed,
+            policy_seed=policy_seed(key, self.config.run_seed),
             recorder=recorder,
             parts=self.parts,
             step_scale=self.config.step_scale,
         )
-        cut = over_budget(getattr(self._policy, "hello", None), record.instruction)
+        cut = over_budget(policy.hello, record.instruction)
         record = replace(
             record, attempts=attempt, diagnostics={**record.diagnostics, **(cut or {})}
         )
-        write_actions(self.config.folder, key, recorder.actions, self._policy.spec.action)
+        write_actions(self.config.folder, key, recorder.actions, policy.spec.action)
         if self.config.video != "failures" or not record.success:
             record = replace(record, video=recorder.write_video(self.config.folder, key))
         self.writer.write(record)
-        self._say_goodbye(record)
+        try:
+            policy.end({"end": record.end, "success": record.success})
+        except Exception:  # the record is safe; the next trial starts on a new connection
+            self._stale = True
         return record
 
-    def _say_goodbye(self, record: TrialRecord) -> None:
-        """Tell the policy's server how it went; the record is safe whatever comes of it."""
-        end = getattr(self._policy, "end", None)
-        if end is not None:
-            try:
-                end({"end": record.end, "success": record.success})
-            except Exception:  # the next trial starts on a new connection
-                self._stale = True
-
-    def _prepare(self, target: str) -> None:
+    def _open_world(self) -> World:
         if self._world is None:
             self._world = load_function(self.config.world)(**self.config.world_arguments)
-        if self._policy is not None and self._target != target:
-            self._leave()
+        return self._world
+
+    def _open_policy(self, target: str) -> MonitoredPolicy:
+        """The policy at `target`, on a connection that can be trusted."""
+        if self._policy is not None and self._policy.target != target:
+            self._close_policy()
         if self._policy is None:
             options = dict(self.config.options)
             if target in self.config.expects:
@@ -167,22 +176,20 @@ class Worker:
             if "timeouts" in options and not self.config.alone:
                 # The driver has other work for this worker until the server is back.
                 options["timeouts"] = replace(options["timeouts"], wait=0.0)
-            with self.pulse.policy(target):
+            with self.heartbeat.policy(target):
                 opened = open_policy(target, options)
-            self._policy, self._target = Attended(opened, target, self.pulse), target
+            self._policy = MonitoredPolicy(opened, target, self.heartbeat)
         elif self._stale:
-            reconnect = getattr(self._policy, "reconnect", None)
-            if reconnect is not None:
-                reconnect()
+            self._policy.reconnect()
         self._stale = False
+        return self._policy
 
-    def _leave(self) -> None:
-        """Close the connection to the policy of the task before, whatever comes of it."""
+    def _close_policy(self) -> None:
+        """Close the connection to the policy of the task before, whether or not that works."""
         policy, self._policy = self._policy, None
-        shut = getattr(policy, "close", None)
-        if shut is not None:
+        if policy is not None:
             with contextlib.suppress(Exception):
-                shut()
+                policy.close()
 
     def recover(self) -> None:
         """After a loss: nothing of the world survives, and the connection is not trusted."""
@@ -192,11 +199,10 @@ class Worker:
             world.close()
 
     def close(self) -> None:
-        """Say goodbye to the policy's server and free the world."""
+        """Close the connection to the policy's server and free the world."""
         for part in (self._policy, self._world):
-            shut = getattr(part, "close", None)
-            if shut is not None:
-                shut()
+            if part is not None:
+                part.close()
 
 
 def die_with_driver() -> None:
@@ -231,33 +237,36 @@ def describe(error: BaseException) -> str:
     return text if text and module.startswith("robospa.") else f"{type(error).__name__}: {text}"
 
 
-def _attempt(worker: Worker, key: TrialKey, attempt: int, target: str) -> tuple[Any, ...]:
-    """The message that tells how this attempt went. Errors are sorted here, once."""
-    from robospa.harness.running.servers import fault_of
+def _attempt(worker: Worker, command: RunTrial) -> Message:
+    """How this attempt went. Errors are sorted here, once."""
+    from robospa.harness.running.server_stats import connection_fault
     from robospa.harness.world import SceneUnstable
     from robospa.protocol.errors import ServerError
     from robospa.registry import UnknownName
 
+    key = command.key
     try:
-        return ("done", worker.run(key, attempt, target))
+        return TrialDone(worker.run(key, command.attempt, command.target))
     except SceneUnstable as error:
-        return ("lost", key, describe(error), False, "")
+        return TrialLost(key, describe(error), retry=False)
     except (UnknownName, StorageError) as error:
-        return ("fatal", describe(error))
+        return Fatal(describe(error))
     except Exception as error:  # the driver decides: retry, then report as missing
         with contextlib.suppress(OSError):  # the log's disk may be full
             traceback.print_exc()
         worker.recover()
         retry = not isinstance(error, ServerError) or error.retriable
-        return ("lost", key, describe(error), retry, fault_of(error))
+        return TrialLost(key, describe(error), retry, connection_fault(error))
 
 
-def _serve(pipe: Connection, send: Callable[[Any], None], worker: Worker) -> None:
+def _serve(
+    commands: Connection[Any, Command], send: Callable[[Message], None], worker: Worker
+) -> None:
     while True:
-        message = pipe.recv()
-        if message[0] == "stop":
+        command = commands.recv()
+        if isinstance(command, Stop):
             return
-        send(_attempt(worker, *message[1:]))
+        send(_attempt(worker, command))
 
 
 def main(pipe: Connection, config: WorkerConfig, name: str) -> None:
@@ -265,23 +274,23 @@ def main(pipe: Connection, config: WorkerConfig, name: str) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     die_with_driver()
-    speaking = threading.Lock()
+    sending = threading.Lock()
 
-    def send(message: Any) -> None:
-        with speaking:
+    def send(message: Message) -> None:
+        with sending:
             pipe.send(message)
 
     try:
         _log_to(config.folder / LOGS / f"{name}.log")
         writer = RecordWriter(config.folder)
     except StorageError as error:
-        send(("fatal", describe(error)))
+        send(Fatal(describe(error)))
         return
-    pulse = Pulse(send)
-    worker = Worker(config, writer, pulse)
-    pulse.start()
+    heartbeat = HeartbeatSender(send)
+    worker = Worker(config, writer, heartbeat)
+    heartbeat.start()
     try:
-        send(("ready", writer.path))
+        send(Ready(writer.path))
         _serve(pipe, send, worker)
     except (EOFError, BrokenPipeError):
         return

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robospa.harness.cli.eval import evaluate
-from robospa.harness.running.watchdog import BEAT_SECONDS
+from robospa.harness.running.heartbeat import HEARTBEAT_SECONDS
 from robospa.harness.settings import (
     GROUPS,
     LEAST_STUCK_SECONDS,
@@ -144,4 +144,4 @@ def test_an_unknown_keyword_is_answered_with_the_nearest() -> None:
 
 
 def test_a_worker_that_gets_on_is_not_taken_for_stuck() -> None:
-    assert LEAST_STUCK_SECONDS >= 3 * BEAT_SECONDS
+    assert LEAST_STUCK_SECONDS >= 3 * HEARTBEAT_SECONDS

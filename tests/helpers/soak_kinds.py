@@ -109,11 +109,11 @@ def worker_stuck(run: Run, rng: random.Random) -> bool:
     """A worker inside native code that never lets go of the interpreter."""
     if not _in_flight(run):
         return False
-    before = run.said().count("did not get on")
+    before = run.said().count("did not advance")
     run.mark.touch()
     until = time.monotonic() + PATIENCE
     while run.alive():
-        if run.said().count("did not get on") > before:
+        if run.said().count("did not advance") > before:
             return True
         if time.monotonic() > until:
             raise Finding("a worker that is stuck in native code stays")
@@ -121,7 +121,7 @@ def worker_stuck(run: Run, rng: random.Random) -> bool:
     if run.mark.exists():
         run.mark.unlink()
         return False
-    return run.said().count("did not get on") > before
+    return run.said().count("did not advance") > before
 
 
 def orphan_stopped(run: Run, rng: random.Random) -> bool:
@@ -199,7 +199,7 @@ def _replaced(run: Run, victim: int) -> bool:
         if time.monotonic() > until:
             raise Finding(f"a stopped worker stays: {run.said()}")
         time.sleep(0.05)
-    return "did not get on" in run.said()
+    return "did not advance" in run.said()
 
 
 def _stops_for_space(run: Run) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 
 from robospa.harness.running.progress import ROWS, Progress, Tally, clock, details, summary
-from robospa.harness.running.servers import Server
+from robospa.harness.running.server_stats import ServerStats
 from robospa.harness.running.status import Status
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
@@ -47,13 +47,13 @@ class Terminal(io.StringIO):
         return True
 
 
-def server(name: str, **means: float) -> Server:
-    found = Server(name, frozenset({"Long"}), batch=8, running=2, task="Long", trials=7)
+def server(name: str, **means: float) -> ServerStats:
+    found = ServerStats(name, frozenset({"Long"}), batch=8, running=2, task="Long", trials=7)
     found.means = {"p50": 120.0, **means}
     return found
 
 
-def status(*servers: Server) -> Status:
+def status(*servers: ServerStats) -> Status:
     shares = {"physics": 0.25, "rendering": 0.05, "waiting": 0.7}
     return Status(0.0, 4, 4, 2, servers, shares, left=90.0)
 

@@ -18,7 +18,7 @@ def test_a_retry_waits_for_its_time_and_then_goes_first() -> None:
     queue = TrialQueue(KEYS, fake_task_of)
     first = queue.take("Pick_Fake", 0.0)
     assert first is not None
-    queue.again(replace(first, attempt=2), due=5.0)
+    queue.requeue(replace(first, attempt=2), due=5.0)
     assert queue.next_due(4.0) == 5.0
     second, third = queue.take("Pick_Fake", 4.0), queue.take("Pick_Fake", 6.0)
     assert second is not None and third is not None
@@ -29,7 +29,7 @@ def test_a_task_that_only_pauses_is_not_due() -> None:
     queue = TrialQueue(KEYS[:1], fake_task_of)
     work = queue.take("Pick_Fake", 0.0)
     assert work is not None
-    queue.again(work, due=5.0)
+    queue.requeue(work, due=5.0)
     assert (queue.due(4.0), list(queue.due(5.0))) == ({}, ["Pick_Fake"])
     assert queue.waiting() == ("Pick_Fake",)
 
@@ -38,8 +38,8 @@ def test_the_level_that_takes_longest_goes_first() -> None:
     slow, quick = TrialKey("Pick_Fake", 1, 7), TrialKey("Pick_Fake", 2, 7)
     queue = TrialQueue([slow, quick, replace(slow, seed=8), replace(quick, seed=8)], fake_task_of)
     assert queue.take("Pick_Fake", 0.0) == Pending(slow)  # equal limits: in order
-    queue.costs.learn(slow, 9.0)
-    queue.costs.learn(quick, 1.0)
+    queue.durations.add(slow, 9.0)
+    queue.durations.add(quick, 1.0)
     assert queue.take("Pick_Fake", 0.0) == Pending(replace(slow, seed=8))
     assert queue.take("Pick_Fake", 0.0) == Pending(quick)
 
@@ -47,12 +47,12 @@ def test_the_level_that_takes_longest_goes_first() -> None:
 def test_what_is_expected_moves_from_the_step_limit_to_what_was_measured() -> None:
     queue = TrialQueue(KEYS, fake_task_of)
     key, other = KEYS[0], TrialKey("Pick_Fake", 3, 1)
-    assert (queue.costs.expect(key), queue.costs.known) == (LIMIT, False)
-    queue.costs.learn(key, 10.0)
-    assert queue.costs.expect(key) == pytest.approx(10.0)
-    assert queue.costs.expect(other) == pytest.approx(10.0)  # as many seconds a step
-    queue.costs.learn(other, 2.0)
-    assert queue.costs.expect(key) == pytest.approx((10.0 + 6.0) / 2)
+    assert (queue.durations.expect(key), queue.durations.known) == (LIMIT, False)
+    queue.durations.add(key, 10.0)
+    assert queue.durations.expect(key) == pytest.approx(10.0)
+    assert queue.durations.expect(other) == pytest.approx(10.0)  # as many seconds a step
+    queue.durations.add(other, 2.0)
+    assert queue.durations.expect(key) == pytest.approx((10.0 + 6.0) / 2)
     assert queue.left() == pytest.approx(3 * 8.0)
 
 

@@ -16,9 +16,8 @@ from typing import Any
 import pytest
 from ray_helpers import QUIET, SIZE, cluster, kill_node
 
-from robospa.harness.running import ray_node
-from robospa.harness.running.ray_bridge import RaySettings
-from robospa.harness.running.ray_executor import NoCluster, RayExecutor, check_address, joined
+from robospa.harness.running.ray_cluster import NoCluster, RaySettings, check_address
+from robospa.harness.running.ray_executor import RayExecutor, ray_executor
 from robospa.harness.running.runner import Runner, RunOptions
 from robospa.harness.running.worker import WorkerConfig
 from robospa.results.records.run_io import read_file, read_records
@@ -98,11 +97,6 @@ def test_the_slurm_example_is_valid_shell() -> None:
     assert subprocess.run(["bash", "-n", script], capture_output=True).stderr == b""
 
 
-def test_a_node_with_other_versions_is_named() -> None:
-    assert ray_node.misfit(ray_node.versions()) == ""
-    assert ray_node.misfit({"numpy": "0.1"}).endswith("instead of 0.1")
-
-
 def test_the_command_gives_the_same_records_as_local_workers_and_no_noise(
     tmp_path: Path, home: tuple[Any, Any, Path]
 ) -> None:
@@ -135,7 +129,7 @@ def test_a_node_that_dies_and_one_that_joins_cost_and_double_nothing(
             made.add_node(num_cpus=1, env_vars={"FAKE_NODE": "two"}, **SIZE)
 
     patient = config(tmp_path / "ray", "ray_helpers:NodePolicy")
-    with joined(RaySettings(made.address), patient, False) as executor:
+    with ray_executor(RaySettings(made.address), patient, False) as executor:
         runner = Runner(patient, KEYS, RunOptions(backoff=0.01), on_record, notes.append)
         runner.executor = executor
         runner.run()

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from robospa.harness.running.ray_bridge import RaySettings
-from robospa.harness.running.ray_executor import joined
+from robospa.harness.running.ray_cluster import RaySettings
+from robospa.harness.running.ray_executor import ray_executor
 from robospa.harness.running.runner import Runner, RunOptions
 from robospa.harness.running.worker import WorkerConfig
 from robospa.results.records.run_io import differences, read_records
@@ -29,7 +29,7 @@ def test_records_of_a_cluster_equal_local_ones_and_the_cluster_ends_with_the_run
     before = processes("raylet")
     Runner(config("here"), KEYS, RunOptions(workers=1)).run()
     filmed = config("ray", "all")
-    with joined(RaySettings("local", workers=1), filmed, True) as executor:
+    with ray_executor(RaySettings("local", workers=1), filmed, True) as executor:
         Runner(filmed, KEYS, executor=executor).run()
     here, ray = read_records(tmp_path / "here"), read_records(tmp_path / "ray")
     assert [differences(here[key], ray[key]) for key in KEYS] == [[] for _ in KEYS]

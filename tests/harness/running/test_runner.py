@@ -12,7 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from robospa.harness.running.runner import RunAborted, Runner, RunOptions
+from robospa.harness.running.executor import RunAborted
+from robospa.harness.running.runner import Runner, RunOptions
 from robospa.harness.running.worker import WorkerConfig
 from robospa.results.records.manifest import RunError
 from robospa.results.records.run_io import finished, read_file, read_records

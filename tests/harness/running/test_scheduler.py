@@ -13,7 +13,6 @@ from run_fakes import fake_task_of
 
 from robospa.harness.running.queue import TrialQueue
 from robospa.harness.running.scheduler import Job, Scheduler
-from robospa.harness.running.servers import BROKEN, UNFIT, UNREACHED
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
@@ -74,9 +73,9 @@ class Simulation:
             free.append(worker)
             away = self.gone.get(job.target, (0.0, 0.0))
             if away[0] <= self.now < away[1]:
-                fault = UNREACHED if begun >= away[0] else BROKEN
+                fault = "unreachable" if begun >= away[0] else "disconnected"
                 charged = self.scheduler.lost(job, self.now, fault, "gone")
-                self.scheduler.again(job, self.now, charged)
+                self.scheduler.requeue(job, self.now, charged)
                 continue
             done = record(job.work.key, 1000 * waits)
             self.scheduler.done(job, done, self.now, 1.0 + waits)
@@ -196,9 +195,9 @@ def test_one_worker_tries_a_server_before_the_others_follow() -> None:
     scheduler = schedule(keys(), equal("a", "b"))
     job = scheduler.next(0.0)
     assert job is not None
-    assert not scheduler.lost(job, 0.0, UNREACHED)
-    scheduler.again(job, 0.0, False)
-    pause = scheduler.servers[job.target].back
+    assert not scheduler.lost(job, 0.0, "unreachable")
+    scheduler.requeue(job, 0.0, False)
+    pause = scheduler.servers[job.target].retry_at
     jobs = [scheduler.next(pause) for _ in range(6)]
     assert [j.target for j in jobs if j is not None].count(job.target) == 1
 
@@ -207,12 +206,12 @@ def test_waiting_for_the_only_server_of_a_task_is_charged_when_all_else_is_done(
     where = {"Pick_A": "a", "Press_B": "b"}
     scheduler = schedule(keys(("Pick_A", "Press_B"), 1), lambda task: (where[task],))
     jobs = {job.target: job for job in (scheduler.next(0.0), scheduler.next(0.0)) if job}
-    assert not scheduler.lost(jobs["a"], 0.0, UNREACHED)  # just gone
-    scheduler.again(jobs["a"], 0.0, False)
+    assert not scheduler.lost(jobs["a"], 0.0, "unreachable")  # just gone
+    scheduler.requeue(jobs["a"], 0.0, False)
     later = scheduler.next(61.0)
     assert later is not None and later.target == "a"
-    assert not scheduler.lost(later, 61.0, UNREACHED)  # the other server still runs a trial
-    scheduler.again(later, 61.0, False)
+    assert not scheduler.lost(later, 61.0, "unreachable")  # the other server still runs a trial
+    scheduler.requeue(later, 61.0, False)
     scheduler.done(jobs["b"], record(jobs["b"].work.key, 1.0), 61.0, 1.0)
     for _ in range(2):
         rest = scheduler.next(99.0)
@@ -223,23 +222,23 @@ def test_waiting_for_the_only_server_of_a_task_is_charged_when_all_else_is_done(
             assert rest is not None
         break
     assert rest.target == "a"
-    assert scheduler.lost(rest, 99.0, UNREACHED)  # nobody else has anything to do
+    assert scheduler.lost(rest, 99.0, "unreachable")  # nobody else has anything to do
 
 
 def test_a_server_that_came_back_as_another_one_is_left_out() -> None:
     scheduler = schedule(keys(), equal("a", "b"))
     job = scheduler.next(0.0)
     assert job is not None
-    assert not scheduler.lost(job, 0.0, UNFIT, "another spec")
-    scheduler.again(job, 0.0, False)
-    assert scheduler.orphans() == ()
+    assert not scheduler.lost(job, 0.0, "incompatible", "another spec")
+    scheduler.requeue(job, 0.0, False)
+    assert scheduler.tasks_without_server() == ()
     assert all(j.target != job.target for _ in range(20) if (j := scheduler.next(1e6)))
-    (left,) = (s for s in scheduler.servers.values() if not s.retired)
+    (left,) = (s for s in scheduler.servers.values() if not s.excluded)
     other = scheduler.next(1e6)
     assert other is not None and other.target == left.target
-    scheduler.lost(other, 1e6, UNFIT, "another spec, too")
-    scheduler.again(other, 1e6, False)
-    assert set(scheduler.orphans()) == set(TASKS)
+    scheduler.lost(other, 1e6, "incompatible", "another spec, too")
+    scheduler.requeue(other, 1e6, False)
+    assert set(scheduler.tasks_without_server()) == set(TASKS)
 
 
 def test_trials_lost_for_other_reasons_say_nothing_of_the_server() -> None:

@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from robospa.harness.running.servers import Server
-from robospa.harness.running.status import Shares, Status, server_text, shares_text
+from robospa.harness.running.server_stats import ServerStats
+from robospa.harness.running.status import Status, TimeBreakdown, server_text, shares_text
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
@@ -21,22 +21,22 @@ def record(wall: float = 10.0, latency: dict[str, float] | None = None, **timing
     )  # fmt: skip
 
 
-def server(running: int = 4, p50: float = 120.0, **means: float) -> Server:
-    found = Server("ws://a", frozenset({"Pick_Fake"}), running=running, trials=9)
+def server(running: int = 4, p50: float = 120.0, **means: float) -> ServerStats:
+    found = ServerStats("ws://a", frozenset({"Pick_Fake"}), running=running, trials=9)
     found.means = {"p50": p50, **means}
     return found
 
 
-def status(waiting: float, *servers: Server, workers: int = 4, cores: int = 2) -> Status:
+def status(waiting: float, *servers: ServerStats, workers: int = 4, cores: int = 2) -> Status:
     shares = {"physics": 1.0 - waiting, "waiting": waiting}
     return Status(0.0, workers, workers, cores, servers, shares)
 
 
 def test_shares_are_those_of_the_recorded_purposes() -> None:
-    shares = Shares()
-    assert shares.now() == {}
+    shares = TimeBreakdown()
+    assert shares.recent_shares() == {}
     shares.add(record(physics=4.0, goal=1.0, rendering=2.0, waiting=2.0, loading=0.5))
-    assert shares.now() == pytest.approx(
+    assert shares.recent_shares() == pytest.approx(
         {"physics": 0.5, "rendering": 0.2, "waiting": 0.2, "scenes": 0.05, "other": 0.05}
     )
     assert shares_text({"physics": 0.5, "rendering": 0.496, "other": 0.004}) == (
@@ -45,9 +45,9 @@ def test_shares_are_those_of_the_recorded_purposes() -> None:
 
 
 def test_old_records_without_purposes_are_all_other() -> None:
-    shares = Shares()
+    shares = TimeBreakdown()
     shares.add(record())
-    assert shares.overall()["other"] == 1.0
+    assert shares.overall_shares()["other"] == 1.0
 
 
 def test_cores_that_are_busy_are_the_bottleneck() -> None:
@@ -104,20 +104,20 @@ def test_a_servers_line_says_what_it_told() -> None:
     told.batch = 8
     assert server_text(told, 0.0) == "answers in 8.2 ms, queue 1.5 ms, batch 4.0 of 8"
     assert server_text(server(p50=61000.0), 0.0) == "answers in 61 s"
-    assert "no answer" in server_text(Server("ws://b", frozenset()), 0.0)
+    assert "no answer" in server_text(ServerStats("ws://b", frozenset()), 0.0)
 
 
 def test_the_pause_of_a_server_grows_but_not_with_every_worker_that_fails_with_it() -> None:
-    away = Server("ws://a", frozenset())
+    away = ServerStats("ws://a", frozenset())
     pauses = []
     now = 0.0
     for _ in range(6):
         for _ in range(4):
             away.fail(now, 2.0)
-        pauses.append(away.back - now)
-        now = away.back
+        pauses.append(away.retry_at - now)
+        now = away.retry_at
     assert pauses == [2.0, 4.0, 8.0, 16.0, 30.0, 30.0]
-    assert away.since == 0.0
+    assert away.failing_since == 0.0
 
 
 def test_workers_that_start_or_idle_are_named() -> None:

@@ -4,63 +4,63 @@ from __future__ import annotations
 
 import pytest
 
-from robospa.harness.running.staffing import Staffing, most_workers
+from robospa.harness.running.autoscaling import Autoscaler, most_workers
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
 KEY = TrialKey("Pick_Fake", 1, 1)
 
 
-def heard(staffing: Staffing, waiting: float, trials: int | None = None) -> None:
+def run_round(scaler: Autoscaler, waiting: float, trials: int | None = None) -> None:
     """A round of trials of 1 s each in which a process did nothing for `waiting`."""
     record = TrialRecord(
         KEY, "GAC", "go", "", "success", True, 1, 1, 1, 2, 1, 50, 1, "", "", 1.0,
         timing={"processor": 1.0 - waiting},
     )  # fmt: skip
-    for _ in range(trials or staffing.wanted):
-        staffing.heard(record)
+    for _ in range(trials or scaler.target):
+        scaler.add(record)
 
 
 def test_workers_that_never_wait_fill_the_cores() -> None:
-    staffing = Staffing(2, 16, cores=2)
-    heard(staffing, 0.05)
-    assert staffing.review(saturated=False) == 0
+    scaler = Autoscaler(2, 16, cores=2)
+    run_round(scaler, 0.05)
+    assert scaler.scale_up(saturated=False) == 0
 
 
 def test_workers_that_wait_leave_room_for_others() -> None:
-    staffing = Staffing(2, 16, cores=2)
-    heard(staffing, 0.4)
-    assert staffing.review(saturated=False) == 1  # 2 workers fill 1.2 cores: 3 fill 2
-    heard(staffing, 0.38)
-    assert staffing.review(saturated=False) == 0  # 1.86 of 2 is full
+    scaler = Autoscaler(2, 16, cores=2)
+    run_round(scaler, 0.4)
+    assert scaler.scale_up(saturated=False) == 1  # 2 workers fill 1.2 cores: 3 fill 2
+    run_round(scaler, 0.38)
+    assert scaler.scale_up(saturated=False) == 0  # 1.86 of 2 is full
 
 
 def test_they_come_in_steps_up_to_the_most() -> None:
-    staffing = Staffing(2, 10, cores=2)
+    scaler = Autoscaler(2, 10, cores=2)
     grown = []
     for _ in range(5):
-        heard(staffing, 0.95)
-        staffing.review(saturated=False)
-        grown.append(staffing.wanted)
+        run_round(scaler, 0.95)
+        scaler.scale_up(saturated=False)
+        grown.append(scaler.target)
     assert grown == [4, 8, 10, 10, 10]
 
 
 def test_a_full_server_ends_it() -> None:
-    staffing = Staffing(2, 16, cores=2)
-    heard(staffing, 0.95)
-    assert staffing.review(saturated=True) == 0
+    scaler = Autoscaler(2, 16, cores=2)
+    run_round(scaler, 0.95)
+    assert scaler.scale_up(saturated=True) == 0
 
 
 def test_a_review_takes_a_whole_round() -> None:
-    staffing = Staffing(4, 16, cores=4)
-    heard(staffing, 0.9, trials=3)
-    assert staffing.review(saturated=False) == 0
-    heard(staffing, 0.9, trials=1)
-    assert staffing.review(saturated=False) > 0
+    scaler = Autoscaler(4, 16, cores=4)
+    run_round(scaler, 0.9, trials=3)
+    assert scaler.scale_up(saturated=False) == 0
+    run_round(scaler, 0.9, trials=1)
+    assert scaler.scale_up(saturated=False) > 0
 
 
 def test_memory_and_cores_bound_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("robospa.harness.running.staffing.cores", lambda: 4)
+    monkeypatch.setattr("robospa.harness.running.autoscaling.cores", lambda: 4)
     monkeypatch.setattr("pathlib.Path.read_text", lambda self: "MemAvailable: 8000000 kB\n")
     assert most_workers() == 10
     monkeypatch.setattr("pathlib.Path.read_text", lambda self: "MemAvailable: 900000000 kB\n")

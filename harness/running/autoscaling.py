@@ -2,9 +2,9 @@
 
 A worker that waits for its policy leaves its core idle. So after every round of trials (as many as
 there are workers) the driver looks at the processor time of their processes: if that does not fill
-the cores, and the servers are not full, more workers come, at most twice as many at once. (What a
-worker does not wait says less: answers come in batches, and then all want the cores at once.) A
-full server ends it: more workers would only stand in its queue.
+the cores, and the servers are not full, more workers are started, at most twice as many at once.
+(The time that workers do not wait is a worse measure: answers come in batches, and then all of them
+want the cores at once.) With full servers more workers would only queue.
 """
 
 from __future__ import annotations
@@ -39,32 +39,32 @@ def most_workers() -> int:
 
 
 @dataclass
-class Staffing:
-    """How many workers are wanted: `wanted` now, `most` ever, for `cores` cores."""
+class Autoscaler:
+    """How many workers there should be: `target` now, `maximum` ever, for `cores` cores."""
 
-    wanted: int
-    most: int
+    target: int
+    maximum: int
     cores: int = field(default_factory=cores)
     _seconds: float = 0.0
-    _worked: float = 0.0
-    _heard: int = 0
+    _busy: float = 0.0
+    _trials: int = 0
 
-    def heard(self, record: TrialRecord) -> None:
+    def add(self, record: TrialRecord) -> None:
         """Count one trial that was run."""
         self._seconds += record.wall_time
-        self._worked += record.timing.get(PROCESSOR, 0.0)
-        self._heard += 1
+        self._busy += record.timing.get(PROCESSOR, 0.0)
+        self._trials += 1
 
-    def review(self, saturated: bool) -> int:
-        """How many more workers come now. `saturated`: no server has room for more."""
-        if self.wanted >= self.most or self._heard < self.wanted or self._seconds <= 0:
+    def scale_up(self, saturated: bool) -> int:
+        """How many more workers to start now. `saturated`: no server has room for more."""
+        if self.target >= self.maximum or self._trials < self.target or self._seconds <= 0:
             return 0
-        busy = self.wanted * self._worked / self._seconds
-        self._seconds = self._worked = 0.0
-        self._heard = 0
+        busy = self.target * self._busy / self._seconds
+        self._seconds = self._busy = 0.0
+        self._trials = 0
         if saturated or busy >= FULL * self.cores:
             return 0
-        fitting = round(self.wanted * self.cores / max(busy, 1e-9))
-        before = self.wanted
-        self.wanted = min(self.most, 2 * before, max(before + 1, fitting))
-        return self.wanted - before
+        fitting = round(self.target * self.cores / max(busy, 1e-9))
+        before = self.target
+        self.target = min(self.maximum, 2 * before, max(before + 1, fitting))
+        return self.target - before

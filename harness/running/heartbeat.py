@@ -1,0 +1,143 @@
+"""Is a worker still advancing with its trial? Both ends of the answer.
+
+A thread of the worker tells the driver about once a second how often something has advanced (a
+scene loaded, an action polled or executed, an answer received) and what the worker is doing. A
+worker that is stopped, or stuck inside native code that never lets another thread run, sends
+nothing; one that is stuck elsewhere sends the same count for ever. Waiting for a server is no
+fault: the client has deadlines of its own. A policy inside the worker may keep all of it busy for
+long (loading weights), so that is announced, and then only the trial's own deadline counts.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+
+from robospa.harness.factory import is_url
+from robospa.harness.running.messages import Activity, Heartbeat
+from robospa.protocol.policy import Observation, PolicySpec, TrialInfo
+
+HEARTBEAT_SECONDS = 1.0
+
+
+class HeartbeatSender:
+    """The worker's end. `send` may block or raise OSError."""
+
+    def __init__(self, send: Callable[[Heartbeat], None] = lambda beat: None) -> None:
+        self._send = send
+        self.count = 0
+        self.activity: Activity = "simulating"
+
+    def start(self) -> None:
+        """Send heartbeats until the process ends or the driver is gone."""
+        threading.Thread(target=self._run, name="heartbeat", daemon=True).start()
+
+    def _run(self) -> None:
+        pause = threading.Event()
+        while not pause.wait(HEARTBEAT_SECONDS):
+            try:
+                self._send(Heartbeat(self.count, self.activity))
+            except OSError:
+                return
+
+    def advance(self, *_: object) -> None:
+        """Something has advanced."""
+        self.count += 1
+
+    @contextmanager
+    def policy(self, target: str) -> Iterator[None]:
+        """While the policy at `target` is doing something."""
+        self.count += 1
+        if is_url(target):
+            self.activity = "waiting"
+        else:
+            self.activity = "in_policy"
+            self._send(Heartbeat(self.count, self.activity))
+        try:
+            yield
+        finally:
+            self.activity = "simulating"
+            self.count += 1
+            if not is_url(target):
+                self._send(Heartbeat(self.count, self.activity))
+
+
+class MonitoredPolicy:
+    """A policy whose calls `heartbeat` knows about. What a policy may lack does nothing here."""
+
+    def __init__(self, policy: Any, target: str, heartbeat: HeartbeatSender) -> None:
+        self._policy = policy
+        self.target = target
+        self._heartbeat = heartbeat
+
+    @property
+    def spec(self) -> PolicySpec:
+        """The policy's."""
+        spec: PolicySpec = self._policy.spec
+        return spec
+
+    @property
+    def hello(self) -> Mapping[str, Any]:
+        """The server's greeting; empty for a policy without a server."""
+        return getattr(self._policy, "hello", None) or {}
+
+    @property
+    def last_timing(self) -> Mapping[str, float]:
+        """The server's times of the last answer [ms]; empty if it reports none."""
+        return getattr(self._policy, "last_timing", None) or {}
+
+    def reset(self, trial: TrialInfo) -> None:
+        """Begin a trial."""
+        with self._heartbeat.policy(self.target):
+            self._policy.reset(trial)
+
+    def infer(self, observation: Observation) -> Any:
+        """The policy's answer, not yet checked."""
+        with self._heartbeat.policy(self.target):
+            return self._policy.infer(observation)
+
+    def end(self, outcome: Mapping[str, Any]) -> None:
+        """Tell the policy how its trial went, if it wants to know."""
+        self._call_if_there("end", outcome)
+
+    def reconnect(self) -> None:
+        """Open a new connection to the policy's server, if it has one."""
+        self._call_if_there("reconnect")
+
+    def close(self) -> None:
+        """Free what the policy holds."""
+        self._call_if_there("close")
+
+    def _call_if_there(self, name: str, *arguments: Any) -> None:
+        method = getattr(self._policy, name, None)
+        if method is not None:
+            with self._heartbeat.policy(self.target):
+                method(*arguments)
+
+
+class HeartbeatMonitor:
+    """The driver's end: watches one attempt at a trial, on the driver's own monotonic clock."""
+
+    def __init__(self, now: float, seconds: float) -> None:
+        """`seconds` without advancing are too many."""
+        self.seconds = seconds
+        self._since = now
+        self._count = -1
+        self._activity: Activity = "simulating"
+
+    def receive(self, beat: Heartbeat, now: float) -> None:
+        """The worker has sent `beat`."""
+        if beat.progress != self._count or beat.activity == "waiting":
+            self._since = now
+        self._count, self._activity = beat.progress, beat.activity
+
+    def extend(self, seconds: float) -> None:
+        """The driver itself was stopped for `seconds`: they do not count."""
+        self._since += seconds
+
+    @property
+    def deadline(self) -> float:
+        """When it is too late; infinite inside a policy of the worker's own."""
+        return float("inf") if self._activity == "in_policy" else self._since + self.seconds

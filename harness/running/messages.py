@@ -1,0 +1,77 @@
+"""What the driver of a run and its workers send to each other: picklable values, one class each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from robospa.results.records.trial_record import TrialRecord
+from robospa.trial import TrialKey
+
+Activity = Literal["simulating", "waiting", "in_policy"]
+"""In the simulator; waiting for a policy server; inside a policy of the worker's own process."""
+
+Fault = Literal["", "unreachable", "disconnected", "incompatible"]
+"""What is wrong with a policy server: nothing; nobody listens; the connection broke within a trial;
+it is another server than the one that the run began with."""
+
+
+@dataclass(frozen=True)
+class RunTrial:
+    """To a worker: run this trial with the policy at `target`, a URL or a name."""
+
+    key: TrialKey
+    attempt: int
+    target: str
+
+
+@dataclass(frozen=True)
+class Stop:
+    """To a worker: close the connection to the policy and end."""
+
+
+Command = RunTrial | Stop
+
+
+@dataclass(frozen=True)
+class Ready:
+    """The worker takes trials and writes to the file `records`; None if the driver writes them."""
+
+    records: Path | None
+
+
+@dataclass(frozen=True)
+class Heartbeat:
+    """Sent about once a second; `progress` counts what has advanced (scenes, actions, answers)."""
+
+    progress: int
+    activity: Activity
+
+
+@dataclass(frozen=True)
+class TrialDone:
+    """A trial has its record, which is on disk."""
+
+    record: TrialRecord
+
+
+@dataclass(frozen=True)
+class TrialLost:
+    """A trial could not be run; `retry`: whether trying again may help."""
+
+    key: TrialKey
+    message: str
+    retry: bool
+    fault: Fault = ""
+
+
+@dataclass(frozen=True)
+class Fatal:
+    """No trial could ever be run."""
+
+    message: str
+
+
+Message = Ready | Heartbeat | TrialDone | TrialLost | Fatal
+"""From a worker."""
