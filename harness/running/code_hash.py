@@ -1,8 +1,7 @@
 """One short hash of the code and data that can change what a trial does.
 
 A run may only go on with the code that it was started with, and a cluster's nodes must have the
-driver's. What counts is what a trial executes: its loop, the world, and everything that these
-import; the packages in PACKAGES count whole, because their modules are found by name. What never
+driver's. What counts is what a trial executes: ROOTS, and everything that these import. What never
 acts is left out: comments, layout, docstrings, annotations of functions, `if TYPE_CHECKING`. So are
 the policy, which a run identifies by its spec, the lists of seeds, which a run's own list of trials
 replaces, and all that only starts trials or shows them.
@@ -12,25 +11,31 @@ from __future__ import annotations
 
 import ast
 import contextlib
+import fnmatch
 import gc
 import hashlib
 import os
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
 from importlib import import_module
 from pathlib import Path
 
-ROOTS = ("robospa.harness.trial", "robospa.harness.sim.sapien_world")
-PACKAGES = (
+ROOTS = (
+    "robospa.harness.trial",
+    "robospa.harness.sim.sapien_world",
+    "robospa.harness.robots.*",
+    "robospa.harness.skills.*",
     "robospa.clients",
-    "robospa.harness.robots",
-    "robospa.harness.skills",
-    "robospa.tasks",
+    "robospa.clients.*.client",
+    "robospa.tasks.*",
 )
-LEFT_OUT = ("robospa.tasks.seeds",)
-NO_DATA = (".py", ".pyc", ".pyi", ".typed", ".md")
-"""Files in PACKAGES that are no data of a trial."""
+"""Modules that count with all that they import; where there is a star, they are found by name."""
+LEFT_OUT = ("robospa.tasks.seeds", "robospa.tasks.leaks")
+DATA = ("harness/robots/", "tasks/")
+"""Folders whose files that are no code count too."""
+NO_DATA = ("tasks/seeds/",)
+NO_DATA_ENDS = (".py", ".pyc", ".pyi", ".typed", ".md")
 LENGTH = 16
 """Hexadecimal digits of a hash."""
 
@@ -59,45 +64,39 @@ def code_hash() -> str:
     return found
 
 
-def hash_files(
-    files: dict[str, bytes],
-    roots: Iterable[str] = ROOTS,
-    packages: Iterable[str] = PACKAGES,
-) -> str:
+def hash_files(files: Mapping[str, bytes], roots: Iterable[str] = ROOTS) -> str:
     """The hash of `files`, by path relative to the folder of `robospa`."""
     digest = hashlib.sha256()
-    for name, tree in sorted(covered(files, roots, packages).items()):
+    for name, tree in sorted(covered(files, roots).items()):
         text: list[str] = []
         _write(tree, text)
         digest.update(f"{name}\0{''.join(text)}\0".encode())
-    inside = tuple(f"{_path(package)}/" for package in packages)
-    outside = tuple(f"{_path(package)}/" for package in LEFT_OUT)
     for path, data in sorted(files.items()):
-        if path.startswith(inside) and not path.startswith(outside) and not path.endswith(NO_DATA):
+        is_data = path.startswith(DATA) and not path.startswith(NO_DATA)
+        if is_data and not path.endswith(NO_DATA_ENDS):
             digest.update(f"{path} {len(data)}\0".encode() + data)
     return digest.hexdigest()[:LENGTH]
 
 
-def covered(
-    files: dict[str, bytes],
-    roots: Iterable[str] = ROOTS,
-    packages: Iterable[str] = PACKAGES,
-) -> dict[str, ast.Module]:
+def covered(files: Mapping[str, bytes], roots: Iterable[str] = ROOTS) -> dict[str, ast.Module]:
     """The modules of `files` that count, by name, with their syntax trees.
 
-    Raises KeyError if a root or a package is not there.
+    Raises KeyError if there is no module for one of `roots`.
     """
     modules = {_module(path): path for path in files if path.endswith(".py")}
-    wanted = [*roots, *packages]
-    for package in packages:
-        wanted += [name for name in modules if name.startswith(f"{package}.")]
+    wanted: list[str] = []
+    for root in roots:
+        matching = fnmatch.filter(modules, root)
+        if not matching:
+            raise KeyError(f"there is no module {root}")
+        wanted += matching
     found: dict[str, ast.Module] = {}
     collecting = gc.isenabled()
     gc.disable()  # it would look again and again through a million nodes that all stay
     try:
         while wanted:
             name = wanted.pop()
-            if name in found or any(f"{name}.".startswith(f"{out}.") for out in LEFT_OUT):
+            if name in found or f"{name}.".startswith(tuple(f"{out}." for out in LEFT_OUT)):
                 continue
             found[name] = ast.parse(files[modules[name]])
             wanted += [m for m in _imports(found[name]) if m in modules]
@@ -118,10 +117,6 @@ def _module(path: str) -> str:
     """`harness/trial.py` as `robospa.harness.trial`, `tasks/__init__.py` as `robospa.tasks`."""
     parts = path.removesuffix(".py").removesuffix("__init__").rstrip("/").split("/")
     return ".".join(["robospa", *filter(None, parts)])
-
-
-def _path(module: str) -> str:
-    return module.removeprefix("robospa.").replace(".", "/")
 
 
 def _imports(tree: ast.AST) -> Iterator[str]:

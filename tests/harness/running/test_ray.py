@@ -6,7 +6,6 @@ its nodes comes last.
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -36,9 +35,6 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Any, Any, P
     with pytest.MonkeyPatch.context() as patch:
         for name, value in {**QUIET, "FAKE_MARKS": str(marks), "FAKE_NODE": "head"}.items():
             patch.setenv(name, value)
-        patch.setenv(
-            "PYTHONPATH", f"{Path(__file__).parents[1]}:{os.environ.get('PYTHONPATH', '')}"
-        )
         with cluster(num_cpus=1) as made:
             yield made, made.add_node(num_cpus=1, env_vars={"FAKE_NODE": "one"}, **SIZE), marks
 

@@ -26,7 +26,6 @@ def test_a_node_with_other_versions_is_named() -> None:
 
 @pytest.fixture
 def actor(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> WorkerActor:
-    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[1]), prepend=":")
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     for name in ("__spec__", "__file__"):
         monkeypatch.setattr(sys.modules["__main__"], name, None, raising=False)
