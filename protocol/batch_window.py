@@ -1,17 +1,17 @@
-"""When is the next request due, what does a call cost, and is it worth waiting?
+"""How long a batch waits for more requests: a window that adapts to the clients and to the model.
 
-Kept for every session are its last pauses between an answer and the next request; for the model
+Kept for every session are its last pauses between an answer and the next request; for the model,
 how long calls of how many observations took. With k requests here and m(w) more expected within w
 seconds, waiting answers (k + m) / (w + cost(k + m)) requests per second. Calling now answers
 k / cost(k), or, if it serves those who come meanwhile right afterwards, (k + j) / (cost(k) +
 cost(j)). The highest rate wins. m(w) follows from the pauses themselves, given how long each
-session has been silent already: no shape of their distribution is assumed, and whoever is later
-than ever before is waited for only a little. A request whose first bytes are here is as good as
-come.
+session has been silent already: no shape of their distribution is assumed, and a session that is
+later than ever before is waited for only a little. A request whose first bytes have come counts as
+certain.
 
-The rule was chosen by simulation of some twenty patterns of arrival against waiting for mean
-pauses, never waiting, and the best fixed window of each; `tests/protocol/test_batching_patterns.py`
-holds it to that.
+`max_wait_ms`, one fixed window as other servers have it, is no substitute: over the seventeen
+patterns of arrival of `tests/protocol/test_batching_patterns.py`, the best one (50 ms) answers 0.89
+of the requests that this window does, at worst 0.62, and no window at all 0.83.
 """
 
 from __future__ import annotations
@@ -26,21 +26,21 @@ from numpy.typing import NDArray
 KEPT = 32
 """Pauses remembered of every session."""
 ENOUGH = 4
-"""With fewer of its own, a session is expected to pause as the others do."""
-FADING = 0.9
+"""With fewer pauses of its own, a session is expected to pause as the others do."""
+DECAY = 0.9
 """Weight of a call's cost beside the one after it."""
-GRACE = 0.95
-"""A session counts as silent for so much of the time since its answer: who is a little later than
-ever before is still waited for."""
+SILENT = 0.95
+"""Share of the time since its answer for which a session counts as silent: one that is a little
+later than ever before is still waited for."""
 SLACK = 1e-4
 """[s] added to a predicted arrival."""
-PATIENCE = 4.0
+LATE = 4.0
 """A request that takes so many times as long as usual to arrive is not waited for."""
 
 
 @dataclass
-class _Pace:
-    """One session: when it was answered, its pauses since [s], and when a request began."""
+class _Arrivals:
+    """One session: when it was answered, its last pauses [s], and when a request began."""
 
     answered: float | None = None
     began: float | None = None
@@ -49,7 +49,7 @@ class _Pace:
 
 @dataclass
 class CallCost:
-    """What a call of n observations takes [s]: a straight line through recent calls."""
+    """Duration of a call of n observations [s]: a straight line through recent calls."""
 
     weight: float = 0.0
     n: float = 0.0
@@ -58,10 +58,11 @@ class CallCost:
     nd: float = 0.0
 
     def add(self, size: int, seconds: float) -> None:
-        for name, value in (("weight", 1.0), ("n", size), ("d", seconds)):
-            setattr(self, name, FADING * getattr(self, name) + value)
-        self.nn = FADING * self.nn + size * size
-        self.nd = FADING * self.nd + size * seconds
+        self.weight = DECAY * self.weight + 1.0
+        self.n = DECAY * self.n + size
+        self.d = DECAY * self.d + seconds
+        self.nn = DECAY * self.nn + size * size
+        self.nd = DECAY * self.nd + size * seconds
 
     def __call__(self, size: float) -> float:
         """Seconds for `size` observations; the mean while all calls were of one size."""
@@ -74,29 +75,29 @@ class CallCost:
 
 
 class AdaptiveBatchWindow:
-    """The pace of all sessions of one model. Times are of one clock [s]."""
+    """The arrivals of all sessions of one model. Times are of one clock [s]."""
 
     def __init__(self) -> None:
         self.cost = CallCost()
-        self._sessions: dict[int, _Pace] = {}
+        self._sessions: dict[int, _Arrivals] = {}
         self._all: deque[float] = deque(maxlen=2 * KEPT)
         self._transfer = 0.0
         self._free = 0.0
 
-    def coming(self, session: int, now: float) -> None:
-        """The first bytes of a request are here."""
-        self._sessions.setdefault(session, _Pace()).began = now
+    def request_began(self, session: int, now: float) -> None:
+        """The first bytes of a request have come."""
+        self._sessions.setdefault(session, _Arrivals()).began = now
 
     def arrived(self, session: int, now: float) -> None:
-        """A whole request is here."""
-        pace = self._sessions.setdefault(session, _Pace())
-        if pace.began is not None:
-            self._transfer += 0.2 * (now - pace.began - self._transfer)
-            pace.began = None
-        if pace.answered is not None:
-            pace.pauses.append(now - pace.answered)
-            self._all.append(now - pace.answered)
-            pace.answered = None
+        """A whole request has come."""
+        arrivals = self._sessions.setdefault(session, _Arrivals())
+        if arrivals.began is not None:
+            self._transfer += 0.2 * (now - arrivals.began - self._transfer)
+            arrivals.began = None
+        if arrivals.answered is not None:
+            arrivals.pauses.append(now - arrivals.answered)
+            self._all.append(now - arrivals.answered)
+            arrivals.answered = None
 
     def answered(self, sessions: Sequence[int], start: float, end: float) -> None:
         """A call for `sessions` is over."""
@@ -107,7 +108,7 @@ class AdaptiveBatchWindow:
                 self._sessions[session].answered = end
 
     def forget(self, session: int) -> None:
-        """The session rests."""
+        """The session pauses: it is not waited for any more."""
         self._sessions.pop(session, None)
 
     def wait_for(self, now: float, waiting: Collection[int], oldest: float, size: int) -> float:
@@ -134,16 +135,16 @@ class AdaptiveBatchWindow:
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """When requests may come [s from now], soonest first, and with what chance each."""
         found: list[tuple[float, float]] = []
-        for session, pace in self._sessions.items():
+        for session, arrivals in self._sessions.items():
             if session in waiting:
                 continue
-            if pace.began is not None:
-                spent = now - pace.began
-                if spent <= PATIENCE * self._transfer:
+            if arrivals.began is not None:
+                spent = now - arrivals.began
+                if spent <= LATE * self._transfer:
                     found.append((max(self._transfer - spent, self._transfer / 4), 1.0))
-            elif pace.answered is not None:
-                silent = GRACE * (now - pace.answered)
-                known = pace.pauses if len(pace.pauses) >= ENOUGH else self._all
+            elif arrivals.answered is not None:
+                silent = SILENT * (now - arrivals.answered)
+                known = arrivals.pauses if len(arrivals.pauses) >= ENOUGH else self._all
                 later = [pause - silent for pause in known if pause > silent]
                 # one more than were seen: it may be later than ever
                 found += [(wait, 1 / (len(later) + 1)) for wait in later]

@@ -16,13 +16,13 @@ import asyncio
 import time
 from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 from robospa.protocol.batch_window import AdaptiveBatchWindow
 from robospa.protocol.policy import Observation
-from robospa.protocol.waiting import within
 
-BatchCall = Callable[[Sequence[Observation], Sequence[int]], Awaitable[Sequence[Any]]]
+BatchCall = Callable[[Sequence[Observation], Sequence[int]], Awaitable[Sequence[object]]]
+Answer = tuple[object, dict[str, float]]
+"""What a policy answered, which is not checked yet, and its times [ms]."""
 
 
 class QueueFull(Exception):
@@ -34,7 +34,7 @@ class _Request:
     session: int
     observation: Observation
     arrival: float
-    future: asyncio.Future[tuple[Any, dict[str, float]]]
+    future: asyncio.Future[Answer]
 
 
 @dataclass
@@ -50,14 +50,18 @@ class Batcher:
     _arrived: asyncio.Event = field(default_factory=asyncio.Event)
     _task: asyncio.Task[None] | None = None
 
-    async def infer(self, session: int, observation: Observation) -> tuple[Any, dict[str, float]]:
+    @property
+    def waiting(self) -> int:
+        """Requests that no call has taken yet."""
+        return len(self._pending)
+
+    async def infer(self, session: int, observation: Observation) -> Answer:
         """The answer to one observation and its timing; raises what the model raised."""
         if len(self._pending) >= self.queue:
             raise QueueFull(f"{self.queue} requests are waiting already")
         now = self.clock()
         self._window.arrived(session, now)
-        future: asyncio.Future[tuple[Any, dict[str, float]]]
-        future = asyncio.get_running_loop().create_future()
+        future: asyncio.Future[Answer] = asyncio.get_running_loop().create_future()
         request = _Request(session, observation, now, future)
         self._pending.append(request)
         self._arrived.set()
@@ -70,12 +74,12 @@ class Batcher:
                 self._pending.remove(request)
                 self._arrived.set()
 
-    def coming(self, session: int) -> None:
-        """The first bytes of a request of `session` are here."""
-        self._window.coming(session, self.clock())
+    def request_began(self, session: int) -> None:
+        """The first bytes of a request of `session` have come."""
+        self._window.request_began(session, self.clock())
 
     def forget(self, session: int) -> None:
-        """The session rests (trial over, connection closed): nobody waits for it any more."""
+        """The session pauses (trial over, connection closed): it is not waited for any more."""
         self._window.forget(session)
         self._arrived.set()
 
@@ -88,11 +92,12 @@ class Batcher:
 
     async def _gather(self) -> None:
         while self._pending and (pause := self.wait_for(self.clock())) > 0:
+            # Whoever comes ends the pause; and if who was expected is late, look again with what
+            # is known then.
             self._arrived.clear()
-            try:
-                await within(pause, self._arrived.wait())
-            except TimeoutError:
-                continue  # who was expected is late: look again, with what is known now
+            timer = asyncio.get_running_loop().call_later(pause, self._arrived.set)
+            await self._arrived.wait()
+            timer.cancel()
 
     def wait_for(self, now: float) -> float:
         """Seconds to wait for more requests before looking again; 0 to call the model now."""
@@ -119,7 +124,7 @@ class Batcher:
             }
             request.future.set_result((outcome, timing))
 
-    async def _call(self, batch: list[_Request]) -> list[Any]:
+    async def _call(self, batch: list[_Request]) -> list[object]:
         try:
             answers = await self.call([r.observation for r in batch], [r.session for r in batch])
             if len(answers) != len(batch):

@@ -13,10 +13,9 @@ import traceback
 from dataclasses import dataclass
 from typing import Any
 
-from websockets.asyncio.server import ServerConnection
-
 from robospa.protocol.batching import QueueFull
 from robospa.protocol.codec import Limits, decode, encode
+from robospa.protocol.connection_limits import MonitoredConnection
 from robospa.protocol.errors import DecodeError, PolicyAnswerError
 from robospa.protocol.images import decode_images
 from robospa.protocol.messages import (
@@ -44,7 +43,6 @@ from robospa.protocol.openpi import from_openpi
 from robospa.protocol.policy import PolicySpec, TrialInfo
 from robospa.protocol.policy_host import PolicySession
 from robospa.protocol.validation import check_chunk, check_observation
-from robospa.protocol.waiting import within
 from robospa.trial import REFERENCE
 
 log = logging.getLogger("robospa.server")
@@ -52,22 +50,21 @@ log = logging.getLogger("robospa.server")
 
 @dataclass
 class ConnectionHandler:
-    """Serves one connection until it closes or stays silent for `idle` seconds."""
+    """Serves one connection until it closes."""
 
-    socket: ServerConnection
+    socket: MonitoredConnection
     policy: PolicySession
     spec: PolicySpec
     server: str
     limits: Limits
-    idle: float
     _in_trial: bool = False
     _last_id: int = 0
 
     async def run(self) -> None:
-        """Speak `robospa.v1`. Raises ConnectionClosed, and TimeoutError after a long silence."""
+        """Speak `robospa.v1`. Raises ConnectionClosed."""
         await self._send(Hello(0, VERSION, self.server, self.spec))
         while True:
-            data = await self._receive()
+            data = await self.socket.next_message()
             if isinstance(data, str):
                 return await self._give_up(1003, "text frames do not exist in robospa.v1")
             try:
@@ -130,9 +127,6 @@ class ConnectionHandler:
         await self.policy.end(request.outcome)
         return Ended(request.id)
 
-    async def _receive(self) -> bytes | str:
-        return await within(self.idle, self.socket.recv())
-
     async def _send(self, message: Message) -> None:
         await self.socket.send(pack(message, self.limits))
 
@@ -149,7 +143,7 @@ class ConnectionHandler:
         await self.socket.send(encode({"robospa": about}, self.limits))
         prompt, step = None, 0
         while True:
-            data = await self._receive()
+            data = await self.socket.next_message()
             try:
                 if isinstance(data, str):
                     raise DecodeError("an observation must be a binary frame")
@@ -172,7 +166,7 @@ class ConnectionHandler:
             await self.socket.send(encode(reply, self.limits))
 
 
-async def refuse(socket: ServerConnection, ours: bool, error: Exception) -> None:
+async def refuse(socket: MonitoredConnection, ours: bool, error: Exception) -> None:
     """Say in either dialect why there is no session, and close."""
     reason = _sentence(error)
     await socket.send(pack(Error(0, POLICY_FAILED, reason)) if ours else reason)

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
-from typing import Annotated, Any, Protocol
+from typing import Annotated, Any, Protocol, runtime_checkable
 
 import numpy as np
 from msgspec import Meta
@@ -160,4 +160,44 @@ class BatchPolicy(Policy, Protocol):
 
     def infer_batch(
         self, observations: Sequence[Observation], sessions: Sequence[int]
-    ) -> list[NDArray[np.float32]]: ...
+    ) -> Sequence[NDArray[np.float32]]: ...
+
+
+# What a policy may have besides; it is asked with `isinstance`.
+
+
+@runtime_checkable
+class SupportsBatches(Protocol):
+    """A `BatchPolicy`, whatever else it has."""
+
+    def infer_batch(
+        self, observations: Sequence[Observation], sessions: Sequence[int]
+    ) -> Sequence[NDArray[np.float32]]: ...
+
+
+@runtime_checkable
+class SupportsSessionReset(Protocol):
+    """A batch policy that keeps state by session: called instead of `reset`."""
+
+    def reset_session(self, session: int, trial: TrialInfo) -> None: ...
+
+
+@runtime_checkable
+class SupportsSessionEnd(Protocol):
+    """A batch policy that wants to know when a connection has ended."""
+
+    def end_session(self, session: int) -> None: ...
+
+
+@runtime_checkable
+class SupportsEnd(Protocol):
+    """A policy that wants to know how a trial ended: JSON values such as success and steps."""
+
+    def end(self, outcome: Mapping[str, Any]) -> None: ...
+
+
+@runtime_checkable
+class SupportsClose(Protocol):
+    """A policy that has something to release."""
+
+    def close(self) -> None: ...

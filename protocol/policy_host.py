@@ -23,13 +23,21 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol, TypeVar
 
-from robospa.protocol.batching import Batcher
-from robospa.protocol.policy import Observation, Policy, PolicySpec, TrialInfo
+from robospa.protocol.batching import Answer, Batcher
+from robospa.protocol.policy import (
+    Observation,
+    Policy,
+    SupportsBatches,
+    SupportsClose,
+    SupportsEnd,
+    SupportsSessionEnd,
+    SupportsSessionReset,
+    TrialInfo,
+)
 from robospa.protocol.threads import PolicyThreads
 
 T = TypeVar("T")
 PolicyFactory = Callable[[], Policy]
-Answer = tuple[Any, dict[str, float]]
 
 
 class PolicySession(Protocol):
@@ -41,14 +49,17 @@ class PolicySession(Protocol):
 
     async def end(self, outcome: Mapping[str, Any]) -> None: ...
 
-    def coming(self) -> None:
-        """The first bytes of a request are here."""
+    def request_began(self) -> None:
+        """The first bytes of a request have come."""
 
     def close(self) -> None: ...
 
 
 class PolicyHost:
-    """Owns the policy or its factory, and the threads that it runs in."""
+    """Owns the policy or its factory, and the threads that it runs in.
+
+    `max_sessions`: how many connections the policy can serve at once, None for any number.
+    """
 
     def __init__(
         self,
@@ -61,58 +72,62 @@ class PolicyHost:
         if (policy is None) == (policy_factory is None):
             raise ValueError("give either a policy or a policy_factory")
         self._factory = policy_factory
-        self._spare: Policy | None = policy_factory() if policy_factory is not None else policy
-        assert self._spare is not None
-        self.spec: PolicySpec = self._spare.spec
-        self._shared = self._spare if policy is not None else None
-        self._batched = policy is not None and hasattr(policy, "infer_batch")
-        self.max_sessions = None if self._factory is not None or self._batched else 1
+        first = policy if policy_factory is None else policy_factory()
+        assert first is not None
+        self.spec = first.spec
+        self._policy, self._spare = policy, None if policy is not None else first
+        self._batched = isinstance(policy, SupportsBatches)
+        self.max_sessions = 1 if policy is not None and not self._batched else None
         self._threads = PolicyThreads(threads)
-        self._alone = threading.Lock()
+        self._lock = threading.Lock()
         self._numbers = itertools.count(1)
         self._batcher = Batcher(self._infer_batch, self.spec.batch, queue)
+
+    @property
+    def waiting(self) -> int:
+        """Requests that wait for a call of a batch policy."""
+        return self._batcher.waiting
 
     async def run(self, call: Callable[..., T], *args: Any) -> T:
         """`call(*args)` in a policy thread."""
         return await self._threads.run(call, *args)
 
-    async def open(self) -> PolicySession:
-        """A session for a new connection."""
-        number = next(self._numbers)
-        if self._factory is None:
-            assert self._shared is not None
-            if self._batched:
-                return _SharedSession(self, self._shared, self._batcher, number)
-            return _OwnSession(self, self._shared, self._alone, keep=True)
-        policy, self._spare = self._spare, None
-        if policy is None:
-            policy = await self.run(self._factory)
-        return _OwnSession(self, policy, threading.Lock(), keep=False)
-
     def post(self, call: Callable[..., object], *args: Any) -> None:
         """The same without waiting: a hanging model must not hold up a closing connection."""
         self._threads.post(call, *args)
 
+    async def open(self) -> PolicySession:
+        """A session for a new connection."""
+        number = next(self._numbers)
+        if self._policy is not None:
+            if self._batched:
+                return _BatchedSession(self, self._policy, self._batcher, number)
+            return _ExclusiveSession(self, self._policy, self._lock, close=False)
+        policy, self._spare = self._spare, None
+        if policy is None:
+            assert self._factory is not None
+            policy = await self.run(self._factory)
+        return _ExclusiveSession(self, policy, threading.Lock(), close=True)
+
     async def _infer_batch(
         self, observations: Sequence[Observation], sessions: Sequence[int]
-    ) -> Sequence[Any]:
-        policy: Any = self._shared
-        answers: Sequence[Any] = await self.run(policy.infer_batch, observations, sessions)
-        return answers
+    ) -> Sequence[object]:
+        assert isinstance(self._policy, SupportsBatches)
+        return await self.run(self._policy.infer_batch, observations, sessions)
 
     def close(self) -> None:
         """Let go of the threads."""
         self._threads.close()
 
 
-class _OwnSession:
-    """A policy object of its own. `alone`: held while it is called, because a client may leave,
-    and the next one or `close` come, while a call is under way in another thread."""
+class _ExclusiveSession:
+    """A policy object that serves one connection. `lock` is held while it is called, because a
+    client may leave, and the next one or `close` come, while a call runs in another thread."""
 
-    def __init__(self, host: PolicyHost, policy: Policy, alone: threading.Lock, keep: bool) -> None:
-        self._host, self._policy, self._alone, self._keep = host, policy, alone, keep
+    def __init__(self, host: PolicyHost, policy: Policy, lock: threading.Lock, close: bool) -> None:
+        self._host, self._policy, self._lock, self._close = host, policy, lock, close
 
-    def coming(self) -> None:
+    def request_began(self) -> None:
         return None
 
     async def reset(self, trial: TrialInfo) -> None:
@@ -122,7 +137,7 @@ class _OwnSession:
         return await self._host.run(self._call, self._timed, time.perf_counter(), observation)
 
     def _call(self, method: Callable[..., T], *args: Any) -> T:
-        with self._alone:
+        with self._lock:
             return method(*args)
 
     def _timed(self, asked: float, observation: Observation) -> Answer:
@@ -133,27 +148,26 @@ class _OwnSession:
         return answer, times
 
     async def end(self, outcome: Mapping[str, Any]) -> None:
-        method = getattr(self._policy, "end", None)
-        if method is not None:
-            await self._host.run(self._call, method, outcome)
+        if isinstance(self._policy, SupportsEnd):
+            await self._host.run(self._call, self._policy.end, outcome)
 
     def close(self) -> None:
-        if not self._keep and hasattr(self._policy, "close"):
+        if self._close and isinstance(self._policy, SupportsClose):
             self._host.post(self._call, self._policy.close)
 
 
-class _SharedSession:
+class _BatchedSession:
     """One session of a policy that serves many at once."""
 
-    def __init__(self, host: PolicyHost, policy: Any, batcher: Batcher, number: int) -> None:
+    def __init__(self, host: PolicyHost, policy: Policy, batcher: Batcher, number: int) -> None:
         self._host, self._policy, self._batcher, self._number = host, policy, batcher, number
 
-    def coming(self) -> None:
-        self._batcher.coming(self._number)
+    def request_began(self) -> None:
+        self._batcher.request_began(self._number)
 
     async def reset(self, trial: TrialInfo) -> None:
         self._batcher.forget(self._number)
-        if hasattr(self._policy, "reset_session"):
+        if isinstance(self._policy, SupportsSessionReset):
             await self._host.run(self._policy.reset_session, self._number, trial)
         else:
             await self._host.run(self._policy.reset, trial)
@@ -166,5 +180,5 @@ class _SharedSession:
 
     def close(self) -> None:
         self._batcher.forget(self._number)
-        if hasattr(self._policy, "end_session"):
+        if isinstance(self._policy, SupportsSessionEnd):
             self._host.post(self._policy.end_session, self._number)

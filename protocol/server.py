@@ -16,11 +16,10 @@ import contextlib
 import hmac
 import logging
 import signal
-import socket
 import ssl as ssl_module
 import threading
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
 from http import HTTPStatus
 from types import TracebackType
 from typing import TYPE_CHECKING
@@ -32,33 +31,34 @@ from websockets.http11 import Request, Response
 from websockets.typing import Subprotocol
 
 from robospa.protocol.codec import DEFAULT_LIMITS, Limits
-from robospa.protocol.connection_limits import ConnectionLimiter, MonitoredConnection, keep_alive
+from robospa.protocol.connection_limits import ConnectionLimiter, MonitoredConnection
 from robospa.protocol.handler import ConnectionHandler, refuse
-from robospa.protocol.memory import keep_freed_memory
 from robospa.protocol.messages import SUBPROTOCOL
 from robospa.protocol.policy import Policy
 from robospa.protocol.policy_host import PolicyFactory, PolicyHost
-from robospa.protocol.transport import SOCKET_BUFFER
-from robospa.protocol.waiting import within
+from robospa.protocol.tuning import enlarge_buffers, keep_alive, keep_freed_memory
 
 if TYPE_CHECKING:
     from typing_extensions import Self
 
 log = logging.getLogger("robospa.server")
-QUIET = logging.getLogger("robospa.server.websockets")
-"""What the library has to say of strangers, with tracebacks; ours is one line each."""
-QUIET.setLevel(logging.CRITICAL)
-LAST_WORDS = 0.1
-"""[s] in which a session whose connection is gone may end by itself."""
+LIBRARY_LOG = logging.getLogger("robospa.server.websockets")
+"""What websockets logs of clients, with tracebacks; ours is one line each."""
+LIBRARY_LOG.setLevel(logging.CRITICAL)
+LAST_ANSWER = 0.1
+"""[s] in which a handler whose connection is closed may return by itself."""
 
 
 @dataclass(frozen=True)
 class ServerOptions:
-    """Bounds of one server. `idle`: seconds of silence after which a connection is closed.
-    `patience`: seconds that a new connection waits for a free place. `message`: seconds within
-    which a message has to be whole and an answer read. `handshakes`: connections that may be
-    entering at once, within `handshake` seconds. `queue`: requests that may wait. `threads`: how
-    many threads call policies (more than one only if they allow it)."""
+    """Limits of one server.
+
+    `idle`: seconds of silence after which a connection is closed. `patience`: seconds that a new
+    connection waits for a free place. `message`: seconds within which a message has to be complete
+    and an answer read. `handshakes`: how many may be in progress at once, each for `handshake`
+    seconds. `queue`: requests that may wait. `threads`: how many threads call policies (more than
+    one only if they allow it).
+    """
 
     max_connections: int = 256
     queue: int = 256
@@ -72,57 +72,69 @@ class ServerOptions:
     limits: Limits = field(default_factory=lambda: DEFAULT_LIMITS)
 
 
-class PolicyServer:
-    """An async context manager around one listening socket. See `serve` for the arguments."""
+@dataclass(frozen=True)
+class ServerLoad:
+    """What a server has to do right now: open sockets (handshakes included), sessions, and requests
+    that wait for a call of a batch policy."""
 
-    def __init__(
-        self,
-        policy: Policy | None = None,
-        host: str = "127.0.0.1",
-        port: int = 0,
-        token: str | None = None,
-        *,
-        policy_factory: PolicyFactory | None = None,
-        ssl: ssl_module.SSLContext | None = None,
-        options: ServerOptions | None = None,
-    ) -> None:
-        self._options = options or ServerOptions()
+    sockets: int
+    sessions: int
+    waiting: int
+
+
+@dataclass(eq=False)
+class PolicyServer:
+    """An async context manager around one listening socket.
+
+    Give a `policy` or a `policy_factory` (`robospa.protocol.policy_host`). `port` 0 is any free
+    one; `url` says where to connect once the server runs. `token`: required of clients. `ssl`: for
+    wss. Raises ValueError for both or neither policy, OSError on entering if the port is taken.
+    """
+
+    policy: Policy | None = None
+    host: str = "127.0.0.1"
+    port: int = 0
+    token: str | None = None
+    _: KW_ONLY
+    policy_factory: PolicyFactory | None = None
+    ssl: ssl_module.SSLContext | None = None
+    options: ServerOptions | None = None
+    url: str = field(default="", init=False)
+
+    def __post_init__(self) -> None:
+        options = self._options = self.options or ServerOptions()
         self._policies = PolicyHost(
-            policy,
-            policy_factory,
-            threads=self._options.threads,
-            queue=self._options.queue,
+            self.policy, self.policy_factory, threads=options.threads, queue=options.queue
         )
-        self._address, self._token, self._ssl = (host, port), token, ssl
-        most = self._options.max_connections
+        most = options.max_connections
         self._limiter = ConnectionLimiter(
             min(most, self._policies.max_sessions or most),
-            patience=self._options.patience,
-            handshakes=self._options.handshakes,
-            message=self._options.message,
+            patience=options.patience,
+            handshakes=options.handshakes,
+            message=options.message,
+            idle=options.idle,
         )
         self._server: Server | None = None
 
     @property
-    def url(self) -> str:
-        """Where to connect; the real port also when 0 was asked for."""
-        assert self._server is not None, "the server is not running"
-        host, port = next(iter(self._server.sockets)).getsockname()[:2]
-        scheme = "ws" if self._ssl is None else "wss"
-        return f"{scheme}://[{host}]:{port}" if ":" in host else f"{scheme}://{host}:{port}"
+    def load(self) -> ServerLoad:
+        """How busy the server is; may be read from any thread."""
+        limiter = self._limiter
+        return ServerLoad(limiter.sockets, limiter.sessions, self._policies.waiting)
 
     async def __aenter__(self) -> Self:
         keep_freed_memory()
         self._server = await websocket_serve(
             self._handle,
-            *self._address,
-            ssl=self._ssl,
+            self.host,
+            self.port,
+            ssl=self.ssl,
             origins=[None],
             select_subprotocol=_select,
             process_request=self._admit,
-            create_connection=self._limiter.connection,
+            create_connection=self._limiter.connection_type,
             server_header=None,
-            logger=QUIET,
+            logger=LIBRARY_LOG,
             compression=None,
             max_size=self._options.limits.message,
             max_queue=2,  # frames that may wait while one request is served
@@ -132,7 +144,11 @@ class PolicyServer:
             close_timeout=1,
         )
         for listener in self._server.sockets:
-            _tune(listener)
+            enlarge_buffers(listener)
+            keep_alive(listener)
+        host, port = next(iter(self._server.sockets)).getsockname()[:2]
+        scheme = "ws" if self.ssl is None else "wss"
+        self.url = f"{scheme}://[{host}]:{port}" if ":" in host else f"{scheme}://{host}:{port}"
         self._limiter.start()
         return self
 
@@ -144,8 +160,8 @@ class PolicyServer:
     ) -> None:
         assert self._server is not None
         self._server.close()
-        with contextlib.suppress(TimeoutError):
-            await within(1, self._server.wait_closed())
+        with contextlib.suppress(asyncio.TimeoutError):
+            await asyncio.wait_for(self._server.wait_closed(), 1)
         self._limiter.stop()
         self._policies.close()
 
@@ -153,8 +169,8 @@ class PolicyServer:
         """None to go on with the handshake, else the HTTP answer."""
         if request.path == "/healthz":
             return connection.respond(HTTPStatus.OK, "OK\n")
-        if not _authorized(self._token, request):
-            self._limiter.tell("a client was refused: its token is missing or wrong")
+        if not _authorized(self.token, request):
+            self._limiter.warn("a client was refused: its token is missing or wrong")
             return connection.respond(HTTPStatus.UNAUTHORIZED, "missing or wrong token\n")
         offered = ",".join(request.headers.get_all("Sec-WebSocket-Protocol"))
         names = [name.strip() for name in offered.split(",")]
@@ -165,131 +181,58 @@ class PolicyServer:
             text = "a policy server, for WebSocket connections only (RoboSPA)\n"
             return connection.respond(HTTPStatus.UPGRADE_REQUIRED, text)
         assert isinstance(connection, MonitoredConnection)
-        if not await self._limiter.seat(connection):
-            text = f"all {self._limiter.places} places of this server are taken\n"
+        if not await self._limiter.acquire(connection):
+            text = f"all {self._limiter.capacity} places of this server are taken\n"
             return connection.respond(HTTPStatus.SERVICE_UNAVAILABLE, text)
         return None
 
     async def _handle(self, connection: ServerConnection) -> None:
         assert isinstance(connection, MonitoredConnection)
-        self._limiter.entered(connection)
-        talk = asyncio.ensure_future(self._converse(connection))
-        gone = asyncio.ensure_future(connection.wait_closed())
+        self._limiter.session_began(connection)
+        session = asyncio.ensure_future(self._serve_session(connection))
+        closed = asyncio.ensure_future(connection.wait_closed())
         try:
             # A model that hangs must not keep the place of a client that has gone.
-            await asyncio.wait((talk, gone), return_when=asyncio.FIRST_COMPLETED)
-            await asyncio.wait((talk,), timeout=0 if talk.done() else LAST_WORDS)
-            if talk.done():
-                await talk
+            await asyncio.wait((session, closed), return_when=asyncio.FIRST_COMPLETED)
+            await asyncio.wait((session,), timeout=0 if session.done() else LAST_ANSWER)
+            if session.done():
+                await session
         except ConnectionClosed:
             pass
-        except TimeoutError:
-            log.warning("closing a connection that was silent for %g s", self._options.idle)
         except Exception:
             log.exception("the session with %s failed", connection.client)
         finally:
-            talk.cancel()
-            gone.cancel()
-            self._limiter.left(connection)
+            session.cancel()
+            closed.cancel()
+            self._limiter.session_ended(connection)
 
-    async def _converse(self, connection: MonitoredConnection) -> None:
+    async def _serve_session(self, connection: MonitoredConnection) -> None:
         options, ours = self._options, connection.subprotocol == SUBPROTOCOL
         try:
             policy = await self._policies.open()
         except Exception as error:
             log.exception("no policy could be made for a new connection")
             return await refuse(connection, ours, error)
-        connection.on_begin = policy.coming
+        connection.on_message_began = policy.request_began
+        handler = ConnectionHandler(
+            connection, policy, self._policies.spec, options.name, options.limits
+        )
         try:
-            session = ConnectionHandler(
-                connection, policy, self._policies.spec, options.name, options.limits, options.idle
-            )
-            await (session.run() if ours else session.run_openpi())
+            await (handler.run() if ours else handler.run_openpi())
         finally:
             policy.close()
 
 
-def _select(connection: ServerConnection, offered: Sequence[Subprotocol]) -> Subprotocol | None:
-    return Subprotocol(SUBPROTOCOL) if SUBPROTOCOL in offered else None
+class ServerThread(PolicyServer):
+    """A policy server in a background thread: `with ServerThread(policy) as server: server.url`."""
 
-
-def _authorized(token: str | None, request: Request) -> bool:
-    if token is None:
-        return True
-    headers = request.headers.get_all("Authorization")
-    kind, _, given = (headers[0] if len(headers) == 1 else "").partition(" ")
-    same = hmac.compare_digest(given.strip().encode(errors="surrogateescape"), token.encode())
-    return same and kind.lower() in ("bearer", "api-key")
-
-
-def _tune(listener: socket.socket) -> None:
-    """Accepted sockets inherit these: room for a whole observation, and the kernel notices a
-    client whose machine is gone."""
-    for option in (socket.SO_RCVBUF, socket.SO_SNDBUF):
-        listener.setsockopt(socket.SOL_SOCKET, option, SOCKET_BUFFER)
-    keep_alive(listener)
-
-
-def serve(
-    policy: Policy | None = None,
-    host: str = "127.0.0.1",
-    port: int = 8000,
-    token: str | None = None,
-    *,
-    policy_factory: PolicyFactory | None = None,
-    ssl: ssl_module.SSLContext | None = None,
-    options: ServerOptions | None = None,
-    on_ready: Callable[[str], None] | None = None,
-) -> None:
-    """Serve until SIGINT or SIGTERM. Give a policy or a factory (`robospa.protocol.policy_host`).
-
-    `on_ready` is called with the URL once clients can connect. Raises OSError if the port is taken.
-    """
-    server = PolicyServer(
-        policy, host, port, token, policy_factory=policy_factory, ssl=ssl, options=options
-    )
-    if token is None and host not in ("127.0.0.1", "localhost", "::1"):
-        log.warning("listening on %s without a token: anybody who reaches it can use it", host)
-
-    async def main() -> None:
-        stop = asyncio.Event()
-        loop = asyncio.get_running_loop()
-        for name in (signal.SIGINT, signal.SIGTERM):
-            loop.add_signal_handler(name, stop.set)
-        async with server:
-            if on_ready is not None:
-                on_ready(server.url)
-            await stop.wait()
-
-    asyncio.run(main())
-
-
-class ServerThread:
-    """A policy server in a background thread: `with ServerThread(policy) as server: server.url`.
-
-    Takes the arguments of `PolicyServer`; the port is chosen freely unless given.
-    """
-
-    def __init__(
-        self,
-        policy: Policy | None = None,
-        host: str = "127.0.0.1",
-        port: int = 0,
-        token: str | None = None,
-        *,
-        policy_factory: PolicyFactory | None = None,
-        ssl: ssl_module.SSLContext | None = None,
-        options: ServerOptions | None = None,
-    ) -> None:
-        self._server = PolicyServer(
-            policy, host, port, token, policy_factory=policy_factory, ssl=ssl, options=options
-        )
+    def __post_init__(self) -> None:
+        super().__post_init__()
         self._thread = threading.Thread(target=self._main, name="robospa-server", daemon=True)
         self._ready = threading.Event()
         self._failure: BaseException | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
         self._stop: asyncio.Event | None = None
-        self.url = ""
 
     def start(self) -> Self:
         """Returns when clients can connect. Raises OSError if the port is taken."""
@@ -316,8 +259,7 @@ class ServerThread:
 
     async def _run(self) -> None:
         self._loop, self._stop = asyncio.get_running_loop(), asyncio.Event()
-        async with self._server:
-            self.url = self._server.url
+        async with self:
             self._ready.set()
             await self._stop.wait()
 
@@ -330,3 +272,50 @@ class ServerThread:
         trace: TracebackType | None,
     ) -> None:
         self.stop()
+
+
+def serve(
+    policy: Policy | None = None,
+    host: str = "127.0.0.1",
+    port: int = 8000,
+    token: str | None = None,
+    *,
+    policy_factory: PolicyFactory | None = None,
+    ssl: ssl_module.SSLContext | None = None,
+    options: ServerOptions | None = None,
+    on_ready: Callable[[str], None] | None = None,
+) -> None:
+    """Serve until SIGINT or SIGTERM; arguments as for `PolicyServer`.
+
+    `on_ready` is called with the URL once clients can connect. Raises OSError if the port is taken.
+    """
+    server = PolicyServer(
+        policy, host, port, token, policy_factory=policy_factory, ssl=ssl, options=options
+    )
+    if token is None and host not in ("127.0.0.1", "localhost", "::1"):
+        log.warning("listening on %s without a token: anybody who reaches it can use it", host)
+
+    async def main() -> None:
+        stop = asyncio.Event()
+        loop = asyncio.get_running_loop()
+        for name in (signal.SIGINT, signal.SIGTERM):
+            loop.add_signal_handler(name, stop.set)
+        async with server:
+            if on_ready is not None:
+                on_ready(server.url)
+            await stop.wait()
+
+    asyncio.run(main())
+
+
+def _select(connection: ServerConnection, offered: Sequence[Subprotocol]) -> Subprotocol | None:
+    return Subprotocol(SUBPROTOCOL) if SUBPROTOCOL in offered else None
+
+
+def _authorized(token: str | None, request: Request) -> bool:
+    if token is None:
+        return True
+    headers = request.headers.get_all("Authorization")
+    kind, _, given = (headers[0] if len(headers) == 1 else "").partition(" ")
+    same = hmac.compare_digest(given.strip().encode(errors="surrogateescape"), token.encode())
+    return same and kind.lower() in ("bearer", "api-key")

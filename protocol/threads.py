@@ -1,26 +1,20 @@
 """Threads in which policies run, so that the event loop keeps answering meanwhile.
 
-Like an executor, with two differences: the way there and back is shorter (it counts once per
-request), and the threads are daemons, so a model that hangs cannot keep a server from ending.
+An executor, but for one thing: its threads are daemons, so that a model that hangs cannot keep the
+server's process from ending (the threads of `ThreadPoolExecutor` are waited for at exit).
 """
 
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import logging
 import threading
 from collections.abc import Callable
+from concurrent.futures import Future
 from queue import SimpleQueue
 from typing import Any, TypeVar
 
 T = TypeVar("T")
-_Job = tuple[
-    asyncio.AbstractEventLoop | None,
-    "asyncio.Future[Any] | None",
-    Callable[..., Any],
-    tuple[Any, ...],
-]
 log = logging.getLogger("robospa.server")
 
 
@@ -28,7 +22,7 @@ class PolicyThreads:
     """`count` threads that take calls from one queue."""
 
     def __init__(self, count: int) -> None:
-        self._jobs: SimpleQueue[_Job | None] = SimpleQueue()
+        self._jobs: SimpleQueue[tuple[Future[Any], Callable[[], Any]] | None] = SimpleQueue()
         self._count = count
         for number in range(count):
             name = f"robospa-policy-{number}"
@@ -36,45 +30,40 @@ class PolicyThreads:
 
     async def run(self, call: Callable[..., T], *args: Any) -> T:
         """`call(*args)` in one of the threads; raises what it raises."""
-        loop = asyncio.get_running_loop()
-        future: asyncio.Future[T] = loop.create_future()
-        self._jobs.put((loop, future, call, args))
-        return await future
+        return await asyncio.wrap_future(self._submit(call, *args))
 
     def post(self, call: Callable[..., object], *args: Any) -> None:
         """`call(*args)` in one of the threads, without waiting; a failure is logged."""
-        self._jobs.put((None, None, call, args))
+        self._submit(call, *args).add_done_callback(_log_failure)
 
     def close(self) -> None:
         """End the threads after the calls that are queued already."""
         for _ in range(self._count):
             self._jobs.put(None)
 
+    def _submit(self, call: Callable[..., T], *args: Any) -> Future[T]:
+        future: Future[T] = Future()
+        self._jobs.put((future, lambda: call(*args)))
+        return future
+
     def _work(self) -> None:
         while (job := self._jobs.get()) is not None:
-            loop, future, call, args = job
-            try:
-                result, error = call(*args), None
-            except Exception as failure:
-                result, error = None, failure
-            except BaseException as failure:  # SystemExit must end neither thread nor server
-                text = f"the policy raised {type(failure).__name__}: {failure}"
-                result, error = None, RuntimeError(text)
-            del job, call, args  # an idle thread must not keep the last observation alive
-            if loop is not None and future is not None:
-                with contextlib.suppress(RuntimeError):  # the loop is gone: nobody waits
-                    loop.call_soon_threadsafe(_deliver, future, result, error)
-            elif error is not None:
-                log.error("a policy failed while it was closed", exc_info=error)
-            del loop, future, result, error
+            future, call = job
+            if future.set_running_or_notify_cancel():
+                try:
+                    future.set_result(call())
+                except BaseException as error:
+                    future.set_exception(_as_exception(error))
+            del job, future, call  # an idle thread must not keep the last observation alive
 
 
-def _deliver(future: asyncio.Future[Any], result: Any, error: Exception | None) -> None:
-    if future.done():
-        return
-    if error is None:
-        future.set_result(result)
-    elif isinstance(error, StopIteration):  # cannot be raised into a future
-        future.set_exception(RuntimeError(f"the policy raised StopIteration: {error}"))
-    else:
-        future.set_exception(error)
+def _as_exception(error: BaseException) -> Exception:
+    """An error that a future can carry: SystemExit must end neither thread nor server."""
+    if isinstance(error, Exception) and not isinstance(error, StopIteration):
+        return error
+    return RuntimeError(f"the policy raised {type(error).__name__}: {error}")
+
+
+def _log_failure(done: Future[Any]) -> None:
+    if (error := done.exception()) is not None:
+        log.error("a policy failed while it was closed", exc_info=error)

@@ -9,7 +9,6 @@ instead). A transport that failed once is closed and stays closed.
 from __future__ import annotations
 
 import contextlib
-import ipaddress
 import socket
 import ssl as ssl_module
 import struct
@@ -40,11 +39,13 @@ from robospa.protocol.errors import (
     Unauthorized,
     printable,
 )
-from robospa.protocol.memory import keep_freed_memory
 from robospa.protocol.messages import SUBPROTOCOL
-
-SOCKET_BUFFER = 4 * 2**20
-"""Bytes asked of the kernel each way (it may give less): a full observation fits."""
+from robospa.protocol.tuning import (
+    enlarge_buffers,
+    is_loopback,
+    keep_freed_memory,
+    loopback_socket,
+)
 
 
 class BadAddress(ValueError):
@@ -207,11 +208,11 @@ def _open_once(
     parts = urlsplit(address.url)
     if parts.scheme not in ("ws", "wss") or not parts.hostname:
         raise BadAddress(f"{address.url!r} is not of the form ws://host:port or wss://host:port")
-    if _is_loopback(parts.hostname or ""):
+    if is_loopback(parts.hostname or ""):
         # Own socket: no detour through a proxy that the environment names, and buffers that
         # are set before the connection exists (the kernel scales its window by them).
         port = parts.port or (443 if parts.scheme == "wss" else 80)
-        options["sock"] = _loopback_socket(parts.hostname or "", port, timeouts.connect)
+        options["sock"] = loopback_socket(parts.hostname or "", port, timeouts.connect)
     manager = websocket_connect(
         address.url,
         ssl=address.ssl,
@@ -227,38 +228,8 @@ def _open_once(
     # As of websockets 17 the result must be entered; before, entering it changes nothing.
     connection: ClientConnection = manager.__enter__()
     with contextlib.suppress(OSError):  # closed again already: the first message will say why
-        _enlarge(connection.socket)
+        enlarge_buffers(connection.socket)
     return connection
-
-
-def _loopback_socket(host: str, port: int, timeout: float) -> socket.socket:
-    error: OSError = ConnectionRefusedError(f"{host} has no address")
-    for family, kind, proto, _, target in socket.getaddrinfo(host, port, type=socket.SOCK_STREAM):
-        sock = socket.socket(family, kind, proto)
-        try:
-            _enlarge(sock)
-            sock.settimeout(timeout)
-            sock.connect(target)
-            sock.settimeout(None)
-            return sock
-        except OSError as failure:
-            sock.close()
-            error = failure
-    raise error
-
-
-def _enlarge(sock: socket.socket) -> None:
-    for option in (socket.SO_SNDBUF, socket.SO_RCVBUF):
-        sock.setsockopt(socket.SOL_SOCKET, option, SOCKET_BUFFER)
-
-
-def _is_loopback(host: str) -> bool:
-    if host == "localhost":
-        return True
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return False
 
 
 def _refused(address: Address, error: InvalidStatus) -> Exception:

@@ -32,8 +32,6 @@ LATER = {
     "tomllib": {"tomllib"},
 }
 """Names that Python 3.10 does not have."""
-ALLOWED = {"protocol/waiting.py"}
-"""Files that ask for the version first."""
 
 
 def later_names(source: str) -> list[str]:
@@ -51,8 +49,7 @@ def later_names(source: str) -> list[str]:
 
 @pytest.mark.parametrize("path", SERVING, ids=lambda path: str(path.relative_to(ROOT)))
 def test_serving_needs_nothing_newer(path: Path) -> None:
-    if str(path.relative_to(ROOT)) not in ALLOWED:
-        assert later_names(path.read_text()) == []
+    assert later_names(path.read_text()) == []
 
 
 def test_the_check_sees_newer_names() -> None:

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import contextlib
 import threading
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from websockets.sync.client import ClientConnection
+from websockets.sync.client import connect as open_websocket
 from websockets.sync.server import serve
+from websockets.typing import Subprotocol
 
-from robospa.protocol.messages import Hello, Message, pack, unpack
+from robospa.protocol.messages import SUBPROTOCOL, Hello, Message, pack, unpack
 from robospa.protocol.policy import CameraSpec, Observation, PolicySpec, TrialInfo
 from robospa.protocol.transport import Address, Timeouts, Transport
 
@@ -136,6 +139,16 @@ def raw(url: str) -> Transport:
     transport = Transport(Address(url), QUICK)
     transport.receive(10, "hello")
     return transport
+
+
+@contextlib.contextmanager
+def websocket(url: str) -> Iterator[ClientConnection]:
+    """A connection of the websockets package, past the hello: it can send what we never would."""
+    with open_websocket(
+        url, subprotocols=[Subprotocol(SUBPROTOCOL)], compression=None, close_timeout=0.2
+    ) as connection:
+        connection.recv(10)
+        yield connection
 
 
 def ask(transport: Transport, frame: bytes) -> Message:

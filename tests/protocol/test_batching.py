@@ -17,17 +17,20 @@ from robospa.protocol.batching import Batcher, QueueFull
 def window() -> AdaptiveBatchWindow:
     """A model that takes 1 s and became free at t = 10 s; session 2 pauses 0.1 s, always."""
     found = AdaptiveBatchWindow()
-    found.answered([9], 9.0, 10.0)
     used(found, 2, 0.1)
+    found.cost = CallCost()
+    found.answered([9], 9.0, 10.0)
     return found
 
 
-def used(window: AdaptiveBatchWindow, session: int, pause: float, answered: float = 10.0) -> None:
-    """`session` was answered at `answered` and has paused `pause` [s] so far, each time."""
-    window.arrived(session, 0.0)
-    pace = window._sessions[session]
-    pace.pauses.extend([pause] * KEPT)
-    pace.answered = answered
+def used(window: AdaptiveBatchWindow, session: int, pause: float, until: float = 10.0) -> None:
+    """`session` was answered at `until` and has paused `pause` [s] so far, each time; the calls
+    that answered it count for nothing."""
+    cost, window.cost = window.cost, CallCost()
+    for number in reversed(range(KEPT + 1)):
+        window.arrived(session, until - number * pause)
+        window.answered([session], until - number * pause, until - number * pause)
+    window.cost = cost
 
 
 def wait(window: AdaptiveBatchWindow, now: float = 10.0, *waiting: int, size: int = 4) -> float:
@@ -72,19 +75,19 @@ def test_without_a_measured_call_nobody_waits() -> None:
     assert wait(window) == 0
 
 
-def test_a_request_whose_first_bytes_are_here_is_waited_for(window: AdaptiveBatchWindow) -> None:
+def test_a_request_whose_first_bytes_have_come_is_waited_for(window: AdaptiveBatchWindow) -> None:
     window.forget(2)
-    window.coming(5, 1.0)
+    window.request_began(5, 1.0)
     window.arrived(5, 1.02)
-    window.coming(6, 10.0)
+    window.request_began(6, 10.0)
     assert 0 < wait(window, 10.001) < 0.01
 
 
 def test_who_sends_byte_by_byte_is_not_waited_for(window: AdaptiveBatchWindow) -> None:
     window.forget(2)
-    window.coming(5, 1.0)
+    window.request_began(5, 1.0)
     window.arrived(5, 1.02)
-    window.coming(6, 9.0)
+    window.request_began(6, 9.0)
     assert wait(window) == 0
 
 

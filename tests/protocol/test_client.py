@@ -30,7 +30,7 @@ from robospa.protocol.errors import (
     VersionMismatch,
 )
 from robospa.protocol.messages import Actions, Error, Hello, Ready, pack
-from robospa.protocol.transport import Transport
+from robospa.protocol.transport import Address, Transport
 
 READY = answer(Ready)
 CHUNK = np.zeros((2, 14), np.float32)
@@ -319,10 +319,10 @@ def test_large_messages_arrive_whole(start: Any) -> None:
 def test_a_server_that_stops_reading_is_given_up() -> None:
     given_up = threading.Event()
     with Scripted(HELLO, [lambda _: (given_up.wait(20), None)[1]]) as url:
-        remote = connect(url, timeouts=replace(QUICK, first_infer=0.2, infer=0.2))
+        transport = Transport(Address(url), replace(QUICK, first_infer=0.2, infer=0.2))
         with pytest.raises(TransportError):
             for _ in range(9):
-                remote._session._transport.send(bytes(8_000_000))
+                transport.send(bytes(8_000_000))
         given_up.set()
 
 

@@ -156,7 +156,7 @@ def test_a_thousand_idle_connections(start: Any, dial: Any) -> None:
     server = start(policy_factory=Recall, options=ServerOptions(max_connections=64))
     idle = [dial(server) for _ in range(half)] + [dial(server, HANDSHAKE) for _ in range(half)]
     assert served(server)
-    assert len(server._server._limiter._open) <= 64 + 128 + half
+    assert server.load.sockets <= 64 + 128 + half
     assert len(idle) == 2 * half
 
 
@@ -329,7 +329,7 @@ def test_a_model_that_hangs_does_not_keep_the_places_of_those_who_left(start: An
         transport.send(pack(Reset(1, TRIAL)))
         transport.send(pack(Infer(2, observation())))
         transport.close()
-    until(lambda: not server._server._limiter._seated)
+    until(lambda: server.load.sessions == 0)
     hung.set()
     assert served(server)
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from wire_helpers import QUICK, SPEC, TRIAL, Recall, ask, observation, raw
+from wire_helpers import QUICK, SPEC, TRIAL, Recall, ask, observation, raw, websocket
 
 from robospa.protocol.client import connect
 from robospa.protocol.codec import Limits, encode
@@ -180,10 +180,10 @@ def test_a_message_over_the_limit_ends_this_connection_only(start: Any) -> None:
 
 def test_a_text_frame_ends_this_connection_only(start: Any) -> None:
     server = start(policy_factory=Recall)
-    transport = raw(server.url)
-    transport._socket.send("hello")
-    assert "text frames" in str(transport.receive(10, "answer"))
-    connect(server.url, timeouts=QUICK).close()
+    with websocket(server.url) as connection:
+        connection.send("hello")
+        assert b"text frames" in connection.recv(10)
+        connect(server.url, timeouts=QUICK).close()
 
 
 def test_half_a_handshake_blocks_nobody(start: Any) -> None:
@@ -197,13 +197,11 @@ def test_half_a_handshake_blocks_nobody(start: Any) -> None:
 
 def test_half_a_message_blocks_nobody(start: Any) -> None:
     server = start(policy_factory=Recall)
-    transport = raw(server.url)
-    transport._socket.socket.sendall(
-        b"\x82\xff" + b"\x00\x00\x00\x00\x00\x0f\x00\x00" + b"abcd" * 9
-    )
-    with connect(server.url, timeouts=QUICK) as remote:
-        remote.reset(TRIAL)
-    transport.close()
+    begun = b"\x82\xff" + b"\x00\x00\x00\x00\x00\x0f\x00\x00" + b"abcd" * 9
+    with websocket(server.url) as connection:
+        connection.socket.sendall(begun)
+        with connect(server.url, timeouts=QUICK) as remote:
+            remote.reset(TRIAL)
 
 
 def test_a_silent_connection_is_closed_in_the_end(start: Any) -> None:

@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from wire_helpers import QUICK, TRIAL, Recall, Together, observation, raw, until
+from wire_helpers import QUICK, TRIAL, Recall, Together, observation, raw, until, websocket
 
 from robospa.protocol.client import connect
 from robospa.protocol.errors import (
@@ -85,12 +85,12 @@ def test_places_are_limited(start: Any) -> None:
 def test_a_client_that_leaves_during_inference_harms_nobody(start: Any) -> None:
     policy = Together()
     server = start(policy)
-    transport = raw(server.url)
-    transport.send(pack(Reset(1, TRIAL)))
-    transport.receive(10, "ready")
-    transport.send(pack(Infer(2, observation(1))))
-    policy.started.wait(10)
-    transport._socket.socket.shutdown(socket.SHUT_RDWR)
+    with websocket(server.url) as connection:
+        connection.send(pack(Reset(1, TRIAL)))
+        connection.recv(10)
+        connection.send(pack(Infer(2, observation(1))))
+        policy.started.wait(10)
+        connection.socket.shutdown(socket.SHUT_RDWR)
     policy.open.set()
     with connect(server.url, timeouts=QUICK) as remote:
         remote.reset(TRIAL)
@@ -133,7 +133,7 @@ def test_requests_that_wait_together_become_one_call(start: Any) -> None:
         first = pool.submit(remotes[0].infer, observation(0))
         assert policy.started.wait(10)
         rest = [pool.submit(remotes[n].infer, observation(n)) for n in (1, 2, 3)]
-        until(lambda: len(server._server._policies._batcher._pending) == 3)
+        until(lambda: server.load.waiting == 3)
         policy.open.set()
         assert [future.result(10)[0, 0] for future in (first, *rest)] == [0, 1, 2, 3]
     assert [sorted(batch) for batch in policy.batches] == [[0], [1, 2, 3]]
@@ -153,7 +153,7 @@ def test_one_bad_sample_spares_the_others(start: Any) -> None:
         assert policy.started.wait(10)
         good = [pool.submit(remotes[n].infer, observation(n)) for n in (1, 2)]
         bad = pool.submit(remotes[3].infer, observation(3, instruction="poison"))
-        until(lambda: len(server._server._policies._batcher._pending) == 3)
+        until(lambda: server.load.waiting == 3)
         policy.open.set()
         assert [future.result(10)[0, 0] for future in (first, *good)] == [0, 1, 2]
         with pytest.raises(ServerError, match="one sample is bad"):
@@ -171,7 +171,7 @@ def crowd(server: ServerThread, policy: Together, third: Any) -> tuple[list[Any]
         first = pool.submit(remotes[0].infer, observation(0))
         assert policy.started.wait(10)
         second = pool.submit(remotes[1].infer, observation(1))
-        until(lambda: len(server._server._policies._batcher._pending) == 1)
+        until(lambda: server.load.waiting == 1)
         found = third(pool, remotes[2])
         policy.open.set()
         answers = [first.result(10)[0, 0], second.result(10)[0, 0]]
