@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from robospa.action_space import equal_arms
 from robospa.protocol.policy import Observation, PolicySpec, TrialInfo
 
 CHUNK = 10
@@ -33,7 +34,7 @@ class Random:
         state = np.asarray(observation["state"], dtype=np.float32)
         strides = generator.normal(0.0, STRIDE, (CHUNK, len(state)))
         walk = state + np.cumsum(strides, axis=0)
-        grippers = [len(state) // 2 - 1, len(state) - 1]
+        grippers = equal_arms("joint", len(state)).grippers
         walk[:, grippers] = generator.uniform(0.0, 1.0, (CHUNK, 2))
         return walk.astype(np.float32)
 

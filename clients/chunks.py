@@ -1,4 +1,4 @@
-"""Action chunks out of whatever a server calls one, and the options that every dialect has."""
+"""Action chunks out of whatever a server calls one."""
 
 from __future__ import annotations
 
@@ -8,10 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-GRIPPERS = {"joint": (6, 13), "ee": (7, 15)}
-"""Columns of the grippers in our action spaces, two arms of six joints."""
-WIDTHS = {"joint": 14, "ee": 16}
-
+from robospa.action_space import ActionSpace
 
 PLAIN = re.compile(r"[<>|=]?(b1|i[1248]|u[1248]|f[248])|bool|u?int(8|16|32|64)|float(16|32|64)")
 
@@ -42,16 +39,16 @@ def as_chunk(value: Any) -> Any:
         return array.astype(np.float32)
 
 
-def turned(chunk: Any, space: str) -> Any:
+def turned(chunk: Any, space: ActionSpace) -> Any:
     """`chunk` with 1 - g for every gripper number: closed becomes open."""
-    if not isinstance(chunk, np.ndarray) or chunk.ndim != 2 or chunk.shape[1] != WIDTHS[space]:
+    if not isinstance(chunk, np.ndarray) or chunk.ndim != 2 or chunk.shape[1] != space.width:
         return chunk  # refused by the check that follows
     actions: NDArray[np.float32] = chunk.copy()
-    actions[:, GRIPPERS[space]] = 1 - actions[:, GRIPPERS[space]]
+    actions[:, space.grippers] = 1 - actions[:, space.grippers]
     return actions
 
 
 def check_horizon(horizon: int, execute: int | None) -> None:
-    """ValueError if the options horizon and execute cannot be."""
+    """ValueError unless 1 <= execute <= horizon."""
     if horizon < 1 or (execute is not None and not 1 <= execute <= horizon):
         raise ValueError("options horizon and execute: 1 <= execute <= horizon is needed")

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from robospa.action_space import ActionSpace
 from robospa.geometry import Array
 from robospa.protocol.errors import PolicyAnswerError
 from robospa.rotations import matrix_to_quaternion, quaternion_to_matrix
@@ -83,13 +84,13 @@ def ee6d_to_actions(
     grippers = np.where(np.isnan(arms[..., 9:]), np.nan, 1.0 - closed)
     poses = np.concatenate([arms[..., :3], rotation, grippers], axis=-1)
     with np.errstate(over="ignore"):
-        return poses.reshape(len(chunk), 16).astype(np.float32)
+        return poses.reshape(len(chunk), ActionSpace("ee").width).astype(np.float32)
 
 
 def closed_to_open(chunk: NDArray[np.floating[Any]], closed_above: float) -> NDArray[np.float32]:
     """(T, 14) joint targets whose gripper numbers say closed, to ours, whose numbers say open."""
     actions = np.array(chunk, dtype=np.float32)
-    for column in (6, 13):
+    for column in ActionSpace("joint").grippers:
         told = actions[:, column]
         actions[:, column] = np.where(np.isnan(told), np.nan, told <= closed_above)
     return actions

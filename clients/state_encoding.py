@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from robospa.action_space import ActionSpace
 from robospa.clients.ee6d import (
     ARM,
     closed_to_open,
@@ -22,7 +23,7 @@ from robospa.clients.ee6d import (
 from robospa.clients.model_policy import Ask, Chunk
 from robospa.protocol.errors import PolicyAnswerError
 
-SPACES = {"joint": 14, "ee": 16, "ee6d": 2 * ARM}
+SPACES = {"joint": ActionSpace("joint").width, "ee": ActionSpace("ee").width, "ee6d": 2 * ARM}
 """Numbers per action, by space."""
 
 
@@ -44,11 +45,12 @@ class Style:
         if space == "joint":
             joints = np.array(ask.observation["state"] if last is None else last, np.float32)
             if self.grippers == "closed":
-                joints[[6, 13]] = 1 - 2 * joints[[6, 13]]
+                grippers = ActionSpace("joint").grippers
+                joints[grippers] = 1 - 2 * joints[grippers]
             return joints
         poses = np.asarray(ask.observation["ee"] if last is None else last.reshape(2, 8))
         if space == "ee":
-            return poses.astype(np.float32).reshape(16)
+            return poses.astype(np.float32).reshape(-1)
         return poses_to_ee6d(poses, self.quaternions, self.rotation).astype(np.float32)
 
     def actions(self, ask: Ask, answer: NDArray[Any]) -> Chunk:

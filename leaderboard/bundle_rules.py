@@ -9,6 +9,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from robospa.action_space import KINDS
 from robospa.harness.trial import policy_seed
 from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.reference import LEVELS, Reference
@@ -20,7 +21,6 @@ from robospa.trial import TrialKey
 CONTROLS = ("rest_to_rest",)
 """Ways of executing an action that the benchmark's numbers are made with."""
 VERSIONS = ("robospa", "python", "numpy", "sapien")
-SPACES = ("joint", "ee", "delta_ee")
 ONE = ("embodiment", "mode", "split")
 COUNT = frozenset(("subtask_done", "subtask_undone", "success", "failed"))
 """Events that decide success and progress."""
@@ -34,7 +34,7 @@ def spec_of(settings: Mapping[str, Any], task: str) -> Mapping[str, Any]:
     if (
         not isinstance(spec, Mapping)
         or not isinstance(spec.get("name"), str)
-        or spec.get("action") not in SPACES
+        or spec.get("action") not in KINDS
     ):
         raise BundleError(f"the run's settings hold no policy spec for {task}")
     return spec

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from robospa.action_space import ActionSpace
 from robospa.protocol.client import RemotePolicy, connect
 from robospa.protocol.codec import DEFAULT_LIMITS, encode
 from robospa.protocol.errors import TransportError, WireError
@@ -131,7 +132,8 @@ def _run(name: str, function: Callable[[_Target], str], target: _Target) -> Chec
 def synthetic_observation(spec: PolicySpec, step: int = 0, seed: int = 0) -> dict[str, Any]:
     """An observation of the form that `spec` asks for, filled with reproducible noise."""
     rng = np.random.default_rng(seed)
-    width = 16 if spec.action == "joint" and spec.action_dim == 16 else 14
+    width = spec.action_dim if spec.action == "joint" else None
+    width = width or ActionSpace("joint").width
 
     def view() -> dict[str, Any]:
         images = {

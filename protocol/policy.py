@@ -23,12 +23,12 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import NDArray
 
+from robospa.action_space import KINDS, SEVEN_JOINT_ARMS, SIX_JOINT_ARMS, ActionSpace
 from robospa.protocol.errors import DecodeError
 from robospa.schema import Identifier, one_of, read
 
 CAMERAS = ("head", "left_wrist", "right_wrist", "front", "third")
 STATES = ("commanded", "measured", "none")
-SPACES = ("joint", "ee", "delta_ee")
 CODECS = ("raw", "jpeg")
 
 Observation = Mapping[str, Any]
@@ -66,7 +66,7 @@ class PolicySpec:
     name: str
     cameras: tuple[CameraSpec, ...] = DEFAULT_CAMERAS
     state: Annotated[str, one_of(STATES)] = "commanded"
-    action: Annotated[str, one_of(SPACES)] = "joint"
+    action: Annotated[str, one_of(KINDS)] = "joint"
     horizon: Annotated[int, Meta(ge=1, le=10_000)] = 50
     execute: Annotated[int, Meta(ge=1)] | None = None
     history: Annotated[tuple[Offset, ...], Meta(max_length=64)] = ()
@@ -91,11 +91,13 @@ class PolicySpec:
 
     @property
     def action_dims(self) -> tuple[int, ...]:
-        """The allowed column counts of an action chunk (14: two 6-joint arms; 16: two 7-joint
-        arms, or two poses with a gripper each)."""
+        """The allowed column counts of an action chunk: `action_dim`, or those of two arms of six
+        or of seven joints (14 or 16), or of two poses (16)."""
         if self.action_dim is not None:
             return (self.action_dim,)
-        return (16,) if self.action == "ee" else (14, 16)
+        kind = "ee" if self.action == "ee" else "joint"
+        arms = (SIX_JOINT_ARMS, SEVEN_JOINT_ARMS)
+        return tuple(sorted({ActionSpace(kind, joints).width for joints in arms}))
 
 
 def check_spec(spec: PolicySpec) -> None:

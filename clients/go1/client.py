@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from robospa.action_space import ActionSpace
 from robospa.clients.detect import explained
 from robospa.clients.dialect import ConnectionParams, Dialect
 from robospa.clients.go1.conventions import Go1Conventions
@@ -51,7 +52,7 @@ class Go1Session:
             state=options.state,
             horizon=options.horizon,
             execute=options.execute,
-            action_dim=14,
+            action_dim=ActionSpace().width,
         )
         warnings = [*WARNINGS, SWAPPED] if options.wrists == "swapped" else list(WARNINGS)
         self.hello: dict[str, Any] = {

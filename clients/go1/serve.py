@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from robospa.action_space import ActionSpace
 from robospa.clients.go1.conventions import Go1Conventions
 from robospa.clients.model_policy import (
     Ask,
@@ -55,7 +56,7 @@ class Go1(ModelPolicy):
             horizon=options.horizon,
             execute=options.execute,
             seeded=True,
-            action_dim=14,
+            action_dim=ActionSpace().width,
         )
 
     def predict(self, asks: Sequence[Ask]) -> list[Chunk]:

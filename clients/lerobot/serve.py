@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from robospa.action_space import ActionSpace
 from robospa.clients.chunks import check_horizon
 from robospa.clients.ee6d import LAYOUTS, ORDERS
 from robospa.clients.image_preprocessing import resize
@@ -190,7 +191,7 @@ class LeRobot(ModelPolicy):
             history=self.history,
             batch=options.batch,
             seeded=True,
-            action_dim=14 if joint else 16,
+            action_dim=ActionSpace("joint" if joint else "ee").width,
         )
 
     def predict(self, asks: Sequence[Ask]) -> list[Chunk]:

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from robospa.action_space import ActionSpace
 from robospa.clients.dialect import ConnectionParams, Dialect
 from robospa.clients.openpi.conventions import to_openpi
 from robospa.clients.probe import Probe
@@ -41,7 +42,7 @@ class OpenPiClientOptions:
     state: str = option("commanded", "which joints to send", ("commanded", "measured"))
     horizon: int = option(50, "actions in a chunk, at most")
     execute: int | None = option(None, "actions executed before the next query; none for all")
-    action_dim: int = option(14, "columns of a chunk")
+    action_dim: int = option(ActionSpace().width, "columns of a chunk")
     text_budget: int | None = option(
         150,
         "tokens that the model keeps of an instruction: pi0.5 has 200 for it and the state "

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from robospa.action_space import ActionSpace
 from robospa.clients.chunks import check_horizon
 from robospa.clients.model_policy import Ask, Chunk, ModelPolicy, import_code
 from robospa.protocol.options import option
@@ -62,7 +63,7 @@ class OpenPi(ModelPolicy):
             execute=options.execute,
             batch=options.batch if self.batches else 1,
             seeded=True,
-            action_dim=14,
+            action_dim=ActionSpace().width,
         )
 
     def predict(self, asks: Sequence[Ask]) -> list[Chunk]:

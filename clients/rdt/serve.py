@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from robospa.action_space import ActionSpace
 from robospa.clients.chunks import check_horizon
 from robospa.clients.image_preprocessing import jpeg_round_trip, pictures, resize
 from robospa.clients.model_policy import (
@@ -37,7 +38,6 @@ from robospa.protocol.policy import Observation, PolicySpec, TrialInfo
 
 VIEWS = ("head", "right_wrist", "left_wrist")
 """Our cameras in the order of the model's images."""
-GRIPPERS = (6, 13)
 STATE_FACTORS = (4.7908, 4.7888)
 """By which the official class divides the grippers of the state."""
 ACTION_FACTORS = (11.8997, 13.9231)
@@ -92,7 +92,7 @@ class Rdt(ModelPolicy):
             execute=options.execute,
             history=(-1,),
             seeded=True,
-            action_dim=14,
+            action_dim=ActionSpace().width,
         )
 
     def begin(self, trial: TrialInfo) -> None:
@@ -111,7 +111,7 @@ class Rdt(ModelPolicy):
         images += [self._picture(now[name]) for name in VIEWS]
         state = np.array(observation["state"], np.float32)
         if self.options.grippers == "cancelled":
-            state[list(GRIPPERS)] *= STATE_FACTORS
+            state[ActionSpace("joint").grippers] *= STATE_FACTORS
         with torch.inference_mode(), seeded_rows([seed]):
             answer = self.model.step(
                 torch.from_numpy(state[None]),
@@ -120,7 +120,7 @@ class Rdt(ModelPolicy):
             )
         chunk: Chunk = answer.float().cpu().numpy()[0, : self.options.horizon].copy()
         if self.options.grippers == "cancelled":
-            chunk[:, GRIPPERS] /= np.array(ACTION_FACTORS, np.float32)
+            chunk[:, ActionSpace("joint").grippers] /= np.array(ACTION_FACTORS, np.float32)
         return chunk
 
     def _picture(self, image: Any) -> Any:

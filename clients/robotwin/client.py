@@ -22,6 +22,7 @@ from typing import Any
 
 import numpy as np
 
+from robospa.action_space import ActionSpace
 from robospa.clients.chunks import as_chunk, check_horizon
 from robospa.clients.detect import explained
 from robospa.clients.dialect import ConnectionParams, Dialect
@@ -105,25 +106,26 @@ def robotwin_observation(observation: Observation) -> dict[str, Any]:
     """RoboTwin's nested observation. Joints and gripper 0..1 (1 = open), poses with w x y z."""
     state = np.asarray(observation["state"], np.float64)
     ee = np.asarray(observation["ee"], np.float64) if "ee" in observation else None
+    left, right = ActionSpace("joint").arms
     sent: dict[str, Any] = {
         "observation": {
             theirs: {"rgb": observation["images"][ours]} for ours, theirs in CAMERAS.items()
         },
         "joint_action": {
-            "left_arm": state[:6].tolist(),
-            "left_gripper": float(state[6]),
-            "right_arm": state[7:13].tolist(),
-            "right_gripper": float(state[13]),
+            "left_arm": state[left.body].tolist(),
+            "left_gripper": float(state[left.gripper]),
+            "right_arm": state[right.body].tolist(),
+            "right_gripper": float(state[right.gripper]),
             "vector": state,
         },
         "instruction": observation.get("instruction", ""),
     }
     if ee is not None:
         sent["endpose"] = {
-            "left_endpose": ee[0, :7].tolist(),
-            "left_gripper": float(ee[0, 7]),
-            "right_endpose": ee[1, :7].tolist(),
-            "right_gripper": float(ee[1, 7]),
+            "left_endpose": ee[0, :-1].tolist(),
+            "left_gripper": float(ee[0, -1]),
+            "right_endpose": ee[1, :-1].tolist(),
+            "right_gripper": float(ee[1, -1]),
         }
     return sent
 
@@ -262,7 +264,7 @@ class RoboTwinSession:
             horizon=options.horizon,
             execute=options.execute,
             history=tuple(range(-options.history, 0)),
-            action_dim=16 if options.space == "ee" else 14,
+            action_dim=ActionSpace(options.space).width,
         )
         self.hello: dict[str, Any] = {
             "dialect": "robotwin",

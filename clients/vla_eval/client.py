@@ -22,7 +22,8 @@ from typing import Any
 
 import numpy as np
 
-from robospa.clients.chunks import WIDTHS, as_chunk, check_horizon, turned
+from robospa.action_space import ActionSpace
+from robospa.clients.chunks import as_chunk, check_horizon, turned
 from robospa.clients.dialect import ConnectionParams, Dialect
 from robospa.clients.msgpack_socket import MsgpackSocket
 from robospa.clients.numpy_msgpack import text_form
@@ -94,7 +95,7 @@ class VlaEvalSession:
             action=options.space,
             horizon=options.horizon,
             execute=options.execute,
-            action_dim=WIDTHS[options.space],
+            action_dim=ActionSpace(options.space).width,
         )
         number = self._send("hello", {"harness_version": "robospa", "protocol_version": PROTOCOL})
         greeting = self._answer("hello", number, params.timeouts.hello)
@@ -135,7 +136,7 @@ class VlaEvalSession:
         if isinstance(chunk, np.ndarray) and chunk.ndim == 1:
             chunk = chunk[None]
         if self._options.grippers == "closed":
-            chunk = turned(chunk, self._options.space)
+            chunk = turned(chunk, ActionSpace(self._options.space))
         return chunk, {}
 
     def end(self, id: int, outcome: Mapping[str, Any]) -> None:
@@ -181,12 +182,13 @@ def _doubts(said: Mapping[str, Any], options: VlaEvalClientOptions) -> list[str]
     sizes = {name: part.get("dims") for name, part in parts.items() if isinstance(part, Mapping)}
     known = [size for size in sizes.values() if isinstance(size, int)]
     total = sum(known)
-    if not all(known) or not known or total == WIDTHS[options.space]:
+    width = ActionSpace(options.space).width
+    if not all(known) or not known or total == width:
         return []
     told = ", ".join(f"{name} {size}" for name, size in sizes.items())
     return [
         f"the server announces {total} numbers an action ({told}), but {options.space} actions "
-        f"have {WIDTHS[options.space]}"
+        f"have {width}"
     ]
 
 

@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from robospa.action_space import ARMS, POSE, ActionSpace
 from robospa.clients.chunks import as_chunk, check_horizon, turned
 from robospa.clients.dialect import ConnectionParams, Dialect
 from robospa.clients.msgpack_socket import MsgpackSocket
@@ -35,7 +36,6 @@ from robospa.protocol.policy import Observation, PolicySpec, TrialInfo
 from robospa.rotations import quaternion_to_matrix
 
 CAMERAS = {"head": "cam_head", "left_wrist": "cam_left_wrist", "right_wrist": "cam_right_wrist"}
-ARMS = ("left", "right")
 TCP_AHEAD = 0.12
 """The tool centre point is this far [m] along the x axis of the end-effector frame."""
 
@@ -91,12 +91,13 @@ def encode(observation: Observation, options: XPolicyLabClientOptions) -> dict[s
 
 def robot_state(observation: Observation) -> dict[str, NDArray[np.float32]]:
     """Joints, grippers and poses of both arms under XPolicyLab's names, float32."""
-    joints = np.asarray(observation["state"], np.float32).reshape(2, 7)
-    poses = np.asarray(observation["ee"], np.float32)[:, :7]
+    state = np.asarray(observation["state"], np.float32)
+    poses = np.asarray(observation["ee"], np.float32)[:, : len(POSE)]
     found: dict[str, NDArray[np.float32]] = {}
-    for arm, name in enumerate(ARMS):
-        found[f"{name}_arm_joint_state"] = joints[arm, :6]
-        found[f"{name}_ee_joint_state"] = joints[arm, 6:]
+    for arm, columns in enumerate(ActionSpace("joint").arms):
+        name = columns.name
+        found[f"{name}_arm_joint_state"] = state[columns.body]
+        found[f"{name}_ee_joint_state"] = state[[columns.gripper]]
         found[f"{name}_ee_pose"] = poses[arm]
         axis = quaternion_to_matrix(poses[arm, 3:].astype(float))[:, 0]
         tcp = poses[arm, :3] + TCP_AHEAD * axis
@@ -113,12 +114,11 @@ def decode(answer: Any, observation: Observation, options: XPolicyLabClientOptio
     else:
         seen = robot_state(observation)
         chunk = as_chunk([_action(item, seen, options.space) for item in answer])
-    return turned(chunk, options.space) if options.grippers == "closed" else chunk
+    return turned(chunk, ActionSpace(options.space)) if options.grippers == "closed" else chunk
 
 
 def _action(item: Any, seen: Mapping[str, NDArray[np.float32]], space: str) -> list[Any]:
     body = "arm_joint_state" if space == "joint" else "ee_pose"
-    size = 6 if space == "joint" else 7
     if not isinstance(item, Mapping) or not any(f"{arm}_{body}" in item for arm in ARMS):
         names = sorted(map(str, item)) if isinstance(item, Mapping) else type(item).__name__
         raise PolicyAnswerError(
@@ -127,11 +127,11 @@ def _action(item: Any, seen: Mapping[str, NDArray[np.float32]], space: str) -> l
         )
     row: list[Any] = []
     for arm in ARMS:
-        for name, width in ((f"{arm}_{body}", size), (f"{arm}_ee_joint_state", 1)):
+        for name in (f"{arm}_{body}", f"{arm}_ee_joint_state"):
             value = np.ravel(item.get(name, seen[name]))
-            if len(value) != width:
+            if len(value) != len(seen[name]):
                 raise PolicyAnswerError(
-                    f"the policy answered {len(value)} numbers as {name}, not {width}"
+                    f"the policy answered {len(value)} numbers as {name}, not {len(seen[name])}"
                 )
             row += value.tolist()
     return row
@@ -150,7 +150,7 @@ class XPolicyLabSession:
             action=options.space,
             horizon=options.horizon,
             execute=options.execute,
-            action_dim=16 if options.space == "ee" else 14,
+            action_dim=ActionSpace(options.space).width,
         )
         self._socket = MsgpackSocket(params, binary_form)
         greeting = self._call(0, "hello", "hello_ack", {}, params.timeouts.hello)

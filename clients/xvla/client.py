@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from robospa.action_space import ActionSpace
 from robospa.clients.chunks import turned
 from robospa.clients.detect import explained
 from robospa.clients.dialect import ConnectionParams, Dialect
@@ -109,7 +110,7 @@ class XvlaSession:
             action="joint" if joint else "ee",
             horizon=options.horizon,
             execute=options.execute,
-            action_dim=14 if joint else 16,
+            action_dim=ActionSpace("joint" if joint else "ee").width,
         )
         self.hello: dict[str, Any] = {
             "dialect": "xvla",
@@ -146,7 +147,7 @@ class XvlaSession:
 
     def _actions(self, chunk: Any) -> NDArray[np.float32]:
         joint = self._options.space == "joint"
-        width = 14 if joint else 2 * ARM
+        width = ActionSpace("joint").width if joint else 2 * ARM
         if not isinstance(chunk, np.ndarray) or chunk.ndim != 2 or chunk.shape[1] != width:
             shape = chunk.shape if isinstance(chunk, np.ndarray) else type(chunk).__name__
             hint = "; is it a fine-tune in the other space (option space)?"
@@ -154,7 +155,7 @@ class XvlaSession:
         if not joint:
             return from_ee6d(chunk, self._options)
         actions: NDArray[np.float32] = (
-            chunk if self._options.joint_grippers == "open" else turned(chunk, "joint")
+            chunk if self._options.joint_grippers == "open" else turned(chunk, ActionSpace("joint"))
         )
         return actions
 
@@ -179,7 +180,8 @@ class XvlaSession:
         if self._options.space == "joint":
             state = np.array(observation["state"] if last is None else last, dtype=float)
             if self._options.joint_grippers == "closed":
-                state[[6, 13]] = 1 - state[[6, 13]]
+                grippers = ActionSpace("joint").grippers
+                state[grippers] = 1 - state[grippers]
             return state
         poses = observation["ee"] if last is None else last.reshape(2, 8)
         return to_ee6d(np.asarray(poses), self._options)

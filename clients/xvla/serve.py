@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from robospa.action_space import ActionSpace
 from robospa.clients.image_preprocessing import pictures
 from robospa.clients.model_policy import (
     Ask,
@@ -74,7 +75,7 @@ class Xvla(ModelPolicy):
             execute=options.execute,
             batch=options.batch,
             seeded=True,
-            action_dim=14 if joint else 16,
+            action_dim=ActionSpace("joint" if joint else "ee").width,
         )
 
     def predict(self, asks: Sequence[Ask]) -> list[Chunk]:

@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from wire_helpers import SPEC, TRIAL, observation
 
+from robospa.action_space import KINDS
 from robospa.protocol.codec import encode
 from robospa.protocol.errors import DecodeError, PolicyAnswerError, VersionMismatch
 from robospa.protocol.messages import (
@@ -27,7 +28,7 @@ from robospa.protocol.messages import (
     pack,
     unpack,
 )
-from robospa.protocol.policy import CAMERAS, SPACES, STATES, CameraSpec, PolicySpec, TrialInfo
+from robospa.protocol.policy import CAMERAS, STATES, CameraSpec, PolicySpec, TrialInfo
 from robospa.protocol.validation import check_chunk, check_observation, compare_specs
 
 IDS = st.integers(0, MAX_ID)
@@ -48,7 +49,7 @@ SPECS = st.builds(
         unique_by=lambda camera: camera.name,
     ).map(tuple),
     state=st.sampled_from(STATES),
-    action=st.sampled_from(SPACES),
+    action=st.sampled_from(KINDS),
     horizon=st.integers(50, 10_000),
     execute=st.none() | st.integers(1, 50),
     history=st.lists(st.integers(-100, -1), max_size=3).map(tuple),
