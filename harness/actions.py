@@ -8,12 +8,12 @@ reported in `Goals.problems`.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from robospa.action_space import KINDS, ActionSpace, ArmColumns
 from robospa.geometry import Pose, to_transform
 from robospa.harness.robots.embodiment import Embodiment
 from robospa.harness.robots.kinematics import (
@@ -25,11 +25,9 @@ from robospa.harness.robots.kinematics import (
 )
 from robospa.harness.world import ActionError
 from robospa.rotations import turning_vector
-from robospa.tasks.snapshot import ARMS
 
 Array = NDArray[np.float64]
 
-POSE_WIDTH = 8  # x y z, qw qx qy qz, gripper
 QUATERNION_TOLERANCE = 0.1
 """A quaternion's length may be off by this much: networks do not normalise."""
 POLISH = 2
@@ -45,95 +43,89 @@ class Goals:
     problems: tuple[str, ...] = ()
 
 
-def action_width(embodiment: Embodiment, space: str) -> int:
-    """Length of an action of `space`; ActionError for a space that does not exist."""
-    if space == "joint":
-        return embodiment.action_dim
-    if space in ("ee", "delta_ee"):
-        return POSE_WIDTH * len(embodiment.arms)
-    raise ActionError(f"no action space {space!r}; there are joint, ee and delta_ee")
-
-
-def labels(embodiment: Embodiment, space: str) -> list[str]:
-    """What every number of an action means: "left joint 3", "right qw", "left gripper"."""
-    names: list[str] = []
-    for arm, spec in zip(ARMS, embodiment.arms, strict=True):
-        if space == "joint":
-            names += [f"{arm} joint {i + 1}" for i in range(len(spec.joints))]
-        else:
-            names += [f"{arm} {part}" for part in ("x", "y", "z", "qw", "qx", "qy", "qz")]
-        names.append(f"{arm} gripper")
-    return names
-
-
 class ActionReader:
     """Reads the actions of one embodiment. Holds its kinematics, no state of a trial."""
 
     def __init__(self, embodiment: Embodiment) -> None:
         self.embodiment = embodiment
         self.chains: tuple[Chain, ...] = tuple(chain_of(arm) for arm in embodiment.arms)
-        self._lower = np.stack([chain.lower for chain in self.chains])
-        self._upper = np.stack([chain.upper for chain in self.chains])
-        self._width = len(embodiment.arms[0].joints)
+        self._spaces = {kind: embodiment.action_space(kind) for kind in KINDS}
+        # The arm with fewer joints has zeros in the columns that it lacks: limits 0 give 0.
+        joints = self._spaces["joint"]
+        self._columns = np.zeros((2, max(joints.joints)), dtype=int)
+        self._lower, self._upper = np.zeros((2, *self._columns.shape))
+        for a, (arm, chain) in enumerate(zip(joints.arms, self.chains, strict=True)):
+            count = joints.joints[a]
+            self._columns[a, :count] = np.arange(arm.body.start, arm.body.stop)
+            self._lower[a, :count], self._upper[a, :count] = chain.lower, chain.upper
 
-    def check(self, action: ArrayLike, space: str) -> Array:
-        """`action` as float64 (D,); ActionError names the first number that cannot be executed."""
-        width = action_width(self.embodiment, space)
+    def check(self, action: ArrayLike, kind: str) -> tuple[Array, ActionSpace]:
+        """`action` as float64 (D,), and its columns.
+
+        Raises ActionError, which names the first number that cannot be executed.
+        """
+        space = self._spaces.get(kind)
+        if space is None:
+            raise ActionError(f"no action space {kind!r}; there are joint, ee and delta_ee")
         try:
             values = np.asarray(action, dtype=np.float64)
         except (TypeError, ValueError) as error:
             raise ActionError(f"the action is not an array of numbers: {error}") from None
-        if values.shape != (width,):
+        if values.shape != (space.width,):
             raise ActionError(
-                f"a {space} action of {self.embodiment.name} has shape ({width},), "
+                f"a {kind} action of {self.embodiment.name} has shape ({space.width},), "
                 f"got {values.shape}"
             )
         bad = np.flatnonzero(~np.isfinite(values))
         if len(bad):
-            name = labels(self.embodiment, space)[int(bad[0])]
+            name = space.labels[int(bad[0])]
             raise ActionError(
-                f"{name} (index {int(bad[0])} of the {space} action) is {values[bad[0]]}"
+                f"{name} (index {int(bad[0])} of the {kind} action) is {values[bad[0]]}"
             )
-        return values
+        return values, space
 
-    def goals(self, action: ArrayLike, space: str, commanded: Array) -> Goals:
+    def goals(self, action: ArrayLike, kind: str, commanded: Array) -> Goals:
         """Joint goals of `action`, given the commanded joints (2, J) at which it starts.
+
+        J is the joint count of the arm that has more; the other's row ends in zeros.
 
         `ee` and `delta_ee` start from the *commanded* posture, so that an identity `delta_ee` is no
         motion at all and an arm pressed against something does not creep.
         """
-        values = self.check(action, space)
-        if space == "joint":
-            table = values.reshape(2, self._width + 1)
-            joints = np.clip(table[:, : self._width], self._lower, self._upper)
-            return Goals(joints, np.clip(table[:, self._width], 0.0, 1.0))
-        table = values.reshape(2, POSE_WIDTH)
+        values, space = self.check(action, kind)
+        gripper = np.clip(values[space.grippers], 0.0, 1.0)
+        if kind == "joint":
+            return Goals(np.clip(values[self._columns], self._lower, self._upper), gripper)
         joints, problems = commanded.copy(), []
-        for a, row in enumerate(table):
-            target = self._target(row, space, a, commanded[a])
-            found, reached = inverse(self.chains[a], [target], near=commanded[a])
+        for a, (arm, chain) in enumerate(zip(space.arms, self.chains, strict=True)):
+            now = commanded[a, : space.joints[a]]
+            target = self._target(values, arm, kind, chain, now)
+            found, reached = inverse(chain, [target], near=now)
             if not reached[0]:
-                found, reached = inverse(self.chains[a], [target])
+                found, reached = inverse(chain, [target])
             if reached[0]:
-                joints[a] = polished(self.chains[a], found[0], target)
+                joints[a, : space.joints[a]] = polished(chain, found[0], target)
             else:
-                problems.append(f"the {ARMS[a]} arm cannot reach {_describe(target)} and holds")
-        return Goals(joints, np.clip(table[:, 7], 0.0, 1.0), tuple(problems))
+                problems.append(f"the {arm.name} arm cannot reach {_describe(target)} and holds")
+        return Goals(joints, gripper, tuple(problems))
 
-    def _target(self, row: Array, space: str, arm: int, commanded: Sequence[float] | Array) -> Pose:
-        """World pose that one arm's eight numbers ask for; ActionError for a null quaternion."""
-        length = float(np.linalg.norm(row[3:7]))
+    def _target(
+        self, values: Array, arm: ArmColumns, kind: str, chain: Chain, commanded: Array
+    ) -> Pose:
+        """World pose that one arm's numbers ask for; ActionError for a null quaternion."""
+        quaternion = values[arm.quaternion]
+        length = float(np.linalg.norm(quaternion))
         if abs(length - 1.0) > QUATERNION_TOLERANCE:
             raise ActionError(
-                f"the {ARMS[arm]} quaternion (w, x, y, z) of the {space} action has length "
+                f"the {arm.name} quaternion (w, x, y, z) of the {kind} action has length "
                 f"{length:.3g}; it must be 1"
             )
-        x, y, z = (float(v) for v in row[:3])
-        w, i, j, k = (float(v) / length for v in row[3:7])
+        x, y, z = (float(v) for v in values[arm.position])
+        w, i, j, k = (float(v) / length for v in quaternion)
         pose = Pose((x, y, z), (w, i, j, k))
-        if space == "ee":
+        if kind == "ee":
             return pose
-        return end_effector(self.chains[arm], [float(v) for v in commanded]) * pose
+        return end_effector(chain, [float(v) for v in commanded]) * pose
 
 
 def polished(chain: Chain, joints: Array, target: Pose) -> Array:

@@ -59,6 +59,7 @@ def _recorded(key: TrialKey, policy: str, name: str) -> tuple[Episode, str]:
     """The trial `key` of a policy as an episode called `name`, and how it ended."""
     from robospa.harness.convention_check.episodes import EpisodeRecorder
     from robospa.harness.factory import open_policy
+    from robospa.harness.robots import embodiment
     from robospa.harness.sim.sapien_world import SapienWorld
     from robospa.harness.trial import policy_seed, run_trial
 
@@ -69,4 +70,5 @@ def _recorded(key: TrialKey, policy: str, name: str) -> tuple[Episode, str]:
         )
     finally:
         world.close()
-    return recorder.episode(name, done.instruction, asdict(key)), done.end
+    space = embodiment(key.embodiment).action_space("joint")
+    return recorder.episode(name, done.instruction, asdict(key), space), done.end

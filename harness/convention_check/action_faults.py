@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import permutations
-from typing import Any
 
 import numpy as np
 
@@ -23,6 +22,9 @@ PI_SIGNS = (1, 2)
 """The joints of an arm whose sign openpi's `adapt_to_pi` changes."""
 
 
+Undo = Callable[[Sample], "Sample | None"]
+
+
 @dataclass(frozen=True)
 class ActionFault:
     """One mistake in what a policy answers. `phrase` completes "it looks as if ..."; only one part
@@ -31,42 +33,74 @@ class ActionFault:
     name: str
     phrase: str
     family: str
-    undo: Callable[[Sample], Sample | None]
+    undo: Undo
 
 
-def _given(change: Callable[[Sample], Array], space: str = "") -> Callable[[Sample], Sample | None]:
+def _given(change: Callable[[Sample], Array], kind: str = "") -> Undo:
     def undo(case: Sample) -> Sample | None:
-        if space and case.space != space:
+        if kind and case.space.kind != kind:
             return None
         return replace(case, given=change(case))
 
     return undo
 
 
-def _columns(order: Callable[[int], Sequence[int]], space: str = "") -> Any:
-    """Column i of ours is column order(half)[i] of the answer."""
-    return _given(lambda case: case.given[:, list(order(case.half))], space)
+Columns = list[int]
 
 
-def _grippers(change: Callable[[Array], Array]) -> Any:
+def _columns(order: Callable[[Columns, Columns], Columns], kind: str = "") -> Undo:
+    """Column i of ours is column order(left, right)[i] of the answer; `left` and `right` are our
+    columns of the arms, the gripper last."""
+
     def changed(case: Sample) -> Array:
-        given = case.given.copy()
-        given[:, case.grippers] = change(given[:, case.grippers])
+        rows = list(range(case.space.width))
+        left, right = (rows[arm.all] for arm in case.space.arms)
+        return case.given[:, order(left, right)]
+
+    return _given(changed, kind)
+
+
+def _grippers(change: Callable[[Array], Array]) -> Undo:
+    def changed(case: Sample) -> Array:
+        given, grippers = case.given.copy(), case.space.grippers
+        given[:, grippers] = change(given[:, grippers])
         return given
 
     return _given(changed)
 
 
-def _joints(change: Callable[[Sample, Array], Array]) -> Any:
+def _joints(change: Callable[[Sample, Array], Array]) -> Undo:
     def changed(case: Sample) -> Array:
-        given = case.given.copy()
-        given[:, case.joints] = change(case, given[:, case.joints])
+        given, joints = case.given.copy(), case.space.bodies
+        given[:, joints] = change(case, given[:, joints])
         return given
 
     return _given(changed, "joint")
 
 
-def _later(shift: int, stride: int = 1) -> Callable[[Sample], Sample | None]:
+def _positions(change: Callable[[Array], Array]) -> Undo:
+    def changed(case: Sample) -> Array:
+        given = case.given.copy()
+        for arm in case.space.arms:
+            given[:, arm.position] = change(given[:, arm.position])
+        return given
+
+    return _given(changed, "ee")
+
+
+def _quaternions(order: Columns) -> Undo:
+    """Number i of our quaternions, w x y z, is number order[i] of theirs."""
+
+    def changed(case: Sample) -> Array:
+        given = case.given.copy()
+        for arm in case.space.arms:
+            given[:, arm.quaternion] = given[:, arm.quaternion][:, order]
+        return given
+
+    return _given(changed, "ee")
+
+
+def _later(shift: int, stride: int = 1) -> Undo:
     """Compare action k with frame t + shift + (k + 1) * stride."""
 
     def undo(case: Sample) -> Sample | None:
@@ -79,6 +113,15 @@ def _later(shift: int, stride: int = 1) -> Callable[[Sample], Sample | None]:
         return replace(case, given=case.given[: len(rows)], wanted=case.track[rows])
 
     return undo
+
+
+def _interleaved(case: Sample) -> Sample | None:
+    """Columns that alternate between two arms of equally many joints."""
+    left, right = case.space.joints
+    if case.space.kind == "joint" and left != right:
+        return None
+    order = [*range(0, case.space.width, 2), *range(1, case.space.width, 2)]
+    return replace(case, given=case.given[:, order])
 
 
 def _slower(case: Sample) -> Sample | None:
@@ -97,22 +140,23 @@ def _measured(case: Sample) -> Sample | None:
 def _moved(case: Sample, along: float) -> Array:
     """Positions shifted by `along` [m] on the x axis of each rotation."""
     given = case.given.copy()
-    for arm in (0, 8):
-        q = given[:, arm + 3 : arm + 7]
+    for arm in case.space.arms:
+        q = given[:, arm.quaternion]
         real = np.linalg.norm(q, axis=1, keepdims=True) > 1e-9
         turn = quaternion_to_matrix(np.where(real, q, [1.0, 0.0, 0.0, 0.0]))
-        given[:, arm : arm + 3] += along * turn[:, :, 0]
+        given[:, arm.position] += along * turn[:, :, 0]
     return given
 
 
 def _pose_delta(case: Sample, each: bool) -> Array:
     """Differences of position added to the pose at the start; rotations turned on from it."""
     given = case.given.copy()
-    for arm in (0, 8):
-        steps, now = given[:, arm : arm + 3], case.now[arm : arm + 7]
-        given[:, arm : arm + 3] = now[:3] + (np.cumsum(steps, axis=0) if each else steps)
-        turned = now[3:7]
-        for row in given[:, arm + 3 : arm + 7]:
+    for arm in case.space.arms:
+        steps = given[:, arm.position]
+        shift = np.cumsum(steps, axis=0) if each else steps
+        given[:, arm.position] = case.now[arm.position] + shift
+        turned = case.now[arm.quaternion]
+        for row in given[:, arm.quaternion]:
             row[:] = product(turned, row)
             turned = row.copy() if each else turned
     return given
@@ -125,36 +169,31 @@ PARTS: tuple[ActionFault, ...] = (
         "arms swapped",
         "its actions name the right arm first",
         "arms",
-        _columns(lambda h: [*range(h, 2 * h), *range(h)]),
+        _columns(lambda a, b: [*(c + len(b) for c in a), *(c - len(a) for c in b)]),
     ),
     ActionFault(
         "grippers last",
         "its actions have both grippers at the end",
         ORDER,
-        _columns(
-            lambda h: [*range(h - 1), 2 * h - 2, *range(h - 1, 2 * h - 2), 2 * h - 1], "joint"
-        ),
+        _columns(lambda a, b: [*a[:-1], b[-2], *(c - 1 for c in b[:-1]), b[-1]], "joint"),
     ),
     ActionFault(
         "grippers first",
         "its actions have each gripper before its arm",
         ORDER,
-        _columns(lambda h: [*range(1, h), 0, *range(h + 1, 2 * h), h], "joint"),
+        _columns(lambda a, b: [*a[1:], a[0], *b[1:], b[0]], "joint"),
     ),
     ActionFault(
         "arms interleaved",
         "its actions alternate between left and right",
         ORDER,
-        _columns(lambda h: [*range(0, 2 * h, 2), *range(1, 2 * h, 2)]),
+        _interleaved,
     ),
     ActionFault(
         "joints reversed",
         "its joints run from the hand to the shoulder",
         ORDER,
-        _columns(
-            lambda h: [*range(h - 2, -1, -1), h - 1, *range(2 * h - 2, h - 1, -1), 2 * h - 1],
-            "joint",
-        ),
+        _columns(lambda a, b: [*a[-2::-1], a[-1], *b[-2::-1], b[-1]], "joint"),
     ),
     ActionFault(
         "degrees",
@@ -166,23 +205,19 @@ PARTS: tuple[ActionFault, ...] = (
         "millimetres",
         "its positions are in millimetres, not metres",
         "units",
-        _given(lambda case: case.given / np.where(np.arange(16) % 8 < 3, 1000.0, 1.0), "ee"),
+        _positions(lambda positions: positions / 1000.0),
     ),
     ActionFault(
         "quaternion x y z w",
         "its quaternions are x y z w, not w x y z",
         "quaternion",
-        _given(
-            lambda case: case.given[:, [0, 1, 2, 6, 3, 4, 5, 7, 8, 9, 10, 14, 11, 12, 13, 15]], "ee"
-        ),
+        _quaternions([3, 0, 1, 2]),
     ),
     ActionFault(
         "quaternion slip",
         "its quaternions come from w x y z read as x y z w, as in X-VLA's official data",
         "quaternion",
-        _given(
-            lambda case: case.given[:, [0, 1, 2, 4, 5, 6, 3, 7, 8, 9, 10, 12, 13, 14, 11, 15]], "ee"
-        ),
+        _quaternions([1, 2, 3, 0]),
     ),
     ActionFault(
         "gripper inverted",
@@ -230,13 +265,13 @@ PARTS: tuple[ActionFault, ...] = (
         "delta from the start",
         "its actions are differences to the state at the query, not absolute targets",
         "delta",
-        _joints(lambda case, joints: case.now[case.joints] + joints),
+        _joints(lambda case, joints: case.now[case.space.bodies] + joints),
     ),
     ActionFault(
         "delta from the last",
         "each of its actions is a difference to the one before, not an absolute target",
         "delta",
-        _joints(lambda case, joints: case.now[case.joints] + np.cumsum(joints, axis=0)),
+        _joints(lambda case, joints: case.now[case.space.bodies] + np.cumsum(joints, axis=0)),
     ),
     ActionFault(
         "pose delta from the start",
@@ -279,9 +314,12 @@ PARTS: tuple[ActionFault, ...] = (
 
 def fitted(cases: Sequence[Sample]) -> list[ActionFault]:
     """Parts that depend on all `cases`: order and signs of an arm's joints, origin of positions."""
-    if cases[0].space == "ee":
+    space = cases[0].space
+    if space.kind == "ee":
         return [_offset(cases)]
-    size = cases[0].half - 1
+    size, other = space.joints
+    if size != other:  # what the arms have in common is not fitted to arms that differ
+        return []
     found = []
     given = np.concatenate([c.given for c in cases]).reshape(-1, 2, size + 1)[:, :, :-1]
     wanted = np.concatenate([c.wanted for c in cases]).reshape(-1, 2, size + 1)[:, :, :-1]
@@ -293,13 +331,13 @@ def fitted(cases: Sequence[Sample]) -> list[ActionFault]:
     best = min(permutations(rows), key=lambda p: float(cost[rows, p].sum()))
     if list(best) != rows:
         told = " ".join(str(i + 1) for i in best)
-        order = [*best, size, *(i + size + 1 for i in best), 2 * size + 1]
+        order = [*best, size]
         found.append(
             ActionFault(
                 "joint order",
                 f"the joints of an arm are in another order (ours are its {told})",
                 ORDER,
-                _columns(lambda h: order, "joint"),
+                _columns(lambda a, b: [a[i] for i in order] + [b[i] for i in order], "joint"),
             )
         )
     for about, name in ((0 * now, "joint signs"), (now, "signs of motion")):
@@ -330,9 +368,12 @@ def _signs(name: str, flips: tuple[int, ...], size: int) -> ActionFault:
 def _offset(cases: Sequence[Sample]) -> ActionFault:
     gap = np.concatenate([c.given - c.wanted for c in cases])
     middle = np.median(gap, axis=0)
-    shift = np.where(np.arange(16) % 8 < 3, middle, 0.0)
-    told = ", ".join(f"{v:+.2f}" for v in shift[:3])
-    right = ", ".join(f"{v:+.2f}" for v in shift[8:11])
+    shift = np.zeros_like(middle)
+    for arm in cases[0].space.arms:
+        shift[arm.position] = middle[arm.position]
+    told, right = (
+        ", ".join(f"{v:+.2f}" for v in shift[arm.position]) for arm in cases[0].space.arms
+    )
     return ActionFault(
         "another origin",
         f"its positions are off by ({told}) m left and ({right}) m right: another origin",

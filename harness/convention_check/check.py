@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from robospa.action_space import ActionSpace
 from robospa.geometry import Array
 from robospa.harness.convention_check.action_faults import PARTS, ActionFault, fitted
 from robospa.harness.convention_check.episodes import Episode, EpisodeError
@@ -152,7 +153,8 @@ def _case(policy: Policy, episode: Episode, t: int, view: ObservationFault | Non
     chunk = np.asarray(policy.infer(seen), dtype=float)
     chunk = chunk[: spec.execute] if spec.execute else chunk
     joint = spec.action == "joint"
-    track = episode.commanded if joint else episode.ee.reshape(len(episode), 16)
+    space = episode.space if joint else ActionSpace("ee", episode.space.joints)
+    track = episode.commanded if joint else episode.ee.reshape(len(episode), space.width)
     wanted = track[t + 1 : t + 1 + len(chunk)]
     given = chunk[: len(wanted)]
     if given.shape != wanted.shape:
@@ -161,9 +163,9 @@ def _case(policy: Policy, episode: Episode, t: int, view: ObservationFault | Non
             f"{track.shape[1]} of that kind"
         )
     if spec.action == "delta_ee":
-        given = absolute(given, track[t])
+        given = absolute(given, track[t], space)
     measured = episode.measured if joint else None
-    return Sample("joint" if joint else "ee", given, wanted, track[t], track, t, measured)
+    return Sample(space, given, wanted, track[t], track, t, measured)
 
 
 def _shown(spec: PolicySpec, view: ObservationFault) -> bool:
@@ -190,17 +192,18 @@ def _trial(episode: Episode) -> TrialInfo:
     )
 
 
-def absolute(chunk: Array, now: Array) -> Array:
+def absolute(chunk: Array, now: Array, space: ActionSpace) -> Array:
     """`delta_ee` actions (K, 16) as the poses (K, 16) they lead to from `now` (16,)."""
-    poses = np.empty_like(chunk)
-    for arm in (0, 8):
-        place, turn = now[arm : arm + 3], now[arm + 3 : arm + 7]
-        for row, out in zip(chunk[:, arm : arm + 8], poses[:, arm : arm + 8], strict=True):
-            shift = product(product(turn, np.concatenate([[0.0], row[:3]])), turn * [1, -1, -1, -1])
+    poses = chunk.copy()
+    for arm in space.arms:
+        place, turn = now[arm.position], now[arm.quaternion]
+        for row, out in zip(chunk, poses, strict=True):
+            step = np.concatenate([[0.0], row[arm.position]])
+            shift = product(product(turn, step), turn * [1, -1, -1, -1])
             place = place + shift[1:]
-            turn = product(turn, row[3:7])
+            turn = product(turn, row[arm.quaternion])
             turn = turn / max(float(np.linalg.norm(turn)), 1e-9)
-            out[:] = [*place, *turn, row[7]]
+            out[arm.position], out[arm.quaternion] = place, turn
     return poses
 
 

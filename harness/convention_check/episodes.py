@@ -27,6 +27,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from robospa.action_space import ARMS, POSE, SEVEN_JOINT_ARMS, SIX_JOINT_ARMS, ActionSpace
 from robospa.harness.running.store import replace_file
 from robospa.harness.world import World
 from robospa.protocol.errors import DecodeError
@@ -46,6 +47,7 @@ VIEWS = {
 """Our cameras and where their frames are."""
 ABOUT = ("task", "level", "seed", "embodiment", "mode", "split")
 MOST_FRAMES = 20_000
+MOST_JOINTS = 32
 QUALITY = 95
 """Of a written JPEG: OpenCV's default, which the official recordings have."""
 EVERY = 15
@@ -63,13 +65,15 @@ class Episode:
 
     `commanded` and `measured` float64 (T, D) as in an observation's `state`, `measured` None where
     it was not recorded; `ee` float64 (T, 2, 8) as in an observation; `frames` per camera T JPEGs
-    (bytes, official colours) or arrays uint8 (H, W, 3) RGB; `about` what is known of the trial.
+    (bytes, official colours) or arrays uint8 (H, W, 3) RGB; `space` has the columns of `commanded`;
+    `about` what is known of the trial.
     """
 
     name: str
     commanded: Array
     ee: Array
     frames: Mapping[str, Any]
+    space: ActionSpace
     instruction: str = ""
     measured: Array | None = None
     about: Mapping[str, Any] = field(default_factory=dict)
@@ -147,16 +151,17 @@ def _read(file: Any, path: Path, instruction: str | None) -> Episode:
     name = path.name
     commanded = _numbers(file, "joint_action/vector", name)
     length, width = commanded.shape
-    if not 2 <= length <= MOST_FRAMES or width not in (14, 16):
+    space = _space(file, width)
+    if not 2 <= length <= MOST_FRAMES or space is None:
         raise EpisodeError(
             f"{name}: joint_action/vector is {commanded.shape}; expected 2 to {MOST_FRAMES} frames "
             "of 14 numbers (16 for two 7-joint arms)"
         )
     arms = []
-    for side in ("left", "right"):
+    for side in ARMS:
         pose = _numbers(file, f"endpose/{side}_endpose", name)
         grip = _numbers(file, f"endpose/{side}_gripper", name).reshape(-1, 1)
-        if pose.shape != (length, 7) or grip.shape != (length, 1):
+        if pose.shape != (length, len(POSE)) or grip.shape != (length, 1):
             raise EpisodeError(f"{name}: endpose/{side}_* is not 7 and 1 numbers a frame")
         arms.append(np.hstack([pose, grip]))
     measured = None
@@ -169,7 +174,19 @@ def _read(file: Any, path: Path, instruction: str | None) -> Episode:
     if not about and len(path.resolve().parents) > 2:  # <task>/<configuration>/data/episode0.hdf5
         about = {"task": path.resolve().parents[2].name}
     told = instruction or str(_plain(file.attrs.get("instruction", ""))) or _beside(path)
-    return Episode(name, commanded, np.stack(arms, axis=1), frames, told, measured, about)
+    return Episode(name, commanded, np.stack(arms, axis=1), frames, space, told, measured, about)
+
+
+def _space(file: Any, width: int) -> ActionSpace | None:
+    """The columns of `joint_action/vector`: two arms of six or of seven joints, or, in files that
+    have the arms one by one as well, of as many as those have. None where it is neither."""
+    counts = [SIX_JOINT_ARMS, SEVEN_JOINT_ARMS]
+    arms = [file.get(f"joint_action/{arm}_arm") for arm in ARMS]
+    shapes = [tuple(getattr(arm, "shape", ())) for arm in arms]
+    if all(len(shape) == 2 and 0 < shape[1] <= MOST_JOINTS for shape in shapes):
+        counts.append((shapes[0][1], shapes[1][1]))
+    spaces = (ActionSpace("joint", count) for count in counts)
+    return next((space for space in spaces if space.width == width), None)
 
 
 def _numbers(file: Any, at: str, name: str) -> Array:
@@ -219,14 +236,13 @@ def write_episode(path: Path, episode: Episode) -> None:
         file.attrs["instruction"] = episode.instruction
         for key, value in episode.about.items():
             file.attrs[key] = value
-        half = episode.commanded.shape[1] // 2
         file["joint_action/vector"] = episode.commanded
-        for arm, side in enumerate(("left", "right")):
-            part = episode.commanded[:, arm * half : (arm + 1) * half]
-            file[f"joint_action/{side}_arm"] = part[:, :-1]
-            file[f"joint_action/{side}_gripper"] = part[:, -1]
-            file[f"endpose/{side}_endpose"] = episode.ee[:, arm, :7]
-            file[f"endpose/{side}_gripper"] = episode.ee[:, arm, 7]
+        for arm, columns in enumerate(episode.space.arms):
+            side = columns.name
+            file[f"joint_action/{side}_arm"] = episode.commanded[:, columns.body]
+            file[f"joint_action/{side}_gripper"] = episode.commanded[:, columns.gripper]
+            file[f"endpose/{side}_endpose"] = episode.ee[:, arm, :-1]
+            file[f"endpose/{side}_gripper"] = episode.ee[:, arm, -1]
         if episode.measured is not None:
             file["joint_action/measured"] = episode.measured
         for camera, frames in episode.frames.items():
@@ -278,10 +294,12 @@ class EpisodeRecorder:
         for name, frames in self._frames.items():
             frames.append(to_jpeg(seen["images"][name]))
 
-    def episode(self, name: str, instruction: str, about: Mapping[str, Any]) -> Episode:
-        """What was recorded."""
+    def episode(
+        self, name: str, instruction: str, about: Mapping[str, Any], space: ActionSpace
+    ) -> Episode:
+        """What was recorded of a robot whose joint actions are of `space`."""
         commanded, measured, ee = (np.stack(rows) for rows in zip(*self._rows, strict=True))
-        return Episode(name, commanded, ee, self._frames, instruction, measured, about)
+        return Episode(name, commanded, ee, self._frames, space, instruction, measured, about)
 
 
 def require() -> None:

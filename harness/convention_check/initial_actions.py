@@ -14,6 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from robospa.action_space import ActionSpace
+from robospa.geometry import Array
 from robospa.harness.convention_check.check import judge
 from robospa.harness.convention_check.samples import Sample
 from robospa.harness.robots import embodiment
@@ -36,22 +38,21 @@ GAIN = 0.8
 def postures(spec: PolicySpec, count: int = POSTURES) -> list[dict[str, Any]]:
     """Observations of the form of `spec`: noise, and postures that no mistake leaves the same."""
     rng = np.random.default_rng(5)
-    arms = embodiment(REFERENCE).arms
+    robot = embodiment(REFERENCE)
+    space = robot.action_space("joint")
     seen = []
     for i in range(count):
         observation = synthetic_observation(spec, seed=i)
-        joints = rng.uniform(0.25, 0.9, (2, 6)) * rng.choice([-1, 1], (2, 6))
+        shape = (2, max(space.joints))
+        joints = rng.uniform(0.25, 0.9, shape) * rng.choice([-1, 1], shape)
         grips = rng.uniform(0.55, 0.95, 2)
-        poses = [
-            end_effector(chain_of(a), [float(v) for v in q])
-            for a, q in zip(arms, joints, strict=True)
-        ]
+        rows = [row[:count].tolist() for row, count in zip(joints, space.joints, strict=True)]
+        poses = [end_effector(chain_of(a), q) for a, q in zip(robot.arms, rows, strict=True)]
         ee = [[*p.position, *p.rotation, g] for p, g in zip(poses, grips, strict=True)]
         observation["ee"] = np.array(ee, np.float32)
         if "state" in observation:
-            observation["state"] = (
-                np.hstack([joints, grips[:, None]]).reshape(-1).astype(np.float32)
-            )
+            state = [v for q, g in zip(rows, grips, strict=True) for v in (*q, g)]
+            observation["state"] = np.array(state, np.float32)
         for view in observation.get("history", {}).values():
             view.update({k: observation[k] for k in ("ee", "state") if k in observation})
         seen.append(observation)
@@ -76,47 +77,51 @@ def hints(policy: Policy) -> tuple[list[str], str]:
 
 
 def _case(policy: Policy, seen: dict[str, Any]) -> Sample | None:
-    space = policy.spec.action
+    kind = policy.spec.action
+    space = embodiment(REFERENCE).action_space("joint" if kind == "joint" else "ee")
     policy.reset(TRIAL)
     chunk = np.asarray(policy.infer(seen), dtype=float)
-    now = np.asarray(seen["state"] if space == "joint" else seen["ee"], dtype=float).reshape(-1)
-    if chunk.shape[1] != len(now):
+    now = np.asarray(seen["state"] if kind == "joint" else seen["ee"], dtype=float).reshape(-1)
+    if not chunk.shape[1] == space.width == len(now):
         return None
-    if space == "delta_ee":
+    if kind == "delta_ee":
         now = np.tile([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0], 2)
     first = chunk[:1].copy()
     wanted = now[None].copy()
-    return Sample("joint" if space == "joint" else "ee", first, wanted, now)
+    return Sample(space, first, wanted, now)
 
 
 def odd(cases: Sequence[Sample], action: str = "joint") -> tuple[list[str], str]:
     """The same for first actions `given` (1, D) at the postures `wanted` (1, D)."""
+    space = cases[0].space
     given = np.concatenate([case.given for case in cases])
     wanted = np.concatenate([case.wanted for case in cases])
-    grips = given[:, cases[0].grippers]
+    grips = given[:, space.grippers]
     found = []
     if grips.min() < -SLACK or grips.max() > 1 + SLACK:
         found.append(
             f"gripper numbers run from {grips.min():.3g} to {grips.max():.3g}; here 0 is closed "
             "and 1 open, and what lies outside is cut off"
         )
-    elif grips.min() >= 0 and grips.max() <= 0.12 and wanted[:, cases[0].grippers].min() > 0.4:
+    elif grips.min() >= 0 and grips.max() <= 0.12 and wanted[:, space.grippers].min() > 0.4:
         found.append(
             f"gripper numbers stay below {grips.max():.3g} though the grippers are shown open: are "
             "they openings in metres? Here 1 is open"
         )
-    jump = _jump(given, wanted, cases[0])
-    unit = "rad" if cases[0].space == "joint" else "m"
-    far = jump > JUMP[cases[0].space]
-    if cases[0].space == "ee":
-        lengths = np.linalg.norm(given.reshape(-1, 8)[:, 3:7], axis=1)
+    jump = _jump(given - wanted, space)
+    unit = "rad" if space.kind == "joint" else "m"
+    far = jump > JUMP[space.kind]
+    if space.kind == "ee":
+        lengths = np.concatenate(
+            [np.linalg.norm(given[:, arm.quaternion], axis=1) for arm in space.arms]
+        )
         if np.abs(lengths - 1).max() > 0.1:
             found.append(
                 f"quaternions have lengths from {lengths.min():.2f} to {lengths.max():.2f}"
             )
     if action != "delta_ee":
         findings = judge(cases, {}, gain=GAIN)
-        grip = np.abs(given - wanted)[:, cases[0].grippers].mean()
+        grip = np.abs(given - wanted)[:, space.grippers].mean()
         if findings.best is not None and (far or grip > TURNED or findings.base.score > 3):
             found.append(
                 f"the first action is far from the state; it looks as if {findings.best.phrase}"
@@ -131,9 +136,8 @@ def odd(cases: Sequence[Sample], action: str = "joint") -> tuple[list[str], str]
     return found, f"at most {seen}"
 
 
-def _jump(given: Any, wanted: Any, case: Sample) -> float:
+def _jump(gap: Array, space: ActionSpace) -> float:
     """The longest way that a first action asks for: of a joint [rad] or a hand [m]."""
-    gap = given - wanted
-    if case.space == "joint":
-        return float(np.abs(gap[:, case.joints]).max())
-    return float(np.linalg.norm(gap.reshape(-1, 8)[:, :3], axis=1).max())
+    if space.kind == "joint":
+        return float(np.abs(gap[:, space.bodies]).max())
+    return max(float(np.linalg.norm(gap[:, arm.position], axis=1).max()) for arm in space.arms)

@@ -56,6 +56,9 @@ def _state(change: Callable[[Array], Array], poses: Callable[[Array], Array] | N
     """Changes the joints shown, and the poses."""
 
     def undo(seen: Mapping[str, Any], extra: Mapping[str, Any]) -> Mapping[str, Any] | None:
+        if len(seen.get("state", ())) % 2:  # arms of different joint counts
+            return None
+
         def changed(view: Mapping[str, Any]) -> dict[str, Any]:
             new: dict[str, Any] = {}
             if "state" in view:

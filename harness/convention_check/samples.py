@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from robospa.action_space import ARMS, ActionSpace
 from robospa.geometry import Array
 from robospa.rotations import angle_between
 
@@ -21,10 +22,11 @@ class Sample:
     """One answer: `given` (K, D) beside what came next in the record, `wanted` (K, D).
 
     `now` (D,) is the command at that frame, `track` (T, D) the whole record of which `now` is row
-    `t`; `measured` the same as the robot measured it, if known. All in `space`, joint or ee.
+    `t`; `measured` the same as the robot measured it, if known. All in `space`, of the kind joint
+    or ee.
     """
 
-    space: str
+    space: ActionSpace
     given: Array
     wanted: Array
     now: Array
@@ -32,40 +34,25 @@ class Sample:
     t: int = 0
     measured: Array | None = None
 
-    @property
-    def half(self) -> int:
-        """Columns of one arm, the last of which is its gripper."""
-        return int(self.given.shape[1]) // 2
 
-    @property
-    def grippers(self) -> list[int]:
-        """The columns of both grippers."""
-        return [self.half - 1, 2 * self.half - 1]
-
-    @property
-    def joints(self) -> list[int]:
-        """All other columns."""
-        return [c for c in range(2 * self.half) if c not in self.grippers]
-
-
-def groups(space: str) -> list[str]:
+def groups(space: ActionSpace) -> list[str]:
     """What errors are told of, in order."""
-    kinds = ("joints", "gripper") if space == "joint" else ("position", "rotation", "gripper")
-    return [f"{arm} {kind}" for arm in ("left", "right") for kind in kinds]
+    parts = ("joints", "gripper") if space.kind == "joint" else ("position", "rotation", "gripper")
+    return [f"{arm} {part}" for arm in ARMS for part in parts]
 
 
 def errors(case: Sample) -> Array:
     """Mean error of each of `groups`: [rad] over joints, [m], [rad] of turning, gripper 0..1."""
     found = []
-    for arm in (0, 1):
-        part = slice(arm * case.half, (arm + 1) * case.half)
-        a, b = case.given[:, part], case.wanted[:, part]
-        if case.space == "joint":
-            found.append(np.abs(a[:, :-1] - b[:, :-1]).mean())
+    a, b = case.given, case.wanted
+    for arm in case.space.arms:
+        if case.space.kind == "joint":
+            found.append(np.abs(a[:, arm.body] - b[:, arm.body]).mean())
         else:
-            found.append(np.linalg.norm(a[:, :3] - b[:, :3], axis=1).mean())
-            found.append(_angle(a[:, 3:7], b[:, 3:7]).mean())
-        found.append(np.abs(a[:, -1] - b[:, -1]).mean())
+            place, turn = arm.position, arm.quaternion
+            found.append(np.linalg.norm(a[:, place] - b[:, place], axis=1).mean())
+            found.append(_angle(a[:, turn], b[:, turn]).mean())
+        found.append(np.abs(a[:, arm.gripper] - b[:, arm.gripper]).mean())
     return np.array(found)
 
 

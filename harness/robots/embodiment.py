@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from robospa.action_space import ActionSpace
 from robospa.geometry import Pose, Vec3
 from robospa.tasks.shapes import Shape
 from robospa.workcell import Workcell
@@ -84,7 +85,10 @@ class Embodiment:
     body: tuple[Shape, ...] = field(default=())
     """What stands still beside the arms (stand, columns), in the world frame: only drawn."""
 
-    @property
-    def action_dim(self) -> int:
-        """Length of a joint action: both arms' joints and one gripper value each."""
-        return sum(len(arm.joints) + 1 for arm in self.arms)
+    def action_space(self, kind: str) -> ActionSpace:
+        """The columns of this robot's actions of a `kind`; ValueError for one that does not exist.
+
+        A state has those of a "joint" action.
+        """
+        left, right = self.arms
+        return ActionSpace(kind, (len(left.joints), len(right.joints)))

@@ -37,7 +37,8 @@ class Drives:
     """The drives of a loaded robot; `now` is the trajectory that they follow and the row reached.
 
     `joints` (2, J) [rad] and `gripper` (2,) are as commanded; `opening` (2,) is the grippers' drive
-    target, which may lag an opening gripper's command.
+    target, which may lag an opening gripper's command. J is the joint count of the arm that has
+    more; the other's row ends in zeros.
 
     Grippers get position targets only (official), so they follow with a time constant of
     damping / stiffness = 0.2 s; arm joints get position and velocity targets.
@@ -49,7 +50,9 @@ class Drives:
             _bind(arm, articulation)
             for arm, articulation in zip(embodiment.arms, articulations, strict=True)
         ]
-        home = np.array([[arm.home] for arm in embodiment.arms], dtype=float)
+        home = np.zeros((2, 1, max(len(arm.joints) for arm in embodiment.arms)))
+        for a, side in enumerate(embodiment.arms):
+            home[a, 0, : len(side.joints)] = side.home
         opened = np.ones((2, 1))
         self.now = (Trajectory(home, np.zeros_like(home), opened, opened), 0)
         self._go_home()
@@ -125,14 +128,14 @@ class Drives:
         """Joints [rad] and gripper 0..1 of left and right (D,): as commanded, or as they are."""
         parts: list[float] = []
         gripper = self.gripper
-        joints = self.measured() if measured else self.joints.tolist()
+        joints: Any = self.measured() if measured else self.joints.tolist()
         for a, arm in enumerate(self._arms):
             opening = float(gripper[a])
             if measured:
                 closed, opened = self._embodiment.arms[a].gripper
                 travel = float(arm.articulation.qpos[arm.finger_columns].mean())
                 opening = min(1.0, max(0.0, (travel - closed) / (opened - closed)))
-            parts += [*joints[a], opening]
+            parts += [*joints[a][: len(arm.columns)], opening]
         return np.array(parts, dtype=np.float32)
 
 

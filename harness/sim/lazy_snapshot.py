@@ -76,10 +76,12 @@ class PoseTable(Mapping[str, Pose]):
 class StateLayout:
     """What the rows and columns of a state mean: of one embodiment in one scene.
 
-    `tools` are, per arm, the row of the last link and the end-effector frame in it.
+    `tools` are, per arm, the row of the last link and the end-effector frame in it; `joints` how
+    many joints each arm has.
     """
 
     tools: tuple[tuple[int, Pose], ...]
+    joints: tuple[int, int]
     workcell: Workcell
 
 
@@ -211,7 +213,8 @@ class LazySnapshot(Snapshot):
         """Commanded joints."""
         path, row = self._commanded
         left, right = path.joints[:, row].tolist()
-        return tuple(left), tuple(right)
+        a, b = self._layout.joints
+        return tuple(left[:a]), tuple(right[:b])
 
     @property
     def contacts(self) -> tuple[Contact, ...]:

@@ -90,6 +90,7 @@ class SapienWorld:
                 (physics.links[a][arm.last_link], arm.tool)
                 for a, arm in enumerate(self._embodiment.arms)
             ),
+            self._embodiment.action_space("joint").joints,
             self._embodiment.workcell,
         )
         self._later = sorted(

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from unequal_arms import unequal_arms
 from world_scenes import READY, joint_action
 
-from robospa.harness.actions import ActionReader, labels
+from robospa.harness.actions import ActionReader
 from robospa.harness.robots import embodiment
 from robospa.harness.robots.kinematics import end_effector
 from robospa.harness.world import ActionError
@@ -117,4 +118,29 @@ def test_a_quaternion_of_no_length_is_refused() -> None:
 
 @pytest.mark.parametrize(("space", "length"), [("joint", 14), ("ee", 16), ("delta_ee", 16)])
 def test_every_number_has_a_name(space: str, length: int) -> None:
-    assert len(set(labels(ROBOT, space))) == length
+    assert ROBOT.action_space(space).width == length
+
+
+def test_arms_may_have_different_joint_counts() -> None:
+    reader = ActionReader(unequal_arms())
+    action = np.array([*READY, 0.25, *READY, 0.1, 0.75])
+    goals = reader.goals(action, "joint", np.zeros((2, 7)))
+    assert goals.joints.tolist() == [[*READY, 0.0], [*READY, 0.1]]
+    assert goals.gripper.tolist() == [0.25, 0.75]
+    with pytest.raises(ActionError, match=r"shape \(15,\), got \(14,\)"):
+        reader.goals(action[:14], "joint", np.zeros((2, 7)))
+
+
+def test_poses_move_arms_of_different_joint_counts() -> None:
+    reader = ActionReader(unequal_arms())
+    start = np.array([[*READY, 0.0], [*READY, 0.1]])
+    rows = []
+    for chain, joints in zip(reader.chains, (READY, (*READY, 0.1)), strict=True):
+        pose = end_effector(chain, joints)
+        x, y, z = pose.position
+        rows += [x, y, z + 0.01, *pose.rotation, 0.5]
+    goals = reader.goals(np.array(rows), "ee", start)
+    assert goals.problems == ()
+    assert goals.joints[0, 6] == 0.0
+    moved = end_effector(reader.chains[1], goals.joints[1].tolist())
+    assert moved.position == pytest.approx(rows[8:11], abs=1e-4)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from robospa.action_space import ActionSpace
 from robospa.geometry import axis_rotation
 from robospa.harness.convention_check.episodes import Episode
 from robospa.protocol.policy import CameraSpec, PolicySpec, TrialInfo
@@ -52,7 +53,14 @@ def episode(measured: bool = True) -> Episode:
     frames = {n: [picture(k, n) for k in range(FRAMES)] for n in names}
     about = {"task": "Pick_Blocks_Size", "level": 1, "seed": 7}
     return Episode(
-        "made-up.hdf5", commanded, ee, frames, "Pick it up.", late if measured else None, about
+        "made-up.hdf5",
+        commanded,
+        ee,
+        frames,
+        ActionSpace("joint"),
+        "Pick it up.",
+        late if measured else None,
+        about,
     )
 
 

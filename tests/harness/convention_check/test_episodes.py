@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from replay_fakes import FRAMES, SPEC, episode
 
+from robospa.action_space import ActionSpace
 from robospa.harness.convention_check import episodes
 from robospa.harness.convention_check.episodes import (
     EpisodeError,
@@ -164,7 +165,7 @@ def test_a_recorder_keeps_a_frame_every_15_physics_steps() -> None:
     for step in range(5, 65, 5):
         recorder.polled(world, step / 250)  # type: ignore[arg-type]
     recorder.ended(world)  # type: ignore[arg-type]
-    made = recorder.episode("x", "Go.", {"task": "T"})
+    made = recorder.episode("x", "Go.", {"task": "T"}, ActionSpace("joint"))
     assert len(made) == 1 + 4 + 1
     assert made.measured is not None and made.measured.min() == 1 and made.commanded.max() == 0
     assert episodes.EVERY / episodes.RATE == 0.06

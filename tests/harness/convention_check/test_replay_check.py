@@ -23,6 +23,7 @@ from replay_fakes import (
     swapped_wrists,
 )
 
+from robospa.action_space import ActionSpace
 from robospa.geometry import Pose
 from robospa.harness.convention_check.check import Findings, absolute, replay
 from robospa.harness.convention_check.episodes import EpisodeError
@@ -180,7 +181,7 @@ def test_differences_of_pose_are_added_up_before_they_are_compared() -> None:
             step = one.inverse() * two
             row += [*step.position, *step.rotation, b[7]]
         deltas.append(row)
-    assert np.allclose(absolute(np.array(deltas), now), wanted, atol=1e-9)
+    assert np.allclose(absolute(np.array(deltas), now, ActionSpace("ee")), wanted, atol=1e-9)
 
 
 def test_a_policy_that_learned_nothing_is_accused_of_nothing() -> None:

@@ -8,12 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from unequal_arms import READY, unequal_arms
 
 from robospa.baselines.oracle import Oracle
 from robospa.geometry import Pose
 from robospa.harness.robots import embodiment
 from robospa.harness.robots.kinematics import chain_of, end_effector
-from robospa.protocol.policy import TrialInfo
+from robospa.harness.sim import sapien_world
+from robospa.protocol.policy import PolicySpec, TrialInfo
+from robospa.tasks.catalog import build_scene
 from robospa.trial import TrialKey
 
 CHAINS = [chain_of(arm) for arm in embodiment("aloha-agilex").arms]
@@ -63,3 +66,18 @@ def test_an_oracle_in_disguise_solves_its_trial(space: str) -> None:
     record = run_trial(SapienWorld(render=False), Disguised(space), key, policy_seed=0)
     assert record.success, record.message or record.diagnostics
     assert "unreachable_actions" not in record.diagnostics
+
+
+@pytest.mark.sim
+def test_a_robot_whose_arms_have_different_joint_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    robot = unequal_arms()
+    monkeypatch.setattr(sapien_world, "embodiment_named", lambda name: robot)
+    world = sapien_world.SapienWorld(render=False)
+    world.load(build_scene("Pick_Blocks_Size", 1, 100_000))
+    action = np.array([*READY, 0.25, *READY, 0.3, 0.75], np.float32)
+    world.step(action, "joint", lambda snapshot: False)
+    for state in ("commanded", "measured"):
+        seen = world.observe(PolicySpec("test", (), state=state))
+        assert seen["state"] == pytest.approx(action, abs=0.1)
+    assert [len(joints) for joints in world.snapshot().joints] == [6, 7]
+    world.close()
