@@ -18,7 +18,7 @@ from typing import Any, ClassVar
 
 import msgpack
 import numpy as np
-from standin_base import StandIn
+from standin_base import QUICK, TRIAL, StandIn, observation
 from standin_codecs import (
     framed_in,
     framed_out,
@@ -32,6 +32,8 @@ from standin_codecs import (
 )
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.server import serve
+
+from robospa.clients import connect
 
 # ---------------------------------------------------------------- HTTP
 
@@ -346,3 +348,11 @@ class RoboTwin(StandIn):
         for piece in [frame[i : i + 1] for i in range(len(frame))] if self.slowly else [frame]:
             sock.sendall(piece)
         return good
+
+
+def first_request(server: Any, query: str = "", seen: Any = None) -> Any:
+    """What our client sends `server` first in a trial; `query` has its options."""
+    with server as url, connect(url + query, timeouts=QUICK) as policy:
+        policy.reset(TRIAL)
+        policy.infer(observation() if seen is None else seen)
+    return server.requests[0]
