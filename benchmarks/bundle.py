@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.categories import CATEGORIES
-from robospa.harness.grid import on_grid
+from robospa.harness.quantize import quantize
 from robospa.harness.running.manifest import about_machine, group_keys, seed_hash
 from robospa.harness.trial import policy_seed
 from robospa.leaderboard.packing import inputs_of, sizes_of, write_bundle
@@ -77,7 +77,7 @@ class Traces:
 
     def __call__(self, key: TrialKey) -> NDArray[np.float32]:
         seed = [int.from_bytes(hashlib.sha256(key.slug.encode()).digest()[:8], "big")]
-        return on_grid(actions(np.random.default_rng(seed), self._steps[key], self._noise))
+        return quantize(actions(np.random.default_rng(seed), self._steps[key], self._noise))
 
 
 def record(key: TrialKey, facts: Any, steps: int, success: bool, digest: str) -> TrialRecord:

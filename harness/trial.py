@@ -21,7 +21,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.harness.grid import on_grid
+from robospa.harness.quantize import quantize
 from robospa.harness.world import ActionError, World
 from robospa.protocol.errors import PolicyAnswerError
 from robospa.protocol.policy import Policy, PolicySpec, TrialInfo
@@ -177,13 +177,13 @@ class _Run:
             self.past[step] = _present(self.watch.call("rendering", self.world.observe, plain))
 
     def ask(self, spec: PolicySpec) -> NDArray[np.float32]:
-        """The policy's next actions, float32 (T, D), on the grid on which they are executed."""
+        """The policy's next actions, float32 (T, D), quantised as they are executed."""
         observation = self.observation(spec)
         begun = time.perf_counter()
         answer = self.watch.call("waiting", self.policy.infer, observation)
         self.latencies.append(1000.0 * (time.perf_counter() - begun))
         self.told.append(getattr(self.policy, "last_timing", {}))
-        return on_grid(check_chunk(answer, spec))
+        return quantize(check_chunk(answer, spec))
 
     def execute(self, action: NDArray[np.float32], space: str) -> bool:
         """Whether the goal was met or lost during `action`."""

@@ -5,7 +5,7 @@
     uint32    actions of each trial
     4 planes  the differences from action to action, most significant bytes first
 
-All little-endian. Executed actions lie on the grid of `harness.grid`, so every number is a whole
+All little-endian. Executed actions are quantised (`harness.quantize`), so every number is a whole
 number of its steps; nothing finer can be written down, and the same float32 bits come back. Of each
 the difference to the action before is kept, small ones of either sign as small numbers; column by
 column through all trials, first all first bytes, then all second ones and so on. Deflate finds
@@ -22,7 +22,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.harness.grid import FURTHEST, PER_UNIT, is_on_grid
+from robospa.harness.quantize import LARGEST, STEPS_PER_UNIT, is_quantized
 from robospa.leaderboard.bundle import BundleError
 
 MAGIC = b"rspa-a2\n"
@@ -84,10 +84,13 @@ def decode(data: bytes, what: str) -> list[Trace]:
             own = table[:, first:last]
             np.cumsum(own, axis=1, dtype=np.uint32, out=own)
     steps = np.ascontiguousarray(table.T).view(np.int32)
-    if count and not -FURTHEST * PER_UNIT <= steps.min() <= steps.max() <= FURTHEST * PER_UNIT:
-        raise BundleError(f"{what} has an action with a number beyond {FURTHEST}")
+    if (
+        count
+        and not -LARGEST * STEPS_PER_UNIT <= steps.min() <= steps.max() <= LARGEST * STEPS_PER_UNIT
+    ):
+        raise BundleError(f"{what} has an action with a number beyond {LARGEST}")
     floats = steps.astype(np.float32)
-    floats /= np.float32(PER_UNIT)
+    floats /= np.float32(STEPS_PER_UNIT)
     return [floats[a:b] for a, b in pairwise(ends)]
 
 
@@ -101,8 +104,8 @@ def _joined(planes: NDArray[np.uint8]) -> Words:
 
 def _differences(trace: Trace) -> Words:
     """Zigzag differences of the whole numbers of grid steps in `trace` (T, D)."""
-    if not is_on_grid(trace):
-        raise ValueError(f"an action is finer than 1/{PER_UNIT} or beyond {FURTHEST}")
-    steps = (trace * np.float32(PER_UNIT)).astype(np.int32).view(np.uint32)
+    if not is_quantized(trace):
+        raise ValueError(f"an action is finer than 1/{STEPS_PER_UNIT} or beyond {LARGEST}")
+    steps = (trace * np.float32(STEPS_PER_UNIT)).astype(np.int32).view(np.uint32)
     steps[1:] -= steps[:-1].copy()
     return (steps << ONE) ^ -(steps >> TOP)

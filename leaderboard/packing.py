@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from robospa.harness.factory import load_function
-from robospa.harness.grid import PER_UNIT, is_on_grid
+from robospa.harness.quantize import STEPS_PER_UNIT, is_quantized
 from robospa.harness.running.manifest import changed_settings, group_keys, seed_hash
 from robospa.harness.running.store import action_path, read_actions
 from robospa.leaderboard import bundle as layout
@@ -93,10 +93,10 @@ def pack(
 
         def trace(key: TrialKey) -> Trace:
             actions = read_actions(action_path(homes[key], key))[0]
-            if not is_on_grid(actions):
+            if not is_quantized(actions):
                 raise BundleError(
-                    f"{key.slug} has actions finer than 1/{PER_UNIT}, as runs of older versions "
-                    "have: run it again with this one"
+                    f"{key.slug} has actions finer than 1/{STEPS_PER_UNIT}, as runs of older "
+                    "versions have: run it again with this one"
                 )
             return actions
 

@@ -165,7 +165,7 @@ MUTATIONS = (
         "if abs(length - 1.0) > QUATERNION_TOLERANCE:",
         "if abs(length - 1.0) > 99:",
     ),
-    _one("coarse grid", "harness", "PER_UNIT = 2**16", "PER_UNIT = 2**8"),
+    _one("coarse grid", "harness", "STEPS_PER_UNIT = 2**16", "STEPS_PER_UNIT = 2**8"),
     _one(
         "every failure is retried for ever",
         "harness/running",

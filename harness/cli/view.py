@@ -19,11 +19,12 @@ def view(
     """Show tables, figures and trials with their videos at an address on this machine."""
     import time
 
-    from robospa.harness.viewing import View, serving
+    from robospa.harness.live_report import LiveReport
+    from robospa.harness.report_server import serving
     from robospa.results.paper.published import load
 
     published = tuple(load().models) if with_published else ()
-    with serving(View(run, published), port) as server:
+    with serving(LiveReport(run, published), port) as server:
         print(f"{run} is shown at {server.address}, end with Ctrl-C", flush=True)
         until = time.monotonic() + 60 * minutes if minutes > 0 else float("inf")
         try:

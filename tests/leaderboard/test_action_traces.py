@@ -10,12 +10,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from robospa.harness.grid import on_grid
+from robospa.harness.quantize import quantize
 from robospa.leaderboard.action_traces import decode, encode
 from robospa.leaderboard.bundle import BundleError
 
 ANY = st.integers(0, 5).flatmap(
-    lambda n: arrays(np.float32, (n, 3), elements=st.floats(width=32, allow_nan=False)).map(on_grid)
+    lambda n: arrays(np.float32, (n, 3), elements=st.floats(width=32, allow_nan=False)).map(
+        quantize
+    )
 )
 
 
@@ -31,7 +33,7 @@ def test_every_bit_comes_back(traces: list[np.ndarray]) -> None:
 
 def test_smooth_actions_shrink() -> None:
     time = np.linspace(0, 6, 500, dtype=np.float32)[:, None]
-    trace = on_grid(np.sin(time + np.arange(14, dtype=np.float32)))
+    trace = quantize(np.sin(time + np.arange(14, dtype=np.float32)))
     packed = zlib.compress(encode([trace]), 6)
     assert len(packed) < 0.6 * len(zlib.compress(trace.tobytes(), 6))
 

@@ -99,13 +99,13 @@ def test_outcomes_forged_with_all_hashes_are_caught(files: Files, tmp_path: Path
 def test_actions_of_another_task_forged_with_all_hashes_are_caught(
     files: Files, tmp_path: Path
 ) -> None:
-    from robospa.harness.grid import on_grid
+    from robospa.harness.quantize import quantize
     from robospa.harness.trial import actions_digest
     from robospa.leaderboard.action_traces import decode, encode
     from robospa.leaderboard.record_rows import trace_hash
 
     name = layout.actions_name(PRESS, 1)
-    traces = [on_grid(0.5 * trace) for trace in decode(files[name], name)]
+    traces = [quantize(0.5 * trace) for trace in decode(files[name], name)]
     files[name] = encode(traces)
     rows = rows_of(files)
     own = [

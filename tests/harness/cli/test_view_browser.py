@@ -13,8 +13,9 @@ import pytest
 from devtools import Page, chromium
 from report_runs import EVIL, make_run, record, write_film
 
-from robospa.harness import viewing
-from robospa.harness.viewing import View, serving
+from robospa.harness import live_report
+from robospa.harness.live_report import LiveReport
+from robospa.harness.report_server import serving
 from robospa.results.records.run_io import to_line
 
 pytestmark = pytest.mark.browser
@@ -32,7 +33,7 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
 @pytest.fixture
 def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Four of seven listed trials, the first filmed."""
-    monkeypatch.setattr(viewing, "REST", 0.0)
+    monkeypatch.setattr(live_report, "PAUSE_FACTOR", 0.0)
     events = ({"time": 4.0, "kind": "wrong_object", "object": "b", "index": -1, "note": EVIL},)
     records = [record("Pick_Blocks_Size", 1, n, n > 0, candidates=2) for n in range(4)]
     records[0] = replace(records[0], video="videos/a.mp4", events=events, message=EVIL)
@@ -47,7 +48,7 @@ def page(browser: Page, run: Path) -> Iterator[Page]:
     """The run's page; afterwards nothing may have gone wrong in it."""
     browser.problems.clear()
     browser.look(1200)
-    with serving(View(run)) as server:
+    with serving(LiveReport(run)) as server:
         browser.call("Page.navigate", url=server.address)
         browser.wait("document.readyState === 'complete' && location.protocol === 'http:'")
         yield browser

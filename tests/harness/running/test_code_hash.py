@@ -115,7 +115,7 @@ def installed() -> dict[str, bytes]:
 
 def test_it_covers_the_modules_of_a_trial_and_no_others() -> None:
     names = set(covered(installed()))
-    for name in ("harness.trial", "harness.grid", "tasks.catalog", "protocol.client", "geometry"):
+    for name in ("harness.trial", "tasks.catalog", "protocol.client", "geometry"):
         assert f"robospa.{name}" in names
     beside = ("harness.cli", "harness.pictures", "harness.running", "leaderboard", "baselines")
     assert [n for n in names if n.startswith(tuple(f"robospa.{b}" for b in beside))] == []

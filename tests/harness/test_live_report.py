@@ -10,8 +10,9 @@ from pathlib import Path
 import pytest
 from report_runs import EVIL, make_run, record
 
-from robospa.harness import viewing
-from robospa.harness.viewing import Server, View, part_of, serving
+from robospa.harness import live_report
+from robospa.harness.live_report import LiveReport
+from robospa.harness.report_server import ReportServer, byte_range, serving
 from robospa.results.records.manifest import RunError
 from robospa.results.records.run_io import to_line
 
@@ -22,7 +23,7 @@ RECORDS = [record("Pick_Blocks_Size", 1, n, n < 3, candidates=2) for n in range(
 @pytest.fixture
 def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Four of six listed trials are there, one filmed."""
-    monkeypatch.setattr(viewing, "REST", 0.0)
+    monkeypatch.setattr(live_report, "PAUSE_FACTOR", 0.0)
     records = [replace(RECORDS[0], video="videos/a.mp4", message=EVIL), *RECORDS[1:]]
     folder = make_run(tmp_path / "run", records, lost=2).folder
     (folder / "videos").mkdir()
@@ -31,12 +32,12 @@ def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.fixture
-def server(run: Path) -> Iterator[Server]:
-    with serving(View(run)) as found:
+def server(run: Path) -> Iterator[ReportServer]:
+    with serving(LiveReport(run)) as found:
         yield found
 
 
-def ask(server: Server, path: str, **headers: str) -> tuple[int, dict[str, str], bytes]:
+def ask(server: ReportServer, path: str, **headers: str) -> tuple[int, dict[str, str], bytes]:
     """Status, headers and body of an answer."""
     connection = http.client.HTTPConnection("127.0.0.1", server.server_port, timeout=30)
     try:
@@ -49,7 +50,7 @@ def ask(server: Server, path: str, **headers: str) -> tuple[int, dict[str, str],
         connection.close()
 
 
-def test_the_page_follows_the_records_and_writes_nothing(run: Path, server: Server) -> None:
+def test_the_page_follows_the_records_and_writes_nothing(run: Path, server: ReportServer) -> None:
     before = sorted(path.name for path in run.rglob("*"))
     status, headers, body = ask(server, "/")
     text = body.decode()
@@ -65,9 +66,9 @@ def test_the_page_follows_the_records_and_writes_nothing(run: Path, server: Serv
 
 
 def test_a_page_that_took_long_is_given_again_for_a_while(
-    run: Path, server: Server, monkeypatch: pytest.MonkeyPatch
+    run: Path, server: ReportServer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(viewing, "REST", 1e6)
+    monkeypatch.setattr(live_report, "PAUSE_FACTOR", 1e6)
     path = run / "trials" / "0000.jsonl"
     whole = path.read_bytes()
     path.write_bytes(whole + to_line(replace(RECORDS[0], key=replace(RECORDS[0].key, seed=900))).encode())  # fmt: skip  # noqa: E501
@@ -76,7 +77,7 @@ def test_a_page_that_took_long_is_given_again_for_a_while(
     assert ask(server, "/")[2] == first
 
 
-def test_videos_are_served_whole_and_in_parts(server: Server) -> None:
+def test_videos_are_served_whole_and_in_parts(server: ReportServer) -> None:
     assert ask(server, "/videos/a.mp4")[::2] == (200, FILM)
     status, headers, body = ask(server, "/videos/a.mp4", Range="bytes=10-19")
     assert (status, body) == (206, FILM[10:20])
@@ -97,7 +98,7 @@ def test_videos_are_served_whole_and_in_parts(server: Server) -> None:
     ],
 )
 def test_ranges(wanted: str, part: tuple[int, int]) -> None:
-    assert part_of(wanted, 200) == part
+    assert byte_range(wanted, 200) == part
 
 
 @pytest.mark.parametrize(
@@ -105,22 +106,24 @@ def test_ranges(wanted: str, part: tuple[int, int]) -> None:
     ["/run.json", "/videos/../run.json", "/videos/%2e%2e/run.json", "/videos/", "//etc/passwd",
      "/videos/%2fetc%2fpasswd", "/trials/0000.jsonl", "/videos/none.mp4"],
 )  # fmt: skip
-def test_nothing_else_is_served(server: Server, path: str) -> None:
+def test_nothing_else_is_served(server: ReportServer, path: str) -> None:
     assert ask(server, path)[0] == 404
 
 
-def test_a_link_out_of_the_run_is_not_followed(run: Path, server: Server, tmp_path: Path) -> None:
+def test_a_link_out_of_the_run_is_not_followed(
+    run: Path, server: ReportServer, tmp_path: Path
+) -> None:
     (tmp_path / "secret.mp4").write_bytes(b"x")
     (run / "videos" / "b.mp4").symlink_to(tmp_path / "secret.mp4")
     assert ask(server, "/videos/b.mp4")[0] == 404
 
 
-def test_other_names_of_this_machine_are_refused(server: Server) -> None:
+def test_other_names_of_this_machine_are_refused(server: ReportServer) -> None:
     assert ask(server, "/", Host="evil.example")[0] == 403
     assert ask(server, "/", Host=f"localhost:{server.server_port}")[0] == 200
 
 
-def test_records_that_contradict_each_other_are_told(run: Path, server: Server) -> None:
+def test_records_that_contradict_each_other_are_reported(run: Path, server: ReportServer) -> None:
     other = replace(RECORDS[1], digest="other")
     (run / "trials" / "0001.jsonl").write_text(to_line(other))
     status, _, body = ask(server, "/")
@@ -129,4 +132,4 @@ def test_records_that_contradict_each_other_are_told(run: Path, server: Server) 
 
 def test_what_is_no_run_is_refused(tmp_path: Path) -> None:
     with pytest.raises(RunError, match="is not a run"):
-        View(tmp_path)
+        LiveReport(tmp_path)

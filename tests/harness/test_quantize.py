@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from run_fakes import FakePolicy, FakeWorld, parts
 
-from robospa.harness.grid import PER_UNIT, is_on_grid, on_grid
 from robospa.harness.pictures.video import TrialRecorder
+from robospa.harness.quantize import STEPS_PER_UNIT, is_quantized, quantize
 from robospa.harness.trial import actions_digest, run_trial
 from robospa.harness.world import Poll, StepResult
 from robospa.trial import TrialKey
@@ -25,17 +25,17 @@ FINITE = arrays(np.float32, (4, 3), elements=st.floats(width=32, allow_nan=False
 @settings(max_examples=100, deadline=None)
 @given(FINITE)
 def test_rounding_again_changes_no_bit(actions: np.ndarray) -> None:
-    once = on_grid(actions)
+    once = quantize(actions)
     assert once.dtype == np.float32
-    assert on_grid(once).tobytes() == once.tobytes()
-    assert is_on_grid(once)
+    assert quantize(once).tobytes() == once.tobytes()
+    assert is_quantized(once)
 
 
 @settings(max_examples=50, deadline=None)
 @given(arrays(np.float32, 5, elements=st.floats(-200, 200, width=32)))
 def test_nothing_moves_by_more_than_half_a_step(actions: np.ndarray) -> None:
-    moved = np.abs(on_grid(actions).astype(float) - actions.astype(float))
-    assert moved.max() <= 0.5 / PER_UNIT
+    moved = np.abs(quantize(actions).astype(float) - actions.astype(float))
+    assert moved.max() <= 0.5 / STEPS_PER_UNIT
 
 
 @pytest.mark.parametrize(
@@ -43,17 +43,17 @@ def test_nothing_moves_by_more_than_half_a_step(actions: np.ndarray) -> None:
     [(0.1, 6554 / 65536), (1.0, 1.0), (-0.25, -0.25), (1e30, 32767.0), (-1e30, -32767.0)],
 )
 def test_single_numbers(number: float, rounded: float) -> None:
-    assert on_grid(np.array([number], np.float32))[0] == rounded
+    assert quantize(np.array([number], np.float32))[0] == rounded
 
 
 def test_minus_zero_becomes_zero() -> None:
-    rounded = on_grid(np.array([-0.0, -1e-9], np.float32))
+    rounded = quantize(np.array([-0.0, -1e-9], np.float32))
     assert not np.signbit(rounded).any()
 
 
 @pytest.mark.parametrize("odd", [0.1, -0.0, np.nan, np.inf, 1e30])
 def test_what_is_not_on_the_grid_is_noticed(odd: float) -> None:
-    assert not is_on_grid(np.array([odd], np.float32))
+    assert not is_quantized(np.array([odd], np.float32))
 
 
 class Watching(FakeWorld):
@@ -78,6 +78,6 @@ class Jittery(FakePolicy):
 def test_what_is_executed_is_on_the_grid_and_is_what_is_recorded() -> None:
     world, recorder = Watching(), TrialRecorder()
     record = run_trial(world, Jittery(), KEY, policy_seed=1, recorder=recorder, parts=parts)
-    assert is_on_grid(np.stack(world.executed))
+    assert is_quantized(np.stack(world.executed))
     assert np.array_equal(np.stack(world.executed), recorder.actions)
     assert actions_digest(list(recorder.actions)) == record.actions_digest

@@ -1,0 +1,162 @@
+"""A small local server for the report of a run.
+
+It listens on 127.0.0.1 only, answers only requests that name it so (a page from elsewhere cannot
+read it through another name), and serves two things: the page and the run's videos.
+"""
+
+from __future__ import annotations
+
+import re
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from http import HTTPStatus
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from socket import socket
+from urllib.parse import unquote
+
+from robospa.harness.live_report import LiveReport
+from robospa.results.records.manifest import RunError
+from robospa.results.report.trials import FILMS
+
+CONNECTIONS = 16
+BLOCK_BYTES = 1 << 18
+RANGE = re.compile(r"bytes=(\d*)-(\d*)")
+Request = socket | tuple[bytes, socket]
+
+
+class ReportServer(ThreadingHTTPServer):
+    """Serves one report on the loopback device to a bounded number of connections."""
+
+    daemon_threads = True
+    allow_reuse_address = True
+
+    def __init__(self, report: LiveReport, port: int = 0) -> None:
+        self.report = report
+        self._free = threading.Semaphore(CONNECTIONS)
+        super().__init__(("127.0.0.1", port), _Handler)
+
+    @property
+    def address(self) -> str:
+        """The URL of the page."""
+        return f"http://127.0.0.1:{self.server_port}/"
+
+    def process_request(self, request: Request, client_address: object) -> None:
+        """One more connection, or none if there are too many."""
+        if not self._free.acquire(blocking=False):
+            self.shutdown_request(request)
+            return
+        super().process_request(request, client_address)
+
+    def process_request_thread(self, request: Request, client_address: object) -> None:
+        """Count the connection as long as it lasts."""
+        try:
+            super().process_request_thread(request, client_address)
+        finally:
+            self._free.release()
+
+    def handle_error(self, request: Request, client_address: object) -> None:
+        """A browser that went away is no fault."""
+
+
+class _Handler(BaseHTTPRequestHandler):
+    server: ReportServer
+    timeout = 30
+    protocol_version = "HTTP/1.0"
+
+    def do_GET(self) -> None:
+        """The page or a video."""
+        port = self.server.server_port
+        if self.headers.get("Host") not in (f"127.0.0.1:{port}", f"localhost:{port}"):
+            self._send_text(HTTPStatus.FORBIDDEN, "this server is for this machine only")
+            return
+        path = unquote(self.path.partition("?")[0])
+        if path == "/":
+            self._send_page()
+        elif path.startswith(f"/{FILMS}/") and (
+            video := self.server.report.video(path.removeprefix(f"/{FILMS}/"))
+        ):
+            self._send_video(video)
+        else:
+            self._send_text(HTTPStatus.NOT_FOUND, "there is nothing of that name")
+
+    def log_message(self, format: str, *args: object) -> None:
+        """Print nothing."""
+
+    def _send_page(self) -> None:
+        try:
+            body, tag = self.server.report.read()
+        except (RunError, ValueError) as error:
+            self._send_text(HTTPStatus.INTERNAL_SERVER_ERROR, " ".join(str(error).split()))
+            return
+        if self.headers.get("If-None-Match") == tag:
+            self.send_response(HTTPStatus.NOT_MODIFIED)
+            self.end_headers()
+            return
+        self._send_head(HTTPStatus.OK, "text/html; charset=utf-8", len(body), ETag=tag)
+        self.wfile.write(body)
+
+    def _send_video(self, path: Path) -> None:
+        """A video or the part of it that is asked for: browsers need that to seek."""
+        size = path.stat().st_size
+        first, last = byte_range(self.headers.get("Range", ""), size)
+        if first > last:
+            missing = {"Content-Range": f"bytes */{size}"}
+            status = HTTPStatus.REQUESTED_RANGE_NOT_SATISFIABLE
+            self._send_head(status, "video/mp4", 0, **missing)
+            return
+        headers = {"Accept-Ranges": "bytes"}
+        status = HTTPStatus.OK
+        if last - first + 1 < size:
+            headers["Content-Range"] = f"bytes {first}-{last}/{size}"
+            status = HTTPStatus.PARTIAL_CONTENT
+        self._send_head(status, "video/mp4", last - first + 1, **headers)
+        with path.open("rb") as file:
+            file.seek(first)
+            left = last - first + 1
+            while left and (block := file.read(min(BLOCK_BYTES, left))):
+                self.wfile.write(block)
+                left -= len(block)
+
+    def _send_text(self, status: HTTPStatus, text: str) -> None:
+        data = text.encode()
+        self._send_head(status, "text/plain; charset=utf-8", len(data))
+        self.wfile.write(data)
+
+    def _send_head(self, status: HTTPStatus, kind: str, size: int, **more: str) -> None:
+        self.send_response(status)
+        common = {"Content-Type": kind, "Content-Length": str(size), "Cache-Control": "no-store"}
+        for name, value in {**common, "X-Content-Type-Options": "nosniff", **more}.items():
+            self.send_header(name, value)
+        self.end_headers()
+
+
+def byte_range(header: str, size: int) -> tuple[int, int]:
+    """First and last byte that a Range `header` asks for; all of them if it is not understood,
+    first > last if it asks for bytes that are not there."""
+    match = RANGE.fullmatch(header.strip())
+    if not match or match.groups() == ("", ""):
+        return 0, size - 1
+    if not match[1]:
+        return max(0, size - int(match[2])), size - 1
+    last = min(int(match[2]), size - 1) if match[2] else size - 1
+    return int(match[1]), last
+
+
+@contextmanager
+def serving(report: LiveReport, port: int = 0) -> Iterator[ReportServer]:
+    """A server that answers in the background until the block ends."""
+    try:
+        server = ReportServer(report, port)
+    except OSError as error:
+        raise OSError(f"port {port} cannot be used: {error.strerror}; leave --port out") from None
+    thread = threading.Thread(target=server.serve_forever, args=(0.2,), daemon=True)
+    thread.start()
+    try:
+        yield server
+    finally:
+        server.shutdown()
+        server.server_close()
+        thread.join()
+        report.close()
