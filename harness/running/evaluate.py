@@ -15,12 +15,12 @@ from typing import Any
 
 from robospa.harness.factory import is_url, load_function
 from robospa.harness.running.executor import RunAborted
-from robospa.harness.running.locking import locked
 from robospa.harness.running.manifest import Manifest, about_machine, check_folder, open_run
 from robospa.harness.running.policies import Probed, probe_policies, warnings_of
 from robospa.harness.running.progress import Progress, summary
 from robospa.harness.running.ray_cluster import RaySettings
 from robospa.harness.running.ray_executor import loopback_warnings, ray_executor
+from robospa.harness.running.run_lock import run_lock
 from robospa.harness.running.runner import Runner, RunOptions
 from robospa.harness.running.store import drop_parts, replace_file, tidy
 from robospa.harness.running.worker import WorkerConfig, describe
@@ -172,7 +172,10 @@ def evaluate(request: Request) -> None:
             if is_url(p.target)
         },
     )
-    with ray_executor(request.ray, config, _renders(config, policies)) as executor, locked(folder):
+    with (
+        ray_executor(request.ray, config, _renders(config, policies)) as executor,
+        run_lock(folder),
+    ):
         tidy(folder)
         open_run(folder, manifest, request.resume)
         if request.settings is not None:

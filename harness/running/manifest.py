@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from robospa.harness.running.code_hash import code_hash
-from robospa.harness.running.locking import LOCK
+from robospa.harness.running.run_lock import LOCK
 from robospa.harness.running.store import PART, replace_file
 from robospa.results.records.manifest import (
     FORMAT,

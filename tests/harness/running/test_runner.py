@@ -126,7 +126,7 @@ DRIVER = """
 import sys
 from pathlib import Path
 from robospa.harness.running.runner import Runner, RunOptions
-from robospa.harness.running.locking import locked
+from robospa.harness.running.run_lock import run_lock
 from robospa.harness.running.worker import WorkerConfig
 from robospa.results.records.run_io import finished, read_records
 from robospa.results.records.trial_record import TrialKey
@@ -136,7 +136,7 @@ if __name__ == "__main__":
     config = WorkerConfig(folder, "run_fakes:slow", world="run_fakes:FakeWorld",
                           parts="run_fakes:parts")
     keys = [TrialKey("Pick_Fake", 1, 100000 + n) for n in range(30)]
-    with locked(folder):
+    with run_lock(folder):
         known = read_records(folder)
         owed = [k for k in keys if not finished(known.get(k))]
         print("owed", len(owed), flush=True)

@@ -1,0 +1,44 @@
+"""One driver per run: a lock on the file `.lock` of its folder, which also names the holder.
+
+The lock ends with its process, however that ends. File systems that several machines share pass
+it on or do not; where they do not, nothing keeps a driver of another machine out.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import socket
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from robospa.harness.running.store import storing
+from robospa.results.records.manifest import RunError
+
+LOCK = ".lock"
+NAME_BYTES = 160
+
+
+@contextmanager
+def run_lock(folder: Path) -> Iterator[None]:
+    """Hold the run in `folder` for this process; raises RunError if another one holds it."""
+    path = folder / LOCK
+    with storing(path):
+        folder.mkdir(parents=True, exist_ok=True)
+        file = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+    try:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            holder = os.pread(file, NAME_BYTES, 0).decode(errors="replace").strip()
+            name = f" ({holder})" if holder.isprintable() and holder else ""
+            raise RunError(f"another process{name} is running the run in {folder}") from error
+        except OSError:
+            pass  # a file system without locks
+        name = f"process {os.getpid()} on {socket.gethostname()}"
+        with storing(path):
+            os.pwrite(file, name.encode()[:NAME_BYTES].ljust(NAME_BYTES), 0)
+        yield
+    finally:
+        os.close(file)
