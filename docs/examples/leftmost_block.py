@@ -11,8 +11,9 @@ from robospa.geometry import Array, Pose, yaw_rotation
 from robospa.tasks.goals.pick import Lift, PickTracker
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText
-from robospa.tasks.layouts import Area, Mask, Points, scatter
 from robospa.tasks.plan import Pick, Skill
+from robospa.tasks.sampling.region import Area, Mask, Points
+from robospa.tasks.sampling.scatter import scatter
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.task import Draft, Level, Task, Tracker
 from robospa.workcell import TABLE_TOP, Workcell

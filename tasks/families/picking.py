@@ -11,9 +11,9 @@ import numpy as np
 
 from robospa.tasks.families.tabletop import draw_look
 from robospa.tasks.goals.pick import Lift, PickTracker
-from robospa.tasks.layouts import LayoutError
 from robospa.tasks.objects import object_model
 from robospa.tasks.plan import Pick, Skill
+from robospa.tasks.sampling.region import LayoutError
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Tracker
 from robospa.workcell import Workcell

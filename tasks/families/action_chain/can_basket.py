@@ -12,21 +12,14 @@ import math
 import numpy as np
 
 from robospa.tasks import objects
-from robospa.tasks.families.tabletop import (
-    Item,
-    Point,
-    draw_look,
-    free_point,
-    named,
-    radius,
-    retry,
-    standing,
-)
+from robospa.tasks.families.tabletop import Item, draw_look, named, radius, standing
 from robospa.tasks.goals.composite import ClickAndPlace, Placement
 from robospa.tasks.goals.repeat import PressCounter
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.plan import Home, Pick, Place, Press, Skill
+from robospa.tasks.sampling.points import free_point, retry
+from robospa.tasks.sampling.region import Point
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
 from robospa.workcell import Workcell

@@ -16,12 +16,10 @@ from robospa.geometry import Pose
 from robospa.tasks import objects
 from robospa.tasks.families.tabletop import (
     Item,
-    Point,
     draw_look,
     look_phrasings,
     named,
     radius,
-    retry,
     side,
     standing,
 )
@@ -31,6 +29,8 @@ from robospa.tasks.goals.repeat import PressCounter
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.plan import Open, Pick, Place, Press, Skill
+from robospa.tasks.sampling.points import retry
+from robospa.tasks.sampling.region import Point
 from robospa.tasks.scene import Scene
 from robospa.tasks.shapes import Hinge
 from robospa.tasks.task import Draft, Level, Task

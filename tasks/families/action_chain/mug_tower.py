@@ -16,21 +16,13 @@ import numpy as np
 from robospa.geometry import Pose
 from robospa.tasks.families.action_chain.stations import frame_of
 from robospa.tasks.families.dustbin.floor_bin import reachable
-from robospa.tasks.families.tabletop import (
-    Item,
-    Point,
-    draw_look,
-    free_point,
-    in_view,
-    named,
-    radius,
-    retry,
-    standing,
-)
+from robospa.tasks.families.tabletop import Item, draw_look, in_view, named, radius, standing
 from robospa.tasks.goals.checklist import Checklist, Counter, Near, Part, Rests
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.plan import Hang, Pick, Place, Skill
+from robospa.tasks.sampling.points import free_point, retry
+from robospa.tasks.sampling.region import Point
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
 from robospa.workcell import Workcell

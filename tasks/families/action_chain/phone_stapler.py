@@ -15,23 +15,15 @@ import numpy as np
 from robospa.geometry import Pose
 from robospa.tasks.families.action_chain.stations import button, frame_of
 from robospa.tasks.families.dustbin.floor_bin import BIN, TABLE_SHIFT, container
-from robospa.tasks.families.tabletop import (
-    Item,
-    Point,
-    draw_look,
-    free_point,
-    in_view,
-    named,
-    radius,
-    retry,
-    standing,
-)
+from robospa.tasks.families.tabletop import Item, draw_look, in_view, named, radius, standing
 from robospa.tasks.goals.checklist import Checklist, Counter, Inside, Near, Part, Rests
 from robospa.tasks.goals.flags import inside_box
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.instructions.words import times
 from robospa.tasks.plan import Dock, Home, Pour, Press, Skill
+from robospa.tasks.sampling.points import free_point, retry
+from robospa.tasks.sampling.region import Point
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
 from robospa.workcell import Workcell

@@ -12,22 +12,14 @@ import math
 import numpy as np
 
 from robospa.tasks.families.action_chain.stations import button, frame_of
-from robospa.tasks.families.tabletop import (
-    Item,
-    draw_look,
-    free_point,
-    named,
-    radius,
-    retry,
-    side,
-    standing,
-)
+from robospa.tasks.families.tabletop import Item, draw_look, named, radius, side, standing
 from robospa.tasks.goals.checklist import Checklist, Counter, Part
 from robospa.tasks.goals.stamping import StampCounter
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.instructions.words import times
 from robospa.tasks.plan import Press, Skill, Stamp
+from robospa.tasks.sampling.points import free_point, retry
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
 from robospa.workcell import Workcell

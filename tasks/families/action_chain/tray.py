@@ -15,21 +15,13 @@ import numpy as np
 from robospa.geometry import Pose
 from robospa.tasks import objects
 from robospa.tasks.families.action_chain.stations import button, frame_of, there_and_back
-from robospa.tasks.families.tabletop import (
-    Item,
-    Point,
-    draw_look,
-    free_point,
-    in_view,
-    named,
-    radius,
-    retry,
-    standing,
-)
+from robospa.tasks.families.tabletop import Item, draw_look, in_view, named, radius, standing
 from robospa.tasks.goals.checklist import Checklist, Counter, Part, Rests, on_spot
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.plan import Place, Skill
+from robospa.tasks.sampling.points import free_point, retry
+from robospa.tasks.sampling.region import Point
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
 from robospa.workcell import Workcell

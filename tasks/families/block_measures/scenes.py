@@ -19,7 +19,8 @@ from robospa.tasks.goals.pick import Lift
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.instructions.words import ordinal
-from robospa.tasks.layouts import Area, Mask, Points, scatter, spread
+from robospa.tasks.sampling.region import Area, Mask, Points, spread
+from robospa.tasks.sampling.scatter import scatter
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.task import Draft, Level, Task
 from robospa.workcell import TABLE_TOP, FixedCamera, Workcell

@@ -10,18 +10,17 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
-from robospa.geometry import Array
 from robospa.tasks.families.picking import lifted, pick_name, pick_target
 from robospa.tasks.families.tabletop import draw_look, standing
 from robospa.tasks.goals.pick import Lift
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.instructions.words import ordinal
-from robospa.tasks.layouts import LayoutError
+from robospa.tasks.sampling.grid import GridLayout
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.task import Draft, Draw, Level, Task
 from robospa.workcell import Workcell
@@ -32,133 +31,6 @@ Thing = tuple[str, Mapping[str, Any]]
 """Asset and parameters."""
 Things = Callable[[np.random.Generator, int], Sequence[Thing]]
 """Draws what stands on the `count` cells, in any order."""
-
-
-class Layout(Protocol):
-    """Where the objects of a level stand."""
-
-    @property
-    def rows(self) -> int: ...
-
-    @property
-    def columns(self) -> int: ...
-
-    def places(
-        self, rng: np.random.Generator, workcell: Workcell
-    ) -> Callable[[int, int], tuple[float, float]]:
-        """A drawn grid: place [m] of object `k` on cell `cell` (row by row from the robot)."""
-        ...
-
-
-@dataclass(frozen=True)
-class Grid:
-    """A grid of a level [m]: pitch, range of its centre, half range of each object's jitter.
-
-    Some official centres let the near row (and the outer columns of four) leave the head image;
-    `y` and, with four columns, `pitch_x` are chosen so that every object is seen. `x` is the
-    official range; the part of it in which all is in view is used. `radius` and `tall` bound the
-    objects for that.
-    """
-
-    rows: int
-    columns: int
-    pitch_x: float
-    pitch_y: float
-    x: tuple[float, float]
-    y: tuple[float, float]
-    jitter: tuple[float, float]
-    radius: float = 0.06
-    tall: float = 0.12
-
-    def centre_x(self, y: float, workcell: Workcell) -> tuple[float, float]:
-        """Where the centre may be when it is at `y`, so that the near row is in view."""
-        near = y - (self.rows - 1) / 2 * self.pitch_y - self.jitter[1]
-        half = (self.columns - 1) / 2 * self.pitch_x + self.jitter[0]
-        footprint, axis = (
-            workcell.view_span(near, self.radius),
-            workcell.view_span(near, 0.0, self.tall),
-        )
-        low = max(self.x[0], footprint[0] + half, axis[0] + half)
-        high = min(self.x[1], footprint[1] - half, axis[1] - half)
-        if low > high:
-            raise ValueError(f"no room in view for {self.columns} columns at y = {y}")
-        return low, high
-
-    def places(
-        self, rng: np.random.Generator, workcell: Workcell
-    ) -> Callable[[int, int], tuple[float, float]]:
-        """Centre and jitter of every object, uniform."""
-        centre_y = float(rng.uniform(*self.y))
-        centre_x = float(rng.uniform(*self.centre_x(centre_y, workcell)))
-        jitter = rng.uniform(-1, 1, (self.rows * self.columns, 2)) * self.jitter
-
-        def place(k: int, cell: int) -> tuple[float, float]:
-            row, column = divmod(cell, self.columns)
-            x = centre_x + (column - (self.columns - 1) / 2) * self.pitch_x + float(jitter[k, 0])
-            y = centre_y + (row - (self.rows - 1) / 2) * self.pitch_y + float(jitter[k, 1])
-            return x, y
-
-        return place
-
-
-DRAWS = 96
-"""Grids that are drawn at once; the first that fits is taken."""
-BATCHES = 200
-
-
-@dataclass(frozen=True)
-class GapGrid:
-    """A grid [m] with drawn pitches that is drawn again until its gaps do.
-
-    `gaps`: least x distance of neighbours in a row and least distance of the means of
-    neighbouring rows. `keep_out`: x, y and radius of a disc that holds no object's centre.
-    """
-
-    rows: int
-    columns: int
-    pitch_x: tuple[float, float]
-    pitch_y: tuple[float, float]
-    x: tuple[float, float]
-    y: tuple[float, float]
-    jitter_x: float
-    jitter_y: tuple[float, float]
-    gaps: tuple[float, float]
-    keep_out: tuple[float, float, float]
-    radius: float
-    tall: float
-
-    def places(
-        self, rng: np.random.Generator, workcell: Workcell
-    ) -> Callable[[int, int], tuple[float, float]]:
-        """The first grid that keeps its gaps, uniform among those that do; LayoutError if none."""
-        for _ in range(BATCHES):
-            x, y = self._drawn(rng)
-            good = np.flatnonzero(self._fits(x, y, workcell))
-            if len(good):
-                xs, ys = x[good[0]].ravel().tolist(), y[good[0]].ravel().tolist()
-                return lambda k, cell: (xs[cell], ys[cell])
-        raise LayoutError(f"no grid fits in {BATCHES * DRAWS} draws; skip this seed")
-
-    def _drawn(self, rng: np.random.Generator) -> tuple[Array, Array]:
-        """x and y of many grids, each (DRAWS, rows, columns)."""
-        shape = (DRAWS, self.rows, self.columns)
-        pitch_x, pitch_y, centre_x, centre_y = (
-            rng.uniform(low, high, (DRAWS, 1, 1))
-            for low, high in (self.pitch_x, self.pitch_y, self.x, self.y)
-        )
-        column = np.arange(self.columns) - (self.columns - 1) / 2
-        row = (np.arange(self.rows) - (self.rows - 1) / 2)[:, None]
-        x = centre_x + column * pitch_x + rng.uniform(-self.jitter_x, self.jitter_x, shape)
-        y = centre_y + row * pitch_y + rng.uniform(*self.jitter_y, shape)
-        return x, y
-
-    def _fits(self, x: Array, y: Array, workcell: Workcell) -> Array:
-        free = np.hypot(x - self.keep_out[0], y - self.keep_out[1]) >= self.keep_out[2]
-        seen = workcell.in_view(x, y, self.radius) & workcell.in_view(x, y, 0.0, self.tall)
-        every = (free & seen & workcell.in_reach(x, y)).all(axis=(1, 2))
-        columns = (np.diff(x, axis=2) >= self.gaps[0]).all(axis=(1, 2))
-        rows = (np.diff(y.mean(axis=2), axis=1) >= self.gaps[1]).all(axis=1)
-        return np.asarray(every & columns & rows)
 
 
 def alike(asset: str) -> Things:
@@ -192,7 +64,7 @@ class Line:
     kind: str
     noun: str
     things: Things
-    layouts: Mapping[int, Layout]
+    layouts: Mapping[int, GridLayout]
     steady: float
     what: str
     sideways: tuple[str, ...] = ()

@@ -12,14 +12,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from robospa.tasks.families.canonical_index.scenes import (
-    GapGrid,
-    Grid,
     Line,
     Thing,
     alike,
     different,
     line_task,
 )
+from robospa.tasks.sampling.grid import GapGrid, Grid
 
 SET_A = (
     "rubikscube", "alarm_clock", "mouse", "stapler", "bell", "hamburger",

@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from robospa.geometry import Array, Vec3
+from robospa.geometry import Vec3
 from robospa.tasks import objects
-from robospa.tasks.families.tabletop import Point, side
+from robospa.tasks.families.tabletop import side
 from robospa.tasks.goals.repeat import PRESS_BOX, PressCounter
-from robospa.tasks.layouts import Area, Mask, scatter
 from robospa.tasks.plan import Press
+from robospa.tasks.sampling.region import Area, Point
+from robospa.tasks.sampling.scatter import candidates, scatter
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.snapshot import ARMS
 from robospa.workcell import Workcell
@@ -66,12 +67,8 @@ def scattered(
     radius, height = (np.array([[v] for v in row]) for row in zip(
         *((m.radius, m.size[2]) for m in models), strict=True
     ))  # fmt: skip
-
-    def propose(generator: np.random.Generator) -> tuple[Array, Array, Mask]:
-        x, y = area.draw(generator, (len(items), TRIES))
-        return x, y, (np.abs(x) >= middle) & workcell.in_view(x, y, radius, height, (0.0, 0.0))
-
-    found = scatter(rng, propose, [[distance] * len(items)] * len(items))
+    propose = candidates(workcell, area, (len(items), TRIES), radius, height, middle)
+    found = scatter(rng, propose, distance)
     return [found[order.index(i)] for i in range(len(items))]
 
 

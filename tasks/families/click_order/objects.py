@@ -20,8 +20,8 @@ from robospa.tasks.goals.clicks import ClickInOrder
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.instructions.words import acting_arm, one_after_another
-from robospa.tasks.layouts import Area
 from robospa.tasks.plan import Skill
+from robospa.tasks.sampling.region import Area
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
 from robospa.workcell import Workcell

@@ -28,8 +28,8 @@ from robospa.tasks.families.tabletop import standing
 from robospa.tasks.goals.pick import Lift
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText
-from robospa.tasks.layouts import LayoutError, Mask
-from robospa.tasks.packing import Fits, pool, walk
+from robospa.tasks.sampling.markov import Fits, pool, walk
+from robospa.tasks.sampling.region import LayoutError, Mask
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.task import Draft, Draw, Level, Task
 from robospa.workcell import TABLE_TOP, Workcell

@@ -23,9 +23,9 @@ from robospa.tasks.goals.pick import Lift
 from robospa.tasks.instructions.grammar import Phrasings, Slots
 from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.instructions.words import ordinal
-from robospa.tasks.layouts import LayoutError, Mask
 from robospa.tasks.objects import object_model
-from robospa.tasks.packing import Fits, apart, pool, walk
+from robospa.tasks.sampling.markov import Fits, keeps_apart, pool, walk
+from robospa.tasks.sampling.region import LayoutError, Mask
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.task import Draft, Level, Task
 from robospa.workcell import Workcell
@@ -102,7 +102,7 @@ def fits(workcell: Workcell, rules: Rules, level: int) -> Fits:
     least = rules.apart[level - 1]
 
     def good(points: Array, wanted: Array, i: int) -> Mask:
-        mask = apart(points, wanted, i, least)
+        mask = keeps_apart(points, wanted, i, least)
         return mask & allowed(workcell, rules, wanted[:, 0], wanted[:, 1]) if mask.any() else mask
 
     return good

@@ -21,12 +21,14 @@ from robospa.tasks.families.dustbin.floor_bin import (
     discard,
     reachable,
 )
-from robospa.tasks.families.tabletop import Item, Point, middle_in_view, named, scatter, standing
+from robospa.tasks.families.tabletop import Item, middle_in_view, named, standing
 from robospa.tasks.goals.anyorder import Collect
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.instructions.words import NUMBERS, by_count
 from robospa.tasks.plan import Skill
+from robospa.tasks.sampling.points import scatter_points
+from robospa.tasks.sampling.region import Point
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
 from robospa.workcell import Workcell
@@ -50,7 +52,7 @@ def _usable(workcell: Workcell, point: Point) -> bool:
 
 def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """Bottles anywhere in the region but the middle strip; different looks up to level 3."""
-    points = scatter(rng, level, X, Y, DISTANCE, partial(_usable, workcell))
+    points = scatter_points(rng, level, X, Y, DISTANCE, partial(_usable, workcell))
     count = objects.looks("bottle")
     looks = rng.choice(count, size=level, replace=level > min(3, count))
     items = [Item("dustbin", "dustbin", BIN, {"look": 0}, fixed=True)]

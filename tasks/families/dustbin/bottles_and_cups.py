@@ -20,23 +20,14 @@ from robospa.tasks.families.dustbin.floor_bin import (
     exchange_place,
     reachable,
 )
-from robospa.tasks.families.tabletop import (
-    Item,
-    Point,
-    draw_look,
-    free_point,
-    in_view,
-    named,
-    radius,
-    retry,
-    side,
-    standing,
-)
+from robospa.tasks.families.tabletop import Item, draw_look, in_view, named, radius, side, standing
 from robospa.tasks.goals.checklist import Checklist, Counter, Inside, Part, Rests, on_spot
 from robospa.tasks.instructions.grammar import Slots, Templates
 from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.instructions.words import by_count
 from robospa.tasks.plan import Pick, Place, Skill
+from robospa.tasks.sampling.points import free_point, retry
+from robospa.tasks.sampling.region import Point
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
 from robospa.workcell import Workcell

@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from robospa.geometry import Array, Pose
+from robospa.geometry import Pose
 from robospa.tasks.families.memory_wall.wall import HOLD_STILL, STAND_TOP, WALL, row, stand, wall
 from robospa.tasks.families.tabletop import Item, named, side, standing
 from robospa.tasks.goals.cue import AfterCue
@@ -19,8 +19,9 @@ from robospa.tasks.goals.gather import Gather, Region
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.instructions.words import NUMBERS, by_count
-from robospa.tasks.layouts import Area, Mask, scatter
 from robospa.tasks.plan import Home, Pick, Place, Skill
+from robospa.tasks.sampling.region import Area, shuffled
+from robospa.tasks.sampling.scatter import candidates, scatter
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
 from robospa.workcell import Workcell
@@ -56,15 +57,10 @@ LEVELS = {n: Level(candidates=2 * n, subtasks=n, steps=50 + 200 * n) for n in ra
 
 def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """Colours on the stand; the same and as many others on the table, all places alike."""
-
-    def propose(generator: np.random.Generator) -> tuple[Array, Array, Mask]:
-        x, y = AREA.draw(generator, (2 * level, TRIES))
-        seen = workcell.in_view(x, y, HALF * math.sqrt(2), 2 * HALF, (0.0, 0.0))
-        return x, y, (np.abs(x) >= MIDDLE) & seen
-
     colors = [list(COLORS)[int(i)] for i in rng.permutation(len(COLORS))[: 2 * level]]
-    found = scatter(rng, propose, [[DISTANCE] * 2 * level] * (2 * level))
-    points = [found[int(i)] for i in rng.permutation(2 * level)]
+    shape, radius = (2 * level, TRIES), HALF * math.sqrt(2)
+    propose = candidates(workcell, AREA, shape, radius, 2 * HALF, MIDDLE)
+    points = shuffled(rng, scatter(rng, propose, DISTANCE))
     items = [wall(WALL_Y), stand(STAND_Y, STAND_HALF, STAND_SHADE)]
     for color, x in zip(colors[:level], row(level, SHOWN_X), strict=True):
         pose = Pose((x, STAND_Y, STAND_TOP + HALF))

@@ -12,12 +12,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robospa.tasks.families.tabletop import LAYOUTS, TRIES_PER_POINT, Item, named, standing
+from robospa.tasks.families.tabletop import Item, named, standing
 from robospa.tasks.goals.regions import Part, Region, Regions
 from robospa.tasks.instructions.grammar import Phrasings, Slots
 from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.instructions.words import NUMBERS
 from robospa.tasks.plan import Pick, Place, Skill
+from robospa.tasks.sampling.points import LAYOUTS, TRIES_PER_POINT
+from robospa.tasks.sampling.region import LayoutError, shuffled
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
 from robospa.workcell import Workcell
@@ -84,8 +86,8 @@ def _squares(rng: np.random.Generator, count: int, half: float) -> list[Square]:
             if all(square.clear_of(other) for other in found):
                 found.append(square)
                 if len(found) == count:
-                    return [found[int(i)] for i in rng.permutation(count)]
-    raise RuntimeError(f"no free column of {count} blocks in {LAYOUTS} draws; skip this seed")
+                    return shuffled(rng, found)
+    raise LayoutError(f"no free column of {count} blocks in {LAYOUTS} draws; skip this seed")
 
 
 def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:

@@ -12,12 +12,14 @@ import numpy as np
 
 from robospa.tasks import objects
 from robospa.tasks.families.picking import drawn_yaw
-from robospa.tasks.families.tabletop import Item, draw_look, named, shuffled_scatter, side, standing
+from robospa.tasks.families.tabletop import Item, draw_look, named, side, standing
 from robospa.tasks.goals.regions import Part, Region, Regions
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.instructions.words import NUMBERS, by_count
 from robospa.tasks.plan import Pick, Place, Skill
+from robospa.tasks.sampling.points import scatter_points
+from robospa.tasks.sampling.region import shuffled
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
 from robospa.workcell import Workcell
@@ -39,7 +41,8 @@ LEVELS = {n: Level(candidates=n, subtasks=n, steps=200 * n) for n in range(1, 6)
 def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """Boxes anywhere in the region, each turned any way that a gripper can take."""
     items = []
-    for i, point in enumerate(shuffled_scatter(rng, level, X, Y, DISTANCE, tries=10)):
+    points = shuffled(rng, scatter_points(rng, level, X, Y, DISTANCE, tries=10))
+    for i, point in enumerate(points):
         look = draw_look(rng, "playing_cards")
         yaw = drawn_yaw(rng, workcell, "playing_cards", look, point[1], math.pi)
         items.append(Item(str(i), "playing_cards", standing(point, yaw), look))

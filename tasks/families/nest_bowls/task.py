@@ -10,19 +10,14 @@ import numpy as np
 
 from robospa.geometry import Array, Vec3
 from robospa.tasks import objects
-from robospa.tasks.families.tabletop import (
-    Item,
-    draw_look,
-    named,
-    side,
-    standing,
-)
+from robospa.tasks.families.tabletop import Item, draw_look, named, side, standing
 from robospa.tasks.goals.nest import Nest
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.instructions.words import NUMBERS, by_count
-from robospa.tasks.layouts import Area, Mask, scatter
 from robospa.tasks.plan import Pick, Place, Skill
+from robospa.tasks.sampling.region import Area, Mask, shuffled
+from robospa.tasks.sampling.scatter import candidates, scatter
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
 from robospa.workcell import Workcell
@@ -46,16 +41,13 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     look = draw_look(rng, "bowl")
     model = objects.object_model("bowl", look)
 
-    def propose(rng: np.random.Generator) -> tuple[Array, Array, Mask]:
-        x, y = AREA.draw(rng, (level, TRIES))
-        usable = (np.abs(x) >= MIDDLE) & (np.hypot(x - plate[0], y - plate[1]) >= FROM_PLATE)
-        usable &= workcell.in_view(
-            x, y, model.radius, model.size[2], (0.0, 0.0)
-        ) & workcell.in_reach(x, y)
-        return x, y, usable
+    def free(x: Array, y: Array) -> Mask:
+        off_plate: Mask = np.hypot(x - plate[0], y - plate[1]) >= FROM_PLATE
+        return off_plate & workcell.in_reach(x, y)
 
-    found = scatter(rng, propose, [[DISTANCE] * level] * level, restarts=RESTARTS)
-    points = [found[int(i)] for i in rng.permutation(level)]
+    shape, height = (level, TRIES), model.size[2]
+    propose = candidates(workcell, AREA, shape, model.radius, height, MIDDLE, free)
+    points = shuffled(rng, scatter(rng, propose, DISTANCE, restarts=RESTARTS))
     items = [Item("plate", "plate", standing(plate), draw_look(rng, "plate"), fixed=True)]
     items += [Item(str(i), "bowl", standing(point), look) for i, point in enumerate(points)]
     scene_objects, names = named(rng, items)

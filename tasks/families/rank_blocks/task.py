@@ -16,22 +16,15 @@ import numpy as np
 
 from robospa.geometry import Vec3
 from robospa.tasks.families.stack_blocks.towers import NEAR_BAND, draw_color
-from robospa.tasks.families.tabletop import (
-    LAYOUTS,
-    Item,
-    Point,
-    apart,
-    named,
-    shuffled_scatter,
-    side,
-    standing,
-)
+from robospa.tasks.families.tabletop import Item, named, side, standing
 from robospa.tasks.goals.row import Row
 from robospa.tasks.goals.stack import Bring
 from robospa.tasks.instructions.grammar import Phrasings, Slots, listed
 from robospa.tasks.instructions.text import COMMON, TaskText
 from robospa.tasks.instructions.words import NUMBERS, by_count
 from robospa.tasks.plan import Pick, Place, Skill
+from robospa.tasks.sampling.points import LAYOUTS, scatter_points
+from robospa.tasks.sampling.region import LayoutError, Point, apart, shuffled
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
 from robospa.workcell import Workcell
@@ -110,9 +103,7 @@ def _scattered(points: Sequence[Point]) -> bool:
     return not ordered and not tight
 
 
-def _places(
-    looks: Sequence[Look], rng: np.random.Generator, workcell: Workcell
-) -> tuple[Point, ...]:
+def _places(looks: Sequence[Look], rng: np.random.Generator, workcell: Workcell) -> list[Point]:
     """Free places, all wholly in the head camera's view."""
     reach = max(math.hypot(half[0], half[1]) for half, _ in looks)
     height = max(2 * half[2] for half, _ in looks)
@@ -125,10 +116,11 @@ def _places(
         return low <= x <= high
 
     for _ in range(LAYOUTS):
-        points = shuffled_scatter(rng, len(looks), X, Y, DISTANCE, allowed, True, TRIES)
+        found = scatter_points(rng, len(looks), X, Y, DISTANCE, allowed, True, TRIES)
+        points = shuffled(rng, found)
         if _scattered(points):
             return points
-    raise RuntimeError(f"no mixed-up layout of {len(looks)} blocks; skip this seed")
+    raise LayoutError(f"no mixed-up layout of {len(looks)} blocks; skip this seed")
 
 
 def _draw(looks: Sequence[Look], rng: np.random.Generator, workcell: Workcell) -> Draft:

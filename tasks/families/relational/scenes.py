@@ -11,7 +11,6 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from itertools import pairwise
 
 import numpy as np
 
@@ -29,8 +28,8 @@ from robospa.tasks.families.tabletop import standing
 from robospa.tasks.goals.pick import Lift
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText
-from robospa.tasks.layouts import LayoutError
 from robospa.tasks.objects import looks, object_model
+from robospa.tasks.sampling.grid import StraightLines
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.task import Draft, Draw, Level, Task
 from robospa.workcell import Workcell
@@ -39,7 +38,6 @@ TEXT = TaskText.beside(__file__, "instructions.toml")
 
 MARGIN = (0.06, 0.08)
 """Centres are this far inside the head image (official)."""
-DRAWS = 200
 CLEAR = 0.002
 """Footprints' circles stay this far apart [m]."""
 DIRECTIONS: Mapping[str, tuple[int, int]] = {
@@ -169,32 +167,11 @@ def _places(
     rng: np.random.Generator,
 ) -> Array:
     """Where the used slots lie: (count, 2) [m]; LayoutError if nothing fits."""
-    pitch_x, pitch_y = crowd.pitches[shape.columns + shape.rows - 4]
+    pitch = crowd.pitches[shape.columns + shape.rows - 4]
     gap_x, gap_y = (round(shape.scale * max(f.spacing[k] for f in families), 4) for k in (0, 1))
+    lines = StraightLines(pitch, shape.jitter, (gap_x, gap_y), shape.x, shape.y)
     least = least_distances(crowd, families, shape.scale)
-    columns, rows = sorted({c for c, _ in used}), sorted({r for _, r in used})
-    for _ in range(DRAWS):
-        px, py = rng.uniform(*pitch_x), rng.uniform(*pitch_y)
-        shift_x = rng.uniform(-shape.jitter[0], shape.jitter[0], len(columns))
-        shift_y = rng.uniform(-shape.jitter[1], shape.jitter[1], len(rows))
-        cx = {c: c * px + float(s) for c, s in zip(columns, shift_x, strict=True)}
-        cy = {r: r * py + float(s) for r, s in zip(rows, shift_y, strict=True)}
-        xs, ys = sorted(cx.values()), sorted(cy.values())
-        room_x, room_y = shape.x[1] - shape.x[0], shape.y[1] - shape.y[0]
-        if xs[-1] - xs[0] > room_x or ys[-1] - ys[0] > room_y:
-            continue
-        anchor_x = rng.uniform(shape.x[0] - xs[0], shape.x[1] - xs[-1])
-        anchor_y = rng.uniform(shape.y[0] - ys[0], shape.y[1] - ys[-1])
-        if any(b - a < gap_x for a, b in pairwise(xs)) or any(
-            b - a < gap_y for a, b in pairwise(ys)
-        ):
-            continue
-        points = np.array([(cx[c] + anchor_x, cy[r] + anchor_y) for c, r in used])
-        if (np.hypot(*(points[:, None] - points).T) < least).any():
-            continue
-        if _seen(workcell, crowd, points):
-            return points
-    raise LayoutError(f"no grid of {len(used)} objects fits in {DRAWS} draws; skip this seed")
+    return lines.places(rng, used, least, lambda points: _seen(workcell, crowd, points))
 
 
 def _seen(workcell: Workcell, crowd: Crowd, points: Array) -> bool:

@@ -10,18 +10,12 @@ from __future__ import annotations
 import numpy as np
 
 from robospa.tasks.families.stack_blocks.towers import building_place, tower_goal, tower_plan
-from robospa.tasks.families.tabletop import (
-    Item,
-    Point,
-    apart,
-    middle_in_view,
-    named,
-    scatter,
-    standing,
-)
+from robospa.tasks.families.tabletop import Item, middle_in_view, named, standing
 from robospa.tasks.instructions.grammar import Slots, listed
 from robospa.tasks.instructions.text import COMMON, TaskText
 from robospa.tasks.instructions.words import NUMBERS, by_count, color_orders
+from robospa.tasks.sampling.points import scatter_points
+from robospa.tasks.sampling.region import Point, apart
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
 from robospa.workcell import Workcell
@@ -51,7 +45,7 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     def allowed(point: Point) -> bool:
         return (level > 1 or away(point)) and middle_in_view(workcell, point, HALF)
 
-    points = scatter(rng, level, X, Y, DISTANCE, allowed, near_middle=True)
+    points = scatter_points(rng, level, X, Y, DISTANCE, allowed, near_middle=True)
     items = [
         Item(
             color,

@@ -14,17 +14,16 @@ import numpy as np
 from robospa.tasks.families.stack_blocks.towers import (
     LENGTH,
     TEXT,
-    Ground,
     building_place,
     draw_color,
-    scattered_blocks,
     tower_goal,
     tower_plan,
     tower_slots,
 )
 from robospa.tasks.families.tabletop import Item, named, standing
 from robospa.tasks.instructions.grammar import Slots
-from robospa.tasks.layouts import Area, Points, spread
+from robospa.tasks.sampling.batch import Ground, scatter_blocks
+from robospa.tasks.sampling.region import Area, Points, spread
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
 from robospa.workcell import Workcell
@@ -63,7 +62,7 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     half_y, half_z = (round(float(v), 5) for v in rng.uniform(*SECTION, 2))
     halves = [(round(float(rng.uniform(*ends)), 5), half_y, half_z) for ends in HALF_LENGTHS[level]]
     reach = [math.hypot(half[0], half_y) for half in halves]
-    points = scattered_blocks(
+    points = scatter_blocks(
         rng,
         workcell,
         GROUNDS[min(level, 2)],

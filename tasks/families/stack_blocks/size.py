@@ -12,17 +12,16 @@ import numpy as np
 from robospa.tasks.families.stack_blocks.towers import (
     SIZE,
     TEXT,
-    Ground,
     building_place,
     draw_color,
-    scattered_blocks,
     tower_goal,
     tower_plan,
     tower_slots,
 )
 from robospa.tasks.families.tabletop import Item, named, standing
 from robospa.tasks.instructions.grammar import Slots
-from robospa.tasks.layouts import Area
+from robospa.tasks.sampling.batch import Ground, scatter_blocks
+from robospa.tasks.sampling.region import Area
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
 from robospa.workcell import Workcell
@@ -49,7 +48,7 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     halves = HALVES.get(level) or (round(float(rng.uniform(*ONE)), 5),)
     cubes = [(half, half, half) for half in halves]
     ground = Ground(AREA, 0.05, MIDDLE, 0.10 if level == 1 else 0.15)
-    points = scattered_blocks(rng, workcell, ground, cubes, lambda i, j: DISTANCE)
+    points = scatter_blocks(rng, workcell, ground, cubes, lambda i, j: DISTANCE)
     color = draw_color(rng)
     items = [
         Item(

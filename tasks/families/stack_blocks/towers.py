@@ -6,22 +6,19 @@ is brought to the middle of the near edge instead (official level 1).
 
 from __future__ import annotations
 
-import itertools
-import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from robospa.tasks.families.tabletop import Point, apart, side
+from robospa.tasks.families.tabletop import side
 from robospa.tasks.goals.stack import HEIGHT_TOLERANCE, Bring, Stack
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import COMMON, TaskText
 from robospa.tasks.instructions.words import NUMBERS, by_count
-from robospa.tasks.layouts import Area, LayoutError, Points
 from robospa.tasks.plan import Pick, Place, Skill
+from robospa.tasks.sampling.region import Point, apart
 from robospa.tasks.scene import Scene
-from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "towers.toml")
 
@@ -30,9 +27,6 @@ NEAR_BAND: tuple[Point, Point] = ((-0.05, 0.05), (-1.0, -0.08))
 
 CLEARANCE = 0.09
 """The expert's place keeps this far [m] from all blocks where it can: a gripper must fit."""
-
-POOL, LAYOUTS, POOLS = 256, 2048, 40
-"""Places drawn at once, layouts made of them, and how often at most."""
 
 LAYER_SHARE = 0.65
 """Heights may be wrong by at most this share of the thinnest block: a layer is never mistaken."""
@@ -46,55 +40,6 @@ def building_place(level: int, rng: np.random.Generator, blocks: Sequence[Point]
         if apart(point, blocks, CLEARANCE):
             return point
     return (0.0, -0.16)
-
-
-@dataclass(frozen=True)
-class Ground:
-    """Where the blocks of a tower may lie: in `area`, |x| at least `off_middle` [m].
-
-    And at least `free` [m] from the point `middle` [m] of the near edge.
-    """
-
-    area: Area
-    off_middle: float
-    middle: Point
-    free: float
-
-
-def scattered_blocks(
-    rng: np.random.Generator,
-    workcell: Workcell,
-    ground: Ground,
-    halves: Sequence[Sequence[float]],
-    gaps: Callable[[int, int], float],
-    accept: Callable[[Points], bool] = lambda points: True,
-) -> list[Point]:
-    """A place [m] for a block of each half sizes [m], seen whole by the head camera.
-
-    `gaps(i, j)` is the least distance [m] of two blocks. Many layouts are drawn at once from a pool
-    of usable places, and the first that keeps the distances and that `accept` takes is used, so
-    every such layout is equally likely. LayoutError if there is none in a bounded number.
-    """
-    count = len(halves)
-    reach = max(math.hypot(*half[:2]) for half in halves)  # the same for all: places tell nothing
-    height = 2 * max(half[2] for half in halves)
-    pairs = list(itertools.combinations(range(count), 2))
-    for _ in range(POOLS):
-        x, y = ground.area.draw(rng, (POOL,))
-        mx, my = ground.middle
-        usable = (np.abs(x) >= ground.off_middle) & (np.hypot(x - mx, y - my) >= ground.free)
-        usable &= workcell.in_view(x, y, reach, height, (0.0, 0.0))
-        x, y = x[usable], y[usable]
-        drawn = rng.integers(len(x), size=(LAYOUTS, count)).T
-        xs, ys = x[drawn], y[drawn]  # a row a block, a column a layout
-        for i, j in pairs:
-            free = (xs[i] - xs[j]) ** 2 + (ys[i] - ys[j]) ** 2 >= gaps(i, j) ** 2
-            xs, ys = xs[:, free], ys[:, free]
-        for px, py in zip(xs.T.tolist(), ys.T.tolist(), strict=True):
-            points = list(zip(px, py, strict=True))
-            if accept(points):
-                return points
-    raise LayoutError(f"no free layout of {count} blocks in {POOLS * LAYOUTS} draws; skip the seed")
 
 
 @dataclass(frozen=True)

@@ -14,13 +14,14 @@ import numpy as np
 from robospa.geometry import Array
 from robospa.tasks import objects
 from robospa.tasks.families.stack_blocks.color import COLORS
-from robospa.tasks.families.tabletop import Item, Point, draw_look, named, side, standing
+from robospa.tasks.families.tabletop import Item, draw_look, named, side, standing
 from robospa.tasks.goals.tools import HitCounter, UseInOrder
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.instructions.words import color_orders
-from robospa.tasks.layouts import Area, Mask, scatter
 from robospa.tasks.plan import Hit, Skill
+from robospa.tasks.sampling.region import Area, Mask, Point, shuffled
+from robospa.tasks.sampling.scatter import scatter
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
 from robospa.workcell import Workcell
@@ -55,9 +56,9 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
         usable &= (reach >= nearest) & (reach <= farthest)
         return x, y, usable & workcell.in_view(x, y, HALF * math.sqrt(2), 2 * HALF, (0.0, 0.0))
 
-    found = scatter(rng, propose, [[DISTANCE] * level] * level)
+    found = scatter(rng, propose, DISTANCE)
     first, *others = found
-    points = [first, *(others[int(i)] for i in rng.permutation(level - 1))]
+    points = [first, *shuffled(rng, others)]
     items = [
         Item("hammer", "hammer", standing(HAMMER, HAMMER_YAW), draw_look(rng, "hammer")),
     ]

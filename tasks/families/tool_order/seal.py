@@ -11,23 +11,15 @@ from itertools import pairwise
 import numpy as np
 
 from robospa.tasks import objects
-from robospa.tasks.families.tabletop import (
-    Item,
-    Point,
-    draw_look,
-    free_point,
-    in_view,
-    named,
-    side,
-    standing,
-)
+from robospa.tasks.families.tabletop import Item, draw_look, in_view, named, side, standing
 from robospa.tasks.goals.stamping import StampCounter
 from robospa.tasks.goals.tools import UseInOrder
 from robospa.tasks.instructions.grammar import Phrasings, Slots, listed
 from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.instructions.words import NUMBERS, by_count, color_orders
-from robospa.tasks.layouts import LayoutError
 from robospa.tasks.plan import Pick, Place, Skill
+from robospa.tasks.sampling.points import free_point
+from robospa.tasks.sampling.region import LayoutError, Point
 from robospa.tasks.scene import Scene
 from robospa.tasks.shapes import ObjectModel
 from robospa.tasks.task import Draft, Level, Task

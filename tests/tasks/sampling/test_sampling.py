@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from robospa.tasks.layouts import Area, LayoutError, scatter, spread
-from robospa.tasks.packing import apart, pool, walk
+from robospa.tasks.sampling.markov import keeps_apart, pool, walk
+from robospa.tasks.sampling.region import Area, LayoutError, spread
+from robospa.tasks.sampling.scatter import scatter
 
 A = np.array
 
@@ -49,7 +50,7 @@ def test_spread_is_the_range() -> None:
 
 def fits_square(points: np.ndarray, wanted: np.ndarray, i: int) -> np.ndarray:
     inside = (wanted >= 0).all(axis=1) & (wanted <= 0.2).all(axis=1)
-    return inside & apart(points, wanted, i, 0.15)
+    return inside & keeps_apart(points, wanted, i, 0.15)
 
 
 CORNERS = A([[[0.0, 0.0], [0.2, 0.0], [0.0, 0.2], [0.2, 0.2]]] * 16)

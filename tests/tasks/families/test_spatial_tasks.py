@@ -19,9 +19,9 @@ from robospa.tasks.families.cross_view.scenes import LEADS
 from robospa.tasks.families.cross_view.task import SPREADS
 from robospa.tasks.families.distance import object_sets
 from robospa.tasks.families.relational import scenes as relational
-from robospa.tasks.layouts import Area
 from robospa.tasks.objects import looks, object_model
 from robospa.tasks.plan import Pick
+from robospa.tasks.sampling.region import Area
 from robospa.tasks.scene import Scene
 from robospa.tasks.snapshot import Contact
 from robospa.workcell import TABLE_TOP, workcell

@@ -14,7 +14,7 @@ from collections.abc import Callable
 import numpy as np
 
 from robospa.geometry import Array
-from robospa.tasks.layouts import LayoutError, Mask
+from robospa.tasks.sampling.region import LayoutError, Mask
 
 Fits = Callable[[Array, Array, int], Mask]
 """Whether place i of each chain's layout (chains, count, 2) may move to `wanted` (chains, 2)."""
@@ -22,7 +22,7 @@ Fits = Callable[[Array, Array, int], Mask]
 SEED = 0
 
 
-def apart(points: Array, wanted: Array, i: int, least: float) -> Mask:
+def keeps_apart(points: Array, wanted: Array, i: int, least: float) -> Mask:
     """Whether `wanted` is at least `least` [m] from all places of its chain but `i`."""
     delta = points - wanted[:, None]
     square = delta[..., 0] ** 2 + delta[..., 1] ** 2
