@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -175,7 +176,11 @@ def test_without_a_device_physics_runs_and_drawing_says_what_to_do() -> None:
     done = subprocess.run(
         [sys.executable, "-W", "ignore", "-c", code],
         cwd=Path(__file__).parents[1],
-        env={"VK_ICD_FILENAMES": "/nonexistent.json", "VK_DRIVER_FILES": "/nonexistent.json"},
+        env={
+            **os.environ,
+            "VK_ICD_FILENAMES": "/nonexistent.json",
+            "VK_DRIVER_FILES": "/nonexistent.json",
+        },
         capture_output=True,
         text=True,
         timeout=120,
