@@ -21,7 +21,5 @@ def embodiment(name: str) -> Embodiment:
     except UnknownName as error:
         raise ValueError(str(error)) from error
     if not isinstance(found, Embodiment) or found.name != name:
-        raise ValueError(
-            f"the entry point {name!r} of {ROBOTS} has to lead to a robot of that name"
-        )
+        raise ValueError(f"entry point {name!r} of {ROBOTS} leads to no Embodiment of that name")
     return found

@@ -1,0 +1,119 @@
+"""twin-arms: a made-up robot of two six-joint arms, drawn and felt as boxes.
+
+A worked example, not a robot of the benchmark; docs/adding-a-robot.md walks through it. Lengths are
+metres, angles radians.
+"""
+
+from __future__ import annotations
+
+import math
+
+from robospa.geometry import Pose, Vec3, axis_rotation, yaw_rotation
+from robospa.harness.robots.embodiment import Arm, Embodiment, Joint
+from robospa.tasks.shapes import Box, Color, Shape
+from robospa.workcell import ArmSite, FixedCamera, Gripper, Workcell
+
+GREY: Color = (0.3, 0.32, 0.35)
+BLUE: Color = (0.05, 0.15, 0.4)
+
+BASE_X, BASE_Y, BASE_Z = 0.32, -0.45, 0.76
+TRAVEL = 0.042
+"""How far a finger slides from the middle."""
+
+# joint: origin in the link before it, axis, lower and upper limit
+CHAIN: tuple[tuple[Vec3, Vec3, float, float], ...] = (
+    ((0.0, 0.0, 0.06), (0, 0, 1), -3.0, 3.0),
+    ((0.0, 0.0, 0.06), (0, 1, 0), -1.5, 1.8),
+    ((0.0, 0.0, 0.31), (0, 1, 0), -1.2, 2.7),
+    ((0.30, 0.0, 0.0), (0, 1, 0), -2.1, 2.1),
+    ((0.07, 0.0, 0.0), (0, 0, 1), -1.9, 1.9),
+    ((0.05, 0.0, 0.0), (1, 0, 0), -3.1, 3.1),
+)
+HOME = (0.0, -1.2, 1.4, -0.2, 0.0, 0.0)
+SEEDS = tuple(
+    (0.0, shoulder, elbow, math.pi / 2 - shoulder - elbow, 0.0, roll)
+    for shoulder, elbow in ((0.5, 0.7), (0.1, 1.2), (1.0, 0.2))
+    for roll in (0.0, 1.5, -1.5)
+)
+"""Postures with the hand down, from which inverse kinematics starts."""
+
+GRIPPER = Gripper(
+    grasp_centre=0.10,
+    opening=0.082,
+    fingertip=0.015,
+    finger_half_width=0.010,
+    finger_thickness=0.012,
+    radius=0.055,
+    palm_back=(0.085, 0.115, 0.145),
+    palm_half=(0.055, 0.025),
+    hand_back=0.085,
+    hand_half=(0.055, 0.03),
+    wrist_back=0.2,
+    wrist_half=0.06,
+)
+
+
+def box(centre: Vec3, half: Vec3, color: Color = GREY, collision: bool = False) -> Shape:
+    """A box in its link's frame."""
+    return Shape(Box(half), Pose(centre), color, collision=collision)
+
+
+SHAPES: tuple[tuple[Shape, ...], ...] = (
+    (box((0.0, 0.0, 0.03), (0.06, 0.06, 0.03)),),
+    (box((0.0, 0.0, 0.03), (0.045, 0.045, 0.03)),),
+    (box((0.0, 0.0, 0.155), (0.03, 0.03, 0.155), BLUE),),
+    (box((0.15, 0.0, 0.0), (0.15, 0.027, 0.027), BLUE),),
+    (box((0.035, 0.0, 0.0), (0.035, 0.025, 0.025)),),
+    (box((0.025, 0.0, 0.0), (0.025, 0.025, 0.025)),),
+    (box((0.03, 0.0, 0.0), (0.03, 0.05, 0.02), collision=True),),
+)
+"""Base, links 1 to 5, and the palm."""
+
+
+def arm(name: str, x: float) -> Arm:
+    """One arm at `x`, facing the table."""
+    links = [f"{name}_base", *(f"{name}_link{i}" for i in range(1, 7))]
+    fingers, shapes = [], dict(zip(links, SHAPES, strict=True))
+    for side, which in ((1.0, "upper"), (-1.0, "lower")):
+        link = f"{name}_{which}_finger"
+        shapes[link] = (box((0.05, side * 0.006, 0.0), (0.035, 0.006, 0.01), collision=True),)
+        origin, axis = Pose((0.06, 0.0, 0.0)), (0.0, side, 0.0)
+        fingers.append(Joint(link, links[6], link, origin, axis, 0.0, TRAVEL, "prismatic"))
+    return Arm(
+        name=name,
+        base=Pose((x, BASE_Y, BASE_Z), yaw_rotation(math.pi / 2)),
+        base_link=links[0],
+        joints=tuple(
+            Joint(f"{name}_joint{i + 1}", links[i], links[i + 1], Pose(at), axis, low, high)
+            for i, (at, axis, low, high) in enumerate(CHAIN)
+        ),
+        fingers=tuple(fingers),
+        gripper=(-0.01, TRAVEL),
+        tool=Pose((0.03, 0.0, 0.0)),
+        home=HOME,
+        seeds=SEEDS,
+        shapes=shapes,
+        camera=Pose((0.0, 0.0, 0.08), axis_rotation((0, 1, 0), 0.5)),
+    )
+
+
+def site(x: float) -> ArmSite:
+    """Where that arm stands, and how far it gets."""
+    return ArmSite(base=(x, BASE_Y), reach=0.70, tool_reach=(0.25, 0.62), gripper=GRIPPER)
+
+
+TWIN_ARMS = Embodiment(
+    name="twin-arms",
+    arms=(arm("left", -BASE_X), arm("right", BASE_X)),
+    workcell=Workcell(
+        arms=(site(-BASE_X), site(BASE_X)),
+        cameras={
+            "head": FixedCamera((0.0, -0.45, 1.35), (0, 0.6, -0.8), (-1, 0, 0), math.radians(37)),
+        },
+        sideways_from=0.02,
+        sideways_within=math.radians(40),
+        travel_height=0.17,
+        highest=0.3,
+    ),
+    body=(Shape(Box((0.4, 0.06, 0.38)), Pose((0.0, BASE_Y - 0.05, 0.38)), GREY, collision=False),),
+)

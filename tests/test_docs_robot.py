@@ -1,0 +1,122 @@
+"""The worked example of docs/adding-a-robot.md, offered by a package of its own and run whole."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from installed import EXAMPLES, installed
+
+from robospa import workcell
+from robospa.geometry import Pose, axis_rotation, look_rotation, rotate
+from robospa.harness import robots
+from robospa.harness.robots.embodiment import Embodiment
+from robospa.harness.robots.kinematics import chain_of, end_effector, inverse
+from robospa.registry import ROBOTS
+from robospa.tasks.catalog import build_scene
+from robospa.trial import TrialKey
+
+NAME = "twin-arms"
+
+
+@pytest.fixture
+def robot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Embodiment]:
+    monkeypatch.syspath_prepend(EXAMPLES)
+    monkeypatch.syspath_prepend(installed(tmp_path, {ROBOTS: {NAME: "twin_arms:TWIN_ARMS"}}))
+    yield robots.embodiment(NAME)
+    robots.embodiment.cache_clear()
+    workcell.workcell.cache_clear()
+    sys.modules.pop("twin_arms", None)
+
+
+def grasps(robot: Embodiment, arm: int, count: int) -> list[Pose]:
+    """End-effector poses of grasps on the arm's side of the table, tilted."""
+    rng, hand, out = np.random.default_rng(arm), robot.workcell.arms[arm].gripper, []
+    for _ in range(count):
+        x, y = (2 * arm - 1) * rng.uniform(0.0, 0.28), rng.uniform(-0.2, 0.15)
+        turn, tilt = rng.uniform(-0.6, 0.6), rng.uniform(0.2, 0.6)
+        closing = (np.cos(turn), np.sin(turn), 0.0)
+        approach = rotate(axis_rotation(closing, tilt), (0.0, 0.0, -1.0))
+        point = np.array((x, y, workcell.TABLE_TOP + 0.02))
+        at = (point - hand.grasp_centre * np.array(approach)).tolist()
+        out.append(Pose((at[0], at[1], at[2]), look_rotation(approach, closing)))
+    return out
+
+
+def test_it_is_found_by_its_name(robot: Embodiment) -> None:
+    assert robots.embodiments() == ("aloha-agilex", NAME)
+    assert workcell.workcell(NAME) is robot.workcell
+
+
+def test_without_the_package_there_is_no_such_robot() -> None:
+    with pytest.raises(ValueError, match=r"no embodiment 'twin-arms'; known are aloha-agilex"):
+        robots.embodiment(NAME)
+
+
+def test_an_entry_that_is_no_robot_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(installed(tmp_path, {ROBOTS: {"other": "math:pi"}}))
+    with pytest.raises(ValueError, match="leads to no Embodiment of that name"):
+        robots.embodiment("other")
+
+
+@pytest.mark.parametrize("arm", [0, 1])
+def test_forward_and_inverse_kinematics_agree(robot: Embodiment, arm: int) -> None:
+    chain, poses = chain_of(robot.arms[arm]), grasps(robot, arm, 100)
+    joints, reached = inverse(chain, poses)
+    assert reached.mean() > 0.8
+    for pose, row in zip(np.array(poses, dtype=object)[reached], joints[reached], strict=True):
+        found = end_effector(chain, row)
+        assert found.position == pytest.approx(pose.position, abs=1e-3)
+        assert abs(np.dot(found.rotation, pose.rotation)) == pytest.approx(1.0, abs=1e-4)
+
+
+def test_it_meets_the_scenes_of_every_robot(robot: Embodiment) -> None:
+    ours, theirs = (build_scene("Pick_Blocks_Size", 3, 1, name) for name in (NAME, "aloha-agilex"))
+    assert ours.embodiment == NAME and ours.objects == theirs.objects
+
+
+def test_its_cameras_see_what_its_workcell_says(robot: Embodiment) -> None:
+    head = robot.workcell.head
+    ahead = head.pose.apply((0.7, 0.0, 0.0))
+    point = (np.array([v]) for v in ahead)
+    assert np.ravel(head.pixel(*point)) == pytest.approx([160.0, 120.0])
+
+
+@pytest.mark.sim
+def test_the_simulator_agrees_about_where_its_hands_are(robot: Embodiment) -> None:
+    from robospa.harness.sim.sapien_world import SapienWorld
+
+    world = SapienWorld(render=False)
+    world.load(build_scene("Pick_Blocks_Size", 1, 900_000, NAME))
+    joints = np.array([0.2, 0.3, 0.8, 0.3, -0.2, 0.4])
+    world.step(np.tile(np.append(joints, 1.0), 2).astype(np.float32), "joint", lambda _: False)
+    snapshot = world.snapshot()
+    for arm, end, measured, point, site in zip(
+        robot.arms,
+        snapshot.end_effector,
+        snapshot.measured,
+        snapshot.grasp_points,
+        robot.workcell.arms,
+        strict=True,
+    ):
+        ours = end_effector(chain_of(arm), measured)
+        assert end.position == pytest.approx(ours.position, abs=1e-4)
+        assert point == pytest.approx(ours.apply((site.gripper.grasp_centre, 0, 0)), abs=1e-4)
+
+
+@pytest.mark.sim
+@pytest.mark.parametrize("task", ["Pick_Blocks_Size", "Stack_Blocks_Size_Order", "Lift_Pot_Repeat"])
+def test_the_expert_solves_tasks_with_it(robot: Embodiment, task: str) -> None:
+    from robospa.harness.factory import policy_factory
+    from robospa.harness.seeds import ORACLE
+    from robospa.harness.sim.sapien_world import SapienWorld
+    from robospa.harness.trial import run_trial
+
+    world, expert = SapienWorld(render=False), policy_factory(ORACLE)()
+    record = run_trial(world, expert, TrialKey(task, 1, 100_000, NAME), policy_seed=0)
+    assert record.success, record
