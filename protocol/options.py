@@ -17,11 +17,11 @@ from pathlib import Path
 from typing import Any, TypeVar
 from urllib.parse import parse_qsl
 
+import msgspec
+
 from robospa.registry import did_you_mean
 
 T = TypeVar("T")
-
-TRUE, FALSE = ("true", "yes", "on", "1"), ("false", "no", "off", "0")
 
 
 @dataclass(frozen=True)
@@ -89,41 +89,27 @@ def option_table(cls: type[Any]) -> list[Row]:
 
 
 def _read(name: str, value: Any, hint: Any) -> Any:
+    """One option as its annotation has it; texts of a URL count as the numbers they spell."""
     allowed = _alternatives(hint)
-    if type(None) in allowed and value in (None, "", "none"):
-        return None
-    for kind in (k for k in allowed if k is not type(None)):
-        try:
-            return _convert(value, kind)
-        except (TypeError, ValueError, OverflowError):
-            continue
-    raise ValueError(f"option {name}={str(value)[:80]!r} is not a {_type_name(hint)}")
+    if isinstance(value, str):
+        if value in ("", "none") and type(None) in allowed:
+            value = None
+        elif bool in allowed:
+            value = {"yes": True, "on": True, "no": False, "off": False}.get(value.lower(), value)
+        elif allowed == (tuple[str, ...],):
+            value = (value,)
+    try:
+        return msgspec.convert(value, hint, strict=False, dec_hook=_decode)
+    except msgspec.ValidationError:
+        text = str(value)[:80]
+        raise ValueError(f"option {name}={text!r} is not a {_type_name(hint)}") from None
 
 
-def _convert(value: Any, kind: Any) -> Any:
-    if kind is bool:
-        if isinstance(value, bool):
-            return value
-        if str(value).lower() in TRUE + FALSE:
-            return str(value).lower() in TRUE
-        raise ValueError
-    if kind in (int, float):
-        if isinstance(value, bool):
-            raise ValueError
-        number = kind(value)
-        if kind is int and isinstance(value, float) and number != value:
-            raise ValueError
-        return number
-    if kind is str:
-        if not isinstance(value, str):
-            raise TypeError
-        return value
-    if kind is Path:
-        return Path(value)
-    if kind == tuple[str, ...]:
-        texts = (value,) if isinstance(value, str) else tuple(value)
-        return tuple(_convert(text, str) for text in texts)
-    raise TypeError
+def _decode(kind: type[Any], value: Any) -> Any:
+    """What msgspec does not read by itself."""
+    if kind is not Path:
+        raise NotImplementedError(f"an option cannot be a {kind.__name__}")
+    return Path(value)
 
 
 def _alternatives(hint: Any) -> tuple[Any, ...]:
