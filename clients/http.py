@@ -27,8 +27,8 @@ from robospa.protocol.errors import (
     ProtocolViolation,
     ServerError,
     Unauthorized,
-    printable,
 )
+from robospa.protocol.sanitize import printable
 
 MAX_ANSWER = 64 * 2**20
 """Bytes of an answer; a chunk as JSON is some kilobytes."""

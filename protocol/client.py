@@ -29,7 +29,6 @@ from robospa.protocol.errors import (
     ServerError,
     SpecMismatch,
     TransportError,
-    printable,
 )
 from robospa.protocol.images import encode_images
 from robospa.protocol.messages import (
@@ -49,6 +48,7 @@ from robospa.protocol.messages import (
     unpack,
 )
 from robospa.protocol.policy import Observation, PolicySpec, TrialInfo
+from robospa.protocol.sanitize import printable
 from robospa.protocol.transport import Address, Timeouts, Transport
 from robospa.protocol.validation import check_chunk, check_size, compare_specs
 

@@ -21,19 +21,7 @@ PolicyAnswerError ends the trial as a failure.
 
 from __future__ import annotations
 
-import re
-
-SHOWN = 300
-"""Characters of a server's own words that are repeated."""
-_COLOURS = re.compile(r"\x1b\[[0-?]*[ -/]*[@-~]|\x1b\][^\x07\x1b]*(?:\x07|\x1b\\)?")
-
-
-def printable(text: str, most: int = SHOWN) -> str:
-    """`text` from outside as one line that is safe on a terminal and in a record: without control
-    characters and colours, and with at most `most` characters."""
-    words = _COLOURS.sub("", text[: 8 * most])
-    line = " ".join("".join(c if c.isprintable() else " " for c in words).split())
-    return line if len(line) <= most else f"{line[: most - 3]}..."
+from robospa.protocol.sanitize import printable
 
 
 class WireError(Exception):

@@ -37,9 +37,9 @@ from robospa.protocol.errors import (
     HandshakeError,
     TransportError,
     Unauthorized,
-    printable,
 )
 from robospa.protocol.messages import SUBPROTOCOL
+from robospa.protocol.sanitize import printable
 from robospa.protocol.tuning import (
     enlarge_buffers,
     is_loopback,

@@ -22,8 +22,8 @@ from robospa.protocol.errors import DecodeError, ProtocolViolation, ServerError
 from robospa.protocol.openpi import CAMERA_NAMES
 from robospa.protocol.options import option, plain_options
 from robospa.protocol.policy import CameraSpec, Observation, PolicySpec, TrialInfo
+from robospa.protocol.sanitize import json_values
 from robospa.protocol.transport import Timeouts, Transport
-from robospa.protocol.validate import as_said
 
 WARNINGS = (
     "adapt_to_pi is invisible on the wire: the served config must have adapt_to_pi=False for "
@@ -115,7 +115,7 @@ class OpenPiSession:
         self.spec = options.spec
         self.hello = {
             "dialect": "openpi",
-            "metadata": as_said(metadata),
+            "metadata": json_values(metadata),
             "spec": self.spec.to_json(),
             "options": plain_options(options),
             "warnings": list(WARNINGS),

@@ -36,10 +36,10 @@ from robospa.protocol.errors import (
     EncodeError,
     ProtocolViolation,
     ServerError,
-    printable,
 )
 from robospa.protocol.options import option, plain_options
 from robospa.protocol.policy import Observation, PolicySpec, TrialInfo
+from robospa.protocol.sanitize import printable
 
 CAMERAS = {"head": "head_camera", "left_wrist": "left_camera", "right_wrist": "right_camera"}
 DP_CAMERAS = {"head": "head_cam", "left_wrist": "left_cam", "right_wrist": "right_cam"}

@@ -28,10 +28,10 @@ from robospa.clients.dialect import ConnectionParams, Dialect
 from robospa.clients.msgpack_socket import MsgpackSocket
 from robospa.clients.numpy_msgpack import text_form
 from robospa.clients.probe import Probe
-from robospa.protocol.errors import HandshakeError, ServerError, printable
+from robospa.protocol.errors import HandshakeError, ServerError
 from robospa.protocol.options import option, plain_options
 from robospa.protocol.policy import CameraSpec, Observation, PolicySpec, TrialInfo
-from robospa.protocol.validate import as_said
+from robospa.protocol.sanitize import json_values, printable
 
 CAMERAS = {"head": "head_camera", "left_wrist": "left_camera", "right_wrist": "right_camera"}
 PROTOCOL = 1
@@ -107,7 +107,7 @@ class VlaEvalSession:
                 f"not {PROTOCOL}"
             )
         name = str(greeting.get("model_server", ""))
-        said = {key: as_said(greeting[key]) for key in SAID if key in greeting}
+        said = {key: json_values(greeting[key]) for key in SAID if key in greeting}
         self.hello: dict[str, Any] = {
             "dialect": "vla-eval",
             "server": printable(f"{name} {greeting.get('harness_version', '')}", 200),

@@ -38,8 +38,8 @@ from robospa.harness.running.messages import (
 )
 from robospa.harness.running.policies import over_budget
 from robospa.harness.running.store import RecordWriter, StorageError, storing, write_actions
-from robospa.protocol.errors import printable
 from robospa.protocol.policy import PolicySpec
+from robospa.protocol.sanitize import printable
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
