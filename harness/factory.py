@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
 
 from robospa.registry import POLICIES, UnknownName, find, load, names
+
+if TYPE_CHECKING:
+    from robospa.protocol.policy import Policy
 
 
 def policy_names() -> tuple[str, ...]:
@@ -40,10 +43,11 @@ def is_url(target: str) -> bool:
     return "://" in target
 
 
-def open_policy(target: str, options: dict[str, Any]) -> Any:
+def open_policy(target: str, options: Mapping[str, Any]) -> Policy:
     """A policy from a server's URL (`options` go to `robospa.clients.connect`) or by name."""
     if is_url(target):
         from robospa.clients import connect
 
         return connect(target, **options)
-    return policy_factory(target)()
+    policy: Policy = policy_factory(target)()
+    return policy

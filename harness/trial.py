@@ -16,7 +16,7 @@ import hashlib
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, replace
-from typing import Any, Protocol
+from typing import Any, ParamSpec, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,12 +36,14 @@ from robospa.tasks.snapshot import Snapshot
 from robospa.tasks.task import Task, Tracker
 from robospa.trial import TrialKey
 
+P = ParamSpec("P")
+T = TypeVar("T")
 SERVER_TIMES = {"queue": "queue_ms", "infer": "infer_ms", "batch": "batch"}
 """Entries of a record's `latency` that come from the server, and what the wire calls them."""
 
 
 class Recorder(Protocol):
-    """Looks on while a trial runs."""
+    """Called while a trial runs, to record it."""
 
     def started(self, world: World) -> None:
         """The scene has settled; no action has been executed."""
@@ -87,16 +89,16 @@ class _Stopwatch:
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}
 
-    def call(self, purpose: str, work: Callable[..., Any], *args: Any) -> Any:
-        begun = time.perf_counter()
+    def call(self, purpose: str, work: Callable[P, T], *args: P.args, **named: P.kwargs) -> T:
+        started = time.perf_counter()
         try:
-            return work(*args)
+            return work(*args, **named)
         finally:
-            self.add(purpose, begun)
+            self.add(purpose, started)
 
-    def add(self, purpose: str, begun: float) -> None:
-        """The time since `begun` on the clock."""
-        self.seconds[purpose] = self.seconds.get(purpose, 0.0) + time.perf_counter() - begun
+    def add(self, purpose: str, started: float) -> None:
+        """Count the time since `started` on the clock."""
+        self.seconds[purpose] = self.seconds.get(purpose, 0.0) + time.perf_counter() - started
 
     def sum(self, *purposes: str) -> float:
         return sum(self.seconds.get(purpose, 0.0) for purpose in purposes)
@@ -110,54 +112,56 @@ class _Run:
     policy: Policy
     parts: TrialParts
     recorder: Recorder | None
-    watch: _Stopwatch = field(default_factory=_Stopwatch)
+    stopwatch: _Stopwatch = field(default_factory=_Stopwatch)
     hands: Hands | None = None
     events: list[Event] = field(default_factory=list)
-    when: list[int] = field(default_factory=list)
-    """For every event the number of actions begun by then."""
+    event_steps: list[int] = field(default_factory=list)
+    """For every event the number of actions started by then."""
     actions: list[NDArray[np.float32]] = field(default_factory=list)
     latencies: list[float] = field(default_factory=list)
-    told: list[Mapping[str, float]] = field(default_factory=list)
-    """What the policy's server said of the time of every answer."""
+    server_timings: list[Mapping[str, float]] = field(default_factory=list)
+    """For every answer, the times that the policy's server reported [ms]."""
     past: dict[int, dict[str, Any]] = field(default_factory=dict)
+    """Views that history offsets may ask for, by the number of actions executed then."""
     physics_steps: int = 0
     physics_seconds: float = 0.0
     unreachable: int = 0
     first_problem: str = ""
 
     def poll(self, snapshot: Snapshot) -> bool:
-        begun = time.perf_counter()
-        new = self._look(snapshot)
-        self.watch.add("goal", begun)
+        """Update the goal; True once it is met or lost."""
+        started = time.perf_counter()
+        new = self._update_goal(snapshot)
+        self.stopwatch.add("goal", started)
         if self.recorder is not None:
-            self.watch.call("recording", self.recorder.polled, self.world, snapshot.time)
+            self.stopwatch.call("recording", self.recorder.polled, self.world, snapshot.time)
         if not new:
             return False
         self.note(new)
         return any(event.kind in ("success", "failed") for event in new)
 
-    def _look(self, snapshot: Snapshot) -> tuple[Event, ...]:
-        """What the goal and the hands say of this instant."""
+    def _update_goal(self, snapshot: Snapshot) -> tuple[Event, ...]:
+        """New events of the goal and of the grippers."""
         new = self.parts.tracker.update(snapshot)
         if self.hands is not None:
-            tried = self.hands.update(snapshot)
-            return (*tried, *new) if tried else new
+            attempts = self.hands.update(snapshot)
+            return (*attempts, *new) if attempts else new
         return new
 
     def note(self, new: tuple[Event, ...]) -> None:
         """Keep events, with the action during which they happened."""
         self.events.extend(new)
-        self.when.extend([len(self.actions)] * len(new))
+        self.event_steps.extend([len(self.actions)] * len(new))
 
     def observation(self, spec: PolicySpec) -> dict[str, Any]:
         """What the policy asked for, at this instant."""
         step = len(self.actions)
-        seen = self.watch.call("rendering", self.world.observe, spec)
-        observation = dict(seen)
+        view = self.stopwatch.call("rendering", self.world.observe, spec)
+        observation = dict(view)
         observation["instruction"] = self.parts.instruction
         observation["step"] = step
         if spec.history:
-            self.past[step] = _present(seen)
+            self.past[step] = _images_and_state(view)
             observation["history"] = {
                 offset: self.past[max(step + offset, 0)] for offset in spec.history
             }
@@ -174,24 +178,26 @@ class _Run:
         step = len(self.actions)
         if step not in self.past and any(step - offset >= next_query for offset in spec.history):
             plain = replace(spec, privileged=False)
-            self.past[step] = _present(self.watch.call("rendering", self.world.observe, plain))
+            self.past[step] = _images_and_state(
+                self.stopwatch.call("rendering", self.world.observe, plain)
+            )
 
-    def ask(self, spec: PolicySpec) -> NDArray[np.float32]:
+    def next_actions(self, spec: PolicySpec) -> NDArray[np.float32]:
         """The policy's next actions, float32 (T, D), quantised as they are executed."""
         observation = self.observation(spec)
-        begun = time.perf_counter()
-        answer = self.watch.call("waiting", self.policy.infer, observation)
-        self.latencies.append(1000.0 * (time.perf_counter() - begun))
-        self.told.append(getattr(self.policy, "last_timing", {}))
+        started = time.perf_counter()
+        answer = self.stopwatch.call("waiting", self.policy.infer, observation)
+        self.latencies.append(1000.0 * (time.perf_counter() - started))
+        self.server_timings.append(getattr(self.policy, "last_timing", {}))
         return quantize(check_chunk(answer, spec))
 
     def execute(self, action: NDArray[np.float32], space: str) -> bool:
         """Whether the goal was met or lost during `action`."""
         self.actions.append(action)
-        begun, other = time.perf_counter(), self.watch.sum("goal", "recording")
+        started, other = time.perf_counter(), self.stopwatch.sum("goal", "recording")
         done = self.world.step(action, space, self.poll)
-        spent = time.perf_counter() - begun
-        self.physics_seconds += spent - (self.watch.sum("goal", "recording") - other)
+        elapsed = time.perf_counter() - started
+        self.physics_seconds += elapsed - (self.stopwatch.sum("goal", "recording") - other)
         self.physics_steps += done.physics_steps
         if done.problems:
             self.unreachable += 1
@@ -199,11 +205,11 @@ class _Run:
                 done.problems
             )
         if self.recorder is not None:
-            self.watch.call("recording", self.recorder.executed, self.world, action)
+            self.stopwatch.call("recording", self.recorder.executed, self.world, action)
         return bool(done.stopped)
 
 
-def _present(observation: Mapping[str, Any]) -> dict[str, Any]:
+def _images_and_state(observation: Mapping[str, Any]) -> dict[str, Any]:
     return {name: observation[name] for name in ("images", "state") if name in observation}
 
 
@@ -211,11 +217,11 @@ def _loop(run: _Run, limit: int) -> str:
     """Act until the goal is met or lost or `limit` actions are spent; returns the end reason."""
     spec = run.policy.spec
     while len(run.actions) < limit:
-        chunk = run.ask(spec)
-        wanted = chunk[: spec.execute] if spec.execute else chunk
-        wanted = wanted[: limit - len(run.actions)]
-        next_query = len(run.actions) + len(wanted)
-        for action in wanted:
+        chunk = run.next_actions(spec)
+        actions = chunk[: spec.execute] if spec.execute else chunk
+        actions = actions[: limit - len(run.actions)]
+        next_query = len(run.actions) + len(actions)
+        for action in actions:
             if spec.history and run.actions:
                 run.remember(spec, next_query)
             if run.execute(action, spec.action):
@@ -230,14 +236,16 @@ def _end_of(run: _Run) -> str:
     return "goal_lost" if reached.failed else "step_limit"
 
 
-def _answer_times(latencies: list[float], told: list[Mapping[str, float]]) -> dict[str, float]:
-    """Percentiles as the client saw them, and means of what the server told, if it did [ms]."""
+def _answer_times(
+    latencies: list[float], server_timings: list[Mapping[str, float]]
+) -> dict[str, float]:
+    """Percentiles as the client measured them, and means of what a server reported [ms]."""
     if not latencies:
         return {}
     p50, p95, p99 = (float(v) for v in np.percentile(latencies, [50, 95, 99]))
     found = {"p50": p50, "p95": p95, "p99": p99, "max": max(latencies)}
     for name, entry in SERVER_TIMES.items():
-        values = [timing.get(entry) for timing in told]
+        values = [timing.get(entry) for timing in server_timings]
         usable = [v for v in values if isinstance(v, (int, float)) and 0.0 <= v < 1e9]
         if usable:
             found[name] = sum(usable) / len(usable)
@@ -255,9 +263,9 @@ def actions_digest(actions: list[NDArray[np.float32]]) -> str:
 def _play(run: _Run, info: TrialInfo, limit: int) -> tuple[str, str]:
     """(end reason, message) of the trial whose scene is loaded."""
     try:
-        run.watch.call("waiting", run.policy.reset, info)
+        run.stopwatch.call("waiting", run.policy.reset, info)
         if run.recorder is not None:
-            run.watch.call("recording", run.recorder.started, run.world)
+            run.stopwatch.call("recording", run.recorder.started, run.world)
         run.note(run.parts.tracker.start(run.world.snapshot()))
         if any(event.kind in ("success", "failed") for event in run.events):
             return _end_of(run), "the goal was decided before the first action"
@@ -294,12 +302,14 @@ def run_trial(
     Whatever `policy` or `world` raise apart from bad actions and answers is passed on: the caller
     decides whether to try again. `world` may be used for any other trial before and after.
     """
-    begun, worked = time.perf_counter(), time.process_time()
-    wanted = parts(key)
-    run = _Run(world, policy, wanted, recorder)
-    level = wanted.task.levels[key.level]
-    tracker = wanted.tracker
-    run.watch.call("loading", world.load, wanted.scene, tracker.needs_contacts)
+    started, processor = time.perf_counter(), time.process_time()
+    setup = parts(key)
+    run = _Run(world, policy, setup, recorder)
+    tracker = setup.tracker
+    run.stopwatch.call("loading", world.load, setup.scene, tracker.needs_contacts)
+    roles = getattr(tracker, "roles", None)
+    if roles:
+        run.hands = Hands(roles, setup.scene, world.contacts)
     info = TrialInfo(
         task=key.task,
         level=key.level,
@@ -307,45 +317,51 @@ def run_trial(
         embodiment=key.embodiment,
         mode=key.mode,
         split=key.split,
-        instruction=wanted.instruction,
+        instruction=setup.instruction,
         policy_seed=policy_seed,
     )
-    roles = getattr(tracker, "roles", None)
-    if roles:
-        run.hands = Hands(roles, wanted.scene, world.contacts)
-    end, message = _play(run, info, max(1, round(level.steps * step_scale)))
+    limit = max(1, round(setup.task.levels[key.level].steps * step_scale))
+    end, message = _play(run, info, limit)
     if run.hands is not None:
         run.note(run.hands.finish(world.snapshot().time))
     if recorder is not None:
-        run.watch.call("recording", recorder.ended, world)
+        run.stopwatch.call("recording", recorder.ended, world)
+    record = _record(run, key, end, message, policy_seed)
+    timing = {
+        **run.stopwatch.seconds,
+        "physics": run.physics_seconds,
+        PROCESSOR: time.process_time() - processor,
+    }
+    return replace(record, wall_time=time.perf_counter() - started, timing=timing)
+
+
+def _record(run: _Run, key: TrialKey, end: str, message: str, policy_seed: int) -> TrialRecord:
+    """The record of a trial that has ended, without its times."""
+    setup, tracker = run.parts, run.parts.tracker
     reached = outcome(run.events, tracker.total)
-    timing = dict(run.watch.seconds)
-    timing["physics"] = run.physics_seconds
-    timing[PROCESSOR] = time.process_time() - worked
     return TrialRecord(
         key=key,
-        category=wanted.task.category,
-        instruction=wanted.instruction,
-        scene_digest=wanted.scene.digest,
+        category=setup.task.category,
+        instruction=setup.instruction,
+        scene_digest=setup.scene.digest,
         end=end,
         success=reached.success,
         done=reached.done,
         best=reached.best,
         total=tracker.total,
-        candidates=level.candidates,
+        candidates=setup.task.levels[key.level].candidates,
         steps=len(run.actions),
         physics_steps=run.physics_steps,
         policy_calls=len(run.latencies),
-        digest=world.digest(),
+        digest=run.world.digest(),
         actions_digest=actions_digest(run.actions),
-        wall_time=time.perf_counter() - begun,
+        wall_time=0.0,
         policy_seed=policy_seed,
         message=message,
         events=tuple(
             {**asdict(event), "step": step}
-            for event, step in zip(run.events, run.when, strict=True)
+            for event, step in zip(run.events, run.event_steps, strict=True)
         ),
-        latency=_answer_times(run.latencies, run.told),
-        timing=timing,
+        latency=_answer_times(run.latencies, run.server_timings),
         diagnostics=_diagnostics(run),
     )
