@@ -1,0 +1,84 @@
+"""The Aloha is one robot of several: only its own modules know its name and its numbers."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterable, Iterator
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+
+import pytest
+
+from robospa.harness.robots.aloha_agilex import ALOHA_AGILEX, CHAIN
+
+ROOT = Path(__file__).resolve().parents[1]
+FOLDERS = ("tasks", "harness", "results", "clients", "baselines", "protocol", "leaderboard")
+NAMED = (
+    "robospa/trial.py",
+    "harness/robots/embodiment.py",
+    "protocol/openpi.py",
+    "clients/openpi/",
+)
+"""Where else the name stands: the suite's own robot, an example, and openpi's configurations."""
+
+
+def sources(*folders: str) -> list[Path]:
+    """The modules that may not know the Aloha."""
+    found = [path for folder in folders for path in (ROOT / folder).rglob("*.py")]
+    return sorted(path for path in found if not path.name.startswith("aloha_agilex"))
+
+
+def numbers(value: object) -> Iterator[float]:
+    """Every float in a value made of dataclasses, mappings and sequences."""
+    if isinstance(value, float):
+        yield abs(value)
+    elif isinstance(value, dict):
+        yield from (n for item in value.values() for n in numbers(item))
+    elif isinstance(value, (tuple, list)):
+        yield from (n for item in value for n in numbers(item))
+    elif is_dataclass(value):
+        yield from (n for field in fields(value) for n in numbers(getattr(value, field.name)))
+
+
+def telling(values: Iterable[float], digits: int) -> set[float]:
+    """Those that stand for themselves: with so many significant digits (1.0 and 0.5 do not)."""
+    return {v for v in values if digits <= len(repr(v).replace(".", "").strip("0")) <= 6}
+
+
+def uses(path: Path, known: set[float]) -> list[str]:
+    """Lines of a module that write one of the `known` numbers."""
+    return [
+        f"{path.relative_to(ROOT)}:{node.lineno} has {node.value}"
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.Constant) and isinstance(node.value, float) and node.value in known
+    ]
+
+
+def test_no_other_module_has_its_joints_mounts_or_reach() -> None:
+    arms, cell = ALOHA_AGILEX.arms, ALOHA_AGILEX.workcell
+    fingers = [finger.origin.position for arm in arms for finger in arm.fingers]
+    mounts = [arm.base.position for arm in arms]
+    sites = [(site.base, site.reach, site.tool_reach) for site in cell.arms]
+    known = telling(numbers([[joint[0] for joint in CHAIN], mounts, fingers]), 3)
+    known |= telling(numbers(sites), 2) - {0.25}
+    assert {0.307, 0.417, 0.7775, 0.69, 0.63, 0.264} <= known
+    # sizes of things may happen to be those of a link
+    modules = [path for path in sources(*FOLDERS) if "objects" not in path.parts]
+    modules += (ROOT / "robospa").glob("*.py")
+    assert [line for path in modules for line in uses(path, known)] == []
+
+
+def test_goals_and_skills_have_no_number_of_its_gripper_or_camera() -> None:
+    cell = ALOHA_AGILEX.workcell
+    known = telling(numbers([cell.arms[0].gripper, cell.head.position]), 2)
+    known -= {0.012, 0.026, 0.032, 0.12, 0.45}  # too common to be told from other lengths
+    assert {0.088, 0.095, 0.155, 1.35} <= known
+    modules = sources("tasks/goals", "harness/skills")
+    assert [line for path in modules for line in uses(path, known)] == []
+
+
+@pytest.mark.parametrize("folder", [*FOLDERS, "robospa"])
+def test_no_other_module_has_its_name(folder: str) -> None:
+    paths = (ROOT / "robospa").glob("*.py") if folder == "robospa" else sources(folder)
+    named = [p.relative_to(ROOT).as_posix() for p in paths if "aloha" in p.read_text().lower()]
+    assert [name for name in named if not name.startswith(NAMED)] == []
