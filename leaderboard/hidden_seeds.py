@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from robospa.harness.running.store import replace_file
+from robospa.harness.running.atomic_file import replace_file
 from robospa.harness.seeds import Sweep
 from robospa.leaderboard.bundle import MEGA, BundleError, canonical, sha256
 from robospa.leaderboard.strict_json import parse_map

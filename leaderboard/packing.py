@@ -21,8 +21,8 @@ from typing import Any
 
 from robospa.harness.factory import load_function
 from robospa.harness.quantize import STEPS_PER_UNIT, is_quantized
+from robospa.harness.running.action_files import action_path, read_actions
 from robospa.harness.running.manifest import changed_settings, group_keys, seed_hash
-from robospa.harness.running.store import action_path, read_actions
 from robospa.leaderboard import bundle as layout
 from robospa.leaderboard.action_traces import Trace, encode
 from robospa.leaderboard.bundle import BundleError

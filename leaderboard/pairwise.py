@@ -12,7 +12,7 @@ import shutil
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from robospa.harness.running.store import replace_file
+from robospa.harness.running.atomic_file import replace_file
 from robospa.leaderboard import bundle as layout
 from robospa.leaderboard.entries import Entry
 from robospa.leaderboard.trial_outcomes import paired, side_of

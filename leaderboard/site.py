@@ -20,7 +20,7 @@ from statistics import NormalDist
 from typing import Any
 
 from robospa.categories import CATEGORIES, CATEGORY_NAMES, DIMENSIONS
-from robospa.harness.running.store import replace_file
+from robospa.harness.running.atomic_file import replace_file
 from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.entries import BADGES, Entry, all_entries, page_values
 from robospa.leaderboard.pairwise import pairs_of, write_pairs

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from robospa.harness.running.store import replace_file
+from robospa.harness.running.atomic_file import replace_file
 from robospa.leaderboard import bundle as layout
 from robospa.leaderboard.archive import Archive
 from robospa.leaderboard.bundle import MEGA, BundleError

@@ -207,6 +207,6 @@ def _replayed(valid: Any, challenge: str, fraction: float, workers: int, referen
 def _write(path: Path, found: dict[str, Any]) -> None:
     import json
 
-    from robospa.harness.running.store import replace_file
+    from robospa.harness.running.atomic_file import replace_file
 
     replace_file(path, (json.dumps(found, indent=1) + "\n").encode())

@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.action_space import ARMS, POSE, SEVEN_JOINT_ARMS, SIX_JOINT_ARMS, ActionSpace
-from robospa.harness.running.store import replace_file
+from robospa.harness.running.atomic_file import replace_file
 from robospa.harness.world import World
 from robospa.protocol.errors import DecodeError
 from robospa.protocol.images import decode_jpeg

@@ -18,7 +18,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.harness.running.store import VIDEOS, replace_file
+from robospa.harness.running.atomic_file import replace_file
+from robospa.harness.running.record_store import VIDEOS
 from robospa.harness.world import World
 from robospa.protocol.policy import CameraSpec
 from robospa.trial import TrialKey

@@ -14,15 +14,16 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from robospa.harness.factory import is_url, load_function
+from robospa.harness.running.atomic_file import replace_file
 from robospa.harness.running.executor import RunAborted
 from robospa.harness.running.manifest import Manifest, about_machine, check_folder, open_run
 from robospa.harness.running.policies import Probed, probe_policies, warnings_of
 from robospa.harness.running.progress import Progress, summary
 from robospa.harness.running.ray_cluster import RaySettings
 from robospa.harness.running.ray_executor import loopback_warnings, ray_executor
+from robospa.harness.running.record_store import recover_folder, remove_partial_files
 from robospa.harness.running.run_lock import run_lock
 from robospa.harness.running.runner import Runner, RunOptions
-from robospa.harness.running.store import drop_parts, replace_file, tidy
 from robospa.harness.running.worker import WorkerConfig, describe
 from robospa.harness.settings import EvaluationSettings
 from robospa.harness.settings_file import FILE, to_toml
@@ -176,7 +177,7 @@ def evaluate(request: Request) -> None:
         ray_executor(request.ray, config, _renders(config, policies)) as executor,
         run_lock(folder),
     ):
-        tidy(folder)
+        recover_folder(folder)
         open_run(folder, manifest, request.resume)
         if request.settings is not None:
             replace_file(folder / FILE, to_toml(request.settings).encode())
@@ -189,7 +190,7 @@ def evaluate(request: Request) -> None:
             runner.executor = executor
             runner.on_status = progress.show
             runner.run()
-        drop_parts(folder)
+        remove_partial_files(folder)
         for text in summary(runner.times.overall_shares(), runner.status(time.monotonic())):
             progress.note(text)
 

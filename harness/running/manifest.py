@@ -19,9 +19,9 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+from robospa.harness.running.atomic_file import PARTIAL, replace_file
 from robospa.harness.running.code_hash import code_hash
 from robospa.harness.running.run_lock import LOCK
-from robospa.harness.running.store import PART, replace_file
 from robospa.results.records.manifest import (
     FORMAT,
     MANIFEST,
@@ -169,7 +169,7 @@ def check_folder(folder: Path, resume: bool) -> None:
 def _is_empty(folder: Path) -> bool:
     """Whether nothing lies in `folder` but what a driver killed at its start leaves behind."""
     names = {path.name for path in folder.iterdir()} - {LOCK}
-    return all(fnmatch(name, PART) for name in names)
+    return all(fnmatch(name, PARTIAL) for name in names)
 
 
 def open_run(folder: Path, manifest: Manifest, resume: bool) -> None:

@@ -17,6 +17,7 @@ from importlib import import_module
 from typing import Any
 from urllib.parse import urlsplit
 
+from robospa.harness.running.atomic_file import replace_file
 from robospa.harness.running.executor import RunAborted, WorkerHandle
 from robospa.harness.running.messages import Command, Message, Ready, TrialDone
 from robospa.harness.running.ray_cluster import (
@@ -27,7 +28,7 @@ from robospa.harness.running.ray_cluster import (
     unreachable,
 )
 from robospa.harness.running.ray_node import Report, WorkerActor, versions
-from robospa.harness.running.store import RecordWriter, replace_file
+from robospa.harness.running.record_store import RecordWriter
 from robospa.harness.running.worker import LOGS, WorkerConfig
 
 NODES_SECONDS = 1.0

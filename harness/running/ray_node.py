@@ -17,10 +17,11 @@ from dataclasses import dataclass, field, replace
 from importlib import metadata
 from pathlib import Path
 
+from robospa.harness.running.action_files import ACTIONS
 from robospa.harness.running.code_hash import code_hash
 from robospa.harness.running.local_workers import LocalExecutor
 from robospa.harness.running.messages import Command, Heartbeat, Message, Ready, TrialDone
-from robospa.harness.running.store import ACTIONS, VIDEOS
+from robospa.harness.running.record_store import VIDEOS
 from robospa.harness.running.worker import LOGS, WorkerConfig
 
 LOG_BYTES = 64_000

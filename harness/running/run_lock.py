@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from robospa.harness.running.store import storing
+from robospa.harness.running.atomic_file import storage_errors
 from robospa.results.records.manifest import RunError
 
 LOCK = ".lock"
@@ -24,7 +24,7 @@ NAME_BYTES = 160
 def run_lock(folder: Path) -> Iterator[None]:
     """Hold the run in `folder` for this process; raises RunError if another one holds it."""
     path = folder / LOCK
-    with storing(path):
+    with storage_errors(path):
         folder.mkdir(parents=True, exist_ok=True)
         file = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
     try:
@@ -37,7 +37,7 @@ def run_lock(folder: Path) -> Iterator[None]:
         except OSError:
             pass  # a file system without locks
         name = f"process {os.getpid()} on {socket.gethostname()}"
-        with storing(path):
+        with storage_errors(path):
             os.pwrite(file, name.encode()[:NAME_BYTES].ljust(NAME_BYTES), 0)
         yield
     finally:

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from robospa.harness.factory import is_url
+from robospa.harness.running.atomic_file import StorageError
 from robospa.harness.running.autoscaling import Autoscaler
 from robospa.harness.running.executor import Executor, RunAborted, WorkerHandle
 from robospa.harness.running.heartbeat import HeartbeatMonitor
@@ -29,9 +30,9 @@ from robospa.harness.running.messages import (
     TrialLost,
 )
 from robospa.harness.running.queue import TrialQueue
+from robospa.harness.running.record_store import RecordWriter
 from robospa.harness.running.scheduler import Job, Scheduler
 from robospa.harness.running.status import Status, TimeBreakdown
-from robospa.harness.running.store import RecordWriter, StorageError
 from robospa.harness.running.worker import LOGS, WorkerConfig, task_finder
 from robospa.results.records.run_io import read_file
 from robospa.results.records.trial_record import TrialRecord

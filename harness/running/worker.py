@@ -25,6 +25,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from robospa.harness.factory import load_function, open_policy
+from robospa.harness.running.action_files import write_actions
+from robospa.harness.running.atomic_file import StorageError, storage_errors
 from robospa.harness.running.heartbeat import HeartbeatSender, MonitoredPolicy
 from robospa.harness.running.messages import (
     Command,
@@ -37,7 +39,7 @@ from robospa.harness.running.messages import (
     TrialLost,
 )
 from robospa.harness.running.policies import over_budget
-from robospa.harness.running.store import RecordWriter, StorageError, storing, write_actions
+from robospa.harness.running.record_store import RecordWriter
 from robospa.protocol.policy import PolicySpec
 from robospa.protocol.sanitize import printable
 from robospa.results.records.trial_record import TrialRecord
@@ -222,7 +224,7 @@ def die_with_driver() -> None:
 
 def _log_to(path: Path) -> None:
     """Send whatever libraries print, and the stack of a crash, to a file instead of the screen."""
-    with storing(path):
+    with storage_errors(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
     os.dup2(file, sys.stdout.fileno())

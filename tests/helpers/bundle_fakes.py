@@ -12,8 +12,9 @@ import pytest
 from run_fakes import LIMIT, FakePolicy, FakeWorld, parts
 
 from robospa.harness.pictures.video import TrialRecorder
+from robospa.harness.running.action_files import write_actions
 from robospa.harness.running.manifest import Manifest, about_machine, write_manifest
-from robospa.harness.running.store import RecordWriter, write_actions
+from robospa.harness.running.record_store import RecordWriter
 from robospa.harness.trial import policy_seed, run_trial
 from robospa.harness.world import Poll, StepResult
 from robospa.leaderboard import bundle as layout

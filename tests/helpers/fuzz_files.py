@@ -31,10 +31,10 @@ from typing import Any
 import bundle_fakes as fakes
 import numpy as np
 
+from robospa.harness.running.action_files import read_actions, write_actions
 from robospa.harness.running.manifest import changed_settings, seed_hash
 from robospa.harness.running.policies import read_map
 from robospa.harness.running.request import client_options
-from robospa.harness.running.store import read_actions, write_actions
 from robospa.harness.selection import parse_seeds
 from robospa.harness.settings import SettingsError
 from robospa.leaderboard import bundle as layout

@@ -16,7 +16,8 @@ from contextlib import contextmanager
 
 from soak_run import PATIENCE, Finding, Run, kill, wait_gone
 
-from robospa.harness.running.store import ACTIONS, PART
+from robospa.harness.running.action_files import ACTIONS
+from robospa.harness.running.atomic_file import PARTIAL
 
 
 def _signal_driver(run: Run, number: int, code: int) -> bool:
@@ -86,7 +87,7 @@ def worker_killed_writing(run: Run, rng: random.Random) -> bool:
     """kill -9 of all workers just when one of them puts a trial on disk."""
     until = time.monotonic() + 5.0
     while run.alive() and time.monotonic() < until:
-        if any((run.folder / ACTIONS).glob(PART)):
+        if any((run.folder / ACTIONS).glob(PARTIAL)):
             time.sleep(rng.choice((0.0, 0.0, 0.001, 0.003)))
             workers = run.workers()
             for pid in workers:

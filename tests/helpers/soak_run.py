@@ -14,7 +14,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from robospa.harness.running.store import ACTIONS, PART, action_path, read_actions
+from robospa.harness.running.action_files import ACTIONS, action_path, read_actions
+from robospa.harness.running.atomic_file import PARTIAL
 from robospa.harness.trial import actions_digest
 from robospa.results.records.run_io import TRIALS, finished, read_file, read_run
 from robospa.results.records.trial_record import TrialRecord
@@ -186,7 +187,7 @@ def check_run(run: Run, reference: Mapping[TrialKey, TrialRecord]) -> list[str]:
     wrong += [f"{n} results of {key.slug}" for key, n in count.items() if n != 1]
     for key in set(count) & set(reference):
         wrong += _differences(run.folder, found.records[key], reference[key])
-    wrong += [f"left behind: {p}" for p in run.folder.rglob(PART)]
+    wrong += [f"left behind: {p}" for p in run.folder.rglob(PARTIAL)]
     traces = {p.name for p in (run.folder / ACTIONS).iterdir()}
     wrong += [f"strange: {name}" for name in traces - {f"{k.slug}.npz" for k in reference}]
     return wrong

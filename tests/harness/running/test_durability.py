@@ -9,14 +9,9 @@ from pathlib import Path
 import pytest
 from fake_records import KEY, RECORD, other
 
-from robospa.harness.running.store import (
-    RecordWriter,
-    StorageError,
-    action_path,
-    read_actions,
-    replace_file,
-    tidy,
-)
+from robospa.harness.running.action_files import action_path, read_actions
+from robospa.harness.running.atomic_file import StorageError, replace_file
+from robospa.harness.running.record_store import RecordWriter, recover_folder
 from robospa.harness.running.worker import Worker, WorkerConfig
 from robospa.results.records.manifest import RunError
 from robospa.results.records.run_io import read_file, read_records
@@ -105,7 +100,7 @@ def test_what_a_killed_worker_left_behind_is_settled(tmp_path: Path) -> None:
     (tmp_path / "actions").mkdir()
     (tmp_path / "actions" / ".x.npz.12.part").touch()
     (tmp_path / ".run.json.12.part").touch()
-    tidy(tmp_path)
+    recover_folder(tmp_path)
     left = sorted(str(p.relative_to(tmp_path)) for p in tmp_path.rglob("*") if p.is_file())
     assert left == ["trials/0000.jsonl"]
 
@@ -114,6 +109,6 @@ def test_a_worker_that_outlives_its_driver_is_not_raced(tmp_path: Path) -> None:
     writer = RecordWriter(tmp_path)
     writer.write(RECORD)
     with pytest.raises(RunError, match=r"an earlier driver still writes to .*0000\.jsonl; end it"):
-        tidy(tmp_path, patience=0.1)
+        recover_folder(tmp_path, patience=0.1)
     writer.close()
-    tidy(tmp_path, patience=0.1)
+    recover_folder(tmp_path, patience=0.1)

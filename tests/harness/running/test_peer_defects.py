@@ -20,10 +20,11 @@ from run_fakes import SPEC, FakePolicy, FakeWorld, parts
 
 from robospa.clients import connect
 from robospa.harness.running import manifest
+from robospa.harness.running.action_files import action_path, read_actions
 from robospa.harness.running.evaluate import Request, evaluate
+from robospa.harness.running.record_store import RecordWriter
 from robospa.harness.running.request import make_request
 from robospa.harness.running.runner import RunOptions
-from robospa.harness.running.store import RecordWriter, action_path, read_actions
 from robospa.harness.running.worker import Worker, WorkerConfig
 from robospa.harness.settings import EvaluationSettings, updated
 from robospa.harness.trial import run_trial

@@ -1,0 +1,72 @@
+"""The executed actions of every trial, one file each, so that the trial can be replayed."""
+
+from __future__ import annotations
+
+import io
+import math
+import re
+import zipfile
+import zlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robospa.harness.running.atomic_file import replace_file
+from robospa.results.records.manifest import RunError
+from robospa.trial import TrialKey
+
+ACTIONS = "actions"
+MAX_BYTES = 2**28
+"""Of a trial's actions."""
+
+
+def action_path(folder: Path, key: TrialKey) -> Path:
+    """Where the action trace of `key` lies."""
+    return folder / ACTIONS / f"{key.slug}.npz"
+
+
+def write_actions(folder: Path, key: TrialKey, actions: NDArray[np.float32], space: str) -> None:
+    """Keep the executed actions, float32 (steps, D), so that the trial can be replayed."""
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, actions=actions, space=np.array(space))
+    replace_file(action_path(folder, key), buffer.getvalue())
+
+
+def read_actions(path: Path) -> tuple[NDArray[np.float32], str]:
+    """(actions (steps, D), action space) of a trace; raises RunError if it is none."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            actions = _member(archive, "actions.npy")
+            space = _member(archive, "space.npy")
+    except _BROKEN as error:
+        raise RunError(f"{path} is no action trace: {error}") from error
+    if actions.ndim != 2 or actions.dtype.kind != "f" or space.ndim or space.dtype.kind != "U":
+        raise RunError(f"{path} is no action trace: it has other arrays")
+    return np.asarray(actions, dtype=np.float32), str(space)
+
+
+_BROKEN = (OSError, ValueError, KeyError, EOFError, RuntimeError, zipfile.BadZipFile, zlib.error)
+
+
+def _member(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
+    """An array of an .npz file; its data is there before anything of its announced size is made."""
+    with archive.open(name) as file:
+        data = file.read(MAX_BYTES + 1)
+    if len(data) > MAX_BYTES:
+        raise ValueError(f"{name} has more than {MAX_BYTES} bytes")
+    found = re.fullmatch(_HEADER, data[10:128].rstrip(b" \n\x00").split(b"\n")[0].rstrip())
+    if not data.startswith(b"\x93NUMPY\x01\x00") or found is None:
+        raise ValueError(f"{name} is no plain array")
+    dtype = np.dtype(found[1].decode())
+    shape = tuple(int(n) for n in found[2].decode().split(",") if n.strip())
+    start = 10 + int.from_bytes(data[8:10], "little")
+    if math.prod(shape) * dtype.itemsize != len(data) - start:
+        raise ValueError(f"{name} announces another size than it has")
+    return np.frombuffer(data, dtype, offset=start).reshape(shape)
+
+
+_HEADER = (
+    rb"\{'descr': '(<[fU][0-9]{1,4})', 'fortran_order': False, 'shape': \(([0-9, ]{0,40})\), \}"
+)
