@@ -16,7 +16,7 @@ from collections.abc import Mapping
 from typing import Any
 from urllib.parse import urlsplit
 
-from robospa.clients.detect import explained
+from robospa.clients.detect import explain_error
 from robospa.clients.dialect import TLS_PORT, ConnectionParams, Endpoint, dialects
 from robospa.protocol.client import RemotePolicy, WireClient, expecting
 from robospa.protocol.codec import DEFAULT_LIMITS, Limits
@@ -98,6 +98,6 @@ def connect(
             # Once it has spoken this dialect, trouble is trouble and no sign of another one.
             if known or isinstance(error.__cause__, ConnectionRefusedError):
                 raise
-            raise explained(error, params) from error.__cause__
+            raise explain_error(error, params) from error.__cause__
 
     return expecting(RemotePolicy(url, opened, params.timeouts), expect)

@@ -39,7 +39,7 @@ def as_chunk(value: Any) -> Any:
         return array.astype(np.float32)
 
 
-def turned(chunk: Any, space: ActionSpace) -> Any:
+def invert_grippers(chunk: Any, space: ActionSpace) -> Any:
     """`chunk` with 1 - g for every gripper number: closed becomes open."""
     if not isinstance(chunk, np.ndarray) or chunk.ndim != 2 or chunk.shape[1] != space.width:
         return chunk  # refused by the check that follows

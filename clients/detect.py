@@ -1,7 +1,7 @@
 """Which dialect a server speaks, if it is not the one it was spoken to in.
 
 Only asked when something has gone wrong already. A server that is busy answers none of the
-questions (`robospa.clients.probe`), and then nothing is said.
+questions (`robospa.clients.probe`), and the error stays as it was.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ WEBSOCKET = "a WebSocket server"
 HTTP = "an HTTP server of another kind"
 
 
-def explained(error: WireError, params: ConnectionParams) -> WireError:
+def explain_error(error: WireError, params: ConnectionParams) -> WireError:
     """`error`, or a HandshakeError that also says which dialect the server seems to speak."""
     endpoint = params.endpoint
     found = detect(params)

@@ -31,8 +31,8 @@ PARALLEL = 1e-6
 
 def encode_rotation(quaternion: Array, order: str, layout: str) -> Array:
     """(..., 4) w x y z to the six numbers (..., 6)."""
-    told = quaternion if order == "wxyz" else np.roll(quaternion, 1, axis=-1)
-    columns = quaternion_to_matrix(np.asarray(told, dtype=float))[..., :2]
+    read = quaternion if order == "wxyz" else np.roll(quaternion, 1, axis=-1)
+    columns = quaternion_to_matrix(np.asarray(read, dtype=float))[..., :2]
     flat = columns if layout == "interleaved" else np.swapaxes(columns, -1, -2)
     return flat.reshape(*columns.shape[:-2], 6)
 
@@ -55,8 +55,8 @@ def decode_rotation(six: Array, order: str, layout: str) -> Array:
         real = length > PARALLEL * np.linalg.norm(second, axis=-1, keepdims=True)
         b = np.where(real, rest / length, np.nan)
         matrix = np.stack([a, b, np.cross(a, b)], axis=-1)
-        told = matrix_to_quaternion(matrix)
-    return told if order == "wxyz" else np.roll(told, -1, axis=-1)
+        read = matrix_to_quaternion(matrix)
+    return read if order == "wxyz" else np.roll(read, -1, axis=-1)
 
 
 def poses_to_ee6d(poses: NDArray[np.floating[Any]], order: str, layout: str) -> Array:
@@ -91,6 +91,6 @@ def closed_to_open(chunk: NDArray[np.floating[Any]], closed_above: float) -> NDA
     """(T, 14) joint targets whose gripper numbers say closed, to ours, whose numbers say open."""
     actions = np.array(chunk, dtype=np.float32)
     for column in ActionSpace("joint").grippers:
-        told = actions[:, column]
-        actions[:, column] = np.where(np.isnan(told), np.nan, told <= closed_above)
+        closed = actions[:, column]
+        actions[:, column] = np.where(np.isnan(closed), np.nan, closed <= closed_above)
     return actions

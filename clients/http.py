@@ -32,14 +32,14 @@ from robospa.protocol.sanitize import printable
 
 MAX_ANSWER = 64 * 2**20
 """Bytes of an answer; a chunk as JSON is some kilobytes."""
-SHOWN = 300
-"""Characters of a server's complaint that are repeated."""
-WRONG = {
+MAX_REASON = 300
+"""Characters of a server's error text that are repeated."""
+WRONG_ADDRESS = {
     "HTTP 404": "does not exist there: is it another server, or another path?",
     "HTTP 426": "is a WebSocket, not an HTTP endpoint",
 }
 """What the status of a first request says about the address."""
-STALE = (http.client.RemoteDisconnected, ConnectionResetError, BrokenPipeError)
+STALE_CONNECTION = (http.client.RemoteDisconnected, ConnectionResetError, BrokenPipeError)
 
 
 def open_http(
@@ -74,9 +74,9 @@ class JsonServer:
         try:
             self.get(path, timeout)
         except ServerError as error:
-            if error.code in WRONG:
+            if error.code in WRONG_ADDRESS:
                 raise HandshakeError(
-                    f"{self.url}{path} {WRONG[error.code]} ({error.code}: {error.message})"
+                    f"{self.url}{path} {WRONG_ADDRESS[error.code]} ({error.code}: {error.message})"
                 ) from error
         except ProtocolViolation:
             return  # it answered, only not in JSON
@@ -98,7 +98,7 @@ class JsonServer:
         until = time.monotonic() + timeout
         try:
             status, reason, data = self._exchange(method, path, body, until)
-        except STALE as error:
+        except STALE_CONNECTION as error:
             if self._fresh:
                 raise self._lost(error) from error
             self._connection.close()
@@ -111,10 +111,10 @@ class JsonServer:
             raise self._failed(error, path, timeout) from error
         self._fresh = False
         if status in (http.HTTPStatus.UNAUTHORIZED, http.HTTPStatus.FORBIDDEN):
-            raise Unauthorized(f"{self.url}{path} refused the request: {_shown(data) or reason}")
+            raise Unauthorized(f"{self.url}{path} refused the request: {_reason(data) or reason}")
         if status != http.HTTPStatus.OK:
-            said = _shown(data) or reason
-            raise ServerError(f"HTTP {status}", said, status >= 500, f"{self.url}{path}")
+            text = _reason(data) or reason
+            raise ServerError(f"HTTP {status}", text, status >= 500, f"{self.url}{path}")
         return self._decoded(path, data)
 
     def close(self) -> None:
@@ -144,9 +144,9 @@ class JsonServer:
         if self._connection.sock is None:
             self._connect(0.0)
         sock = self._connection.sock
-        if left_over(sock):
+        if has_unread_bytes(sock):
             self.close()
-            raise ProtocolViolation(f"{self.url} sent what nobody asked for")
+            raise ProtocolViolation(f"{self.url} sent data that was not requested")
         left = max(until - time.monotonic(), 1e-3)
         sock.settimeout(left)
         # A time limit of a socket is that of a single byte: a server that sends one now and then
@@ -192,8 +192,8 @@ class JsonServer:
             raise ProtocolViolation(f"{self.url}{path} did not answer JSON: {error}") from error
 
 
-def left_over(sock: socket.socket) -> bool:
-    """Whether something has come over `sock` that was not read yet. That it is closed is none."""
+def has_unread_bytes(sock: socket.socket) -> bool:
+    """Whether bytes have arrived at `sock` that were not read yet; False if it is closed."""
     if isinstance(sock, ssl_module.SSLSocket):
         return sock.pending() > 0
     if not select.select([sock], [], [], 0)[0]:
@@ -210,8 +210,8 @@ def _shut(sock: socket.socket) -> None:
         sock.shutdown(socket.SHUT_RDWR)
 
 
-def _shown(data: bytes) -> str:
-    """A server's complaint in one line."""
+def _reason(data: bytes) -> str:
+    """A server's error text in one line."""
     text = data.decode("utf-8", "replace").strip()
     try:
         value = json.loads(text)
@@ -219,4 +219,4 @@ def _shown(data: bytes) -> str:
         value = text
     if isinstance(value, Mapping):
         value = value.get("error", value.get("detail", value.get("message", value)))
-    return printable(str(value), SHOWN)
+    return printable(str(value), MAX_REASON)

@@ -27,7 +27,7 @@ def resize(image: Image, width: int, height: int) -> Image:
     cv2 = _module("cv2")
     if cv2 is not None:
         return np.asarray(cv2.resize(image, (width, height), interpolation=cv2.INTER_LINEAR))
-    pillow = pictures()
+    pillow = pillow_image()
     resized = pillow.fromarray(image).resize((width, height), pillow.Resampling.BILINEAR)
     return np.asarray(resized)
 
@@ -40,14 +40,14 @@ def jpeg_round_trip(image: Image) -> Image:
         _, data = cv2.imencode(".jpg", np.ascontiguousarray(image))
         return np.asarray(cv2.imdecode(data, cv2.IMREAD_COLOR))
     stream = io.BytesIO()
-    pillow = pictures()
+    pillow = pillow_image()
     swapped = np.ascontiguousarray(image[..., ::-1])
     pillow.fromarray(swapped).save(stream, "JPEG", quality=JPEG_QUALITY)
     with pillow.open(stream, formats=("JPEG",)) as picture:
         return np.ascontiguousarray(np.asarray(picture.convert("RGB"))[..., ::-1])
 
 
-def pictures() -> Any:
+def pillow_image() -> Any:
     """Pillow's Image module; raises ModelMissing."""
     found = _module("PIL.Image")
     if found is None:

@@ -31,7 +31,7 @@ class ModelMissing(Exception):
 
 
 @dataclass
-class Ask:
+class Query:
     """One query: the observation, its trial, the `seed` of its noise, and the trial's `memory`,
     which is empty at the first query."""
 
@@ -49,7 +49,7 @@ class ModelPolicy:
     def __init__(self) -> None:
         self._trials: dict[int, tuple[TrialInfo, dict[str, Any]]] = {}
 
-    def predict(self, asks: Sequence[Ask]) -> list[Chunk]:
+    def predict(self, queries: Sequence[Query]) -> list[Chunk]:
         """One chunk per query, float32 (T, D)."""
         raise NotImplementedError
 
@@ -78,12 +78,12 @@ class ModelPolicy:
     ) -> list[Chunk]:
         """One chunk per observation. The noise of each follows from its trial's policy seed and
         its step alone, so neither neighbours in the batch nor a repeated call change it."""
-        asks = []
+        queries = []
         for observation, session in zip(observations, sessions, strict=True):
             trial, memory = self._trials[session]
             seed = seed_of(trial.policy_seed, int(observation["step"]))
-            asks.append(Ask(observation, trial, seed, memory))
-        return self.predict(asks)
+            queries.append(Query(observation, trial, seed, memory))
+        return self.predict(queries)
 
 
 def seed_of(policy_seed: int, step: int) -> int:

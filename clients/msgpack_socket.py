@@ -38,7 +38,7 @@ class MsgpackSocket:
         except DecodeError as error:
             raise self.violation(f"the answer cannot be read: {error}") from error
         if not isinstance(value, dict):
-            raise self.violation(f"{what} is no map")
+            raise self.violation(f"{what} is not a map")
         return value
 
     def violation(self, reason: str) -> TransportError:

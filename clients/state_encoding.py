@@ -1,4 +1,4 @@
-"""What a model is told of the robot, and what its numbers mean: joints, poses, or 20 numbers.
+"""A model's encoding of state and actions: joints, poses, or the 20 numbers of X-VLA.
 
 Shared by the servers of X-VLA, whose poses have conventions that no shape shows: which quaternion
 order was read in training, how the rotation's six numbers are laid out, and that after the first
@@ -20,7 +20,7 @@ from robospa.clients.ee6d import (
     ee6d_to_actions,
     poses_to_ee6d,
 )
-from robospa.clients.model_policy import Ask, Chunk
+from robospa.clients.model_policy import Chunk, Query
 from robospa.protocol.errors import PolicyAnswerError
 
 SPACES = {"joint": ActionSpace("joint").width, "ee": ActionSpace("ee").width, "ee6d": 2 * ARM}
@@ -28,7 +28,7 @@ SPACES = {"joint": ActionSpace("joint").width, "ee": ActionSpace("ee").width, "e
 
 
 @dataclass(frozen=True)
-class Style:
+class StateEncoding:
     """How a model writes poses and grippers; the fields are those of its server's options."""
 
     space: str
@@ -38,22 +38,22 @@ class Style:
     grippers: str = "open"
     closed_above: float = 0.7
 
-    def told(self, ask: Ask, space: str | None = None) -> NDArray[np.float32]:
+    def state(self, query: Query, space: str | None = None) -> NDArray[np.float32]:
         """The state in `space` (that of the actions unless given), float32 (14,), (16,), (20,)."""
         space = space or self.space
-        last = self._last_command(ask) if space == self.space else None
+        last = self._last_command(query) if space == self.space else None
         if space == "joint":
-            joints = np.array(ask.observation["state"] if last is None else last, np.float32)
+            joints = np.array(query.observation["state"] if last is None else last, np.float32)
             if self.grippers == "closed":
                 grippers = ActionSpace("joint").grippers
                 joints[grippers] = 1 - 2 * joints[grippers]
             return joints
-        poses = np.asarray(ask.observation["ee"] if last is None else last.reshape(2, 8))
+        poses = np.asarray(query.observation["ee"] if last is None else last.reshape(2, 8))
         if space == "ee":
             return poses.astype(np.float32).reshape(-1)
         return poses_to_ee6d(poses, self.quaternions, self.rotation).astype(np.float32)
 
-    def actions(self, ask: Ask, answer: NDArray[Any]) -> Chunk:
+    def actions(self, query: Query, answer: NDArray[Any]) -> Chunk:
         """Our actions from a model's (T, D), which are remembered as the last command."""
         width = SPACES[self.space]
         if answer.ndim != 2 or answer.shape[1] != width:
@@ -67,13 +67,13 @@ class Style:
             chunk = closed_to_open(answer, self.closed_above)
         else:
             chunk = np.array(answer, np.float32)
-        ask.memory["chunk"], ask.memory["asked_at"] = chunk, int(ask.observation["step"])
+        query.memory["chunk"], query.memory["asked_at"] = chunk, int(query.observation["step"])
         return chunk
 
-    def _last_command(self, ask: Ask) -> Chunk | None:
-        """The action executed just before this query, if the model is to be told that."""
-        chunk: Chunk | None = ask.memory.get("chunk")
+    def _last_command(self, query: Query) -> Chunk | None:
+        """The action executed just before this query, if that is its proprioception."""
+        chunk: Chunk | None = query.memory.get("chunk")
         if chunk is None or self.proprio == "measured":
             return None
-        done = int(ask.observation["step"]) - int(ask.memory["asked_at"])
+        done = int(query.observation["step"]) - int(query.memory["asked_at"])
         return chunk[min(done, len(chunk)) - 1] if done > 0 else None

@@ -10,13 +10,13 @@ from __future__ import annotations
 import re
 
 PIECES = re.compile(r"[^\W\d_]+|\d+|(?:[^\w\s]|_)+")
-ENDS = 2
-"""Tokens that mark the beginning and the end of a text."""
+END_TOKENS = 2
+"""Those that mark the beginning and the end of a text."""
 
 
 def least_tokens(text: str) -> int:
     """The fewest tokens that `text` can have, with those at its two ends."""
-    return len(PIECES.findall(text)) + ENDS
+    return len(PIECES.findall(text)) + END_TOKENS
 
 
 def check_budget(budget: int | None) -> None:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from robospa.action_space import ActionSpace
-from robospa.clients.detect import explained
+from robospa.clients.detect import explain_error
 from robospa.clients.dialect import ConnectionParams, Dialect
 from robospa.clients.go1.conventions import Go1Conventions
 from robospa.clients.http import JsonServer
@@ -74,7 +74,7 @@ class Go1Session:
             body = dumps(self._options.inputs(observation)).encode()
             answer = self._server.post(self._path, body, timeout)
         except ServerError as error:
-            raise error if self._answered else explained(error, self._params) from error
+            raise error if self._answered else explain_error(error, self._params) from error
         self._answered = True
         return chunk_of(answer), {}
 

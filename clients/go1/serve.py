@@ -18,9 +18,9 @@ import numpy as np
 from robospa.action_space import ActionSpace
 from robospa.clients.go1.conventions import Go1Conventions
 from robospa.clients.model_policy import (
-    Ask,
     Chunk,
     ModelPolicy,
+    Query,
     existing,
     import_code,
     import_torch,
@@ -59,18 +59,18 @@ class Go1(ModelPolicy):
             action_dim=ActionSpace().width,
         )
 
-    def predict(self, asks: Sequence[Ask]) -> list[Chunk]:
+    def predict(self, queries: Sequence[Query]) -> list[Chunk]:
         """One chunk (T, 14) of absolute joint targets per query."""
         chunks = []
-        for ask in asks:
-            with seeded_rows([ask.seed]):
-                answer = self.model.inference(self._payload(ask))
+        for query in queries:
+            with seeded_rows([query.seed]):
+                answer = self.model.inference(self._payload(query))
             chunks.append(np.array(answer, np.float32)[: self.options.horizon])
         return chunks
 
-    def _payload(self, ask: Ask) -> dict[str, Any]:
+    def _payload(self, query: Query) -> dict[str, Any]:
         """What its server would have read from the wire, in arrays of its own."""
-        inputs = self.options.inputs(ask.observation)
+        inputs = self.options.inputs(query.observation)
         return {k: np.array(v) if isinstance(v, np.ndarray) else v for k, v in inputs.items()}
 
 

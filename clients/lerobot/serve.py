@@ -11,8 +11,7 @@ anew, so trials never mix and several of them make one batch.
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,28 +21,20 @@ from robospa.action_space import ActionSpace
 from robospa.clients.chunks import check_horizon
 from robospa.clients.ee6d import LAYOUTS, ORDERS
 from robospa.clients.image_preprocessing import resize
+from robospa.clients.lerobot.cameras import ImageInput, match_cameras
+from robospa.clients.lerobot.state_prompt import STATE, print_state
 from robospa.clients.model_policy import (
-    Ask,
     Chunk,
     ModelMissing,
     ModelPolicy,
+    Query,
     import_installed,
     import_torch,
 )
 from robospa.clients.seeded_noise import NotByRow, seeded_rows
-from robospa.clients.state_encoding import SPACES, Style
+from robospa.clients.state_encoding import SPACES, StateEncoding
 from robospa.protocol.options import option
-from robospa.protocol.policy import CAMERAS, CameraSpec, PolicySpec
-
-STATE = "observation.state"
-WORDS = {
-    "head": ("head", "high", "top"),
-    "left_wrist": ("left",),
-    "right_wrist": ("right",),
-    "front": ("front", "low"),
-}
-"""Parts of an image's name that tell which of our cameras it is."""
-STATE_STEP = "Pi05PrepareStateTokenizerProcessorStep"
+from robospa.protocol.policy import CameraSpec, PolicySpec
 
 
 @dataclass(frozen=True)
@@ -103,54 +94,6 @@ class LeRobotServerOptions:
             raise ValueError(f"option space={self.space!r} is none of {', '.join(SPACES)}")
 
 
-@dataclass(frozen=True)
-class View:
-    """One image of the policy: its `key`, our `camera`, its declared size [px]."""
-
-    key: str
-    camera: str
-    width: int
-    height: int
-
-
-def find_views(features: Mapping[str, Sequence[int]], images: str | None) -> tuple[View, ...]:
-    """Which of our cameras each image (key to (C, H, W)) is; raises ValueError.
-
-    Keys that say `empty` are left out: the policy fills them itself.
-    """
-    wanted = {key: shape for key, shape in features.items() if "empty" not in key}
-    told: dict[str, str] = {}
-    for pair in (images or "").split(","):
-        camera, colon, key = pair.strip().partition(":")
-        if not pair.strip():
-            continue
-        if not colon or camera not in CAMERAS or key not in wanted or key in told:
-            raise ValueError(
-                f"option images={images!r}: {pair!r} is no camera:key with a camera of "
-                f"{', '.join(CAMERAS)} and a key of {', '.join(wanted) or 'no images'}"
-            )
-        told[key] = camera
-    views = []
-    for key, (_, height, width) in wanted.items():
-        camera = told.get(key) or _camera_named(key)
-        views.append(View(key, camera, int(width), int(height)))
-    cameras = [view.camera for view in views]
-    if len(set(cameras)) != len(cameras):
-        raise ValueError(f"two images of the policy are the same camera: {views}; set images")
-    return tuple(views)
-
-
-def _camera_named(key: str) -> str:
-    words = re.split(r"[^a-z]+", key.rpartition(".")[2].lower())
-    found = [camera for camera, names in WORDS.items() if any(name in words for name in names)]
-    if len(found) != 1:
-        raise ValueError(
-            f"the name {key!r} does not tell which camera it is; say "
-            f"--option images=head:{key}, with a pair for every image"
-        )
-    return found[0]
-
-
 class LeRobot(ModelPolicy):
     """A LeRobot policy with its processors."""
 
@@ -163,9 +106,9 @@ class LeRobot(ModelPolicy):
         unknown = [k for k in inputs if k != STATE and not k.startswith("observation.image")]
         if unknown:
             raise ValueError(f"the policy wants {', '.join(unknown)}, which we do not have")
-        self.views = find_views({k: s for k, s in inputs.items() if k != STATE}, options.images)
+        self.views = match_cameras({k: s for k, s in inputs.items() if k != STATE}, options.images)
         width = int(config.output_features["action"].shape[0])
-        self.style = Style(
+        self.encoding = StateEncoding(
             options.space or _space(width, "action"),
             options.quaternions,
             options.rotation,
@@ -181,7 +124,7 @@ class LeRobot(ModelPolicy):
         horizon = getattr(config, "chunk_size", None) or config.n_action_steps
         execute = options.execute or min(int(config.n_action_steps), int(horizon))
         check_horizon(int(horizon), execute)
-        joint = self.style.space == "joint"
+        joint = self.encoding.space == "joint"
         self.spec = PolicySpec(
             name=f"lerobot:{config.type}",
             cameras=tuple(CameraSpec(view.camera) for view in self.views),
@@ -194,57 +137,57 @@ class LeRobot(ModelPolicy):
             action_dim=ActionSpace("joint" if joint else "ee").width,
         )
 
-    def predict(self, asks: Sequence[Ask]) -> list[Chunk]:
+    def predict(self, queries: Sequence[Query]) -> list[Chunk]:
         """One chunk per query, in the space of the spec."""
         try:
-            return self._predict(asks)
+            return self._predict(queries)
         except NotByRow:
-            return [chunk for ask in asks for chunk in self._predict([ask])]
+            return [chunk for query in queries for chunk in self._predict([query])]
 
-    def _predict(self, asks: Sequence[Ask]) -> list[Chunk]:
+    def _predict(self, queries: Sequence[Query]) -> list[Chunk]:
         torch = import_torch()
         self.policy.reset()
         with torch.inference_mode():
-            batch = self.before(self._batch(asks, None))
+            batch = self.before(self._batch(queries, None))
             batch.pop("action", None)  # empty, but a policy with queues would look for it
             if self.history:
-                batch = self._queue(asks, batch)
-            with seeded_rows([ask.seed for ask in asks]):
+                batch = self._queue(queries, batch)
+            with seeded_rows([query.seed for query in queries]):
                 answer = self.policy.predict_action_chunk(batch)
             chunks = self.after(answer).float().cpu().numpy()[:, : self.spec.horizon]
-        return [self.style.actions(ask, c) for ask, c in zip(asks, chunks, strict=True)]
+        return [self.encoding.actions(query, c) for query, c in zip(queries, chunks, strict=True)]
 
-    def _batch(self, asks: Sequence[Ask], offset: int | None) -> dict[str, Any]:
+    def _batch(self, queries: Sequence[Query], offset: int | None) -> dict[str, Any]:
         """The observations of now, or of `offset` actions ago, as LeRobot's data loader gives them:
         images float (B, C, H, W) from 0 to 1."""
         torch = import_torch()
-        batch: dict[str, Any] = {"task": [ask.observation["instruction"] for ask in asks]}
+        batch: dict[str, Any] = {"task": [query.observation["instruction"] for query in queries]}
         seen = [
-            ask.observation if offset is None else ask.observation["history"][offset]
-            for ask in asks
+            query.observation if offset is None else query.observation["history"][offset]
+            for query in queries
         ]
         for view in self.views:
             images = np.stack([self._image(one["images"][view.camera], view) for one in seen])
             batch[view.key] = torch.from_numpy(images).permute(0, 3, 1, 2).float() / 255
         if self.state is not None:
             if offset is None:
-                told = [self.style.told(ask, self.state) for ask in asks]
+                state = [self.encoding.state(query, self.state) for query in queries]
             else:
-                told = [np.array(one["state"], np.float32) for one in seen]
-            batch[STATE] = torch.from_numpy(np.stack(told))
+                state = [np.array(one["state"], np.float32) for one in seen]
+            batch[STATE] = torch.from_numpy(np.stack(state))
         return batch
 
-    def _image(self, image: Any, view: View) -> Any:
+    def _image(self, image: Any, view: ImageInput) -> Any:
         if self.options.resize == "declared":
             image = resize(image, view.width, view.height)
         return np.ascontiguousarray(image if self.options.colors == "rgb" else image[..., ::-1])
 
-    def _queue(self, asks: Sequence[Ask], now: dict[str, Any]) -> dict[str, Any]:
+    def _queue(self, queries: Sequence[Query], now: dict[str, Any]) -> dict[str, Any]:
         """Fill the policy's queues with the frames of all queries, oldest first."""
         torch = import_torch()
         utils = import_installed("lerobot.policies.utils")
         keys = list(self.policy.config.image_features)
-        frames = [self.before(self._batch(asks, offset)) for offset in self.history]
+        frames = [self.before(self._batch(queries, offset)) for offset in self.history]
         for frame in (*frames, now):
             if keys:
                 frame["observation.images"] = torch.stack([frame[key] for key in keys], dim=-4)
@@ -258,35 +201,6 @@ def _space(width: int, what: str) -> str:
             return space
     sizes = ", ".join(f"{space} {size}" for space, size in SPACES.items())
     raise ValueError(f"the policy's {what} has {width} numbers, which is none of ours ({sizes})")
-
-
-class StateWidth:
-    """A processor step that pads or cuts the state before pi0.5 prints it into its prompt."""
-
-    def __init__(self, width: int) -> None:
-        self.width = width
-
-    def __call__(self, transition: Any) -> Any:
-        """The transition with a state of `width` numbers, zeros appended."""
-        torch = import_torch()
-        changed = dict(transition)
-        observation = dict(changed["observation"])
-        state = observation[STATE]
-        lacking = self.width - state.shape[-1]
-        observation[STATE] = torch.nn.functional.pad(state, (0, lacking)) if lacking > 0 else state
-        changed["observation"] = observation
-        return changed
-
-
-def print_state(before: Any, width: int) -> None:
-    """Make the processors of pi0.5 print `width` numbers of state; ValueError for others'."""
-    steps = list(before.steps)
-    places = [i for i, step in enumerate(steps) if type(step).__name__ == STATE_STEP]
-    if not places:
-        raise ValueError("option state_prompt is for pi0.5: these processors print no state")
-    steps[places[0]].max_state_dim = width  # LeRobot < 0.5 pads to this itself
-    steps.insert(places[0], StateWidth(width))
-    before.steps = steps
 
 
 def create(options: LeRobotServerOptions) -> LeRobot:

@@ -130,7 +130,7 @@ class OpenPiSession:
     ) -> tuple[Any, Mapping[str, float]]:
         if self._transport.has_more():
             self.close()
-            raise ProtocolViolation(f"{self._transport.url} sent what nobody asked for")
+            raise ProtocolViolation(f"{self._transport.url} sent data that was not requested")
         request = to_openpi(observation, self._cameras, self._extra)
         self._transport.send(encode(request, self._limits))
         answer = self._receive(timeout, "actions")
@@ -161,7 +161,7 @@ class OpenPiSession:
             raise ProtocolViolation(f"{self._transport.url}: unreadable {what}: {error}") from error
         if not isinstance(value, dict):
             self.close()
-            raise ProtocolViolation(f"{self._transport.url}: {what} is no map")
+            raise ProtocolViolation(f"{self._transport.url}: {what} is not a map")
         return value
 
 

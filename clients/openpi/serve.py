@@ -2,7 +2,7 @@
 
 Its own server (`scripts/serve_policy.py`, reached by `openpi://`) needs none of this. Here a
 configuration whose `adapt_to_pi` is on is refused: it turns joints and grippers of another robot
-into ours without a word, which over the wire nobody can see.
+into ours silently, which is invisible on the wire.
 
     robospa serve openpi --option config=pi05_robotwin --option checkpoint=...
 """
@@ -17,7 +17,7 @@ import numpy as np
 
 from robospa.action_space import ActionSpace
 from robospa.clients.chunks import check_horizon
-from robospa.clients.model_policy import Ask, Chunk, ModelPolicy, import_code
+from robospa.clients.model_policy import Chunk, ModelPolicy, Query, import_code
 from robospa.protocol.options import option
 from robospa.protocol.policy import PolicySpec
 
@@ -66,11 +66,11 @@ class OpenPi(ModelPolicy):
             action_dim=ActionSpace().width,
         )
 
-    def predict(self, asks: Sequence[Ask]) -> list[Chunk]:
+    def predict(self, queries: Sequence[Query]) -> list[Chunk]:
         """One chunk (T, 14) of absolute joint targets per query."""
-        inputs = [_observation(ask) for ask in asks]
-        noise = [self._noise(ask.seed) for ask in asks]
-        if self.batches and len(asks) > 1:
+        inputs = [_observation(query) for query in queries]
+        noise = [self._noise(query.seed) for query in queries]
+        if self.batches and len(queries) > 1:
             answer = self.policy.infer_batch(inputs, noise=np.stack(noise))["actions"]
             return [np.array(chunk, np.float32) for chunk in answer]
         pairs = zip(inputs, noise, strict=True)
@@ -80,16 +80,16 @@ class OpenPi(ModelPolicy):
         return np.random.default_rng(seed).standard_normal(self.shape, np.float32)
 
 
-def _observation(ask: Ask) -> dict[str, Any]:
+def _observation(query: Query) -> dict[str, Any]:
     """What the Aloha input transform takes: images (3, H, W), no other camera."""
-    images = ask.observation["images"]
+    images = query.observation["images"]
     return {
-        "state": np.array(ask.observation["state"], np.float32),
+        "state": np.array(query.observation["state"], np.float32),
         "images": {
             theirs: np.ascontiguousarray(images[ours].transpose(2, 0, 1))
             for theirs, ours in VIEWS.items()
         },
-        "prompt": ask.observation["instruction"],
+        "prompt": query.observation["instruction"],
     }
 
 

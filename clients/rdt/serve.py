@@ -20,12 +20,12 @@ import numpy as np
 
 from robospa.action_space import ActionSpace
 from robospa.clients.chunks import check_horizon
-from robospa.clients.image_preprocessing import jpeg_round_trip, pictures, resize
+from robospa.clients.image_preprocessing import jpeg_round_trip, pillow_image, resize
 from robospa.clients.model_policy import (
-    Ask,
     Chunk,
     ModelMissing,
     ModelPolicy,
+    Query,
     existing,
     import_code,
     import_installed,
@@ -99,9 +99,9 @@ class Rdt(ModelPolicy):
         """Encode the trial's instruction now, so that no step waits for it."""
         self.embeddings.find(trial.instruction)
 
-    def predict(self, asks: Sequence[Ask]) -> list[Chunk]:
+    def predict(self, queries: Sequence[Query]) -> list[Chunk]:
         """One chunk (T, 14) of absolute joint targets per query."""
-        return [self._one(ask.observation, ask.seed) for ask in asks]
+        return [self._one(query.observation, query.seed) for query in queries]
 
     def _one(self, observation: Observation, seed: int) -> Chunk:
         torch = import_torch()
@@ -125,7 +125,7 @@ class Rdt(ModelPolicy):
 
     def _picture(self, image: Any) -> Any:
         large = resize(image, 640, 480)
-        return pictures().fromarray(jpeg_round_trip(large) if self.options.jpeg else large)
+        return pillow_image().fromarray(jpeg_round_trip(large) if self.options.jpeg else large)
 
 
 def create(options: RdtServerOptions) -> Rdt:

@@ -15,7 +15,7 @@ from typing import Any
 
 from robospa.clients.model_policy import ModelMissing, import_installed, import_torch
 
-KEEP = 512
+CACHED = 512
 """Embeddings kept in memory; about 0.3 MB each."""
 
 
@@ -28,7 +28,7 @@ class Embeddings:
         self._folder, self._t5, self._device, self._dtype = folder, t5, device, dtype
         self._max_tokens = max_tokens
         self._encoder: tuple[Any, Any] | None = None
-        self._kept: OrderedDict[str, Any] = OrderedDict()
+        self._cache: OrderedDict[str, Any] = OrderedDict()
         self._files: dict[str, Path] = {}
         if folder is not None:
             if t5 is None and not folder.is_dir():
@@ -36,20 +36,20 @@ class Embeddings:
             folder.mkdir(parents=True, exist_ok=True)
             for path in sorted(folder.glob("*.pt")):
                 found = self._read(path)
-                if "instruction" in found:  # a file without one cannot be told apart
+                if "instruction" in found:  # a file without one cannot be identified
                     self._files[str(found["instruction"])] = path
 
     def find(self, instruction: str) -> Any:
         """The embedding of `instruction`; raises ModelMissing where nothing can make it."""
-        if instruction not in self._kept:
+        if instruction not in self._cache:
             path = self._files.get(instruction)
-            self._kept[instruction] = (
+            self._cache[instruction] = (
                 self._read(path)["embeddings"] if path is not None else self._make(instruction)
             )
-            if len(self._kept) > KEEP:
-                self._kept.popitem(last=False)
-        self._kept.move_to_end(instruction)
-        tensor = self._kept[instruction]
+            if len(self._cache) > CACHED:
+                self._cache.popitem(last=False)
+        self._cache.move_to_end(instruction)
+        tensor = self._cache[instruction]
         return tensor[None] if tensor.ndim == 2 else tensor
 
     def _read(self, path: Path) -> Any:

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from robospa.action_space import ActionSpace
-from robospa.clients.chunks import as_chunk, check_horizon, turned
+from robospa.clients.chunks import as_chunk, check_horizon, invert_grippers
 from robospa.clients.dialect import ConnectionParams, Dialect
 from robospa.clients.msgpack_socket import MsgpackSocket
 from robospa.clients.numpy_msgpack import text_form
@@ -107,14 +107,14 @@ class VlaEvalSession:
                 f"not {PROTOCOL}"
             )
         name = str(greeting.get("model_server", ""))
-        said = {key: json_values(greeting[key]) for key in SAID if key in greeting}
+        announced = {key: json_values(greeting[key]) for key in ANNOUNCED if key in greeting}
         self.hello: dict[str, Any] = {
             "dialect": "vla-eval",
             "server": printable(f"{name} {greeting.get('harness_version', '')}", 200),
-            "said": said,
+            "said": announced,
             "spec": self.spec.to_json(),
             "options": plain_options(options),
-            "warnings": [*WARNINGS, *_doubts(said, options)],
+            "warnings": [*WARNINGS, *_mismatches(announced, options)],
         }
 
     def reset(self, id: int, trial: TrialInfo) -> None:
@@ -136,7 +136,7 @@ class VlaEvalSession:
         if isinstance(chunk, np.ndarray) and chunk.ndim == 1:
             chunk = chunk[None]
         if self._options.grippers == "closed":
-            chunk = turned(chunk, ActionSpace(self._options.space))
+            chunk = invert_grippers(chunk, ActionSpace(self._options.space))
         return chunk, {}
 
     def end(self, id: int, outcome: Mapping[str, Any]) -> None:
@@ -151,9 +151,9 @@ class VlaEvalSession:
         self._socket.send(message)
         return self._number
 
-    def _answer(self, wanted: str, number: int, timeout: float) -> Mapping[str, Any]:
-        """The payload of the answer of type `wanted` to message `number`."""
-        answer = self._socket.receive(timeout, wanted)
+    def _answer(self, expected: str, number: int, timeout: float) -> Mapping[str, Any]:
+        """The payload of the answer of type `expected` to message `number`."""
+        answer = self._socket.receive(timeout, expected)
         kind, body = answer.get("type"), answer.get("payload")
         if not isinstance(body, Mapping):
             raise self._socket.violation("its answer is no message of vla-eval")
@@ -166,17 +166,17 @@ class VlaEvalSession:
             raise ServerError(what, text, True, self._socket.url)
         if answer.get("seq") != number:
             raise self._socket.violation(f"answer {answer.get('seq')} came to message {number}")
-        if kind != wanted:
-            raise self._socket.violation(f"{kind} came where {wanted} was due")
+        if kind != expected:
+            raise self._socket.violation(f"it answered {kind} instead of {expected}")
         return body
 
 
-SAID = ("observation_params", "action_spec", "observation_spec", "capabilities")
+ANNOUNCED = ("observation_params", "action_spec", "observation_spec", "capabilities")
 
 
-def _doubts(said: Mapping[str, Any], options: VlaEvalClientOptions) -> list[str]:
-    """What the server says of its actions and does not fit the options."""
-    parts = said.get("action_spec")
+def _mismatches(announced: Mapping[str, Any], options: VlaEvalClientOptions) -> list[str]:
+    """What the server announces of its actions and does not fit the options."""
+    parts = announced.get("action_spec")
     if not isinstance(parts, Mapping):
         return []
     sizes = {name: part.get("dims") for name, part in parts.items() if isinstance(part, Mapping)}
@@ -185,9 +185,9 @@ def _doubts(said: Mapping[str, Any], options: VlaEvalClientOptions) -> list[str]
     width = ActionSpace(options.space).width
     if not all(known) or not known or total == width:
         return []
-    told = ", ".join(f"{name} {size}" for name, size in sizes.items())
+    listed = ", ".join(f"{name} {size}" for name, size in sizes.items())
     return [
-        f"the server announces {total} numbers an action ({told}), but {options.space} actions "
+        f"the server announces {total} numbers an action ({listed}), but {options.space} actions "
         f"have {width}"
     ]
 

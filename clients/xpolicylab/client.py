@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.action_space import ARMS, POSE, ActionSpace
-from robospa.clients.chunks import as_chunk, check_horizon, turned
+from robospa.clients.chunks import as_chunk, check_horizon, invert_grippers
 from robospa.clients.dialect import ConnectionParams, Dialect
 from robospa.clients.msgpack_socket import MsgpackSocket
 from robospa.clients.numpy_msgpack import binary_form
@@ -59,7 +59,7 @@ class XPolicyLabClientOptions:
         "joint", "the action_type that the policy is configured with", ("joint", "ee")
     )
     grippers: str = option("open", "what 1 means in an answered gripper", ("open", "closed"))
-    frequency: int = option(30, "control frequency [Hz] told in additional_info")
+    frequency: int = option(30, "control frequency [Hz] sent in additional_info")
     state: str = option("commanded", "which joints to send", ("commanded", "measured"))
     horizon: int = option(64, "actions in a chunk, at most")
     execute: int | None = option(None, "actions executed before the next query; none for all")
@@ -115,7 +115,11 @@ def decode(answer: Any, observation: Observation, options: XPolicyLabClientOptio
     else:
         seen = robot_state(observation)
         chunk = as_chunk([_action(item, seen, options.space) for item in answer])
-    return turned(chunk, ActionSpace(options.space)) if options.grippers == "closed" else chunk
+    return (
+        invert_grippers(chunk, ActionSpace(options.space))
+        if options.grippers == "closed"
+        else chunk
+    )
 
 
 def _action(item: Any, seen: Mapping[str, NDArray[np.float32]], space: str) -> list[Any]:
@@ -197,9 +201,9 @@ class XPolicyLabSession:
         self._socket.close()
 
     def _call(
-        self, id: int, kind: str, wanted: str, payload: Any, timeout: float, step: int = 0
+        self, id: int, kind: str, expected: str, payload: Any, timeout: float, step: int = 0
     ) -> Mapping[str, Any]:
-        """The payload of the answer of type `wanted` to this very message."""
+        """The payload of the answer of type `expected` to this message."""
         name = f"{id}-{kind}"
         message = {
             "message_type": kind,
@@ -211,7 +215,7 @@ class XPolicyLabSession:
             "payload": payload,
         }
         self._socket.send(message)
-        answer = self._socket.receive(timeout, wanted)
+        answer = self._socket.receive(timeout, expected)
         body = answer.get("payload")
         if not isinstance(body, Mapping) or "message_type" not in answer:
             raise self._socket.violation("its answer is no message of XPolicyLab")
@@ -220,8 +224,10 @@ class XPolicyLabSession:
         if answer["message_type"] == "error":
             text = str(body.get("message", "no reason given"))
             raise ServerError(str(body.get("code", "an error")), text, True, self._socket.url)
-        if answer["message_type"] != wanted:
-            raise self._socket.violation(f"{answer['message_type']} came where {wanted} was due")
+        if answer["message_type"] != expected:
+            raise self._socket.violation(
+                f"it answered {answer['message_type']} instead of {expected}"
+            )
         return body
 
 

@@ -9,8 +9,8 @@
     options                domain_id, steps
 
 Answered are T x 20 absolute end-effector poses, executed as our `ee` actions; with `space=joint`
-T x 14 joint targets for a joint-space fine-tune. From the second query of a trial on, what is told
-of the robot is not measured but the command executed last, as in X-VLA's own evaluation.
+T x 14 joint targets for a joint-space fine-tune. From the second query of a trial on, the state
+sent is not measured but the command executed last, as in X-VLA's own evaluation.
 Errors inside the server are a bare HTTP 400 without a reason.
 """
 
@@ -24,8 +24,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.action_space import ActionSpace
-from robospa.clients.chunks import turned
-from robospa.clients.detect import explained
+from robospa.clients.chunks import invert_grippers
+from robospa.clients.detect import explain_error
 from robospa.clients.dialect import ConnectionParams, Dialect
 from robospa.clients.ee6d import ARM, closed_to_open, ee6d_to_actions, poses_to_ee6d
 from robospa.clients.http import JsonServer
@@ -62,7 +62,7 @@ class XvlaClientOptions(XvlaConventions):
     )
     text: str = option(
         "instruction",
-        "what the model is told: the instruction, or the task's name as words, as in X-VLA's own "
+        "text given to the model: the instruction, or the task's name as words, as in X-VLA's own "
         "RoboTwin evaluation",
         ("instruction", "task"),
     )
@@ -135,7 +135,7 @@ class XvlaSession:
         except ServerError as error:
             if error.code == "HTTP 400":  # all that its server ever says, of any failure
                 error = ServerError(error.code, f"{error.message}; {SILENT}", True)
-            raise error if self._answered else explained(error, self._params) from error
+            raise error if self._answered else explain_error(error, self._params) from error
         self._answered = True
         if not isinstance(answer, Mapping) or "action" not in answer:
             raise ProtocolViolation(
@@ -155,7 +155,9 @@ class XvlaSession:
         if not joint:
             return from_ee6d(chunk, self._options)
         actions: NDArray[np.float32] = (
-            chunk if self._options.joint_grippers == "open" else turned(chunk, ActionSpace("joint"))
+            chunk
+            if self._options.joint_grippers == "open"
+            else invert_grippers(chunk, ActionSpace("joint"))
         )
         return actions
 
@@ -168,14 +170,16 @@ class XvlaSession:
                 image if self._options.colors == "rgb" else image[..., ::-1]
             )
         sent["proprio"] = dumps(self.proprio(observation).astype(np.float32))
-        told = observation.get("instruction", "")
-        sent["language_instruction"] = told if self._options.text == "instruction" else self._task
+        instruction = observation.get("instruction", "")
+        sent["language_instruction"] = (
+            instruction if self._options.text == "instruction" else self._task
+        )
         sent["domain_id"] = self._options.domain_id
         sent["steps"] = self._options.steps
         return dumps(sent).encode()
 
     def proprio(self, observation: Observation) -> NDArray[np.float64]:
-        """What the model is told of the robot's own state."""
+        """The robot's state as the model reads it."""
         last = self._last_command(observation)
         if self._options.space == "joint":
             state = np.array(observation["state"] if last is None else last, dtype=float)

@@ -16,17 +16,17 @@ from typing import Any
 import numpy as np
 
 from robospa.action_space import ActionSpace
-from robospa.clients.image_preprocessing import pictures
+from robospa.clients.image_preprocessing import pillow_image
 from robospa.clients.model_policy import (
-    Ask,
     Chunk,
     ModelMissing,
     ModelPolicy,
+    Query,
     import_code,
     import_torch,
 )
 from robospa.clients.seeded_noise import seeded_rows
-from robospa.clients.state_encoding import Style
+from robospa.clients.state_encoding import StateEncoding
 from robospa.clients.xvla.conventions import XvlaConventions
 from robospa.protocol.options import option
 from robospa.protocol.policy import CameraSpec, PolicySpec
@@ -59,7 +59,7 @@ class Xvla(ModelPolicy):
         super().__init__()
         self.model, self.processor, self.options = model, processor, options
         joint = options.space == "joint"
-        self.style = Style(
+        self.encoding = StateEncoding(
             options.space,
             options.quaternions,
             options.rotation,
@@ -78,13 +78,15 @@ class Xvla(ModelPolicy):
             action_dim=ActionSpace("joint" if joint else "ee").width,
         )
 
-    def predict(self, asks: Sequence[Ask]) -> list[Chunk]:
+    def predict(self, queries: Sequence[Query]) -> list[Chunk]:
         """One chunk per query: `ee` actions (T, 16), or joint targets (T, 14)."""
         torch = import_torch()
-        shown = [self._shown(ask) for ask in asks]
+        shown = [self._shown(query) for query in queries]
         inputs = {name: torch.cat([one[name] for one in shown]) for name in shown[0]}
-        inputs["proprio"] = torch.from_numpy(np.stack([self.style.told(ask) for ask in asks]))
-        inputs["domain_id"] = torch.full((len(asks),), self.options.domain_id, dtype=torch.long)
+        inputs["proprio"] = torch.from_numpy(
+            np.stack([self.encoding.state(query) for query in queries])
+        )
+        inputs["domain_id"] = torch.full((len(queries),), self.options.domain_id, dtype=torch.long)
         weight = next(iter(self.model.parameters()))
         inputs = {
             name: value.to(weight.device, weight.dtype)
@@ -92,18 +94,18 @@ class Xvla(ModelPolicy):
             else value.to(weight.device)
             for name, value in inputs.items()
         }
-        with torch.inference_mode(), seeded_rows([ask.seed for ask in asks]):
+        with torch.inference_mode(), seeded_rows([query.seed for query in queries]):
             answer = self.model.generate_actions(**inputs, steps=self.options.steps)
         chunks = answer.float().cpu().numpy()[:, : self.options.horizon]
-        return [self.style.actions(ask, c) for ask, c in zip(asks, chunks, strict=True)]
+        return [self.encoding.actions(query, c) for query, c in zip(queries, chunks, strict=True)]
 
-    def _shown(self, ask: Ask) -> dict[str, Any]:
+    def _shown(self, query: Query) -> dict[str, Any]:
         """What the processor makes of images and text: tensors whose first axis is 1."""
-        images = [ask.observation["images"][name] for name in self.options.views]
+        images = [query.observation["images"][name] for name in self.options.views]
         if self.options.colors == "bgr":
             images = [np.ascontiguousarray(image[..., ::-1]) for image in images]
-        views = [pictures().fromarray(image) for image in images]
-        inputs = self.processor(views, ask.observation["instruction"])
+        views = [pillow_image().fromarray(image) for image in images]
+        inputs = self.processor(views, query.observation["instruction"])
         lacking = {"input_ids", "image_input", "image_mask"} - set(inputs)
         if lacking:
             raise ModelMissing(f"the checkpoint's processor gives no {', '.join(sorted(lacking))}")

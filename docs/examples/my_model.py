@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robospa.clients.model_policy import Ask, Chunk, ModelPolicy
+from robospa.clients.model_policy import Chunk, ModelPolicy, Query
 from robospa.protocol.options import option
 from robospa.protocol.policy import CameraSpec, PolicySpec
 
@@ -33,9 +33,10 @@ class MyModel(ModelPolicy):
             "my-model", cameras=(CameraSpec("head"),), horizon=rows, batch=8, seeded=True
         )
 
-    def predict(self, asks: Sequence[Ask]) -> list[Chunk]:
-        """One chunk per query; `ask.seed` follows from the trial's policy seed and its step."""
-        noise = [np.random.default_rng(ask.seed).normal(0, 0.02, (self.rows, 14)) for ask in asks]
+    def predict(self, queries: Sequence[Query]) -> list[Chunk]:
+        """One chunk per query; `query.seed` follows from the trial's policy seed and its step."""
+        generators = [np.random.default_rng(query.seed) for query in queries]
+        noise = [generator.normal(0, 0.02, (self.rows, 14)) for generator in generators]
         return [(self.mean + one).astype(np.float32) for one in noise]
 
 

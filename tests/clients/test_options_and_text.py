@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from robospa.action_space import ActionSpace
 from robospa.clients import check_options, find_endpoint
-from robospa.clients.chunks import as_chunk, turned
+from robospa.clients.chunks import as_chunk, invert_grippers
 from robospa.clients.dialect import Dialect, dialects
 from robospa.clients.ee6d import LAYOUTS, ORDERS, decode_rotation, encode_rotation
 from robospa.clients.token_budget import budget_warning, least_tokens
@@ -127,10 +127,10 @@ def test_what_is_no_chunk_stays_what_it_is(value: object) -> None:
 
 def test_grippers_are_turned_and_nothing_else() -> None:
     chunk = np.arange(28, dtype=np.float32).reshape(2, 14)
-    change = turned(chunk, ActionSpace("joint")) - chunk
+    change = invert_grippers(chunk, ActionSpace("joint")) - chunk
     assert np.flatnonzero(change.any(axis=0)).tolist() == [6, 13]
     wrong = np.zeros((1, 3), np.float32)
-    assert turned(wrong, ActionSpace("joint")) is wrong
+    assert invert_grippers(wrong, ActionSpace("joint")) is wrong
 
 
 # ---------------------------------------------------------------- the page of options

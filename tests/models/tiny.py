@@ -27,7 +27,7 @@ from lerobot.configs.types import FeatureType, PolicyFeature
 from lerobot.policies.factory import make_pre_post_processors
 
 from robospa.clients.lerobot import serve as served
-from robospa.clients.model_policy import Ask
+from robospa.clients.model_policy import Query
 from robospa.clients.seeded_noise import NotByRow, seeded_rows
 from robospa.protocol.policy import TrialInfo
 
@@ -332,7 +332,7 @@ def prompt(folder: str) -> None:
             "step": 0,
         }
         policy.infer(seen)
-        batch = policy._batch([Ask(seen, trial(0), 0)], None)
+        batch = policy._batch([Query(seen, trial(0), 0)], None)
         transition = policy.before.to_transition(batch)
         for step in policy.before.steps:
             transition = step(transition)

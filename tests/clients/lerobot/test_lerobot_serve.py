@@ -11,6 +11,8 @@ import pytest
 from model_fakes import COLORS, install, seen, tensor, trial
 
 from robospa.clients.lerobot import serve as lerobot
+from robospa.clients.lerobot.cameras import match_cameras
+from robospa.clients.lerobot.state_prompt import print_state
 from robospa.clients.model_policy import ModelMissing
 
 HEAD = "observation.images.head_camera"
@@ -207,7 +209,7 @@ def test_joint_actions_of_a_policy_that_sees_poses(torch: Any) -> None:
 def test_cameras_go_by_names(keys: Any, images: Any, cameras: list[str]) -> None:
     prefix = "observation.images."
     told = images and images.replace("IMAGE", prefix + "image")
-    views = lerobot.find_views({prefix + key: (3, 8, 8) for key in keys}, told)
+    views = match_cameras({prefix + key: (3, 8, 8) for key in keys}, told)
     assert [view.camera.split("_")[0] for view in views] == cameras
 
 
@@ -224,7 +226,7 @@ def test_cameras_go_by_names(keys: Any, images: Any, cameras: list[str]) -> None
 def test_cameras_that_cannot_be_told(keys: Any, images: Any, words: str) -> None:
     features = {f"observation.images.{key}": (3, 8, 8) for key in keys}
     with pytest.raises(ValueError, match=words):
-        lerobot.find_views(features, images)
+        match_cameras(features, images)
 
 
 @pytest.mark.parametrize("width", [14, 32])
@@ -234,7 +236,7 @@ def test_both_sides_of_the_state_prompt_change(torch: Any, width: int) -> None:
 
     step = Pi05PrepareStateTokenizerProcessorStep()
     before = Processor(object(), step)
-    lerobot.print_state(before, width)
+    print_state(before, width)
     assert before.steps[2] is step and step.max_state_dim == width
     state = tensor(np.ones((2, 14), np.float32))
     transition = {"observation": {"observation.state": state}, "task": ["a", "b"]}

@@ -164,7 +164,7 @@ def test_xpolicylab_an_error_leaves_the_connection_good() -> None:
     [
         (b"\xc1", "cannot be read"),
         ("hello", "a text frame"),
-        (msgpack.packb([1]), "no map"),
+        (msgpack.packb([1]), "not a map"),
         (msgpack.packb({"a": 1}), "no message of XPolicyLab"),
         (
             msgpack.packb({"message_type": "infer_result", "message_id": "9", "payload": {}}),
