@@ -11,10 +11,10 @@ from collections.abc import Callable, Sequence
 
 from robospa.geometry import Pose, Vec3, rotate
 from robospa.tasks.events import Event
-from robospa.tasks.goals.checklist import HELD_RADIUS
 from robospa.tasks.goals.flags import Flags, closed_near
 from robospa.tasks.goals.handling import Handling
 from robospa.tasks.goals.hands import Role
+from robospa.tasks.goals.parts import HELD_RADIUS
 from robospa.tasks.snapshot import Snapshot
 
 UPRIGHT = math.cos(math.radians(36.87))

@@ -10,10 +10,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from robospa.geometry import Vec3
-from robospa.tasks.events import Event
-from robospa.tasks.goals.flags import Flags, both_open, closed_near
-from robospa.tasks.goals.handling import Handling
-from robospa.tasks.goals.hands import Role
+from robospa.tasks.goals.checklist import Checklist
+from robospa.tasks.goals.flags import closed_near
 from robospa.tasks.snapshot import Snapshot
 
 OVER_BASE, OVER_TOP = 0.05, 0.04
@@ -26,55 +24,26 @@ HELD_RADIUS = 0.09
 """A gripper that is not open and this near [m] to a vessel's origin may hold its rim."""
 
 
-class Nest:
-    """`names` stacked on the fixed object `base`; subtask i is vessel i, not latched.
-
-    Success: all are in one stack and both grippers are open.
-    """
-
-    needs_contacts = False
+class _Tower:
+    """The vessels that stand in each other on `base`, found once for every snapshot."""
 
     def __init__(self, names: Sequence[str], base: str) -> None:
-        self.total = len(names)
+        self.base = base
         self._names = tuple(names)
-        self._base = base
-        self._flags = Flags(self.total)
-        self._handling = Handling(names, radius=HELD_RADIUS)
+        self._seen: Snapshot | None = None
+        self._found: list[str] = []
 
-    @property
-    def roles(self) -> dict[str, Role]:
-        """Every vessel; the base is a mere place."""
-        found = {name: Role((i,)) for i, name in enumerate(self._names)}
-        return {self._base: Role(), **found}
-
-    def start(self, snapshot: Snapshot) -> tuple[Event, ...]:
-        """What stands on the base already, if anything does."""
-        self._handling.start(snapshot)
-        return self._look(snapshot)
-
-    def update(self, snapshot: Snapshot) -> tuple[Event, ...]:
-        """Changes of the flags, drops; success."""
-        events = self._handling.update(snapshot) + self._look(snapshot)
-        if self._flags.all and both_open(snapshot):
-            events += (Event(snapshot.time, "success"),)
-        return events
-
-    def _look(self, snapshot: Snapshot) -> tuple[Event, ...]:
-        stack = self._stack(snapshot)
-        events: tuple[Event, ...] = ()
-        for i, name in enumerate(self._names):
-            now = name in stack
-            if now == self._flags.held[i]:
-                continue
-            if not now or not closed_near(snapshot, snapshot.poses[name].position, HELD_RADIUS):
-                events += self._flags.set(i, now, snapshot.time, name)
-        return events
+    def at(self, snapshot: Snapshot) -> list[str]:
+        """The vessels of the stack from bottom to top."""
+        if snapshot is not self._seen:
+            self._seen, self._found = snapshot, self._stack(snapshot)
+        return self._found
 
     def _stack(self, snapshot: Snapshot) -> list[str]:
         """The vessels of the stack from bottom to top."""
         at = {name: snapshot.poses[name].position for name in self._names}
         rest = sorted(self._names, key=lambda name: at[name][2])
-        below, reach = snapshot.poses[self._base].position, OVER_BASE
+        below, reach = snapshot.poses[self.base].position, OVER_BASE
         lowest, highest = float("-inf"), float("inf")
         stack: list[str] = []
         while True:
@@ -92,9 +61,39 @@ class Nest:
             rest.remove(found)
             below, reach, (lowest, highest) = at[found], OVER_TOP, RISE
 
-    def diagnostics(self) -> dict[str, float]:
-        """Progress of doing nothing (none), and drops."""
-        return {"idle_progress": 0.0, "drops": self._handling.drops}
+
+class Nested:
+    """`name` is part of the stack, and was let go of in it."""
+
+    latched = False
+    after: int | None = None
+
+    def __init__(self, name: str, tower: _Tower) -> None:
+        self.name = name
+        self.movers = (name,)
+        self.targets = (tower.base,)
+        self._tower = tower
+
+    def start(self, snapshot: Snapshot) -> None:
+        """Nothing to remember."""
+
+    def holds(self, snapshot: Snapshot, before: bool) -> bool:
+        """Whether it stands there, given whether it did `before`."""
+        if self.name not in self._tower.at(snapshot):
+            return False
+        return before or not closed_near(snapshot, snapshot.position(self.name), HELD_RADIUS)
+
+
+def nest(names: Sequence[str], base: str) -> Checklist:
+    """The goal that all `names` are in one stack on the fixed object `base`, grippers open."""
+    tower = _Tower(names, base)
+    return Checklist(
+        [Nested(name, tower) for name in names],
+        released=True,
+        radius=HELD_RADIUS,
+        ordered=False,
+        handled=names,
+    )
 
 
 def _over(point: Vec3, below: Vec3, reach: float) -> bool:

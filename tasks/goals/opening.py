@@ -18,6 +18,7 @@ class Opened:
 
     def __init__(self, name: str, angle: float) -> None:
         self.name = name
+        self.movers = (name,)
         self._angle = angle
 
     def start(self, snapshot: Snapshot) -> None:

@@ -1,96 +1,86 @@
 """Lining things up from left to right in a given order.
 
 Subtask 0 holds from the start (official: the first of the row is given for free); subtask k is the
-pair (k - 1, k): its second part lies farther right and hardly nearer or farther away. Pairs do not
-latch, and some hold by chance before anything was done: `diagnostics` says how many.
+pair (k - 1, k): its second object lies farther right and hardly nearer or farther away. Pairs do
+not latch, and some hold by chance before anything was done: `diagnostics` says how many.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 from robospa.tasks.events import Event
-from robospa.tasks.goals.checklist import HELD_RADIUS
-from robospa.tasks.goals.flags import Flags, both_open, closed_near
-from robospa.tasks.goals.handling import Handling
+from robospa.tasks.goals.checklist import Checklist
+from robospa.tasks.goals.flags import closed_near
 from robospa.tasks.goals.hands import Role
+from robospa.tasks.goals.parts import HELD_RADIUS, Given
 from robospa.tasks.snapshot import Snapshot
 
 ALIGNED = 0.03
 """Neighbours of the row differ by at most this [m] in y."""
 
 RAISED = 0.01
-"""A part this much higher [m] than at the start stands on something or hangs in the air."""
+"""An object this much higher [m] than at the start stands on something or hangs in the air."""
 
 
-class Row:
-    """`order` names the parts from left to right.
+class Pair:
+    """`left` and `right` are neighbours of the row: down, in line, nothing holding either."""
 
-    A pair begins to count when both its parts are down and nothing holds them, and counts until
-    they are out of place. Success: all pairs hold and both grippers are open.
-    """
+    targets: tuple[str, ...] = ()
+    latched = False
+    after: int | None = None
 
-    needs_contacts = False
+    def __init__(self, left: str, right: str) -> None:
+        self.name = right
+        self.movers = (left, right)
+        self._ceilings: list[float] = []
 
-    def __init__(self, order: Sequence[str]) -> None:
-        self.total = len(order)
-        self._order = tuple(order)
-        self._flags = Flags(self.total)
-        self._handling = Handling(order, radius=HELD_RADIUS)
-        self._ceiling: list[float] = []
-        self._idle = 0
+    def start(self, snapshot: Snapshot) -> None:
+        """Remember how high both lie."""
+        self._ceilings = [snapshot.height(name) + RAISED for name in self.movers]
 
-    @property
-    def roles(self) -> dict[str, Role]:
-        """Every part; one in the middle of the row belongs to two pairs."""
-        last = self.total - 1
-        return {
-            name: Role(tuple(k for k in (i, i + 1) if 0 < k <= last))
-            for i, name in enumerate(self._order)
-        }
-
-    def start(self, snapshot: Snapshot) -> tuple[Event, ...]:
-        """The first part counts as done, and so do pairs that are in place by chance."""
-        self._handling.start(snapshot)
-        self._ceiling = [snapshot.poses[name].position[2] + RAISED for name in self._order]
-        events = self._flags.set(0, True, snapshot.time, self._order[0]) + self._pairs(snapshot)
-        self._idle = sum(self._flags.held)
-        return events
-
-    def update(self, snapshot: Snapshot) -> tuple[Event, ...]:
-        """Changes of the flags; success once all hold and both grippers are open."""
-        events = self._handling.update(snapshot) + self._pairs(snapshot)
-        if self._flags.all and both_open(snapshot):
-            events += (Event(snapshot.time, "success"),)
-        return events
-
-    def _pairs(self, snapshot: Snapshot) -> tuple[Event, ...]:
-        events: tuple[Event, ...] = ()
-        for k in range(1, self.total):
-            now = self._in_place(snapshot, k)
-            if now != self._flags.held[k]:
-                if now and any(
-                    closed_near(snapshot, snapshot.poses[name].position, HELD_RADIUS)
-                    for name in self._order[k - 1 : k + 1]
-                ):
-                    continue
-                events += self._flags.set(k, now, snapshot.time, self._order[k])
-        return events
-
-    def _in_place(self, snapshot: Snapshot, k: int) -> bool:
-        left = snapshot.poses[self._order[k - 1]].position
-        right = snapshot.poses[self._order[k]].position
-        return (
+    def holds(self, snapshot: Snapshot, before: bool) -> bool:
+        """Whether they are in place, given whether they were `before`."""
+        left, right = places = [snapshot.position(name) for name in self.movers]
+        in_place = (
             right[0] > left[0]
             and abs(right[1] - left[1]) <= ALIGNED
-            and left[2] < self._ceiling[k - 1]
-            and right[2] < self._ceiling[k]
+            and left[2] < self._ceilings[0]
+            and right[2] < self._ceilings[1]
         )
+        if not in_place or before:
+            return in_place
+        return not any(closed_near(snapshot, place, HELD_RADIUS) for place in places)
+
+
+class _ChancePairs:
+    """How many pairs were in place before anything was done."""
+
+    def __init__(self, pairs: Sequence[Pair]) -> None:
+        self.roles: dict[str, Role] = {}
+        self._pairs = tuple(pairs)
+        self._count = 0
+
+    def start(self, snapshot: Snapshot) -> tuple[Event, ...]:
+        self._count = sum(pair.holds(snapshot, False) for pair in self._pairs)
+        return ()
+
+    def update(self, snapshot: Snapshot, events: Sequence[Event]) -> tuple[Event, ...]:
+        return ()
 
     def diagnostics(self) -> dict[str, float]:
-        """Progress of doing nothing, pairs in place by chance at the start, drops."""
-        return {
-            "idle_progress": self._idle / self.total,
-            "chance_pairs": self._idle - 1,
-            "drops": self._handling.drops,
-        }
+        return {"chance_pairs": self._count}
+
+
+def row(order: Sequence[str]) -> Checklist:
+    """The goal that `order` lies from left to right and both grippers are open."""
+    pairs = [Pair(left, right) for left, right in pairwise(order)]
+    return Checklist(
+        [Given(order[0]), *pairs],
+        released=True,
+        radius=HELD_RADIUS,
+        ordered=False,
+        handled=order,
+        watch=_ChancePairs(pairs),
+    )

@@ -8,8 +8,8 @@ from snapshots_by_hand import TICK, held, kinds, run, snap
 
 from robospa.geometry import Pose, Vec3
 from robospa.tasks.events import Event, outcome
-from robospa.tasks.goals.anyorder import Container
-from robospa.tasks.goals.checklist import Checklist, Inside, Rests, on_spot
+from robospa.tasks.goals.checklist import Checklist
+from robospa.tasks.goals.parts import Container, Inside, Rests, on_spot
 from robospa.tasks.goals.repeat import PressCounter
 from robospa.tasks.goals.stamping import StampCounter
 from robospa.tasks.snapshot import Snapshot

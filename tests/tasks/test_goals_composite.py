@@ -8,7 +8,8 @@ from snapshots_by_hand import AWAY, TICK, held, kinds, run, snap
 
 from robospa.geometry import Pose, Vec3
 from robospa.tasks.events import Event, outcome
-from robospa.tasks.goals.composite import ClickAndPlace, Placement
+from robospa.tasks.goals.checklist import Checklist
+from robospa.tasks.goals.parts import Rests, level_with
 from robospa.tasks.goals.repeat import PressCounter
 from robospa.tasks.snapshot import Snapshot
 
@@ -21,11 +22,11 @@ TIP: Vec3 = (-0.1, -0.1, 0.84)
 IN_BASKET: Vec3 = (0.11, -0.19, 0.75)
 
 
-def tracker() -> ClickAndPlace:
+def tracker() -> Checklist:
     """Click, bread into the basket, click."""
-    bread = Placement("bread", "basket", 0.05, (0.73, 0.80))
+    bread = Rests("bread", ("basket",), level_with(0.05, 0.73, 0.80))
     counter = PressCounter("can", Pose((0.0, 0.0, 0.1)), (0.03, 0.03, 0.04))
-    return ClickAndPlace(counter, [None, bread, None])
+    return Checklist([counter, bread, counter], released=True)
 
 
 def click(bread: Vec3 = START["bread"], gripper: float = 0.0) -> list[Snapshot]:
@@ -39,7 +40,7 @@ def put(bread: Vec3 = IN_BASKET) -> list[Snapshot]:
     return [snap(0, dict(START, bread=bread))] * 2
 
 
-def play(*parts: list[Snapshot]) -> tuple[ClickAndPlace, list[Event]]:
+def play(*parts: list[Snapshot]) -> tuple[Checklist, list[Event]]:
     goal = tracker()
     flat = [snap(0, START), *(s for part in parts for s in part)]
     timed = [replace(s, time=i * TICK) for i, s in enumerate(flat)]

@@ -11,7 +11,8 @@ from snapshots_by_hand import AWAY, TICK, held, kinds, run, snap
 from robospa.geometry import Pose, Vec3, yaw_rotation
 from robospa.tasks.events import Event, outcome
 from robospa.tasks.goals.cue import MOVED_EARLY, AfterCue
-from robospa.tasks.goals.gather import Gather, Region
+from robospa.tasks.goals.parts import Region
+from robospa.tasks.goals.placing import gather
 from robospa.tasks.goals.restore import Restore, Wanted
 from robospa.tasks.snapshot import Snapshot
 
@@ -27,7 +28,7 @@ def timed(snapshots: list[Snapshot]) -> list[Snapshot]:
 
 def play(*after: Snapshot, before: list[Snapshot] | None = None) -> tuple[AfterCue, list[Event]]:
     """Two blocks to bring and one to leave; `after` the wall has come."""
-    goal = AfterCue(Gather(["a", "b"], ["x"], STRIP), ["wall"])
+    goal = AfterCue(gather(["a", "b"], ["x"], STRIP), ["wall"])
     first = [snap(0, START), *(before or []), snap(0, {**START, **WALL})]
     return goal, run(goal, timed([*first, *after]))
 

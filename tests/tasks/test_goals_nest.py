@@ -7,7 +7,7 @@ from snapshots_by_hand import TICK, held, kinds, run, snap
 
 from robospa.geometry import Vec3
 from robospa.tasks.events import outcome
-from robospa.tasks.goals.nest import Nest
+from robospa.tasks.goals.nest import nest
 
 START: dict[str, Vec3] = {
     "p": (0.1, -0.12, 0.74),
@@ -28,7 +28,7 @@ def stacked(*names: str, shift: Vec3 = (0.0, 0.0, 0.0)) -> dict[str, Vec3]:
 
 
 def play(*scenes: dict[str, Vec3]):  # type: ignore[no-untyped-def]
-    goal = Nest("abc", "p")
+    goal = nest("abc", "p")
     return run(goal, [snap(i * TICK, s) for i, s in enumerate((START, *scenes))])
 
 
@@ -67,12 +67,12 @@ def test_a_bowl_held_over_the_plate_counts_only_after_release() -> None:
     scene = stacked("a")
     grip = held((0.15, -0.12, 0.78))
     snapshots = [snap(0, START), snap(TICK, scene, (0.1, 1), grip), snap(2 * TICK, scene)]
-    assert outcome(run(Nest("abc", "p"), snapshots[:2]), 3).done == 0
-    assert outcome(run(Nest("abc", "p"), snapshots), 3).done == 1
+    assert outcome(run(nest("abc", "p"), snapshots[:2]), 3).done == 0
+    assert outcome(run(nest("abc", "p"), snapshots), 3).done == 1
 
 
 def test_success_waits_for_both_grippers_to_open() -> None:
     scene = stacked("a", "b", "c")
     snapshots = [snap(0, START), snap(TICK, scene, (1.0, 0.5)), snap(2 * TICK, scene)]
-    assert "success" not in kinds(run(Nest("abc", "p"), snapshots[:2]))
-    assert kinds(run(Nest("abc", "p"), snapshots))[-1] == "success"
+    assert "success" not in kinds(run(nest("abc", "p"), snapshots[:2]))
+    assert kinds(run(nest("abc", "p"), snapshots))[-1] == "success"

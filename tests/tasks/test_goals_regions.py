@@ -9,7 +9,9 @@ from snapshots_by_hand import TICK, held, kinds, run, snap
 
 from robospa.geometry import Vec3
 from robospa.tasks.events import outcome
-from robospa.tasks.goals.regions import Part, Region, Regions
+from robospa.tasks.goals.checklist import Checklist
+from robospa.tasks.goals.parts import Region
+from robospa.tasks.goals.placing import Destination, bring
 from robospa.workcell import TABLE_TOP
 
 RIGHT, LEFT = Region(x=(0.1, math.inf)), Region(x=(-math.inf, -0.1))
@@ -17,8 +19,9 @@ START: dict[str, Vec3] = {"a": (0.0, 0.05, 0.755), "b": (0.03, -0.1, 0.755)}
 APART: dict[str, Vec3] = {"a": (0.17, 0.05, 0.755), "b": (-0.17, -0.1, 0.755)}
 
 
-def goal(opened: bool = False) -> Regions:
-    return Regions([Part("a", (RIGHT,), (LEFT,)), Part("b", (LEFT,), (RIGHT,))], TABLE_TOP, opened)
+def goal(opened: bool = False) -> Checklist:
+    parts = [Destination("a", (RIGHT,), (LEFT,)), Destination("b", (LEFT,), (RIGHT,))]
+    return bring(parts, TABLE_TOP, opened)
 
 
 def play(*scenes: dict[str, Vec3]):  # type: ignore[no-untyped-def]

@@ -7,7 +7,7 @@ from snapshots_by_hand import TICK, held, kinds, run, snap
 
 from robospa.geometry import Vec3
 from robospa.tasks.events import outcome
-from robospa.tasks.goals.row import Row
+from robospa.tasks.goals.row import row
 
 START = {"a": (0.2, 0.0, 0.76), "b": (0.0, -0.05, 0.76), "c": (-0.2, 0.04, 0.76)}
 
@@ -18,7 +18,7 @@ def lined(a: float, b: float, c: float, y: float = -0.17, z: float = 0.76) -> di
 
 
 def play(*scenes: dict[str, Vec3]):  # type: ignore[no-untyped-def]
-    goal = Row("abc")
+    goal = row("abc")
     return goal, run(goal, [snap(i * TICK, s) for i, s in enumerate((START, *scenes))])
 
 
@@ -30,7 +30,7 @@ def test_the_first_of_the_row_is_free() -> None:
 
 
 def test_pairs_in_place_by_chance_count_and_are_told_apart() -> None:
-    goal = Row("abc")
+    goal = row("abc")
     scene = {**START, "a": (-0.1, -0.04, 0.76)}
     events = run(goal, [snap(0, scene), snap(TICK, scene)])
     assert outcome(events, 3).done == 2
@@ -43,8 +43,8 @@ def test_a_row_in_the_right_order_succeeds() -> None:
 
 
 def test_the_row_may_slope_as_long_as_neighbours_keep_close() -> None:
-    row = {"a": (-0.1, -0.2, 0.76), "b": (0.0, -0.171, 0.76), "c": (0.1, -0.142, 0.76)}
-    assert kinds(play(row)[1])[-1] == "success"
+    placed = {"a": (-0.1, -0.2, 0.76), "b": (0.0, -0.171, 0.76), "c": (0.1, -0.142, 0.76)}
+    assert kinds(play(placed)[1])[-1] == "success"
 
 
 @pytest.mark.parametrize("x", [(0.1, 0.0, -0.1), (-0.1, 0.1, 0.0), (0.0, 0.0, 0.1)])
@@ -55,37 +55,37 @@ def test_another_order_does_not_succeed(x: tuple[float, float, float]) -> None:
 
 
 def test_neighbours_too_far_apart_in_depth_are_no_row() -> None:
-    row = lined(-0.1, 0.0, 0.1)
-    row["b"] = (0.0, -0.135, 0.76)
-    assert outcome(play(row)[1], 3).done == 1
+    placed = lined(-0.1, 0.0, 0.1)
+    placed["b"] = (0.0, -0.135, 0.76)
+    assert outcome(play(placed)[1], 3).done == 1
 
 
 def test_blocks_on_top_of_each_other_are_no_row() -> None:
-    row = lined(-0.01, 0.0, 0.1)
-    row["b"] = (0.0, -0.17, 0.79)
-    assert outcome(play(row)[1], 3).done == 1
+    placed = lined(-0.01, 0.0, 0.1)
+    placed["b"] = (0.0, -0.17, 0.79)
+    assert outcome(play(placed)[1], 3).done == 1
 
 
 def test_a_pair_counts_only_after_release_and_success_waits_for_open_grippers() -> None:
-    row = lined(-0.1, 0.0, 0.1)
+    placed = lined(-0.1, 0.0, 0.1)
     snapshots = [
         snap(0, START),
-        snap(TICK, row, (0.1, 1.0), held(row["c"])),
-        snap(2 * TICK, row, (0.5, 1.0)),
-        snap(3 * TICK, row),
+        snap(TICK, placed, (0.1, 1.0), held(placed["c"])),
+        snap(2 * TICK, placed, (0.5, 1.0)),
+        snap(3 * TICK, placed),
     ]
-    assert outcome(run(Row("abc"), snapshots[:2]), 3).done == 2
-    assert "success" not in kinds(run(Row("abc"), snapshots[:3]))
-    assert kinds(run(Row("abc"), snapshots))[-1] == "success"
+    assert outcome(run(row("abc"), snapshots[:2]), 3).done == 2
+    assert "success" not in kinds(run(row("abc"), snapshots[:3]))
+    assert kinds(run(row("abc"), snapshots))[-1] == "success"
 
 
 def test_a_pair_is_lost_when_a_block_leaves() -> None:
-    row = lined(-0.1, 0.0, 0.25)
-    _, events = play({**row, "c": START["c"]}, {**row, "b": START["b"], "c": START["c"]})
+    placed = lined(-0.1, 0.0, 0.25)
+    _, events = play({**placed, "c": START["c"]}, {**placed, "b": START["b"], "c": START["c"]})
     result = outcome(events, 3)
     assert (result.done, result.best) == (1, 2)
 
 
 def test_every_part_has_its_pairs() -> None:
-    roles = Row("abc").roles
+    roles = row("abc").roles
     assert [roles[name].subtasks for name in "abc"] == [(1,), (1, 2), (2,)]

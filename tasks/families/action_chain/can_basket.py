@@ -13,7 +13,8 @@ import numpy as np
 
 from robospa.tasks import objects
 from robospa.tasks.families.tabletop import Item, draw_look, named, radius, standing
-from robospa.tasks.goals.composite import ClickAndPlace, Placement
+from robospa.tasks.goals.checklist import Checklist, Counter
+from robospa.tasks.goals.parts import Part, Rests, level_with
 from robospa.tasks.goals.repeat import PressCounter
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText
@@ -86,24 +87,25 @@ def _draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft | N
     return Draft(*named(rng, items))
 
 
-def goal(scene: Scene) -> ClickAndPlace:
+def goal(scene: Scene) -> Checklist:
     """Clicks and placements in the asked order."""
     facts = scene.facts
     can = scene.object(facts["can"])
     model = objects.object_model(can.asset, can.params)
-    subtasks: list[Placement | None] = []
+    counter = PressCounter(can.name, model.frames["press"], CAN_BOX)
+    subtasks: list[Counter | Part] = []
     for step in STEPS[scene.level]:
         if step == "b":
             basket = scene.object(facts["basket"])
             rim = scene.table_top + objects.object_model(basket.asset, basket.params).size[2]
             height = (scene.table_top - 0.01, rim + 0.01)
-            subtasks.append(Placement(facts["bread"], facts["basket"], 0.05, height))
+            subtasks.append(Rests(facts["bread"], (facts["basket"],), level_with(0.05, *height)))
         elif step == "p":
             height = (scene.table_top - 0.004, scene.table_top + 0.006)
-            subtasks.append(Placement(facts["pill_bottle"], facts["pad"], 0.03, height))
+            subtasks.append(Rests(facts["pill_bottle"], (facts["pad"],), level_with(0.03, *height)))
         else:
-            subtasks.append(None)
-    return ClickAndPlace(PressCounter(can.name, model.frames["press"], CAN_BOX), subtasks)
+            subtasks.append(counter)
+    return Checklist(subtasks, released=True)
 
 
 def plan(scene: Scene) -> tuple[Skill, ...]:

@@ -23,8 +23,9 @@ from robospa.tasks.families.tabletop import (
     side,
     standing,
 )
-from robospa.tasks.goals.checklist import Checklist, Counter, Part, Rests
+from robospa.tasks.goals.checklist import Checklist, Counter
 from robospa.tasks.goals.opening import Opened
+from robospa.tasks.goals.parts import Part, Rests
 from robospa.tasks.goals.repeat import PressCounter
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText

@@ -17,7 +17,8 @@ from robospa.geometry import Pose
 from robospa.tasks.families.action_chain.stations import frame_of
 from robospa.tasks.families.dustbin.floor_bin import reachable
 from robospa.tasks.families.tabletop import Item, draw_look, in_view, named, radius, standing
-from robospa.tasks.goals.checklist import Checklist, Counter, Near, Part, Rests
+from robospa.tasks.goals.checklist import Checklist, Counter
+from robospa.tasks.goals.parts import Near, Part, Rests
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.plan import Hang, Pick, Place, Skill

@@ -13,7 +13,8 @@ import numpy as np
 
 from robospa.tasks.families.action_chain.stations import button, frame_of
 from robospa.tasks.families.tabletop import Item, draw_look, named, radius, side, standing
-from robospa.tasks.goals.checklist import Checklist, Counter, Part
+from robospa.tasks.goals.checklist import Checklist, Counter
+from robospa.tasks.goals.parts import Part
 from robospa.tasks.goals.stamping import StampCounter
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText

@@ -16,7 +16,8 @@ from robospa.geometry import Pose
 from robospa.tasks import objects
 from robospa.tasks.families.action_chain.stations import button, frame_of, there_and_back
 from robospa.tasks.families.tabletop import Item, draw_look, in_view, named, radius, standing
-from robospa.tasks.goals.checklist import Checklist, Counter, Part, Rests, on_spot
+from robospa.tasks.goals.checklist import Checklist, Counter
+from robospa.tasks.goals.parts import Part, Rests, on_spot
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.plan import Place, Skill

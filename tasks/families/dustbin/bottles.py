@@ -22,7 +22,7 @@ from robospa.tasks.families.dustbin.floor_bin import (
     reachable,
 )
 from robospa.tasks.families.tabletop import Item, middle_in_view, named, standing
-from robospa.tasks.goals.anyorder import Collect
+from robospa.tasks.goals.placing import collect
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.instructions.words import NUMBERS, by_count
@@ -30,7 +30,7 @@ from robospa.tasks.plan import Skill
 from robospa.tasks.sampling.points import scatter_points
 from robospa.tasks.sampling.region import Point
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Draft, Level, Task
+from robospa.tasks.task import Draft, Level, Task, Tracker
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "bottles.toml")
@@ -66,11 +66,11 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     return Draft(scene_objects, facts, TABLE_SHIFT)
 
 
-def goal(scene: Scene) -> Collect:
+def goal(scene: Scene) -> Tracker:
     """All bottles inside the bin's walls."""
     dustbin = scene.object(scene.facts["dustbin"])
     names = scene.facts["bottles"]
-    return Collect(names, container(dustbin), lost_below=scene.table_top - 0.1)
+    return collect(names, container(dustbin), lost_below=scene.table_top - 0.1)
 
 
 def plan(scene: Scene) -> tuple[Skill, ...]:

@@ -21,7 +21,8 @@ from robospa.tasks.families.dustbin.floor_bin import (
     reachable,
 )
 from robospa.tasks.families.tabletop import Item, draw_look, in_view, named, radius, side, standing
-from robospa.tasks.goals.checklist import Checklist, Counter, Inside, Part, Rests, on_spot
+from robospa.tasks.goals.checklist import Checklist, Counter
+from robospa.tasks.goals.parts import Inside, Part, Rests, on_spot
 from robospa.tasks.instructions.grammar import Slots, Templates
 from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.instructions.words import by_count

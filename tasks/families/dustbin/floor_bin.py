@@ -10,7 +10,7 @@ from collections.abc import Iterable
 
 from robospa.geometry import Pose
 from robospa.tasks import objects
-from robospa.tasks.goals.anyorder import Container
+from robospa.tasks.goals.parts import Container
 from robospa.tasks.plan import Drop, Pick, Place, Skill
 from robospa.tasks.sampling.region import Point, apart
 from robospa.tasks.scene import Scene, SceneObject

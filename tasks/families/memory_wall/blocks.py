@@ -15,7 +15,8 @@ from robospa.geometry import Pose
 from robospa.tasks.families.memory_wall.wall import HOLD_STILL, STAND_TOP, WALL, row, stand, wall
 from robospa.tasks.families.tabletop import Item, named, side, standing
 from robospa.tasks.goals.cue import AfterCue
-from robospa.tasks.goals.gather import Gather, Region
+from robospa.tasks.goals.parts import Region
+from robospa.tasks.goals.placing import gather
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.instructions.words import NUMBERS, by_count
@@ -83,8 +84,8 @@ def _look(color: str) -> dict[str, list[float]]:
 
 def goal(scene: Scene) -> AfterCue:
     """The shown colours' blocks in the strip near the robot, after the wall has come."""
-    gather = Gather(scene.facts["targets"], scene.facts["others"], NEAR)
-    return AfterCue(gather, [scene.facts["wall"]])
+    blocks = gather(scene.facts["targets"], scene.facts["others"], NEAR)
+    return AfterCue(blocks, [scene.facts["wall"]])
 
 
 def plan(scene: Scene) -> tuple[Skill, ...]:

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from robospa.tasks.families.tabletop import Item, named, standing
-from robospa.tasks.goals.regions import Part, Region, Regions
+from robospa.tasks.goals.parts import Region
+from robospa.tasks.goals.placing import Destination, bring
 from robospa.tasks.instructions.grammar import Phrasings, Slots
 from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.instructions.words import NUMBERS
@@ -21,7 +22,7 @@ from robospa.tasks.plan import Pick, Place, Skill
 from robospa.tasks.sampling.points import LAYOUTS, TRIES_PER_POINT
 from robospa.tasks.sampling.region import LayoutError, shuffled
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Draft, Level, Task
+from robospa.tasks.task import Draft, Level, Task, Tracker
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "blocks.toml")
@@ -116,12 +117,12 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     return Draft(scene_objects, facts)
 
 
-def goal(scene: Scene) -> Regions:
+def goal(scene: Scene) -> Tracker:
     """Every block on its colour's side; the other side is astray."""
     facts = scene.facts
-    parts = [Part(name, (RIGHT,), (LEFT,)) for name in facts["right"]]
-    parts += [Part(name, (LEFT,), (RIGHT,)) for name in facts["left"]]
-    return Regions(parts, scene.table_top)
+    parts = [Destination(name, (RIGHT,), (LEFT,)) for name in facts["right"]]
+    parts += [Destination(name, (LEFT,), (RIGHT,)) for name in facts["left"]]
+    return bring(parts, scene.table_top)
 
 
 def plan(scene: Scene) -> tuple[Skill, ...]:

@@ -13,7 +13,8 @@ import numpy as np
 from robospa.tasks import objects
 from robospa.tasks.families.picking import drawn_yaw
 from robospa.tasks.families.tabletop import Item, draw_look, named, side, standing
-from robospa.tasks.goals.regions import Part, Region, Regions
+from robospa.tasks.goals.parts import Region
+from robospa.tasks.goals.placing import Destination, bring
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.instructions.words import NUMBERS, by_count
@@ -21,7 +22,7 @@ from robospa.tasks.plan import Pick, Place, Skill
 from robospa.tasks.sampling.points import scatter_points
 from robospa.tasks.sampling.region import shuffled
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Draft, Level, Task
+from robospa.tasks.task import Draft, Level, Task, Tracker
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "cards.toml")
@@ -58,15 +59,15 @@ def _sides(scene: Scene) -> dict[str, list[str]]:
     return found
 
 
-def goal(scene: Scene) -> Regions:
+def goal(scene: Scene) -> Tracker:
     """Every box far out on either side; the farther side is a diagnostic."""
     start = {name: where for where, names in _sides(scene).items() for name in names}
     both = tuple(SIDES.values())
     parts = [
-        Part(name, both, (SIDES["left" if start[name] == "right" else "right"],))
+        Destination(name, both, (SIDES["left" if start[name] == "right" else "right"],))
         for name in scene.facts["boxes"]
     ]
-    return Regions(parts, scene.table_top)
+    return bring(parts, scene.table_top)
 
 
 def plan(scene: Scene) -> tuple[Skill, ...]:

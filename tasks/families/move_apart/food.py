@@ -12,13 +12,14 @@ import math
 import numpy as np
 
 from robospa.tasks.families.tabletop import Item, draw_look, named, side, standing
-from robospa.tasks.goals.regions import Part, Region, Regions
+from robospa.tasks.goals.parts import Region
+from robospa.tasks.goals.placing import Destination, bring
 from robospa.tasks.instructions.grammar import Phrasings, Slots
 from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.instructions.words import NUMBERS
 from robospa.tasks.plan import Pick, Place, Skill
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Draft, Level, Task
+from robospa.tasks.task import Draft, Level, Task, Tracker
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "food.toml")
@@ -73,11 +74,11 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     return Draft(scene_objects, facts)
 
 
-def goal(scene: Scene) -> Regions:
+def goal(scene: Scene) -> Tracker:
     """Every object beyond its line, and both grippers open."""
-    parts = [Part(name, (FORWARD,), (BACKWARD,)) for name in scene.facts["forward"]]
-    parts += [Part(name, (BACKWARD,), (FORWARD,)) for name in scene.facts["backward"]]
-    return Regions(parts, scene.table_top, opened=True)
+    parts = [Destination(name, (FORWARD,), (BACKWARD,)) for name in scene.facts["forward"]]
+    parts += [Destination(name, (BACKWARD,), (FORWARD,)) for name in scene.facts["backward"]]
+    return bring(parts, scene.table_top, released=True)
 
 
 def plan(scene: Scene) -> tuple[Skill, ...]:

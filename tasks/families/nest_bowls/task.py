@@ -11,7 +11,7 @@ import numpy as np
 from robospa.geometry import Array, Vec3
 from robospa.tasks import objects
 from robospa.tasks.families.tabletop import Item, draw_look, named, side, standing
-from robospa.tasks.goals.nest import Nest
+from robospa.tasks.goals.nest import nest
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.instructions.words import NUMBERS, by_count
@@ -19,7 +19,7 @@ from robospa.tasks.plan import Pick, Place, Skill
 from robospa.tasks.sampling.region import Area, Mask, shuffled
 from robospa.tasks.sampling.scatter import candidates, scatter
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Draft, Level, Task
+from robospa.tasks.task import Draft, Level, Task, Tracker
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "instructions.toml")
@@ -57,9 +57,9 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     )
 
 
-def goal(scene: Scene) -> Nest:
+def goal(scene: Scene) -> Tracker:
     """All bowls in one stack on the plate."""
-    return Nest(scene.facts["bowls"], scene.facts["plate"])
+    return nest(scene.facts["bowls"], scene.facts["plate"])
 
 
 def plan(scene: Scene) -> tuple[Skill, ...]:

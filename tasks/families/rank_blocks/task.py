@@ -17,7 +17,7 @@ import numpy as np
 from robospa.geometry import Vec3
 from robospa.tasks.families.stack_blocks.towers import NEAR_BAND, draw_color
 from robospa.tasks.families.tabletop import Item, named, side, standing
-from robospa.tasks.goals.row import Row
+from robospa.tasks.goals.row import row
 from robospa.tasks.goals.stack import Bring
 from robospa.tasks.instructions.grammar import Phrasings, Slots, listed
 from robospa.tasks.instructions.text import COMMON, TaskText
@@ -26,7 +26,7 @@ from robospa.tasks.plan import Pick, Place, Skill
 from robospa.tasks.sampling.points import LAYOUTS, scatter_points
 from robospa.tasks.sampling.region import LayoutError, Point, apart, shuffled
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Draft, Level, Task
+from robospa.tasks.task import Draft, Level, Task, Tracker
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "instructions.toml")
@@ -139,10 +139,10 @@ def _draw(looks: Sequence[Look], rng: np.random.Generator, workcell: Workcell) -
     return Draft(scene_objects, {"order": [names[item.role] for item in items]})
 
 
-def goal(scene: Scene) -> Row | Bring:
+def goal(scene: Scene) -> Tracker:
     """The row from left to right, or at level 1 a block in the near band."""
     order = scene.facts["order"]
-    return Row(order) if scene.level > 1 else Bring(order[0], *NEAR_BAND)
+    return row(order) if scene.level > 1 else Bring(order[0], *NEAR_BAND)
 
 
 def plan(scene: Scene) -> tuple[Skill, ...]:

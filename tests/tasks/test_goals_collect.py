@@ -6,15 +6,17 @@ from snapshots_by_hand import TICK, held, kinds, run, snap
 
 from robospa.geometry import Pose, Vec3
 from robospa.tasks.events import Event, outcome
-from robospa.tasks.goals.anyorder import Collect, Container
+from robospa.tasks.goals.checklist import Checklist
+from robospa.tasks.goals.parts import Container
+from robospa.tasks.goals.placing import collect
 
 BIN = Container(Pose((-0.45, 0.0, 0.0)), (0.15, 0.15), 0.6)
 TABLE = {"p": (0.0, 0.1, 0.74), "q": (0.2, 0.1, 0.74)}
 IN: Vec3 = (-0.45, 0.02, 0.05)
 
 
-def play(*scenes: dict[str, Vec3]) -> tuple[Collect, list[Event]]:
-    goal = Collect(["p", "q"], BIN, lost_below=0.64)
+def play(*scenes: dict[str, Vec3]) -> tuple[Checklist, list[Event]]:
+    goal = collect(["p", "q"], BIN, lost_below=0.64)
     scenes = (TABLE, *scenes)
     return goal, run(goal, [snap(i * TICK, scene) for i, scene in enumerate(scenes)])
 
@@ -64,7 +66,7 @@ def carried(p: Vec3, opening: float, time: float):  # type: ignore[no-untyped-de
 
 
 def test_a_bottle_let_go_over_the_bin_is_not_a_drop() -> None:
-    goal = Collect(["p", "q"], BIN, lost_below=0.64)
+    goal = collect(["p", "q"], BIN, lost_below=0.64)
     snapshots = [carried((0.0, 0.1, 0.74), 0.1, 0.0), carried((0.0, 0.1, 0.85), 0.1, TICK)]
     snapshots += [carried((-0.45, 0.0, 0.85), 0.1, 2 * TICK)]
     snapshots += [carried((-0.45, 0.0, z), 1.0, (3 + i) * TICK) for i, z in enumerate((0.8, 0.7))]
@@ -72,7 +74,7 @@ def test_a_bottle_let_go_over_the_bin_is_not_a_drop() -> None:
 
 
 def test_the_same_over_the_table_is() -> None:
-    goal = Collect(["p", "q"], BIN, lost_below=0.64)
+    goal = collect(["p", "q"], BIN, lost_below=0.64)
     snapshots = [carried((0.0, 0.1, 0.74), 0.1, 0.0), carried((0.0, 0.1, 0.85), 0.1, TICK)]
     snapshots += [carried((0.0, 0.1, 0.81), 0.1, 2 * TICK)]
     assert kinds(run(goal, snapshots)) == ["grasped", "dropped"]

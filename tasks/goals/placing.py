@@ -1,0 +1,168 @@
+"""Bringing objects to places, in any order: the table's regions, a container, a guarded strip.
+
+Each is a `Checklist` of parts that do not latch, with something watched beside it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from robospa.tasks.events import Event
+from robospa.tasks.goals.checklist import Checklist
+from robospa.tasks.goals.hands import Role
+from robospa.tasks.goals.parts import (
+    HELD_RADIUS,
+    Container,
+    Inside,
+    Region,
+    Rests,
+    lying_in,
+    put_into,
+)
+from robospa.tasks.snapshot import Snapshot
+
+FALLEN = 0.05
+"""An origin so far [m] below the top of the table has left it."""
+HEIGHT_TOLERANCE = 0.02
+"""An object in a guarded strip may be this much higher [m] than at the start."""
+CLOSE = 0.03
+"""A gripper that is not open and whose grasp centre is nearer [m] than this holds a block."""
+
+
+@dataclass(frozen=True)
+class Destination:
+    """`name` belongs into one of the regions `to`; `astray` are those it was not asked for."""
+
+    name: str
+    to: tuple[Region, ...]
+    astray: tuple[Region, ...] = ()
+
+
+def bring(parts: Sequence[Destination], table_top: float, released: bool = False) -> Checklist:
+    """Every object in one of its regions at once, with `released` both grippers open too.
+
+    An object stops counting when it leaves. One that falls off the table, whose top is at
+    `table_top` [m], counts nowhere; one in a region of `astray` is a diagnostic, no failure.
+    """
+    lowest = table_top - FALLEN
+    return Checklist(
+        [Rests(part.name, (), lying_in(part.to, lowest)) for part in parts],
+        released,
+        HELD_RADIUS,
+        ordered=False,
+        handled=[part.name for part in parts],
+        watch=_Strays(parts, lowest),
+    )
+
+
+class _Strays:
+    """Objects in regions that they were not asked for, and those that fell off the table."""
+
+    def __init__(self, parts: Sequence[Destination], lowest: float) -> None:
+        self.roles: dict[str, Role] = {}
+        self._parts = tuple(parts)
+        self._lowest = lowest
+        self._astray: set[str] = set()
+        self._fallen: set[str] = set()
+
+    def start(self, snapshot: Snapshot) -> tuple[Event, ...]:
+        return self.update(snapshot, ())
+
+    def update(self, snapshot: Snapshot, events: Sequence[Event]) -> tuple[Event, ...]:
+        found: tuple[Event, ...] = ()
+        for i, part in enumerate(self._parts):
+            x, y, z = snapshot.position(part.name)
+            if z < self._lowest and part.name not in self._fallen:
+                self._fallen.add(part.name)
+                found += (Event(snapshot.time, "dropped", part.name, i, "off the table"),)
+            if any(region.holds(x, y) for region in part.astray):
+                self._astray.add(part.name)
+        return found
+
+    def diagnostics(self) -> dict[str, float]:
+        return {"astray": len(self._astray), "fallen": len(self._fallen)}
+
+
+def gather(targets: Sequence[str], others: Sequence[str], region: Region) -> Checklist:
+    """All of `targets` in `region` at once and let go of, none of `others` ever.
+
+    A target counts while it lies no higher than before; the official rule also counts what is
+    carried through. A wrong object in the region, at any height, fails for good (official).
+    """
+    near = put_into(region, HEIGHT_TOLERANCE)
+    return Checklist(
+        [Rests(name, (), near, held_radius=CLOSE) for name in targets],
+        released=True,
+        radius=0.06,
+        ordered=False,
+        handled=(*targets, *others),
+        watch=_Intruders(others, region),
+    )
+
+
+class _Intruders:
+    """Objects that no one asked for: lifted, or in the region."""
+
+    def __init__(self, others: Sequence[str], region: Region) -> None:
+        self.roles = {name: Role() for name in others}
+        self._region = region
+        self._lifts = 0
+
+    def start(self, snapshot: Snapshot) -> tuple[Event, ...]:
+        return ()
+
+    def update(self, snapshot: Snapshot, events: Sequence[Event]) -> tuple[Event, ...]:
+        lifted = [e.object for e in events if e.kind == "grasped" and e.object in self.roles]
+        self._lifts += len(lifted)
+        found = tuple(Event(snapshot.time, "wrong_object", name) for name in lifted)
+        for name in self.roles:
+            if self._region.over(snapshot.position(name)):
+                note = "an object that was not shown is in the region"
+                return (*found, Event(snapshot.time, "failed", name, note=note))
+        return found
+
+    def diagnostics(self) -> dict[str, float]:
+        return {"wrong_lifts": self._lifts}
+
+
+def collect(names: Sequence[str], container: Container, lost_below: float) -> Checklist:
+    """Every object of `names` at rest inside `container`, until it leaves its walls again.
+
+    `lost_below` [m] is the height under which an object outside the container cannot be fetched
+    any more; it is reported as dropped, and the trial goes on (official).
+    """
+    return Checklist(
+        [Inside(name, None, container, latched=False) for name in names],
+        radius=0.2,
+        may_fall=container.over,
+        ordered=False,
+        handled=names,
+        watch=_Lost(names, container, lost_below),
+    )
+
+
+class _Lost:
+    """Objects that lie beside the container, too low to be fetched."""
+
+    def __init__(self, names: Sequence[str], container: Container, below: float) -> None:
+        self.roles: dict[str, Role] = {}
+        self._names = tuple(names)
+        self._container = container
+        self._below = below
+        self._lost: set[str] = set()
+
+    def start(self, snapshot: Snapshot) -> tuple[Event, ...]:
+        return ()
+
+    def update(self, snapshot: Snapshot, events: Sequence[Event]) -> tuple[Event, ...]:
+        found: tuple[Event, ...] = ()
+        for i, name in enumerate(self._names):
+            here = snapshot.position(name)
+            if here[2] < self._below and name not in self._lost and not self._container.over(here):
+                self._lost.add(name)
+                found += (Event(snapshot.time, "dropped", name, i, "out of reach"),)
+        return found
+
+    def diagnostics(self) -> dict[str, float]:
+        return {"lost": len(self._lost)}
