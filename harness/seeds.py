@@ -25,11 +25,11 @@ from this very policy."""
 
 @dataclass(frozen=True)
 class Attempt:
-    """What became of one seed. `why` is empty for an accepted one."""
+    """The expert's trial of one seed. `reason` says why it was not accepted, or is empty."""
 
     seed: int
     accepted: bool
-    why: str
+    reason: str
     digest: str = ""
     physics_steps: int = 0
     steps: int = 0
@@ -39,7 +39,7 @@ class Attempt:
 _WORKER: list[tuple[World, Policy]] = []
 
 
-def _start() -> None:
+def _start_worker() -> None:
     from robospa.harness.factory import policy_factory
     from robospa.harness.sim.sapien_world import SapienWorld
 
@@ -52,14 +52,14 @@ def attempt(world: World, policy: Policy, name: str, level: int, seed: int) -> A
 
     try:
         record = run_trial(world, policy, TrialKey(name, level, seed), policy_seed=0)
-    except SceneUnstable as trouble:
-        return Attempt(seed, False, f"does not settle: {trouble}")
-    trouble_now = "; ".join(getattr(policy, "trouble", ()))
-    why = "" if record.success else f"{record.end} {record.message} {trouble_now}".strip()
+    except SceneUnstable as error:
+        return Attempt(seed, False, f"does not settle: {error}")
+    failures = "; ".join(getattr(policy, "trouble", ()))
+    reason = "" if record.success else f"{record.end} {record.message} {failures}".strip()
     return Attempt(
         seed,
         record.success,
-        why,
+        reason,
         record.digest,
         record.physics_steps,
         record.steps,
@@ -69,13 +69,13 @@ def attempt(world: World, policy: Policy, name: str, level: int, seed: int) -> A
 
 def _batch(name: str, level: int, seeds: list[int]) -> list[Attempt]:
     if not _WORKER:
-        _start()
+        _start_worker()
     world, policy = _WORKER[0]
     return [attempt(world, policy, name, level, seed) for seed in seeds]
 
 
 class Sweep:
-    """Worker processes that try seeds; use as a context manager."""
+    """Worker processes that run the expert on seeds; use as a context manager."""
 
     def __init__(self, workers: int) -> None:
         self._workers = max(1, workers)
@@ -88,13 +88,17 @@ class Sweep:
         self._pool.shutdown(cancel_futures=True)
 
     def try_seeds(
-        self, name: str, level: int, seeds: list[int], done: Callable[[int], None] = lambda n: None
+        self,
+        name: str,
+        level: int,
+        seeds: list[int],
+        on_progress: Callable[[int], None] = lambda n: None,
     ) -> list[Attempt]:
-        """Attempts for `seeds`, in their order; `done(n)` is called as n more are finished."""
+        """Attempts for `seeds`, in their order; `on_progress(n)` is called as n more finish."""
         parts = [seeds[i : i + BATCH] for i in range(0, len(seeds), BATCH)]
         futures = [self._pool.submit(_batch, name, level, part) for part in parts]
         for future in as_completed(futures):
-            done(len(future.result()))
+            on_progress(len(future.result()))
         return [item for future in futures for item in future.result()]
 
     def first_accepted(
@@ -103,7 +107,7 @@ class Sweep:
         level: int,
         start: int,
         count: int,
-        done: Callable[[int], None] = lambda n: None,
+        on_progress: Callable[[int], None] = lambda n: None,
     ) -> tuple[list[int], list[Attempt]]:
         """The first `count` accepted seeds from `start` up, and every refused attempt before them.
 
@@ -112,7 +116,7 @@ class Sweep:
         accepted: list[int] = []
         refused: list[Attempt] = []
         for block in _blocks(start, count):
-            for item in self.try_seeds(name, level, block, done):
+            for item in self.try_seeds(name, level, block, on_progress):
                 if len(accepted) == count:
                     break
                 if item.accepted:
@@ -135,7 +139,7 @@ def _blocks(start: int, count: int) -> Iterator[list[int]]:
 
 
 def save(folder: Path, name: str, level: int, seeds: list[int]) -> None:
-    """Add a variant's seeds to the task's JSON file, whole or not at all."""
+    """Add a variant's seeds to the task's JSON file, at once or not at all."""
     path = folder / f"{name}.json"
     data = json.loads(path.read_text()) if path.exists() else {}
     data[str(level)] = seeds

@@ -91,7 +91,7 @@ def test_the_expert_solves_it_in_the_simulator(installed: Path, level: int) -> N
     world, expert = SapienWorld(render=False), policy_factory(ORACLE)()
     for seed in (500_000, 500_001):
         tried = attempt(world, expert, NAME, level, seed)
-        assert tried.accepted, tried.why
+        assert tried.accepted, tried.reason
 
 
 @pytest.mark.sim

@@ -47,17 +47,17 @@ def demo(
     """See a policy server evaluated: trials of each category, a table, a report with videos."""
     from robospa.harness.selection import parse_levels, parse_tasks
 
-    begun = time.monotonic()
+    started = time.monotonic()
     folder = out or Path("runs") / f"demo-{time.strftime('%Y%m%d-%H%M%S')}"
     names = parse_tasks(",".join(SAMPLE) if tasks == "sample" else tasks)
     page = _evaluate("oracle", _select(names, levels, trials), folder / "oracle", workers, video)
     # The tasks with the shortest trials: one pick each.
     short = [name for name in names if name in parse_tasks("spatial")]
-    if contrast and short and time.monotonic() - begun < seconds:
+    if contrast and short and time.monotonic() - started < seconds:
         chosen = _select(short, str(min(parse_levels(levels))), trials)
         print("\nFor contrast, some of the same trials with arms that move at random:")
         _evaluate(CONTRAST, chosen, folder / CONTRAST, workers, "none")
-    print(f"\nDone in {time.monotonic() - begun:.0f} s. Open {page} in a browser.")
+    print(f"\nDone in {time.monotonic() - started:.0f} s. Open {page} in a browser.")
 
 
 def _select(names: Sequence[str], levels: str, trials: int) -> Selection:

@@ -6,6 +6,7 @@ below it and imports nothing of it.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -22,7 +23,7 @@ Home = Annotated[Path, typer.Option(help="folder of the submissions")]
 Hidden = Annotated[str | None, typer.Option(hidden=True)]
 
 
-def _reach(path: str) -> Any:
+def _load(path: str) -> Callable[..., Any]:
     from robospa.harness.factory import load_function
 
     return load_function(f"robospa.leaderboard.{path}")
@@ -36,7 +37,7 @@ def build(
     """Write the leaderboard as static pages."""
     if not submissions.is_dir():
         print(f"There is no folder {submissions}: the site has the published models only.")
-    index = _reach("site:build")(submissions, out, note=print)
+    index = _load("site:build")(submissions, out, note=print)
     print(f"Leaderboard: {index}")
 
 
@@ -55,11 +56,11 @@ def add(
     parts: Hidden = None,
 ) -> None:
     """Verify a bundle and keep what the leaderboard needs of it in the submission's folder."""
-    valid = _reach("verify:verify")(bundle, _reach("reference:shipped")(world, parts))
+    valid = _load("verify:verify")(bundle, _load("reference:shipped")(world, parts))
     found = []
     for path in evidence or []:
         if path.stat().st_size > MOST:
             raise ValueError(f"{path} is larger than evidence can be")
-        found.append(_reach("strict_json:parse_map")(path.read_bytes(), str(path)))
-    folder = _reach("submission:add")(valid, found, submissions, name, address)
+        found.append(_load("strict_json:parse_map")(path.read_bytes(), str(path)))
+    folder = _load("submission:add")(valid, found, submissions, name, address)
     print(f"Submission: {folder}")

@@ -52,6 +52,6 @@ def seeds(
             bar.remove_task(row)
             bar.console.print(text)
             for item in refused:
-                bar.console.print(f"  seed {item.seed}: {item.why}")
+                bar.console.print(f"  seed {item.seed}: {item.reason}")
     if failed:
         raise typer.Exit(1)

@@ -6,6 +6,7 @@ below it and imports nothing of it.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -20,7 +21,7 @@ submit = typer.Typer(
 Hidden = Annotated[str | None, typer.Option(hidden=True)]
 
 
-def _reach(path: str) -> Any:
+def _load(path: str) -> Callable[..., Any]:
     from robospa.harness.factory import load_function
 
     return load_function(f"{LEADERBOARD}.{path}")
@@ -29,7 +30,7 @@ def _reach(path: str) -> Any:
 @submit.command()
 def template() -> None:
     """Print a model card to fill in: robospa submit template > model.toml"""
-    print(_reach("card:template")(), end="")
+    print(_load("card:template")(), end="")
 
 
 @submit.command()
@@ -50,15 +51,15 @@ def pack(
     parts: Hidden = None,
 ) -> None:
     """Make a bundle of complete runs, film the announced trials, and verify the result."""
-    reference = _reach("reference:shipped")(world, parts)
-    card = _reach("card:read_card")(model)
-    packed = _reach("packing:pack")(
+    reference = _load("reference:shipped")(world, parts)
+    card = _load("card:read_card")(model)
+    packed = _load("packing:pack")(
         run, card, out, reference, practice=practice, videos=videos, note=print
     )
     evidence = packed.valid.evidence
     print(f"{out}: {packed.size / 1e6:.1f} MB, {evidence['trials']} trials")
-    whole = sum(packed.parts.values())
-    shares = [f"{n} {100 * s / whole:.0f} %" for n, s in packed.parts.items() if s > whole / 100]
+    total = sum(packed.parts.values())
+    shares = [f"{n} {100 * s / total:.0f} %" for n, s in packed.parts.items() if s > total / 100]
     print("of which " + ", ".join(shares))
     for warning in evidence["warnings"]:
         print(warning)
@@ -89,11 +90,11 @@ def verify(
     """Check a bundle; with --challenge also replay a sample. Offline; nothing is unpacked."""
     import time
 
-    reference = _reach("reference:shipped")(world, parts)
-    begun = time.perf_counter()
-    valid = _reach("verify:verify")(bundle, reference, practice)
+    reference = _load("reference:shipped")(world, parts)
+    started = time.perf_counter()
+    valid = _load("verify:verify")(bundle, reference, practice)
     found: dict[str, Any] = {"valid": dict(valid.evidence)}
-    seconds = time.perf_counter() - begun
+    seconds = time.perf_counter() - started
     print(
         f"valid: {valid.evidence['trials']} trials of {valid.evidence['variants']} variants; "
         "structure, hashes, chain, seeds, records, actions, scores and tables hold "
@@ -103,11 +104,11 @@ def verify(
         print(warning)
     holds = True
     if challenge is not None:
-        made = _replayed(valid, challenge, fraction, workers, reference)
-        found["replayed"] = made.to_json()
-        holds = made.holds
-        badge = "replayed" if made.exact else "replayed, outcomes only" if holds else "NOT REPLAYED"
-        print(f"{badge}: " + " ".join(made.sentences()))
+        replayed = _replay(valid, challenge, fraction, workers, reference)
+        found["replayed"] = replayed.to_json()
+        holds = replayed.holds
+        exact = "replayed" if replayed.exact else "replayed, outcomes only"
+        print(f"{exact if holds else 'NOT REPLAYED'}: " + " ".join(replayed.sentences()))
     print(f"bundle {valid.manifest['bundle']}")
     if evidence is not None:
         _write(evidence, found)
@@ -128,10 +129,10 @@ def block(
     from robospa.harness.selection import parse_levels, parse_tasks
 
     variants = [(task, level) for task in parse_tasks(tasks) for level in parse_levels(levels)]
-    made = _reach("hidden_seeds:draw_block")(variants, trials, workers or cores(), note=print)
-    _reach("hidden_seeds:write_block")(made, out)
+    drawn = _load("hidden_seeds:draw_block")(variants, trials, workers or cores(), note=print)
+    _load("hidden_seeds:write_block")(drawn, out)
     print(f"Keep {out} secret until the trials begin. Publish now:")
-    print(f"commitment {made.commitment}")
+    print(f"commitment {drawn.commitment}")
 
 
 @submit.command()
@@ -162,10 +163,10 @@ def reproduce(
     from robospa.harness.settings import EvaluationSettings, updated
     from robospa.results.records.run_io import read_run
 
-    reference = _reach("reference:shipped")(world, parts)
-    valid = _reach("verify:verify")(bundle, reference, practice)
-    seeds = _reach("hidden_seeds:read_block")(block, commitment)
-    keys = _reach("reproduce:hidden_keys")(valid, seeds, reference)
+    reference = _load("reference:shipped")(world, parts)
+    valid = _load("verify:verify")(bundle, reference, practice)
+    seeds = _load("hidden_seeds:read_block")(block, commitment)
+    keys = _load("reproduce:hidden_keys")(valid, seeds, reference)
     run_seed = valid.run.manifest["settings"]["run_seed"]
     asked = {"policy": policy, "out": out, "workers": workers, "run_seed": run_seed}
     request = make_request(
@@ -175,33 +176,33 @@ def reproduce(
         keys=keys,
         arguments={"command": "submit reproduce", "commitment": commitment},
     )
-    _reach("reproduce:check_policy")(valid, request)
+    _load("reproduce:check_policy")(valid, request)
     evaluate(request)
-    made = _reach("reproduce:compare")(valid, read_run(out), keys, seeds, alpha)
-    badge = "reproduced" if made.holds else "NOT REPRODUCED"
-    print(f"{badge}: " + " ".join(made.sentences()))
+    compared = _load("reproduce:compare")(valid, read_run(out), keys, seeds, alpha)
+    verdict = "reproduced" if compared.holds else "NOT REPRODUCED"
+    print(f"{verdict}: " + " ".join(compared.sentences()))
     if evidence is not None:
-        _write(evidence, {"reproduced": made.to_json()})
-    if not made.holds:
+        _write(evidence, {"reproduced": compared.to_json()})
+    if not compared.holds:
         raise typer.Exit(1)
 
 
-def _replayed(valid: Any, challenge: str, fraction: float, workers: int, reference: Any) -> Any:
-    """The replayed sample, with a bar while it is made."""
+def _replay(valid: Any, challenge: str, fraction: float, workers: int, reference: Any) -> Any:
+    """Replay a sample of the trials, with a progress bar."""
     from robospa.harness.running.autoscaling import cores
     from robospa.harness.running.progress import Progress
 
-    count = _reach("sampling:sample_size")(fraction, len(valid.keys))
+    count = _load("sampling:sample_size")(fraction, len(valid.keys))
     with Progress(count) as progress:
 
         def show(trial: Any) -> None:
             if trial.kind == "different":
-                why = trial.trouble or "other " + ", ".join(trial.differs)
-                progress.note(f"{trial.key.slug}: {why}")
+                reason = trial.trouble or "other " + ", ".join(trial.differs)
+                progress.note(f"{trial.key.slug}: {reason}")
             progress.add(trial.record or valid.run.records[trial.key])
             progress.show()
 
-        return _reach("replay:replay")(valid, challenge, count, reference, workers or cores(), show)
+        return _load("replay:replay")(valid, challenge, count, reference, workers or cores(), show)
 
 
 def _write(path: Path, found: dict[str, Any]) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import fields
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-    from robospa.tasks.scene import Scene
+    from robospa.tasks.scene import Scene, SceneObject
     from robospa.tasks.task import Task
 
 GALLERY = Path("gallery.jpg")
@@ -142,7 +142,7 @@ def describe_skill(skill: object) -> str:
     return ", ".join([head, *rest])
 
 
-def _plain(value: Any) -> str:
+def _plain(value: object) -> str:
     """Numbers shortened, everything else as it is."""
     if isinstance(value, float):
         return f"{value:.4g}"
@@ -185,7 +185,7 @@ def _describe(console: Console, scene: Scene, splits: tuple[str, ...]) -> None:
     console.print(table)
 
 
-def _object_line(item: Any) -> str:
+def _object_line(item: SceneObject) -> str:
     late = "" if item.appears_at is None else f", appears at {item.appears_at:g} s"
     fixed = ", fixed" if item.fixed else ""
     return f"{item.name}: {item.asset} at {_plain(item.pose.position)}{fixed}{late}"
