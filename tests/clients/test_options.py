@@ -1,21 +1,14 @@
-"""Options from URLs and files, texts counted from below, rotations both ways."""
+"""Options from URLs and files, and the page that lists them."""
 
 from __future__ import annotations
 
 import re
 from pathlib import Path
 
-import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from robospa.action_space import ActionSpace
 from robospa.clients import check_options, find_endpoint
-from robospa.clients.chunks import as_chunk, invert_grippers
 from robospa.clients.dialect import Dialect, dialects
-from robospa.clients.ee6d import LAYOUTS, ORDERS, decode_rotation, encode_rotation
-from robospa.clients.token_budget import budget_warning, least_tokens
 from robospa.protocol.options import option_table, plain_options, read_options, url_options
 
 DIALECTS = dialects()
@@ -80,57 +73,6 @@ def test_none_and_flags_and_numbers_from_a_url() -> None:
     assert url_options("execute=none&ctrl_freq=12.5") == {"execute": "none", "ctrl_freq": "12.5"}
     check_options("go1+http://h?execute=none&ctrl_freq=12.5")
     check_options("xvla+http://h?text_budget=none")
-
-
-@pytest.mark.parametrize(
-    ("text", "count"),
-    [("", 2), ("pick", 3), ("pick the red, small block.", 9), ("3 blocks (left)", 7)],
-)
-def test_tokens_are_counted_from_below(text: str, count: int) -> None:
-    assert least_tokens(text) == count
-
-
-def test_a_budget_is_warned_about_only_when_it_is_broken() -> None:
-    assert budget_warning(None, {"A": "word " * 500}) is None
-    assert budget_warning(50, {"A": "word " * 48}) is None
-    warning = budget_warning(50, {"A": "word " * 49, "B": "word", "C": "word " * 70})
-    assert warning is not None
-    assert "2 of 3 tasks" in warning and "C: at least 72" in warning
-
-
-quaternions = st.lists(st.floats(-1, 1), min_size=4, max_size=4).filter(
-    lambda q: np.linalg.norm(q) > 0.1
-)
-
-
-@pytest.mark.parametrize("order", ORDERS)
-@pytest.mark.parametrize("layout", LAYOUTS)
-@given(values=quaternions)
-def test_rotations_survive_both_ways(order: str, layout: str, values: list[float]) -> None:
-    unit = np.array(values) / np.linalg.norm(values)
-    back = decode_rotation(encode_rotation(unit, order, layout), order, layout)
-    assert min(np.abs(back - unit).max(), np.abs(back + unit).max()) < 1e-6
-
-
-def test_six_numbers_of_no_rotation_are_not_finite() -> None:
-    assert not np.isfinite(decode_rotation(np.zeros(6), "wxyz", "interleaved")).all()
-    assert not np.isfinite(decode_rotation(np.ones(6), "wxyz", "columns")).all()
-
-
-@pytest.mark.parametrize(
-    "value", [None, "x", {}, [[1], [2, 3]], [["a"]], [[10**400]], [["1.5"]], [[True]]]
-)
-def test_what_is_no_chunk_stays_what_it_is(value: object) -> None:
-    found = as_chunk(value)
-    assert found is value
-
-
-def test_grippers_are_turned_and_nothing_else() -> None:
-    chunk = np.arange(28, dtype=np.float32).reshape(2, 14)
-    change = invert_grippers(chunk, ActionSpace("joint")) - chunk
-    assert np.flatnonzero(change.any(axis=0)).tolist() == [6, 13]
-    wrong = np.zeros((1, 3), np.float32)
-    assert invert_grippers(wrong, ActionSpace("joint")) is wrong
 
 
 # ---------------------------------------------------------------- the page of options
