@@ -24,7 +24,7 @@ from robospa.harness.skills.pick import pick
 from robospa.harness.skills.place import holder
 from robospa.harness.skills.press import press
 from robospa.harness.skills.workspace import Steps, Workspace
-from robospa.protocol.policy import Observation
+from robospa.observation import Observation
 from robospa.tasks.catalog import task as find_task
 from robospa.tasks.plan import Home, Pick, Press, Skill, Wait
 from robospa.tasks.scene import Scene

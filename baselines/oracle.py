@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.harness.skills import Expert
-from robospa.protocol.policy import Observation, PolicySpec, TrialInfo
+from robospa.observation import Observation
+from robospa.protocol.policy import PolicySpec, TrialInfo
 from robospa.registry import ROBOTS, names
 from robospa.tasks.catalog import build_scene
 from robospa.tasks.scene import Scene

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.action_space import equal_arms
-from robospa.protocol.policy import Observation, PolicySpec, TrialInfo
+from robospa.observation import Observation
+from robospa.protocol.policy import PolicySpec, TrialInfo
 
 CHUNK = 10
 STRIDE = 0.15

@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.protocol.policy import Observation, PolicySpec, TrialInfo
+from robospa.observation import Observation
+from robospa.protocol.policy import PolicySpec, TrialInfo
 
 CHUNK = 100
 

@@ -28,7 +28,8 @@ from robospa.clients import connect
 from robospa.geometry import Pose
 from robospa.harness.trial import TrialParts, run_trial
 from robospa.harness.world import Poll, StepResult
-from robospa.protocol.policy import CameraSpec, Policy, PolicySpec
+from robospa.observation import CameraSpec
+from robospa.protocol.policy import Policy, PolicySpec
 from robospa.tasks.events import Event
 from robospa.tasks.scene import Scene
 from robospa.tasks.snapshot import Contact, Snapshot

@@ -19,7 +19,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.protocol.policy import Observation, PolicySpec, TrialInfo
+from robospa.observation import Observation
+from robospa.protocol.policy import PolicySpec, TrialInfo
 
 Chunk = NDArray[np.float32]
 

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from robospa.harness.quantize import quantize
 from robospa.harness.world import ActionError, World
+from robospa.observation import Observation, View
 from robospa.protocol.errors import PolicyAnswerError
 from robospa.protocol.policy import Policy, PolicySpec, TrialInfo
 from robospa.protocol.validation import check_chunk
@@ -121,7 +122,7 @@ class _Run:
     latencies: list[float] = field(default_factory=list)
     server_timings: list[Mapping[str, float]] = field(default_factory=list)
     """For every answer, the times that the policy's server reported [ms]."""
-    past: dict[int, dict[str, Any]] = field(default_factory=dict)
+    past: dict[int, View] = field(default_factory=dict)
     """Views that history offsets may ask for, by the number of actions executed then."""
     physics_steps: int = 0
     physics_seconds: float = 0.0
@@ -153,11 +154,11 @@ class _Run:
         self.events.extend(new)
         self.event_steps.extend([len(self.actions)] * len(new))
 
-    def observation(self, spec: PolicySpec) -> dict[str, Any]:
+    def observation(self, spec: PolicySpec) -> Observation:
         """What the policy asked for, at this instant."""
         step = len(self.actions)
-        view = self.stopwatch.call("rendering", self.world.observe, spec)
-        observation = dict(view)
+        view: Observation = self.stopwatch.call("rendering", self.world.observe, spec)
+        observation = view.copy()
         observation["instruction"] = self.parts.instruction
         observation["step"] = step
         if spec.history:
@@ -209,8 +210,13 @@ class _Run:
         return bool(done.stopped)
 
 
-def _images_and_state(observation: Mapping[str, Any]) -> dict[str, Any]:
-    return {name: observation[name] for name in ("images", "state") if name in observation}
+def _images_and_state(observation: Observation) -> View:
+    view: View = {}
+    if "images" in observation:
+        view["images"] = observation["images"]
+    if "state" in observation:
+        view["state"] = observation["state"]
+    return view
 
 
 def _loop(run: _Run, limit: int) -> str:

@@ -12,7 +12,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.protocol.policy import CameraSpec, PolicySpec
+from robospa.observation import CameraSpec, Observation
+from robospa.protocol.policy import PolicySpec
 from robospa.tasks.scene import Scene
 from robospa.tasks.snapshot import Contact, Snapshot
 
@@ -63,8 +64,8 @@ class World(Protocol):
         """
         ...
 
-    def observe(self, spec: PolicySpec) -> dict[str, Any]:
-        """What `spec` asks for at this instant: see `robospa.protocol.policy`."""
+    def observe(self, spec: PolicySpec) -> Observation:
+        """What `spec` asks for at this instant: see `robospa.observation`."""
         ...
 
     def render(self, camera: CameraSpec) -> NDArray[np.uint8]:

@@ -17,8 +17,8 @@ import time
 from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass, field
 
+from robospa.observation import Observation
 from robospa.protocol.batch_window import AdaptiveBatchWindow
-from robospa.protocol.policy import Observation
 
 BatchCall = Callable[[Sequence[Observation], Sequence[int]], Awaitable[Sequence[object]]]
 Answer = tuple[object, dict[str, float]]

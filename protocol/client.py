@@ -14,11 +14,12 @@ import ssl as ssl_module
 import time
 from collections.abc import Callable, Mapping
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from robospa.observation import Observation
 from robospa.protocol.codec import DEFAULT_LIMITS, Limits
 from robospa.protocol.errors import (
     ConnectionLost,
@@ -47,7 +48,7 @@ from robospa.protocol.messages import (
     pack,
     unpack,
 )
-from robospa.protocol.policy import Observation, PolicySpec, TrialInfo
+from robospa.protocol.policy import PolicySpec, TrialInfo
 from robospa.protocol.sanitize import printable
 from robospa.protocol.transport import Address, Timeouts, Transport
 from robospa.protocol.validation import check_chunk, check_size, compare_specs
@@ -122,7 +123,8 @@ class RemotePolicy:
     def infer(self, observation: Observation) -> NDArray[np.float32]:
         """The action chunk, float32 (T, D), finite, 1 <= T <= spec.horizon."""
         if self.spec.image_codec == "jpeg":
-            observation = encode_images(observation)
+            # what is sent has bytes for images; nothing else looks at them
+            observation = cast("Observation", encode_images(observation))
         timeout = self.timeouts.infer if self._warm else self.timeouts.first_infer
         start = time.perf_counter()
         answer, timing = self._asked(observation, timeout)

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.action_space import ActionSpace
+from robospa.observation import Observation
 from robospa.protocol.client import RemotePolicy, connect
 from robospa.protocol.codec import DEFAULT_LIMITS, encode
 from robospa.protocol.errors import TransportError, WireError
@@ -129,22 +130,23 @@ def _run(name: str, function: Callable[[_Target], str], target: _Target) -> Chec
         return CheckResult(name, False, str(error) or type(error).__name__)
 
 
-def synthetic_observation(spec: PolicySpec, step: int = 0, seed: int = 0) -> dict[str, Any]:
+def synthetic_observation(spec: PolicySpec, step: int = 0, seed: int = 0) -> Observation:
     """An observation of the form that `spec` asks for, filled with reproducible noise."""
     rng = np.random.default_rng(seed)
     width = spec.action_dim if spec.action == "joint" else None
     width = width or ActionSpace("joint").width
 
-    def view() -> dict[str, Any]:
+    def view() -> Observation:
         images = {
             c.name: rng.integers(0, 256, (c.height, c.width, 3), np.uint8) for c in spec.cameras
         }
-        seen: dict[str, Any] = {"images": images, "ee": np.tile(POSE, (2, 1))}
+        seen: Observation = {"images": images, "ee": np.tile(POSE, (2, 1))}
         if spec.state != "none":
             seen["state"] = np.zeros(width, np.float32)
         return seen
 
-    observation = {**view(), "instruction": TRIAL.instruction, "step": step}
+    observation = view()
+    observation["instruction"], observation["step"] = TRIAL.instruction, step
     if spec.history:
         observation["history"] = {offset: view() for offset in spec.history}
     if spec.privileged:

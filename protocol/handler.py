@@ -107,11 +107,11 @@ class ConnectionHandler:
     async def _infer(self, request: Infer) -> Message:
         if not self._in_trial:
             return Error(request.id, NO_TRIAL, "infer needs a successful reset first", True)
-        observation: Any = request.observation
+        received = request.observation
         try:
             if self.spec.image_codec == "jpeg":
-                observation = await asyncio.to_thread(decode_images, observation, self.limits)
-            check_observation(observation, self.spec)
+                received = await asyncio.to_thread(decode_images, received, self.limits)
+            observation = check_observation(received, self.spec)
         except DecodeError as error:
             return Error(request.id, BAD_OBSERVATION, str(error))
         answer, timing = await self.policy.infer(observation)
@@ -147,8 +147,8 @@ class ConnectionHandler:
             try:
                 if isinstance(data, str):
                     raise DecodeError("an observation must be a binary frame")
-                observation = from_openpi(decode(data, self.limits), step)
-                check_observation(observation, self.spec)
+                received = from_openpi(decode(data, self.limits), step)
+                observation = check_observation(received, self.spec)
                 if observation["instruction"] != prompt:
                     prompt, step = observation["instruction"], 0
                     observation["step"] = 0

@@ -7,7 +7,7 @@ image travels as binary data in the place of the array.
 from __future__ import annotations
 
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from robospa.protocol.codec import DEFAULT_LIMITS, Limits
 from robospa.protocol.errors import DecodeError, EncodeError
-from robospa.protocol.policy import Observation
 
 QUALITY = 90
 
@@ -42,21 +41,23 @@ def decode_jpeg(data: bytes, limits: Limits = DEFAULT_LIMITS) -> NDArray[np.uint
         raise DecodeError(f"an image is no JPEG: {error}") from error
 
 
-def encode_images(observation: Observation) -> dict[str, Any]:
+def encode_images(observation: Mapping[str, Any]) -> dict[str, Any]:
     """The observation with every image as JPEG; nothing else is touched."""
     return _map_images(
         observation, lambda image: encode_jpeg(image) if isinstance(image, np.ndarray) else image
     )
 
 
-def decode_images(observation: Observation, limits: Limits = DEFAULT_LIMITS) -> dict[str, Any]:
+def decode_images(
+    observation: Mapping[str, Any], limits: Limits = DEFAULT_LIMITS
+) -> dict[str, Any]:
     """The observation with every JPEG as an array."""
     return _map_images(
         observation, lambda image: decode_jpeg(image, limits) if isinstance(image, bytes) else image
     )
 
 
-def _map_images(view: Observation, change: Callable[[Any], Any]) -> dict[str, Any]:
+def _map_images(view: Mapping[str, Any], change: Callable[[Any], Any]) -> dict[str, Any]:
     changed = dict(view)
     if isinstance(changed.get("images"), dict):
         changed["images"] = {name: change(image) for name, image in changed["images"].items()}

@@ -22,14 +22,7 @@ from numpy.typing import NDArray
 
 from robospa.protocol.codec import DEFAULT_LIMITS, Buffer, Limits, decode, encode
 from robospa.protocol.errors import DecodeError, VersionMismatch
-from robospa.protocol.policy import (
-    Observation,
-    PolicySpec,
-    TrialInfo,
-    Whole,
-    check_spec,
-    is_printable,
-)
+from robospa.protocol.policy import PolicySpec, TrialInfo, Whole, check_spec, is_printable
 from robospa.schema import describe, read
 
 VERSION = "1.0"
@@ -77,11 +70,11 @@ class Ready:
 
 @dataclass(frozen=True, eq=False)
 class Infer:
-    """An observation; see `robospa.protocol.policy` for its keys."""
+    """An observation that nobody has checked yet; see `robospa.observation` for its keys."""
 
     type: ClassVar[str] = "infer"
     id: RequestId
-    observation: Observation
+    observation: Mapping[str, Any]
 
 
 @dataclass(frozen=True, eq=False)

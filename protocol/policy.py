@@ -1,16 +1,7 @@
 """What a policy is: a spec, and three calls. In process or behind a server, it is the same.
 
-An observation is a plain dict of numpy arrays and scalars:
-
-    images      {camera: uint8 (height, width, 3) RGB} of exactly the cameras in the spec
-    state       float32 (D,): left arm joints [rad], left gripper 0..1, right arm, right gripper
-    ee          float32 (2, 8): per arm x y z [m], qw qx qy qz, gripper (world frame)
-    instruction str
-    step        int, number of actions executed so far in this trial
-    history     {offset: {"images": ..., "state": ...}} for the offsets in the spec
-    privileged  only if the spec asks: the exact state as JSON values
-
-An action chunk is float32 (T, D): T actions to execute one after the other.
+What a policy is shown is `robospa.observation`; an action chunk is float32 (T, D): T actions to
+execute one after the other.
 """
 
 from __future__ import annotations
@@ -24,30 +15,15 @@ from msgspec import Meta
 from numpy.typing import NDArray
 
 from robospa.action_space import KINDS, SEVEN_JOINT_ARMS, SIX_JOINT_ARMS, ActionSpace
+from robospa.observation import DEFAULT_CAMERAS, STATES, CameraSpec, Observation
 from robospa.protocol.errors import DecodeError
 from robospa.schema import Identifier, one_of, read
 
-CAMERAS = ("head", "left_wrist", "right_wrist", "front", "third")
-STATES = ("commanded", "measured", "none")
 CODECS = ("raw", "jpeg")
 
-Observation = Mapping[str, Any]
 Whole = Annotated[int, Meta(ge=0, le=2**63 - 1)]
 Seed = Annotated[int, Meta(ge=0)]  # up to 2^64 - 1: more does not fit into a message
-Pixels = Annotated[int, Meta(ge=1, le=8192)]
 Offset = Annotated[int, Meta(ge=-10_000, lt=0)]
-
-
-@dataclass(frozen=True)
-class CameraSpec:
-    """One wanted image; `width` and `height` [px]."""
-
-    name: Annotated[str, one_of(CAMERAS)]
-    width: Pixels = 320
-    height: Pixels = 240
-
-
-DEFAULT_CAMERAS = (CameraSpec("head"), CameraSpec("left_wrist"), CameraSpec("right_wrist"))
 
 
 @dataclass(frozen=True)

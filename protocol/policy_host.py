@@ -23,9 +23,9 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol, TypeVar
 
+from robospa.observation import Observation
 from robospa.protocol.batching import Answer, Batcher
 from robospa.protocol.policy import (
-    Observation,
     Policy,
     SupportsBatches,
     SupportsClose,

@@ -5,14 +5,16 @@ The same functions run at both ends, so that a mistake is reported where it was 
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from robospa.observation import Observation
 from robospa.protocol.codec import Limits
 from robospa.protocol.errors import DecodeError, HandshakeError, PolicyAnswerError
-from robospa.protocol.policy import Observation, PolicySpec
+from robospa.protocol.policy import PolicySpec
 
 
 def check_chunk(answer: Any, spec: PolicySpec) -> NDArray[np.float32]:
@@ -41,8 +43,11 @@ def check_chunk(answer: Any, spec: PolicySpec) -> NDArray[np.float32]:
     return chunk
 
 
-def check_observation(observation: Observation, spec: PolicySpec) -> None:
-    """Raises DecodeError if `observation` (images decoded) lacks what `spec` asks for."""
+def check_observation(observation: Mapping[str, Any], spec: PolicySpec) -> Observation:
+    """`observation` (images decoded) itself, typed.
+
+    Raises DecodeError if it lacks what `spec` asks for.
+    """
     _check_view("observation", observation, spec)
     if not isinstance(observation.get("instruction"), str):
         raise DecodeError("observation: 'instruction' must be text")
@@ -53,6 +58,7 @@ def check_observation(observation: Observation, spec: PolicySpec) -> None:
         _check_view(f"history {offset}", history[offset], spec)
     if spec.privileged and not isinstance(observation.get("privileged"), dict):
         raise DecodeError("observation lacks the privileged state that the spec asks for")
+    return cast("Observation", observation)
 
 
 def _check_view(what: str, view: Any, spec: PolicySpec) -> None:

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from robospa.geometry import Pose as Pose
     from robospa.harness.running.api import evaluate as evaluate
     from robospa.harness.settings import EvaluationSettings as EvaluationSettings
-    from robospa.protocol.policy import CameraSpec as CameraSpec
-    from robospa.protocol.policy import Observation as Observation
+    from robospa.observation import CameraSpec as CameraSpec
+    from robospa.observation import Observation as Observation
     from robospa.protocol.policy import Policy as Policy
     from robospa.protocol.policy import PolicySpec as PolicySpec
     from robospa.protocol.policy import TrialInfo as TrialInfo
@@ -33,9 +33,9 @@ if TYPE_CHECKING:
     from robospa.trial import TrialKey as TrialKey
 
 _HOMES = {
-    "CameraSpec": "robospa.protocol.policy:CameraSpec",
+    "CameraSpec": "robospa.observation:CameraSpec",
     "EvaluationSettings": "robospa.harness.settings:EvaluationSettings",
-    "Observation": "robospa.protocol.policy:Observation",
+    "Observation": "robospa.observation:Observation",
     "Policy": "robospa.protocol.policy:Policy",
     "PolicySpec": "robospa.protocol.policy:PolicySpec",
     "Pose": "robospa.geometry:Pose",

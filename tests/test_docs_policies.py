@@ -17,14 +17,15 @@ import numpy as np
 import pytest
 import typer
 
+from robospa.action_space import ActionSpace
 from robospa.clients import check_options
 from robospa.harness.cli.main import COMMANDS, NAMES
 from robospa.harness.cli.serve import options_class
 from robospa.harness.convention_check.episodes import Episode, write_episode
 from robospa.harness.factory import load_function
 from robospa.harness.selection import parse_tasks
+from robospa.observation import CAMERAS
 from robospa.protocol.options import option_table, read_options, url_options
-from robospa.protocol.policy import CAMERAS
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
@@ -162,7 +163,8 @@ def test_the_converter_gives_lerobot_what_it_wants(
 ) -> None:
     commanded = np.arange(3 * 14, dtype=float).reshape(3, 14)
     black = [np.zeros((240, 320, 3), np.uint8)] * 3
-    made = Episode("e", commanded, np.zeros((3, 2, 8)), dict.fromkeys(CAMERAS[:3], black), "Go.")
+    frames = dict.fromkeys(CAMERAS[:3], black)
+    made = Episode("e", commanded, np.zeros((3, 2, 8)), frames, ActionSpace("joint"), "Go.")
     for i in range(2):
         write_episode(tmp_path / "data" / f"episode{i}.hdf5", made)
     module = types.ModuleType("lerobot.datasets.lerobot_dataset")

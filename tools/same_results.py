@@ -112,8 +112,9 @@ def write_scenes(folder: Path) -> None:
 
 def write_wire(folder: Path) -> None:
     """One line per kind of message: a hash of its bytes."""
+    from robospa.observation import CameraSpec
     from robospa.protocol import messages
-    from robospa.protocol.policy import CameraSpec, PolicySpec, TrialInfo
+    from robospa.protocol.policy import PolicySpec, TrialInfo
 
     spec = PolicySpec("name", (CameraSpec("head", 64, 48),), history=(-1, -5), execute=3)
     trial = TrialInfo("T", 3, 7, "aloha-agilex", "clean", "heldout", "do it", 11, {"a": 1})

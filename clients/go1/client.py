@@ -18,9 +18,10 @@ from robospa.clients.go1.conventions import Go1Conventions
 from robospa.clients.http import JsonServer
 from robospa.clients.numpy_json import chunk_of, dumps
 from robospa.clients.probe import Probe
+from robospa.observation import Observation
 from robospa.protocol.errors import ServerError
 from robospa.protocol.options import option, plain_options
-from robospa.protocol.policy import Observation, PolicySpec, TrialInfo
+from robospa.protocol.policy import PolicySpec, TrialInfo
 
 WARNINGS = (
     "the control frequency that the model was trained with is invisible on the wire: `ctrl_freq` "

@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 
 from robospa.clients.chunks import check_horizon
+from robospa.observation import Observation
 from robospa.protocol.options import option
-from robospa.protocol.policy import Observation
 
 
 @dataclass(frozen=True)

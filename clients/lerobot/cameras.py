@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from robospa.protocol.policy import CAMERAS
+from robospa.observation import CAMERAS
 
 CAMERA_WORDS = {
     "head": ("head", "high", "top"),

@@ -33,8 +33,9 @@ from robospa.clients.model_policy import (
 )
 from robospa.clients.seeded_noise import NotByRow, seeded_rows
 from robospa.clients.state_encoding import SPACES, StateEncoding
+from robospa.observation import CameraSpec
 from robospa.protocol.options import option
-from robospa.protocol.policy import CameraSpec, PolicySpec
+from robospa.protocol.policy import PolicySpec
 
 
 @dataclass(frozen=True)

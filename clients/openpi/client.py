@@ -17,11 +17,12 @@ from robospa.clients.dialect import ConnectionParams, Dialect
 from robospa.clients.openpi.conventions import to_openpi
 from robospa.clients.probe import Probe
 from robospa.clients.token_budget import check_budget
+from robospa.observation import CameraSpec, Observation
 from robospa.protocol.codec import Limits, decode, encode
 from robospa.protocol.errors import DecodeError, ProtocolViolation, ServerError
 from robospa.protocol.openpi import CAMERA_NAMES
 from robospa.protocol.options import option, plain_options
-from robospa.protocol.policy import CameraSpec, Observation, PolicySpec, TrialInfo
+from robospa.protocol.policy import PolicySpec, TrialInfo
 from robospa.protocol.sanitize import json_values
 from robospa.protocol.transport import Timeouts, Transport
 

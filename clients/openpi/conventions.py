@@ -18,8 +18,8 @@ from typing import Any
 
 import numpy as np
 
+from robospa.observation import Observation
 from robospa.protocol.errors import EncodeError
-from robospa.protocol.policy import Observation
 
 
 def to_openpi(

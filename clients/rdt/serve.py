@@ -33,8 +33,9 @@ from robospa.clients.model_policy import (
 )
 from robospa.clients.rdt.t5 import Embeddings
 from robospa.clients.seeded_noise import seeded_rows
+from robospa.observation import Observation
 from robospa.protocol.options import option
-from robospa.protocol.policy import Observation, PolicySpec, TrialInfo
+from robospa.protocol.policy import PolicySpec, TrialInfo
 
 VIEWS = ("head", "right_wrist", "left_wrist")
 """Our cameras in the order of the model's images."""

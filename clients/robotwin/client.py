@@ -23,6 +23,7 @@ from robospa.clients.detect import explain_error
 from robospa.clients.dialect import ConnectionParams, Dialect
 from robospa.clients.probe import Probe
 from robospa.clients.robotwin.framing import FramedJson
+from robospa.observation import Observation
 from robospa.protocol.errors import (
     CallTimeout,
     ConnectionLost,
@@ -30,7 +31,7 @@ from robospa.protocol.errors import (
     ServerError,
 )
 from robospa.protocol.options import option, plain_options
-from robospa.protocol.policy import Observation, PolicySpec, TrialInfo
+from robospa.protocol.policy import PolicySpec, TrialInfo
 
 CAMERAS = {"head": "head_camera", "left_wrist": "left_camera", "right_wrist": "right_camera"}
 DP_CAMERAS = {"head": "head_cam", "left_wrist": "left_cam", "right_wrist": "right_cam"}

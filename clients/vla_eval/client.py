@@ -28,9 +28,10 @@ from robospa.clients.dialect import ConnectionParams, Dialect
 from robospa.clients.msgpack_socket import MsgpackSocket
 from robospa.clients.numpy_msgpack import text_form
 from robospa.clients.probe import Probe
+from robospa.observation import CameraSpec, Observation
 from robospa.protocol.errors import HandshakeError, ServerError
 from robospa.protocol.options import option, plain_options
-from robospa.protocol.policy import CameraSpec, Observation, PolicySpec, TrialInfo
+from robospa.protocol.policy import PolicySpec, TrialInfo
 from robospa.protocol.sanitize import json_values, printable
 
 CAMERAS = {"head": "head_camera", "left_wrist": "left_camera", "right_wrist": "right_camera"}

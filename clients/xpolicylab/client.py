@@ -30,9 +30,10 @@ from robospa.clients.dialect import ConnectionParams, Dialect
 from robospa.clients.msgpack_socket import MsgpackSocket
 from robospa.clients.numpy_msgpack import binary_form
 from robospa.clients.probe import Probe
+from robospa.observation import Observation
 from robospa.protocol.errors import PolicyAnswerError, ServerError
 from robospa.protocol.options import option, plain_options
-from robospa.protocol.policy import Observation, PolicySpec, TrialInfo
+from robospa.protocol.policy import PolicySpec, TrialInfo
 from robospa.protocol.sanitize import printable
 from robospa.rotations import quaternion_to_matrix
 

@@ -33,9 +33,10 @@ from robospa.clients.numpy_json import chunk_of, dumps
 from robospa.clients.probe import Probe
 from robospa.clients.token_budget import check_budget
 from robospa.clients.xvla.conventions import XvlaConventions
+from robospa.observation import CameraSpec, Observation
 from robospa.protocol.errors import PolicyAnswerError, ProtocolViolation, ServerError
 from robospa.protocol.options import option, plain_options
-from robospa.protocol.policy import CameraSpec, Observation, PolicySpec, TrialInfo
+from robospa.protocol.policy import PolicySpec, TrialInfo
 
 WARNINGS = (
     "whether a checkpoint was trained with red and blue swapped is invisible on the wire: if it "

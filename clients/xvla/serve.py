@@ -28,8 +28,9 @@ from robospa.clients.model_policy import (
 from robospa.clients.seeded_noise import seeded_rows
 from robospa.clients.state_encoding import StateEncoding
 from robospa.clients.xvla.conventions import XvlaConventions
+from robospa.observation import CameraSpec
 from robospa.protocol.options import option
-from robospa.protocol.policy import CameraSpec, PolicySpec
+from robospa.protocol.policy import PolicySpec
 
 CHECKOUT = "a checkout of X-VLA"
 

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from robospa.clients.model_policy import Chunk, ModelPolicy, Query
+from robospa.observation import CameraSpec
 from robospa.protocol.options import option
-from robospa.protocol.policy import CameraSpec, PolicySpec
+from robospa.protocol.policy import PolicySpec
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ import numpy as np
 from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
 from robospa.harness.convention_check.episodes import read_episode
-from robospa.protocol.policy import CameraSpec
+from robospa.observation import CameraSpec
 
 CAMERAS = [CameraSpec("head"), CameraSpec("left_wrist"), CameraSpec("right_wrist")]
 JOINTS = [f"{arm}_{j}" for arm in ("left", "right") for j in (*range(1, 7), "gripper")]

@@ -40,7 +40,7 @@ def tasks(
     """List the tasks; describe and draw one scene; or draw tasks at all levels on one sheet."""
     from rich.console import Console
 
-    from robospa.protocol.policy import CAMERAS
+    from robospa.observation import CAMERAS
 
     console = Console()
     if camera not in CAMERAS:

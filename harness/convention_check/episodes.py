@@ -30,9 +30,10 @@ from numpy.typing import NDArray
 from robospa.action_space import ARMS, POSE, SEVEN_JOINT_ARMS, SIX_JOINT_ARMS, ActionSpace
 from robospa.harness.running.atomic_file import replace_file
 from robospa.harness.world import World
+from robospa.observation import CameraSpec, Observation
 from robospa.protocol.errors import DecodeError
 from robospa.protocol.images import decode_jpeg
-from robospa.protocol.policy import CameraSpec, PolicySpec
+from robospa.protocol.policy import PolicySpec
 
 Array = NDArray[np.float64]
 Picture = NDArray[np.uint8]
@@ -102,9 +103,9 @@ class Episode:
             frame = np.asarray(small.resize((camera.width, camera.height)))
         return np.ascontiguousarray(frame)
 
-    def observation(self, spec: PolicySpec, t: int) -> dict[str, Any]:
+    def observation(self, spec: PolicySpec, t: int) -> Observation:
         """What a policy with `spec` is shown at frame `t`; `step` is t. Raises EpisodeError."""
-        seen: dict[str, Any] = self._view(spec, t)
+        seen = self._view(spec, t)
         seen["instruction"], seen["step"] = self.instruction, t
         if spec.history:
             seen["history"] = {
@@ -112,8 +113,8 @@ class Episode:
             }
         return seen
 
-    def _view(self, spec: PolicySpec, t: int) -> dict[str, Any]:
-        view: dict[str, Any] = {
+    def _view(self, spec: PolicySpec, t: int) -> Observation:
+        view: Observation = {
             "images": {camera.name: self.picture(camera, t) for camera in spec.cameras},
             "ee": self.ee[t].astype(np.float32),
         }

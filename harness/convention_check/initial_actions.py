@@ -10,7 +10,6 @@ in front of noise.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -20,6 +19,7 @@ from robospa.harness.convention_check.check import judge
 from robospa.harness.convention_check.samples import Sample
 from robospa.harness.robots import embodiment
 from robospa.harness.robots.kinematics import chain_of, end_effector
+from robospa.observation import Observation
 from robospa.protocol.conformance import TRIAL, synthetic_observation
 from robospa.protocol.policy import Policy, PolicySpec
 from robospa.trial import REFERENCE
@@ -35,7 +35,7 @@ GAIN = 0.8
 """Share of the jump that undoing a mistake must take away for it to be named."""
 
 
-def postures(spec: PolicySpec, count: int = POSTURES) -> list[dict[str, Any]]:
+def postures(spec: PolicySpec, count: int = POSTURES) -> list[Observation]:
     """Observations of the form of `spec`: noise, and postures that no mistake leaves the same."""
     rng = np.random.default_rng(5)
     robot = embodiment(REFERENCE)
@@ -54,7 +54,9 @@ def postures(spec: PolicySpec, count: int = POSTURES) -> list[dict[str, Any]]:
             state = [v for q, g in zip(rows, grips, strict=True) for v in (*q, g)]
             observation["state"] = np.array(state, np.float32)
         for view in observation.get("history", {}).values():
-            view.update({k: observation[k] for k in ("ee", "state") if k in observation})
+            view["ee"] = observation["ee"]
+            if "state" in observation:
+                view["state"] = observation["state"]
         seen.append(observation)
     return seen
 
@@ -76,7 +78,7 @@ def hints(policy: Policy) -> tuple[list[str], str]:
     return odd(cases, spec.action)
 
 
-def _case(policy: Policy, seen: dict[str, Any]) -> Sample | None:
+def _case(policy: Policy, seen: Observation) -> Sample | None:
     kind = policy.spec.action
     space = embodiment(REFERENCE).action_space("joint" if kind == "joint" else "ee")
     policy.reset(TRIAL)

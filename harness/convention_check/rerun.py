@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from robospa.harness.trial import Recorder, TrialParts, run_trial, task_parts
 from robospa.harness.world import World
+from robospa.observation import Observation
 from robospa.protocol.errors import PolicyAnswerError
-from robospa.protocol.policy import Observation, PolicySpec, TrialInfo
+from robospa.protocol.policy import PolicySpec, TrialInfo
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.harness.world import SceneUnstable, World
-from robospa.protocol.policy import CameraSpec
+from robospa.observation import CameraSpec
 from robospa.tasks.catalog import build_scene
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Task

@@ -214,7 +214,7 @@ def draw(chosen: Iterable[Task], folder: Path) -> int:
 
     from robospa.harness.pictures.gallery import settled_scene
     from robospa.harness.sim.sapien_world import SapienWorld
-    from robospa.protocol.policy import CameraSpec
+    from robospa.observation import CameraSpec
 
     folder.mkdir(parents=True, exist_ok=True)
     world = SapienWorld()

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from robospa.harness.running.atomic_file import replace_file
 from robospa.harness.running.record_store import VIDEOS
 from robospa.harness.world import World
-from robospa.protocol.policy import CameraSpec
+from robospa.observation import CameraSpec
 from robospa.trial import TrialKey
 
 FPS = 10

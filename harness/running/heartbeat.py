@@ -17,7 +17,8 @@ from typing import Any
 
 from robospa.harness.factory import is_url
 from robospa.harness.running.messages import Activity, Heartbeat
-from robospa.protocol.policy import Observation, PolicySpec, TrialInfo
+from robospa.observation import Observation
+from robospa.protocol.policy import PolicySpec, TrialInfo
 
 HEARTBEAT_SECONDS = 1.0
 

@@ -21,7 +21,7 @@ from robospa.harness.robots.embodiment import Embodiment
 from robospa.harness.sim import furniture
 from robospa.harness.sim.shaders import shader_folder
 from robospa.harness.world import RenderUnavailable
-from robospa.protocol.policy import CameraSpec
+from robospa.observation import CameraSpec
 from robospa.tasks.scene import Scene
 from robospa.tasks.shapes import Hinge, ObjectModel
 from robospa.tasks.snapshot import ARMS

@@ -22,7 +22,8 @@ from robospa.harness.sim.motion import RATE, Trajectory, fixed_rate, rest_to_res
 from robospa.harness.sim.physics import Physics
 from robospa.harness.sim.settling import settle
 from robospa.harness.world import Poll, RenderUnavailable, SceneUnstable, StepResult
-from robospa.protocol.policy import CameraSpec, PolicySpec
+from robospa.observation import CameraSpec, Observation
+from robospa.protocol.policy import PolicySpec
 from robospa.tasks.scene import Scene
 from robospa.tasks.shapes import ObjectModel
 from robospa.tasks.snapshot import Contact, Snapshot, snapshot_to_json
@@ -206,15 +207,15 @@ class SapienWorld:
             raise RuntimeError("a poll's contacts were asked for after the world moved on")
         return self._loaded().contacts() if self._contacts else ()
 
-    def observe(self, spec: PolicySpec) -> dict[str, Any]:
-        """Images, state and poses that `spec` asks for; see `robospa.protocol.policy`.
+    def observe(self, spec: PolicySpec) -> Observation:
+        """Images, state and poses that `spec` asks for; see `robospa.observation`.
 
         `state` is left out if the spec wants none, `privileged` unless it wants it. The caller adds
         instruction, step and history.
         """
         snapshot = self.snapshot()
         images = self._pictures(spec.cameras)
-        out: dict[str, Any] = {
+        out: Observation = {
             "images": {c.name: image for c, image in zip(spec.cameras, images, strict=True)}
         }
         if spec.state != "none":

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from robospa.clients import connect
 from robospa.clients.dialect import dialects
-from robospa.protocol.policy import Observation, PolicySpec, TrialInfo
+from robospa.observation import Observation
+from robospa.protocol.policy import PolicySpec, TrialInfo
 from robospa.protocol.server import ServerThread
 
 

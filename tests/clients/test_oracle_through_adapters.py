@@ -20,7 +20,8 @@ from robospa.baselines.oracle import Oracle
 from robospa.clients import connect
 from robospa.harness.robots import embodiment
 from robospa.harness.robots.kinematics import chain_of, end_effector
-from robospa.protocol.policy import DEFAULT_CAMERAS, TrialInfo
+from robospa.observation import DEFAULT_CAMERAS
+from robospa.protocol.policy import TrialInfo
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 

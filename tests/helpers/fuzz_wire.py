@@ -31,6 +31,7 @@ from typing import Any
 import numpy as np
 
 from robospa.clients.openpi.conventions import to_openpi
+from robospa.observation import CameraSpec
 from robospa.protocol.codec import decode, encode
 from robospa.protocol.errors import DecodeError, PolicyAnswerError, VersionMismatch
 from robospa.protocol.messages import (
@@ -47,7 +48,7 @@ from robospa.protocol.messages import (
     read_message,
 )
 from robospa.protocol.openpi import CAMERA_NAMES, from_openpi
-from robospa.protocol.policy import CameraSpec, PolicySpec, TrialInfo
+from robospa.protocol.policy import PolicySpec, TrialInfo
 from robospa.protocol.validation import check_chunk, check_observation
 
 ROOM = 512 * 2**20

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from robospa.action_space import ActionSpace
 from robospa.geometry import axis_rotation
 from robospa.harness.convention_check.episodes import Episode
-from robospa.protocol.policy import CameraSpec, PolicySpec, TrialInfo
+from robospa.observation import CameraSpec
+from robospa.protocol.policy import PolicySpec, TrialInfo
 
 Array = NDArray[np.float64]
 Change = Callable[[Array, Array], Array]

@@ -21,7 +21,8 @@ from numpy.typing import NDArray
 from robospa.geometry import Pose
 from robospa.harness.trial import TrialParts
 from robospa.harness.world import ActionError, Poll, SceneUnstable, StepResult
-from robospa.protocol.policy import CameraSpec, PolicySpec, TrialInfo
+from robospa.observation import CameraSpec
+from robospa.protocol.policy import PolicySpec, TrialInfo
 from robospa.tasks.events import Event
 from robospa.tasks.scene import Scene
 from robospa.tasks.snapshot import Contact, Snapshot

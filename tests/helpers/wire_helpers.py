@@ -14,8 +14,9 @@ from websockets.sync.client import connect as open_websocket
 from websockets.sync.server import serve
 from websockets.typing import Subprotocol
 
+from robospa.observation import CameraSpec, Observation
 from robospa.protocol.messages import SUBPROTOCOL, Hello, Message, pack, unpack
-from robospa.protocol.policy import CameraSpec, Observation, PolicySpec, TrialInfo
+from robospa.protocol.policy import PolicySpec, TrialInfo
 from robospa.protocol.transport import Address, Timeouts, Transport
 
 CAMERA = CameraSpec("head", 8, 6)

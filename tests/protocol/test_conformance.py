@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 from wire_helpers import QUICK, SPEC, Recall, Scripted, answer
 
+from robospa.observation import CameraSpec
 from robospa.protocol.conformance import CHECKS, check, synthetic_observation
 from robospa.protocol.messages import Actions, Hello, Ready, pack
-from robospa.protocol.policy import CameraSpec, PolicySpec
+from robospa.protocol.policy import PolicySpec
 from robospa.protocol.validation import check_observation
 
 

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from wire_helpers import SPEC, TRIAL, observation
 
 from robospa.action_space import KINDS
+from robospa.observation import CAMERAS, STATES, CameraSpec
 from robospa.protocol.codec import encode
 from robospa.protocol.errors import DecodeError, PolicyAnswerError, VersionMismatch
 from robospa.protocol.messages import (
@@ -28,7 +29,7 @@ from robospa.protocol.messages import (
     pack,
     unpack,
 )
-from robospa.protocol.policy import CAMERAS, STATES, CameraSpec, PolicySpec, TrialInfo
+from robospa.protocol.policy import PolicySpec, TrialInfo
 from robospa.protocol.validation import check_chunk, check_observation, compare_specs
 
 IDS = st.integers(0, MAX_ID)

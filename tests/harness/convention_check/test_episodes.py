@@ -21,7 +21,8 @@ from robospa.harness.convention_check.episodes import (
     to_jpeg,
     write_episode,
 )
-from robospa.protocol.policy import CameraSpec, PolicySpec
+from robospa.observation import CameraSpec
+from robospa.protocol.policy import PolicySpec
 
 MADE = episode()
 

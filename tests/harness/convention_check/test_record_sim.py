@@ -13,7 +13,8 @@ from robospa.harness.cli.main import main
 from robospa.harness.convention_check.check import replay
 from robospa.harness.convention_check.episodes import Episode, read_episode
 from robospa.harness.factory import policy_names
-from robospa.protocol.policy import DEFAULT_CAMERAS, PolicySpec, TrialInfo
+from robospa.observation import DEFAULT_CAMERAS
+from robospa.protocol.policy import PolicySpec, TrialInfo
 
 pytestmark = [
     pytest.mark.sim,

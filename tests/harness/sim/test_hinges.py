@@ -11,7 +11,7 @@ from world_scenes import block, scene, two_blocks, wandering
 from robospa.geometry import Pose
 from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.harness.skills import Expert
-from robospa.protocol.policy import CameraSpec
+from robospa.observation import CameraSpec
 from robospa.tasks.objects import object_model
 from robospa.tasks.plan import Open
 from robospa.tasks.scene import Scene, SceneObject

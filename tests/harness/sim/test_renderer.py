@@ -17,7 +17,8 @@ from robospa.harness.robots import embodiment
 from robospa.harness.sim.renderer import camera_view, focal_length
 from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.harness.world import RenderUnavailable
-from robospa.protocol.policy import CAMERAS, CameraSpec, PolicySpec
+from robospa.observation import CAMERAS, CameraSpec
+from robospa.protocol.policy import PolicySpec
 from robospa.tasks.snapshot import Snapshot
 
 pytestmark = pytest.mark.sim
@@ -145,7 +146,7 @@ def test_info_names_device_and_driver(world: SapienWorld) -> None:
 def test_the_trimmed_shader_draws_the_same_pixels(tmp_path: Path) -> None:
     code = (
         "import sys, numpy as np; from world_scenes import *; "
-        "import robospa.harness.sim.renderer as c; from robospa.protocol.policy import CameraSpec; "
+        "import robospa.harness.sim.renderer as c; from robospa.observation import CameraSpec; "
         "from robospa.harness.sim.sapien_world import SapienWorld; "
         "c.shader_folder = c.shader_folder if sys.argv[1] == 'trimmed' else lambda: ''; "
         "w = SapienWorld(); w.load(two_blocks()); "
@@ -167,7 +168,7 @@ def test_the_trimmed_shader_draws_the_same_pixels(tmp_path: Path) -> None:
 def test_without_a_device_physics_runs_and_drawing_says_what_to_do() -> None:
     code = (
         "from world_scenes import *; from robospa.harness.sim.sapien_world import SapienWorld; "
-        "from robospa.protocol.policy import CameraSpec\n"
+        "from robospa.observation import CameraSpec\n"
         "w = SapienWorld(); w.load(two_blocks())\n"
         "w.step(joint_action(), 'joint', lambda s: False)\n"
         "try: w.render(CameraSpec('head'))\n"

@@ -12,7 +12,8 @@ from world_scenes import READY, block, joint_action, run_digest, scene, two_bloc
 
 from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.harness.world import ActionError, RenderUnavailable, SceneUnstable
-from robospa.protocol.policy import CameraSpec, PolicySpec
+from robospa.observation import CameraSpec
+from robospa.protocol.policy import PolicySpec
 from robospa.tasks.snapshot import Snapshot, snapshot_from_json
 from robospa.workcell import TABLE_TOP, workcell
 

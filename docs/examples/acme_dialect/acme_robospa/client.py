@@ -21,9 +21,10 @@ from robospa.clients.dialect import ConnectionParams, Dialect
 from robospa.clients.http import JsonServer
 from robospa.clients.numpy_json import dumps
 from robospa.clients.probe import Probe
+from robospa.observation import CameraSpec, Observation
 from robospa.protocol.errors import ProtocolViolation
 from robospa.protocol.options import option, plain_options
-from robospa.protocol.policy import CameraSpec, Observation, PolicySpec, TrialInfo
+from robospa.protocol.policy import PolicySpec, TrialInfo
 
 SCALE = np.where(np.isin(np.arange(14), [6, 13]), 100, 1).astype(np.float32)
 """Their numbers are ours times this."""
