@@ -153,7 +153,7 @@ class RoboTwinSession:
         for offset in self.spec.history:
             # Steps before the first one, and those sent with an earlier query, are left out.
             if now + offset > self._last_step and now + offset >= 0:
-                past = {**observation, **observation["history"][offset]}
+                past: Observation = {**observation, **observation["history"][offset]}
                 past.pop("ee", None)
                 self._call("update_obs", encode(past), timeout, until)
         self._last_step = now
