@@ -13,7 +13,7 @@ from __future__ import annotations
 import ssl as ssl_module
 import warnings
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib import metadata
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -41,6 +41,7 @@ class Dialect:
     recognise: whether a server speaks this dialect, by a few harmless questions that run no model.
     weak_sign: whether other servers may pass `recognise` too, so that it is asked after the others.
     also_reaches: schemes of other dialects whose servers this one gets on with.
+    deciding_options: for mistakes that `robospa check --demo` names, the option that decides them.
     """
 
     server: str
@@ -53,6 +54,7 @@ class Dialect:
     recognise: Callable[[Probe], bool] | None = None
     weak_sign: bool = False
     also_reaches: tuple[str, ...] = ()
+    deciding_options: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def schemes(self) -> tuple[str, ...]:

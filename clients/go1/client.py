@@ -101,4 +101,8 @@ DIALECT = Dialect(
     open_session=Go1Session,
     recognise=recognise,
     weak_sign=True,
+    deciding_options={
+        "wrist images swapped": "wrists",
+        "measured state": "state",
+    },
 )

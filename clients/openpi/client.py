@@ -190,6 +190,8 @@ def recognise(probe: Probe) -> bool:
     return True
 
 
+DECIDING_OPTIONS = {"measured state": "state"}
+
 DIALECT = Dialect(
     server="an openpi server",
     scheme="openpi",
@@ -199,4 +201,5 @@ DIALECT = Dialect(
     recognise=recognise,
     weak_sign=True,
     also_reaches=("ws",),  # our own server also answers an openpi client
+    deciding_options=DECIDING_OPTIONS,
 )

@@ -5,7 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from robospa.clients.dialect import ConnectionParams, Dialect
-from robospa.clients.openpi.client import OpenPiClientOptions, OpenPiSession
+from robospa.clients.openpi.client import (
+    DECIDING_OPTIONS,
+    OpenPiClientOptions,
+    OpenPiSession,
+)
 from robospa.clients.probe import Probe
 from robospa.protocol.client import WireClient, open_wire
 from robospa.protocol.transport import Transport
@@ -43,4 +47,5 @@ DIALECT = Dialect(
     open_session=open_session,
     recognise=recognise,
     also_reaches=("openpi",),
+    deciding_options=DECIDING_OPTIONS,
 )

@@ -206,4 +206,7 @@ DIALECT = Dialect(
     options=VlaEvalClientOptions,
     open_session=VlaEvalSession,
     recognise=recognise,
+    deciding_options={
+        "gripper inverted": "grippers",
+    },
 )

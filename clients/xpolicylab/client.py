@@ -246,4 +246,8 @@ DIALECT = Dialect(
     options=XPolicyLabClientOptions,
     open_session=XPolicyLabSession,
     recognise=recognise,
+    deciding_options={
+        "measured state": "state",
+        "gripper inverted": "grippers",
+    },
 )

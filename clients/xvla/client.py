@@ -219,4 +219,11 @@ DIALECT = Dialect(
     options=XvlaClientOptions,
     open_session=XvlaSession,
     recognise=recognise,
+    deciding_options={
+        "blue for red": "colors",
+        "quaternion x y z w": "quaternions",
+        "quaternion slip": "quaternions",
+        "quaternions of the state x y z w": "quaternions",
+        "gripper inverted": "joint_grippers",
+    },
 )

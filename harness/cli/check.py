@@ -9,7 +9,7 @@ failed, or if the replay names a mistake; hints, and a replay that does not fit,
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -31,21 +31,6 @@ if TYPE_CHECKING:
 MARKS = {True: "[green]ok[/]", False: "[red]FAILED[/]", None: "[dim]n/a[/]"}
 SHOWN = 6
 """Mistakes in the table of the replay, beside the policy as it is."""
-
-OPTIONS = {
-    ("go1", "wrist images swapped"): "wrists",
-    ("openpi", "measured state"): "state",
-    ("go1", "measured state"): "state",
-    ("xpolicylab", "measured state"): "state",
-    ("xvla", "blue for red"): "colors",
-    ("xvla", "quaternion x y z w"): "quaternions",
-    ("xvla", "quaternion slip"): "quaternions",
-    ("xvla", "quaternions of the state x y z w"): "quaternions",
-    ("xvla", "gripper inverted"): "joint_grippers",
-    ("xpolicylab", "gripper inverted"): "grippers",
-    ("vla-eval", "gripper inverted"): "grippers",
-}
-"""(dialect, mistake) -> the option of the dialect that decides it."""
 
 
 def check(
@@ -89,7 +74,7 @@ def check(
     if failed:
         console.print(f"{escape(url)} failed {len(failed)} of {len(results)} checks.", style="red")
         raise typer.Exit(1)
-    if episode is not None and not _replay(console, target.connect, episode, points):
+    if episode is not None and not _replay(console, target, episode, points):
         raise typer.Exit(1)
     console.print(f"{escape(url)} can be evaluated.", style="green")
 
@@ -102,6 +87,8 @@ class _Target:
     token: str | None
     timeouts: Timeouts
     connect: Connect
+    deciding_options: Mapping[str, str]
+    """Mistakes that a demonstration may show, to the option of the dialect that decides them."""
 
 
 def _target(url: str, token: str | None, timeouts: Timeouts, client: Path | None) -> _Target:
@@ -110,12 +97,12 @@ def _target(url: str, token: str | None, timeouts: Timeouts, client: Path | None
     from robospa.harness.running.request import client_options
 
     try:
-        find_endpoint(url)
+        dialect = find_endpoint(url).dialect
     except ValueError as error:
         raise typer.BadParameter(str(error)) from error
     options = client_options(url, client)
     connector = partial(connect, url, token, timeouts, options=options)
-    return _Target(url.partition("?")[0], token, timeouts, connector)
+    return _Target(url.partition("?")[0], token, timeouts, connector, dialect.deciding_options)
 
 
 def _episode(demo: Path, instruction: str | None) -> Episode:
@@ -183,18 +170,20 @@ def _warnings(connect: Connect) -> list[str]:
         return []
 
 
-def _replay(console: Console, connect: Connect, episode: Episode, points: int) -> bool:
+def _replay(console: Console, target: _Target, episode: Episode, points: int) -> bool:
     """Compare the policy's answers with a demonstration; False if a mistake was found."""
     from robospa.harness.convention_check.check import replay
 
-    with connect() as policy:
+    with target.connect() as policy:
         findings = replay(policy, episode, points)
-        show(console, findings, episode.name, policy.dialect)
+        chosen = policy.hello.get("options", {})  # a robospa.v1 server leaves nothing to choose
+    options = {m: name for m, name in target.deciding_options.items() if name in chosen}
+    show(console, findings, episode.name, options)
     return findings.kind != "mistaken"
 
 
-def show(console: Console, findings: Findings, name: str, dialect: str) -> None:
-    """The table of the replay and its sentence."""
+def show(console: Console, findings: Findings, name: str, options: Mapping[str, str]) -> None:
+    """The table of the replay, its sentence and, by mistake, the option that decides it."""
     from rich.markup import escape
     from rich.table import Table
 
@@ -217,6 +206,6 @@ def show(console: Console, findings: Findings, name: str, dialect: str) -> None:
     color = {"fits": "green", "mistaken": "red", "unclear": "yellow"}[findings.kind]
     console.print(escape(findings.sentence), style=color)
     if findings.best is not None:
-        names = [OPTIONS[(dialect, n)] for n in findings.best.names if (dialect, n) in OPTIONS]
+        names = [options[mistake] for mistake in findings.best.names if mistake in options]
         if names:
             console.print(f"See option {' and '.join(dict.fromkeys(names))} of its dialect.")

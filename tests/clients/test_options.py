@@ -28,6 +28,7 @@ def test_every_option_is_explained_and_round_trips(dialect: Dialect) -> None:
     told = plain_options(options())
     assert read_options(options, told) == options()
     assert [row.name for row in rows] == list(told)
+    assert set(dialect.deciding_options.values()) <= set(told)
 
 
 @pytest.mark.parametrize(
