@@ -13,7 +13,7 @@ from typing import Any
 
 from robospa.harness.running.evaluate import Request
 from robospa.harness.running.manifest import changed_settings
-from robospa.harness.running.policies import probe_policies
+from robospa.harness.running.policy_probe import probe_policies
 from robospa.leaderboard.agreement import Agreement, Counts, agreement, holm, power
 from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.bundle_rules import spec_of

@@ -84,22 +84,22 @@ def covered(files: Mapping[str, bytes], roots: Iterable[str] = ROOTS) -> dict[st
     Raises KeyError if there is no module for one of `roots`.
     """
     modules = {_module(path): path for path in files if path.endswith(".py")}
-    wanted: list[str] = []
+    pending: list[str] = []
     for root in roots:
         matching = fnmatch.filter(modules, root)
         if not matching:
             raise KeyError(f"there is no module {root}")
-        wanted += matching
+        pending += matching
     found: dict[str, ast.Module] = {}
     collecting = gc.isenabled()
     gc.disable()  # it would look again and again through a million nodes that all stay
     try:
-        while wanted:
-            name = wanted.pop()
+        while pending:
+            name = pending.pop()
             if name in found or f"{name}.".startswith(tuple(f"{out}." for out in LEFT_OUT)):
                 continue
             found[name] = ast.parse(files[modules[name]])
-            wanted += [m for m in _imports(found[name]) if m in modules]
+            pending += [m for m in _imports(found[name]) if m in modules]
     finally:
         if collecting:
             gc.enable()

@@ -1,4 +1,4 @@
-"""One evaluation from start to finish: look at the policy and the world, fix the trials, run them.
+"""One evaluation from start to finish: probe the policy and the world, fix the trials, run them.
 
 Nothing is written before the policy has answered, the world has been built and the settings fit an
 earlier run of the same folder.
@@ -17,7 +17,7 @@ from robospa.harness.factory import is_url, load_function
 from robospa.harness.running.atomic_file import replace_file
 from robospa.harness.running.executor import RunAborted
 from robospa.harness.running.manifest import Manifest, about_machine, check_folder, open_run
-from robospa.harness.running.policies import Probed, probe_policies, warnings_of
+from robospa.harness.running.policy_probe import ProbedPolicy, probe_policies, warnings_of
 from robospa.harness.running.progress import Progress, summary
 from robospa.harness.running.ray_cluster import RaySettings
 from robospa.harness.running.ray_executor import loopback_warnings, ray_executor
@@ -101,7 +101,7 @@ def probe_world(config: WorkerConfig, render: bool) -> dict[str, Any]:
     return dict(info)
 
 
-def make_manifest(request: Request, policies: Mapping[str, Probed]) -> Manifest:
+def make_manifest(request: Request, policies: Mapping[str, ProbedPolicy]) -> Manifest:
     """The run's manifest, with the policy of every task; the world is built once to describe it."""
     config = request.config
     specs = [policy.spec for policy in policies.values()]
@@ -124,8 +124,8 @@ def make_manifest(request: Request, policies: Mapping[str, Probed]) -> Manifest:
         settings["policies"] = {task: policy.settings() for task, policy in policies.items()}
         about["policies"] = {task: _about_policy(policy) for task, policy in policies.items()}
     about["arguments"] = dict(request.arguments)
-    told = {task: getattr(part, "instruction", "") for task, part in found.items()}
-    about["warnings"] = warnings_of(policies, told, config.step_scale)
+    instructions = {task: getattr(part, "instruction", "") for task, part in found.items()}
+    about["warnings"] = warnings_of(policies, instructions, config.step_scale)
     categories = {task: part.task.category for task, part in found.items()}
     return Manifest(settings, tuple(request.keys), about, categories)
 
@@ -139,17 +139,17 @@ def _shared(keys: Sequence[TrialKey]) -> dict[str, list[str]]:
     }
 
 
-def _renders(config: WorkerConfig, policies: Mapping[str, Probed]) -> bool:
+def _renders(config: WorkerConfig, policies: Mapping[str, ProbedPolicy]) -> bool:
     """Whether any picture will be asked for."""
     return config.video != "none" or any(p.spec.cameras for p in policies.values())
 
 
-def _about_policy(policy: Probed) -> dict[str, Any]:
-    """Where it is and how it greeted; further servers of the same policy beside."""
-    told: dict[str, Any] = {"target": policy.target, "hello": policy.hello}
-    if policy.equals:
-        told["equals"] = [{"target": p.target, "hello": p.hello} for p in policy.equals]
-    return told
+def _about_policy(policy: ProbedPolicy) -> dict[str, Any]:
+    """Where it is and how it greeted, with its replicas."""
+    about: dict[str, Any] = {"target": policy.target, "hello": policy.hello}
+    if policy.replicas:
+        about["equals"] = [{"target": p.target, "hello": p.hello} for p in policy.replicas]
+    return about
 
 
 def evaluate(request: Request) -> None:
@@ -169,7 +169,7 @@ def evaluate(request: Request) -> None:
         expects={
             p.target: p.spec
             for policy in policies.values()
-            for p in (policy, *policy.equals)
+            for p in (policy, *policy.replicas)
             if is_url(p.target)
         },
     )
@@ -182,11 +182,11 @@ def evaluate(request: Request) -> None:
         if request.settings is not None:
             replace_file(folder / FILE, to_toml(request.settings).encode())
         known = read_records(folder)
-        owed = [key for key in request.keys if not finished(known.get(key))]
-        with Progress(len(request.keys), len(request.keys) - len(owed)) as progress:
+        missing = [key for key in request.keys if not finished(known.get(key))]
+        with Progress(len(request.keys), len(request.keys) - len(missing)) as progress:
             for text in [*manifest.about["warnings"], *loopback_warnings(executor, config)]:
                 progress.note(f"warning: {text}")
-            runner = Runner(config, owed, request.options, progress.add, progress.note)
+            runner = Runner(config, missing, request.options, progress.add, progress.note)
             runner.executor = executor
             runner.on_status = progress.show
             runner.run()

@@ -7,11 +7,16 @@ import time
 from collections import deque
 from collections.abc import Mapping, Sequence
 from types import TracebackType
-from typing import Any, TextIO
+from typing import TYPE_CHECKING, TextIO
 
 from robospa.harness.running.server_stats import ServerStats
 from robospa.harness.running.status import Status, server_text, shares_text
 from robospa.results.records.trial_record import TrialRecord
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+    from rich.live import Live
+    from rich.table import Table
 
 EVERY = 15.0
 """Seconds between two plain lines."""
@@ -84,7 +89,7 @@ class Progress:
     def __init__(self, total: int, already: int = 0, stream: TextIO | None = None) -> None:
         self.tally = Tally(total, already)
         self._stream = stream or sys.stderr
-        self._live: Any = None
+        self._live: Live | None = None
         self._status: Status | None = None
         self._shown = self._line = self._detail = float("-inf")
 
@@ -151,8 +156,8 @@ class Progress:
         self._live = Live(self._picture(), console=console, auto_refresh=False)
         self._live.start()
 
-    def _picture(self, final: bool = False) -> Any:
-        """What a terminal shows: bar and counts, where the time goes, the servers, who is slow."""
+    def _picture(self, final: bool = False) -> RenderableType:
+        """What a terminal shows: bar, counts, where the time goes, servers, the bottleneck."""
         from rich.console import Group
         from rich.progress_bar import ProgressBar
         from rich.table import Table
@@ -161,21 +166,21 @@ class Progress:
         status, tally = self._status, self.tally
         head = Table.grid(padding=(0, 1))
         bar = ProgressBar(total=max(tally.total, 1), completed=tally.done, width=28)
-        said = tally.text(self._seconds_left()) if tally.ran else "starting"
-        head.add_row(bar, f"{tally.done}/{tally.total}", Text(said))
+        counts = tally.text(self._seconds_left()) if tally.ran else "starting"
+        head.add_row(bar, f"{tally.done}/{tally.total}", Text(counts))
         if status is None or final:
             return head
         shares = shares_text(status.shares)
-        told = f"{status.staff}; {shares}" if shares else status.staff
-        lines: list[Any] = [head, Text(told, style="dim")]
+        workers = f"{status.workers_text}; {shares}" if shares else status.workers_text
+        lines: list[RenderableType] = [head, Text(workers, style="dim")]
         if status.servers:
             lines.append(_table(status))
-        if status.verdict:
-            lines.append(Text(status.verdict, style="bold"))
+        if status.bottleneck:
+            lines.append(Text(status.bottleneck, style="bold"))
         return Group(*lines)
 
 
-def _table(status: Status) -> Any:
+def _table(status: Status) -> Table:
     from rich.table import Table
     from rich.text import Text
 
@@ -187,9 +192,9 @@ def _table(status: Status) -> Any:
     table.add_column("task", overflow="ellipsis", no_wrap=True, style="dim")
     shown = _busiest(status.servers)
     for server in shown:
-        told = Text(server_text(server, status.now), style="" if server.up else "yellow")
+        state = Text(server_text(server, status.now), style="" if server.up else "yellow")
         counts = (str(server.running), str(server.trials))
-        table.add_row(Text(server.target), *counts, told, Text(server.task))
+        table.add_row(Text(server.target), *counts, state, Text(server.task))
     if more := len(status.servers) - len(shown):
         table.add_row(f"and {more} more", "", "", "", "")
     return table
@@ -204,19 +209,19 @@ def _busiest(servers: Sequence[ServerStats]) -> list[ServerStats]:
 
 
 def details(status: Status) -> list[str]:
-    """Lines that say where the time goes, what the servers do and who holds the others up."""
+    """Lines that say where the time goes, what the servers do and what the bottleneck is."""
     shares = shares_text(status.shares)
-    lines = [f"{status.staff}; {shares}"] if shares else []
-    asked = [s for s in _busiest(status.servers) if s.trials or not s.up]
-    lines += [f"{s.target}: {s.trials} trials, {server_text(s, status.now)}" for s in asked]
-    return [*lines, status.verdict] if status.verdict else lines
+    lines = [f"{status.workers_text}; {shares}"] if shares else []
+    used = [s for s in _busiest(status.servers) if s.trials or not s.up]
+    lines += [f"{s.target}: {s.trials} trials, {server_text(s, status.now)}" for s in used]
+    return [*lines, status.bottleneck] if status.bottleneck else lines
 
 
 def summary(shares: Mapping[str, float], status: Status) -> list[str]:
     """The same about a whole run, for its end."""
     lines = [f"time: {shares_text(shares)}, with {status.workers} workers on {status.cores} cores"]
-    asked = [s for s in _busiest(status.servers) if s.trials]
-    many = len(asked) > 1
+    used = [s for s in _busiest(status.servers) if s.trials]
+    many = len(used) > 1
     lines += [f"{s.target}: {f'{s.trials} trials, ' if many else ''}{server_text(s, status.now)}"
-              for s in asked if s.means]  # fmt: skip
+              for s in used if s.means]  # fmt: skip
     return lines if shares else []

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from robospa.harness.factory import is_url
 from robospa.harness.running.autoscaling import cores, most_workers
 from robospa.harness.running.evaluate import Request
-from robospa.harness.running.policies import read_map
+from robospa.harness.running.policy_probe import read_map
 from robospa.harness.running.runner import RunOptions
 from robospa.harness.running.worker import TASK_PARTS, Targets, WorkerConfig
 from robospa.harness.selection import list_trials
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from robospa.harness.running.ray_cluster import RaySettings
 
 RUNS = Path("runs")
-"""Where runs go that are not told where."""
+"""Where runs go by default."""
 
 
 def make_request(

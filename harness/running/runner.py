@@ -153,8 +153,8 @@ class Runner:
     def _start_workers(self) -> None:
         """Replace workers that have ended, but never have more than there are trials left."""
         local = self.executor is None
-        wanted = self._autoscaler.target if local else self._workers.capacity()
-        while len(self._slots) < min(wanted, self._queue.unsettled):
+        target = self._autoscaler.target if local else self._workers.capacity()
+        while len(self._slots) < min(target, self._queue.unsettled):
             worker = self._workers.start(f"worker-{self._started:03d}")
             self._started += 1
             self._slots.append(_Slot(worker, time.monotonic() + START_SECONDS))

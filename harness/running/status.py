@@ -1,5 +1,5 @@
-"""How a run is doing, as values and in words: where the time goes, what each server does, who holds
-the others up.
+"""How a run is doing, as values and in words: where the time goes, what each server does, what the
+bottleneck is.
 
 The driver makes a `Status` from what it knows; `harness.progress` shows it.
 """
@@ -86,30 +86,30 @@ class Status:
     starting: int = 0
 
     @property
-    def verdict(self) -> str:
-        """Who holds the others up, in words; empty before the first trial."""
+    def bottleneck(self) -> str:
+        """The bottleneck, in words; empty before the first trial."""
         if not self.shares:
             return ""
         waiting = self.shares.get("waiting", 0.0)
         if not any(is_url(s.target) for s in self.servers):
             waiting = 0.0  # a policy in the worker's own process takes its core as well
         busy = (self.workers - self.starting) * (1.0 - waiting)
-        asked = [s for s in self.servers if s.running and s.means]
+        used = [s for s in self.servers if s.running and s.means]
         if away := [s for s in self.servers if not s.up and not s.excluded]:
             others = "" if len(away) == len(self.servers) else "; the others get its workers"
             return f"{_some(len(away))} away{others}"
         if busy >= FULL * self.cores:
             return f"the simulators are the bottleneck: they fill {_cores(self.cores)}"
-        full = [s for s in asked if s.saturated]
-        if asked and len(full) == len(asked):
-            who = "the policy server is" if len(asked) == 1 else "the policy servers are"
+        full = [s for s in used if s.saturated]
+        if used and len(full) == len(used):
+            who = "the policy server is" if len(used) == 1 else "the policy servers are"
             return f"{who} the bottleneck: workers wait {100 * waiting:.0f} % of their time"
         share = f"{100 * waiting:.0f} %"
         return f"room for more workers: they wait {share} of their time, no queue is long"
 
     @property
-    def staff(self) -> str:
-        """`8 workers on 4 cores`, and how many of them do nothing yet."""
+    def workers_text(self) -> str:
+        """`8 workers on 4 cores`, and how many of them are starting or idle."""
         text = f"{self.workers} workers on {self.cores} cores"
         if self.starting:
             return f"{text}, {self.starting} starting"

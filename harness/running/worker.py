@@ -38,7 +38,7 @@ from robospa.harness.running.messages import (
     TrialDone,
     TrialLost,
 )
-from robospa.harness.running.policies import over_budget
+from robospa.harness.running.policy_probe import over_budget
 from robospa.harness.running.record_store import RecordWriter
 from robospa.protocol.policy import PolicySpec
 from robospa.protocol.sanitize import printable
@@ -111,7 +111,7 @@ class WorkerConfig:
         return len({t for f in found for t in ((f,) if isinstance(f, str) else f)}) == 1
 
     def filmed(self, key: TrialKey) -> bool:
-        """Whether a video of `key` may be wanted."""
+        """Whether a video of `key` may be kept."""
         return self.video in ("failures", "all") or (self.video == "first" and key in self.samples)
 
 

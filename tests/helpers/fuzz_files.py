@@ -33,7 +33,7 @@ import numpy as np
 
 from robospa.harness.running.action_files import read_actions, write_actions
 from robospa.harness.running.manifest import changed_settings, seed_hash
-from robospa.harness.running.policies import read_map
+from robospa.harness.running.policy_probe import read_map
 from robospa.harness.running.request import client_options
 from robospa.harness.selection import parse_seeds
 from robospa.harness.settings import SettingsError

@@ -183,4 +183,4 @@ def test_workers_come_while_others_wait_and_the_server_has_room(tmp_path: Path) 
         runner.run()
     assert notes == ["workers wait while cores idle: 1 more, 2 now"]
     assert sorted(read_records(tmp_path)) == keys
-    assert runner.shares.overall()["waiting"] > 0.5
+    assert runner.times.overall_shares()["waiting"] > 0.5

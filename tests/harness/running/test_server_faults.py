@@ -19,7 +19,7 @@ from fault_table import CASES
 from run_fakes import SPEC, FakePolicy, FakeWorld, parts
 
 from robospa.harness.running.executor import RunAborted
-from robospa.harness.running.policies import probe
+from robospa.harness.running.policy_probe import probe
 from robospa.harness.running.runner import Runner, RunOptions
 from robospa.harness.running.worker import WorkerConfig
 from robospa.harness.trial import run_trial

@@ -51,19 +51,21 @@ def test_old_records_without_purposes_are_all_other() -> None:
 
 
 def test_cores_that_are_busy_are_the_bottleneck() -> None:
-    assert "simulators are the bottleneck: they fill all 2 cores" in status(0.3, server()).verdict
+    assert (
+        "simulators are the bottleneck: they fill all 2 cores" in status(0.3, server()).bottleneck
+    )
 
 
 def test_a_server_whose_queue_is_longer_than_its_model_is_the_bottleneck() -> None:
     full = server(queue=200.0, infer=100.0)
-    assert status(0.9, full).verdict.startswith("the policy server is the bottleneck")
-    assert "wait 90 % of their time" in status(0.9, full).verdict
+    assert status(0.9, full).bottleneck.startswith("the policy server is the bottleneck")
+    assert "wait 90 % of their time" in status(0.9, full).bottleneck
 
 
 def test_idle_cores_and_idle_servers_have_room_for_more_workers() -> None:
-    assert "room for more workers" in status(0.9, server(queue=1.0, infer=100.0)).verdict
+    assert "room for more workers" in status(0.9, server(queue=1.0, infer=100.0)).bottleneck
     mixed = status(0.9, server(queue=1.0, infer=100.0), server(queue=900.0, infer=100.0))
-    assert "room for more workers" in mixed.verdict
+    assert "room for more workers" in mixed.bottleneck
 
 
 def test_a_server_with_full_batches_is_full_before_its_queue_is_long() -> None:
@@ -84,16 +86,16 @@ def test_a_server_that_tells_nothing_is_full_when_it_answers_slower_than_it_coul
 
 
 def test_before_the_first_trial_there_is_nothing_to_say() -> None:
-    assert Status(0.0, 2, 2, 2).verdict == ""
+    assert Status(0.0, 2, 2, 2).bottleneck == ""
 
 
 def test_servers_that_are_away_are_said_first() -> None:
     away = server()
     away.fail(0.0, 2.0)
-    assert status(0.3, away, server()).verdict == (
+    assert status(0.3, away, server()).bottleneck == (
         "a policy server is away; the others get its workers"
     )
-    assert status(0.3, away).verdict == "a policy server is away"
+    assert status(0.3, away).bottleneck == "a policy server is away"
     assert server_text(away, 0.5) == "away, next try in 2 s"
     assert server_text(away, 3.0) == "away, being tried"
 
@@ -121,6 +123,6 @@ def test_the_pause_of_a_server_grows_but_not_with_every_worker_that_fails_with_i
 
 
 def test_workers_that_start_or_idle_are_named() -> None:
-    assert Status(0.0, 4, 4, 2).staff == "4 workers on 2 cores"
-    assert Status(0.0, 4, 3, 2).staff == "4 workers on 2 cores, 1 idle"
-    assert Status(0.0, 4, 2, 2, starting=2).staff == "4 workers on 2 cores, 2 starting"
+    assert Status(0.0, 4, 4, 2).workers_text == "4 workers on 2 cores"
+    assert Status(0.0, 4, 3, 2).workers_text == "4 workers on 2 cores, 1 idle"
+    assert Status(0.0, 4, 2, 2, starting=2).workers_text == "4 workers on 2 cores, 2 starting"

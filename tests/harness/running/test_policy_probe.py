@@ -13,8 +13,8 @@ from typing import Any
 import pytest
 from run_fakes import SPEC, FakePolicy
 
-from robospa.harness.running.policies import (
-    Probed,
+from robospa.harness.running.policy_probe import (
+    ProbedPolicy,
     check_fit,
     over_budget,
     probe_policies,
@@ -72,7 +72,7 @@ def test_every_server_is_asked_once(tmp_path: Path, monkeypatch: pytest.MonkeyPa
         asked.append(target)
         return FakePolicy(replace(SPEC, name=target))
 
-    monkeypatch.setattr("robospa.harness.running.policies.open_policy", opened)
+    monkeypatch.setattr("robospa.harness.running.policy_probe.open_policy", opened)
     config = WorkerConfig(tmp_path, "", policies={"Pick_A": "a", "Pick_B": "b"})
     found = probe_policies(config, KEYS)
     assert {task: probed.spec.name for task, probed in found.items()} == {
@@ -90,8 +90,8 @@ def test_a_policy_for_another_robot() -> None:
         check_fit(replace(SPEC, embodiments=("franka",)), KEYS)
 
 
-def greeting(**more: Any) -> Probed:
-    return Probed("ws://a", SPEC, {"dialect": "test", **more})
+def greeting(**more: Any) -> ProbedPolicy:
+    return ProbedPolicy("ws://a", SPEC, {"dialect": "test", **more})
 
 
 def test_warnings_are_told_once_each() -> None:

@@ -1,8 +1,8 @@
-"""The policies of a run: one for all tasks, or one for each, looked at before anything is written.
+"""The policies of a run: one for all tasks, or one for each, probed before anything is written.
 
 A map from base task to policy is a JSON file, {"Pick_Blocks_Size": "ws://gpu1:8000", ...}: the
 paper's protocol trains one checkpoint per base task, so one "model" is as many servers. Where one
-server is not enough there may be a list of them; they have to be one as good as the other.
+server is not enough there may be a list of them, which have to be replicas of one policy.
 """
 
 from __future__ import annotations
@@ -26,16 +26,16 @@ NAMED = 3
 
 
 @dataclass(frozen=True)
-class Probed:
+class ProbedPolicy:
     """A policy that has answered: `hello` is its greeting, or says that it runs in process.
 
-    `equals` are further servers that answered the same.
+    `replicas` are further servers of the same policy.
     """
 
     target: str
     spec: PolicySpec
     hello: Mapping[str, Any]
-    equals: tuple[Probed, ...] = ()
+    replicas: tuple[ProbedPolicy, ...] = ()
 
     def settings(self) -> dict[str, Any]:
         """What of it decides a result; JSON values."""
@@ -46,8 +46,8 @@ class Probed:
         }
 
 
-def read_map(file: Path, wanted: Sequence[str], known: Collection[str]) -> dict[str, Targets]:
-    """The policy of every task in `wanted`, or its policies, from the JSON `file`.
+def read_map(file: Path, tasks: Sequence[str], known: Collection[str]) -> dict[str, Targets]:
+    """The policy of every task in `tasks`, or its policies, from the JSON `file`.
 
     Raises RunError if the file is no such map, names a task that does not exist, or lacks one.
     """
@@ -60,14 +60,14 @@ def read_map(file: Path, wanted: Sequence[str], known: Collection[str]) -> dict[
             f"--policy-map {file} is no map from tasks to URLs: write "
             '{"Pick_Blocks_Size": "ws://host:8000", ...}, or a list of different URLs for a task'
         )
-    if strange := [task for task in found if task not in known]:
-        raise RunError(f"--policy-map {file} names tasks that do not exist: {_some(strange)}")
-    if missing := [task for task in wanted if task not in found]:
+    if unknown := [task for task in found if task not in known]:
+        raise RunError(f"--policy-map {file} names tasks that do not exist: {_some(unknown)}")
+    if missing := [task for task in tasks if task not in found]:
         raise RunError(
             f"--policy-map {file} has no policy for {_some(missing)}; add them or choose fewer "
             "--tasks"
         )
-    return {t: v if isinstance(v := found[t], str) else tuple(v) for t in wanted}
+    return {t: v if isinstance(v := found[t], str) else tuple(v) for t in tasks}
 
 
 def _is_targets(value: object) -> bool:
@@ -82,7 +82,7 @@ def _some(names: Sequence[str]) -> str:
     return ", ".join(name[:80] for name in names[:NAMED]) + more
 
 
-def probe(target: str, given: Mapping[str, Any], wait: float = 0.0) -> Probed:
+def probe(target: str, given: Mapping[str, Any], wait: float = 0.0) -> ProbedPolicy:
     """The policy at `target`, after at most `wait` s of nobody listening.
 
     Raises what connecting raises.
@@ -95,48 +95,49 @@ def probe(target: str, given: Mapping[str, Any], wait: float = 0.0) -> Probed:
     close = getattr(policy, "close", None)
     if close is not None:
         close()
-    return Probed(target, policy.spec, hello)
+    return ProbedPolicy(target, policy.spec, hello)
 
 
 def probe_policies(
     config: WorkerConfig, keys: Sequence[TrialKey], wait: float = 0.0
-) -> dict[str, Probed]:
+) -> dict[str, ProbedPolicy]:
     """The policy of every task of `keys`, each server asked once.
 
     Raises what connecting raises, and RunError if one does not drive the embodiment asked for or
     if those of one task differ.
     """
-    seen: dict[str, Probed] = {}
-    found: dict[str, Probed] = {}
+    seen: dict[str, ProbedPolicy] = {}
+    found: dict[str, ProbedPolicy] = {}
     for task in dict.fromkeys(key.task for key in keys):
         targets = config.targets(task)
         for target in targets:
             if target not in seen:
                 seen[target] = probe(target, config.options, wait)
-        found[task] = equals([seen[target] for target in targets], task if config.policies else "")
+        servers = [seen[target] for target in targets]
+        found[task] = combine_replicas(servers, task if config.policies else "")
         check_fit(found[task].spec, [key for key in keys if key.task == task])
     return found
 
 
-def equals(servers: Sequence[Probed], task: str = "") -> Probed:
-    """The first of `servers` with the others beside; raises RunError if one differs from it."""
+def combine_replicas(servers: Sequence[ProbedPolicy], task: str = "") -> ProbedPolicy:
+    """The first of `servers` with the others as replicas; raises RunError if one differs."""
     first, *others = servers
-    wanted = _flat(first.settings())
+    expected = _flat(first.settings())
     for other in others:
         found = _flat(other.settings())
         changes = [
-            f"{name} is {wanted.get(name, 'unset')!r} and {found.get(name, 'unset')!r}"
-            for name in sorted({*wanted, *found})
-            if wanted.get(name, "unset") != found.get(name, "unset")
+            f"{name} is {expected.get(name, 'unset')!r} and {found.get(name, 'unset')!r}"
+            for name in sorted({*expected, *found})
+            if expected.get(name, "unset") != found.get(name, "unset")
         ]
         if changes:
             where = f" of {task}" if task else ""
             raise RunError(
                 f"the policy servers {first.target} and {other.target}{where} are not the same: "
-                f"{'; '.join(changes)}; start them alike, or use --policy-map to tell which task "
-                "each of them does"
+                f"{'; '.join(changes)}; start both with the same options, or give each its own "
+                "tasks with --policy-map"
             )
-    return replace(first, equals=tuple(others))
+    return replace(first, replicas=tuple(others))
 
 
 def _flat(settings: Mapping[str, Any]) -> dict[str, Any]:
@@ -148,8 +149,8 @@ def _flat(settings: Mapping[str, Any]) -> dict[str, Any]:
 
 def check_fit(spec: PolicySpec, keys: Sequence[TrialKey]) -> None:
     """Raises RunError if the policy does not drive the embodiment that is asked for."""
-    wanted = sorted({key.embodiment for key in keys})
-    missing = [name for name in wanted if spec.embodiments and name not in spec.embodiments]
+    embodiments = sorted({key.embodiment for key in keys})
+    missing = [name for name in embodiments if spec.embodiments and name not in spec.embodiments]
     if missing:
         raise RunError(
             f"the policy {spec.name!r} drives {', '.join(spec.embodiments)}, not {missing[0]}; "
@@ -158,7 +159,7 @@ def check_fit(spec: PolicySpec, keys: Sequence[TrialKey]) -> None:
 
 
 def warnings_of(
-    policies: Mapping[str, Probed], instructions: Mapping[str, str], step_scale: float
+    policies: Mapping[str, ProbedPolicy], instructions: Mapping[str, str], step_scale: float
 ) -> list[str]:
     """Everything that a user should know before the first trial, once each.
 
@@ -167,12 +168,12 @@ def warnings_of(
     found: list[str] = []
     if step_scale != 1:
         found.append(
-            f"step limits are {step_scale:g} times the official ones: these numbers do not stand "
-            "beside those of other runs"
+            f"step limits are {step_scale:g} times the official ones: the results are not "
+            "comparable with those of other runs"
         )
     budgets: dict[int, dict[str, str]] = {}
     for task, policy in policies.items():
-        for other in policy.equals:
+        for other in policy.replicas:
             first, second = policy.hello.get("server"), other.hello.get("server")
             if first != second:
                 found.append(
@@ -188,8 +189,8 @@ def warnings_of(
 
         found += [
             text
-            for budget, told in budgets.items()
-            if (text := budget_warning(budget, told)) is not None
+            for budget, texts in budgets.items()
+            if (text := budget_warning(budget, texts)) is not None
         ]
     return list(dict.fromkeys(found))
 
