@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ast
+import inspect
 import json
 from dataclasses import fields
 from pathlib import Path
@@ -145,3 +147,15 @@ def test_an_unknown_keyword_is_answered_with_the_nearest() -> None:
 
 def test_a_worker_that_gets_on_is_not_taken_for_stuck() -> None:
     assert LEAST_STUCK_SECONDS >= 3 * HEARTBEAT_SECONDS
+
+
+def test_functions_of_the_command_line_stay_short() -> None:
+    """Commands are thin: what is longer than this belongs in a module that needs no terminal."""
+    folder = Path(inspect.getfile(evaluate)).parent
+    lengths = {
+        f"{path.name}:{node.name}": (node.end_lineno or 0) - node.lineno + 1
+        for path in folder.glob("*.py")
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.FunctionDef)
+    }
+    assert {name: length for name, length in lengths.items() if length > 60} == {}
