@@ -20,6 +20,10 @@ from robospa.protocol.errors import DecodeError
 from robospa.schema import Identifier, one_of, read
 
 CODECS = ("raw", "jpeg")
+JOINT_DIMS = tuple(
+    ActionSpace("joint", joints).width for joints in (SIX_JOINT_ARMS, SEVEN_JOINT_ARMS)
+)
+POSE_DIMS = (ActionSpace("ee").width,)
 
 Whole = Annotated[int, Meta(ge=0, le=2**63 - 1)]
 Seed = Annotated[int, Meta(ge=0)]  # up to 2^64 - 1: more does not fit into a message
@@ -71,9 +75,7 @@ class PolicySpec:
         or of seven joints (14 or 16), or of two poses (16)."""
         if self.action_dim is not None:
             return (self.action_dim,)
-        kind = "ee" if self.action == "ee" else "joint"
-        arms = (SIX_JOINT_ARMS, SEVEN_JOINT_ARMS)
-        return tuple(sorted({ActionSpace(kind, joints).width for joints in arms}))
+        return POSE_DIMS if self.action == "ee" else JOINT_DIMS
 
 
 def check_spec(spec: PolicySpec) -> None:
