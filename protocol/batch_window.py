@@ -3,11 +3,11 @@
 Kept for every session are its last pauses between an answer and the next request; for the model,
 how long calls of how many observations took. With k requests here and m(w) more expected within w
 seconds, waiting answers (k + m) / (w + cost(k + m)) requests per second. Calling now answers
-k / cost(k), or, if it serves those who come meanwhile right afterwards, (k + j) / (cost(k) +
+k / cost(k), or, if it serves those that arrive meanwhile right afterwards, (k + j) / (cost(k) +
 cost(j)). The highest rate wins. m(w) follows from the pauses themselves, given how long each
 session has been silent already: no shape of their distribution is assumed, and a session that is
-later than ever before is waited for only a little. A request whose first bytes have come counts as
-certain.
+later than ever before is waited for only a little. A request whose first bytes have arrived counts
+as certain.
 
 `max_wait_ms`, one fixed window as other servers have it, is no substitute: over the seventeen
 patterns of arrival of `tests/protocol/test_batching_patterns.py`, the best one (50 ms) answers 0.89
@@ -28,7 +28,7 @@ KEPT = 32
 ENOUGH = 4
 """With fewer pauses of its own, a session is expected to pause as the others do."""
 DECAY = 0.9
-"""Weight of a call's cost beside the one after it."""
+"""Weight of a call's cost relative to that of the next call."""
 SILENT = 0.95
 """Share of the time since its answer for which a session counts as silent: one that is a little
 later than ever before is still waited for."""
@@ -85,11 +85,11 @@ class AdaptiveBatchWindow:
         self._free = 0.0
 
     def request_began(self, session: int, now: float) -> None:
-        """The first bytes of a request have come."""
+        """The first bytes of a request have arrived."""
         self._sessions.setdefault(session, _Arrivals()).began = now
 
     def arrived(self, session: int, now: float) -> None:
-        """A whole request has come."""
+        """A complete request has arrived."""
         arrivals = self._sessions.setdefault(session, _Arrivals())
         if arrivals.began is not None:
             self._transfer += 0.2 * (now - arrivals.began - self._transfer)
@@ -133,7 +133,7 @@ class AdaptiveBatchWindow:
     def _expected(
         self, now: float, waiting: Collection[int], limit: float
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """When requests may come [s from now], soonest first, and with what chance each."""
+        """Expected arrivals [s from now], soonest first, and the probability of each."""
         found: list[tuple[float, float]] = []
         for session, arrivals in self._sessions.items():
             if session in waiting:

@@ -1,10 +1,10 @@
 """Requests that arrive together become one call of the model, without anything to tune.
 
 While a call runs, requests gather. When it is over, the batcher may still wait for those that are
-about to come, if that raises the number of answers per second (`robospa.protocol.batch_window`), at
-most for as long as one call takes. So a lone client never waits, eight clients in step share one
-call, and a client in the middle of a long simulation delays nobody. With a fixed number of clients
-more answers per second are also shorter waits on average: there is one goal, not two.
+about to arrive, if that raises the number of answers per second, at most for as long as one call
+takes (`robospa.protocol.batch_window`). So a lone client never waits, eight clients in step share
+one call, and a client in the middle of a long simulation delays nobody. With a fixed number of
+clients more answers per second are also shorter waits on average: there is one goal, not two.
 
 If a call of several observations fails, each is tried alone: one bad sample must not fail the
 others.
@@ -92,8 +92,7 @@ class Batcher:
 
     async def _gather(self) -> None:
         while self._pending and (pause := self.wait_for(self.clock())) > 0:
-            # Whoever comes ends the pause; and if who was expected is late, look again with what
-            # is known then.
+            # A request that arrives ends the pause. If the expected one is late, look again.
             self._arrived.clear()
             timer = asyncio.get_running_loop().call_later(pause, self._arrived.set)
             await self._arrived.wait()

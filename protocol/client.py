@@ -88,7 +88,7 @@ class RemotePolicy:
 
     `open_session` makes a connection, now and at every `reconnect`. `spec` is what the server
     wants. `hello` is the server's greeting as JSON values, for records. `last_timing` holds the
-    last answer's times [ms]: `round_trip_ms`, and what the server told (`queue_ms`, `infer_ms`,
+    last answer's times [ms]: `round_trip_ms`, and what the server reported (`queue_ms`, `infer_ms`,
     `batch`).
     """
 
@@ -115,7 +115,7 @@ class RemotePolicy:
         return str(self._session.hello["dialect"])
 
     def reset(self, trial: TrialInfo) -> None:
-        """Begin a trial; returns when the server says that it is ready."""
+        """Begin a trial; returns when the server is ready."""
         self._warm = self._warm and trial.task == self._task
         self._task = trial.task
         self._session.reset(self._id(), trial)
@@ -127,15 +127,17 @@ class RemotePolicy:
             observation = cast("Observation", encode_images(observation))
         timeout = self.timeouts.infer if self._warm else self.timeouts.first_infer
         start = time.perf_counter()
-        answer, timing = self._asked(observation, timeout)
-        told = {name: ms for name, ms in timing.items() if math.isfinite(ms)}
-        self.last_timing = {**told, "round_trip_ms": (time.perf_counter() - start) * 1e3}
+        answer, timing = self._infer_when_free(observation, timeout)
+        reported = {name: ms for name, ms in timing.items() if math.isfinite(ms)}
+        self.last_timing = {**reported, "round_trip_ms": (time.perf_counter() - start) * 1e3}
         self._warm = True
         return check_chunk(answer, self.spec)
 
-    def _asked(self, observation: Observation, timeout: float) -> tuple[Any, Mapping[str, float]]:
-        """The answer. A server that is busy is asked again, with growing pauses, for `timeout` s:
-        the trial goes on, and the simulator waits for the model."""
+    def _infer_when_free(
+        self, observation: Observation, timeout: float
+    ) -> tuple[Any, Mapping[str, float]]:
+        """The answer. While the server is busy the request is repeated, with growing pauses, for
+        `timeout` seconds: the trial goes on, and the simulator waits for the model."""
         give_up, pause = time.monotonic() + timeout, FIRST_PAUSE
         while True:
             try:
@@ -218,11 +220,11 @@ class _RobospaClient:
         self._transport.send(pack(request, self._limits))
         return self._receive(answer, request.id, timeout)
 
-    def _receive(self, wanted: type[M], id: int, timeout: float) -> M:
-        data = self._transport.receive(timeout, wanted.type)
+    def _receive(self, expected: type[M], id: int, timeout: float) -> M:
+        data = self._transport.receive(timeout, expected.type)
         if isinstance(data, str):
-            said = printable(data, 200)
-            raise self._violation(f"a text frame came instead of {wanted.type}: {said!r}")
+            text = printable(data, 200)
+            raise self._violation(f"a text frame came instead of {expected.type}: {text!r}")
         try:
             message = unpack(data, self._limits)
         except DecodeError as error:
@@ -238,8 +240,8 @@ class _RobospaClient:
             raise ServerError(message.code, message.message, message.retriable, url)
         if message.id != id:
             raise self._violation(f"answer {message.id} came to request {id}")
-        if not isinstance(message, wanted):
-            raise self._violation(f"{message.type} came where {wanted.type} was due")
+        if not isinstance(message, expected):
+            raise self._violation(f"{message.type} came where {expected.type} was expected")
         return message
 
     def _violation(self, reason: str) -> TransportError:
@@ -250,7 +252,7 @@ class _RobospaClient:
 def violation(url: str, reason: str) -> TransportError:
     """The error for something that the protocol does not allow."""
     return ProtocolViolation(
-        f"{url} broke the protocol: {reason}; robospa check tells what else it gets wrong"
+        f"{url} broke the protocol: {reason}; robospa check lists what else it gets wrong"
     )
 
 

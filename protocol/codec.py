@@ -18,6 +18,7 @@ with either.
 
 from __future__ import annotations
 
+import math
 import struct
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -25,6 +26,7 @@ from typing import Any
 
 import msgpack
 import numpy as np
+from numpy.typing import NDArray
 
 from robospa.protocol.errors import DecodeError, EncodeError
 
@@ -129,7 +131,7 @@ class _Writer:
             raise EncodeError(f"text of {len(value)} characters is over the limit")
         self.add(packed, len(packed))
 
-    def array(self, array: np.ndarray[Any, Any]) -> None:
+    def array(self, array: NDArray[np.generic]) -> None:
         name = array.dtype.newbyteorder("<").str
         if name not in DTYPES:
             raise EncodeError(f"array of dtype {array.dtype} cannot be sent, only {list(DTYPES)}")
@@ -308,7 +310,7 @@ class _Reader:
         start = self.take(self.length(_BIN[tag]))
         return self.view[start : self.pos]
 
-    def usual_array(self) -> np.ndarray[Any, Any] | None:
+    def usual_array(self) -> NDArray[np.generic] | None:
         """An array with its keys in the order in which `encode` writes them, else None."""
         start, items, depth = self.pos, self.items, self.limits.depth - 1
         if self.bytes.startswith(_ARRAY_HEAD, start - 1):
@@ -344,7 +346,7 @@ class _Reader:
     def _next_is_binary(self) -> bool:
         return self.pos < self.end and self.bytes[self.pos] in _BIN
 
-    def array(self, data: Any, name: Any, shape: Any) -> np.ndarray[Any, Any]:
+    def array(self, data: Any, name: Any, shape: Any) -> NDArray[np.generic]:
         dtype = DTYPES.get(name) if isinstance(name, str) else None
         if dtype is None:
             raise self.fail(f"array dtype {str(name)[:20]!r} is no plain number")
@@ -354,16 +356,14 @@ class _Reader:
             raise self.fail("array shape is not a list of numbers from 0 up")
         if len(shape) > self.limits.ndim:
             raise self.fail(f"array of {len(shape)} axes, at most {self.limits.ndim} are allowed")
-        wanted = dtype.itemsize
-        for size in shape:
-            wanted *= size
-        if wanted != len(data):
-            raise self.fail(f"array {name} of shape {shape} has {len(data)} bytes, not {wanted}")
-        if wanted > self.limits.array:
-            raise self.fail(f"array of {wanted} bytes is over the limit of {self.limits.array}")
+        expected = dtype.itemsize * math.prod(shape)
+        if expected != len(data):
+            raise self.fail(f"array {name} of shape {shape} has {len(data)} bytes, not {expected}")
+        if expected > self.limits.array:
+            raise self.fail(f"array of {expected} bytes is over the limit of {self.limits.array}")
         if max(shape, default=0) > self.limits.array:
             raise self.fail(f"array axis of {max(shape)} is over the limit")
-        array = np.frombuffer(data, dtype=dtype) if wanted else np.empty(0, dtype)
+        array = np.frombuffer(data, dtype=dtype) if expected else np.empty(0, dtype)
         if not array.flags.aligned:
             array = array.copy()
         array = array.reshape(shape)

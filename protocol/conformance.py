@@ -67,7 +67,7 @@ class _Skip(Exception):
 
 OURS = "robospa.v1"
 EXACT = "the policy needs the exact state, which only a simulator can give"
-ASKED, SESSIONS = 6, 4
+REQUESTS, SESSIONS = 6, 4
 CLOSE = 1e-2
 """How far actions of a seeded policy may be off in another batch: half precision."""
 POSE = np.array([0, 0, 1, 1, 0, 0, 0, 1], np.float32)
@@ -76,7 +76,7 @@ POSE = np.array([0, 0, 1, 1, 0, 0, 0, 1], np.float32)
 
 @dataclass
 class _Target:
-    """How to reach the server under test, and what it said first."""
+    """How to reach the server under test, and what its hello contains."""
 
     url: str
     token: str | None
@@ -219,14 +219,16 @@ def _latency(target: _Target) -> str:
         raise _Skip(EXACT)
     with target.connect() as policy:
         policy.reset(TRIAL)
-        taken, told = [], []
-        for step in range(ASKED):
+        round_trips, model = [], []
+        for step in range(REQUESTS):
             policy.infer(synthetic_observation(target.spec, step))
-            taken.append(policy.last_timing["round_trip_ms"])
-            told.append(policy.last_timing.get("infer_ms", float("nan")))
-    model = f", {np.median(told[1:]):.1f} ms of it in the model" if np.isfinite(told).all() else ""
-    middle = f"then {np.median(taken[1:]):.1f} ms (at most {max(taken[1:]):.1f})"
-    return f"first answer {taken[0]:.1f} ms, {middle}{model}"
+            round_trips.append(policy.last_timing["round_trip_ms"])
+            model.append(policy.last_timing.get("infer_ms", float("nan")))
+    share = ""
+    if np.isfinite(model).all():
+        share = f", {np.median(model[1:]):.1f} ms of it in the model"
+    later = f"then {np.median(round_trips[1:]):.1f} ms (at most {max(round_trips[1:]):.1f})"
+    return f"first answer {round_trips[0]:.1f} ms, {later}{share}"
 
 
 def _order(target: _Target) -> str:
@@ -322,9 +324,9 @@ def _concurrent(target: _Target) -> str:
     if not target.spec.seeded:
         return text
     pairs = list(zip(alone, together, strict=True))
-    assert all(a.shape == b.shape for a, b in pairs), "in company chunks have other lengths"
+    assert all(a.shape == b.shape for a, b in pairs), "concurrent chunks have other lengths"
     off = max(float(np.abs(a - b).max()) for a, b in pairs)
-    assert off <= CLOSE, f"in company actions differ by up to {off:.3g}: are sessions mixed up?"
+    assert off <= CLOSE, f"concurrent actions are {off:.3g} off: are sessions mixed up?"
     same = "the same to the bit" if off == 0 else f"the same but for {off:.1g}"
     return f"{text}; {same} as alone"
 
@@ -344,7 +346,7 @@ def _reconnect(target: _Target) -> str:
         changes = compare_specs(target.spec, policy.spec)
         assert not changes, "; ".join(changes)
         policy.reset(TRIAL)
-        return "a trial that was cut off can be begun again"
+        return "a trial that was interrupted can be started again"
     finally:
         policy.close()
 

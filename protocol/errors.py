@@ -12,7 +12,7 @@
     │   ├── ConnectionLost     closed in the middle; there is no reconnect inside a trial
     │   ├── CallTimeout        no answer in time; the connection is given up
     │   ├── ProtocolViolation  wrong request id, unreadable or unexpected message; given up too
-    │   └── ServerError        the server said `error` (code, retriable); the connection is good
+    │   └── ServerError        the server answered `error` (code, retriable); the connection is good
     └── PolicyAnswerError      the answer came and cannot be executed: scored as a policy error
 
 A harness needs three branches: HandshakeError stops the run, TransportError repeats the trial,
@@ -76,7 +76,7 @@ class ServerError(TransportError):
     """The server reported an error for one request; the connection stays usable."""
 
     def __init__(self, code: str, message: str, retriable: bool, url: str = "") -> None:
-        """`url`: where a reader finds the log that tells more."""
+        """`url`: where the log with the details is."""
         self.code, self.message = printable(code, 60), printable(message)
         where = f"; look at the log of {url}" if url else ""
         super().__init__(f"the server reported {self.code}: {self.message}{where}")

@@ -167,7 +167,7 @@ class ConnectionHandler:
 
 
 async def refuse(socket: MonitoredConnection, ours: bool, error: Exception) -> None:
-    """Say in either dialect why there is no session, and close."""
+    """Send the reason why there is no session, in either dialect, and close."""
     reason = _sentence(error)
     await socket.send(pack(Error(0, POLICY_FAILED, reason)) if ours else reason)
     await socket.close(1011, "no policy for this connection")

@@ -22,7 +22,13 @@ from numpy.typing import NDArray
 
 from robospa.protocol.codec import DEFAULT_LIMITS, Buffer, Limits, decode, encode
 from robospa.protocol.errors import DecodeError, VersionMismatch
-from robospa.protocol.policy import PolicySpec, TrialInfo, Whole, check_spec, is_printable
+from robospa.protocol.policy import (
+    PolicySpec,
+    TrialInfo,
+    Whole,
+    check_printable,
+    check_spec,
+)
 from robospa.schema import describe, read
 
 VERSION = "1.0"
@@ -162,8 +168,7 @@ def read_message(value: Any) -> Message:
     message = read(TYPES[kind], value, f"{kind} message", DecodeError)
     if isinstance(message, Hello):
         check_spec(message.spec)
-        if not is_printable(message.server):
-            raise DecodeError("hello message: 'server' must be printable text")
+        check_printable("hello message: 'server'", message.server)
     elif isinstance(message, Infer):
         read(_Step, message.observation, "observation", DecodeError)
     return message

@@ -1,4 +1,4 @@
-"""Named, typed options: what a server does not say about itself, and what one is started with.
+"""Named, typed options: what a server does not report about itself, and how one is started.
 
 Every dialect, and every server of ours that loads a model, has a frozen dataclass whose fields are
 its conventions: made with `option(...)`, each has a default, a sentence of help and, where there

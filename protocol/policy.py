@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from robospa.action_space import KINDS, SEVEN_JOINT_ARMS, SIX_JOINT_ARMS, ActionSpace
 from robospa.observation import DEFAULT_CAMERAS, STATES, CameraSpec, Observation
 from robospa.protocol.errors import DecodeError
-from robospa.schema import Identifier, one_of, read
+from robospa.schema import Identifier, describe, one_of, read
 
 CODECS = ("raw", "jpeg")
 JOINT_DIMS = tuple(
@@ -36,8 +36,8 @@ class PolicySpec:
 
     `state`: joints as commanded (official convention) or as measured, or none. `action`: the
     space of its actions. `horizon`: actions per chunk (the most it may send); `execute`: how many
-    of them are executed before it is asked again, None for all. `history`: offsets in executed
-    actions, all negative, whose observations it wants beside the present one. `batch`: how many
+    of them are executed before the next query, None for all. `history`: offsets in executed
+    actions, all negative, whose observations it needs besides the present one. `batch`: how many
     observations one call of `infer_batch` may hold. `seeded`: whether it honours the policy seed.
     `privileged`: whether it needs the exact state (no honest learned policy does). `action_dim`:
     columns of a chunk, None for 14 or 16, whichever the embodiment and the space have.
@@ -86,14 +86,16 @@ def check_spec(spec: PolicySpec) -> None:
         raise DecodeError(
             f"spec: 'execute' must be at most the horizon {spec.horizon}, not {spec.execute}"
         )
-    for field_, names in (("name", (spec.name,)), ("embodiments", spec.embodiments)):
-        if not all(is_printable(name) for name in names):
-            raise DecodeError(f"spec: {field_!r} must be printable text of at most 200 characters")
+    for what, names in (("name", (spec.name,)), ("embodiments", spec.embodiments)):
+        for name in names:
+            check_printable(f"spec: {what!r}", name)
 
 
-def is_printable(text: str) -> bool:
-    """Whether `text` can stand in a table or on a terminal as it is."""
-    return len(text) <= 200 and text.isprintable()
+def check_printable(what: str, text: str) -> None:
+    """Raises DecodeError if `text` cannot stand in a table or on a terminal as it is."""
+    if len(text) > 200 or not text.isprintable():
+        expected = "printable text of at most 200 characters"
+        raise DecodeError(f"{what} must be {expected}, not {describe(text)}")
 
 
 @dataclass(frozen=True)
@@ -143,7 +145,7 @@ class BatchPolicy(Policy, Protocol):
     ) -> Sequence[NDArray[np.float32]]: ...
 
 
-# What a policy may have besides; it is asked with `isinstance`.
+# Optional members of policies, checked with `isinstance`.
 
 
 @runtime_checkable
@@ -164,14 +166,14 @@ class SupportsSessionReset(Protocol):
 
 @runtime_checkable
 class SupportsSessionEnd(Protocol):
-    """A batch policy that wants to know when a connection has ended."""
+    """A batch policy that is notified when a connection has ended."""
 
     def end_session(self, session: int) -> None: ...
 
 
 @runtime_checkable
 class SupportsEnd(Protocol):
-    """A policy that wants to know how a trial ended: JSON values such as success and steps."""
+    """A policy that is notified how a trial ended: JSON values such as success and steps."""
 
     def end(self, outcome: Mapping[str, Any]) -> None: ...
 

@@ -1,4 +1,4 @@
-"""Runs policies off the event loop and keeps the trials of different connections apart.
+"""Policy hosting: runs policies off the event loop, with a session for every connection.
 
 Three ways to hand over a policy, by what it knows about sessions:
 
@@ -9,7 +9,7 @@ Three ways to hand over a policy, by what it knows about sessions:
                      has `reset_session(session, trial)` and `end_session(session)`, these are
                      called instead of `reset(trial)`.
     any other policy one object, hence one connection at a time; a second one is refused, because
-                     two trials would share its state unseen.
+                     two trials would share its state unnoticed.
 
 A policy may have `end(outcome)` and `close()`. It is called from `threads` threads, one by default:
 then it need not be thread-safe.
@@ -50,7 +50,7 @@ class PolicySession(Protocol):
     async def end(self, outcome: Mapping[str, Any]) -> None: ...
 
     def request_began(self) -> None:
-        """The first bytes of a request have come."""
+        """The first bytes of a request have arrived."""
 
     def close(self) -> None: ...
 
@@ -122,7 +122,7 @@ class PolicyHost:
 
 class _ExclusiveSession:
     """A policy object that serves one connection. `lock` is held while it is called, because a
-    client may leave, and the next one or `close` come, while a call runs in another thread."""
+    client may leave, and the next one or `close` follow, while a call runs in another thread."""
 
     def __init__(self, host: PolicyHost, policy: Policy, lock: threading.Lock, close: bool) -> None:
         self._host, self._policy, self._lock, self._close = host, policy, lock, close

@@ -1,4 +1,4 @@
-"""What others say, made safe for a terminal, a log and the record of a run."""
+"""Text and values from other machines, made safe for a terminal, a log and the record of a run."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 MAX_LINE = 300
-"""Characters of a server's own words that are repeated."""
+"""Characters of a server's message that are repeated."""
 MAX_JSON = 2**16
-"""Characters of what a server says about itself that a run keeps."""
+"""Characters of a server's metadata that a run keeps."""
 _COLOURS = re.compile(r"\x1b\[[0-?]*[ -/]*[@-~]|\x1b\][^\x07\x1b]*(?:\x07|\x1b\\)?")
 
 

@@ -94,8 +94,7 @@ class Transport:
         self._socket = _open(address, timeouts, limits, subprotocol)
         self.subprotocol: str | None = self._socket.subprotocol
         seconds = max(timeouts.first_infer, timeouts.infer)
-        whole = int(seconds)
-        wait = struct.pack("@ll", whole, int((seconds - whole) * 1e6))
+        wait = struct.pack("@ll", int(seconds), int(seconds % 1 * 1e6))
         with contextlib.suppress(OSError):
             self._socket.socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, wait)
 
@@ -121,7 +120,7 @@ class Transport:
             raise self._lost(f"while waiting for {what}", error) from error
 
     def has_more(self) -> bool:
-        """Whether a message has come that was not received yet; it is dropped."""
+        """Whether a message has arrived that was not received yet; it is dropped."""
         try:
             self._socket.recv(0)
         except (TimeoutError, ConnectionClosed):
@@ -155,7 +154,7 @@ def why_closed(error: Exception, limit: int) -> str:
     if error.rcvd is not None:
         reason = f"{error.rcvd.code:d}: {printable(error.rcvd.reason) or 'no reason given'}"
         return f"the server closed it ({reason}); look at its log"
-    return "it was cut off without a word; look at the server's log"
+    return "it was closed without a reason; look at the server's log"
 
 
 def _open(
@@ -227,7 +226,7 @@ def _open_once(
     )
     # As of websockets 17 the result must be entered; before, entering it changes nothing.
     connection: ClientConnection = manager.__enter__()
-    with contextlib.suppress(OSError):  # closed again already: the first message will say why
+    with contextlib.suppress(OSError):  # closed again already: the first message tells why
         enlarge_buffers(connection.socket)
     return connection
 

@@ -1,4 +1,4 @@
-"""Is this a chunk, does this observation fit the spec, are these two specs the same?
+"""Checks of action chunks, observations and specs.
 
 The same functions run at both ends, so that a mistake is reported where it was made.
 """
@@ -82,10 +82,10 @@ def _check_view(what: str, view: Any, spec: PolicySpec) -> None:
 def check_size(spec: PolicySpec, limits: Limits, url: str) -> None:
     """Raises HandshakeError if the images that `spec` asks for fit into no message."""
     sizes = [3 * camera.width * camera.height for camera in spec.cameras]
-    whole = sum(sizes) * (1 + len(spec.history)) if spec.image_codec == "raw" else 0
-    if whole > limits.message or max(sizes, default=0) > limits.array:
+    total = sum(sizes) * (1 + len(spec.history)) if spec.image_codec == "raw" else 0
+    if total > limits.message or max(sizes, default=0) > limits.array:
         raise HandshakeError(
-            f"the server at {url} wants {max(whole, *sizes) / 1e6:.0f} MB of images in an "
+            f"the server at {url} asks for {max(total, *sizes) / 1e6:.0f} MB of images in an "
             f"observation, and a message may have {limits.message / 1e6:.0f} MB: ask for smaller "
             "images"
         )

@@ -90,7 +90,7 @@ GONE = [
         "first",
         do.cut,
         REPEATED,
-        f"{ENDED} actions: it was cut off without a word; {LOG}",
+        f"{ENDED} actions: it was closed without a reason; {LOG}",
     ),
     Case(
         "half",
@@ -98,7 +98,7 @@ GONE = [
         "first",
         do.cut_in_message,
         REPEATED,
-        f"{ENDED} actions: it was cut off without a word; {LOG}",
+        f"{ENDED} actions: it was closed without a reason; {LOG}",
     ),
     Case(
         "restart",
@@ -106,7 +106,7 @@ GONE = [
         "later",
         do.restart,
         REPEATED,
-        f"{ENDED} actions: it was cut off without a word; {LOG}",
+        f"{ENDED} actions: it was closed without a reason; {LOG}",
     ),
     Case(
         "between",
@@ -265,7 +265,7 @@ ORDER = [
         "later",
         do.of_other_type,
         REPEATED,
-        f"{BROKE} ready came where actions was due{CHECK}",
+        f"{BROKE} ready came where actions was expected{CHECK}",
     ),
 ]
 ERRORS = [
@@ -326,7 +326,7 @@ HELLOS = [
         "hello",
         do.instead(Ready(0)),
         REPEATED,
-        f"{BROKE} ready came where hello was due{CHECK}",
+        f"{BROKE} ready came where hello was expected{CHECK}",
     ),
     Case(
         "horizon",
@@ -334,7 +334,7 @@ HELLOS = [
         "hello",
         do.instead(hello(horizon=-5)),
         REPEATED,
-        f"{UNREADABLE} spec: 'horizon' must be a whole number from 1 to 10000, not -5{CHECK}",
+        f"{UNREADABLE} hello message: 'spec.horizon' must be a whole number >= 1, not -5{CHECK}",
     ),
     Case(
         "cameras",
@@ -350,7 +350,7 @@ HELLOS = [
         "hello",
         do.instead(hello(cameras=[{"name": "head", "width": 10**9, "height": 1}])),
         REPEATED,
-        f"{UNREADABLE} spec camera: 'width' must be a whole number from 1 to 8192, not "
+        f"{UNREADABLE} hello message: 'spec.cameras[0].width' must be a whole number <= 8192, not "
         f"1000000000{CHECK}",
     ),
     Case(
@@ -368,8 +368,8 @@ HELLOS = [
         "first",
         do.come_back_as(hello(cameras=[{"name": "head", "width": 8192, "height": 8192}])),
         STOPS,
-        "the server at {url} wants 201 MB of images in an observation, and a message may have 67 "
-        "MB: ask for smaller images",
+        "the server at {url} asks for 201 MB of images in an observation, and a message may have "
+        "67 MB: ask for smaller images",
     ),
     Case(
         "other",

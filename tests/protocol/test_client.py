@@ -167,7 +167,7 @@ def test_an_answer_of_the_wrong_type_is_fatal() -> None:
     with Scripted(HELLO, [READY, READY]) as url:
         remote = connect(url, timeouts=QUICK)
         remote.reset(TRIAL)
-        with pytest.raises(ProtocolViolation, match="ready came where actions was due"):
+        with pytest.raises(ProtocolViolation, match="ready came where actions was expected"):
             remote.infer(observation())
 
 
