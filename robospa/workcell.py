@@ -66,33 +66,40 @@ class FixedCamera:
         """Focal length [px] in an image of HEIGHT."""
         return HEIGHT / 2 / math.tan(self.fov / 2)
 
-    def column(self, x: Array, y: Array, z: Array | float) -> Array:
-        """How far right [px] of the left edge points [m] are in an image of WIDTH x HEIGHT."""
-        forward, right, _ = self.axes
+    def pixel(self, x: Array, y: Array, z: Array | float) -> tuple[Array, Array]:
+        """Column and row [px] of points [m] in an image of WIDTH x HEIGHT."""
+        forward, right, up = self.axes
         depth = self._along(forward, x, y, z)
         column: Array = WIDTH / 2 + self.focal * self._along(right, x, y, z) / depth
-        return column
+        row: Array = HEIGHT / 2 - self.focal * self._along(up, x, y, z) / depth
+        return column, row
 
     def row(self, x: Array, y: Array, z: Array | float) -> Array:
-        """How far below [px] the top edge points [m] are in an image of WIDTH x HEIGHT."""
+        """Row [px] of points [m] alone."""
         forward, _, up = self.axes
         depth = self._along(forward, x, y, z)
         row: Array = HEIGHT / 2 - self.focal * self._along(up, x, y, z) / depth
         return row
 
-    def pixel(self, x: Array, y: Array, z: Array | float) -> tuple[Array, Array]:
-        """Column and row [px] of points [m] in an image of WIDTH x HEIGHT."""
-        return self.column(x, y, z), self.row(x, y, z)
+    def box(
+        self, x: Array, y: Array, radius: Array | float, low: Array | float, high: Array | float
+    ) -> tuple[Array, Array, Array, Array]:
+        """Left, right, top and bottom [px] of upright cylinders at x, y, from `low` to `high` [m].
 
-    def _along(self, axis: Vec3, *point: Array | float) -> Any:
+        Of a camera with a level picture that does not look sideways.
+        """
+        depth, eye = self._along(self.axes[0], x, y, high), self.position[0]
+        left = WIDTH / 2 + self.focal * (x - radius - eye) / depth
+        right = WIDTH / 2 + self.focal * (x + radius - eye) / depth
+        return left, right, self.row(x, y + radius, high), self.row(x, y - radius, low)
+
+    def _along(self, axis: Vec3, x: Array, y: Array, z: Array | float) -> Any:
         """Component [m] along the unit vector `axis` of the way from the camera to points."""
-        # Most components are 0 or 1, and samplers ask for millions of points: do only what counts.
-        parts = [
-            value - eye if share == 1.0 else share * (value - eye)
-            for share, value, eye in zip(axis, point, self.position, strict=True)
-            if share
-        ]
-        return sum(parts[1:], parts[0])
+        (a, b, c), (ex, ey, ez) = axis, self.position
+        if a == 1.0:  # samplers ask for millions of points: do only what counts
+            return x - ex
+        total = b * (y - ey) + c * (z - ez)
+        return total + a * (x - ex) if a else total
 
 
 def _unit(vector: Vec3) -> Vec3:
@@ -181,7 +188,7 @@ class Workcell:
 
     @property
     def head(self) -> FixedCamera:
-        """The camera that scenes have to be seen by."""
+        """The camera that scenes have to be seen by; level, looking straight along the table."""
         return self.cameras["head"]
 
     def grasp_points(self, end_effectors: tuple[Pose, Pose]) -> tuple[Vec3, Vec3]:
@@ -213,9 +220,8 @@ class Workcell:
         `radius` and `height` bound each object; `margin` is the part of the image's width and
         height that stays free on each side.
         """
-        camera, low, high = self.head, self.table.top, self.table.top + height
-        left, right = camera.column(x - radius, y, high), camera.column(x + radius, y, high)
-        top, bottom = camera.row(x, y + radius, high), camera.row(x, y - radius, low)
+        low = self.table.top
+        left, right, top, bottom = self.head.box(x, y, radius, low, low + height)
         free_x, free_y = margin[0] * WIDTH, margin[1] * HEIGHT
         inside: Mask = (
             (left >= free_x)
@@ -228,10 +234,7 @@ class Workcell:
     def view_span(
         self, y: float, radius: float = 0.0, height: float = 0.0, margin: float = 0.02
     ) -> tuple[float, float]:
-        """The x range in which a cylinder of this `radius` and `height` at `y` is in view.
-
-        The head camera's picture has to be level and the camera must not look sideways.
-        """
+        """The x range in which a cylinder of this `radius` and `height` at `y` is in view."""
         camera = self.head
         ex, ey, ez = camera.position
         _, ahead, down = camera.forward

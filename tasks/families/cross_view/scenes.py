@@ -126,12 +126,7 @@ class Spread:
 
     def _box(self, workcell: Workcell, x: Array, y: Array) -> tuple[Array, Array, Array, Array]:
         """Left, right, top and bottom [px] of the upright cylinders that bound the objects."""
-        high = TABLE_TOP + self.tall
-        left = workcell.head.column(x - self.seen, y, high)
-        right = workcell.head.column(x + self.seen, y, high)
-        top = workcell.head.row(x, y + self.seen, high)
-        bottom = workcell.head.row(x, y - self.seen, TABLE_TOP)
-        return left, right, top, bottom
+        return workcell.head.box(x, y, self.seen, TABLE_TOP, TABLE_TOP + self.tall)
 
 
 AXES = np.array([0, 0, 1, 1])
