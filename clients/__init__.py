@@ -28,7 +28,7 @@ from robospa.protocol.transport import Timeouts
 __all__ = ["check_options", "connect", "find_endpoint"]
 
 
-def find_endpoint(url: str, options: Mapping[str, Any] | None = None) -> Endpoint:
+def find_endpoint(url: str, options: Mapping[str, object] | None = None) -> Endpoint:
     """The server that `url` names; `options` are overruled by those in the URL.
 
     Raises ValueError for an unknown scheme or a URL without host.
@@ -53,12 +53,12 @@ def find_endpoint(url: str, options: Mapping[str, Any] | None = None) -> Endpoin
     return Endpoint(url, dialect, parts.scheme, parts.hostname, port, parts.path, given)
 
 
-def check_options(url: str, options: Mapping[str, Any] | None = None) -> None:
+def check_options(url: str, options: Mapping[str, object] | None = None) -> None:
     """Raises ValueError if `url` or an option cannot be; talks to nobody."""
     _prepare(url, options)
 
 
-def _prepare(url: str, options: Mapping[str, Any] | None) -> tuple[Endpoint, Any]:
+def _prepare(url: str, options: Mapping[str, object] | None) -> tuple[Endpoint, Any]:
     """The server, and the options of its dialect."""
     endpoint = find_endpoint(url, options)
     try:
@@ -72,7 +72,7 @@ def connect(
     token: str | None = None,
     timeouts: Timeouts | None = None,
     *,
-    options: Mapping[str, Any] | None = None,
+    options: Mapping[str, object] | None = None,
     limits: Limits = DEFAULT_LIMITS,
     ssl: ssl_module.SSLContext | None = None,
     expect: PolicySpec | None = None,

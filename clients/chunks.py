@@ -13,18 +13,19 @@ from robospa.action_space import ActionSpace
 PLAIN = re.compile(r"[<>|=]?(b1|i[1248]|u[1248]|f[248])|bool|u?int(8|16|32|64)|float(16|32|64)")
 
 
-def plain_dtype(name: Any) -> np.dtype[Any] | None:
+def plain_dtype(name: object) -> np.dtype[Any] | None:
     """The dtype of plain numbers that a message names, None for anything else.
 
     numpy itself evaluates parts of such a name, so it sees only those that are known.
     """
     if isinstance(name, bytes):
         name = name.decode("ascii", "replace")
-    known = isinstance(name, str) and PLAIN.fullmatch(name) is not None
-    return np.dtype(name) if known else None
+    if not isinstance(name, str) or PLAIN.fullmatch(name) is None:
+        return None
+    return np.dtype(name)
 
 
-def as_chunk(value: Any) -> Any:
+def as_chunk(value: object) -> object:
     """`value` as float32 (T, D) wherever it is an array or lists of numbers.
 
     Anything else is returned as it is, and refused by the check that follows every answer.
@@ -39,7 +40,7 @@ def as_chunk(value: Any) -> Any:
         return array.astype(np.float32)
 
 
-def invert_grippers(chunk: Any, space: ActionSpace) -> Any:
+def invert_grippers(chunk: object, space: ActionSpace) -> Any:
     """`chunk` with 1 - g for every gripper number: closed becomes open."""
     if not isinstance(chunk, np.ndarray) or chunk.ndim != 2 or chunk.shape[1] != space.width:
         return chunk  # refused by the check that follows

@@ -72,7 +72,7 @@ class Endpoint:
     host: str
     port: int
     path: str
-    options: Mapping[str, Any]
+    options: Mapping[str, object]
 
     @property
     def secure(self) -> bool:

@@ -16,7 +16,6 @@ import ssl as ssl_module
 import threading
 import time
 from collections.abc import Mapping
-from typing import Any
 
 from robospa.clients.dialect import ConnectionParams, Endpoint
 from robospa.protocol.errors import (
@@ -81,7 +80,7 @@ class JsonServer:
         except ProtocolViolation:
             return  # it answered, only not in JSON
 
-    def post(self, path: str, body: bytes, timeout: float) -> Any:
+    def post(self, path: str, body: bytes, timeout: float) -> object:
         """The decoded JSON answer to a POST.
 
         Raises ConnectFailed, ConnectionLost, CallTimeout, Unauthorized, ServerError for a status
@@ -89,11 +88,11 @@ class JsonServer:
         """
         return self.request("POST", path, body, timeout)
 
-    def get(self, path: str, timeout: float) -> Any:
+    def get(self, path: str, timeout: float) -> object:
         """The decoded JSON answer to a GET; errors as in `post`."""
         return self.request("GET", path, None, timeout)
 
-    def request(self, method: str, path: str, body: bytes | None, timeout: float) -> Any:
+    def request(self, method: str, path: str, body: bytes | None, timeout: float) -> object:
         """One request; see `post`."""
         until = time.monotonic() + timeout
         try:
@@ -185,7 +184,7 @@ class JsonServer:
         reason = str(error) or type(error).__name__
         return ConnectionLost(f"the connection to {self.url} ended while waiting: {reason}")
 
-    def _decoded(self, path: str, data: bytes) -> Any:
+    def _decoded(self, path: str, data: bytes) -> object:
         try:
             return json.loads(data)
         except (ValueError, RecursionError) as error:

@@ -5,8 +5,6 @@ What the two dialects of this form, XPolicyLab's and vla-eval's, have in common.
 
 from __future__ import annotations
 
-from typing import Any
-
 from robospa.clients.dialect import ConnectionParams
 from robospa.clients.numpy_msgpack import Form, pack, unpack
 from robospa.protocol.client import violation
@@ -24,11 +22,11 @@ class MsgpackSocket:
         self._form, self._limits = form, params.limits
         self.url = params.endpoint.url
 
-    def send(self, message: dict[str, Any]) -> None:
+    def send(self, message: dict[str, object]) -> None:
         """Raises EncodeError and ConnectionLost."""
         self._transport.send(pack(message, self._form, self._limits))
 
-    def receive(self, timeout: float, what: str) -> dict[str, Any]:
+    def receive(self, timeout: float, what: str) -> dict[str, object]:
         """The next message; raises CallTimeout, ConnectionLost, ProtocolViolation."""
         data = self._transport.receive(timeout, what)
         if isinstance(data, str):

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from robospa.clients.chunks import as_chunk, plain_dtype
 
 
-def array_object(array: NDArray[Any]) -> dict[str, Any]:
+def array_object(array: NDArray[Any]) -> dict[str, object]:
     """The JSON object of an array; C order, little-endian."""
     plain = np.ascontiguousarray(array)
     if plain.dtype.byteorder == ">":
@@ -25,12 +25,12 @@ def array_object(array: NDArray[Any]) -> dict[str, Any]:
     return {"__numpy__": data, "dtype": plain.dtype.str, "shape": list(array.shape)}
 
 
-def dumps(value: Any) -> str:
+def dumps(value: object) -> str:
     """JSON text in which arrays, anywhere, are their objects."""
     return json.dumps(value, default=_default, separators=(",", ":"))
 
 
-def _default(value: Any) -> Any:
+def _default(value: object) -> object:
     if isinstance(value, np.ndarray):
         return array_object(value)
     if isinstance(value, np.generic):
@@ -38,7 +38,7 @@ def _default(value: Any) -> Any:
     raise TypeError(f"{type(value).__name__} cannot be written as JSON")
 
 
-def chunk_of(value: Any) -> Any:
+def chunk_of(value: object) -> object:
     """An action chunk in a decoded answer as float32 (T, D), wherever that is possible.
 
     Lists of lists and array objects are understood; anything else is returned as it is, and
@@ -49,7 +49,7 @@ def chunk_of(value: Any) -> Any:
     return as_chunk(value)
 
 
-def array_of(value: Mapping[str, Any], data: str) -> Any:
+def array_of(value: Mapping[str, Any], data: str) -> object:
     """The array whose base64 bytes are under the key `data`; `value` itself if it is none."""
     try:
         raw = base64.b64decode(value[data], validate=True)

@@ -21,11 +21,11 @@ from robospa.clients.chunks import plain_dtype
 from robospa.protocol.codec import Limits
 from robospa.protocol.errors import DecodeError, EncodeError
 
-Form = Callable[[NDArray[Any]], dict[Any, Any]]
+Form = Callable[[NDArray[Any]], dict[object, object]]
 KINDS = "biuf"
 
 
-def text_form(array: NDArray[Any]) -> dict[Any, Any]:
+def text_form(array: NDArray[Any]) -> dict[object, object]:
     """An array as vla-eval writes it."""
     return {
         "__ndarray__": True,
@@ -35,7 +35,7 @@ def text_form(array: NDArray[Any]) -> dict[Any, Any]:
     }
 
 
-def binary_form(array: NDArray[Any]) -> dict[Any, Any]:
+def binary_form(array: NDArray[Any]) -> dict[object, object]:
     """An array as msgpack-numpy writes it."""
     return {
         b"nd": True,
@@ -46,10 +46,10 @@ def binary_form(array: NDArray[Any]) -> dict[Any, Any]:
     }
 
 
-def pack(value: Any, form: Form, limits: Limits) -> bytes:
+def pack(value: object, form: Form, limits: Limits) -> bytes:
     """One message; raises EncodeError."""
 
-    def default(item: Any) -> Any:
+    def default(item: object) -> object:
         if isinstance(item, np.ndarray) and item.dtype.kind in KINDS:
             return form(item)
         if isinstance(item, np.generic) and item.dtype.kind in KINDS:
@@ -120,7 +120,7 @@ _FIXED = {
 """Tag -> bytes that follow."""
 
 
-def unpack(data: bytes, limits: Limits) -> Any:
+def unpack(data: bytes, limits: Limits) -> object:
     """The value of one message; raises DecodeError."""
     if len(data) > limits.message:
         raise DecodeError(f"message of {len(data)} bytes is over the limit of {limits.message}")
@@ -143,11 +143,11 @@ def unpack(data: bytes, limits: Limits) -> Any:
         raise DecodeError(f"no readable msgpack: {error}") from error
 
 
-def _refuse(code: int, data: bytes) -> Any:
+def _refuse(code: int, data: bytes) -> object:
     raise DecodeError(f"extension type {code} is refused")
 
 
-def _array(value: dict[Any, Any]) -> Any:
+def _array(value: dict[object, object]) -> object:
     if value.get(b"nd") is True:
         if value.get(b"kind") not in (b"", None, ""):
             raise DecodeError("an array of objects or structures is refused")
@@ -159,7 +159,7 @@ def _array(value: dict[Any, Any]) -> Any:
     return value
 
 
-def _build(dtype: Any, shape: Any, data: Any) -> NDArray[Any]:
+def _build(dtype: object, shape: Any, data: object) -> NDArray[Any]:
     kind = plain_dtype(dtype)
     if kind is None:
         raise DecodeError(f"an array of dtype {str(dtype)[:40]!r} is refused")

@@ -8,7 +8,6 @@ from __future__ import annotations
 import http.client
 import json
 from dataclasses import dataclass, field
-from typing import Any
 
 from robospa.clients.dialect import ConnectionParams
 from robospa.clients.http import open_http
@@ -24,7 +23,7 @@ class HttpAnswer:
     status: int | None
     body: bytes = b""
 
-    def json(self) -> dict[str, Any] | None:
+    def json(self) -> dict[str, object] | None:
         """The body as a JSON map, None for anything else."""
         try:
             value = json.loads(self.body)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 from robospa.action_space import ActionSpace
 from robospa.clients.detect import explain_error
@@ -56,7 +55,7 @@ class Go1Session:
             action_dim=ActionSpace().width,
         )
         warnings = [*WARNINGS, SWAPPED] if options.wrists == "swapped" else list(WARNINGS)
-        self.hello: dict[str, Any] = {
+        self.hello: dict[str, object] = {
             "dialect": "go1",
             "spec": self.spec.to_json(),
             "options": plain_options(options),
@@ -70,7 +69,7 @@ class Go1Session:
 
     def infer(
         self, id: int, observation: Observation, timeout: float
-    ) -> tuple[Any, Mapping[str, float]]:
+    ) -> tuple[object, Mapping[str, float]]:
         try:
             body = dumps(self._options.inputs(observation)).encode()
             answer = self._server.post(self._path, body, timeout)
@@ -79,7 +78,7 @@ class Go1Session:
         self._answered = True
         return chunk_of(answer), {}
 
-    def end(self, id: int, outcome: Mapping[str, Any]) -> None:
+    def end(self, id: int, outcome: Mapping[str, object]) -> None:
         """Nothing to send."""
 
     def close(self) -> None:

@@ -12,7 +12,6 @@ option ctrl_freq       ctrl_freqs (1,) float32
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -47,7 +46,7 @@ class Go1Conventions:
             return {"top": "head", "right": "left_wrist", "left": "right_wrist"}
         return {"top": "head", "right": "right_wrist", "left": "left_wrist"}
 
-    def inputs(self, observation: Observation) -> dict[str, Any]:
+    def inputs(self, observation: Observation) -> dict[str, object]:
         """One query, arrays as they are in `observation`."""
         images = observation["images"]
         return {

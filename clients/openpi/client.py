@@ -8,7 +8,6 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -84,7 +83,7 @@ class OpenPiClientOptions:
         return names
 
     @property
-    def extra_fields(self) -> dict[str, Any]:
+    def extra_fields(self) -> dict[str, object]:
         """Option `extra` as a map."""
         try:
             extra = json.loads(self.extra)
@@ -128,7 +127,7 @@ class OpenPiSession:
 
     def infer(
         self, id: int, observation: Observation, timeout: float
-    ) -> tuple[Any, Mapping[str, float]]:
+    ) -> tuple[object, Mapping[str, float]]:
         if self._transport.has_more():
             self.close()
             raise ProtocolViolation(f"{self._transport.url} sent data that was not requested")
@@ -141,13 +140,13 @@ class OpenPiSession:
                 actions = actions.astype(np.float32)
         return actions, _timing(answer)
 
-    def end(self, id: int, outcome: Mapping[str, Any]) -> None:
+    def end(self, id: int, outcome: Mapping[str, object]) -> None:
         """Nothing to send."""
 
     def close(self) -> None:
         self._transport.close()
 
-    def _receive(self, timeout: float, what: str) -> dict[str, Any]:
+    def _receive(self, timeout: float, what: str) -> dict[str, object]:
         data = self._transport.receive(timeout, what)
         if isinstance(data, str):
             self.close()
@@ -166,7 +165,7 @@ class OpenPiSession:
         return value
 
 
-def _timing(answer: Mapping[str, Any]) -> dict[str, float]:
+def _timing(answer: Mapping[str, object]) -> dict[str, float]:
     for name in ("policy_timing", "server_timing"):
         times = answer.get(name)
         if isinstance(times, dict) and isinstance(times.get("infer_ms"), (int, float)):

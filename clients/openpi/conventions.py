@@ -14,7 +14,6 @@ The way back, which our own server needs for a client of openpi, is `robospa.pro
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
@@ -23,8 +22,8 @@ from robospa.protocol.errors import EncodeError
 
 
 def to_openpi(
-    observation: Observation, cameras: Mapping[str, str], extra: Mapping[str, Any]
-) -> dict[str, Any]:
+    observation: Observation, cameras: Mapping[str, str], extra: Mapping[str, object]
+) -> dict[str, object]:
     """Our observation as an openpi Aloha observation, `extra` beside it at the top level.
 
     `cameras` maps our names to the server's; raises EncodeError for a camera that it lacks.

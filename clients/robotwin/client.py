@@ -13,7 +13,6 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -75,12 +74,12 @@ class RoboTwinClientOptions:
             raise ValueError(f"option reset={self.reset!r} is no name of a model's method")
 
 
-def robotwin_observation(observation: Observation) -> dict[str, Any]:
+def robotwin_observation(observation: Observation) -> dict[str, object]:
     """RoboTwin's nested observation. Joints and gripper 0..1 (1 = open), poses with w x y z."""
     state = np.asarray(observation["state"], np.float64)
     ee = np.asarray(observation["ee"], np.float64) if "ee" in observation else None
     left, right = ActionSpace("joint").arms
-    sent: dict[str, Any] = {
+    sent: dict[str, object] = {
         "observation": {
             theirs: {"rgb": observation["images"][ours]} for ours, theirs in CAMERAS.items()
         },
@@ -103,9 +102,9 @@ def robotwin_observation(observation: Observation) -> dict[str, Any]:
     return sent
 
 
-def dp_observation(observation: Observation) -> dict[str, Any]:
+def dp_observation(observation: Observation) -> dict[str, object]:
     """What RoboTwin's DP sends: images CHW in 0..1, float32 here, and the 14 joints."""
-    sent: dict[str, Any] = {
+    sent: dict[str, object] = {
         theirs: np.moveaxis(observation["images"][ours], -1, 0).astype(np.float32) / np.float32(255)
         for ours, theirs in DP_CAMERAS.items()
     }
@@ -131,7 +130,7 @@ class RoboTwinSession:
             history=tuple(range(-options.history, 0)),
             action_dim=ActionSpace(options.space).width,
         )
-        self.hello: dict[str, Any] = {
+        self.hello: dict[str, object] = {
             "dialect": "robotwin",
             "spec": self.spec.to_json(),
             "options": plain_options(options),
@@ -146,7 +145,7 @@ class RoboTwinSession:
 
     def infer(
         self, id: int, observation: Observation, timeout: float
-    ) -> tuple[Any, Mapping[str, float]]:
+    ) -> tuple[object, Mapping[str, float]]:
         until = time.monotonic() + timeout
         encode = LAYOUTS[self._options.layout]
         now = int(observation["step"])
@@ -157,13 +156,15 @@ class RoboTwinSession:
                 past.pop("ee", None)
                 self._call("update_obs", encode(past), timeout, until)
         self._last_step = now
-        sent: dict[str, Any] | None = encode(observation)
+        sent: dict[str, object] | None = encode(observation)
         if self._options.calls == "update":
             self._call("update_obs", sent, timeout, until)
             sent = None
         return as_chunk(self._call("get_action", sent, timeout, until)), {}
 
-    def _call(self, method: str, value: Any, timeout: float, until: float | None = None) -> Any:
+    def _call(
+        self, method: str, value: object, timeout: float, until: float | None = None
+    ) -> object:
         try:
             result = self._connection.call(method, value, timeout, until)
         except (CallTimeout, ConnectionLost, ProtocolViolation) as error:
@@ -174,7 +175,7 @@ class RoboTwinSession:
         self._answered = True
         return result
 
-    def end(self, id: int, outcome: Mapping[str, Any]) -> None:
+    def end(self, id: int, outcome: Mapping[str, object]) -> None:
         """Nothing to send."""
 
     def close(self) -> None:

@@ -10,7 +10,6 @@ import json
 import socket
 import time
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
@@ -31,7 +30,7 @@ MAX_REASON = 240
 """Characters of a server's error text that are repeated."""
 
 
-def to_json(value: Any) -> dict[str, Any]:
+def to_json(value: object) -> dict[str, object]:
     """An array as RoboTwin's JSON writes it."""
     if not isinstance(value, np.ndarray):
         raise TypeError(f"{type(value).__name__} cannot be sent")
@@ -44,7 +43,7 @@ def to_json(value: Any) -> dict[str, Any]:
     }
 
 
-def from_json(value: dict[str, Any]) -> Any:
+def from_json(value: dict[str, object]) -> object:
     """The inverse, for `json.loads`; only plain numbers become arrays."""
     return array_of(value, "data") if value.get("__numpy_array__") is True else value
 
@@ -74,7 +73,9 @@ class FramedJson:
             except OSError as error:
                 raise ConnectFailed(f"cannot connect to {self.url}: {error}") from error
 
-    def call(self, method: str, value: Any, timeout: float, until: float | None = None) -> Any:
+    def call(
+        self, method: str, value: object, timeout: float, until: float | None = None
+    ) -> object:
         """What the model's `method` returned; after any error the connection is closed.
 
         `until`: an earlier end of the `timeout` s on the monotonic clock, shared by several calls.
@@ -118,7 +119,7 @@ class FramedJson:
             )
         return _read(sock, size, deadline)
 
-    def _result(self, method: str, answer: bytes) -> Any:
+    def _result(self, method: str, answer: bytes) -> object:
         try:
             value = json.loads(answer, object_hook=from_json)
         except (ValueError, RecursionError) as error:

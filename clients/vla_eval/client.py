@@ -18,7 +18,6 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -71,10 +70,10 @@ class VlaEvalClientOptions:
         return tuple(name for name in self.cameras.split(",") if name)
 
 
-def encode(observation: Observation, options: VlaEvalClientOptions) -> dict[str, Any]:
+def encode(observation: Observation, options: VlaEvalClientOptions) -> dict[str, object]:
     """The payload of one `observation`."""
     images = observation["images"]
-    sent: dict[str, Any] = {
+    sent: dict[str, object] = {
         "images": {CAMERAS[name]: images[name] for name in options.views},
         "task_description": observation.get("instruction", ""),
     }
@@ -109,7 +108,7 @@ class VlaEvalSession:
             )
         name = str(greeting.get("model_server", ""))
         announced = {key: json_values(greeting[key]) for key in ANNOUNCED if key in greeting}
-        self.hello: dict[str, Any] = {
+        self.hello: dict[str, object] = {
             "dialect": "vla-eval",
             "server": printable(f"{name} {greeting.get('harness_version', '')}", 200),
             "said": announced,
@@ -130,7 +129,7 @@ class VlaEvalSession:
 
     def infer(
         self, id: int, observation: Observation, timeout: float
-    ) -> tuple[Any, Mapping[str, float]]:
+    ) -> tuple[object, Mapping[str, float]]:
         number = self._send("observation", encode(observation, self._options))
         answer = self._answer("action", number, timeout)
         chunk = as_chunk(answer.get("actions", answer.get("action")))
@@ -140,19 +139,19 @@ class VlaEvalSession:
             chunk = invert_grippers(chunk, ActionSpace(self._options.space))
         return chunk, {}
 
-    def end(self, id: int, outcome: Mapping[str, Any]) -> None:
+    def end(self, id: int, outcome: Mapping[str, object]) -> None:
         self._send("episode_end", {"metrics": {"success": bool(outcome.get("success"))}})
 
     def close(self) -> None:
         self._socket.close()
 
-    def _send(self, kind: str, payload: dict[str, Any]) -> int:
+    def _send(self, kind: str, payload: dict[str, object]) -> int:
         self._number += 1
         message = {"type": kind, "payload": payload, "seq": self._number, "timestamp": time.time()}
         self._socket.send(message)
         return self._number
 
-    def _answer(self, expected: str, number: int, timeout: float) -> Mapping[str, Any]:
+    def _answer(self, expected: str, number: int, timeout: float) -> Mapping[str, object]:
         """The payload of the answer of type `expected` to message `number`."""
         answer = self._socket.receive(timeout, expected)
         kind, body = answer.get("type"), answer.get("payload")
@@ -175,7 +174,7 @@ class VlaEvalSession:
 ANNOUNCED = ("observation_params", "action_spec", "observation_spec", "capabilities")
 
 
-def _mismatches(announced: Mapping[str, Any], options: VlaEvalClientOptions) -> list[str]:
+def _mismatches(announced: Mapping[str, object], options: VlaEvalClientOptions) -> list[str]:
     """What the server announces of its actions and does not fit the options."""
     parts = announced.get("action_spec")
     if not isinstance(parts, Mapping):

@@ -19,7 +19,6 @@ import contextlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime, timezone
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,7 +72,7 @@ class XPolicyLabClientOptions:
             raise ValueError(f"option frequency={self.frequency} is no frequency in Hz")
 
 
-def encode(observation: Observation, options: XPolicyLabClientOptions) -> dict[str, Any]:
+def encode(observation: Observation, options: XPolicyLabClientOptions) -> dict[str, object]:
     """`payload.observation` of one query."""
     instruction = observation.get("instruction", "")
     images = observation["images"]
@@ -107,7 +106,7 @@ def robot_state(observation: Observation) -> dict[str, NDArray[np.float32]]:
     return found
 
 
-def decode(answer: Any, observation: Observation, options: XPolicyLabClientOptions) -> Any:
+def decode(answer: object, observation: Observation, options: XPolicyLabClientOptions) -> object:
     """The chunk in `payload.actions`; raises PolicyAnswerError for an action that names nothing."""
     if isinstance(answer, Mapping):
         answer = [answer]
@@ -123,7 +122,7 @@ def decode(answer: Any, observation: Observation, options: XPolicyLabClientOptio
     )
 
 
-def _action(item: Any, seen: Mapping[str, NDArray[np.float32]], space: str) -> list[Any]:
+def _action(item: object, seen: Mapping[str, NDArray[np.float32]], space: str) -> list[object]:
     body = "arm_joint_state" if space == "joint" else "ee_pose"
     if not isinstance(item, Mapping) or not any(f"{arm}_{body}" in item for arm in ARMS):
         names = sorted(map(str, item)) if isinstance(item, Mapping) else type(item).__name__
@@ -131,7 +130,7 @@ def _action(item: Any, seen: Mapping[str, NDArray[np.float32]], space: str) -> l
             f"the policy answered an action of {names}, without left_{body} or right_{body}; is "
             "option space its action_type?"
         )
-    row: list[Any] = []
+    row: list[object] = []
     for arm in ARMS:
         for name in (f"{arm}_{body}", f"{arm}_ee_joint_state"):
             value = np.ravel(item.get(name, seen[name]))
@@ -148,8 +147,8 @@ class XPolicyLabSession:
 
     def __init__(self, params: ConnectionParams, options: XPolicyLabClientOptions) -> None:
         self._options, self._timeouts = options, params.timeouts
-        self._trial: dict[str, Any] = {}
-        self._ids: dict[str, Any] = {}
+        self._trial: dict[str, object] = {}
+        self._ids: dict[str, object] = {}
         self.spec = PolicySpec(
             name="xpolicylab",
             state=options.state,
@@ -160,7 +159,7 @@ class XPolicyLabSession:
         )
         self._socket = MsgpackSocket(params, binary_form)
         greeting = self._call(0, "hello", "hello_ack", {}, params.timeouts.hello)
-        self.hello: dict[str, Any] = {
+        self.hello: dict[str, object] = {
             "dialect": "xpolicylab",
             "server": printable(str(greeting.get("server", "")), 200),
             "spec": self.spec.to_json(),
@@ -186,7 +185,7 @@ class XPolicyLabSession:
 
     def infer(
         self, id: int, observation: Observation, timeout: float
-    ) -> tuple[Any, Mapping[str, float]]:
+    ) -> tuple[object, Mapping[str, float]]:
         payload = {"observation": encode(observation, self._options)}
         step = int(observation["step"])
         answer = self._call(id, "infer", "infer_result", payload, timeout, step)
@@ -194,7 +193,7 @@ class XPolicyLabSession:
         timing = {"infer_ms": float(spent)} if isinstance(spent, int | float) else {}
         return decode(answer.get("actions"), observation, self._options), timing
 
-    def end(self, id: int, outcome: Mapping[str, Any]) -> None:
+    def end(self, id: int, outcome: Mapping[str, object]) -> None:
         payload = {**self._ids, **self._trial, "success": bool(outcome.get("success", False))}
         self._call(id, "trial_end", "trial_end_ack", payload, self._timeouts.end)
 
@@ -202,8 +201,8 @@ class XPolicyLabSession:
         self._socket.close()
 
     def _call(
-        self, id: int, kind: str, expected: str, payload: Any, timeout: float, step: int = 0
-    ) -> Mapping[str, Any]:
+        self, id: int, kind: str, expected: str, payload: object, timeout: float, step: int = 0
+    ) -> Mapping[str, object]:
         """The payload of the answer of type `expected` to this message."""
         name = f"{id}-{kind}"
         message = {

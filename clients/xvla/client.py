@@ -113,7 +113,7 @@ class XvlaSession:
             execute=options.execute,
             action_dim=ActionSpace("joint" if joint else "ee").width,
         )
-        self.hello: dict[str, Any] = {
+        self.hello: dict[str, object] = {
             "dialect": "xvla",
             "spec": self.spec.to_json(),
             "options": plain_options(options),
@@ -130,7 +130,7 @@ class XvlaSession:
 
     def infer(
         self, id: int, observation: Observation, timeout: float
-    ) -> tuple[Any, Mapping[str, float]]:
+    ) -> tuple[object, Mapping[str, float]]:
         try:
             answer = self._server.post(self._path, self.body(observation), timeout)
         except ServerError as error:
@@ -146,7 +146,7 @@ class XvlaSession:
         self._asked_at = int(observation["step"])
         return self._chunk, {}
 
-    def _actions(self, chunk: Any) -> NDArray[np.float32]:
+    def _actions(self, chunk: object) -> NDArray[np.float32]:
         joint = self._options.space == "joint"
         width = ActionSpace("joint").width if joint else 2 * ARM
         if not isinstance(chunk, np.ndarray) or chunk.ndim != 2 or chunk.shape[1] != width:
@@ -164,7 +164,7 @@ class XvlaSession:
 
     def body(self, observation: Observation) -> bytes:
         """The JSON body of one request."""
-        sent: dict[str, Any] = {}
+        sent: dict[str, object] = {}
         for place, name in enumerate(self._options.views):
             image = observation["images"][name]
             sent[f"image{place}"] = dumps(
@@ -198,7 +198,7 @@ class XvlaSession:
         done = int(observation["step"]) - self._asked_at
         return self._chunk[min(done, len(self._chunk)) - 1] if done > 0 else None
 
-    def end(self, id: int, outcome: Mapping[str, Any]) -> None:
+    def end(self, id: int, outcome: Mapping[str, object]) -> None:
         """Nothing to send."""
 
     def close(self) -> None:
