@@ -183,3 +183,26 @@ class SupportsClose(Protocol):
     """A policy that has something to release."""
 
     def close(self) -> None: ...
+
+
+@runtime_checkable
+class SupportsReconnect(Protocol):
+    """A policy behind a server, to which a new connection can be opened."""
+
+    def reconnect(self) -> None: ...
+
+
+@runtime_checkable
+class HasHello(Protocol):
+    """A policy behind a server, with the server's greeting as JSON values."""
+
+    @property
+    def hello(self) -> Mapping[str, Any]: ...
+
+
+@runtime_checkable
+class HasTiming(Protocol):
+    """A policy whose server reports its times of the last answer [ms]."""
+
+    @property
+    def last_timing(self) -> Mapping[str, float]: ...

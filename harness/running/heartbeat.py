@@ -15,10 +15,22 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from robospa.harness.factory import is_url
 from robospa.harness.running.messages import Activity, Heartbeat
 from robospa.observation import Observation
-from robospa.protocol.policy import PolicySpec, TrialInfo
+from robospa.protocol.policy import (
+    HasHello,
+    HasTiming,
+    Policy,
+    PolicySpec,
+    SupportsClose,
+    SupportsEnd,
+    SupportsReconnect,
+    TrialInfo,
+)
 
 HEARTBEAT_SECONDS = 1.0
 
@@ -68,7 +80,7 @@ class HeartbeatSender:
 class MonitoredPolicy:
     """A policy whose calls `heartbeat` knows about. What a policy may lack does nothing here."""
 
-    def __init__(self, policy: Any, target: str, heartbeat: HeartbeatSender) -> None:
+    def __init__(self, policy: Policy, target: str, heartbeat: HeartbeatSender) -> None:
         self._policy = policy
         self.target = target
         self._heartbeat = heartbeat
@@ -76,46 +88,45 @@ class MonitoredPolicy:
     @property
     def spec(self) -> PolicySpec:
         """The policy's."""
-        spec: PolicySpec = self._policy.spec
-        return spec
+        return self._policy.spec
 
     @property
     def hello(self) -> Mapping[str, Any]:
         """The server's greeting; empty for a policy without a server."""
-        return getattr(self._policy, "hello", None) or {}
+        return self._policy.hello if isinstance(self._policy, HasHello) else {}
 
     @property
     def last_timing(self) -> Mapping[str, float]:
         """The server's times of the last answer [ms]; empty if it reports none."""
-        return getattr(self._policy, "last_timing", None) or {}
+        return self._policy.last_timing if isinstance(self._policy, HasTiming) else {}
 
     def reset(self, trial: TrialInfo) -> None:
         """Begin a trial."""
         with self._heartbeat.policy(self.target):
             self._policy.reset(trial)
 
-    def infer(self, observation: Observation) -> Any:
+    def infer(self, observation: Observation) -> NDArray[np.float32]:
         """The policy's answer, not yet checked."""
         with self._heartbeat.policy(self.target):
             return self._policy.infer(observation)
 
     def end(self, outcome: Mapping[str, Any]) -> None:
         """Tell the policy how its trial went, if it wants to know."""
-        self._call_if_there("end", outcome)
+        if isinstance(self._policy, SupportsEnd):
+            with self._heartbeat.policy(self.target):
+                self._policy.end(outcome)
 
     def reconnect(self) -> None:
         """Open a new connection to the policy's server, if it has one."""
-        self._call_if_there("reconnect")
+        if isinstance(self._policy, SupportsReconnect):
+            with self._heartbeat.policy(self.target):
+                self._policy.reconnect()
 
     def close(self) -> None:
         """Free what the policy holds."""
-        self._call_if_there("close")
-
-    def _call_if_there(self, name: str, *arguments: Any) -> None:
-        method = getattr(self._policy, name, None)
-        if method is not None:
+        if isinstance(self._policy, SupportsClose):
             with self._heartbeat.policy(self.target):
-                method(*arguments)
+                self._policy.close()
 
 
 class HeartbeatMonitor:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from robospa.harness.factory import open_policy
-from robospa.protocol.policy import PolicySpec
+from robospa.protocol.policy import HasHello, PolicySpec, SupportsClose
 from robospa.results.records.manifest import RunError
 from robospa.results.records.schema import parse
 from robospa.trial import TrialKey
@@ -91,10 +91,9 @@ def probe(target: str, given: Mapping[str, Any], wait: float = 0.0) -> ProbedPol
     if "timeouts" in options:
         options["timeouts"] = replace(options["timeouts"], wait=wait)
     policy = open_policy(target, options)
-    hello = dict(getattr(policy, "hello", None) or {"dialect": "in process"})
-    close = getattr(policy, "close", None)
-    if close is not None:
-        close()
+    hello = dict(policy.hello) if isinstance(policy, HasHello) else {"dialect": "in process"}
+    if isinstance(policy, SupportsClose):
+        policy.close()
     return ProbedPolicy(target, policy.spec, hello)
 
 
