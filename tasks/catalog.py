@@ -142,7 +142,7 @@ def build_scene(
         embodiment=embodiment,
         mode=mode,
         objects=draft.objects,
-        facts=draft.facts,
+        facts=draft.facts.to_json(),
         table_shift=draft.table_shift,
     )
     return vary(scene, lambda part: _generator(f"{identity}/{part}"))

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from robospa.categories import BASIC, SPATIAL
 from robospa.tasks.events import Event
+from robospa.tasks.facts import SceneFacts
 from robospa.tasks.instructions.grammar import Phrasings, Templates
 from robospa.tasks.plan import Skill
 from robospa.tasks.scene import Scene, SceneObject
@@ -37,7 +38,7 @@ class Draft:
     """What a task draws for a seed: its objects, its facts and, rarely, a shifted table."""
 
     objects: tuple[SceneObject, ...]
-    facts: Mapping[str, Any]
+    facts: SceneFacts
     table_shift: tuple[float, float] = (0.0, 0.0)
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from robospa.geometry import Array, Pose, yaw_rotation
+from robospa.tasks.families.picking import PickFacts
 from robospa.tasks.goals.pick import Lift, PickTracker
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText
@@ -48,18 +49,18 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
         for i, (x, y) in enumerate(points)
     )
     target = min(blocks, key=lambda block: block.pose.position[0])
-    return Draft(blocks, {"target": target.name})
+    return Draft(blocks, PickFacts(target.name))
 
 
 def goal(scene: Scene) -> Tracker:
     """The target rises by more than 6 cm while a gripper carries it."""
     names = tuple(item.name for item in scene.objects)
-    return PickTracker(str(scene.facts["target"]), names, Lift(rise=0.06))
+    return PickTracker(PickFacts.of(scene).target, names, Lift(rise=0.06))
 
 
 def plan(scene: Scene) -> tuple[Skill, ...]:
     """Pick the target."""
-    return (Pick(str(scene.facts["target"])),)
+    return (Pick(PickFacts.of(scene).target),)
 
 
 def slots(scene: Scene) -> Slots:

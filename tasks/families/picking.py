@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.tabletop import draw_look
 from robospa.tasks.goals.pick import Lift, PickTracker
 from robospa.tasks.objects import object_model
@@ -17,6 +18,13 @@ from robospa.tasks.sampling.region import LayoutError
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Tracker
 from robospa.workcell import Workcell
+
+
+@dataclass(frozen=True)
+class PickFacts(SceneFacts):
+    """What the pick tasks have in common."""
+
+    target: str
 
 
 def pick_name(kind: str, family: str) -> str:
@@ -33,14 +41,14 @@ def lifted(lift: Lift) -> Callable[[Scene], Tracker]:
     def goal(scene: Scene) -> Tracker:
         above = None if lift.above is None else lift.above + scene.table_rise
         names = tuple(o.name for o in scene.objects)
-        return PickTracker(str(scene.facts["target"]), names, replace(lift, above=above))
+        return PickTracker(PickFacts.of(scene).target, names, replace(lift, above=above))
 
     return goal
 
 
 def pick_target(scene: Scene) -> tuple[Skill, ...]:
     """The plan: pick the target."""
-    return (Pick(str(scene.facts["target"])),)
+    return (Pick(PickFacts.of(scene).target),)
 
 
 BLOCK_HALF = 0.015

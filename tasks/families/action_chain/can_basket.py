@@ -8,10 +8,12 @@ the pill bottle on the pad, both grippers open. The order is asked for, but not 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
 from robospa.tasks import objects
+from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.tabletop import Item, draw_look, named, radius, standing
 from robospa.tasks.goals.checklist import Checklist, Counter
 from robospa.tasks.goals.parts import Part, Rests, level_with
@@ -45,6 +47,17 @@ LEVELS = {
     n: Level(candidates=1 + len(set(steps) - {"c"}), subtasks=n, steps=200 * n)
     for n, steps in STEPS.items()
 }
+
+
+@dataclass(frozen=True)
+class Facts(SceneFacts):
+    """Things by their role; those of later levels may be missing."""
+
+    can: str
+    basket: str = ""
+    bread: str = ""
+    pill_bottle: str = ""
+    pad: str = ""
 
 
 def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
@@ -84,25 +97,26 @@ def _draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft | N
     if place is None:
         return None
     items.append(Item("can", "can", standing(place), can, fixed=True))
-    return Draft(*named(rng, items))
+    scene_objects, names = named(rng, items)
+    return Draft(scene_objects, Facts(**names))
 
 
 def goal(scene: Scene) -> Checklist:
     """Clicks and placements in the asked order."""
-    facts = scene.facts
-    can = scene.object(facts["can"])
+    facts = Facts.of(scene)
+    can = scene.object(facts.can)
     model = objects.object_model(can.asset, can.params)
     counter = PressCounter(can.name, model.frames["press"], CAN_BOX)
     subtasks: list[Counter | Part] = []
     for step in STEPS[scene.level]:
         if step == "b":
-            basket = scene.object(facts["basket"])
+            basket = scene.object(facts.basket)
             rim = scene.table_top + objects.object_model(basket.asset, basket.params).size[2]
             height = (scene.table_top - 0.01, rim + 0.01)
-            subtasks.append(Rests(facts["bread"], (facts["basket"],), level_with(0.05, *height)))
+            subtasks.append(Rests(facts.bread, (facts.basket,), level_with(0.05, *height)))
         elif step == "p":
             height = (scene.table_top - 0.004, scene.table_top + 0.006)
-            subtasks.append(Rests(facts["pill_bottle"], (facts["pad"],), level_with(0.03, *height)))
+            subtasks.append(Rests(facts.pill_bottle, (facts.pad,), level_with(0.03, *height)))
         else:
             subtasks.append(counter)
     return Checklist(subtasks, released=True)
@@ -110,17 +124,17 @@ def goal(scene: Scene) -> Checklist:
 
 def plan(scene: Scene) -> tuple[Skill, ...]:
     """The asked steps in the asked order; home at the end, which opens the grippers."""
-    facts = scene.facts
+    facts = Facts.of(scene)
     skills: list[Skill] = []
     for step in STEPS[scene.level]:
         if step == "c":
-            skills.append(Press(facts["can"], arm="left"))
+            skills.append(Press(facts.can, arm="left"))
         elif step == "b":
-            skills.append(Pick(facts["bread"], arm="right"))
-            skills.append(Place(facts["bread"], on=facts["basket"], drop=0.02, arm="right"))
+            skills.append(Pick(facts.bread, arm="right"))
+            skills.append(Place(facts.bread, on=facts.basket, drop=0.02, arm="right"))
         else:
-            skills.append(Pick(facts["pill_bottle"], lift=0.08, arm="left"))
-            skills.append(Place(facts["pill_bottle"], on=facts["pad"], arm="left"))
+            skills.append(Pick(facts.pill_bottle, lift=0.08, arm="left"))
+            skills.append(Place(facts.pill_bottle, on=facts.pad, arm="left"))
     return (*skills, Home())
 
 

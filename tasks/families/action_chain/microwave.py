@@ -9,11 +9,13 @@ is asked for, but not enforced.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
 from robospa.geometry import Pose
 from robospa.tasks import objects
+from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.tabletop import (
     Item,
     draw_look,
@@ -74,6 +76,16 @@ ELBOW = 0.04
 """Free space [m] around the bell."""
 
 
+@dataclass(frozen=True)
+class Facts(SceneFacts):
+    """Bell, microwave, the thing to be moved and the one that stays; "" where there is none."""
+
+    bell: str
+    microwave: str = ""
+    object: str = ""
+    reference: str = ""
+
+
 def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """Bell, microwave and things, each in its region, none where the door swings."""
     return retry(
@@ -94,7 +106,8 @@ def _draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft | N
             if things is None:
                 return None
             items += things
-    return Draft(*named(rng, items))
+    scene_objects, names = named(rng, items)
+    return Draft(scene_objects, Facts(**names))
 
 
 def _point(rng: np.random.Generator, x: tuple[float, float], y: tuple[float, float]) -> Point:
@@ -149,29 +162,29 @@ def beside(pose: Pose, other: Pose) -> bool:
 
 def goal(scene: Scene) -> Checklist:
     """Clicks, the door and the placement in the asked order."""
-    facts = scene.facts
-    bell = scene.object(facts["bell"])
+    facts = Facts.of(scene)
+    bell = scene.object(facts.bell)
     press = objects.object_model(bell.asset, bell.params).frames["press"]
     parts: dict[str, Counter | Part] = {"c": PressCounter(bell.name, press, BELL_BOX, arm=0)}
-    if "microwave" in facts:
-        parts["o"] = Opened(facts["microwave"], OPEN * _door().upper)
-    if "object" in facts:
-        parts["p"] = Rests(facts["object"], (facts["reference"],), beside)
+    if facts.microwave:
+        parts["o"] = Opened(facts.microwave, OPEN * _door().upper)
+    if facts.object:
+        parts["p"] = Rests(facts.object, (facts.reference,), beside)
     return Checklist([parts[step] for step in STEPS[scene.level]], released=True)
 
 
 def plan(scene: Scene) -> tuple[Skill, ...]:
     """The asked steps in the asked order; the arms go home at the end, which opens them."""
-    facts = scene.facts
+    facts = Facts.of(scene)
     skills: list[Skill] = []
     for step in STEPS[scene.level]:
         if step == "c":
-            skills.append(Press(facts["bell"], arm="left"))
+            skills.append(Press(facts.bell, arm="left"))
         elif step == "o":
-            skills.append(Open(facts["microwave"], arm="left"))
+            skills.append(Open(facts.microwave, arm="left"))
         else:
-            name = facts["object"]
-            thing, other = scene.object(name), scene.object(facts["reference"])
+            name = facts.object
+            thing, other = scene.object(name), scene.object(facts.reference)
             bottom = objects.object_model(thing.asset, thing.params).bottom
             x, y, _ = other.pose.position
             arm = side(thing.pose.position[0])
@@ -182,7 +195,8 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
 
 def slots(scene: Scene) -> Slots:
     """How the things are said."""
-    things = [scene.object(scene.facts[r]) for r in ("object", "reference") if r in scene.facts]
+    facts = Facts.of(scene)
+    things = [scene.object(name) for name in (facts.object, facts.reference) if name]
     phrasings = [look_phrasings(objects.object_model(o.asset, o.params)) for o in things]
     said = TEXT.slots("arm", "bell", *(("microwave",) if scene.level >= 2 else ()))
     for role, (train, held) in zip(("object", "reference"), phrasings, strict=False):

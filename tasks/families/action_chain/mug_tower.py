@@ -8,12 +8,14 @@ left area, every further block on the one before it.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
 
 import numpy as np
 
 from robospa.geometry import Pose
+from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.action_chain.stations import frame_of
 from robospa.tasks.families.dustbin.floor_bin import reachable
 from robospa.tasks.families.tabletop import Item, draw_look, in_view, named, radius, standing
@@ -63,6 +65,18 @@ HELD_RADIUS = 0.03
 LEVELS = {n: Level(candidates=n, subtasks=n, steps=200 + 200 * n) for n in range(1, 6)}
 
 
+@dataclass(frozen=True)
+class Facts(SceneFacts):
+    """Mug, rack, and as many blocks as the level has, by colour."""
+
+    mug: str
+    rack: str
+    red: str = ""
+    green: str = ""
+    blue: str = ""
+    yellow: str = ""
+
+
 def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """Mug and rack on the right, blocks on the left."""
     return retry(
@@ -91,7 +105,8 @@ def _draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft | N
         pose = standing(point, float(rng.uniform(-BLOCK_YAW, BLOCK_YAW)), HALF)
         paint = {"half": [HALF] * 3, "color": list(COLORS[color])}
         items.append(Item(color, "block", pose, paint))
-    return Draft(*named(rng, items))
+    scene_objects, names = named(rng, items)
+    return Draft(scene_objects, Facts(**names))
 
 
 def _rack_seen(workcell: Workcell, point: Point) -> bool:
@@ -115,7 +130,8 @@ def _block_point(
 
 def _blocks(scene: Scene) -> list[str]:
     """Names of the blocks, bottom to top."""
-    return [scene.facts[color] for color in COLORS if color in scene.facts]
+    facts = Facts.of(scene)
+    return [name for name in (facts.red, facts.green, facts.blue, facts.yellow) if name]
 
 
 def _hangs(handle: Pose, peg: Pose, above: float) -> Near:
@@ -148,8 +164,8 @@ def _on_top(pose: Pose, below: Pose) -> bool:
 
 def goal(scene: Scene) -> Checklist:
     """The mug on the peg, the red block in its area, the others on top; nothing latches."""
-    facts = scene.facts
-    mug, rack = facts["mug"], facts["rack"]
+    facts = Facts.of(scene)
+    mug, rack = facts.mug, facts.rack
     handle, peg = frame_of(scene, mug, "handle"), frame_of(scene, rack, "hang")
     near = _hangs(handle, peg, HANGING + scene.table_rise)
     parts: list[Counter | Part] = [Rests(mug, (rack,), near, grip=MUG_GRIP)]
@@ -168,7 +184,7 @@ def goal(scene: Scene) -> Checklist:
 def plan(scene: Scene) -> tuple[Skill, ...]:
     """The right arm hangs the mug, the left one builds."""
     blocks = _blocks(scene)
-    skills: list[Skill] = [Hang(scene.facts["mug"], on=scene.facts["rack"], arm="right")]
+    skills: list[Skill] = [Hang(Facts.of(scene).mug, on=Facts.of(scene).rack, arm="right")]
     for i, name in enumerate(blocks):
         skills.append(Pick(name, lift=0.07 + 2 * HALF * i, arm="left"))
         if i == 0:

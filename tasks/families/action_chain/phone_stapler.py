@@ -9,10 +9,12 @@ bin on the floor. The order is asked for, but not enforced.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
 from robospa.geometry import Pose
+from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.action_chain.stations import button, frame_of
 from robospa.tasks.families.dustbin.floor_bin import BIN, TABLE_SHIFT, container
 from robospa.tasks.families.tabletop import Item, draw_look, in_view, named, radius, standing
@@ -58,6 +60,18 @@ LEVELS = {
 }
 
 
+@dataclass(frozen=True)
+class Facts(SceneFacts):
+    """Things by their role; those of later levels may be missing."""
+
+    phone: str
+    phone_stand: str
+    stapler: str = ""
+    table_trash_bin: str = ""
+    garbage: str = ""
+    dustbin: str = ""
+
+
 def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """This level's things, each in its region, no two touching."""
     return retry(
@@ -87,7 +101,8 @@ def _draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft | N
         start = Pose((bin_x + dx, bin_y + dy, GARBAGE_Z))
         items.append(Item("garbage", "garbage", start, {"look": 0}))
         items.append(Item("dustbin", "dustbin", BIN, {"look": 0}, fixed=True))
-    return Draft(*named(rng, items), TABLE_SHIFT)
+    scene_objects, names = named(rng, items)
+    return Draft(scene_objects, Facts(**names), TABLE_SHIFT)
 
 
 def _within(box: tuple[float, float, float], frame: Pose) -> Near:
@@ -101,28 +116,28 @@ def _within(box: tuple[float, float, float], frame: Pose) -> Near:
 
 def goal(scene: Scene) -> Checklist:
     """Phone on the stand, presses, and the ball in the bin; only the presses latch."""
-    facts = scene.facts
-    stand = facts["phone_stand"]
+    facts = Facts.of(scene)
+    stand = facts.phone_stand
     near = _within(BOX, frame_of(scene, stand))
-    subtasks: list[Counter | Part] = [Rests(facts["phone"], (stand,), near)]
-    if "stapler" in facts:
-        subtasks += [button(scene, facts["stapler"])] * PRESSES[scene.level]
+    subtasks: list[Counter | Part] = [Rests(facts.phone, (stand,), near)]
+    if facts.stapler:
+        subtasks += [button(scene, facts.stapler)] * PRESSES[scene.level]
     if scene.level == DUMP_LEVEL:
-        inside = container(scene.object(facts["dustbin"]))
-        subtasks.append(Inside(facts["garbage"], facts["dustbin"], inside, latched=False))
-        tools = {facts["table_trash_bin"]: DUMP_LEVEL - 1}
+        inside = container(scene.object(facts.dustbin))
+        subtasks.append(Inside(facts.garbage, facts.dustbin, inside, latched=False))
+        tools = {facts.table_trash_bin: DUMP_LEVEL - 1}
         return Checklist(subtasks, may_fall=inside.over, tools=tools)
     return Checklist(subtasks)
 
 
 def plan(scene: Scene) -> tuple[Skill, ...]:
     """The right arm docks the phone and presses, the left one empties the small bin."""
-    facts = scene.facts
-    skills: list[Skill] = [Dock(facts["phone"], on=facts["phone_stand"], arm="right")]
-    if "stapler" in facts:
-        skills += [Press(facts["stapler"], arm="right")] * PRESSES[scene.level]
+    facts = Facts.of(scene)
+    skills: list[Skill] = [Dock(facts.phone, on=facts.phone_stand, arm="right")]
+    if facts.stapler:
+        skills += [Press(facts.stapler, arm="right")] * PRESSES[scene.level]
     if scene.level == DUMP_LEVEL:
-        skills += [Home("right"), Pour(facts["table_trash_bin"], into=facts["dustbin"], arm="left")]
+        skills += [Home("right"), Pour(facts.table_trash_bin, into=facts.dustbin, arm="left")]
     return tuple(skills)
 
 

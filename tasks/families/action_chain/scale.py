@@ -10,10 +10,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
 from robospa.geometry import Pose
+from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.action_chain.stations import button, frame_of, there_and_back
 from robospa.tasks.families.tabletop import Item, draw_look, in_view, named, radius, standing
 from robospa.tasks.goals.checklist import Checklist, Counter
@@ -33,7 +35,6 @@ STEPS = {1: "b", 2: "bo", 3: "boc", 4: "bocB", 5: "bocBO"}
 """What is asked for: b bell onto the scale, o thing onto the stand, c a click, B and O back."""
 
 THINGS = ("mouse", "stapler", "rubikscube", "toycar", "remote_control")
-PLACES = {"b": ("bell", "scale"), "o": ("object", "stand")}
 FIXED = {"scale": "electronic_scale", "stand": "display_stand", "cards": "playing_cards"}
 
 REGIONS = {
@@ -63,6 +64,22 @@ LEVELS = {
 }
 
 
+@dataclass(frozen=True)
+class Facts(SceneFacts):
+    """Things by their role; those of later levels may be missing."""
+
+    bell: str
+    scale: str
+    object: str = ""
+    stand: str = ""
+    cards: str = ""
+
+    @property
+    def moves(self) -> dict[str, tuple[str, str]]:
+        """What goes onto what, by the letter of the step."""
+        return {"b": (self.bell, self.scale), "o": (self.object, self.stand)}
+
+
 def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """This level's things, each in its region."""
     return retry(
@@ -87,7 +104,8 @@ def _draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft | N
         taken[role] = (point, room)
         pose = standing(point, float(rng.uniform(-turn, turn)))
         items.append(Item(role, asset, pose, look, fixed=role in FIXED))
-    return Draft(*named(rng, items))
+    scene_objects, names = named(rng, items)
+    return Draft(scene_objects, Facts(**names))
 
 
 def _allowed(
@@ -111,14 +129,14 @@ def _back(pose: Pose, start: Pose) -> bool:
 
 def goal(scene: Scene) -> Checklist:
     """On scale and stand (latched once it has to go back), a click, back on the table."""
-    facts, steps = scene.facts, STEPS[scene.level]
+    facts, steps = Facts.of(scene), STEPS[scene.level]
     subtasks: list[Counter | Part] = []
     for step in steps:
         if step == "c":
-            subtasks.append(button(scene, facts["cards"], own_side_closed=True))
+            subtasks.append(button(scene, facts.cards, own_side_closed=True))
             continue
-        name, place = (facts[role] for role in PLACES[step.lower()])
-        if step in PLACES:
+        name, place = facts.moves[step.lower()]
+        if step in facts.moves:
             near = on_spot(ON, BELOW, ABOVE, Pose(), frame_of(scene, place))
             latched = step.upper() in steps
             subtasks.append(Rests(name, (place,), near, latched=latched, grip=GRIP))
@@ -129,20 +147,20 @@ def goal(scene: Scene) -> Checklist:
 
 def plan(scene: Scene) -> tuple[Skill, ...]:
     """The bell by the left arm, the thing by the right one, there and back to where it was."""
-    facts = scene.facts
+    facts = Facts.of(scene)
     moves = {
-        key: Place(facts[role], on=facts[place], arm="left" if key == "b" else "right")
-        for key, (role, place) in PLACES.items()
-        if role in facts
+        key: Place(name, on=place, arm="left" if key == "b" else "right")
+        for key, (name, place) in facts.moves.items()
+        if name
     }
-    return there_and_back(scene, STEPS[scene.level], moves, facts.get("cards"))
+    return there_and_back(scene, STEPS[scene.level], moves, facts.cards or None)
 
 
 def slots(scene: Scene) -> Slots:
     """How the things are said."""
     said = TEXT.slots("bell", "scale")
     if scene.level >= 2:
-        said |= TEXT.slots(f"object.{scene.object(scene.facts['object']).asset}", "stand")
+        said |= TEXT.slots(f"object.{scene.object(Facts.of(scene).object).asset}", "stand")
     return said | (TEXT.slots("cards") if scene.level >= 3 else {})
 
 

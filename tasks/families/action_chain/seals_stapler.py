@@ -8,9 +8,11 @@ right one on the other, then the stapler was pressed. The order is asked for, bu
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
+from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.action_chain.stations import button, frame_of
 from robospa.tasks.families.tabletop import Item, draw_look, named, radius, side, standing
 from robospa.tasks.goals.checklist import Checklist, Counter
@@ -45,6 +47,22 @@ LEVELS = {
 }
 
 
+@dataclass(frozen=True)
+class Facts(SceneFacts):
+    """Seals and pads by side, and the stapler; those of later levels may be missing."""
+
+    left_seal: str
+    left_pad: str
+    right_seal: str = ""
+    right_pad: str = ""
+    stapler: str = ""
+
+    @property
+    def pairs(self) -> dict[str, tuple[str, str]]:
+        """Seal and pad of each side, by its letter."""
+        return {"l": (self.left_seal, self.left_pad), "r": (self.right_seal, self.right_pad)}
+
+
 def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """Seals and pads of this level's sides, and the stapler between them."""
     return retry(
@@ -76,32 +94,31 @@ def _draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft | N
             return None
         pose = standing(spot, float(rng.uniform(-math.pi, math.pi)))
         items.append(Item("stapler", "stapler", pose, look, fixed=True))
-    return Draft(*named(rng, items))
+    scene_objects, names = named(rng, items)
+    return Draft(scene_objects, Facts(**names))
 
 
 def goal(scene: Scene) -> Checklist:
     """Three counters at most; the flags follow the asked order."""
-    facts = scene.facts
+    facts = Facts.of(scene)
     counters: dict[str, Counter | Part] = {
-        key: StampCounter(facts[f"{at}_seal"], facts[f"{at}_pad"])
-        for key, at in SIDES.items()
-        if f"{at}_seal" in facts
+        key: StampCounter(seal, pad) for key, (seal, pad) in facts.pairs.items() if seal
     }
-    if "stapler" in facts:
-        counters["s"] = button(scene, facts["stapler"])
+    if facts.stapler:
+        counters["s"] = button(scene, facts.stapler)
     return Checklist([counters[step] for step in STEPS[scene.level]])
 
 
 def plan(scene: Scene) -> tuple[Skill, ...]:
     """Each seal by the arm on its side, all its stamps with one grasp."""
-    facts, steps = scene.facts, STEPS[scene.level]
+    facts, steps = Facts.of(scene), STEPS[scene.level]
     skills: list[Skill] = [
-        Stamp(facts[f"{at}_seal"], on=facts[f"{at}_pad"], times=steps.count(key), arm=at)
-        for key, at in SIDES.items()
+        Stamp(seal, on=pad, times=steps.count(key), arm=SIDES[key])
+        for key, (seal, pad) in facts.pairs.items()
         if key in steps
     ]
     if "s" in steps:
-        stapler = scene.object(facts["stapler"])
+        stapler = scene.object(facts.stapler)
         press = frame_of(scene, stapler.name, "press")
         skills.append(Press(stapler.name, arm=side(stapler.pose.apply(press.position)[0])))
     return tuple(skills)

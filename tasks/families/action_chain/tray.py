@@ -9,11 +9,13 @@ level asks).
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
 from robospa.geometry import Pose
 from robospa.tasks import objects
+from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.action_chain.stations import button, frame_of, there_and_back
 from robospa.tasks.families.tabletop import Item, draw_look, in_view, named, radius, standing
 from robospa.tasks.goals.checklist import Checklist, Counter
@@ -54,6 +56,21 @@ LEVELS = {
 }
 
 
+@dataclass(frozen=True)
+class Facts(SceneFacts):
+    """Things by their role; those of later levels may be missing."""
+
+    tray: str
+    burger: str
+    fries: str = ""
+    bell: str = ""
+
+    @property
+    def food(self) -> dict[str, str]:
+        """What is served, by role."""
+        return {"burger": self.burger, "fries": self.fries}
+
+
 def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """The tray in the middle, food beside it, the bell behind."""
     what = f"objects of Place_Burger_Fries_Click_Bell level {level}"
@@ -89,7 +106,8 @@ def _draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft | N
         if place is None:
             return None
         items.append(Item("bell", "bell", standing(place), look, fixed=True))
-    return Draft(*named(rng, items))
+    scene_objects, names = named(rng, items)
+    return Draft(scene_objects, Facts(**names))
 
 
 def _at_home(pose: Pose, start: Pose) -> bool:
@@ -100,34 +118,34 @@ def _at_home(pose: Pose, start: Pose) -> bool:
 
 def goal(scene: Scene) -> Checklist:
     """Food on the tray (latched once it has to go back), a click, food at home again."""
-    facts, steps = scene.facts, STEPS[scene.level]
+    facts, steps = Facts.of(scene), STEPS[scene.level]
     back = "B" in steps
     subtasks: list[Counter | Part] = []
     for step in steps:
         if step == "c":
-            subtasks.append(button(scene, facts["bell"], CLICK_BOX, own_side_closed=True))
+            subtasks.append(button(scene, facts.bell, CLICK_BOX, own_side_closed=True))
             continue
         role, _ = FOOD[step.lower()]
         if step in FOOD:
-            spot = frame_of(scene, facts["tray"], HALF[role])
+            spot = frame_of(scene, facts.tray, HALF[role])
             near = on_spot(ON_TRAY, -TRAY_HEIGHT, TRAY_HEIGHT, Pose(), spot)
-            subtasks.append(Rests(facts[role], (facts["tray"],), near, latched=back, grip=GRIP))
+            subtasks.append(Rests(facts.food[role], (facts.tray,), near, latched=back, grip=GRIP))
         else:
             after = steps.index(step.lower())
-            subtasks.append(Rests(facts[role], (), _at_home, after=after, grip=GRIP))
+            subtasks.append(Rests(facts.food[role], (), _at_home, after=after, grip=GRIP))
     return Checklist(subtasks)
 
 
 def plan(scene: Scene) -> tuple[Skill, ...]:
     """Each food by the arm on its side, there and back."""
-    facts = scene.facts
-    tray = scene.object(facts["tray"])
+    facts = Facts.of(scene)
+    tray = scene.object(facts.tray)
     moves = {}
     for key, (role, _) in FOOD.items():
-        if role in facts:
+        if facts.food[role]:
             place = tray.pose.apply(frame_of(scene, tray.name, HALF[role]).position)
-            moves[key] = Place(facts[role], place, arm=HALF[role])
-    return there_and_back(scene, STEPS[scene.level], moves, facts.get("bell"))
+            moves[key] = Place(facts.food[role], place, arm=HALF[role])
+    return there_and_back(scene, STEPS[scene.level], moves, facts.bell or None)
 
 
 def slots(scene: Scene) -> Slots:

@@ -13,7 +13,7 @@ import numpy as np
 
 from robospa.tasks.families.distance import object_sets as sets
 from robospa.tasks.families.distance.scenes import Family, Thing, layouts, put_down, shifted
-from robospa.tasks.families.picking import lifted, pick_target
+from robospa.tasks.families.picking import PickFacts, lifted, pick_target
 from robospa.tasks.goals.pick import Lift
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText
@@ -92,6 +92,13 @@ SET_B = Palette(sets.ASSETS_B, never=("yellow",))
 """Fries are yellow in any carton."""
 
 
+@dataclass(frozen=True)
+class Facts(PickFacts):
+    """Target and its colour word."""
+
+    color: str
+
+
 def color_task(family: Family, colored: Colored, what: str) -> Task:
     """The task that names the target of `family` by its colour."""
     rules = family.rules
@@ -103,10 +110,10 @@ def color_task(family: Family, colored: Colored, what: str) -> Task:
         things, words = colored(level, rng)
         objects, order = put_down(rng, workcell, points, things, family.yaw)
         target = int(rng.integers(len(objects)))
-        return Draft(objects, {"target": f"object_{target}", "color": words[order[target]]})
+        return Draft(objects, Facts(f"object_{target}", words[order[target]]))
 
     def slots(scene: Scene) -> Slots:
-        return TEXT.slots("target", color=scene.facts["color"], noun=family.noun)
+        return TEXT.slots("target", color=Facts.of(scene).color, noun=family.noun)
 
     return Task(
         name=f"Basic_Color_{family.name}",

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from robospa.geometry import Array, Pose, Vec3, yaw_rotation
-from robospa.tasks.families.picking import lifted, pick_target
+from robospa.tasks.families.picking import PickFacts, lifted, pick_target
 from robospa.tasks.goals.pick import Lift
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText
@@ -60,6 +60,21 @@ WORDS: Mapping[str, Mapping[str, str]] = {
 DISC = ((0.0, -0.12), 0.015)
 """No block lies within this squared radius [m2] of this point."""
 LEVELS: Mapping[int, Level] = {k: Level(k + 1, 1, 150) for k in range(1, 6)}
+
+
+@dataclass(frozen=True)
+class Facts(PickFacts):
+    """Target, and its rank in the one measure that differs; rank 1 is the largest."""
+
+    size_rank: int = 0
+    height_rank: int = 0
+    length_rank: int = 0
+    area_rank: int = 0
+
+    @property
+    def rank(self) -> int:
+        """The rank that is asked for, in the measure of the scene."""
+        return self.size_rank or self.height_rank or self.length_rank or self.area_rank
 
 
 def tight_row(points: Points) -> bool:
@@ -181,7 +196,8 @@ def draw(
         for i in range(count)
     )
     target = int(rng.integers(count))
-    return Draft(objects, {"target": f"object_{target}", f"{measure.word}_rank": ranks[target]})
+    rank = {f"{measure.word}_rank": ranks[target]}
+    return Draft(objects, Facts(f"object_{target}", **rank))
 
 
 def rank_task(measure: Measure, layouts: Mapping[int, Layout]) -> Task:
@@ -189,7 +205,7 @@ def rank_task(measure: Measure, layouts: Mapping[int, Layout]) -> Task:
     word = measure.word
 
     def slots(scene: Scene) -> Slots:
-        rank, count = int(scene.facts[f"{word}_rank"]), len(scene.objects)
+        rank, count = Facts.of(scene).rank, len(scene.objects)
         if count == 2:
             which = "larger" if rank == 1 else "smaller"
         else:

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from robospa.tasks.families.picking import lifted, pick_name, pick_target
+from robospa.tasks.families.picking import PickFacts, lifted, pick_name, pick_target
 from robospa.tasks.families.tabletop import draw_look, standing
 from robospa.tasks.goals.pick import Lift
 from robospa.tasks.instructions.grammar import Slots
@@ -71,6 +71,16 @@ class Line:
     wording: str = "noun"
 
 
+@dataclass(frozen=True)
+class Facts(PickFacts):
+    """Target, and its column and row, counted from 1 in the directions; no row in a single line."""
+
+    column: int
+    column_direction: str
+    row: int = 0
+    row_direction: str = ""
+
+
 def drawer(line: Line, fixed: bool) -> Draw:
     """The draw of `line`: the grid, what stands where, and a uniform cell to count to.
 
@@ -92,14 +102,17 @@ def drawer(line: Line, fixed: bool) -> Draw:
         from_right, from_far = False, True
         if not fixed:
             from_right, from_far = bool(rng.integers(2)), bool(rng.integers(2))
-        facts: dict[str, object] = {
-            "target": f"object_{cells.index(row * grid.columns + column)}",
-            "column": grid.columns - column if from_right else column + 1,
-            "column_direction": "right_to_left" if from_right else "left_to_right",
-        }
+        facts = Facts(
+            target=f"object_{cells.index(row * grid.columns + column)}",
+            column=grid.columns - column if from_right else column + 1,
+            column_direction="right_to_left" if from_right else "left_to_right",
+        )
         if grid.rows > 1:
-            facts["row"] = grid.rows - row if from_far else row + 1
-            facts["row_direction"] = "far_to_near" if from_far else "near_to_far"
+            facts = replace(
+                facts,
+                row=grid.rows - row if from_far else row + 1,
+                row_direction="far_to_near" if from_far else "near_to_far",
+            )
         return Draft(tuple(objects), facts)
 
     return draw
@@ -109,17 +122,17 @@ def line_task(line: Line, basic: bool = False) -> Task:
     """The CPI task of `line` or, if `basic`, the SOI one with its fixed directions."""
 
     def slots(scene: Scene) -> Slots:
-        facts = scene.facts
-        number, word = ordinal(facts["column"])
-        a, b = facts["column_direction"].split("_to_")
+        facts = Facts.of(scene)
+        number, word = ordinal(facts.column)
+        a, b = facts.column_direction.split("_to_")
         said = {
             **TEXT.slots("viewer", f"noun.{line.noun}"),
             "column": TEXT.phrasings("rank", number=number, word=word),
             "column_direction": TEXT.phrasings("column_direction", a=a, b=b),
         }
-        if "row" in facts:
-            number, word = ordinal(facts["row"])
-            a, b = facts["row_direction"].split("_to_")
+        if facts.row:
+            number, word = ordinal(facts.row)
+            a, b = facts.row_direction.split("_to_")
             most = {"near": "nearest", "far": "farthest"}
             said["row"] = TEXT.phrasings("rank", number=number, word=word)
             said["row_direction"] = TEXT.phrasings(

@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
+from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.click_order import objects
 from robospa.tasks.families.click_order.clicking import click, click_counter, clickable_look
 from robospa.tasks.families.tabletop import Item, in_view, named, side, standing
@@ -39,6 +41,13 @@ LEAD, TURN, LAYOUTS = 0.012, 0.12, 400
 LEVELS = {n: Level(candidates=n, subtasks=n, steps=200 * n) for n in range(1, 6)}
 
 
+@dataclass(frozen=True)
+class Facts(SceneFacts):
+    """The bells in the order of the clicks."""
+
+    order: tuple[str, ...]
+
+
 def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """The ring of bells, all of one look, shifted to a random place of the region."""
     params = clickable_look(rng, "bell")
@@ -48,7 +57,7 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
         for i, point in enumerate(points)
     ]
     scene_objects, names = named(rng, items)
-    return Draft(scene_objects, {"order": [names[item.role] for item in items]})
+    return Draft(scene_objects, Facts(tuple(names[item.role] for item in items)))
 
 
 def _ring(level: int, rng: np.random.Generator, seen: Callable[[Point], bool]) -> list[Point]:
@@ -107,18 +116,18 @@ def _regular(ring: list[Point], distance: float) -> bool:
 
 def goal(scene: Scene) -> ClickInOrder:
     """The bells in their order."""
-    return ClickInOrder([click_counter(scene, name) for name in scene.facts["order"]])
+    return ClickInOrder([click_counter(scene, name) for name in Facts.of(scene).order])
 
 
 def plan(scene: Scene) -> tuple[Skill, ...]:
     """One press each."""
-    return tuple(click(scene, name) for name in scene.facts["order"])
+    return tuple(click(scene, name) for name in Facts.of(scene).order)
 
 
 def slots(scene: Scene) -> Slots:
     """How the bells and their order are said, and the arm on the side of the first."""
-    first = scene.object(scene.facts["order"][0])
-    count = len(scene.facts["order"])
+    first = scene.object(Facts.of(scene).order[0])
+    count = len(Facts.of(scene).order)
     if count == 1:
         said = objects.TEXT.slots("thing.bell")
     elif count == 2:

@@ -6,8 +6,11 @@ front of the robot. Success: all were clicked in that order with a closed grippe
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
+from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.click_order.clicking import (
     click,
     click_counter,
@@ -34,6 +37,13 @@ AREA, MIDDLE, DISTANCE = Area((-0.25, 0.25), (-0.20, 0.0)), 0.05, 0.14
 LEVELS = {n: Level(candidates=n, subtasks=n, steps=200 * n) for n in range(1, 6)}
 
 
+@dataclass(frozen=True)
+class Facts(SceneFacts):
+    """The things in the order of the clicks."""
+
+    order: tuple[str, ...]
+
+
 def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """The first things of the order, at random places off the middle."""
     looks = [(asset, clickable_look(rng, asset)) for asset in ORDER[:level]]
@@ -43,22 +53,22 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
         for (asset, look), point in zip(looks, points, strict=True)
     ]
     scene_objects, names = named(rng, items)
-    return Draft(scene_objects, {"order": [names[asset] for asset in ORDER[:level]]})
+    return Draft(scene_objects, Facts(tuple(names[asset] for asset in ORDER[:level])))
 
 
 def goal(scene: Scene) -> ClickInOrder:
     """The things in their order."""
-    return ClickInOrder([click_counter(scene, name) for name in scene.facts["order"]])
+    return ClickInOrder([click_counter(scene, name) for name in Facts.of(scene).order])
 
 
 def plan(scene: Scene) -> tuple[Skill, ...]:
     """One press each."""
-    return tuple(click(scene, name) for name in scene.facts["order"])
+    return tuple(click(scene, name) for name in Facts.of(scene).order)
 
 
 def slots(scene: Scene) -> Slots:
     """How the things are said, and the arm on the side of the first."""
-    order = [scene.object(name) for name in scene.facts["order"]]
+    order = [scene.object(name) for name in Facts.of(scene).order]
     arm = acting_arm(side(order[0].pose.position[0]))
     if len(order) == 1:
         return TEXT.slots(f"thing.{order[0].asset}") | arm

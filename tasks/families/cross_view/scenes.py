@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from robospa.geometry import Array
 from robospa.tasks.families.picking import (
     BLOCK_HALF,
+    PickFacts,
     draw_params,
     drawn_yaw,
     lifted,
@@ -190,6 +191,15 @@ def layouts(workcell: Workcell, spread: Spread, level: int) -> Array:
     return found.reshape(-1, *starts.shape[1:])
 
 
+@dataclass(frozen=True)
+class Facts(PickFacts):
+    """Target, viewer, and the extreme in the robot's frame and in the viewer's words."""
+
+    extreme: str
+    viewpoint: str
+    position: str
+
+
 def drawer(spread: Spread, views: tuple[str, ...]) -> Draw:
     """The draw of `spread`: a uniform viewpoint of `views`, a layout, what lies where, and one of
     the objects that are extreme there, each equally likely: the scene does not tell which.
@@ -217,12 +227,12 @@ def drawer(spread: Spread, views: tuple[str, ...]) -> Draw:
             yaw = drawn_yaw(rng, workcell, assets[k], params, y, 0.75 if is_block else math.pi)
             pose = standing((x, y), yaw, BLOCK_HALF if is_block else 0.0)
             objects.append(SceneObject(f"object_{k}", assets[k], pose, params))
-        facts = {
-            "target": f"object_{order.index(asked)}",
-            "extreme": EXTREMES[extreme],
-            "viewpoint": view,
-            "position": SEEN_AS[view][extreme],
-        }
+        facts = Facts(
+            target=f"object_{order.index(asked)}",
+            extreme=EXTREMES[extreme],
+            viewpoint=view,
+            position=SEEN_AS[view][extreme],
+        )
         return Draft(tuple(objects), facts)
 
     return draw
@@ -230,7 +240,8 @@ def drawer(spread: Spread, views: tuple[str, ...]) -> Draw:
 
 def slots(scene: Scene) -> Slots:
     """What the instruction says: the extreme in the viewer's words, and the viewer."""
-    position, view = scene.facts["position"], scene.facts["viewpoint"]
+    facts = Facts.of(scene)
+    position, view = facts.position, facts.viewpoint
     side = position.removesuffix("most")
     return TEXT.slots("target", f"view.{view}", "convention", position=position, side=side)
 

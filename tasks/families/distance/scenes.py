@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from robospa.geometry import Array
-from robospa.tasks.families.picking import drawn_yaw, lifted, pick_target
+from robospa.tasks.families.picking import PickFacts, drawn_yaw, lifted, pick_target
 from robospa.tasks.families.tabletop import draw_look, standing
 from robospa.tasks.goals.pick import Lift
 from robospa.tasks.instructions.grammar import Phrasings, Slots
@@ -244,6 +244,14 @@ def put_down(
     return tuple(objects), order
 
 
+@dataclass(frozen=True)
+class Facts(PickFacts):
+    """Target, reference, and the target's rank; rank 1 is the farthest."""
+
+    reference: str
+    distance_rank: int
+
+
 def draw(level: int, rng: np.random.Generator, workcell: Workcell, family: Family) -> Draft:
     """A layout with clear distances, a uniform rank, then what lies where."""
     rules = family.rules
@@ -254,11 +262,7 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell, family: Famil
     target = 1 + int(np.argsort(-distances(points))[rank - 1])
     things = family.things(level, rng)
     objects, order = put_down(rng, workcell, points, things, family.yaw)
-    facts = {
-        "target": f"object_{order.index(target)}",
-        "reference": f"object_{order.index(0)}",
-        "distance_rank": rank,
-    }
+    facts = Facts(f"object_{order.index(target)}", f"object_{order.index(0)}", rank)
     return Draft(objects, facts)
 
 
@@ -266,8 +270,8 @@ def distance_task(family: Family, name: str, what: str) -> Task:
     """The task that asks for the k-th farthest of `what` from a reference."""
 
     def slots(scene: Scene) -> Slots:
-        names = family.reference(scene.object(str(scene.facts["reference"])))
-        rank = int(scene.facts["distance_rank"])
+        names = family.reference(scene.object(Facts.of(scene).reference))
+        rank = Facts.of(scene).distance_rank
         number, word = ordinal(rank)
         entry = "rank.first" if rank == 1 else "rank.other"
         said = TEXT.slots(entry, "object", number=number, word=word, noun=family.noun)

@@ -8,11 +8,13 @@ right arm cannot reach the bin, so it hands bottles over by setting them down in
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
 from robospa.tasks import objects
+from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.dustbin.floor_bin import (
     BIN,
     EXCHANGE,
@@ -41,6 +43,14 @@ HALF_HEIGHT = 0.07
 LEVELS = {n: Level(candidates=n, subtasks=n, steps=400 * n) for n in range(1, 6)}
 
 
+@dataclass(frozen=True)
+class Facts(SceneFacts):
+    """The bin and the bottles."""
+
+    dustbin: str
+    bottles: tuple[str, ...]
+
+
 def _usable(workcell: Workcell, point: Point) -> bool:
     """Off the middle strip, within reach of the arm on that side, a bottle's middle in view."""
     return (
@@ -59,17 +69,14 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     for i, (point, look) in enumerate(zip(points, looks, strict=True)):
         items.append(Item(f"bottle {i}", "bottle", standing(point), {"look": int(look)}))
     scene_objects, names = named(rng, items)
-    facts = {
-        "dustbin": names["dustbin"],
-        "bottles": [names[f"bottle {i}"] for i in range(level)],
-    }
+    facts = Facts(names["dustbin"], tuple(names[f"bottle {i}"] for i in range(level)))
     return Draft(scene_objects, facts, TABLE_SHIFT)
 
 
 def goal(scene: Scene) -> Tracker:
     """All bottles inside the bin's walls."""
-    dustbin = scene.object(scene.facts["dustbin"])
-    names = scene.facts["bottles"]
+    dustbin = scene.object(Facts.of(scene).dustbin)
+    names = Facts.of(scene).bottles
     return collect(names, container(dustbin), lost_below=scene.table_top - 0.1)
 
 
@@ -85,9 +92,9 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
         right = point[0] > 0
         return right, math.dist(point, EXCHANGE if right else BIN.position[:2])
 
-    dustbin = scene.facts["dustbin"]
+    dustbin = Facts.of(scene).dustbin
     skills: list[Skill] = []
-    for name in sorted(scene.facts["bottles"], key=turn):
+    for name in sorted(Facts.of(scene).bottles, key=turn):
         skills += discard(scene, name, dustbin)
     return tuple(skills)
 
@@ -100,7 +107,7 @@ def bottle_slots(count: int) -> Slots:
 
 def slots(scene: Scene) -> Slots:
     """How the bottles and the bin are said."""
-    return bottle_slots(len(scene.facts["bottles"]))
+    return bottle_slots(len(Facts.of(scene).bottles))
 
 
 TASK = Task(

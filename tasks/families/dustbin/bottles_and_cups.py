@@ -7,9 +7,12 @@ Success: every bottle came to rest in the bin, every cup was put on a coaster, b
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from robospa.geometry import Pose
+from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.action_chain.stations import frame_of
 from robospa.tasks.families.dustbin import bottles as only_bottles
 from robospa.tasks.families.dustbin.floor_bin import (
@@ -61,6 +64,35 @@ LEVELS = {
 }
 
 
+@dataclass(frozen=True)
+class Facts(SceneFacts):
+    """The bin, the bottles, and from level 4 on cups and their coasters."""
+
+    dustbin: str
+    bottle_0: str
+    bottle_1: str = ""
+    bottle_2: str = ""
+    cup_0: str = ""
+    cup_1: str = ""
+    coaster_0: str = ""
+    coaster_1: str = ""
+
+    @property
+    def bottles(self) -> tuple[str, ...]:
+        """The bottles, the left one first."""
+        return _there(self.bottle_0, self.bottle_1, self.bottle_2)
+
+    @property
+    def cups(self) -> tuple[str, ...]:
+        """The cups."""
+        return _there(self.cup_0, self.cup_1)
+
+    @property
+    def coasters(self) -> tuple[str, ...]:
+        """The coasters, in the order of the cups."""
+        return _there(self.coaster_0, self.coaster_1)
+
+
 def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """Bottles on the far half, cups and coasters on the near one."""
     return retry(lambda: _draw(level, rng, workcell), f"objects of Place_Bottle_Cup level {level}")
@@ -99,38 +131,36 @@ def _draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft | N
         far = [(p, PAIR_DISTANCE if p == cup else CUP_DISTANCE) for p in points]
         if put(f"coaster_{i}", COASTER_X[i], CUP_Y, far) is None:
             return None
-    return Draft(*named(rng, items), TABLE_SHIFT)
+    scene_objects, names = named(rng, items)
+    return Draft(scene_objects, Facts(**names), TABLE_SHIFT)
 
 
-def _roles(scene: Scene, kind: str) -> list[str]:
-    """Names of all bottles, cups or coasters, in the sheet's order."""
-    return [scene.facts[role] for role in sorted(scene.facts) if role.startswith(kind)]
+def _there(*names: str) -> tuple[str, ...]:
+    return tuple(name for name in names if name)
 
 
 def goal(scene: Scene) -> Checklist:
     """Bottles in the bin, then cups on coasters, any cup on any coaster; everything latches."""
-    inside = container(scene.object(scene.facts["dustbin"]))
-    parts: list[Counter | Part] = [
-        Inside(name, scene.facts["dustbin"], inside) for name in _roles(scene, "bottle")
-    ]
+    facts = Facts.of(scene)
+    inside = container(scene.object(facts.dustbin))
+    parts: list[Counter | Part] = [Inside(name, facts.dustbin, inside) for name in facts.bottles]
     turns = [0] * len(parts)
-    coasters = _roles(scene, "coaster")
-    for name in _roles(scene, "cup"):
-        near = on_spot(REACH, -HEIGHT, HEIGHT, Pose(), frame_of(scene, coasters[0]))
-        parts.append(Rests(name, tuple(coasters), near, latched=True, grip=GRIP))
+    for name in facts.cups:
+        near = on_spot(REACH, -HEIGHT, HEIGHT, Pose(), frame_of(scene, facts.coasters[0]))
+        parts.append(Rests(name, facts.coasters, near, latched=True, grip=GRIP))
         turns.append(1)
     return Checklist(parts, released=True, radius=0.2, may_fall=inside.over, turns=turns)
 
 
 def plan(scene: Scene) -> tuple[Skill, ...]:
     """The left bottle, those on the right through the middle, then each cup to its own coaster."""
-    dustbin = scene.facts["dustbin"]
-    cups, coasters = _roles(scene, "cup"), _roles(scene, "coaster")
+    facts = Facts.of(scene)
+    cups, coasters = facts.cups, facts.coasters
     taken = [(scene.object(name).pose.position[:2], ROOM) for name in (*cups, *coasters)]
     middle = exchange_place(taken)
     skills: list[Skill] = []
-    for name in _roles(scene, "bottle"):
-        skills += discard(scene, name, dustbin, middle)
+    for name in facts.bottles:
+        skills += discard(scene, name, facts.dustbin, middle)
     for cup, coaster in zip(cups, coasters, strict=True):
         arm = side(scene.object(cup).pose.position[0])
         skills += [Pick(cup, lift=0.08, arm=arm), Place(cup, on=coaster, arm=arm)]

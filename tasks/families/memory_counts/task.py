@@ -8,9 +8,11 @@ many cannot be made good.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
+from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.click_order.clicking import click_counter, press_point
 from robospa.tasks.families.tabletop import Item, draw_look, named, side, standing
 from robospa.tasks.goals.clicks import PressCounts
@@ -41,6 +43,14 @@ MOST = 5
 LEVELS = {n: Level(candidates=n, subtasks=n, steps=200 * n) for n in range(1, 6)}
 
 
+@dataclass(frozen=True)
+class Facts(SceneFacts):
+    """The staplers from left to right, and how often each is pressed."""
+
+    row: tuple[str, ...]
+    counts: tuple[int, ...]
+
+
 def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """A row of staplers, and how often each is to be pressed."""
     y = float(rng.uniform(*Y))
@@ -54,29 +64,29 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
         )
         for i, x in enumerate(ROWS[level])
     ]
-    counts = [int(n) for n in rng.integers(1, MOST + 1, level)]
+    counts = tuple(int(n) for n in rng.integers(1, MOST + 1, level))
     scene_objects, names = named(rng, items)
-    return Draft(scene_objects, {"row": [names[item.role] for item in items], "counts": counts})
+    return Draft(scene_objects, Facts(tuple(names[item.role] for item in items), counts))
 
 
 def goal(scene: Scene) -> PressCounts:
     """The row from left to right with its counts; grippers need not be closed (official)."""
-    row = [click_counter(scene, name, closed=False) for name in scene.facts["row"]]
-    return PressCounts(row, scene.facts["counts"])
+    row = [click_counter(scene, name, closed=False) for name in Facts.of(scene).row]
+    return PressCounts(row, Facts.of(scene).counts)
 
 
 def plan(scene: Scene) -> tuple[Skill, ...]:
     """From left to right, every stapler by the arm on its press point's side."""
     skills: list[Skill] = []
-    for name, count in zip(scene.facts["row"], scene.facts["counts"], strict=True):
+    for name, count in zip(Facts.of(scene).row, Facts.of(scene).counts, strict=True):
         arm = side(press_point(scene.object(name))[0])
-        skills += [Press(name, arm=arm)] * int(count)
+        skills += [Press(name, arm=arm)] * count
     return tuple(skills)
 
 
 def slots(scene: Scene) -> Slots:
     """How the counts are said."""
-    counts = [int(n) for n in scene.facts["counts"]]
+    counts = Facts.of(scene).counts
     if len(counts) == 1:
         return TEXT.slots("stapler") | {"times": _times(counts[0])}
     words = [_times(n)[0][0] for n in counts]

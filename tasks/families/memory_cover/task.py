@@ -6,14 +6,18 @@ the covers have been opened in the asked order of colours, each put 13 cm behind
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
+from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.tabletop import Item, named, side, standing
 from robospa.tasks.goals.memory import Cover, UncoverInOrder
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.instructions.words import color_orders
 from robospa.tasks.plan import Home, Pick, Place, Skill, Wait
+from robospa.tasks.sampling.region import shuffled
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draft, Level, Task
 from robospa.workcell import Workcell
@@ -54,6 +58,15 @@ OPEN_BELOW = 0.005
 LEVELS = {n: Level(candidates=n, subtasks=n, steps=50 + 200 * n) for n in range(1, 6)}
 
 
+@dataclass(frozen=True)
+class Facts(SceneFacts):
+    """Colours, covers and blocks in the order in which covers are opened."""
+
+    colors: tuple[str, ...]
+    covers: tuple[str, ...]
+    blocks: tuple[str, ...]
+
+
 def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """Different colours in a fixed row, opened in a uniformly random order."""
     chosen = [list(COLORS)[int(i)] for i in rng.permutation(len(COLORS))[:level]]
@@ -64,13 +77,13 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
         items.append(Item(f"{color} block", "block", pose, block, fixed=True))
         cover = Item(f"{color} cover", "cover", standing((x, Y)), appears_at=COVERED_AT)
         items.append(cover)
-    order = [chosen[int(i)] for i in rng.permutation(level)]
+    order = tuple(shuffled(rng, chosen))
     scene_objects, names = named(rng, items)
-    facts = {
-        "colors": order,
-        "covers": [names[f"{color} cover"] for color in order],
-        "blocks": [names[f"{color} block"] for color in order],
-    }
+    facts = Facts(
+        colors=order,
+        covers=tuple(names[f"{color} cover"] for color in order),
+        blocks=tuple(names[f"{color} block"] for color in order),
+    )
     return Draft(scene_objects, facts)
 
 
@@ -81,7 +94,7 @@ def _open_place(scene: Scene, block: str) -> tuple[float, float]:
 
 def goal(scene: Scene) -> UncoverInOrder:
     """The covers in the asked order."""
-    pairs = zip(scene.facts["covers"], scene.facts["blocks"], strict=True)
+    pairs = zip(Facts.of(scene).covers, Facts.of(scene).blocks, strict=True)
     covers = [Cover(cover, _open_place(scene, block)) for cover, block in pairs]
     return UncoverInOrder(covers, scene.table_top + OPEN_BELOW)
 
@@ -89,7 +102,7 @@ def goal(scene: Scene) -> UncoverInOrder:
 def plan(scene: Scene) -> tuple[Skill, ...]:
     """Hold still until the covers are there, then open them one by one."""
     skills: list[Skill] = [Wait(COVERED_AT + 0.6)]
-    for cover, block in zip(scene.facts["covers"], scene.facts["blocks"], strict=True):
+    for cover, block in zip(Facts.of(scene).covers, Facts.of(scene).blocks, strict=True):
         x, y = _open_place(scene, block)
         arm = side(x)
         skills.append(Pick(cover, lift=0.08, arm=arm))
@@ -99,7 +112,7 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
 
 def slots(scene: Scene) -> Slots:
     """How the order of the colours is said, and where a cover goes."""
-    colors = list(scene.facts["colors"])
+    colors = Facts.of(scene).colors
     if len(colors) == 1:
         return TEXT.slots("where", "block", color=colors[0])
     return TEXT.slots("where") | {"order": color_orders(colors)}

@@ -8,10 +8,12 @@ lie in the strip nearest to the robot, no other block has ever been there, both 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
 from robospa.geometry import Pose
+from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.memory_wall.wall import HOLD_STILL, STAND_TOP, WALL, row, stand, wall
 from robospa.tasks.families.tabletop import Item, named, side, standing
 from robospa.tasks.goals.cue import AfterCue
@@ -56,6 +58,16 @@ GOAL_Y, GOAL_X = -0.18, 0.16
 LEVELS = {n: Level(candidates=2 * n, subtasks=n, steps=50 + 200 * n) for n in range(1, 6)}
 
 
+@dataclass(frozen=True)
+class Facts(SceneFacts):
+    """The colours shown, the blocks of these colours, all other blocks, and the wall."""
+
+    colors: tuple[str, ...]
+    targets: tuple[str, ...]
+    others: tuple[str, ...]
+    wall: str
+
+
 def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """Colours on the stand; the same and as many others on the table, all places alike."""
     colors = [list(COLORS)[int(i)] for i in rng.permutation(len(COLORS))[: 2 * level]]
@@ -69,12 +81,12 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     for color, point in zip(colors, points, strict=True):
         items.append(Item(color, "block", standing(point, height=HALF), _look(color)))
     scene_objects, names = named(rng, items)
-    facts = {
-        "colors": colors[:level],
-        "targets": [names[color] for color in colors[:level]],
-        "others": [names[color] for color in colors[level:]],
-        "wall": names[WALL],
-    }
+    facts = Facts(
+        colors=tuple(colors[:level]),
+        targets=tuple(names[color] for color in colors[:level]),
+        others=tuple(names[color] for color in colors[level:]),
+        wall=names[WALL],
+    )
     return Draft(scene_objects, facts)
 
 
@@ -84,13 +96,13 @@ def _look(color: str) -> dict[str, list[float]]:
 
 def goal(scene: Scene) -> AfterCue:
     """The shown colours' blocks in the strip near the robot, after the wall has come."""
-    blocks = gather(scene.facts["targets"], scene.facts["others"], NEAR)
-    return AfterCue(blocks, [scene.facts["wall"]])
+    blocks = gather(Facts.of(scene).targets, Facts.of(scene).others, NEAR)
+    return AfterCue(blocks, [Facts.of(scene).wall])
 
 
 def plan(scene: Scene) -> tuple[Skill, ...]:
     """Hold still, then bring the blocks of each side to the nearest free place of the strip."""
-    targets = sorted(scene.facts["targets"], key=lambda n: scene.object(n).pose.position[0])
+    targets = sorted(Facts.of(scene).targets, key=lambda n: scene.object(n).pose.position[0])
     skills: list[Skill] = [HOLD_STILL]
     for name, x in zip(targets, row(len(targets), GOAL_X), strict=True):
         arm = side(scene.object(name).pose.position[0])
@@ -101,7 +113,7 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
 
 def slots(scene: Scene) -> Slots:
     """What is shown, and where the blocks have to go; no colour is named."""
-    count = len(scene.facts["targets"])
+    count = len(Facts.of(scene).targets)
     return TEXT.slots("wall", f"blocks.{by_count(count)}", "strip", word=NUMBERS[count])
 
 

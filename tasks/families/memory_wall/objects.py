@@ -8,10 +8,12 @@ in the order in which they stood on the stand from left to right.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
 from robospa.geometry import Pose, yaw_rotation
+from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.click_order.clicking import (
     TURNS,
     click,
@@ -43,6 +45,15 @@ AREA, MIDDLE, DISTANCE = Area((-0.27, 0.27), (-0.21, -0.05)), 0.05, 0.10
 LEVELS = {n: Level(candidates=n, subtasks=n, steps=50 + 200 * n) for n in range(1, 6)}
 
 
+@dataclass(frozen=True)
+class Facts(SceneFacts):
+    """Objects and kinds in the order shown, and the wall."""
+
+    order: tuple[str, ...]
+    kinds: tuple[str, ...]
+    wall: str
+
+
 def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """Different kinds, in random order on the stand, at random places on the table."""
     kinds = [KINDS[int(i)] for i in rng.permutation(len(KINDS))[:level]]
@@ -56,24 +67,24 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
         yaw = float(rng.uniform(-math.pi, math.pi)) if kind in TURNS else 0.0
         items.append(Item(kind, kind, standing(point, yaw), look, fixed=True))
     scene_objects, names = named(rng, items)
-    facts = {"order": [names[kind] for kind in kinds], "kinds": kinds, "wall": names[WALL]}
+    facts = Facts(tuple(names[kind] for kind in kinds), tuple(kinds), names[WALL])
     return Draft(scene_objects, facts)
 
 
 def goal(scene: Scene) -> AfterCue:
     """The objects on the table in the order of the stand, after the wall has come."""
-    order = ClickInOrder([click_counter(scene, name) for name in scene.facts["order"]])
-    return AfterCue(order, [scene.facts["wall"]])
+    order = ClickInOrder([click_counter(scene, name) for name in Facts.of(scene).order])
+    return AfterCue(order, [Facts.of(scene).wall])
 
 
 def plan(scene: Scene) -> tuple[Skill, ...]:
     """Hold still, then one press each."""
-    return (HOLD_STILL, *(click(scene, name) for name in scene.facts["order"]))
+    return (HOLD_STILL, *(click(scene, name) for name in Facts.of(scene).order))
 
 
 def slots(scene: Scene) -> Slots:
     """What is shown and which way round to go; no object is named."""
-    count = len(scene.facts["order"])
+    count = len(Facts.of(scene).order)
     return TEXT.slots("wall", f"objects.{by_count(count)}", word=NUMBERS[count])
 
 

@@ -8,11 +8,13 @@ at its place in its partner's direction, both grippers open.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
 from robospa.geometry import yaw_rotation
 from robospa.tasks import objects
+from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.memory_wall.wall import HOLD_STILL, WALL, row, wall
 from robospa.tasks.families.tabletop import Item, named, side, standing
 from robospa.tasks.goals.cue import AfterCue
@@ -40,6 +42,17 @@ FULL_TURN = 0.2
 LEVELS = {n: Level(candidates=2 * n, subtasks=n, steps=50 + 200 * n) for n in range(1, 6)}
 
 
+@dataclass(frozen=True)
+class Facts(SceneFacts):
+    """Both rows, how the far and the near blocks lie (indices of TURNS), and the wall."""
+
+    near: tuple[str, ...]
+    far: tuple[str, ...]
+    turns: tuple[int, ...]
+    start: tuple[int, ...]
+    wall: str
+
+
 def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """Two rows; a near block never lies as its partner does. All blocks of a row look alike."""
     shown = [int(i) for i in rng.integers(4, size=level)]
@@ -54,23 +67,23 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
         pose = standing((x, NEAR_Y), TURNS[turn])
         items.append(Item(f"near {i}", "t_block", pose, {"look": look, "kind": 1 - far_kind}))
     scene_objects, names = named(rng, items)
-    facts = {
-        "near": [names[f"near {i}"] for i in range(level)],
-        "far": [names[f"far {i}"] for i in range(level)],
-        "turns": shown,
-        "start": start,
-        "wall": names[WALL],
-    }
+    facts = Facts(
+        near=tuple(names[f"near {i}"] for i in range(level)),
+        far=tuple(names[f"far {i}"] for i in range(level)),
+        turns=tuple(shown),
+        start=tuple(start),
+        wall=names[WALL],
+    )
     return Draft(scene_objects, facts)
 
 
 def goal(scene: Scene) -> AfterCue:
     """The near blocks turned like the far ones, after the wall has come."""
-    pairs = zip(scene.facts["near"], scene.facts["turns"], strict=True)
+    pairs = zip(Facts.of(scene).near, Facts.of(scene).turns, strict=True)
     wanted = [
         Wanted(name, yaw_rotation(TURNS[turn]), scene.table_top + LOW) for name, turn in pairs
     ]
-    return AfterCue(Restore(wanted, scene.facts["far"]), [scene.facts["wall"]])
+    return AfterCue(Restore(wanted, Facts.of(scene).far), [Facts.of(scene).wall])
 
 
 def plan(scene: Scene) -> tuple[Skill, ...]:
@@ -79,8 +92,8 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
     Where the wrist cannot, half a turn is made of two quarters.
     """
     skills: list[Skill] = [HOLD_STILL]
-    facts = scene.facts
-    for name, start, turn in zip(facts["near"], facts["start"], facts["turns"], strict=True):
+    facts = Facts.of(scene)
+    for name, start, turn in zip(facts.near, facts.start, facts.turns, strict=True):
         place = scene.object(name).pose.position
         arm = side(place[0])
         half = (turn - start) % 4 == 2 and abs(place[0]) < FULL_TURN
@@ -92,7 +105,7 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
 
 def slots(scene: Scene) -> Slots:
     """Which blocks are to be turned like which; no direction is named."""
-    count = len(scene.facts["near"])
+    count = len(Facts.of(scene).near)
     some = "one" if count == 1 else "many"
     return TEXT.slots(*(f"{slot}.{some}" for slot in ("wall", "near", "far")), word=NUMBERS[count])
 

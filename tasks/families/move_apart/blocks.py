@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.tabletop import Item, named, standing
 from robospa.tasks.goals.parts import Region
 from robospa.tasks.goals.placing import Destination, bring
@@ -51,6 +52,16 @@ PLACE_Y = {1: (-0.05,), 2: (-0.02, -0.14), 3: (0.0, -0.10, -0.20)}
 """Where the expert puts the blocks of one colour, far ones first; not part of the rule."""
 
 LEVELS = {n: Level(candidates=n, subtasks=n, steps=200 * n) for n in range(1, 6)}
+
+
+@dataclass(frozen=True)
+class Facts(SceneFacts):
+    """The blocks of each side, and their colour; None where there is none."""
+
+    right: tuple[str, ...]
+    left: tuple[str, ...]
+    right_color: str | None
+    left_color: str | None
 
 
 @dataclass(frozen=True)
@@ -107,29 +118,31 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
         for i, (word, square) in enumerate(zip(words, _squares(rng, level, half), strict=True))
     ]
     scene_objects, names = named(rng, items)
-    blocks = [names[str(i)] for i in range(level)]
-    facts = {
-        "right": blocks[:right],
-        "left": blocks[right:],
-        "right_color": first if right else None,
-        "left_color": second if right < level else None,
-    }
+    blocks = tuple(names[str(i)] for i in range(level))
+    facts = Facts(
+        right=blocks[:right],
+        left=blocks[right:],
+        right_color=first if right else None,
+        left_color=second if right < level else None,
+    )
     return Draft(scene_objects, facts)
 
 
 def goal(scene: Scene) -> Tracker:
     """Every block on its colour's side; the other side is astray."""
-    facts = scene.facts
-    parts = [Destination(name, (RIGHT,), (LEFT,)) for name in facts["right"]]
-    parts += [Destination(name, (LEFT,), (RIGHT,)) for name in facts["left"]]
+    facts = Facts.of(scene)
+    parts = [Destination(name, (RIGHT,), (LEFT,)) for name in facts.right]
+    parts += [Destination(name, (LEFT,), (RIGHT,)) for name in facts.left]
     return bring(parts, scene.table_top)
 
 
 def plan(scene: Scene) -> tuple[Skill, ...]:
     """Right blocks with the right arm, then left ones with the left arm, far ones first."""
     skills: list[Skill] = []
-    for arm, x in (("right", PLACE_X), ("left", -PLACE_X)):
-        at = {name: scene.object(name).pose.position for name in scene.facts[arm]}
+    facts = Facts.of(scene)
+    sides = (("right", PLACE_X, facts.right), ("left", -PLACE_X, facts.left))
+    for arm, x, names in sides:
+        at = {name: scene.object(name).pose.position for name in names}
         rows = PLACE_Y.get(len(at), ())
         for name, y in zip(sorted(at, key=lambda n: -at[n][1]), rows, strict=True):
             half = float(scene.object(name).params["half"][2])
@@ -140,15 +153,17 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
 
 def slots(scene: Scene) -> Slots:
     """How the colours and sides are said."""
-    facts = scene.facts
+    facts = Facts.of(scene)
     if scene.level == 1:
-        side = "right" if facts["right"] else "left"
-        return TEXT.slots("block", "to", "at", color=facts[f"{side}_color"], side=side)
-    blocks = {side: _blocks(facts[f"{side}_color"], len(facts[side])) for side in ("right", "left")}
-    return TEXT.slots() | blocks
+        side, color = ("right" if facts.right else "left"), facts.right_color or facts.left_color
+        return TEXT.slots("block", "to", "at", color=color, side=side)
+    return TEXT.slots() | {
+        "right": _blocks(facts.right_color, len(facts.right)),
+        "left": _blocks(facts.left_color, len(facts.left)),
+    }
 
 
-def _blocks(color: str, count: int) -> Phrasings:
+def _blocks(color: str | None, count: int) -> Phrasings:
     entry = "blocks.one" if count == 1 else "blocks.many"
     return TEXT.phrasings(entry, color=color, count=count, word=NUMBERS[count])
 

@@ -7,10 +7,12 @@ Draw: k boxes scattered in the middle of the table, turned any way. Success: eve
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
 from robospa.tasks import objects
+from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.picking import drawn_yaw
 from robospa.tasks.families.tabletop import Item, draw_look, named, side, standing
 from robospa.tasks.goals.parts import Region
@@ -39,6 +41,13 @@ PLACE_X, PLACE_Y, SPACING = 0.28, (-0.24, 0.10), 0.08
 LEVELS = {n: Level(candidates=n, subtasks=n, steps=200 * n) for n in range(1, 6)}
 
 
+@dataclass(frozen=True)
+class Facts(SceneFacts):
+    """The boxes, in no order."""
+
+    boxes: tuple[str, ...]
+
+
 def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """Boxes anywhere in the region, each turned any way that a gripper can take."""
     items = []
@@ -48,13 +57,13 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
         yaw = drawn_yaw(rng, workcell, "playing_cards", look, point[1], math.pi)
         items.append(Item(str(i), "playing_cards", standing(point, yaw), look))
     scene_objects, names = named(rng, items)
-    return Draft(scene_objects, {"boxes": [names[item.role] for item in items]})
+    return Draft(scene_objects, Facts(tuple(names[item.role] for item in items)))
 
 
 def _sides(scene: Scene) -> dict[str, list[str]]:
     """The boxes that start on each side."""
     found: dict[str, list[str]] = {"left": [], "right": []}
-    for name in scene.facts["boxes"]:
+    for name in Facts.of(scene).boxes:
         found[side(scene.object(name).pose.position[0])].append(name)
     return found
 
@@ -65,7 +74,7 @@ def goal(scene: Scene) -> Tracker:
     both = tuple(SIDES.values())
     parts = [
         Destination(name, both, (SIDES["left" if start[name] == "right" else "right"],))
-        for name in scene.facts["boxes"]
+        for name in Facts.of(scene).boxes
     ]
     return bring(parts, scene.table_top)
 
@@ -97,7 +106,7 @@ def _rows(wanted: list[float]) -> list[float]:
 
 def slots(scene: Scene) -> Slots:
     """How the boxes are said."""
-    boxes = scene.facts["boxes"]
+    boxes = Facts.of(scene).boxes
     count = len(boxes)
     if count > 1:
         entry = f"boxes.{by_count(count)}"

@@ -8,9 +8,11 @@ grippers open. Level 1 has one object and one direction.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
+from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.tabletop import Item, draw_look, named, side, standing
 from robospa.tasks.goals.parts import Region
 from robospa.tasks.goals.placing import Destination, bring
@@ -48,6 +50,16 @@ PLACE_Y = {"forward": -0.04, "backward": -0.21}
 LEVELS = {n: Level(candidates=n, subtasks=n, steps=200 * n) for n in range(1, 6)}
 
 
+@dataclass(frozen=True)
+class Facts(SceneFacts):
+    """What goes forward and what backward, and the kind of food that it is."""
+
+    forward: tuple[str, ...]
+    backward: tuple[str, ...]
+    forward_kind: str
+    backward_kind: str
+
+
 def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """Which kind goes forward is a fair coin, and so is the direction at level 1."""
     kinds = ["bread", "fries"] if rng.random() < 0.5 else ["fries", "bread"]
@@ -64,29 +76,25 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
         pose = standing((x, y), yaw)
         items.append(Item(str(int(index)), ASSETS[kind], pose, look))
     scene_objects, names = named(rng, items)
-    foods = [names[str(i)] for i in range(level)]
-    facts = {
-        "forward": foods[:first],
-        "backward": foods[first:],
-        "forward_kind": kinds[0],
-        "backward_kind": kinds[1],
-    }
+    foods = tuple(names[str(i)] for i in range(level))
+    facts = Facts(foods[:first], foods[first:], kinds[0], kinds[1])
     return Draft(scene_objects, facts)
 
 
 def goal(scene: Scene) -> Tracker:
     """Every object beyond its line, and both grippers open."""
-    parts = [Destination(name, (FORWARD,), (BACKWARD,)) for name in scene.facts["forward"]]
-    parts += [Destination(name, (BACKWARD,), (FORWARD,)) for name in scene.facts["backward"]]
+    parts = [Destination(name, (FORWARD,), (BACKWARD,)) for name in Facts.of(scene).forward]
+    parts += [Destination(name, (BACKWARD,), (FORWARD,)) for name in Facts.of(scene).backward]
     return bring(parts, scene.table_top, released=True)
 
 
 def plan(scene: Scene) -> tuple[Skill, ...]:
     """Everything straight forward or backward, from left to right: the arms change once."""
+    facts = Facts.of(scene)
     moves = [
         (scene.object(name).pose.position[0], name, PLACE_Y[way])
-        for way in ("forward", "backward")
-        for name in scene.facts[way]
+        for way, names in (("forward", facts.forward), ("backward", facts.backward))
+        for name in names
     ]
     skills: list[Skill] = []
     for x, name, y in sorted(moves):
@@ -98,13 +106,14 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
 
 def slots(scene: Scene) -> Slots:
     """How the kinds and the directions are said."""
-    facts = scene.facts
+    facts = Facts.of(scene)
     if scene.level == 1:
-        way = "forward" if facts["forward"] else "backward"
-        return TEXT.slots(f"way.{way}") | {"food": _food(facts[f"{way}_kind"], 1)}
+        way = "forward" if facts.forward else "backward"
+        kind = facts.forward_kind if facts.forward else facts.backward_kind
+        return TEXT.slots(f"way.{way}") | {"food": _food(kind, 1)}
     return TEXT.slots() | {
-        "first": _food(facts["forward_kind"], len(facts["forward"])),
-        "second": _food(facts["backward_kind"], len(facts["backward"])),
+        "first": _food(facts.forward_kind, len(facts.forward)),
+        "second": _food(facts.backward_kind, len(facts.backward)),
         "ahead": TEXT.phrasings("way.forward"),
         "back": TEXT.phrasings("way.backward"),
     }

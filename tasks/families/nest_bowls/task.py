@@ -6,10 +6,13 @@ stand in each other on the plate, in any order, and both grippers are open.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from robospa.geometry import Array, Vec3
 from robospa.tasks import objects
+from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.tabletop import Item, draw_look, named, side, standing
 from robospa.tasks.goals.nest import nest
 from robospa.tasks.instructions.grammar import Slots
@@ -33,6 +36,14 @@ DISTANCE, FROM_PLATE = 0.13, 0.135
 LEVELS = {n: Level(candidates=n, subtasks=n, steps=200 * n) for n in range(1, 6)}
 
 
+@dataclass(frozen=True)
+class Facts(SceneFacts):
+    """The plate and the bowls."""
+
+    plate: str
+    bowls: tuple[str, ...]
+
+
 def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """The plate on either side, then bowls of one look, off the middle, in view and in reach."""
     left = rng.random() < 0.5
@@ -53,19 +64,19 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     scene_objects, names = named(rng, items)
     return Draft(
         scene_objects,
-        {"plate": names["plate"], "bowls": [names[str(i)] for i in range(level)]},
+        Facts(names["plate"], tuple(names[str(i)] for i in range(level))),
     )
 
 
 def goal(scene: Scene) -> Tracker:
     """All bowls in one stack on the plate."""
-    return nest(scene.facts["bowls"], scene.facts["plate"])
+    return nest(Facts.of(scene).bowls, Facts.of(scene).plate)
 
 
 def plan(scene: Scene) -> tuple[Skill, ...]:
     """One bowl after the other, those on the plate's side and the near ones first."""
-    plate = scene.facts["plate"]
-    at = {name: scene.object(name).pose.position for name in scene.facts["bowls"]}
+    plate = Facts.of(scene).plate
+    at = {name: scene.object(name).pose.position for name in Facts.of(scene).bowls}
     here = side(scene.object(plate).pose.position[0])
     skills: list[Skill] = []
     below: str | None = None
@@ -89,7 +100,7 @@ def _nested(scene: Scene, below: str) -> Vec3:
 
 def slots(scene: Scene) -> Slots:
     """How the bowls and the plate are said."""
-    count = len(scene.facts["bowls"])
+    count = len(Facts.of(scene).bowls)
     bowls = "bowl" if count == 1 else f"bowls.{by_count(count)}"
     return TEXT.slots("plate", bowls, count=count, word=NUMBERS[count])
 

@@ -15,6 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from robospa.geometry import Vec3
+from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.stack_blocks.towers import NEAR_BAND, draw_color
 from robospa.tasks.families.tabletop import Item, named, side, standing
 from robospa.tasks.goals.row import row
@@ -69,6 +70,13 @@ ROW_Y = -0.175
 """Where the expert lines them up; not part of the rule."""
 
 LEVELS = {n: Level(candidates=n, subtasks=n, steps=200 * n) for n in range(1, 6)}
+
+
+@dataclass(frozen=True)
+class Facts(SceneFacts):
+    """The blocks from left to right."""
+
+    order: tuple[str, ...]
 
 
 def _heights(level: int, rng: np.random.Generator) -> list[Look]:
@@ -136,12 +144,12 @@ def _draw(looks: Sequence[Look], rng: np.random.Generator, workcell: Workcell) -
         )
     ]
     scene_objects, names = named(rng, items)
-    return Draft(scene_objects, {"order": [names[item.role] for item in items]})
+    return Draft(scene_objects, Facts(tuple(names[item.role] for item in items)))
 
 
 def goal(scene: Scene) -> Tracker:
     """The row from left to right, or at level 1 a block in the near band."""
-    order = scene.facts["order"]
+    order = Facts.of(scene).order
     return row(order) if scene.level > 1 else Bring(order[0], *NEAR_BAND)
 
 
@@ -150,7 +158,7 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
 
     In that order the arms change only once, and no block is set down beside one not yet moved.
     """
-    order = list(scene.facts["order"])
+    order = Facts.of(scene).order
     at = {name: scene.object(name).pose.position for name in order}
     skills: list[Skill] = []
     for name in sorted(order, key=lambda n: (at[n][0] > 0, -abs(at[n][0]))):
@@ -239,7 +247,7 @@ def _task(kind: Kind) -> Task:
         goal=goal,
         plan=plan,
         templates=TEXT.templates,
-        slots=lambda scene: _slots(kind, len(scene.facts["order"])),
+        slots=lambda scene: _slots(kind, len(Facts.of(scene).order)),
         summary=kind.summary,
         success=(
             f"From left to right every block is followed by {kind.order} block, at most 3 cm "

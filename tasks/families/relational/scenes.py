@@ -18,6 +18,7 @@ from robospa.geometry import Array
 from robospa.tasks.families.picking import (
     BLOCK_HALF,
     BLOCK_RADIUS,
+    PickFacts,
     draw_params,
     drawn_yaw,
     lifted,
@@ -200,6 +201,15 @@ def _in_line(a: tuple[int, int], b: tuple[int, int]) -> bool:
     return a[0] == b[0] or a[1] == b[1]
 
 
+@dataclass(frozen=True)
+class Facts(PickFacts):
+    """Target, its direction from the reference, and the name of the reference's place."""
+
+    reference: str
+    relation: str
+    reference_label: str
+
+
 def drawer(crowd: Crowd) -> Draw:
     """The draw of `crowd`: direction and target slot, other slots, a straight layout, turns."""
 
@@ -232,12 +242,12 @@ def drawer(crowd: Crowd) -> Draw:
             yaw = drawn_yaw(rng, workcell, asset, own, y, families[i].half_range)
             pose = standing((x, y), yaw, BLOCK_HALF if asset == "block" else 0.0)
             objects.append(SceneObject(f"object_{i}", asset, pose, own))
-        facts = {
-            "target": f"object_{used.index(target)}",
-            "reference": f"object_{used.index(reference)}",
-            "relation": direction,
-            "reference_label": _label(shape, reference, used),
-        }
+        facts = Facts(
+            target=f"object_{used.index(target)}",
+            reference=f"object_{used.index(reference)}",
+            relation=direction,
+            reference_label=_label(shape, reference, used),
+        )
         return Draft(tuple(objects), facts)
 
     return draw
@@ -272,8 +282,8 @@ def crowd_task(crowd: Crowd) -> Task:
     """The RRR task of `crowd`."""
 
     def slots(scene: Scene) -> Slots:
-        facts = scene.facts
-        return _slots(facts["relation"], facts["reference_label"], scene.level, crowd.noun)
+        facts = Facts.of(scene)
+        return _slots(facts.relation, facts.reference_label, scene.level, crowd.noun)
 
     return Task(
         name=pick_name(crowd.kind, "Relational"),

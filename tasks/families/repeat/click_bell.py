@@ -7,9 +7,12 @@ when the touch begins and re-armed by 0.1 s without one.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from robospa.tasks import objects
+from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.tabletop import Item, draw_look, named, side, standing
 from robospa.tasks.goals.repeat import PressCounter, Repeat
 from robospa.tasks.instructions.grammar import Slots
@@ -33,6 +36,14 @@ HOVER = 0.045
 LEVELS = {n: Level(candidates=1, subtasks=n, steps=200 * n) for n in range(1, 6)}
 
 
+@dataclass(frozen=True)
+class Facts(SceneFacts):
+    """The bell, and how often it is clicked."""
+
+    bell: str
+    count: int
+
+
 def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """One bell in view and off the middle strip; left and right are equally likely."""
     look = draw_look(rng, "bell")
@@ -45,29 +56,29 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
         x = float(rng.uniform(MIDDLE, min(FAR, high)))
     items = [Item("bell", "bell", standing((x, y)), look, fixed=True)]
     scene_objects, names = named(rng, items)
-    return Draft(scene_objects, {**names, "count": level})
+    return Draft(scene_objects, Facts(names["bell"], level))
 
 
 def goal(scene: Scene) -> Repeat:
     """The click counter of the scene's bell."""
-    bell = scene.object(scene.facts["bell"])
+    bell = scene.object(Facts.of(scene).bell)
     frame = objects.object_model(bell.asset, bell.params).frames["press"]
     arm = ARMS.index(side(bell.pose.position[0]))
-    return Repeat(PressCounter(bell.name, frame, BOX, arm), scene.facts["count"])
+    return Repeat(PressCounter(bell.name, frame, BOX, arm), Facts.of(scene).count)
 
 
 def plan(scene: Scene) -> tuple[Skill, ...]:
     """As many presses as asked for, by the arm on the bell's side."""
-    bell = scene.object(scene.facts["bell"])
+    bell = scene.object(Facts.of(scene).bell)
     press = Press(bell.name, hover=HOVER, arm=side(bell.pose.position[0]))
-    return (press,) * int(scene.facts["count"])
+    return (press,) * Facts.of(scene).count
 
 
 def slots(scene: Scene) -> Slots:
     """How the bell, the arm on its side and the count are said."""
-    bell = scene.object(scene.facts["bell"])
+    bell = scene.object(Facts.of(scene).bell)
     arm = acting_arm(side(bell.pose.position[0]))
-    count = int(scene.facts["count"])
+    count = Facts.of(scene).count
     if count == 1:
         return TEXT.slots("bell", "closed") | arm
     times = f"times.{by_count(count)}"

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from robospa.tasks import objects
+from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.tabletop import Item, draw_look, named, side, standing
 from robospa.tasks.goals.cycles import Cycles, back_home, held_up, put_down, raised
 from robospa.tasks.instructions.grammar import Slots
@@ -37,18 +38,26 @@ FAN_UP, FAN_WAY, FAN_TURN = 0.05, 0.04, 0.05
 """Rise [m] of a lifted fan; errors in each coordinate [m] and quaternion component at home."""
 
 
+@dataclass(frozen=True)
+class Facts(SceneFacts):
+    """What is lifted, and how often."""
+
+    thing: str
+    count: int
+
+
 def _pot_goal(scene: Scene) -> Cycles:
-    pot = scene.object(scene.facts["thing"])
+    pot = scene.object(Facts.of(scene).thing)
     model = objects.object_model(pot.asset, pot.params)
     handles = [model.frames[arm].position for arm in ("left", "right")]
     up, down = held_up(pot.name, UP + scene.table_rise, handles), put_down(pot.name, DOWN, ASIDE)
-    return Cycles(pot.name, int(scene.facts["count"]), up, down, radius=0.2)
+    return Cycles(pot.name, Facts.of(scene).count, up, down, radius=0.2)
 
 
 def _fan_goal(scene: Scene) -> Cycles:
-    name = str(scene.facts["thing"])
+    name = Facts.of(scene).thing
     up, down = raised(name, FAN_UP), back_home(name, FAN_WAY, FAN_TURN)
-    return Cycles(name, int(scene.facts["count"]), up, down)
+    return Cycles(name, Facts.of(scene).count, up, down)
 
 
 @dataclass(frozen=True)
@@ -99,18 +108,18 @@ def _draw(thing: Thing, level: int, rng: np.random.Generator, workcell: Workcell
     pose = standing(point, float(rng.uniform(-thing.yaw, thing.yaw)))
     items = [Item("thing", thing.asset, pose, draw_look(rng, thing.asset))]
     scene_objects, names = named(rng, items)
-    return Draft(scene_objects, {**names, "count": level})
+    return Draft(scene_objects, Facts(names["thing"], level))
 
 
 def _plan(thing: Thing, scene: Scene) -> tuple[Skill, ...]:
     """All cycles in one go: both arms for the pot, the arm on its side for the fan."""
-    name, count = str(scene.facts["thing"]), int(scene.facts["count"])
+    name, count = Facts.of(scene).thing, Facts.of(scene).count
     near = side(scene.object(name).pose.position[0])
     return (RaiseLower(name, thing.rise, count, ("left", "right") if thing.both else (near,)),)
 
 
 def _slots(thing: Thing, scene: Scene) -> Slots:
-    count = int(scene.facts["count"])
+    count = Facts.of(scene).count
     own = f"thing.{thing.name}", f"hands.{thing.name}"
     if count == 1:
         return TEXT.slots(*own)

@@ -8,10 +8,12 @@ counted when the touch begins and re-armed by 0.1 s without one.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
 from robospa.tasks import objects
+from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.tabletop import Item, draw_look, named, side, standing
 from robospa.tasks.goals.repeat import PressCounter, Repeat
 from robospa.tasks.instructions.grammar import Slots
@@ -29,33 +31,41 @@ X, Y = (-0.2, 0.2), (-0.1, 0.05)
 LEVELS = {n: Level(candidates=1, subtasks=n, steps=200 * n) for n in range(1, 6)}
 
 
+@dataclass(frozen=True)
+class Facts(SceneFacts):
+    """The stapler, and how often it is pressed."""
+
+    stapler: str
+    count: int
+
+
 def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """One stapler anywhere in the region, turned any way."""
     point = (float(rng.uniform(*X)), float(rng.uniform(*Y)))
     pose = standing(point, float(rng.uniform(-math.pi, math.pi)))
     items = [Item("stapler", "stapler", pose, draw_look(rng, "stapler"), fixed=True)]
     scene_objects, names = named(rng, items)
-    return Draft(scene_objects, {**names, "count": level})
+    return Draft(scene_objects, Facts(names["stapler"], level))
 
 
 def goal(scene: Scene) -> Repeat:
     """The press counter of the scene's stapler."""
-    stapler = scene.object(scene.facts["stapler"])
+    stapler = scene.object(Facts.of(scene).stapler)
     model = objects.object_model(stapler.asset, stapler.params)
-    return Repeat(PressCounter(stapler.name, model.frames["press"]), scene.facts["count"])
+    return Repeat(PressCounter(stapler.name, model.frames["press"]), Facts.of(scene).count)
 
 
 def plan(scene: Scene) -> tuple[Skill, ...]:
     """As many presses as asked for, by the arm on the press point's side."""
-    stapler = scene.object(scene.facts["stapler"])
+    stapler = scene.object(Facts.of(scene).stapler)
     press = objects.object_model(stapler.asset, stapler.params).frames["press"]
     arm = side(stapler.pose.apply(press.position)[0])
-    return (Press(stapler.name, arm=arm),) * int(scene.facts["count"])
+    return (Press(stapler.name, arm=arm),) * Facts.of(scene).count
 
 
 def slots(scene: Scene) -> Slots:
     """How the stapler and the count are said."""
-    count = int(scene.facts["count"])
+    count = Facts.of(scene).count
     if count == 1:
         return TEXT.slots("stapler")
     times = f"times.{by_count(count)}"

@@ -7,9 +7,16 @@ Level 1 has one block, to be brought to the middle of the near edge.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from robospa.tasks.families.stack_blocks.towers import building_place, tower_goal, tower_plan
+from robospa.tasks.families.stack_blocks.towers import (
+    TowerFacts,
+    building_place,
+    tower_goal,
+    tower_plan,
+)
 from robospa.tasks.families.tabletop import Item, middle_in_view, named, standing
 from robospa.tasks.instructions.grammar import Slots, listed
 from robospa.tasks.instructions.text import COMMON, TaskText
@@ -36,6 +43,13 @@ X, Y, DISTANCE, YAW = (-0.28, 0.28), (-0.08, 0.05), 0.10, 0.75
 LEVELS = {n: Level(candidates=n, subtasks=n, steps=200 * n) for n in range(1, 6)}
 
 
+@dataclass(frozen=True)
+class Facts(TowerFacts):
+    """A tower and its colours from bottom to top."""
+
+    colors: tuple[str, ...]
+
+
 def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """Scattered cubes; at level 1 the only one starts away from the place it must go to."""
 
@@ -57,17 +71,14 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     ]
     place = building_place(level, rng, points)
     scene_objects, names = named(rng, items)
-    facts = {
-        "order": [names[item.role] for item in items],
-        "colors": [item.role for item in items],
-        "place": list(place),
-    }
+    order = tuple(names[item.role] for item in items)
+    facts = Facts(order, place, tuple(item.role for item in items))
     return Draft(scene_objects, facts)
 
 
 def slots(scene: Scene) -> Slots:
     """How the order of the colours is said."""
-    colors, count = list(scene.facts["colors"]), len(scene.facts["colors"])
+    colors, count = Facts.of(scene).colors, len(Facts.of(scene).colors)
     if count == 1:
         middle = COMMON.phrasings("middle.near")
         return TEXT.slots("block", color=colors[0]) | {"middle": middle}

@@ -14,6 +14,7 @@ import numpy as np
 from robospa.tasks.families.stack_blocks.towers import (
     LENGTH,
     TEXT,
+    TowerFacts,
     building_place,
     draw_color,
     tower_goal,
@@ -77,7 +78,7 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
         items.append(Item(f"block {i}", "block", pose, {"half": list(half), "color": color}))
     place = building_place(level, rng, points)
     scene_objects, names = named(rng, items)
-    facts = {"order": [names[item.role] for item in items], "place": list(place)}
+    facts = TowerFacts(tuple(names[item.role] for item in items), place)
     return Draft(scene_objects, facts)
 
 
@@ -88,7 +89,7 @@ def _wide(level: int, points: Points) -> bool:
 
 def slots(scene: Scene) -> Slots:
     """How the order of the lengths is said."""
-    return tower_slots(LENGTH, len(scene.facts["order"]))
+    return tower_slots(LENGTH, len(TowerFacts.of(scene).order))
 
 
 TASK = Task(

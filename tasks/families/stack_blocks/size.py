@@ -12,6 +12,7 @@ import numpy as np
 from robospa.tasks.families.stack_blocks.towers import (
     SIZE,
     TEXT,
+    TowerFacts,
     building_place,
     draw_color,
     tower_goal,
@@ -61,13 +62,13 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     ]
     place = building_place(level, rng, points)
     scene_objects, names = named(rng, items)
-    facts = {"order": [names[item.role] for item in items], "place": list(place)}
+    facts = TowerFacts(tuple(names[item.role] for item in items), place)
     return Draft(scene_objects, facts)
 
 
 def slots(scene: Scene) -> Slots:
     """How the order of the sizes is said."""
-    return tower_slots(SIZE, len(scene.facts["order"]))
+    return tower_slots(SIZE, len(TowerFacts.of(scene).order))
 
 
 TASK = Task(

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.tabletop import side
 from robospa.tasks.goals.stack import HEIGHT_TOLERANCE, Bring, Stack
 from robospa.tasks.instructions.grammar import Slots
@@ -30,6 +31,14 @@ CLEARANCE = 0.09
 
 LAYER_SHARE = 0.65
 """Heights may be wrong by at most this share of the thinnest block: a layer is never mistaken."""
+
+
+@dataclass(frozen=True)
+class TowerFacts(SceneFacts):
+    """The blocks from bottom to top, and where [m] the expert builds."""
+
+    order: tuple[str, ...]
+    place: tuple[float, float]
 
 
 def building_place(level: int, rng: np.random.Generator, blocks: Sequence[Point]) -> Point:
@@ -92,7 +101,7 @@ def tower_goal(scene: Scene) -> Stack | Bring:
 
     Heights are looked at finely enough to tell a thin block's layer from the one below.
     """
-    order = scene.facts["order"]
+    order = TowerFacts.of(scene).order
     if scene.level == 1:
         return Bring(order[0], *NEAR_BAND)
     thick = [2 * _half_height(scene, name) for name in order]
@@ -101,8 +110,8 @@ def tower_goal(scene: Scene) -> Stack | Bring:
 
 def tower_plan(scene: Scene) -> tuple[Skill, ...]:
     """Bottom block to the drawn place, every further block on top of the one before."""
-    order = list(scene.facts["order"])
-    x, y = scene.facts["place"]
+    order = TowerFacts.of(scene).order
+    x, y = TowerFacts.of(scene).place
     skills: list[Skill] = []
     height = 0.0
     for i, name in enumerate(order):

@@ -8,11 +8,13 @@ in that order.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
 from robospa.geometry import Array
 from robospa.tasks import objects
+from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.stack_blocks.color import COLORS
 from robospa.tasks.families.tabletop import Item, draw_look, named, side, standing
 from robospa.tasks.goals.tools import HitCounter, UseInOrder
@@ -41,6 +43,15 @@ FREE = 0.068
 LEVELS = {n: Level(candidates=n, subtasks=n, steps=200 * n) for n in range(1, 6)}
 
 
+@dataclass(frozen=True)
+class Facts(SceneFacts):
+    """The hammer, and the blocks with their colours in the order of the hits."""
+
+    hammer: str
+    colors: tuple[str, ...]
+    order: tuple[str, ...]
+
+
 def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """The first block on a random side, the others where the same arm gets to."""
     left = bool(rng.random() < 0.5)
@@ -67,8 +78,8 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
         pose = standing(point, float(rng.uniform(-YAW, YAW)), HALF)
         items.append(Item(color, "block", pose, look, fixed=True))
     scene_objects, names = named(rng, items)
-    colors = list(COLORS)[:level]
-    facts = {"hammer": names["hammer"], "colors": colors, "order": [names[c] for c in colors]}
+    colors = tuple(COLORS)[:level]
+    facts = Facts(names["hammer"], colors, tuple(names[c] for c in colors))
     return Draft(scene_objects, facts)
 
 
@@ -84,10 +95,10 @@ def _beside_hammer(x: Array, y: Array) -> Mask:
 
 def goal(scene: Scene) -> UseInOrder:
     """The blocks in their order."""
-    hammer = scene.object(scene.facts["hammer"])
+    hammer = scene.object(Facts.of(scene).hammer)
     head = objects.object_model(hammer.asset, hammer.params).frames["head"]
     counters = []
-    for name in scene.facts["order"]:
+    for name in Facts.of(scene).order:
         block = scene.object(name)
         top = objects.object_model(block.asset, block.params).frames["press"]
         counters.append(HitCounter(name, top, hammer.name, head))
@@ -96,14 +107,14 @@ def goal(scene: Scene) -> UseInOrder:
 
 def plan(scene: Scene) -> tuple[Skill, ...]:
     """All hits by the arm on the first block's side."""
-    order = scene.facts["order"]
+    order = Facts.of(scene).order
     arm = side(scene.object(order[0]).pose.position[0])
-    return (Hit(scene.facts["hammer"], tuple(order), arm=arm),)
+    return (Hit(Facts.of(scene).hammer, order, arm=arm),)
 
 
 def slots(scene: Scene) -> Slots:
     """How the order of the colours is said."""
-    colors = scene.facts["colors"]
+    colors = Facts.of(scene).colors
     if len(colors) == 1:
         return TEXT.slots("hammer", "block", color=colors[0])
     return TEXT.slots("hammer") | {"order": color_orders(colors)}

@@ -6,11 +6,13 @@ brought down on the middle of each pad, the rightmost first.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from robospa.tasks import objects
+from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.tabletop import Item, draw_look, in_view, named, side, standing
 from robospa.tasks.goals.stamping import StampCounter
 from robospa.tasks.goals.tools import UseInOrder
@@ -59,17 +61,26 @@ LAYOUTS = 60
 LEVELS = {n: Level(candidates=n, subtasks=n, steps=200 * n) for n in range(1, 6)}
 
 
+@dataclass(frozen=True)
+class Facts(SceneFacts):
+    """The seal, and the pads with their colours from right to left."""
+
+    seal: str
+    colors: tuple[str, ...]
+    order: tuple[str, ...]
+
+
 def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """Pads of different colours, the seal not too near to any."""
     groups = [COLORS[int(i)] for i in rng.permutation(len(COLORS))[:level]]
-    colors = [group[int(rng.integers(len(group)))] for group in groups]
+    colors = tuple(group[int(rng.integers(len(group)))] for group in groups)
     look = draw_look(rng, "seal")
     points, seal = _layout(level, rng, workcell, look)
     items = [Item("seal", "seal", standing(seal), look)]
     for color, point in zip(colors, points, strict=True):
         items.append(Item(color, "pad", standing(point), {"look": PADS.index(color)}, fixed=True))
     scene_objects, names = named(rng, items)
-    facts = {"seal": names["seal"], "colors": colors, "order": [names[c] for c in colors]}
+    facts = Facts(names["seal"], colors, tuple(names[c] for c in colors))
     return Draft(scene_objects, facts)
 
 
@@ -98,17 +109,17 @@ def _layout(
 
 def goal(scene: Scene) -> UseInOrder:
     """The pads from right to left; a counter is told which pad comes to which seal."""
-    seal = scene.facts["seal"]
-    return UseInOrder([StampCounter(pad, seal) for pad in scene.facts["order"]], seal)
+    seal = Facts.of(scene).seal
+    return UseInOrder([StampCounter(pad, seal) for pad in Facts.of(scene).order], seal)
 
 
 def plan(scene: Scene) -> tuple[Skill, ...]:
     """From pad to pad, each time with the arm that has less far to reach: the one on the side of
     the pad, or of the seal, that is farther out."""
-    seal = scene.facts["seal"]
+    seal = Facts.of(scene).seal
     skills: list[Skill] = []
     here = scene.object(seal).pose.position[0]
-    for pad in scene.facts["order"]:
+    for pad in Facts.of(scene).order:
         there = scene.object(pad).pose.position[0]
         arm = side(max(here, there, key=abs))
         skills += [Pick(seal, lift=0.06, arm=arm), Place(seal, on=pad, drop=0.002, arm=arm)]
@@ -118,7 +129,8 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
 
 def slots(scene: Scene) -> Slots:
     """How the seal, the pads and their order are said."""
-    colors, seal = list(scene.facts["colors"]), scene.object(scene.facts["seal"])
+    facts = Facts.of(scene)
+    colors, seal = facts.colors, scene.object(facts.seal)
     count = len(colors)
     own: Slots = {"seal": _seal_names(objects.object_model(seal.asset, seal.params))}
     if count == 1:
