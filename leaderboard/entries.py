@@ -15,10 +15,12 @@ from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.scores import compare_scores
 from robospa.leaderboard.submission import Submission, slug_of
 from robospa.results.paper import rounding
-from robospa.results.paper.columns import Column, published_column, table_values
+from robospa.results.paper.columns import Column, published_column
 from robospa.results.paper.published import LEVELS, load
 from robospa.results.report.score_table import to_json
+from robospa.results.scoring.model_results import ModelResults
 from robospa.results.scoring.scores import Cell, combine
+from robospa.results.scoring.setting import Setting
 from robospa.results.statistics.intervals import Estimate
 
 BADGES = {
@@ -113,9 +115,9 @@ def entry_of(submission: Submission) -> Entry:
         ("demonstrations", f"{demonstrations} (levels 1 to 5, per base task)"),
         ("actions", f"{actions['space']}, chunks of {actions['chunk']}, {actions['rate']:g} Hz"),
         ("embodiment", column.embodiment),
-        ("scene mode", column.mode),
-        ("instructions", column.split),
-        ("suite", column.suite),
+        ("scene mode", _first(settings["mode"])),
+        ("instructions", _first(settings["split"])),
+        ("suite", str(submission.run.get("suite", ""))),
         ("bundle", str(submission.manifest["bundle"])),
     )  # fmt: skip
     return Entry(
@@ -174,21 +176,19 @@ def _column(submission: Submission) -> Column:
                     task, level, category, listed, int(part["trials"]), done, values, n
                 )
         scores = combine(cells)
-        values_of = table_values(cells)
+        setting = Setting(
+            (_first(settings["embodiment"]),),
+            (_first(settings["mode"]),),
+            (_first(settings["split"]),),
+            (str(run.get("suite", "")),),
+        )
+        column = Column(ModelResults(str(submission.card["name"]), scores, setting))
+        assert column.values, "computed here, where an error is the bundle's"
     except (KeyError, TypeError, ValueError, AttributeError, AssertionError, IndexError) as error:
         raise BundleError(f"{where}: scores.json is not a report's: {error!r}") from None
     if found := compare_scores(to_json(scores), submission.scores):
         raise BundleError(f"{where}: scores.json does not hold together: {found}")
-    return Column(
-        str(submission.card["name"]),
-        scores,
-        values_of,
-        _first(settings["embodiment"]),
-        _first(settings["mode"]),
-        suite=str(run.get("suite", "")),
-        split=_first(settings["split"]),
-        trials=max(cell.listed for cell in cells.values()),
-    )
+    return column
 
 
 def _estimate(triple: Any) -> Estimate:

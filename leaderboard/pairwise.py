@@ -15,10 +15,10 @@ from pathlib import Path
 from robospa.harness.running.atomic_file import replace_file
 from robospa.leaderboard import bundle as layout
 from robospa.leaderboard.entries import Entry
-from robospa.leaderboard.trial_outcomes import paired, side_of
-from robospa.results.comparison.operands import Side
+from robospa.leaderboard.trial_outcomes import paired, results_of
 from robospa.results.records.manifest import manifest_keys
 from robospa.results.report.page import own_version
+from robospa.results.scoring.model_results import ModelResults
 
 FOLDER = "pairs"
 Pair = tuple[Entry, Entry]
@@ -52,7 +52,7 @@ def write_pairs(pairs: Sequence[Pair], out: Path, note: Callable[[str], None]) -
     for old in (out / FOLDER).glob("*"):
         if old.is_dir() and not any(old.iterdir()):
             shutil.rmtree(old)
-    first: tuple[str, Side] | None = None
+    first: tuple[str, ModelResults] | None = None
     for one, two in pairs:
         path = out / FOLDER / one.slug / f"{two.slug}.js"
         state = f"// {_state(one)} {_state(two)} {own_version()}\n"
@@ -60,16 +60,16 @@ def write_pairs(pairs: Sequence[Pair], out: Path, note: Callable[[str], None]) -
             continue
         note(f"{one.name} and {two.name} on equal seeds")
         if first is None or first[0] != one.slug:
-            first = one.slug, _side(one)
+            first = one.slug, _results(one)
         key = json.dumps(f"{one.slug}/{two.slug}")
-        rows = json.dumps(paired(first[1], _side(two)), separators=(",", ":"))
+        rows = json.dumps(paired(first[1], _results(two)), separators=(",", ":"))
         replace_file(path, f"{state}pairLoaded({key}, {rows});\n".encode())
 
 
-def _side(entry: Entry) -> Side:
+def _results(entry: Entry) -> ModelResults:
     kept = entry.submission
     assert kept is not None
-    return side_of(entry.name, kept.outcomes, manifest_keys(kept.run), kept.run["categories"])
+    return results_of(entry.name, kept.outcomes, manifest_keys(kept.run), kept.run["categories"])
 
 
 def _state(entry: Entry) -> str:

@@ -6,12 +6,13 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from robospa.results.paper.columns import TableError, run_column
+from robospa.results.paper.columns import run_column
 from robospa.results.paper.tables import FORMATS
 from robospa.results.records.run_io import Run
 from robospa.results.report.score_table import to_json
 from robospa.results.report.tables import report_tables
 from robospa.results.scoring.scores import score_run
+from robospa.results.scoring.setting import IncomparableError
 
 CLOSE = 1e-9
 """Two computations of one number may differ by this much: other numpy, other order of sums."""
@@ -26,7 +27,7 @@ def tables_of(run: Run) -> dict[str, bytes]:
     """The report's tables of `run` as files, by ending."""
     try:
         grids = [shown.grid for shown in report_tables([run_column(run, "model")])]
-    except TableError:
+    except IncomparableError:
         grids = []  # of variants that no table has
     return {ending: FORMATS[ending](grids).encode() for ending in ("csv", "md")}
 

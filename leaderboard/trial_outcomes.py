@@ -15,9 +15,11 @@ from typing import Any
 from robospa.categories import METRICS
 from robospa.leaderboard.bundle import BundleError
 from robospa.results.comparison.compare import Difference, compare, over_levels
-from robospa.results.comparison.operands import COMPARED, CompareError, Side, Variant, sample_of
+from robospa.results.records.manifest import RunInfo
 from robospa.results.records.run_io import Run
 from robospa.results.records.trial_record import TrialRecord
+from robospa.results.scoring.model_results import ModelResults, Variant, results_of_records
+from robospa.results.scoring.setting import IncomparableError
 from robospa.trial import TrialKey
 
 DIGITS = "0123456789abcdefghijklmnopqrstuvwxyz"
@@ -40,26 +42,21 @@ def outcomes_of(run: Run) -> dict[str, dict[str, Any]]:
     return found
 
 
-def side_of(
+def results_of(
     name: str, outcomes: Mapping[str, Any], keys: Sequence[TrialKey], categories: Mapping[str, str]
-) -> Side:
-    """One side of a comparison, from the `outcomes` of the trials `keys`; BundleError if they do
+) -> ModelResults:
+    """The results of a model, from the `outcomes` of the trials `keys`; BundleError if they do
     not fit each other."""
     seeds: dict[Variant, list[TrialKey]] = {}
     for key in sorted(keys):
         seeds.setdefault(key.variant, []).append(key)
     if set(outcomes) != {f"{task}/{level}" for task, level in seeds}:
         raise BundleError(f"{name[:80]!a}: the outcomes are of other variants than the run")
-    trials: dict[Variant, dict[int, TrialRecord]] = {}
+    records: dict[TrialKey, TrialRecord] = {}
     for (task, level), own in seeds.items():
         part = _checked(outcomes[f"{task}/{level}"], len(own), f"{name[:80]!a}, {task} L{level}")
-        trials[task, level] = {
-            key.seed: _record(key, categories[task], part, place) for place, key in enumerate(own)
-        }
-    first = keys[0]
-    setting = (first.embodiment, first.mode, first.split)
-    listed = {variant: len(own) for variant, own in seeds.items()}
-    return Side(name, setting, dict(categories), {}, trials, listed, {})
+        records |= {k: _record(k, categories[task], part, place) for place, k in enumerate(own)}
+    return results_of_records(name, sorted(keys), records, RunInfo(categories=categories))
 
 
 def _checked(part: Any, count: int, where: str) -> Mapping[str, Any]:
@@ -84,7 +81,7 @@ def _record(key: TrialKey, category: str, part: Mapping[str, Any], place: int) -
     return TrialRecord(key, category, "", "", end, good, *counts, "", "", 0.0)
 
 
-def paired(first: Side, second: Side) -> dict[str, Rows]:
+def paired(first: ModelResults, second: ModelResults) -> dict[str, Rows]:
     """Differences in percent on equal seeds, by metric, row and level (0: over levels).
 
     Each is [difference, low, high, pairs that only the first, only the second did better in, q].
@@ -93,28 +90,15 @@ def paired(first: Side, second: Side) -> dict[str, Rows]:
     made: dict[str, Rows] = {}
     for metric in METRICS:
         try:
-            one, two = _measured(first, metric), _measured(second, metric)
-            found = compare(one, two, metric)
-            rows = [*found.cells, *found.groups, *over_levels(one, two, metric)]
-        except CompareError:
+            found = compare(first, second, metric)
+            rows = [*found.cells, *found.groups, *over_levels(first, second, metric)]
+        except IncomparableError:
             continue
         if found.paired:
             made[metric] = {}
             for row in rows:
                 made[metric].setdefault(row.label, {})[str(row.level)] = _shown(row)
     return made
-
-
-def _measured(side: Side, metric: str) -> Side:
-    """`side` with its samples by `metric`."""
-    samples = {
-        v: sample_of(list(found.values()), metric, f"{v[0]} L{v[1]}")
-        for v, found in side.trials.items()
-        if side.category[v[0]] in COMPARED[metric]
-    }
-    return Side(
-        side.name, side.setting, side.category, samples, side.trials, side.listed, side.versions
-    )
 
 
 def _shown(row: Difference) -> list[float | None]:

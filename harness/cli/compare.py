@@ -11,7 +11,7 @@ import typer
 
 if TYPE_CHECKING:
     from robospa.results.comparison.compare import Comparison, Difference
-    from robospa.results.comparison.operands import Side
+    from robospa.results.scoring.model_results import ModelResults
 
 GAPS = (0.02, 0.05, 0.1, 0.2)
 """Differences of rates in the table of sample sizes."""
@@ -55,14 +55,15 @@ def compare(
     if not (first and second):
         raise ValueError("compare needs two sides: folders of runs, or names of published models")
     from robospa.results.comparison.compare import compare as differences
-    from robospa.results.comparison.compare import stop_early
 
-    one, two = _side(first, metric.value), _side(second, metric.value)
+    one, two = _results(first), _results(second)
     if one.name == two.name:
         from dataclasses import replace
 
         one, two = replace(one, name=first), replace(two, name=second)
     if early:
+        from robospa.results.comparison.early_stopping import stop_early
+
         verdict = stop_early(one, two)
         who = {1: f"{one.name} is better", 2: f"{two.name} is better", 0: "undecided"}
         print(
@@ -73,7 +74,7 @@ def compare(
     found = differences(one, two, metric.value, ci.value)
     _print(found, variants)
     if drops:
-        _print_drops(one, two)
+        _print_drops(one, two, metric.value)
     if json is not None:
         from dataclasses import asdict
         from json import dumps
@@ -81,19 +82,20 @@ def compare(
         json.write_text(dumps(asdict(found), indent=1) + "\n")
 
 
-def _side(name: str, metric: str) -> Side:
+def _results(name: str) -> ModelResults:
     """A run's folder, or else a published model."""
-    from robospa.results.comparison.operands import side_of_published, side_of_run
+    from robospa.results.paper.columns import published_results
     from robospa.results.paper.published import load
     from robospa.results.records.run_io import read_run
+    from robospa.results.scoring.model_results import results_of_run
 
     folder = Path(name)
     if not folder.exists() and name in load().models:
-        return side_of_published(name, metric)
+        return published_results(name)
     if not folder.exists():
         models = ", ".join(load().models)
         raise ValueError(f"{name} is neither a folder nor a published model ({models})")
-    return side_of_run(read_run(folder), metric=metric)
+    return results_of_run(read_run(folder))
 
 
 def _print(found: Comparison, variants: bool) -> None:
@@ -160,12 +162,12 @@ def _chance(p: float) -> str:
     return f"{p:.3f}" if p >= 0.0005 else "<.001"
 
 
-def _print_drops(one: Side, two: Side) -> None:
-    from robospa.results.comparison.compare import drops
+def _print_drops(one: ModelResults, two: ModelResults, metric: str) -> None:
+    from robospa.results.comparison.drops import drops
 
-    for side in (one, two):
-        print(f"{side.name} loses from level to level, percentage points")
-        for row in drops(side):
+    for model in (one, two):
+        print(f"{model.name} loses from level to level, percentage points")
+        for row in drops(model, metric):
             e = row.estimate
             partly = f" ({row.variants} of {row.listed} tasks)" if row.variants < row.listed else ""
             print(

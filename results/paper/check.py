@@ -17,6 +17,7 @@ from robospa.results.paper import rounding
 from robospa.results.paper.columns import Column, published_column
 from robospa.results.paper.published import LEVELS, Published, Table, load
 from robospa.results.paper.rounding import rounded
+from robospa.results.statistics import onta
 from robospa.results.statistics.intervals import interval_of
 
 ENDS = 0.1
@@ -155,8 +156,8 @@ def _per_task(data: Published) -> Iterator[Check]:
                 if metric == "sr":
                     ours, digits = rounded(round(shown * data.trials / 100) / data.trials * 100), 0
                 elif metric == "onta":
-                    ours = rounded(rounding.onta(success, count))
-                    fits = [n for n in range(101) if rounded(rounding.onta(n, count)) == shown]
+                    ours = rounded(onta.of_percent(success, count))
+                    fits = [n for n in range(101) if rounded(onta.of_percent(n, count)) == shown]
                     if ours != shown:
                         guesses = ["is the SR itself"] if shown == success else []
                         guesses += [f"is the ONTA of SR {fits[0]}"] if fits else []

@@ -1,4 +1,4 @@
-"""One column of a paper's table: a published model or a run, with the same arithmetic for both.
+"""One column of a paper's table: a model's results with the values as the paper computes them.
 
 A run covers what it covers. A variant that was not run, or lost every trial, leaves open all
 averages above it; one that lost some trials keeps its rate, and everything above it knows how many
@@ -7,15 +7,18 @@ are missing. Columns of one table must have been measured alike: `check_columns`
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 from robospa.categories import BASIC, DIMENSIONS, METRIC_CATEGORIES, SPATIAL
 from robospa.results.paper import rounding
 from robospa.results.paper.published import LEVELS, Published, load, title
 from robospa.results.records.run_io import Run
-from robospa.results.scoring.scores import Average, Cell, Scores, combine, score_run
+from robospa.results.scoring.model_results import ModelResults, results_of_run
+from robospa.results.scoring.scores import Average, Cell, Scores, combine
+from robospa.results.scoring.setting import TABLE, IncomparableError, Setting, check_same
+from robospa.results.statistics import onta
 from robospa.results.statistics.bootstrap import Sample, rate
 from robospa.results.statistics.intervals import (
     METHODS,
@@ -24,32 +27,57 @@ from robospa.results.statistics.intervals import (
     chance_corrected,
     wilson,
 )
-from robospa.results.tables.table import MISSING
+from robospa.results.tables.table import MISSING, Entry
 
-
-class TableError(ValueError):
-    """Columns that cannot stand in one table, or a run that fits none."""
+Values = Mapping[str, Mapping[tuple[str, int], float | None]]
+"""Percent by metric and (row, level)."""
 
 
 @dataclass(frozen=True)
 class Column:
-    """A model's values in percent by metric and (row, level); None where something is missing.
+    """A model's values in percent by metric, row and level; None where something is missing.
 
-    A row is a task, a category, a dimension or `overall`. `scores` has the same with intervals as
-    fractions. `suite` is "" where it is not known. `trials` is the most that any variant lists. A
-    `privileged` policy saw the exact state: it is shown, but competes with nobody.
+    A row is a task, a category, a dimension or `overall`. A privileged policy is shown, but
+    competes with nobody.
     """
 
-    title: str
-    scores: Scores
-    values: Mapping[str, Mapping[tuple[str, int], float | None]]
-    embodiment: str
-    mode: str
-    suite: str = ""
-    split: str = ""
-    trials: int = 0
-    published: str = ""
-    privileged: bool = False
+    results: ModelResults
+
+    @property
+    def title(self) -> str:
+        """The head of the column."""
+        return self.results.name + " (privileged)" * self.privileged
+
+    @property
+    def scores(self) -> Scores:
+        """The same values with intervals, as fractions."""
+        return self.results.scores
+
+    @property
+    def published(self) -> str:
+        """The published model's name; "" of a run."""
+        return self.results.published
+
+    @property
+    def privileged(self) -> bool:
+        """Whether the policy saw the exact state."""
+        return self.results.info.privileged
+
+    @property
+    def embodiment(self) -> str:
+        """The robot, "" where it is not known."""
+        return next(iter(self.results.setting.embodiment), "")
+
+    @property
+    def trials(self) -> int:
+        """The most trials that any variant lists."""
+        return max((cell.listed for cell in self.scores.cells.values()), default=0)
+
+    @cached_property
+    def values(self) -> Values:
+        """Percent, unrounded, by metric and (row, level)."""
+        values = table_values(self.scores.cells)
+        return _untied(values, self.published) if self.published else values
 
     def value(self, metric: str, row: str, level: int) -> float | None:
         """Percent, unrounded."""
@@ -101,14 +129,14 @@ class Column:
         part = self.part(row, level)
         return 0 if part is None else part.missing
 
-    def lacks(self, metric: str, row: str, level: int) -> dict[str, Any]:
-        """What an entry of a table says of missing trials."""
+    def with_missing(self, entry: Entry, metric: str, row: str, level: int) -> Entry:
+        """`entry` with what it has to say of missing trials."""
         part = self.part(row, level)
         if part is None or not part.missing:
-            return {}
+            return entry
         ends = part.bounds(metric)
         bounds = None if ends is None else (100 * ends[0], 100 * ends[1])
-        return {"sign": MISSING, "missing": part.missing, "bounds": bounds}
+        return replace(entry, sign=MISSING, missing=part.missing, bounds=bounds)
 
     @property
     def covers_benchmark(self) -> bool:
@@ -133,7 +161,7 @@ def cell_percent(cell: Cell | None, metric: str) -> float | None:
     if metric == "ps":
         return 100 * estimate.value
     success = 100 * cell.successes / cell.trials
-    return success if metric == "sr" else rounding.onta(success, cell.candidates)
+    return success if metric == "sr" else onta.of_percent(success, cell.candidates)
 
 
 def table_values(
@@ -177,94 +205,71 @@ def published_cell(published: Published, model: str, task: str, level: int) -> C
     return Cell(task, level, about.category, trials, trials, successes, values, samples=samples)
 
 
-def published_column(model: str, name: str | None = None, ci: str = METHODS[0]) -> Column:
-    """A published model, computed from its per-task tables.
-
-    Where an average of progress falls exactly between two printable values, binary noise in the
-    means of c/T decided what was printed, so the printed one is taken.
-    """
+def published_results(model: str, ci: str = METHODS[0]) -> ModelResults:
+    """A published model, computed from its per-task tables."""
     data = load()
     if model not in data.models:
-        raise TableError(f"no published model is called {model!r}; there are {_names(data.models)}")
+        known = ", ".join(data.models)
+        raise ValueError(f"no published model is called {model!r}; there are {known}")
     cells = {
         (task, level): published_cell(data, model, task, level)
         for task in data.tasks
         for level in LEVELS
     }
-    values = table_values(cells)
-    for row, printed in data.ps.rows.items():
-        for column, shown in zip(data.ps.columns, printed[model], strict=True):
+    setting = Setting((data.embodiment,), (data.mode,))
+    return ModelResults(title(model), combine(cells, ci), setting, published=model)
+
+
+def _untied(values: Mapping[str, dict[tuple[str, int], float | None]], model: str) -> Values:
+    """Where an average of progress falls exactly between two printable values, binary noise in the
+    means of c/T decided what was printed, so the printed one is taken."""
+    printed = load().ps
+    for row, by_model in printed.rows.items():
+        for column, shown in zip(printed.columns, by_model[model], strict=True):
             value = values["ps"][row, int(column[1])]
             if value is not None and rounding.is_tie(value) and abs(value - shown) < 0.051:
                 values["ps"][row, int(column[1])] = value + (1e-6 if shown > value else -1e-6)
-    return Column(
-        name or title(model),
-        combine(cells, ci),
-        values,
-        data.embodiment,
-        data.mode,
-        trials=data.trials,
-        published=model,
-    )
+    return values
 
 
-def run_column(run: Run, name: str | None = None, ci: str = METHODS[0]) -> Column:
-    """A run as a column; TableError if it mixes what one column cannot hold, or fits no table."""
-    data = load()
-    label = (name or run.info.policy or run.folder.name) + " (privileged)" * run.info.privileged
-    keys = run.keys
-    if not keys:
-        raise TableError(f"the run {label} lists no trials; there is nothing to show")
-    for what in ("embodiment", "mode", "split"):
-        several = sorted({str(getattr(key, what)) for key in keys})
-        if len(several) > 1:
-            raise TableError(
-                f"the run {label} mixes {what}s ({_names(several)}); evaluate one at a time"
-            )
-    basic = {t for t, c in run.info.categories.items() if c in BASIC}
+def published_column(model: str, name: str = "", ci: str = METHODS[0]) -> Column:
+    """A published model as a column, called `name` or as the paper writes it."""
+    results = published_results(model, ci)
+    return Column(replace(results, name=name) if name else results)
+
+
+def run_column(run: Run, name: str = "", ci: str = METHODS[0]) -> Column:
+    """`run` as a column, called `name` or as its policy; see `column_of`."""
+    return column_of(results_of_run(run, name or run.info.policy, ci))
+
+
+def column_of(results: ModelResults) -> Column:
+    """A run's results as a column; IncomparableError if a column cannot hold them all."""
+    data, column = load(), Column(results)
+    where, variants = f"the run {column.title}", results.scores.cells
+    if not variants:
+        raise IncomparableError(f"{where} lists no trials; there is nothing to show")
+    check_same([(where, results.setting)], TABLE)
+    basic = {task for task, category in results.info.categories.items() if category in BASIC}
     unknown = sorted(
-        {
-            f"{k.task} L{k.level}"
-            for k in keys
-            if not (k.level in LEVELS and (k.task in data.tasks or k.task in basic))
-        }
+        f"{task} L{level}"
+        for task, level in variants
+        if not (level in LEVELS and (task in data.tasks or task in basic))
     )
     if unknown:
-        raise TableError(
-            f"the run {label} has variants that the benchmark's tables do not know "
-            f"({_names(unknown[:3])}{', ...' if len(unknown) > 3 else ''}); see `robospa tasks`"
+        raise IncomparableError(
+            f"{where} has variants that the benchmark's tables do not know "
+            f"({', '.join(unknown[:3])}{', ...' if len(unknown) > 3 else ''}); see `robospa tasks`"
         )
-    scores = score_run(run, ci)
-    return Column(
-        label,
-        scores,
-        table_values(scores.cells),
-        keys[0].embodiment,
-        keys[0].mode,
-        suite=run.info.suite,
-        split=keys[0].split,
-        trials=max(cell.listed for cell in scores.cells.values()),
-        privileged=run.info.privileged,
-    )
+    return column
 
 
 def check_columns(columns: Sequence[Column]) -> None:
-    """TableError unless all columns were measured on the same suite, embodiment and scenes."""
-    for what in ("embodiment", "mode", "suite", "split"):
-        found = {str(getattr(c, what)): c.title for c in columns if getattr(c, what)}
-        if len(found) > 1:
-            (first, one), (second, other), *_ = found.items()
-            raise TableError(
-                f"{one} and {other} cannot stand in one table: their {what} differs "
-                f"({first}, {second})"
-            )
+    """IncomparableError unless all were measured on the same suite, embodiment and scenes."""
+    check_same([(column.title, column.results.setting) for column in columns], TABLE)
     titles = [c.title for c in columns]
     twice = sorted({t for t in titles if titles.count(t) > 1})
     if twice:
-        raise TableError(f"two columns are called {twice[0]}; give one of them another name")
+        raise IncomparableError(f"two columns are called {twice[0]}; give one of them another name")
     if not columns:
-        raise TableError("a table needs at least one published model or run")
-
-
-def _names(items: Iterable[str]) -> str:
-    return ", ".join(items)
+        raise IncomparableError("a table needs at least one published model or run")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 from robospa.categories import BASIC, CATEGORY_NAMES, DIMENSIONS
 from robospa.results.paper import rounding
@@ -67,7 +66,7 @@ def _interval(column: Column, row: str, level: int, method: str) -> Entry:
     found = interval_of(samples, shares, method)
     value = column.value("sr", row, level) or 0.0
     entry = _with_ends(value / 100, found.low, found.high)
-    return replace(entry, **column.lacks("sr", row, level))
+    return column.with_missing(entry, "sr", row, level)
 
 
 def _with_ends(value: float, low: float, high: float, sign: str = "") -> Entry:
@@ -116,8 +115,8 @@ def _variant(column: Column, task: str, level: int) -> Entry:
     found = column.estimate("sr", task, level)
     assert found is not None, "a value has an interval"
     text = rounding.text(value, 0 if value == round(value) else 1)
-    ends = (100 * found.low, 100 * found.high)
-    return Entry(text, value, *ends, **column.lacks("sr", task, level))
+    entry = Entry(text, value, 100 * found.low, 100 * found.high)
+    return column.with_missing(entry, "sr", task, level)
 
 
 def _words(*texts: object) -> tuple[Entry, ...]:

@@ -164,14 +164,9 @@ def _value(column: Column, metric: str, row: str, level: int, best: bool) -> Ent
         return DASH
     whole = metric == "sr" and row in load().tasks and value == round(value)
     found = column.estimate(metric, row, level)
-    return Entry(
-        rounding.text(value, 0 if whole else 1),
-        value,
-        100 * found.low if found else None,
-        100 * found.high if found else None,
-        best,
-        **column.lacks(metric, row, level),
-    )
+    low, high = (100 * found.low, 100 * found.high) if found else (None, None)
+    entry = Entry(rounding.text(value, 0 if whole else 1), value, low, high, best)
+    return column.with_missing(entry, metric, row, level)
 
 
 def _number(value: float | None) -> Entry:

@@ -49,13 +49,6 @@ def mean(values: Iterable[float | None]) -> float | None:
     return math.fsum(known) / len(known) if known else None
 
 
-def onta(success: float, candidates: int) -> float:
-    """Success in percent, corrected for guessing among `candidates` objects: 0 is chance."""
-    if candidates < 2:
-        raise ValueError(f"chance among {candidates} candidates is certainty")
-    return (success - 100 / candidates) / (1 - 1 / candidates)
-
-
 def exact_progress(printed: float, subtasks: int, trials: int = 100) -> float:
     """The mean of c/T percent over `trials` that was rounded to `printed`, or `printed` itself.
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from robospa.results.paper import other_tables as given
-from robospa.results.paper.columns import Column, TableError
+from robospa.results.paper.columns import Column
 from robospa.results.paper.result_tables import summary_table, task_table
 from robospa.results.tables.html import page
 from robospa.results.tables.latex import document, to_latex
@@ -44,14 +44,14 @@ FORMATS: dict[str, Callable[[Sequence[Grid]], str]] = {
 def make_tables(
     columns: Sequence[Column], names: Sequence[str] | None = None, mark: str = "tied"
 ) -> list[Grid]:
-    """The tables called `names` (default all); TableError if one is unknown.
+    """The tables called `names` (default all); ValueError if one is unknown.
 
     Runs of basic grounding tasks alone appear in the table of these only.
     """
     chosen = list(TABLES) if names is None else list(names)
     for name in chosen:
         if name not in TABLES:
-            raise TableError(f"no table is called {name!r}; there are {', '.join(TABLES)}")
+            raise ValueError(f"no table is called {name!r}; there are {', '.join(TABLES)}")
     base = [column for column in columns if column.covers_benchmark]
     return [TABLES[name](columns if name == "basic" else base, mark) for name in chosen]
 

@@ -15,9 +15,10 @@ from typing import TypeVar
 
 from robospa.categories import PROCEDURAL
 from robospa.results.paper.published import load
-from robospa.results.paper.rounding import onta, rounded
+from robospa.results.paper.rounding import rounded
 from robospa.results.records.run_io import TRIALS, Run, finished, read_file
 from robospa.results.records.trial_record import TrialRecord
+from robospa.results.statistics.onta import of_percent
 from robospa.trial import TrialKey
 
 FASTEST_STEP = 4e-6
@@ -128,7 +129,7 @@ def _lint_row(row: Row) -> Iterator[Finding]:
             yield Finding("ps-not-a-share", "error", where, text)
         n = _at(row.candidates, place)
         if corrected is not None and sr is not None and n:
-            follows = onta(sr, n)
+            follows = of_percent(sr, n)
             if abs((rounded(follows) if row.printed else follows) - corrected) > 0.05:
                 text = f"ONTA {corrected:g} does not follow from SR {sr:g} and n = {n}"
                 yield Finding("onta-from-sr", "error", where, f"{text}: {rounded(follows):g} does")

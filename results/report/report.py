@@ -18,7 +18,6 @@ from robospa.results.figures.draw import draw
 from robospa.results.figures.series import FORMATS, Drawing, Series
 from robospa.results.paper.columns import (
     Column,
-    TableError,
     check_columns,
     published_column,
     run_column,
@@ -31,6 +30,7 @@ from robospa.results.report.run_card import about, ends, facts, names_of
 from robospa.results.report.score_table import loss_lines, missing_lines, to_json
 from robospa.results.report.tables import Shown, for_page, report_tables, write_files
 from robospa.results.scoring.scores import Scores, score_run
+from robospa.results.scoring.setting import IncomparableError
 from robospa.results.tables.table import escape_markdown, to_markdown
 
 TABLES = "tables"
@@ -110,7 +110,7 @@ def columns_of(
         columns = [run_column(run, name, ci) for run, name in zip(runs, names, strict=True)]
         columns += [published_column(model, ci=ci) for model in published]
         check_columns(columns)
-    except TableError as error:
+    except IncomparableError as error:
         if published or len(runs) > 1:
             raise
         return [], [f"No tables: {error}."]

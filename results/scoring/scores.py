@@ -27,6 +27,7 @@ from robospa.results.statistics.intervals import (
     mean,
     wilson,
 )
+from robospa.results.statistics.onta import of_bound
 from robospa.trial import TrialKey
 
 Weighted = tuple[tuple[Sample, float], ...]
@@ -73,9 +74,10 @@ class Cell:
         if metric not in self.values:
             return None
         if metric == "onta":
-            if (n := self.candidates) < 2:
+            if self.candidates < 2:
                 return None
-            return (self.worst * n - 1) / (n - 1), (self.best * n - 1) / (n - 1)
+            low, high = (of_bound(rate, self.candidates) for rate in (self.worst, self.best))
+            return low, high
         if metric == "ps":
             known = self.values["ps"]
             held = known.value * self.trials if known is not None else 0.0
@@ -127,26 +129,37 @@ def score_cell(
     task: str, level: int, category: str, listed: int, records: Sequence[TrialRecord]
 ) -> Cell:
     """The cell of one variant from its results (`records` without lost ones)."""
-    count = len(records)
-    successes = sum(r.success for r in records)
-    sr = wilson(successes, count) if count else None
-    values: dict[str, Estimate | None] = {"sr": sr}
-    samples = {"sr": rate(successes, count)} if count else {}
-    candidates = 0
-    if category in SPATIAL:
-        found = {r.candidates for r in records}
-        candidates = found.pop() if len(found) == 1 else 0
-        values["onta"] = None
-        if sr and candidates > 1:
+    metrics = ["sr"] + ["onta"] * (category in SPATIAL) + ["ps"] * (category in PROCEDURAL)
+    samples = {m: sample for m in metrics if (sample := sample_of(records, m)) is not None}
+    values: dict[str, Estimate | None] = dict.fromkeys(metrics)
+    count, successes = len(records), sum(r.success for r in records)
+    candidates = candidates_of(records) if category in SPATIAL else 0
+    if count:
+        values["sr"] = sr = wilson(successes, count)
+        if "onta" in samples:
             values["onta"] = chance_corrected(sr, candidates)
-            samples["onta"] = rate(successes, count, candidates)
-    elif category in PROCEDURAL:
-        values["ps"] = None
-        if count:
-            done = [(r.done, r.total) if r.total else (int(r.success), 1) for r in records]
-            samples["ps"] = progress(done)
+        if "ps" in samples:
             values["ps"] = interval_of([samples["ps"]], seed=_seed(task, level))
     return Cell(task, level, category, listed, count, successes, values, candidates, samples)
+
+
+def candidates_of(records: Sequence[TrialRecord]) -> int:
+    """The number of candidates in all of `records`; 0 if they differ."""
+    found = {r.candidates for r in records}
+    return found.pop() if len(found) == 1 else 0
+
+
+def sample_of(records: Sequence[TrialRecord], metric: str) -> Sample | None:
+    """The results of one variant by `metric`, None where it cannot be computed."""
+    if not records:
+        return None
+    if metric == "ps":
+        return progress((r.done, r.total) if r.total else (int(r.success), 1) for r in records)
+    successes, count = sum(r.success for r in records), len(records)
+    if metric == "sr":
+        return rate(successes, count)
+    candidates = candidates_of(records)
+    return rate(successes, count, candidates) if candidates > 1 else None
 
 
 def with_intervals(cell: Cell, ci: str) -> Cell:

@@ -20,6 +20,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from robospa.results.statistics.onta import scale_and_shift
+
 RESAMPLES = 10_000
 CHUNK = 16
 """Variants drawn at once: keeps the random numbers in the processor's cache."""
@@ -76,10 +78,7 @@ def rate(successes: int, trials: int, candidates: int = 0) -> Sample:
         raise ValueError(f"{successes} successes in {trials} trials is no rate")
     if candidates == 0:
         return Sample((trials - successes, successes))
-    if candidates < 2:
-        raise ValueError(f"chance among {candidates} candidates is certainty")
-    chance = 1 / candidates
-    return Sample((trials - successes, successes), 1 / (1 - chance), -chance / (1 - chance))
+    return Sample((trials - successes, successes), *scale_and_shift(candidates))
 
 
 def progress(done_of: Iterable[tuple[int, int]]) -> Sample:

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.results.statistics.bootstrap import Sample, draw, draw_over_tasks
+from robospa.results.statistics.onta import scale_and_shift
 
 Z95 = 1.959963984540054
 """Two-sided 95 % quantile of the normal distribution."""
@@ -112,10 +113,7 @@ def mean(parts: Sequence[Estimate]) -> Estimate:
 
 def chance_corrected(rate: Estimate, candidates: int) -> Estimate:
     """ONTA of a success rate among `candidates` objects: 0 at chance 1/n, 1 at certainty."""
-    if candidates < 2:
-        raise ValueError(f"chance among {candidates} candidates is certainty")
-    chance = 1 / candidates
-    return _affine(rate, 1 / (1 - chance), -chance / (1 - chance))
+    return _affine(rate, *scale_and_shift(candidates))
 
 
 def difference(first: Estimate, second: Estimate) -> Estimate:

@@ -16,10 +16,12 @@ from robospa.leaderboard.entries import Entry, published_entries
 from robospa.leaderboard.packing import pack
 from robospa.leaderboard.submission import add
 from robospa.leaderboard.verify import Valid
-from robospa.results.paper.columns import Column, table_values
+from robospa.results.paper.columns import Column
 from robospa.results.paper.published import LEVELS, load
 from robospa.results.records.trial_record import TrialRecord
+from robospa.results.scoring.model_results import ModelResults
 from robospa.results.scoring.scores import combine, score_cell
+from robospa.results.scoring.setting import Setting
 from robospa.trial import TrialKey
 
 REPLAYED: dict[str, Any] = {
@@ -77,7 +79,8 @@ def _random_entry(model: Entry, number: int) -> Entry:
             cells[task.name, level] = score_cell(task.name, level, task.category, 20, records)
     name = f"Model {number}"
     mode = ("clean", "randomised")[number % 2]
-    column = Column(name, combine(cells), table_values(cells), "aloha-agilex", mode, "robospa-1")
+    setting = Setting(("aloha-agilex",), (mode,), suite=("robospa-1",))
+    column = Column(ModelResults(name, combine(cells), setting))
     return replace(
         model,
         slug=f"model-{number}",

@@ -13,10 +13,10 @@ from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.entries import entry_of
 from robospa.leaderboard.pairwise import pairs_of, write_pairs
 from robospa.leaderboard.submission import read_submissions
-from robospa.leaderboard.trial_outcomes import outcomes_of, paired, side_of
+from robospa.leaderboard.trial_outcomes import outcomes_of, paired, results_of
 from robospa.results.comparison.compare import compare
-from robospa.results.comparison.operands import Side, side_of_run
 from robospa.results.records.run_io import Run, read_run
+from robospa.results.scoring.model_results import ModelResults, results_of_run
 
 
 @pytest.fixture(scope="module")
@@ -28,14 +28,14 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> tuple[Run, Run]:
     )
 
 
-def side(run: Run) -> Side:
-    return side_of("x", outcomes_of(run), run.keys, run.manifest["categories"])
+def side(run: Run) -> ModelResults:
+    return results_of("x", outcomes_of(run), run.keys, run.manifest["categories"])
 
 
 def test_the_numbers_are_those_of_comparing_the_runs(runs: tuple[Run, Run]) -> None:
     rows = paired(side(runs[0]), side(runs[1]))
     for metric in ("sr", "onta"):
-        right = compare(*(side_of_run(run, metric=metric) for run in runs), metric)
+        right = compare(*(results_of_run(run) for run in runs), metric)
         assert right.paired
         for row in (*right.cells, *right.groups):
             shown = rows[metric][row.label][str(row.level)]
@@ -63,10 +63,10 @@ def test_outcomes_that_cannot_be_are_refused(
     outcomes = outcomes_of(runs[0])
     outcomes[f"{PICK}/1"][field] = value
     with pytest.raises(BundleError, match=words):
-        side_of("x", outcomes, runs[0].keys, runs[0].manifest["categories"])
+        results_of("x", outcomes, runs[0].keys, runs[0].manifest["categories"])
     del outcomes[f"{PICK}/1"]
     with pytest.raises(BundleError, match="other variants"):
-        side_of("x", outcomes, runs[0].keys, runs[0].manifest["categories"])
+        results_of("x", outcomes, runs[0].keys, runs[0].manifest["categories"])
 
 
 def test_pairs_are_written_once_and_only_of_what_was_measured_alike(tmp_path: Path) -> None:

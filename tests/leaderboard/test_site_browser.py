@@ -18,8 +18,8 @@ from robospa.leaderboard.pairwise import pairs_of, write_pairs
 from robospa.leaderboard.site import index_page, write_model
 from robospa.leaderboard.submission import read_submission, read_submissions
 from robospa.results.comparison.compare import over_levels
-from robospa.results.comparison.operands import side_of_run
 from robospa.results.records.run_io import read_run
+from robospa.results.scoring.model_results import results_of_run
 
 pytestmark = pytest.mark.browser
 
@@ -182,7 +182,7 @@ def test_models_on_equal_seeds_are_paired(page: Page, pair: Path) -> None:
     page.wait(f"{HOW}.startsWith('Paired')")
     one, two, gap, alone = page.run(FIRST)
     assert (one[0], two[0], gap[0], alone[0]) == ("75.0", "50.0", "+25.0", "5 : 0")
-    sides = [side_of_run(read_run(pair.parent / name / "run")) for name in ("one", "two")]
+    sides = [results_of_run(read_run(pair.parent / name / "run")) for name in ("one", "two")]
     (right,) = over_levels(*sides)
     low, high = (float(text) for text in gap[1].strip("[]").split(","))
     assert (low, high) == pytest.approx(

@@ -8,9 +8,13 @@ from pathlib import Path
 import pytest
 from run_by_hand import outcomes, record, write
 
-from robospa.results.comparison.compare import Comparison, Difference, compare, drops, stop_early
-from robospa.results.comparison.operands import CompareError, Side, side_of_published, side_of_run
+from robospa.results.comparison.compare import Comparison, Difference, compare
+from robospa.results.comparison.drops import drops
+from robospa.results.comparison.early_stopping import stop_early
+from robospa.results.paper.columns import published_results
 from robospa.results.records.trial_record import TrialRecord
+from robospa.results.scoring.model_results import ModelResults, results_of_run
+from robospa.results.scoring.setting import IncomparableError
 from robospa.results.statistics.intervals import difference, paired_difference, wilson
 from robospa.results.statistics.significance import boschloo, mcnemar_mid_p
 from robospa.trial import TrialKey
@@ -18,8 +22,8 @@ from robospa.trial import TrialKey
 SIZE, MUGS, BOTTLES = "Pick_Blocks_Size", "Pick_Mugs_Distance", "Put_Bottles_Dustbin"
 
 
-def side(folder: Path, records: list[TrialRecord], metric: str = "sr", **more: object) -> Side:
-    return side_of_run(write(folder, records, **more), metric=metric)  # type: ignore[arg-type]
+def side(folder: Path, records: list[TrialRecord], **more: object) -> ModelResults:
+    return results_of_run(write(folder, records, **more))  # type: ignore[arg-type]
 
 
 def group(found: Comparison, label: str, level: int) -> Difference:
@@ -63,12 +67,12 @@ def test_runs_on_other_seeds_are_not_paired(tmp_path: Path) -> None:
     assert not found.paired
     assert cell.only_first is None
     assert cell.estimate == difference(wilson(2, 3), wilson(0, 2))
-    assert cell.p == boschloo(a.samples[SIZE, 1], b.samples[SIZE, 1])
+    assert cell.p == boschloo(a.samples("sr")[SIZE, 1], b.samples("sr")[SIZE, 1])
 
 
 def test_a_run_against_the_paper(tmp_path: Path) -> None:
     run = side(tmp_path / "a", outcomes(SIZE, 1, [1] * 9 + [0]))
-    found = compare(run, side_of_published("RDT"))
+    found = compare(run, published_results("RDT"))
     (cell,) = found.cells
     assert not found.paired
     assert (cell.first, cell.second) == (0.9, pytest.approx(0.03))
@@ -78,7 +82,7 @@ def test_a_run_against_the_paper(tmp_path: Path) -> None:
 
 
 def test_two_published_models() -> None:
-    found = compare(side_of_published("pi0.5"), side_of_published("X-VLA"))
+    found = compare(published_results("pi0.5"), published_results("X-VLA"))
     assert found.first == "π0.5"
     best = group(found, "overall", 5)
     assert 100 * best.estimate.value == pytest.approx(22.25 - 19.87, abs=0.02)
@@ -87,8 +91,8 @@ def test_two_published_models() -> None:
 
 
 def test_onta_is_the_difference_of_rates_on_its_own_scale(tmp_path: Path) -> None:
-    one = side(tmp_path / "a", outcomes(SIZE, 1, [1, 1, 0, 0]), "onta")
-    two = side(tmp_path / "b", outcomes(SIZE, 1, [0, 1, 0, 0]), "onta")
+    one = side(tmp_path / "a", outcomes(SIZE, 1, [1, 1, 0, 0]))
+    two = side(tmp_path / "b", outcomes(SIZE, 1, [0, 1, 0, 0]))
     (cell,) = compare(one, two, "onta").cells
     assert cell.estimate.value == pytest.approx(0.25 * 2)  # chance is one half
     assert (cell.first, cell.second) == (pytest.approx(0.0), pytest.approx(-0.5))
@@ -97,7 +101,7 @@ def test_onta_is_the_difference_of_rates_on_its_own_scale(tmp_path: Path) -> Non
 def test_progress_compares_shares_of_subtasks(tmp_path: Path) -> None:
     one = [record(BOTTLES, 3, n, d, 3) for n, d in enumerate((3, 2, 1, 2))]
     two = [record(BOTTLES, 3, n, d, 3) for n, d in enumerate((3, 1, 1, 0))]
-    found = compare(side(tmp_path / "a", one, "ps"), side(tmp_path / "b", two, "ps"), "ps")
+    found = compare(side(tmp_path / "a", one), side(tmp_path / "b", two), "ps")
     (cell,) = found.cells
     assert cell.estimate.value == pytest.approx((0 + 1 + 0 + 2) / 3 / 4)
     assert (cell.only_first, cell.only_second) == (2, 0)
@@ -112,7 +116,7 @@ def test_other_tasks_move_a_difference_more(tmp_path: Path) -> None:
     assert row.over_tasks is not None
     assert (row.over_tasks.low, row.over_tasks.high) == pytest.approx((0.0, 1.0), abs=1e-6)
     assert row.estimate.low > 0.3
-    unpaired = compare(side_of_published("RDT"), side_of_published("GO-1"))
+    unpaired = compare(published_results("RDT"), published_results("GO-1"))
     nothing = group(unpaired, "MIP", 5)
     assert nothing.over_tasks is not None  # all at 0: as wide as over seeds, never a point
     assert nothing.over_tasks.high == nothing.estimate.high > 0.01
@@ -175,50 +179,54 @@ def test_a_run_that_mixes_settings_is_refused(
 ) -> None:
     one = record(SIZE, 1, 0, 1)
     other = replace(one, key=replace(one.key, **change))  # type: ignore[arg-type]
-    with pytest.raises(CompareError, match=message):
-        side(tmp_path / "a", [one, other])
+    mixed = side(tmp_path / "a", [one, other])
+    with pytest.raises(IncomparableError, match=message):
+        compare(mixed, mixed)
 
 
 def test_sides_of_different_embodiments_are_refused(tmp_path: Path) -> None:
     one = record(SIZE, 1, 0, 1)
     other = replace(one, key=TrialKey(SIZE, 1, 0, "piper"))
     first, second = side(tmp_path / "a", [one]), side(tmp_path / "b", [other])
-    with pytest.raises(CompareError, match="a ran with embodiment aloha-agilex and b with piper"):
+    with pytest.raises(IncomparableError, match=r"a and b .* embodiment \(aloha-agilex, piper\)"):
         compare(first, second)
-    with pytest.raises(CompareError, match="embodiment piper and RDT with aloha-agilex"):
-        compare(second, side_of_published("RDT"))
+    with pytest.raises(IncomparableError, match=r"b and RDT .* embodiment \(piper, aloha-agilex\)"):
+        compare(second, published_results("RDT"))
 
 
 def test_other_step_limits_are_refused_but_not_against_the_paper(tmp_path: Path) -> None:
     """Whether the printed X-VLA had tripled limits is not known."""
     plain = side(tmp_path / "a", outcomes(SIZE, 1, [1, 0]))
-    tripled = replace(plain, step_scale=3.0)
-    with pytest.raises(CompareError, match="3 times the official step limits"):
+    tripled = replace(plain, setting=replace(plain.setting, step_scale=(3.0,)))
+    with pytest.raises(IncomparableError, match=r"step limits .* \(3.0, 1.0\)"):
         compare(tripled, plain)
-    assert compare(tripled, side_of_published("X-VLA")).cells
+    assert compare(tripled, published_results("X-VLA")).cells
 
 
 def test_other_scenes_under_one_seed_are_refused(tmp_path: Path) -> None:
     one = record(SIZE, 1, 0, 1)
     first = side(tmp_path / "a", [one])
     second = side(tmp_path / "b", [replace(one, scene_digest="changed")])
-    with pytest.raises(CompareError, match="seed 0 of Pick_Blocks_Size L1 is another scene in b"):
+    with pytest.raises(
+        IncomparableError, match="seed 0 of Pick_Blocks_Size L1 is another scene in b"
+    ):
         compare(first, second)
 
 
 def test_what_cannot_be_compared_is_one_sentence(tmp_path: Path) -> None:
     first = side(tmp_path / "a", outcomes(SIZE, 1, [1]))
     second = side(tmp_path / "b", outcomes(MUGS, 1, [1]))
-    with pytest.raises(CompareError, match="no variant in common"):
+    with pytest.raises(IncomparableError, match="no variant in common"):
         compare(first, second)
-    with pytest.raises(CompareError, match="share no seed"):
+    with pytest.raises(IncomparableError, match="share no seed"):
         stop_early(first, second)
-    with pytest.raises(CompareError, match="holds no result yet"):
-        side(tmp_path / "c", [record(SIZE, 1, 0, 0, end="infrastructure")])
-    with pytest.raises(CompareError, match="no published model is called 'pi9'; there are RDT"):
-        side_of_published("pi9")
-    with pytest.raises(CompareError, match="only the mean is known"):
-        side_of_published("RDT", "ps")
-    mixed = [record(SIZE, 1, 0, 1), record(SIZE, 1, 1, 1, candidates=5)]
-    with pytest.raises(CompareError, match="differ in their number of candidates"):
-        side(tmp_path / "d", mixed, "onta")
+    empty = side(tmp_path / "c", [record(SIZE, 1, 0, 0, end="infrastructure")])
+    with pytest.raises(IncomparableError, match="holds no result yet"):
+        compare(first, empty)
+    with pytest.raises(ValueError, match="no published model is called 'pi9'; there are RDT"):
+        published_results("pi9")
+    with pytest.raises(IncomparableError, match="only the mean is known"):
+        compare(published_results("RDT"), published_results("GO-1"), "ps")
+    mixed = side(tmp_path / "d", [record(SIZE, 1, 0, 1), record(SIZE, 1, 1, 1, candidates=5)])
+    with pytest.raises(IncomparableError, match="differ in their number of candidates"):
+        compare(first, mixed, "onta")

@@ -11,11 +11,11 @@ import pytest
 from run_by_hand import outcomes, record, write
 
 from robospa.results.comparison.compare import compare
-from robospa.results.comparison.operands import side_of_run
 from robospa.results.records.run_io import Run
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.report.report import write_report
 from robospa.results.report.score_table import loss_lines, terminal, to_json
+from robospa.results.scoring.model_results import results_of_run
 from robospa.results.scoring.scores import score_run
 from robospa.trial import TrialKey
 
@@ -129,10 +129,10 @@ def test_the_csv_has_them_as_numbers(report: Path) -> None:
 def test_a_comparison_knows_its_worst_and_best_case(run: Run, tmp_path: Path) -> None:
     records = outcomes(PICK, 1, [0] * 8) + [record(PUT, 1, seed, 1, 2) for seed in range(8)]
     other = write(tmp_path / "other", records)
-    found = compare(side_of_run(run, "mine"), side_of_run(other, "other"))
+    found = compare(results_of_run(run, "mine"), results_of_run(other, "other"))
     assert (
         "mine lacks 4 of the trials that both list: over these the difference is +50.0 in the "
         "worst and +75.0 in the best case for mine." in found.notes
     )
-    whole = compare(side_of_run(other, "other"), side_of_run(other, "again"))
+    whole = compare(results_of_run(other, "other"), results_of_run(other, "again"))
     assert not any("lacks" in note for note in whole.notes)

@@ -1,0 +1,81 @@
+"""What a reader has to know before using a comparison, in sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from robospa.categories import METRIC_CATEGORIES
+from robospa.results.comparison.groups import weights_of
+from robospa.results.comparison.pairs import common_seeds
+from robospa.results.scoring.model_results import ModelResults, Variant
+
+
+def notes(
+    first: ModelResults,
+    second: ModelResults,
+    common: Sequence[Variant],
+    listed: set[Variant],
+    paired: bool,
+) -> list[str]:
+    """What limits the comparison, in sentences."""
+    found = []
+    if paired:
+        found.append("Paired: trials on the same seeds are held against each other.")
+        pairs = {v: len(common_seeds(first, second, v)) for v in common}
+        alone = sum(max(first.listed[v], second.listed[v]) - pairs[v] for v in common)
+        if alone:
+            found.append(f"{alone} listed trials have no result on one of the sides: left out.")
+        blind = [side.name for side in (first, second) if side.info.seeded is False]
+        if blind:
+            found.append(
+                f"{' and '.join(blind)} ignores the policy seed: another run may differ, so the "
+                "pairs tell less than the intervals say."
+            )
+    else:
+        found.append("Unpaired: the sides share no seeds, so every difference needs more trials.")
+    if len(common) < len(listed):
+        found.append(
+            f"Only {len(common)} of {len(listed)} variants are in both: means are of those."
+        )
+    one, two = _versions(first), _versions(second)
+    if changed := sorted(n for n in one.keys() & two.keys() if one[n] != two[n]):
+        found.append(f"Made by different versions of {', '.join(changed)}.")
+    return found
+
+
+def _versions(model: ModelResults) -> dict[str, Any]:
+    return {} if model.published else {**model.info.versions, "code": model.info.code}
+
+
+def worst_and_best(first: ModelResults, second: ModelResults, metric: str) -> list[str]:
+    """What missing trials could make of the mean over all variants that both list."""
+    category = {**second.categories, **first.categories}
+    both = [
+        v
+        for v in first.listed
+        if v in second.listed and category[v[0]] in METRIC_CATEGORIES[metric]
+    ]
+    models = (first, second)
+    missing = [sum(model.scores.cells[v].missing for v in both) for model in models]
+    if not any(missing):
+        return []
+    weights = weights_of(both, category)
+    (low, high), (other_low, other_high) = (_bounds(m, both, weights, metric) for m in models)
+    counts = " and ".join(
+        f"{model.name} lacks {n}" for model, n in zip(models, missing, strict=True) if n
+    )
+    return [
+        f"{counts} of the trials that both list: over these the difference is "
+        f"{100 * (low - other_high):+.1f} in the worst and {100 * (high - other_low):+.1f} in the "
+        f"best case for {first.name}."
+    ]
+
+
+def _bounds(
+    model: ModelResults, variants: Sequence[Variant], weights: Sequence[float], metric: str
+) -> tuple[float, float]:
+    """The mean if every missing trial had achieved nothing, and if every one everything."""
+    spans = [model.scores.cells[v].bounds(metric) or (0.0, 1.0) for v in variants]
+    low = sum(w * low for w, (low, _) in zip(weights, spans, strict=True))
+    return low, sum(w * high for w, (_, high) in zip(weights, spans, strict=True))

@@ -1,0 +1,93 @@
+"""The results of one model: what tables, figures, reports and comparisons are made from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from robospa.categories import BASIC, METRIC_CATEGORIES
+from robospa.results.records.manifest import RunInfo
+from robospa.results.records.run_io import Run, finished
+from robospa.results.records.trial_record import TrialRecord
+from robospa.results.scoring.scores import Scores, score
+from robospa.results.scoring.setting import IncomparableError, Setting, setting_of
+from robospa.results.statistics.bootstrap import Sample
+from robospa.results.statistics.intervals import METHODS
+from robospa.trial import TrialKey
+
+Variant = tuple[str, int]
+
+
+@dataclass(frozen=True)
+class ModelResults:
+    """A run or a published model.
+
+    `trials` has the trials that have a result, by variant and seed; of a `published` model (its
+    name there) no trials are known.
+    """
+
+    name: str
+    scores: Scores
+    setting: Setting
+    info: RunInfo = field(default_factory=RunInfo)
+    trials: Mapping[Variant, Mapping[int, TrialRecord]] = field(default_factory=dict)
+    published: str = ""
+
+    @property
+    def categories(self) -> dict[str, str]:
+        """The category of every task that a trial is listed of."""
+        return {task: cell.category for (task, _), cell in self.scores.cells.items()}
+
+    @property
+    def listed(self) -> dict[Variant, int]:
+        """Number of listed trials by variant."""
+        return {variant: cell.listed for variant, cell in self.scores.cells.items()}
+
+    def samples(self, metric: str) -> dict[Variant, Sample]:
+        """Outcomes of every variant that has results and `metric`.
+
+        Raises IncomparableError if they are not known, or not of one kind.
+        """
+        found: dict[Variant, Sample] = {}
+        for (task, level), cell in self.scores.cells.items():
+            if not cell.trials or cell.category not in categories_of(metric):
+                continue
+            if metric not in cell.samples:
+                raise IncomparableError(
+                    f"{self.name}, {task} L{level}: "
+                    + (
+                        "of published progress only the mean is known, without the trials: compare "
+                        "sr or onta"
+                        if self.published
+                        else "trials differ in their number of candidates: no ONTA"
+                    )
+                )
+            found[task, level] = cell.samples[metric]
+        return found
+
+
+def categories_of(metric: str) -> tuple[str, ...]:
+    """The categories that have `metric`; basic grounding has success rates too."""
+    return METRIC_CATEGORIES[metric] + (BASIC if metric == "sr" else ())
+
+
+def results_of_run(run: Run, name: str = "", ci: str = METHODS[0]) -> ModelResults:
+    """The results of `run`, called `name` or as its folder, with intervals by the method `ci`."""
+    return results_of_records(name or run.folder.name, run.keys, run.records, run.info, ci)
+
+
+def results_of_records(
+    name: str,
+    keys: Sequence[TrialKey],
+    records: Mapping[TrialKey, TrialRecord],
+    info: RunInfo,
+    ci: str = METHODS[0],
+) -> ModelResults:
+    """The results of the trials `keys`, of which `records` has some."""
+    trials: dict[Variant, dict[int, TrialRecord]] = {}
+    for key in keys:
+        record = records.get(key)
+        if record is not None and finished(record):
+            trials.setdefault(key.variant, {})[key.seed] = record
+    setting = setting_of(keys, info.suite, info.step_scale)
+    return ModelResults(name, score(keys, records, info.categories, ci), setting, info, trials)

@@ -1,0 +1,76 @@
+"""What was asked of a model, and the refusal to average or compare what was asked differently."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from robospa.trial import TrialKey
+
+TABLE = ("embodiment", "mode", "suite", "split")
+COMPARISON = ("embodiment", "mode", "split", "step_scale")
+"""Parts of a setting that have to be the same in one table, and in one comparison."""
+NAMES = {
+    "embodiment": "embodiment",
+    "mode": "scene mode",
+    "split": "instruction split",
+    "suite": "suite",
+    "step_scale": "step limits (times the official ones)",
+}
+"""How the parts are called in messages."""
+
+
+class IncomparableError(ValueError):
+    """Results that cannot stand in one table or comparison; the message says why and what to do."""
+
+
+@dataclass(frozen=True)
+class Setting:
+    """The distinct values of every part over all trials; empty where a part is not known.
+
+    `step_scale` multiplied the official step limits.
+    """
+
+    embodiment: tuple[str, ...] = ()
+    mode: tuple[str, ...] = ()
+    split: tuple[str, ...] = ()
+    suite: tuple[str, ...] = ()
+    step_scale: tuple[float, ...] = ()
+
+    def mixed(self) -> list[tuple[str, tuple[str, ...]]]:
+        """The parts that have several values, with these."""
+        parts = (("embodiment", self.embodiment), ("mode", self.mode), ("split", self.split))
+        return [(name, values) for name, values in parts if len(values) > 1]
+
+
+def setting_of(keys: Sequence[TrialKey], suite: str = "", step_scale: float = 1.0) -> Setting:
+    """The setting of the trials `keys`."""
+    return Setting(
+        tuple(sorted({key.embodiment for key in keys})),
+        tuple(sorted({key.mode for key in keys})),
+        tuple(sorted({key.split for key in keys})),
+        (suite,) if suite else (),
+        (step_scale,),
+    )
+
+
+def check_same(settings: Iterable[tuple[str, Setting]], parts: Sequence[str]) -> None:
+    """IncomparableError if one of the named settings mixes values, or two differ in `parts`."""
+    known = list(settings)
+    for name, setting in known:
+        for part, values in setting.mixed():
+            raise IncomparableError(
+                f"{name} mixes the {NAMES[part]}s {' and '.join(values)}, whose mean means "
+                "nothing: evaluate one at a time"
+            )
+    for part in parts:
+        found: dict[str | float, str] = {}
+        for name, setting in known:
+            for value in getattr(setting, part):
+                found.setdefault(value, name)
+        if len(found) > 1:
+            (one, first), (other, second), *_ = found.items()
+            raise IncomparableError(
+                f"{first} and {second} cannot be compared: they differ in {NAMES[part]} "
+                f"({one}, {other})"
+            )
