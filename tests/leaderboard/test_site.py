@@ -16,6 +16,7 @@ from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.entries import BADGES, all_entries, published_entries
 from robospa.leaderboard.site import build, index_page, write_model, write_site
 from robospa.leaderboard.submission import add, read_submission, read_submissions, slug_of, waiting
+from robospa.results.paper.columns import Column
 
 CARD_TEXT = """
 name = "Fake 1"
@@ -101,7 +102,7 @@ def test_names_that_are_scripts_stay_text(tmp_path: Path) -> None:
         about=about,
         evidence=about,
         embodiment=EVIL,
-        column=replace(entry.column, title=EVIL),
+        column=Column(replace(entry.column.results, name=EVIL)),
     )
     write_model(evil, tmp_path)
     for page in (index_page([evil]), (tmp_path / "index.html").read_text()):

@@ -171,7 +171,7 @@ def test_other_suites_scenes_or_splits_are_refused() -> None:
 
 def test_a_run_that_mixes_robots_is_refused() -> None:
     records = [*full_run("RDT", trials=1), *full_run("RDT", trials=1, embodiment="piper")]
-    with pytest.raises(IncomparableError, match="mine mixes the embodiments aloha.* piper"):
+    with pytest.raises(IncomparableError, match=r"mixes the embodiments aloha.* piper"):
         run_column(make_run(records))
 
 
