@@ -16,8 +16,7 @@ from robospa.results.figures.series import Drawing
 from robospa.results.records.manifest import MANIFEST, RunError
 from robospa.results.records.run_io import TRIALS, Run, read_run
 from robospa.results.report.page import FIGURES, page
-from robospa.results.report.report import draw_figures, gather
-from robospa.results.report.tables import for_page
+from robospa.results.report.report import draw_figures, make_report
 from robospa.results.report.trials import FILMS
 
 FORMATS = ("svg",)
@@ -74,19 +73,17 @@ class LiveReport:
         return tuple(found)
 
     def _make(self, run: Run) -> str:
-        gathered = gather([run], self._published, self._ci)
+        report = make_report(run, self._published, self._ci)
         drawn = Path(self._drawn_folder.name)
         if not run.missing or time.monotonic() >= self._drawn_at + FIGURES_SECONDS:
             (drawn / FIGURES).mkdir(exist_ok=True)
-            self._drawings = draw_figures([run], gathered.columns, drawn / FIGURES, FORMATS)
+            self._drawings = draw_figures(
+                report.runs, report.columns, drawn / FIGURES, FORMATS, report.failures
+            )
             self._drawn_at = time.monotonic()
         return page(
-            [run],
-            gathered.names,
-            gathered.scores,
-            for_page(gathered.tables),
+            report,
             self._drawings,
-            gathered.notes,
             self.folder,
             drawn=drawn,
             formats=(),

@@ -32,7 +32,7 @@ from robospa.results.figures.series import Drawing, Series, save, styled
 from robospa.results.paper.published import load
 from robospa.results.report.page import FIGURES, card, figure, own_version, render
 from robospa.results.report.report import method_notes
-from robospa.results.report.tables import Shown, for_page, report_tables
+from robospa.results.report.tables import ReportTable, for_page, report_tables
 
 MARK = ".robospa-site"
 """A file that says a folder is ours to write over."""
@@ -191,7 +191,7 @@ def _partial(entry: Entry) -> str:
     return f"ran {count} of {len(known)} tasks" if count < len(known) else ""
 
 
-def _tables(entry: Entry) -> list[Shown]:
+def _tables(entry: Entry) -> list[ReportTable]:
     """The report's tables; those of all tasks are opened by hand."""
     shown = report_tables([entry.column])
     return [replace(table, folded=table.grid.name.endswith("-tasks")) for table in shown]

@@ -26,7 +26,7 @@ from robospa.leaderboard.bundle import MEGA, BundleError
 from robospa.leaderboard.card import LINK, check_card, read_card
 from robospa.leaderboard.strict_json import is_hash, parse_map
 from robospa.leaderboard.verify import Valid
-from robospa.results.failures.labels import NAMES, distribution
+from robospa.results.failures.labels import NAMES, distribution, failures_of
 from robospa.results.records.run_io import Run
 from robospa.results.report.run_card import END_NAMES
 from robospa.results.report.trials import trial_rows
@@ -112,7 +112,8 @@ def add(
             replace_file(folder / name, archive.read(source))
         for record in filmed.values():
             replace_file(folder / record.video, archive.read(record.video))
-    rows = trial_rows([Run(folder, valid.run.manifest, tuple(filmed), filmed)], folder)
+    shown = Run(folder, valid.run.manifest, tuple(filmed), filmed)
+    rows = trial_rows([shown], folder, [failures_of(filmed.values())])
     trials = {"failures": distribution(valid.run.records.values()), "films": rows}
     for name, content in ((TRIALS, trials), (EVIDENCE, evidence)):
         replace_file(folder / name, (json.dumps(content, indent=1) + "\n").encode())

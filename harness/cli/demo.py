@@ -79,7 +79,8 @@ def _evaluate(policy: str, chosen: Selection, folder: Path, workers: int, video:
     from robospa.harness.running.request import make_request
     from robospa.harness.settings import Compute, Connection, EvaluationSettings, Recording
     from robospa.results.records.run_io import read_run
-    from robospa.results.report.report import write_report
+    from robospa.results.report.files import write_report
+    from robospa.results.report.report import make_report
 
     with server(policy) as url:
         print(f"`robospa serve {policy}` listens at {url}; evaluating it over the wire", flush=True)
@@ -92,7 +93,7 @@ def _evaluate(policy: str, chosen: Selection, folder: Path, workers: int, video:
             recording=Recording(video=video),
         )
         run_and_show(make_request(settings, arguments={"command": "demo"}))
-    return write_report(read_run(folder), folder / "report") / "report.html"
+    return write_report(make_report(read_run(folder)), folder / "report") / "report.html"
 
 
 @contextmanager

@@ -23,7 +23,8 @@ def report(
     """Write report.html, report.md, report.json, tables and figures of one or several runs."""
     from robospa.results.paper.published import load
     from robospa.results.records.run_io import read_run
-    from robospa.results.report.report import write_report
+    from robospa.results.report.files import write_report
+    from robospa.results.report.report import make_report
     from robospa.results.report.score_table import terminal
     from robospa.results.statistics.intervals import METHODS
 
@@ -33,7 +34,8 @@ def report(
         raise ValueError("a report of several runs belongs to none of them; say where with --out")
     found = [read_run(folder) for folder in run]
     published = list(load().models) if with_published else []
-    folder = write_report(found, out or run[0] / "report", published, ci)
-    for one in found:
-        terminal(one, ci)
+    made = make_report(found, published, ci)
+    folder = write_report(made, out or run[0] / "report")
+    for one, model in zip(made.runs, made.models, strict=False):
+        terminal(one, model.scores)
     print(f"Report: {folder / 'report.html'}")

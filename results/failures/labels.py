@@ -16,6 +16,7 @@ from typing import Any
 from robospa.categories import SPATIAL
 from robospa.results.failures.attribution import Cause, roles_of, root_of
 from robospa.results.records.trial_record import TrialRecord
+from robospa.trial import TrialKey
 
 NAMES = {
     "target_grounding": "target grounding",
@@ -66,17 +67,28 @@ def label(record: TrialRecord) -> Failure | None:
     return Failure(cause.kind, cause.evidence, time, cause.event.get("step"), _film(record, time))
 
 
-def distribution(records: Iterable[TrialRecord], by: str = "task") -> dict[str, dict[str, int]]:
+def failures_of(records: Iterable[TrialRecord]) -> dict[TrialKey, Failure]:
+    """The type of every failed trial among `records`."""
+    return {r.key: failure for r in records if (failure := label(r)) is not None}
+
+
+def distribution(
+    records: Iterable[TrialRecord],
+    by: str = "task",
+    failures: Mapping[TrialKey, Failure] | None = None,
+) -> dict[str, dict[str, int]]:
     """How often each kind occurs, by "task", "category" or "variant"; kinds in their order.
 
-    Groups without a failure are left out. ValueError for another grouping.
+    Groups without a failure are left out. `failures` are those of the records, where they are known
+    already. ValueError for another grouping.
     """
     if by not in _GROUPS:
         raise ValueError(f"failures are grouped by {', '.join(_GROUPS)}, not by {by!r}")
+    known = list(records)
+    found = failures_of(known) if failures is None else failures
     counts: dict[str, dict[str, int]] = {}
-    for record in records:
-        failure = label(record)
-        if failure is not None:
+    for record in known:
+        if failure := found.get(record.key):
             row = counts.setdefault(_GROUPS[by](record), dict.fromkeys(KINDS, 0))
             row[failure.kind] += 1
     return {

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from robospa.results.failures.labels import KINDS, NAMES, distribution
+from robospa.results.failures.labels import KINDS, NAMES
 from robospa.results.figures.failure_bars import draw_failures
 from robospa.results.figures.heat import draw_heat
 from robospa.results.figures.latency import draw_latency, has_latency
@@ -66,8 +66,8 @@ def _own_figures(
     made = []
     ending = f"-{number}" if number else ""
     of = f": {series.name}" if number else ""
-    found = distribution(series.records)
-    counts = {t: found[t] for t in tasks_in_order(series.scores) if t in found}
+    found = series.failures
+    counts = {t: found[t] for t in tasks_in_order(series.scores) if any(found.get(t, {}).values())}
     if counts:
         name = f"failures{ending}"
         save(draw_failures(counts, KINDS, NAMES), folder, name, formats)

@@ -6,9 +6,9 @@ differ by marker and dash, stacked parts by hatching.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +37,8 @@ class Series:
     scores: Scores
     records: Sequence[TrialRecord] = ()
     published: bool = False
+    failures: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
+    """How often each type of failure occurs, by task."""
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ the page's colours; only videos lie beside it.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -17,8 +17,10 @@ from robospa.categories import BASIC, CATEGORY_NAMES
 from robospa.results.failures.labels import NAMES, SIMULATED_PER_FILM
 from robospa.results.figures.series import FORMATS, GRID, INK, Drawing
 from robospa.results.records.run_io import Run
+from robospa.results.report.report import Report
 from robospa.results.report.run_card import facts
 from robospa.results.report.score_table import percent
+from robospa.results.report.tables import for_page
 from robospa.results.report.trials import failure_counts, trial_rows
 from robospa.results.scoring.scores import Scores
 
@@ -26,25 +28,21 @@ FIGURES = "figures"
 
 
 def page(
-    runs: Sequence[Run],
-    names: Sequence[str],
-    scores: Mapping[str, Scores],
-    tables: Sequence[Mapping[str, Any]],
+    report: Report,
     drawings: Sequence[Drawing],
-    notes: Mapping[str, Sequence[str]],
     folder: Path,
     drawn: Path | None = None,
     formats: Sequence[str] = FORMATS,
     live: bool = False,
 ) -> str:
-    """The page of `runs`, called `names`; `scores` also has published models.
+    """The page of `report`.
 
-    `tables` have title, html (already escaped) and folded. `notes` has `missing`, `findings` and
-    `method`, each as sentences. Videos are put into `folder`, figures are read from `drawn` or else
-    from there, with links to their `formats`. A `live` page asks its server for what is new.
+    Videos are put into `folder`, figures are read from `drawn` or else from there, with links to
+    their `formats`. A `live` page asks its server for what is new.
     """
-    trials = trial_rows(runs, folder)
-    failures = failure_counts(runs)
+    runs, names = report.runs, [name for name, _ in report.named_runs]
+    trials = trial_rows(runs, folder, report.failures)
+    failures = failure_counts(report.failures)
     listed = sum(len(run.keys) for run in runs)
     sections = ["summary", "tables", "trials", "runs"]
     sections += ["figures"] if drawings else []
@@ -54,16 +52,16 @@ def page(
         "report.html",
         title=", ".join(names),
         badges=badges(runs, names),
-        scores_shown=len(scores),
-        cards=[card(name, found) for name, found in scores.items()],
-        missing=notes["missing"],
-        findings=notes["findings"],
-        tables=tables,
-        note=" ".join(notes["method"]),
+        scores_shown=len(report.models),
+        cards=[card(model.name, model.scores) for model in report.models],
+        missing=report.missing,
+        findings=report.findings,
+        tables=for_page(report.tables),
+        note=" ".join(report.method),
         figures=[figure(d, drawn or folder, formats) for d in drawings],
         failures=failures,
         names=names,
-        runs=[{"name": name, "facts": facts(run)} for name, run in zip(names, runs, strict=True)],
+        runs=[{"name": name, "facts": facts(run)} for name, run in report.named_runs],
         sections=sections,
         left_out=listed - len(trials),
         live=live,

@@ -9,7 +9,7 @@ from typing import Any
 from robospa.categories import BASIC, CATEGORIES, CATEGORY_NAMES, DIMENSIONS, METRIC_NAMES, METRICS
 from robospa.results.records.run_io import Run
 from robospa.results.report.run_card import ends
-from robospa.results.scoring.scores import Average, Cell, Scores, score_run
+from robospa.results.scoring.scores import Average, Cell, Scores
 from robospa.results.statistics.intervals import Estimate
 from robospa.results.tables.table import MISSING
 
@@ -184,13 +184,12 @@ def to_json(scores: Scores) -> dict[str, Any]:
     }
 
 
-def terminal(run: Run, ci: str = "wilson") -> None:
-    """Print the run's table on the terminal, with intervals by the method `ci`."""
+def terminal(run: Run, scores: Scores) -> None:
+    """Print the table of `run` on the terminal, which has these `scores`."""
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
 
-    scores = score_run(run, ci)
     shown = rows(scores)
     if all(category_size(scores, row) < 2 for row in shown):
         shown = [row for row in shown if row.kind != "category"]  # they would repeat their task

@@ -28,14 +28,14 @@ SUMMARIES = (("main", "sr"), ("onta", "onta"), ("ps", "ps"))
 
 
 @dataclass(frozen=True)
-class Shown:
+class ReportTable:
     """A table of the report; a `folded` one is opened by hand."""
 
     grid: Grid
     folded: bool
 
 
-def report_tables(columns: Sequence[Column]) -> list[Shown]:
+def report_tables(columns: Sequence[Column]) -> list[ReportTable]:
     """The tables of `columns`; the ones that are published models come last in them."""
     runs = [c for c in columns if not c.published] or list(columns)
     levels = sorted({level for c in runs for _, level in c.scores.cells})
@@ -43,13 +43,13 @@ def report_tables(columns: Sequence[Column]) -> list[Shown]:
     for name, metric in SUMMARIES:
         if any(_has(c, metric) for c in runs):
             grid = summary_table(columns, name, metric, _heads(columns, levels, metric))
-            made.append(Shown(covered(grid, len(runs)), False))
+            made.append(ReportTable(covered(grid, len(runs)), False))
     if any(c.covers_basic for c in runs):
-        made.append(Shown(basic_table(columns), False))
+        made.append(ReportTable(basic_table(columns), False))
     for _, metric in SUMMARIES:
         if any(_has(c, metric) for c in runs):
             grid = task_table(columns, f"{metric}-tasks", metric)
-            made.append(Shown(covered(grid, len(runs)), len(columns) > 1))
+            made.append(ReportTable(covered(grid, len(runs)), len(columns) > 1))
     return [s for s in made if any(line.entries for line in s.grid.lines)]
 
 
@@ -103,7 +103,7 @@ def _levels_that_were_run(grid: Grid, runs: int) -> Grid:
     )
 
 
-def for_page(tables: Sequence[Shown]) -> list[Mapping[str, Any]]:
+def for_page(tables: Sequence[ReportTable]) -> list[Mapping[str, Any]]:
     """Title, markup, whether it is folded, and notes too long to stand below it, of each table."""
     from markupsafe import Markup
 
@@ -117,7 +117,7 @@ def for_page(tables: Sequence[Shown]) -> list[Mapping[str, Any]]:
     return made
 
 
-def write_files(tables: Sequence[Shown], folder: Path) -> None:
+def write_files(tables: Sequence[ReportTable], folder: Path) -> None:
     """The same tables for papers and programs: LaTeX and CSV."""
     if tables:
         write_tables([t.grid for t in tables], folder, ("tex", "csv"))

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from robospa.results.failures.labels import NAMES, label
+from robospa.results.failures.labels import NAMES, Failure
 from robospa.results.records.run_io import Run
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.report.run_card import END_NAMES, NOT_RUN
@@ -17,14 +17,22 @@ from robospa.trial import TrialKey
 SHOWN_TRIALS = 60_000
 """Two whole benchmark runs. Beyond that browsers choke: successes are left out first."""
 FILMS = "videos"
+Failures = Mapping[TrialKey, Failure]
+"""The type of every failed trial of a run."""
 
 
-def trial_rows(runs: Sequence[Run], folder: Path) -> list[dict[str, Any]]:
-    """A row for every trial of `runs`, in their order; videos are put into `folder`."""
+def trial_rows(
+    runs: Sequence[Run], folder: Path, failures: Sequence[Failures]
+) -> list[dict[str, Any]]:
+    """A row for every trial of `runs`, in their order, with the type of its failure; videos are put
+    into `folder`."""
     pairs = [(number, run, key) for number, run in enumerate(runs) for key in run.keys]
     if len(pairs) > SHOWN_TRIALS:
         pairs = sorted(pairs, key=lambda p: _succeeded(p[1], p[2]))[:SHOWN_TRIALS]
-    return [_row(number, run, key, folder, len(runs) > 1) for number, run, key in pairs]
+    return [
+        _row(number, run, key, folder, failures[number].get(key), len(runs) > 1)
+        for number, run, key in pairs
+    ]
 
 
 def _succeeded(run: Run, key: TrialKey) -> bool:
@@ -32,7 +40,9 @@ def _succeeded(run: Run, key: TrialKey) -> bool:
     return record is not None and record.success
 
 
-def _row(number: int, run: Run, key: TrialKey, folder: Path, several: bool) -> dict[str, Any]:
+def _row(
+    number: int, run: Run, key: TrialKey, folder: Path, failure: Failure | None, several: bool
+) -> dict[str, Any]:
     """One trial; what is empty is left out, because 28,000 of them are one file."""
     record = run.records.get(key)
     row: dict[str, Any] = {"run": number, "task": key.task, "level": key.level, "seed": key.seed}
@@ -40,7 +50,6 @@ def _row(number: int, run: Run, key: TrialKey, folder: Path, several: bool) -> d
         return {**row, "end": NOT_RUN}
     place = folder / FILMS / str(number + 1) if several else folder / FILMS
     video = film(run, record, place)
-    failure = label(record)
     row |= {
         "end": END_NAMES[record.end],
         "good": int(record.success),
@@ -69,14 +78,12 @@ def event_row(event: Mapping[str, Any]) -> list[Any]:
     return [round(float(event.get("time", 0.0)), 2), kind, " ".join(words)]
 
 
-def failure_counts(runs: Sequence[Run]) -> list[dict[str, Any]]:
+def failure_counts(failures: Sequence[Failures]) -> list[dict[str, Any]]:
     """How often each type occurs in each run, by frequency; types that never occur are left out."""
     counts: dict[str, list[int]] = {}
-    for number, run in enumerate(runs):
-        for record in run.records.values():
-            failure = label(record)
-            if failure is not None:
-                counts.setdefault(failure.kind, [0] * len(runs))[number] += 1
+    for number, found in enumerate(failures):
+        for failure in found.values():
+            counts.setdefault(failure.kind, [0] * len(failures))[number] += 1
     made = [{"kind": k, "name": NAMES.get(k, k), "counts": n} for k, n in counts.items()]
     return sorted(made, key=lambda row: -sum(row["counts"]))
 

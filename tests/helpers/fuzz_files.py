@@ -258,6 +258,7 @@ class Readers:
     def _run(self, rng: random.Random) -> None:
         """A whole run, one of its records or its manifest changed, up to its tables."""
         from robospa.results.report.score_table import terminal
+        from robospa.results.scoring.scores import score_run
 
         run = self.folder / "whole"
         (run / "trials").mkdir(parents=True, exist_ok=True)
@@ -271,7 +272,8 @@ class Readers:
         (run / "run.json").write_bytes(manifest)
         (run / "trials" / "0000.jsonl").write_bytes(b"\n".join(lines) + b"\n")
         with contextlib.redirect_stdout(io.StringIO()):
-            terminal(read_run(run))
+            found = read_run(run)
+            terminal(found, score_run(found))
 
 
 def attempt(readers: Readers, name: str, rng: random.Random) -> str:

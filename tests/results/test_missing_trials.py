@@ -13,8 +13,9 @@ from run_by_hand import outcomes, record, write
 from robospa.results.comparison.compare import compare
 from robospa.results.records.run_io import Run
 from robospa.results.records.trial_record import TrialRecord
-from robospa.results.report.report import write_report
-from robospa.results.report.score_table import loss_lines, terminal, to_json
+from robospa.results.report.files import write_report
+from robospa.results.report.report import make_report
+from robospa.results.report.score_table import loss_lines, to_json
 from robospa.results.scoring.model_results import results_of_run
 from robospa.results.scoring.scores import score_run
 from robospa.trial import TrialKey
@@ -38,7 +39,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
 
 @pytest.fixture(scope="module")
 def report(run: Run) -> Path:
-    return write_report(run, run.folder / "report")
+    return write_report(make_report(run), run.folder / "report")
 
 
 def test_rates_are_of_results_and_bounds_of_all_that_is_listed(run: Run) -> None:
@@ -71,7 +72,7 @@ def test_json_has_counts_and_bounds_of_every_metric(run: Run) -> None:
 def test_the_terminal_marks_incomplete_variants_and_says_why(
     run: Run, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    terminal(run)
+    terminal(run, score_run(run))
     text = capsys.readouterr().out
     assert "83.3†" in text and "50.0†" in text
     assert "16 trials: 8 success, 4 step limit, 2 missing, 2 not run († lacks trials)" in text
@@ -84,7 +85,8 @@ def test_what_a_server_said_is_no_markup(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     bad = lost(PICK, 1, 1, "the server reported [/x]: [red]")
-    terminal(write(tmp_path / "run", [record(PICK, 1, 0, 1), bad]))
+    run = write(tmp_path / "run", [record(PICK, 1, 0, 1), bad])
+    terminal(run, score_run(run))
     assert "missing 1: the server reported [/x]: [red]" in capsys.readouterr().out
 
 

@@ -13,7 +13,8 @@ from report_runs import EVIL, KNOWN, RECORDS, make_run
 from robospa.results.records.manifest import RunError
 from robospa.results.records.run_io import read_run
 from robospa.results.report import score_table as tables
-from robospa.results.report.report import write_report
+from robospa.results.report.files import write_report
+from robospa.results.report.report import make_report
 from robospa.results.report.trials import event_row
 from robospa.results.scoring.scores import score_run
 from robospa.results.statistics.intervals import Estimate, wilson
@@ -27,7 +28,7 @@ def trials_of(folder: Path) -> list[dict[str, Any]]:
 
 
 def test_the_report_holds_what_other_programs_need(tmp_path: Path) -> None:
-    folder = write_report(make_run(tmp_path / "run", KNOWN), tmp_path / "report")
+    folder = write_report(make_report(make_run(tmp_path / "run", KNOWN)), tmp_path / "report")
     data = json.loads((folder / "report.json").read_text())["runs"][0]
     cell = data["variants"]["Pick_Blocks_Size"]["L1"]
     assert (cell["trials"], cell["successes"], cell["missing"]) == (4, 3, 0)
@@ -41,7 +42,7 @@ def test_the_report_holds_what_other_programs_need(tmp_path: Path) -> None:
 
 
 def test_text_from_outside_is_never_markup(tmp_path: Path) -> None:
-    folder = write_report(make_run(tmp_path / "run", KNOWN), tmp_path / "report")
+    folder = write_report(make_report(make_run(tmp_path / "run", KNOWN)), tmp_path / "report")
     page = (folder / "report.html").read_text()
     assert EVIL not in page
     assert "&lt;script&gt;alert(1)&lt;/script&gt;" in page
@@ -50,7 +51,7 @@ def test_text_from_outside_is_never_markup(tmp_path: Path) -> None:
 
 
 def test_the_page_loads_nothing_from_elsewhere(tmp_path: Path) -> None:
-    folder = write_report(make_run(tmp_path / "run", KNOWN), tmp_path / "report")
+    folder = write_report(make_report(make_run(tmp_path / "run", KNOWN)), tmp_path / "report")
     page = (folder / "report.html").read_text()
     assert "http" not in page.replace("http-equiv", "")
     assert "@import" not in page
@@ -60,7 +61,7 @@ def test_the_page_loads_nothing_from_elsewhere(tmp_path: Path) -> None:
 def test_every_trial_is_listed_with_its_failure_type(tmp_path: Path) -> None:
     lost = replace(KNOWN[0], end="infrastructure", success=False)
     run = make_run(tmp_path / "run", [lost, *KNOWN[1:]], lost=1)
-    found = trials_of(write_report(run, tmp_path / "report"))
+    found = trials_of(write_report(make_report(run), tmp_path / "report"))
     assert [t["end"] for t in found] == [
         "missing",
         "success",
@@ -75,7 +76,7 @@ def test_every_trial_is_listed_with_its_failure_type(tmp_path: Path) -> None:
 
 def test_several_runs_and_published_models_stand_side_by_side(tmp_path: Path) -> None:
     runs = [make_run(tmp_path / name, KNOWN) for name in ("one", "two")]
-    folder = write_report(runs, tmp_path / "report", ["X-VLA"])
+    folder = write_report(make_report(runs, ["X-VLA"]), tmp_path / "report")
     page = (folder / "report.html").read_text()
     assert "(one)" in page
     assert "(two)" in page
@@ -84,14 +85,14 @@ def test_several_runs_and_published_models_stand_side_by_side(tmp_path: Path) ->
 
 
 def test_a_run_that_fits_no_table_says_why_and_keeps_its_trials(tmp_path: Path) -> None:
-    folder = write_report(make_run(tmp_path / "run", RECORDS), tmp_path / "report")
+    folder = write_report(make_report(make_run(tmp_path / "run", RECORDS)), tmp_path / "report")
     assert "No tables: " in (folder / "report.html").read_text()
     assert len(trials_of(folder)) == 6
 
 
 def test_missing_trials_are_shown_with_the_worst_and_the_best_case(tmp_path: Path) -> None:
     run = make_run(tmp_path / "run", RECORDS, lost=4)
-    folder = write_report(run, tmp_path / "report")
+    folder = write_report(make_report(run), tmp_path / "report")
     sentence = (
         "Pick_It L1: 4 of 8 trials are missing; if all had failed SR would be 37.5, "
         "if all had succeeded 87.5"
@@ -112,7 +113,7 @@ def test_videos_are_put_into_the_report_and_nothing_else_is(tmp_path: Path) -> N
     run = make_run(tmp_path / "run", films)
     (run.folder / "videos").mkdir()
     (run.folder / "videos" / "a.mp4").write_bytes(b"film")
-    folder = write_report(run, tmp_path / "report")
+    folder = write_report(make_report(run), tmp_path / "report")
     assert [p.name for p in (folder / "videos").iterdir()] == ["a.mp4"]
     assert [t.get("video") for t in trials_of(folder)] == ["videos/a.mp4", None, None]
 
@@ -123,14 +124,14 @@ def test_a_video_of_a_trial_that_was_run_again_replaces_the_old_one(tmp_path: Pa
     for content in (b"old", b"new"):
         (run.folder / "videos" / "a.mp4").unlink(missing_ok=True)
         (run.folder / "videos" / "a.mp4").write_bytes(content)
-        folder = write_report(run, tmp_path / "report")
+        folder = write_report(make_report(run), tmp_path / "report")
         assert (folder / "videos" / "a.mp4").read_bytes() == content
 
 
 def test_a_run_without_any_record_still_makes_a_report(tmp_path: Path) -> None:
     run = make_run(tmp_path / "run", KNOWN[:1], lost=1)
     (run.folder / "trials" / "0000.jsonl").unlink()
-    folder = write_report(read_run(run.folder), tmp_path / "report")
+    folder = write_report(make_report(read_run(run.folder)), tmp_path / "report")
     assert [t["end"] for t in trials_of(folder)] == ["not run", "not run"]
 
 
@@ -140,7 +141,8 @@ def test_a_folder_that_is_no_run_is_refused(tmp_path: Path) -> None:
 
 
 def test_the_terminal_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    tables.terminal(make_run(tmp_path / "run", RECORDS, lost=1))
+    run = make_run(tmp_path / "run", RECORDS, lost=1)
+    tables.terminal(run, score_run(run))
     text = capsys.readouterr().out
     assert "GAC Pick It" in text
     assert "75.0" in text

@@ -13,7 +13,8 @@ import pytest
 from devtools import Page, chromium
 from report_runs import EVIL, make_run, record, write_film
 
-from robospa.results.report.report import write_report
+from robospa.results.report.files import write_report
+from robospa.results.report.report import make_report
 
 pytestmark = pytest.mark.browser
 
@@ -39,7 +40,7 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     run = make_run(folder / "run", records)
     (folder / "run" / "videos").mkdir()
     write_film(folder / "run" / "videos" / "a b#1.mp4", 6)
-    return write_report(run, folder / "report", ["RDT", "X-VLA"]) / "report.html"
+    return write_report(make_report(run, ["RDT", "X-VLA"]), folder / "report") / "report.html"
 
 
 @pytest.fixture(scope="module")
