@@ -8,7 +8,7 @@ from pathlib import Path
 
 from robospa.categories import BASIC, CATEGORIES, DIMENSIONS
 from robospa.harness.settings import Selection, SettingsError
-from robospa.results.records.schema import MOST, parse
+from robospa.results.records.schema import MAX_INTEGER, parse
 from robospa.trial import TrialKey
 
 GROUPS = {"all": CATEGORIES, **DIMENSIONS, "basic": BASIC}
@@ -84,7 +84,9 @@ def parse_seeds(text: str | None) -> Seeds:
     def look_up(task: str, level: int) -> Sequence[int]:
         levels = data.get(task) if isinstance(data, dict) else {str(level): data}
         found = levels.get(str(level)) if isinstance(levels, dict) else None
-        if not isinstance(found, list) or not all(type(n) is int and 0 <= n <= MOST for n in found):
+        if not isinstance(found, list) or not all(
+            type(n) is int and 0 <= n <= MAX_INTEGER for n in found
+        ):
             raise SettingsError(f"{text} has no list of seeds for {task} level {level}")
         return found
 

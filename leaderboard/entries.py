@@ -17,9 +17,9 @@ from robospa.leaderboard.submission import Submission, slug_of
 from robospa.results.paper import rounding
 from robospa.results.paper.columns import Column, published_column
 from robospa.results.paper.published import LEVELS, load
-from robospa.results.report.score_table import to_json
 from robospa.results.scoring.model_results import ModelResults
-from robospa.results.scoring.scores import Cell, combine
+from robospa.results.scoring.score_json import to_json
+from robospa.results.scoring.scores import VariantScore, combine
 from robospa.results.scoring.setting import Setting
 from robospa.results.statistics.intervals import Estimate
 
@@ -158,7 +158,7 @@ def _column(submission: Submission) -> Column:
     run, where = submission.run, f"the submission {submission.folder.name}"
     settings, categories = run["settings"], run["categories"]
     counts = load().tasks
-    cells: dict[tuple[str, int], Cell] = {}
+    cells: dict[tuple[str, int], VariantScore] = {}
     try:
         for task, levels in submission.scores["variants"].items():
             for name, part in levels.items():
@@ -172,7 +172,7 @@ def _column(submission: Submission) -> Column:
                 n = known.counts[level - 1] if known and category in SPATIAL else 0
                 listed = int(part["trials"]) + int(part["missing"])
                 done = int(part["successes"])
-                cells[task, level] = Cell(
+                cells[task, level] = VariantScore(
                     task, level, category, listed, int(part["trials"]), done, values, n
                 )
         scores = combine(cells)

@@ -9,8 +9,8 @@ from typing import Any
 from robospa.results.paper.columns import run_column
 from robospa.results.paper.tables import FORMATS
 from robospa.results.records.run_io import Run
-from robospa.results.report.score_table import to_json
 from robospa.results.report.tables import report_tables
+from robospa.results.scoring.score_json import to_json
 from robospa.results.scoring.scores import score_run
 from robospa.results.scoring.setting import IncomparableError
 

@@ -25,7 +25,7 @@ def report(
     from robospa.results.records.run_io import read_run
     from robospa.results.report.files import write_report
     from robospa.results.report.report import make_report
-    from robospa.results.report.score_table import terminal
+    from robospa.results.report.score_table import print_scores
     from robospa.results.statistics.intervals import METHODS
 
     if ci not in METHODS:
@@ -37,5 +37,5 @@ def report(
     made = make_report(found, published, ci)
     folder = write_report(made, out or run[0] / "report")
     for one, model in zip(made.runs, made.models, strict=False):
-        terminal(one, model.scores)
+        print_scores(one, model.scores)
     print(f"Report: {folder / 'report.html'}")

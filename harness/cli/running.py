@@ -15,7 +15,7 @@ from robospa.harness.running.evaluate import Request, RunAborted, evaluate
 def run_and_show(request: Request) -> None:
     """Evaluate, print the table, and end with 1 if trials are missing, 130 on Ctrl-C."""
     from robospa.results.records.run_io import read_run
-    from robospa.results.report.score_table import terminal
+    from robospa.results.report.score_table import print_scores
     from robospa.results.scoring.scores import score_run
 
     folder = request.config.folder
@@ -29,7 +29,7 @@ def run_and_show(request: Request) -> None:
     except RunAborted as error:
         raise RunAborted(f"the run stopped: {error}; {again}") from error
     run = read_run(folder)
-    terminal(run, score_run(run))
+    print_scores(run, score_run(run))
     if run.missing:
         print(
             f"robospa: {len(run.missing)} of {len(run.keys)} trials could not be run and are "

@@ -14,7 +14,7 @@ from typing import Any
 
 from robospa.categories import BASIC, CATEGORIES
 from robospa.results.records.trial_record import TrialRecord
-from robospa.results.scoring.scores import Average, Cell, Scores
+from robospa.results.scoring.scores import AverageScore, Scores, VariantScore
 
 WIDTH = 3.4
 """Width of a column [inch]."""
@@ -50,7 +50,7 @@ class Drawing:
     caption: str
 
 
-def percent_of(part: Cell | Average | None, metric: str) -> float | None:
+def percent_of(part: VariantScore | AverageScore | None, metric: str) -> float | None:
     """The value of `metric` in percent, None where there is no result."""
     estimate = None if part is None else part.values.get(metric)
     return None if estimate is None else 100 * estimate.value

@@ -15,7 +15,7 @@ from functools import cache
 from robospa.categories import DIMENSIONS, METRIC_CATEGORIES
 from robospa.results.paper import rounding
 from robospa.results.paper.columns import Column, published_column
-from robospa.results.paper.published import LEVELS, Published, Table, load
+from robospa.results.paper.published import LEVELS, PrintedTable, Published, load
 from robospa.results.paper.rounding import rounded
 from robospa.results.statistics import onta
 from robospa.results.statistics.intervals import interval_of
@@ -81,7 +81,9 @@ def checks() -> tuple[Check, ...]:
     return tuple(found)
 
 
-def _summary_table(data: Published, table: Table, columns: Mapping[str, Column]) -> Iterator[Check]:
+def _summary_table(
+    data: Published, table: PrintedTable, columns: Mapping[str, Column]
+) -> Iterator[Check]:
     for row, by_model in table.rows.items():
         for model, printed in by_model.items():
             for place, name in enumerate(table.columns):
@@ -100,7 +102,7 @@ def _summary_table(data: Published, table: Table, columns: Mapping[str, Column])
                 yield Check(table.source, title, row, model, name, shown, ours, reason=reason)
 
 
-def _reason(data: Published, table: Table, column: Column, row: str, name: str) -> str:
+def _reason(data: Published, table: PrintedTable, column: Column, row: str, name: str) -> str:
     """Why a printed average differs, as far as the other printed numbers tell."""
     model = column.published
     printed = dict(zip(table.columns, table.rows[row][model], strict=True))
@@ -124,7 +126,7 @@ def _reason(data: Published, table: Table, column: Column, row: str, name: str) 
 
 
 def _category_reason(
-    data: Published, table: Table, column: Column, row: str, level: int, printed: float
+    data: Published, table: PrintedTable, column: Column, row: str, level: int, printed: float
 ) -> str:
     model, tasks = column.published, data.members[row]
     if table.metric == "ps" and level == 1 and data.main.rows[row][model][0] == printed:

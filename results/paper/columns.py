@@ -16,7 +16,7 @@ from robospa.results.paper import rounding
 from robospa.results.paper.published import LEVELS, Published, load, title
 from robospa.results.records.run_io import Run
 from robospa.results.scoring.model_results import ModelResults, results_of_run
-from robospa.results.scoring.scores import Average, Cell, Scores, combine
+from robospa.results.scoring.scores import AverageScore, Scores, VariantScore, combine
 from robospa.results.scoring.setting import TABLE, IncomparableError, Setting, check_same
 from robospa.results.statistics import onta
 from robospa.results.statistics.bootstrap import Sample, rate
@@ -27,7 +27,7 @@ from robospa.results.statistics.intervals import (
     chance_corrected,
     wilson,
 )
-from robospa.results.tables.table import MISSING, Entry
+from robospa.results.tables.table import MISSING, TableCell
 
 Values = Mapping[str, Mapping[tuple[str, int], float | None]]
 """Percent by metric and (row, level)."""
@@ -83,7 +83,7 @@ class Column:
         """Percent, unrounded."""
         return self.values[metric].get((row, level))
 
-    def part(self, row: str, level: int) -> Cell | Average | None:
+    def part(self, row: str, level: int) -> VariantScore | AverageScore | None:
         """What the run knows of a row, which for averages is only what was run."""
         if row == rounding.OVERALL:
             return self.scores.overall.get(level)
@@ -95,7 +95,7 @@ class Column:
         part = self.part(row, level)
         if part is None or self.value(metric, row, level) is None:
             return None
-        if metric == "sr" or isinstance(part, Cell) or row in METRIC_CATEGORIES[metric]:
+        if metric == "sr" or isinstance(part, VariantScore) or row in METRIC_CATEGORIES[metric]:
             return part.values.get(metric)
         dimension = "spatial" if metric == "onta" else "procedural"
         return part.values.get(metric) if row == dimension else None
@@ -103,7 +103,7 @@ class Column:
     def sample(self, metric: str, row: str, level: int) -> Sample | Estimate | None:
         """What a test compares: counts of a variant's success rate, else value and interval."""
         part = self.part(row, level)
-        if metric == "sr" and isinstance(part, Cell) and part.trials:
+        if metric == "sr" and isinstance(part, VariantScore) and part.trials:
             return rate(part.successes, part.trials)
         return self.estimate(metric, row, level)
 
@@ -129,7 +129,7 @@ class Column:
         part = self.part(row, level)
         return 0 if part is None else part.missing
 
-    def with_missing(self, entry: Entry, metric: str, row: str, level: int) -> Entry:
+    def with_missing(self, entry: TableCell, metric: str, row: str, level: int) -> TableCell:
         """`entry` with what it has to say of missing trials."""
         part = self.part(row, level)
         if part is None or not part.missing:
@@ -153,7 +153,7 @@ class Column:
         return sum((task, level) not in self.scores.cells for task in load().tasks)
 
 
-def cell_percent(cell: Cell | None, metric: str) -> float | None:
+def cell_percent(cell: VariantScore | None, metric: str) -> float | None:
     """A variant's value in percent, from its counts where it has them."""
     estimate = None if cell is None else cell.values.get(metric)
     if cell is None or estimate is None:
@@ -165,7 +165,7 @@ def cell_percent(cell: Cell | None, metric: str) -> float | None:
 
 
 def table_values(
-    cells: Mapping[tuple[str, int], Cell],
+    cells: Mapping[tuple[str, int], VariantScore],
 ) -> dict[str, dict[tuple[str, int], float | None]]:
     """Percent by metric and (task, category, dimension or overall; level)."""
     members = load().members
@@ -184,7 +184,7 @@ def table_values(
     return made
 
 
-def published_cell(published: Published, model: str, task: str, level: int) -> Cell:
+def published_cell(published: Published, model: str, task: str, level: int) -> VariantScore:
     """A published variant as if it had been run: counts from SR, progress as a bare mean."""
     about = published.tasks[task]
     trials, count = published.trials, about.counts[level - 1]
@@ -197,12 +197,16 @@ def published_cell(published: Published, model: str, task: str, level: int) -> C
     if about.category in SPATIAL:
         values["onta"] = chance_corrected(found, count)
         samples["onta"] = rate(successes, trials, count)
-        return Cell(task, level, about.category, trials, trials, successes, values, count, samples)
+        return VariantScore(
+            task, level, about.category, trials, trials, successes, values, count, samples
+        )
     printed = published.value(model, "ps", task, level)
     assert printed is not None, f"no PS of {task}"
     progress = rounding.exact_progress(printed, count, trials)
     values["ps"] = bounded_mean(progress / 100, trials)
-    return Cell(task, level, about.category, trials, trials, successes, values, samples=samples)
+    return VariantScore(
+        task, level, about.category, trials, trials, successes, values, samples=samples
+    )
 
 
 def published_results(model: str, ci: str = METHODS[0]) -> ModelResults:

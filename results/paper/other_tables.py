@@ -11,12 +11,12 @@ from robospa.results.paper.columns import Column, check_columns
 from robospa.results.paper.published import load, title
 from robospa.results.paper.result_tables import DASH, DIMENSION_NAMES, not_run_note
 from robospa.results.statistics.intervals import interval_of
-from robospa.results.tables.table import MISSING, Entry, Grid, Line
+from robospa.results.tables.table import MISSING, Table, TableCell, TableRow
 
 INTERVAL_METHODS = (("bootstrap", "Stratified bootstrap"), ("wilson", "MOVER on Wilson limits"))
 
 
-def interval_table(columns: Sequence[Column]) -> Grid:
+def interval_table(columns: Sequence[Column]) -> Table:
     """Success at L5 with intervals by two methods; of published models also as printed."""
     check_columns(columns)
     data = load()
@@ -26,12 +26,12 @@ def interval_table(columns: Sequence[Column]) -> Grid:
         entries = [
             _interval(column, row, level, method) for method, _ in INTERVAL_METHODS for row in rows
         ]
-        lines.append(Line(column.title, tuple(entries)))
+        lines.append(TableRow(column.title, tuple(entries)))
         printed = data.intervals["rows"].get(column.published)
         if printed:
             given = [_with_ends(*(x / 100 for x in printed[row])) for row in rows]
-            blank = [Entry()] * len(rows)
-            lines.append(Line(f"{column.title}, as printed", (*given, *blank)))
+            blank = [TableCell()] * len(rows)
+            lines.append(TableRow(f"{column.title}, as printed", (*given, *blank)))
     heads = ("Fine-grained", "Long-horizon", "Overall") * len(INTERVAL_METHODS)
     groups = tuple((name, len(rows)) for _, name in INTERVAL_METHODS)
     notes = (
@@ -41,7 +41,7 @@ def interval_table(columns: Sequence[Column]) -> Grid:
         *_open_notes(columns, level),
     )
     name = "Success rate (SR) at L5 in percent with 95 % intervals"
-    return Grid("intervals", name, "Model", heads, tuple(lines), groups, notes)
+    return Table("intervals", name, "Model", heads, tuple(lines), groups, notes)
 
 
 def _open_notes(columns: Sequence[Column], level: int) -> list[str]:
@@ -59,7 +59,7 @@ def _open_notes(columns: Sequence[Column], level: int) -> list[str]:
     return notes
 
 
-def _interval(column: Column, row: str, level: int, method: str) -> Entry:
+def _interval(column: Column, row: str, level: int, method: str) -> TableCell:
     samples, shares = column.samples(row, level)
     if not samples:
         return DASH
@@ -69,21 +69,21 @@ def _interval(column: Column, row: str, level: int, method: str) -> Entry:
     return column.with_missing(entry, "sr", row, level)
 
 
-def _with_ends(value: float, low: float, high: float, sign: str = "") -> Entry:
+def _with_ends(value: float, low: float, high: float, sign: str = "") -> TableCell:
     shown = [rounding.text(100 * x) for x in (value, low, high)]
     text = f"{shown[0]} [{shown[1]}, {shown[2]}]"
-    return Entry(text, 100 * value, 100 * low, 100 * high, sign=sign)
+    return TableCell(text, 100 * value, 100 * low, 100 * high, sign=sign)
 
 
-def embodiment_table(dimension: str, columns: Sequence[Column] = ()) -> Grid:
+def embodiment_table(dimension: str, columns: Sequence[Column] = ()) -> Table:
     """One task a category on five robots; runs become further rows, each with its own robot."""
     table, data = load().embodiments, load()
     shorts = [s for s, t in table.tasks.items() if data.tasks[t].category in DIMENSIONS[dimension]]
     levels = [int(name[1]) for name in table.columns]
     lines = [
-        Line(
+        TableRow(
             f"{table.model}, {table.names[robot]}",
-            tuple(Entry(rounding.text(x, 0), x) for s in shorts for x in row[s]),
+            tuple(TableCell(rounding.text(x, 0), x) for s in shorts for x in row[s]),
         )
         for robot, row in table.rows.items()
     ]
@@ -92,12 +92,12 @@ def embodiment_table(dimension: str, columns: Sequence[Column] = ()) -> Grid:
             continue
         robot = table.names.get(column.embodiment, column.embodiment)
         entries = [_variant(column, table.tasks[s], n) for s in shorts for n in levels]
-        lines.append(Line(f"{column.title}, {robot}", tuple(entries)))
+        lines.append(TableRow(f"{column.title}, {robot}", tuple(entries)))
     groups = tuple((short, len(levels)) for short in shorts)
     names = "; ".join(f"{s} {data.tasks[table.tasks[s]].printed}" for s in shorts)
     lost = any(entry.sign for line in lines for entry in line.entries)
     notes = (f"{names}.", *((f"{MISSING} Some trials have no result.",) if lost else ()))
-    return Grid(
+    return Table(
         f"embodiments-{dimension}",
         f"Success rate (SR) in percent by embodiment: {DIMENSION_NAMES[dimension]}",
         "Model, embodiment",
@@ -108,22 +108,22 @@ def embodiment_table(dimension: str, columns: Sequence[Column] = ()) -> Grid:
     )
 
 
-def _variant(column: Column, task: str, level: int) -> Entry:
+def _variant(column: Column, task: str, level: int) -> TableCell:
     value = column.value("sr", task, level)
     if value is None:
         return DASH
     found = column.estimate("sr", task, level)
     assert found is not None, "a value has an interval"
     text = rounding.text(value, 0 if value == round(value) else 1)
-    entry = Entry(text, value, 100 * found.low, 100 * found.high)
+    entry = TableCell(text, value, 100 * found.low, 100 * found.high)
     return column.with_missing(entry, "sr", task, level)
 
 
-def _words(*texts: object) -> tuple[Entry, ...]:
-    return tuple(Entry(str(text)) for text in texts)
+def _words(*texts: object) -> tuple[TableCell, ...]:
+    return tuple(TableCell(str(text)) for text in texts)
 
 
-def basic_table(columns: Sequence[Column] = ()) -> Grid:
+def basic_table(columns: Sequence[Column] = ()) -> Table:
     """Basic grounding tasks, which are no part of the 56: the printed values, and those of runs.
 
     A run's value is the mean over the sets of objects; it stays open unless all were run.
@@ -134,10 +134,10 @@ def basic_table(columns: Sequence[Column] = ()) -> Grid:
     names = {CATEGORY_NAMES[category]: category for category in BASIC}
     lines = []
     for name, printed in table["rows"].items():
-        entries = [Entry(rounding.text(x), x) for x in printed]
+        entries = [TableCell(rounding.text(x), x) for x in printed]
         for run in runs:
             entries += [_grounding(run, names[name], int(h[1]), table["tasks"]) for h in heads]
-        lines.append(Line(name, tuple(entries)))
+        lines.append(TableRow(name, tuple(entries)))
     groups = (("Printed", len(heads)), *((c.title, len(heads)) for c in runs)) if runs else ()
     notes = [
         f"Means over {table['tasks']} tasks of {table['trials']} trials; "
@@ -151,10 +151,10 @@ def basic_table(columns: Sequence[Column] = ()) -> Grid:
     if any(entry.sign for line in lines for entry in line.entries):
         notes.append(f"{MISSING} Some trials have no result.")
     name = "Success rate (SR) in percent on basic spatial tasks"
-    return Grid("basic", name, "Task", heads * (1 + len(runs)), tuple(lines), groups, tuple(notes))
+    return Table("basic", name, "Task", heads * (1 + len(runs)), tuple(lines), groups, tuple(notes))
 
 
-def _grounding(run: Column, category: str, level: int, sets: int) -> Entry:
+def _grounding(run: Column, category: str, level: int, sets: int) -> TableCell:
     """A run's mean over the `sets` of a basic category at `level`."""
     part = run.scores.categories.get((category, level))
     found = None if part is None else part.values.get("sr")
@@ -166,25 +166,25 @@ def _grounding(run: Column, category: str, level: int, sets: int) -> Entry:
     return _with_ends(found.value, found.low, found.high, MISSING if part.missing else "")
 
 
-def models_table() -> Grid:
+def models_table() -> Table:
     """Size and training of the published models."""
     lines = tuple(
-        Line(
+        TableRow(
             title(model),
             (
-                Entry(row["parameters"]),
-                Entry(str(row["gpus"]), row["gpus"]),
-                Entry(f"{row['hours']:g}", row["hours"]),
-                Entry(f"{row['gpu_hours']:g}", row["gpu_hours"]),
+                TableCell(row["parameters"]),
+                TableCell(str(row["gpus"]), row["gpus"]),
+                TableCell(f"{row['hours']:g}", row["hours"]),
+                TableCell(f"{row['gpu_hours']:g}", row["gpu_hours"]),
             ),
         )
         for model, row in load().models.items()
     )
     heads = ("Parameters", "GPUs", "Hours", "GPU hours")
-    return Grid("models", "Model size and training per base task", "Model", heads, lines)
+    return Table("models", "Model size and training per base task", "Model", heads, lines)
 
 
-def datasets_table() -> Grid:
+def datasets_table() -> Table:
     """Data sets and benchmarks beside RoboSPA."""
     table = load().datasets
     given = ("categories", "tasks", "trajectories", "embodiments")
@@ -194,33 +194,33 @@ def datasets_table() -> Grid:
         if row["kind"] != last:
             last = row["kind"]
             lines.append(
-                Line({"dataset": "Datasets", "benchmark": "Benchmarks"}[last], (), "section")
+                TableRow({"dataset": "Datasets", "benchmark": "Benchmarks"}[last], (), "section")
             )
         words = [row[key] or "–" for key in given] + ["yes" if row[key] else "no" for key in has]
-        lines.append(Line(row["name"], _words(*words)))
+        lines.append(TableRow(row["name"], _words(*words)))
     heads = (
         *("Categories", "Tasks", "Trajectories", "Embodiments", "Spatial reasoning"),
         *("Long-horizon", "Step-level", "Multi-difficulty", "Scene diversity"),
     )
     notes = (table["note"],)
     name = "Robot manipulation datasets and benchmarks"
-    return Grid("datasets", name, "Name", heads, tuple(lines), notes=notes, words=True)
+    return Table("datasets", name, "Name", heads, tuple(lines), notes=notes, words=True)
 
 
-def assets_table() -> Grid:
+def assets_table() -> Table:
     """Object categories and their variants."""
     table = load().assets
-    rows = tuple(Line(name, (Entry(str(n), n),)) for name, n in table["rows"].items())
+    rows = tuple(TableRow(name, (TableCell(str(n), n),)) for name, n in table["rows"].items())
     total = sum(table["rows"].values())
-    lines = (*rows, Line("Total", (Entry(str(total), total),), "average"))
+    lines = (*rows, TableRow("Total", (TableCell(str(total), total),), "average"))
     name = f"Object categories ({len(rows)}) and variants of each"
-    return Grid("assets", name, "Asset", ("Variants",), lines)
+    return Table("assets", name, "Asset", ("Variants",), lines)
 
 
-def errata_table() -> Grid:
+def errata_table() -> Table:
     """Every printed value that does not follow from the per-task tables."""
     lines = tuple(
-        Line(
+        TableRow(
             check.table,
             _words(
                 check.row,
@@ -240,4 +240,4 @@ def errata_table() -> Grid:
     )
     heads = ("Row", "Model", "Column", "Printed", "Recomputed", "Remark")
     name = "Printed values that do not follow from the per-task tables"
-    return Grid("errata", name, "Table", heads, lines, notes=notes, words=True)
+    return Table("errata", name, "Table", heads, lines, notes=notes, words=True)

@@ -16,7 +16,7 @@ from robospa.results.paper.check import Check, errata
 from robospa.results.paper.columns import Column, check_columns
 from robospa.results.paper.published import LEVELS, load
 from robospa.results.statistics.significance import separable
-from robospa.results.tables.table import MISSING, PRINTED_OTHERWISE, Entry, Grid, Line
+from robospa.results.tables.table import MISSING, PRINTED_OTHERWISE, Table, TableCell, TableRow
 
 MARKS = ("tied", "highest", "none")
 """Which values are marked as best: all that cannot be told from the highest (Boschloo's test or
@@ -31,12 +31,12 @@ _MARK_NOTES = {
     "highest": "Bold: the highest value of a row and level.",
     "none": "",
 }
-DASH = Entry("–")
+DASH = TableCell("–")
 
 
 def summary_table(
     columns: Sequence[Column], name: str, metric: str, heads: Sequence[str], mark: str = "tied"
-) -> Grid:
+) -> Table:
     """Categories, dimensions and the overall value of `metric` at some levels, or their drop."""
     check_columns(columns)
     rows = _summary_rows(metric)
@@ -46,7 +46,7 @@ def summary_table(
     lines = []
     for row, label in rows:
         if not row:
-            lines.append(Line(label, kind="section"))
+            lines.append(TableRow(label, kind="section"))
             continue
         entries = []
         for column in columns:
@@ -59,14 +59,14 @@ def summary_table(
                     entry = _value(column, metric, row, level, column.title in best[row, level])
                 sign = PRINTED_OTHERWISE if (row, column.published, head) in wrong else ""
                 entries.append(_signed(entry, sign))
-        lines.append(Line(label, tuple(entries), "row" if row in CATEGORY_NAMES else "average"))
+        lines.append(TableRow(label, tuple(entries), "row" if row in CATEGORY_NAMES else "average"))
     title = f"{_long_name(metric)} in percent by category"
     notes = _notes(columns, metric, [r for r, _ in rows if r], levels, mark, wrong)
     groups = tuple((c.title, len(heads)) for c in columns)
-    return Grid(name, title, "", tuple(heads) * len(columns), tuple(lines), groups, notes)
+    return Table(name, title, "", tuple(heads) * len(columns), tuple(lines), groups, notes)
 
 
-def task_table(columns: Sequence[Column], name: str, metric: str, mark: str = "tied") -> Grid:
+def task_table(columns: Sequence[Column], name: str, metric: str, mark: str = "tied") -> Table:
     """Every task at every level."""
     check_columns(columns)
     data = load()
@@ -82,7 +82,7 @@ def task_table(columns: Sequence[Column], name: str, metric: str, mark: str = "t
     for task in shown:
         if task.category != last:
             last = task.category
-            lines.append(Line(f"{last} {CATEGORY_NAMES[last]}", kind="section"))
+            lines.append(TableRow(f"{last} {CATEGORY_NAMES[last]}", kind="section"))
         entries = []
         for column in columns:
             for level in LEVELS:
@@ -93,12 +93,12 @@ def task_table(columns: Sequence[Column], name: str, metric: str, mark: str = "t
                     entry = _signed(_number(wrong[key].printed), "")
                 sign = PRINTED_OTHERWISE if key in wrong else ""
                 entries.append(_signed(entry, sign))
-        lines.append(Line(task.printed, tuple(entries)))
+        lines.append(TableRow(task.printed, tuple(entries)))
     heads = tuple(f"L{level}" for level in LEVELS)
     title = f"{_long_name(metric)} in percent by task"
     notes = _notes(columns, metric, [t.name for t in shown], LEVELS, mark, wrong)
     groups = tuple((c.title, len(heads)) for c in columns)
-    return Grid(name, title, "Task", heads * len(columns), tuple(lines), groups, notes)
+    return Table(name, title, "Task", heads * len(columns), tuple(lines), groups, notes)
 
 
 def _source(name: str) -> str:
@@ -158,22 +158,22 @@ def _best(
     return made
 
 
-def _value(column: Column, metric: str, row: str, level: int, best: bool) -> Entry:
+def _value(column: Column, metric: str, row: str, level: int, best: bool) -> TableCell:
     value = column.value(metric, row, level)
     if value is None:
         return DASH
     whole = metric == "sr" and row in load().tasks and value == round(value)
     found = column.estimate(metric, row, level)
     low, high = (100 * found.low, 100 * found.high) if found else (None, None)
-    entry = Entry(rounding.text(value, 0 if whole else 1), value, low, high, best)
+    entry = TableCell(rounding.text(value, 0 if whole else 1), value, low, high, best)
     return column.with_missing(entry, metric, row, level)
 
 
-def _number(value: float | None) -> Entry:
-    return DASH if value is None else Entry(rounding.text(value), value)
+def _number(value: float | None) -> TableCell:
+    return DASH if value is None else TableCell(rounding.text(value), value)
 
 
-def _signed(entry: Entry, sign: str) -> Entry:
+def _signed(entry: TableCell, sign: str) -> TableCell:
     return replace(entry, sign=entry.sign + sign)
 
 

@@ -10,9 +10,9 @@ from robospa.results.paper.columns import Column
 from robospa.results.paper.result_tables import summary_table, task_table
 from robospa.results.tables.html import page
 from robospa.results.tables.latex import document, to_latex
-from robospa.results.tables.table import Grid, to_csv, to_markdown
+from robospa.results.tables.table import Table, to_csv, to_markdown
 
-Maker = Callable[[Sequence[Column], str], Grid]
+Maker = Callable[[Sequence[Column], str], Table]
 
 TABLES: dict[str, Maker] = {
     "main": lambda c, m: summary_table(c, "main", "sr", ("L1", "L5", "Drop"), m),
@@ -32,7 +32,7 @@ TABLES: dict[str, Maker] = {
 }
 """Name -> what makes it from columns and a way of marking the best (`tables_paper.MARKS`)."""
 
-FORMATS: dict[str, Callable[[Sequence[Grid]], str]] = {
+FORMATS: dict[str, Callable[[Sequence[Table]], str]] = {
     "md": lambda grids: "\n".join(to_markdown(grid) for grid in grids),
     "tex": document,
     "html": lambda grids: page(grids, "RoboSPA: results"),
@@ -43,7 +43,7 @@ FORMATS: dict[str, Callable[[Sequence[Grid]], str]] = {
 
 def make_tables(
     columns: Sequence[Column], names: Sequence[str] | None = None, mark: str = "tied"
-) -> list[Grid]:
+) -> list[Table]:
     """The tables called `names` (default all); ValueError if one is unknown.
 
     Runs of basic grounding tasks alone appear in the table of these only.
@@ -56,7 +56,7 @@ def make_tables(
     return [TABLES[name](columns if name == "basic" else base, mark) for name in chosen]
 
 
-def write_tables(grids: Sequence[Grid], folder: Path, formats: Sequence[str]) -> list[Path]:
+def write_tables(grids: Sequence[Table], folder: Path, formats: Sequence[str]) -> list[Path]:
     """Write `tables.<ending>` with all of `grids`; for LaTeX also one file each, to be input."""
     folder.mkdir(parents=True, exist_ok=True)
     written = []

@@ -45,7 +45,7 @@ class Finding:
 
 
 @dataclass(frozen=True)
-class Row:
+class ResultRow:
     """One model's results of one task, in percent by level, None where there is none.
 
     `candidates` and `subtasks` are the n of ONTA and the T of PS by level, empty if unknown;
@@ -69,7 +69,7 @@ def lint_published() -> list[Finding]:
     return lint_table(published_rows())
 
 
-def published_rows() -> list[Row]:
+def published_rows() -> list[ResultRow]:
     """The paper's per-task tables."""
     data, rows = load(), []
     for model in data.models:
@@ -77,7 +77,7 @@ def published_rows() -> list[Row]:
             spatial = task in data.per_task[model, "onta"].rows
             other = data.per_task[model, "onta" if spatial else "ps"].rows[task]
             counts = data.tasks[task].counts
-            row = Row(
+            row = ResultRow(
                 model,
                 task,
                 (1, 2, 3, 4, 5),
@@ -93,7 +93,7 @@ def published_rows() -> list[Row]:
     return rows
 
 
-def lint_table(rows: Sequence[Row]) -> list[Finding]:
+def lint_table(rows: Sequence[ResultRow]) -> list[Finding]:
     """Findings in rows of results; each cell on its own, then rows that repeat each other."""
     found = [finding for row in rows for finding in _lint_row(row)]
     same: dict[tuple[object, ...], list[str]] = defaultdict(list)
@@ -108,7 +108,7 @@ def lint_table(rows: Sequence[Row]) -> list[Finding]:
     return found
 
 
-def _lint_row(row: Row) -> Iterator[Finding]:
+def _lint_row(row: ResultRow) -> Iterator[Finding]:
     for place, level in enumerate(row.levels):
         where = f"{row.model}, {row.task} L{level}"
         sr, ps, corrected = (_at(x, place) for x in (row.sr, row.ps, row.onta))
@@ -188,7 +188,7 @@ def lint_runs(runs: Sequence[Run]) -> list[Finding]:
 
 def run_rows(
     run: Run, name: str, groups: dict[tuple[str, int], list[TrialRecord]] | None = None
-) -> list[Row]:
+) -> list[ResultRow]:
     """A run's results by task, in percent."""
     if groups is None:
         groups = defaultdict(list)
@@ -203,7 +203,7 @@ def run_rows(
         if all(r.category in PROCEDURAL and r.total for cell in cells for r in cell):
             ps = tuple(100 * sum(r.done / r.total for r in cell) / len(cell) for cell in cells)
         sr = tuple(100 * sum(r.success for r in cell) / len(cell) for cell in cells)
-        rows.append(Row(name, task, levels, sr, ps=ps, trials=tuple(map(len, cells))))
+        rows.append(ResultRow(name, task, levels, sr, ps=ps, trials=tuple(map(len, cells))))
     return rows
 
 

@@ -42,7 +42,7 @@ MANIFEST_VALUES: dict[str, tuple[type, ...]] = {
 }
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,99}")
 """Names that become parts of paths."""
-MOST = 2**53
+MAX_INTEGER = 2**53
 """Whole numbers beyond this are none that anything of ours counts."""
 TEXTS = (
     "category",
@@ -124,7 +124,7 @@ def check_key(key: TrialKey) -> None:
         if not isinstance(name, str) or not NAME.fullmatch(name):
             raise ValueError(f"{str(name)[:80]!r} is no plain name of a task, robot, mode or split")
     for number in (key.level, key.seed):
-        if type(number) is not int or not 0 <= number <= MOST:
+        if type(number) is not int or not 0 <= number <= MAX_INTEGER:
             raise ValueError(f"{str(number)[:80]} is no level or seed")
 
 
@@ -136,7 +136,7 @@ def check_record(record: TrialRecord) -> None:
         if not isinstance(values[name], str):
             raise ValueError(f"{name} is no text")
     for name in COUNTS:
-        if type(values[name]) is not int or not 0 <= values[name] <= MOST:
+        if type(values[name]) is not int or not 0 <= values[name] <= MAX_INTEGER:
             raise ValueError(f"{name} {str(values[name])[:40]} is no count")
     for name in MAPS:
         if not isinstance(values[name], Mapping):
@@ -168,14 +168,14 @@ def _is_event(event: Any) -> bool:
         and type(get("note", "")) is str
         and type(index) is int
         and type(step) is int
-        and -MOST <= index <= MOST
-        and -MOST <= step <= MOST
+        and -MAX_INTEGER <= index <= MAX_INTEGER
+        and -MAX_INTEGER <= step <= MAX_INTEGER
         and type(time) in (int, float)
-        and -MOST <= time <= MOST
+        and -MAX_INTEGER <= time <= MAX_INTEGER
     )
 
 
 def _is_number(value: object) -> bool:
     if type(value) is int:
-        return abs(value) <= MOST
+        return abs(value) <= MAX_INTEGER
     return type(value) is float and math.isfinite(value)

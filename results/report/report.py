@@ -17,8 +17,8 @@ from robospa.results.figures.series import FORMATS, Drawing, Series
 from robospa.results.paper.columns import Column, check_columns, column_of, published_results
 from robospa.results.records.lint import lint_run, lint_runs
 from robospa.results.records.run_io import Run, finished
+from robospa.results.report.missing import loss_lines, missing_lines
 from robospa.results.report.run_card import names_of
-from robospa.results.report.score_table import loss_lines, missing_lines
 from robospa.results.report.tables import ReportTable, report_tables
 from robospa.results.scoring.model_results import ModelResults, results_of_run
 from robospa.results.scoring.setting import IncomparableError

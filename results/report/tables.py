@@ -18,7 +18,7 @@ from robospa.results.paper.other_tables import basic_table
 from robospa.results.paper.result_tables import DASH, summary_table, task_table
 from robospa.results.paper.tables import write_tables
 from robospa.results.tables.html import fragment
-from robospa.results.tables.table import Grid, Line
+from robospa.results.tables.table import Table, TableRow
 
 FEW = 2
 """So many columns are shown with all their levels; more of them as in the paper."""
@@ -31,7 +31,7 @@ SUMMARIES = (("main", "sr"), ("onta", "onta"), ("ps", "ps"))
 class ReportTable:
     """A table of the report; a `folded` one is opened by hand."""
 
-    grid: Grid
+    grid: Table
     folded: bool
 
 
@@ -64,10 +64,10 @@ def _heads(columns: Sequence[Column], levels: Sequence[int], metric: str) -> tup
     return ("L1", "L3", "L5") if metric != "sr" else ("L1", "L5", "Drop")
 
 
-def covered(grid: Grid, runs: int) -> Grid:
+def covered(grid: Table, runs: int) -> Table:
     """`grid` without the rows that none of its first `runs` columns has a value in."""
     width = len(grid.heads) // max(1, len(grid.groups)) * runs
-    kept: list[Line] = []
+    kept: list[TableRow] = []
     for line in grid.lines:
         if line.kind == "section" or any(e.text != DASH.text for e in line.entries[:width]):
             kept.append(line)
@@ -77,7 +77,7 @@ def covered(grid: Grid, runs: int) -> Grid:
     return _levels_that_were_run(replace(grid, lines=tuple(full)), runs)
 
 
-def _levels_that_were_run(grid: Grid, runs: int) -> Grid:
+def _levels_that_were_run(grid: Table, runs: int) -> Table:
     """`grid` without the levels at which its first `runs` groups have no value at all."""
     width = len(grid.heads) // max(1, len(grid.groups))
     rows = [line.entries for line in grid.lines if line.kind != "section"]

@@ -35,7 +35,7 @@ Range = tuple[float, float]
 
 
 @dataclass(frozen=True)
-class Cell:
+class VariantScore:
     """One variant: `listed` trials, of which `trials` have a result and `successes` succeeded.
 
     `values` has the metrics that apply to it, None where there is no result to compute them from.
@@ -87,7 +87,7 @@ class Cell:
 
 
 @dataclass(frozen=True)
-class Average:
+class AverageScore:
     """A mean over tasks or categories, by metric; None where something below has no value.
 
     `worst` and `best` bound the mean success rate over all that the missing trials could be.
@@ -104,7 +104,7 @@ class Average:
     """By metric between which values the missing trials leave it, where that is known."""
 
     def bounds(self, metric: str) -> Range | None:
-        """`metric` in the worst and the best case; see `Cell.bounds`."""
+        """`metric` in the worst and the best case; see `VariantScore.bounds`."""
         return self.ranges.get(metric)
 
 
@@ -112,12 +112,12 @@ class Average:
 class Scores:
     """Everything that a run's tables show. Level 0, like `tasks`, is the mean over levels."""
 
-    cells: Mapping[tuple[str, int], Cell]
+    cells: Mapping[tuple[str, int], VariantScore]
     levels: tuple[int, ...]
-    tasks: Mapping[str, Average]
-    categories: Mapping[tuple[str, int], Average]
-    dimensions: Mapping[tuple[str, int], Average]
-    overall: Mapping[int, Average]
+    tasks: Mapping[str, AverageScore]
+    categories: Mapping[tuple[str, int], AverageScore]
+    dimensions: Mapping[tuple[str, int], AverageScore]
+    overall: Mapping[int, AverageScore]
 
 
 def _seed(task: str, level: int) -> int:
@@ -127,7 +127,7 @@ def _seed(task: str, level: int) -> int:
 
 def score_cell(
     task: str, level: int, category: str, listed: int, records: Sequence[TrialRecord]
-) -> Cell:
+) -> VariantScore:
     """The cell of one variant from its results (`records` without lost ones)."""
     metrics = ["sr"] + ["onta"] * (category in SPATIAL) + ["ps"] * (category in PROCEDURAL)
     samples = {m: sample for m in metrics if (sample := sample_of(records, m)) is not None}
@@ -140,7 +140,9 @@ def score_cell(
             values["onta"] = chance_corrected(sr, candidates)
         if "ps" in samples:
             values["ps"] = interval_of([samples["ps"]], seed=_seed(task, level))
-    return Cell(task, level, category, listed, count, successes, values, candidates, samples)
+    return VariantScore(
+        task, level, category, listed, count, successes, values, candidates, samples
+    )
 
 
 def candidates_of(records: Sequence[TrialRecord]) -> int:
@@ -162,7 +164,7 @@ def sample_of(records: Sequence[TrialRecord], metric: str) -> Sample | None:
     return rate(successes, count, candidates) if candidates > 1 else None
 
 
-def with_intervals(cell: Cell, ci: str) -> Cell:
+def with_intervals(cell: VariantScore, ci: str) -> VariantScore:
     """`cell` with the intervals that the method `ci` makes; Wilson's are there already."""
     if ci == METHODS[0]:
         return cell
@@ -175,7 +177,7 @@ def with_intervals(cell: Cell, ci: str) -> Cell:
     return replace(cell, values=made)
 
 
-def _join(parts: Sequence[Cell | Average], ci: str = METHODS[0]) -> Average:
+def _join(parts: Sequence[VariantScore | AverageScore], ci: str = METHODS[0]) -> AverageScore:
     """Mean of cells, or of averages, that all count the same.
 
     A metric has a mean only if every part that it applies to has a value: one variant without a
@@ -199,7 +201,7 @@ def _join(parts: Sequence[Cell | Average], ci: str = METHODS[0]) -> Average:
                 found, weights = zip(*samples[metric], strict=True)
                 joined = replace(interval_of(found, weights, ci), value=joined.value)
             values[metric] = joined
-    return Average(
+    return AverageScore(
         trials=sum(p.trials for p in parts),
         missing=sum(p.missing for p in parts),
         values=values,
@@ -210,11 +212,11 @@ def _join(parts: Sequence[Cell | Average], ci: str = METHODS[0]) -> Average:
     )
 
 
-def _flat(parts: Sequence[Cell | Average], metric: str) -> Weighted:
+def _flat(parts: Sequence[VariantScore | AverageScore], metric: str) -> Weighted:
     """The samples of all variants below `parts`, which count the same; empty if one has none."""
     flat: list[tuple[Sample, float]] = []
     for part in parts:
-        if isinstance(part, Cell):
+        if isinstance(part, VariantScore):
             below: Weighted = ((part.samples[metric], 1.0),) if metric in part.samples else ()
         else:
             below = part.samples.get(metric, ())
@@ -227,11 +229,11 @@ def _flat(parts: Sequence[Cell | Average], metric: str) -> Weighted:
 def _by_level(
     groups: Mapping[str, Sequence[str]],
     levels: Sequence[int],
-    find: Callable[[str, int], Cell | Average | None],
+    find: Callable[[str, int], VariantScore | AverageScore | None],
     ci: str,
-) -> dict[tuple[str, int], Average]:
+) -> dict[tuple[str, int], AverageScore]:
     """Average of each group's members at every level, and at level 0 of what `find` gives there."""
-    made: dict[tuple[str, int], Average] = {}
+    made: dict[tuple[str, int], AverageScore] = {}
     for name, members in groups.items():
         for level in (*levels, 0):
             parts = [p for m in members if (p := find(m, level)) is not None]
@@ -262,7 +264,7 @@ def score(
     return combine(cells, ci)
 
 
-def combine(cells: Mapping[tuple[str, int], Cell], ci: str = METHODS[0]) -> Scores:
+def combine(cells: Mapping[tuple[str, int], VariantScore], ci: str = METHODS[0]) -> Scores:
     """All averages above `cells`, and their intervals by the method `ci` (`intervals.METHODS`).
 
     Under `bootstrap` an average resamples the episodes of all variants below it, as the paper does.
@@ -273,7 +275,7 @@ def combine(cells: Mapping[tuple[str, int], Cell], ci: str = METHODS[0]) -> Scor
     names = list(category)
     tasks = {t: _join([cells[t, n] for n in levels if (t, n) in cells], ci) for t in names}
 
-    def cell_or_mean(task: str, level: int) -> Cell | Average | None:
+    def cell_or_mean(task: str, level: int) -> VariantScore | AverageScore | None:
         return cells.get((task, level)) if level else tasks[task]
 
     members_of = {c: [t for t in names if category.get(t) == c] for c in CATEGORIES + BASIC}

@@ -76,11 +76,13 @@ def benjamini_hochberg(chances: Sequence[float]) -> list[float]:
     return found
 
 
-Entry = Sample | Estimate | None
+RateOrEstimate = Sample | Estimate | None
 """A cell of a table: outcomes of a variant, an average with its interval, or nothing."""
 
 
-def separable(rows: Sequence[Sequence[Entry]], alpha: float = ALPHA) -> list[frozenset[int]]:
+def separable(
+    rows: Sequence[Sequence[RateOrEstimate]], alpha: float = ALPHA
+) -> list[frozenset[int]]:
     """For each row of a table, the places of the entries that cannot be told from its best.
 
     The best is always among them, ties too. All comparisons with a row's best, over all rows,

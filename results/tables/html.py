@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from html import escape
 
-from robospa.results.tables.table import Entry, Grid, Line, plain
+from robospa.results.tables.table import Table, TableCell, TableRow, plain
 
 STYLE = """
 :root { color-scheme: light dark; }
@@ -24,7 +24,7 @@ td.best { background: #4a7dff33; font-weight: 700; }
 """
 
 
-def fragment(grid: Grid) -> str:
+def fragment(grid: Table) -> str:
     """The table with its title as caption and its notes below, to put into a page."""
     kind = ' class="words"' if grid.words else ""
     parts = [
@@ -43,7 +43,7 @@ def fragment(grid: Grid) -> str:
     return "\n".join(parts)
 
 
-def page(grids: Sequence[Grid], title: str) -> str:
+def page(grids: Sequence[Table], title: str) -> str:
     """A whole page with all tables."""
     links = " · ".join(f'<a href="#{_text(g.name)}">{_text(g.name)}</a>' for g in grids)
     body = "\n".join(fragment(grid) for grid in grids)
@@ -55,7 +55,7 @@ def page(grids: Sequence[Grid], title: str) -> str:
     )
 
 
-def _head(grid: Grid) -> list[str]:
+def _head(grid: Table) -> list[str]:
     names = "".join(f'<th scope="col">{_text(name)}</th>' for name in (grid.corner, *grid.heads))
     rows = [f"<tr>{names}</tr>"]
     if grid.groups:
@@ -67,7 +67,7 @@ def _head(grid: Grid) -> list[str]:
     return rows
 
 
-def _line(line: Line, width: int) -> str:
+def _line(line: TableRow, width: int) -> str:
     if line.kind == "section":
         name = f'<th colspan="{width + 1}" scope="rowgroup">{_text(line.label)}</th>'
         return f'<tr class="section">{name}</tr>'
@@ -76,7 +76,7 @@ def _line(line: Line, width: int) -> str:
     return f'<tr{kind}><th scope="row">{_text(line.label)}</th>{cells}</tr>'
 
 
-def _entry(entry: Entry) -> str:
+def _entry(entry: TableCell) -> str:
     kind = ' class="best"' if entry.best else ""
     hint = ""
     if entry.low is not None and entry.high is not None:

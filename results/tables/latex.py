@@ -10,7 +10,7 @@ import re
 import unicodedata
 from collections.abc import Sequence
 
-from robospa.results.tables.table import Entry, Grid, plain
+from robospa.results.tables.table import Table, TableCell, plain
 
 PREAMBLE = r"""\documentclass[a4paper]{article}
 \usepackage[margin=15mm]{geometry}
@@ -55,7 +55,7 @@ def _ascii(character: str) -> str:
     return "".join(_SPECIAL.get(c, c) for c in letters) or "?"
 
 
-def to_latex(grid: Grid) -> str:
+def to_latex(grid: Table) -> str:
     """The table as a float of two columns' width."""
     width = len(grid.heads)
     align = "l" * width if grid.words else "r" * width
@@ -87,7 +87,7 @@ def to_latex(grid: Grid) -> str:
     return "\n".join([*lines, r"\end{table*}", ""])
 
 
-def _fit(grid: Grid) -> str:
+def _fit(grid: Table) -> str:
     """A table that would not fit is scaled by whichever of width and height is the tighter."""
     texts = [(line.label, *(e.text for e in line.entries)) for line in grid.lines if line.entries]
     columns = zip(*texts, (grid.corner, *grid.heads), strict=True)
@@ -101,7 +101,7 @@ def _fit(grid: Grid) -> str:
     return rf"\resizebox*{{!}}{{{PAGE[1]:.0f}pt}}{{%"  # the star counts the depth as well
 
 
-def _head(grid: Grid) -> list[str]:
+def _head(grid: Table) -> list[str]:
     lines = []
     if grid.groups:
         spans, rules, place = [], [], 2
@@ -114,7 +114,7 @@ def _head(grid: Grid) -> list[str]:
     return [*lines, " & ".join(names) + r" \\"]
 
 
-def _entry(entry: Entry) -> str:
+def _entry(entry: TableCell) -> str:
     text = escape_latex(entry.text)
     if re.fullmatch(r"-[\d.]+", text):
         text = f"${text}$"  # a minus sign, not a hyphen
@@ -128,7 +128,7 @@ def _sign(sign: str) -> str:
     return "".join({"*": r"\ast", "†": r"\dagger"}[c] for c in sign)
 
 
-def document(grids: Sequence[Grid]) -> str:
+def document(grids: Sequence[Table]) -> str:
     """All tables as one document."""
     body = "\n\\clearpage\n".join(to_latex(grid) for grid in grids)
     return f"{PREAMBLE}\\begin{{document}}\n{body}\n\\end{{document}}\n"

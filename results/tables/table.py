@@ -1,6 +1,6 @@
 """A table as a value, and as Markdown and CSV.
 
-A `Grid` knows no metric and no model: labels, entries that are already text, marks and notes. What
+A `Table` knows no metric and no model: labels, entries that are already text, marks and notes. What
 comes from outside (names of models) is escaped by every writer.
 """
 
@@ -20,7 +20,7 @@ LACKS = ("sign", "missing", "worst_case", "best_case")
 
 
 @dataclass(frozen=True)
-class Entry:
+class TableCell:
     """One cell: its text, and for programs its value and interval in percent.
 
     `best` marks it; `sign` (* or †) points to the notes.
@@ -38,23 +38,23 @@ class Entry:
 
 
 @dataclass(frozen=True)
-class Line:
+class TableRow:
     """One row. Of a `section` only the label is shown; an `average` is set apart."""
 
     label: str
-    entries: tuple[Entry, ...] = ()
+    entries: tuple[TableCell, ...] = ()
     kind: str = "row"
 
 
 @dataclass(frozen=True)
-class Grid:
+class Table:
     """A table: `heads` name its columns; `groups` (title, width) span them, or are empty."""
 
     name: str
     title: str
     corner: str
     heads: tuple[str, ...]
-    lines: tuple[Line, ...]
+    lines: tuple[TableRow, ...]
     groups: tuple[tuple[str, int], ...] = ()
     notes: tuple[str, ...] = ()
     words: bool = False
@@ -84,7 +84,7 @@ def escape_markdown(text: str) -> str:
     return re.sub(r"([\\|*_`<>\[\]])", r"\\\1", plain(text))
 
 
-def to_markdown(grid: Grid) -> str:
+def to_markdown(grid: Table) -> str:
     """The table in Markdown, its title above and its notes below."""
     names = [
         f"{escape_markdown(group)} {escape_markdown(head)}".strip()
@@ -109,12 +109,12 @@ def to_markdown(grid: Grid) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _markdown_entry(entry: Entry) -> str:
+def _markdown_entry(entry: TableCell) -> str:
     text = escape_markdown(entry.text)
     return (f"**{text}**" if entry.best else text) + escape_markdown(entry.sign)
 
 
-def to_csv(grids: Sequence[Grid]) -> str:
+def to_csv(grids: Sequence[Table]) -> str:
     """All cells of `grids`, one a line, for programs: FIELDS, then LACKS.
 
     Values are not rounded. A text that a spreadsheet would run as a formula gets a quote before it.
@@ -138,7 +138,7 @@ def to_csv(grids: Sequence[Grid]) -> str:
     return out.getvalue()
 
 
-def _numbers(entry: Entry) -> tuple[float | None, float | None, float | None]:
+def _numbers(entry: TableCell) -> tuple[float | None, float | None, float | None]:
     return entry.value, entry.low, entry.high
 
 

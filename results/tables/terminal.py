@@ -2,32 +2,32 @@
 
 from __future__ import annotations
 
-from robospa.results.tables.table import Grid
+from robospa.results.tables.table import Table
 
 
-def show(grid: Grid) -> None:
-    """Print `grid`; a file gets all columns, however narrow the terminal."""
+def show(table: Table) -> None:
+    """Print `table`; a file gets all columns, however narrow the terminal."""
+    from rich import table as rich_table
     from rich.console import Console
-    from rich.table import Table
     from rich.text import Text
 
-    table = Table(title=grid.title, title_justify="left", box=None, pad_edge=False)
-    table.add_column(grid.corner, no_wrap=True)
+    shown = rich_table.Table(title=table.title, title_justify="left", box=None, pad_edge=False)
+    shown.add_column(table.corner)
     last = ""
-    for group, head in zip(grid.group_of, grid.heads, strict=True):
-        name = f"{group}\n{head}" if group != last else f"\n{head}"
-        table.add_column(name, justify="left" if grid.words else "right", no_wrap=True)
+    for group, head in zip(table.group_of, table.heads, strict=True):
+        name = f"{group if group != last else ''}\n{head}" if table.groups else head
+        shown.add_column(name, justify="left" if table.words else "right", no_wrap=True)
         last = group
-    for line in grid.lines:
-        if line.kind == "section":
-            table.add_section()
-            table.add_row(Text(line.label, style="bold"))
+    for row in table.lines:
+        if row.kind == "section":
+            shown.add_section()
+            shown.add_row(Text(row.label, style="bold"))
             continue
-        cells = [Text(e.text + e.sign, style="bold" if e.best else "") for e in line.entries]
-        table.add_row(Text(line.label, style="italic" * (line.kind == "average")), *cells)
+        cells = [Text(e.text + e.sign, style="bold" if e.best else "") for e in row.entries]
+        shown.add_row(Text(row.label, style="bold" * (row.kind == "average")), *cells)
     console = Console()
     if not console.is_terminal:
         console = Console(width=220)  # rows are only as long as they need
-    console.print(table, highlight=False)
-    for note in grid.notes:
+    console.print(shown, highlight=False)
+    for note in table.notes:
         console.print(Text(note, style="dim"))

@@ -257,7 +257,7 @@ class Readers:
 
     def _run(self, rng: random.Random) -> None:
         """A whole run, one of its records or its manifest changed, up to its tables."""
-        from robospa.results.report.score_table import terminal
+        from robospa.results.report.score_table import print_scores
         from robospa.results.scoring.scores import score_run
 
         run = self.folder / "whole"
@@ -273,7 +273,7 @@ class Readers:
         (run / "trials" / "0000.jsonl").write_bytes(b"\n".join(lines) + b"\n")
         with contextlib.redirect_stdout(io.StringIO()):
             found = read_run(run)
-            terminal(found, score_run(found))
+            print_scores(found, score_run(found))
 
 
 def attempt(readers: Readers, name: str, rng: random.Random) -> str:

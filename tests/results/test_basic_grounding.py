@@ -12,8 +12,9 @@ from robospa.results.paper.columns import published_column, run_column
 from robospa.results.paper.tables import make_tables
 from robospa.results.records.run_io import Run
 from robospa.results.records.trial_record import TrialRecord
-from robospa.results.report.score_table import rows, to_json
+from robospa.results.report.score_table import rows
 from robospa.results.report.tables import report_tables
+from robospa.results.scoring.score_json import to_json
 from robospa.results.scoring.scores import score_run
 
 SETS = 5

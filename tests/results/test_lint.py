@@ -11,7 +11,7 @@ from run_by_hand import outcomes, record, write
 
 from robospa.results.records.lint import (
     Finding,
-    Row,
+    ResultRow,
     lint_published,
     lint_run,
     lint_runs,
@@ -124,7 +124,7 @@ def test_tasks_with_the_same_results(tmp_path: Path) -> None:
 
 
 def test_few_successes_may_agree_by_chance() -> None:
-    rows = [Row("m", task, (1, 2), (3.0, 0.0)) for task in "ab"]
+    rows = [ResultRow("m", task, (1, 2), (3.0, 0.0)) for task in "ab"]
     assert lint_table(rows) == []
 
 
@@ -137,24 +137,26 @@ def test_a_run_as_rows(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("row", "rule"),
     [
-        (Row("m", "t", (2,), (60.0,), ps=(50.0,)), "ps-below-sr"),
-        (Row("m", "t", (1,), (60.0,), ps=(61.0,), subtasks=(1,), trials=(100,)), "ps-is-sr"),
+        (ResultRow("m", "t", (2,), (60.0,), ps=(50.0,)), "ps-below-sr"),
+        (ResultRow("m", "t", (1,), (60.0,), ps=(61.0,), subtasks=(1,), trials=(100,)), "ps-is-sr"),
         (
-            Row("m", "t", (2,), (10.0,), ps=(23.3,), subtasks=(2,), trials=(100,), printed=True),
+            ResultRow(
+                "m", "t", (2,), (10.0,), ps=(23.3,), subtasks=(2,), trials=(100,), printed=True
+            ),
             "ps-not-a-share",
         ),
-        (Row("m", "t", (2,), (10.5,), trials=(100,)), "sr-not-a-count"),
-        (Row("m", "t", (2,), (120.0,)), "range"),
-        (Row("m", "t", (4,), (22.0,), onta=(22.0,), candidates=(6,)), "onta-from-sr"),
+        (ResultRow("m", "t", (2,), (10.5,), trials=(100,)), "sr-not-a-count"),
+        (ResultRow("m", "t", (2,), (120.0,)), "range"),
+        (ResultRow("m", "t", (4,), (22.0,), onta=(22.0,), candidates=(6,)), "onta-from-sr"),
     ],
 )
-def test_numbers_that_cannot_be(row: Row, rule: str) -> None:
+def test_numbers_that_cannot_be(row: ResultRow, rule: str) -> None:
     assert rules(lint_table([row])) == [rule]
 
 
 def test_a_third_of_the_trials_is_a_count_when_not_rounded() -> None:
-    assert lint_table([Row("m", "t", (1,), (100 / 3,), trials=(3,))]) == []
-    assert lint_table([Row("m", "t", (1,), (33.3,), trials=(3,), printed=True)]) == []
+    assert lint_table([ResultRow("m", "t", (1,), (100 / 3,), trials=(3,))]) == []
+    assert lint_table([ResultRow("m", "t", (1,), (33.3,), trials=(3,), printed=True)]) == []
 
 
 def test_the_paper() -> None:

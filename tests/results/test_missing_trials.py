@@ -14,9 +14,11 @@ from robospa.results.comparison.compare import compare
 from robospa.results.records.run_io import Run
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.report.files import write_report
+from robospa.results.report.missing import loss_lines
 from robospa.results.report.report import make_report
-from robospa.results.report.score_table import loss_lines, to_json
+from robospa.results.report.score_table import print_scores
 from robospa.results.scoring.model_results import results_of_run
+from robospa.results.scoring.score_json import to_json
 from robospa.results.scoring.scores import score_run
 from robospa.trial import TrialKey
 
@@ -72,7 +74,7 @@ def test_json_has_counts_and_bounds_of_every_metric(run: Run) -> None:
 def test_the_terminal_marks_incomplete_variants_and_says_why(
     run: Run, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    terminal(run, score_run(run))
+    print_scores(run, score_run(run))
     text = capsys.readouterr().out
     assert "83.3†" in text and "50.0†" in text
     assert "16 trials: 8 success, 4 step limit, 2 missing, 2 not run († lacks trials)" in text
@@ -86,7 +88,7 @@ def test_what_a_server_said_is_no_markup(
 ) -> None:
     bad = lost(PICK, 1, 1, "the server reported [/x]: [red]")
     run = write(tmp_path / "run", [record(PICK, 1, 0, 1), bad])
-    terminal(run, score_run(run))
+    print_scores(run, score_run(run))
     assert "missing 1: the server reported [/x]: [red]" in capsys.readouterr().out
 
 

@@ -142,18 +142,11 @@ def test_a_folder_that_is_no_run_is_refused(tmp_path: Path) -> None:
 
 def test_the_terminal_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     run = make_run(tmp_path / "run", RECORDS, lost=1)
-    tables.terminal(run, score_run(run))
+    tables.print_scores(run, score_run(run))
     text = capsys.readouterr().out
     assert "GAC Pick It" in text
     assert "75.0" in text
     assert "1 of 5 trials are missing" in text
-
-
-def test_every_metric_has_a_markdown_table(tmp_path: Path) -> None:
-    scores = score_run(make_run(tmp_path / "run", RECORDS))
-    assert "| Pick It | 75.0 [30.1, 95.4] (3/4) |" in tables.markdown_table(scores, "sr")
-    assert "Press It" not in tables.markdown_table(scores, "onta")
-    assert "| Press It |  | 50.0" in tables.markdown_table(scores, "ps")
 
 
 def test_percent_has_no_negative_zero() -> None:

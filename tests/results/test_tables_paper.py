@@ -15,7 +15,7 @@ from robospa.results.paper.tables import make_tables
 from robospa.results.records.run_io import Run
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.scoring.setting import IncomparableError
-from robospa.results.tables.table import Entry, Grid
+from robospa.results.tables.table import Table, TableCell
 from robospa.trial import TrialKey
 
 DATA = load()
@@ -72,7 +72,7 @@ def full_run(model: str, trials: int = 100, **key: Any) -> list[TrialRecord]:
     return made
 
 
-def entry(grid: Grid, row: str, column: int) -> Entry:
+def entry(grid: Table, row: str, column: int) -> TableCell:
     return next(line for line in grid.lines if line.label == row).entries[column]
 
 
@@ -128,7 +128,7 @@ def test_the_best_is_marked_in_every_model_that_cannot_be_told_from_it() -> None
     tied = summary_table(columns, "main", "sr", ("L1", "L5", "Drop"), "tied")
     highest = summary_table(columns, "main", "sr", ("L1", "L5", "Drop"), "highest")
 
-    def marked(grid: Grid, row: str) -> list[int]:
+    def marked(grid: Table, row: str) -> list[int]:
         line = next(x for x in grid.lines if x.label == row)
         return [n for n, e in enumerate(line.entries) if e.best]
 

@@ -17,19 +17,22 @@ from robospa.results.paper.published import load
 from robospa.results.paper.tables import FORMATS, TABLES, make_tables, write_tables
 from robospa.results.tables.html import fragment, page
 from robospa.results.tables.latex import document, escape_latex, to_latex
-from robospa.results.tables.table import Entry, Grid, Line, to_csv, to_markdown
+from robospa.results.tables.table import Table, TableCell, TableRow, to_csv, to_markdown
 from robospa.results.tables.terminal import show
 
 EVIL = "=a|b_c & 100% <script>alert(1)</script> \\input{x} $#~^{} “é” 模型"
-SMALL = Grid(
+SMALL = Table(
     "small",
     f"Title {EVIL}",
     "Model",
     ("L1", "L5"),
     (
-        Line("A section", kind="section"),
-        Line(EVIL, (Entry("12.5", 12.5, 10.0, 15.0, best=True), Entry("-1.2", -1.2, sign="*†"))),
-        Line("Average", (Entry("–"), Entry(EVIL)), "average"),
+        TableRow("A section", kind="section"),
+        TableRow(
+            EVIL,
+            (TableCell("12.5", 12.5, 10.0, 15.0, best=True), TableCell("-1.2", -1.2, sign="*†")),
+        ),
+        TableRow("Average", (TableCell("–"), TableCell(EVIL)), "average"),
     ),
     groups=((EVIL, 2),),
     notes=(f"note {EVIL}",),
@@ -37,11 +40,11 @@ SMALL = Grid(
 
 
 @pytest.fixture(scope="module")
-def grids() -> list[Grid]:
+def grids() -> list[Table]:
     return make_tables([published_column(model) for model in load().models])
 
 
-def test_every_table_of_the_paper_is_there(grids: list[Grid]) -> None:
+def test_every_table_of_the_paper_is_there(grids: list[Table]) -> None:
     assert [g.name for g in grids] == list(TABLES)
     assert {g.name: len([x for x in g.lines if x.kind != "section"]) for g in grids} == {
         "main": 13,
@@ -67,7 +70,7 @@ def latex_columns(line: str) -> int:
     return len(re.findall(r"(?<!\\)&", line)) + 1 + sum(n - 1 for n in spans)
 
 
-def test_latex_is_balanced_and_every_row_fills_its_columns(grids: list[Grid]) -> None:
+def test_latex_is_balanced_and_every_row_fills_its_columns(grids: list[Table]) -> None:
     for grid in (*grids, SMALL):
         text = to_latex(grid)
         bare = re.sub(r"\\[\\{}]", "", text)
@@ -80,7 +83,7 @@ def test_latex_is_balanced_and_every_row_fills_its_columns(grids: list[Grid]) ->
 
 
 @pytest.mark.skipif(shutil.which("pdflatex") is None, reason="needs pdflatex")
-def test_latex_compiles(grids: list[Grid], tmp_path: Path) -> None:
+def test_latex_compiles(grids: list[Table], tmp_path: Path) -> None:
     (tmp_path / "all.tex").write_text(document([*grids, SMALL]))
     command = ["pdflatex", "-interaction=nonstopmode", "-halt-on-error", "all.tex"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120)
@@ -96,7 +99,7 @@ def test_what_latex_takes_for_commands_is_escaped() -> None:
     assert "$-1.2$" in to_latex(SMALL)
 
 
-def test_markdown_rows_have_equal_columns_and_no_markup_from_outside(grids: list[Grid]) -> None:
+def test_markdown_rows_have_equal_columns_and_no_markup_from_outside(grids: list[Table]) -> None:
     for grid in (*grids, SMALL):
         text = to_markdown(grid)
         rows = [x for x in text.splitlines() if x.startswith("|")]
@@ -128,7 +131,7 @@ class Tags(HTMLParser):
         assert self.open.pop() == tag
 
 
-def test_html_nests_and_takes_nothing_from_outside(grids: list[Grid]) -> None:
+def test_html_nests_and_takes_nothing_from_outside(grids: list[Table]) -> None:
     for grid in (*grids, SMALL):
         reader = Tags()
         reader.feed(fragment(grid))
@@ -140,7 +143,7 @@ def test_html_nests_and_takes_nothing_from_outside(grids: list[Grid]) -> None:
     assert 'class="best" title="95 %: 10.0 to 15.0"' in whole
 
 
-def test_csv_has_a_line_a_cell_with_unrounded_numbers(grids: list[Grid]) -> None:
+def test_csv_has_a_line_a_cell_with_unrounded_numbers(grids: list[Table]) -> None:
     rows = list(csv.DictReader(io.StringIO(to_csv(grids))))
     assert len(rows) == sum(
         len(line.entries) for grid in grids for line in grid.lines if line.kind != "section"
@@ -163,12 +166,12 @@ def test_csv_has_a_line_a_cell_with_unrounded_numbers(grids: list[Grid]) -> None
 
 def test_tables_of_the_wrong_shape_are_refused() -> None:
     with pytest.raises(ValueError, match="wrong length"):
-        Grid("x", "", "", ("a", "b"), (Line("r", (Entry("1"),)),))
+        Table("x", "", "", ("a", "b"), (TableRow("r", (TableCell("1"),)),))
     with pytest.raises(ValueError, match="do not span"):
-        Grid("x", "", "", ("a", "b"), (), groups=(("g", 3),))
+        Table("x", "", "", ("a", "b"), (), groups=(("g", 3),))
 
 
-def test_every_format_is_written(tmp_path: Path, grids: list[Grid]) -> None:
+def test_every_format_is_written(tmp_path: Path, grids: list[Table]) -> None:
     written = write_tables(grids[:2], tmp_path / "out", list(FORMATS))
     assert {path.name for path in written} == {
         *(f"tables.{ending}" for ending in FORMATS),
@@ -179,7 +182,7 @@ def test_every_format_is_written(tmp_path: Path, grids: list[Grid]) -> None:
 
 
 def test_the_terminal_gets_every_cell(
-    capsys: pytest.CaptureFixture[str], grids: list[Grid]
+    capsys: pytest.CaptureFixture[str], grids: list[Table]
 ) -> None:
     show(grids[0])
     out = capsys.readouterr().out

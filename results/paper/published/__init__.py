@@ -2,7 +2,7 @@
 
 Every file names the label of the paper's table that it was read from. Numbers are percent exactly
 as printed, misprints included: what does not follow is named by `robospa.results.paper.check`.
-Tasks have the names of the environments; `Task.printed` is the name in the result tables.
+Tasks have the names of the environments; `PublishedTask.printed` is the name in the result tables.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ TITLES = {"pi0.5": "π0.5"}
 
 
 @dataclass(frozen=True)
-class Task:
+class PublishedTask:
     """A base task: `counts` per level are candidates (the n of ONTA) or subtasks (the T of PS)."""
 
     name: str
@@ -30,8 +30,8 @@ class Task:
 
 
 @dataclass(frozen=True)
-class Table:
-    """A printed table: values by row and model in the order of `columns`; `best` is its shading."""
+class PrintedTable:
+    """A table: values by row and model in the order of `columns`; `best` is its shading."""
 
     source: str
     metric: str
@@ -70,11 +70,11 @@ class Published:
     embodiment: str
     mode: str
     models: Mapping[str, Mapping[str, Any]]
-    tasks: Mapping[str, Task]
+    tasks: Mapping[str, PublishedTask]
     per_task: Mapping[tuple[str, str], PerTask]
-    main: Table
-    onta: Table
-    ps: Table
+    main: PrintedTable
+    onta: PrintedTable
+    ps: PrintedTable
     intervals: Mapping[str, Any]
     embodiments: Embodiments
     basic_grounding: Mapping[str, Any]
@@ -107,10 +107,10 @@ def _read(name: str) -> dict[str, Any]:
     return data
 
 
-def _table(name: str) -> Table:
+def _table(name: str) -> PrintedTable:
     data = _read(name)
     columns = tuple(data["columns"])
-    return Table(data["source"], data["metric"], columns, data["rows"], data["best"])
+    return PrintedTable(data["source"], data["metric"], columns, data["rows"], data["best"])
 
 
 def _embodiments() -> Embodiments:
@@ -125,7 +125,7 @@ def _embodiments() -> Embodiments:
 def load() -> Published:
     """The published results; read once."""
     tasks = {
-        name: Task(
+        name: PublishedTask(
             name, row["printed"], row["category"], tuple(row.get("candidates") or row["subtasks"])
         )
         for name, row in _read("tasks.json")["tasks"].items()

@@ -1,0 +1,30 @@
+"""Which trials of a run are missing and why, in sentences."""
+
+from __future__ import annotations
+
+from robospa.results.records.run_io import Run
+from robospa.results.scoring.scores import Scores
+
+
+def missing_lines(scores: Scores) -> list[str]:
+    """One sentence for every variant that lacks trials."""
+    return [
+        f"{cell.task} L{cell.level}: {cell.missing} of {cell.listed} trials are missing; if all "
+        f"had failed SR would be {100 * cell.worst:.1f}, if all had succeeded {100 * cell.best:.1f}"
+        for cell in scores.cells.values()
+        if cell.missing
+    ]
+
+
+def loss_lines(run: Run, most: int = 5) -> list[str]:
+    """Why trials are missing, one sentence a reason, the most frequent first."""
+    reasons: dict[str, int] = {}
+    for key in run.missing:
+        record = run.records.get(key)
+        reason = "not run yet" if record is None else record.message or "no reason was recorded"
+        reasons[reason] = reasons.get(reason, 0) + 1
+    common = sorted(reasons.items(), key=lambda item: -item[1])
+    lines = [f"missing {count}: {reason}" for reason, count in common[:most]]
+    if rest := common[most:]:
+        lines.append(f"missing {sum(n for _, n in rest)}: for {len(rest)} other reasons")
+    return lines
