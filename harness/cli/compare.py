@@ -84,8 +84,8 @@ def compare(
 
 def _results(name: str) -> ModelResults:
     """A run's folder, or else a published model."""
-    from robospa.results.paper.columns import published_results
     from robospa.results.paper.published import load
+    from robospa.results.paper.published_results import published_results
     from robospa.results.records.run_io import read_run
     from robospa.results.scoring.model_results import results_of_run
 

@@ -11,21 +11,19 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from robospa.categories import BASIC, DIMENSIONS, METRIC_CATEGORIES, SPATIAL
+from robospa.categories import BASIC, DIMENSIONS, METRIC_CATEGORIES
 from robospa.results.paper import rounding
-from robospa.results.paper.published import LEVELS, Published, load, title
+from robospa.results.paper.published import LEVELS, load
+from robospa.results.paper.published_results import published_results
 from robospa.results.records.run_io import Run
 from robospa.results.scoring.model_results import ModelResults, results_of_run
-from robospa.results.scoring.scores import AverageScore, Scores, VariantScore, combine
-from robospa.results.scoring.setting import TABLE, IncomparableError, Setting, check_same
+from robospa.results.scoring.scores import AverageScore, Scores, VariantScore
+from robospa.results.scoring.setting import TABLE, IncomparableError, check_same
 from robospa.results.statistics import onta
 from robospa.results.statistics.bootstrap import Sample, rate
 from robospa.results.statistics.intervals import (
     METHODS,
     Estimate,
-    bounded_mean,
-    chance_corrected,
-    wilson,
 )
 from robospa.results.tables.table import MISSING, TableCell
 
@@ -182,46 +180,6 @@ def table_values(
             found = {**tasks, **rounding.summary(tasks, below)}
             made[metric].update({(row, level): value for row, value in found.items()})
     return made
-
-
-def published_cell(published: Published, model: str, task: str, level: int) -> VariantScore:
-    """A published variant as if it had been run: counts from SR, progress as a bare mean."""
-    about = published.tasks[task]
-    trials, count = published.trials, about.counts[level - 1]
-    sr = published.value(model, "sr", task, level)
-    assert sr is not None, f"no SR of {task}"
-    successes = round(sr * trials / 100)
-    found = wilson(successes, trials)
-    values: dict[str, Estimate | None] = {"sr": found}
-    samples = {"sr": rate(successes, trials)}
-    if about.category in SPATIAL:
-        values["onta"] = chance_corrected(found, count)
-        samples["onta"] = rate(successes, trials, count)
-        return VariantScore(
-            task, level, about.category, trials, trials, successes, values, count, samples
-        )
-    printed = published.value(model, "ps", task, level)
-    assert printed is not None, f"no PS of {task}"
-    progress = rounding.exact_progress(printed, count, trials)
-    values["ps"] = bounded_mean(progress / 100, trials)
-    return VariantScore(
-        task, level, about.category, trials, trials, successes, values, samples=samples
-    )
-
-
-def published_results(model: str, ci: str = METHODS[0]) -> ModelResults:
-    """A published model, computed from its per-task tables."""
-    data = load()
-    if model not in data.models:
-        known = ", ".join(data.models)
-        raise ValueError(f"no published model is called {model!r}; there are {known}")
-    cells = {
-        (task, level): published_cell(data, model, task, level)
-        for task in data.tasks
-        for level in LEVELS
-    }
-    setting = Setting((data.embodiment,), (data.mode,))
-    return ModelResults(title(model), combine(cells, ci), setting, published=model)
 
 
 def _untied(values: Mapping[str, dict[tuple[str, int], float | None]], model: str) -> Values:

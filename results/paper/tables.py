@@ -8,9 +8,11 @@ from pathlib import Path
 from robospa.results.paper import other_tables as given
 from robospa.results.paper.columns import Column
 from robospa.results.paper.result_tables import summary_table, task_table
+from robospa.results.tables.csv import to_csv
 from robospa.results.tables.html import page
 from robospa.results.tables.latex import document, to_latex
-from robospa.results.tables.table import Table, to_csv, to_markdown
+from robospa.results.tables.markdown import to_markdown
+from robospa.results.tables.table import Table
 
 Maker = Callable[[Sequence[Column], str], Table]
 

@@ -16,10 +16,9 @@ from typing import TypeVar
 from robospa.categories import PROCEDURAL
 from robospa.results.paper.published import load
 from robospa.results.paper.rounding import rounded
-from robospa.results.records.run_io import TRIALS, Run, finished, read_file
+from robospa.results.records.run_io import Run, finished
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.statistics.onta import of_percent
-from robospa.trial import TrialKey
 
 FASTEST_STEP = 4e-6
 """Wall time of a physics step [s] that no machine known to us beats: 1000 times real time. Arms
@@ -216,8 +215,8 @@ def _lint_listing(
     if twice:
         text = f"{_some(twice)} listed twice: each would count double"
         yield Finding("listed-twice", "error", name, text)
-    if strangers := [key.slug for key in run.records if key not in listed]:
-        text = f"{_some(strangers)} recorded but not in the run's list"
+    if unlisted := [key.slug for key in run.records if key not in listed]:
+        text = f"{_some(unlisted)} recorded but not in the run's list"
         yield Finding("not-listed", "error", name, text)
     if variants is not None:
         unknown = [
@@ -249,15 +248,13 @@ def _lint_limits(run: Run, name: str) -> Iterator[Finding]:
 
 def _lint_files(run: Run, name: str) -> Iterator[Finding]:
     """How the records were written."""
-    seen: Counter[TrialKey] = Counter()
-    for path in sorted((run.folder / TRIALS).glob("*.jsonl")):
-        written = path.read_bytes()
-        if written and not written.endswith(b"\n"):
-            text = f"the last line of {path.name} was torn off: its trial has to be run again"
-            yield Finding("torn-line", "warning", name, text)
-        seen.update(r.key for r in read_file(path) if finished(r))
-    if again := [key.slug for key, count in seen.items() if count > 1]:
-        text = f"{_some(again)} recorded more than once (the records agree)"
+    for file in run.torn:
+        text = f"the last line of {file} was torn off: its trial has to be run again"
+        yield Finding("torn-line", "warning", name, text)
+    if run.repeated:
+        text = (
+            f"{_some([k.slug for k in run.repeated])} recorded more than once (the records agree)"
+        )
         yield Finding("recorded-twice", "warning", name, text)
 
 

@@ -9,6 +9,7 @@ one trial must agree on everything that a repeatable world decides; if not, that
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, fields
 from functools import cached_property
@@ -61,6 +62,10 @@ class Run:
     manifest: Mapping[str, Any]
     keys: tuple[TrialKey, ...]
     records: Mapping[TrialKey, TrialRecord]
+    torn: tuple[str, ...] = ()
+    """Names of the record files whose last line was torn off."""
+    repeated: tuple[TrialKey, ...] = ()
+    """Trials that have more than one result; these agree."""
 
     @cached_property
     def info(self) -> RunInfo:
@@ -106,15 +111,19 @@ def from_data(data: Any) -> TrialRecord:
 
 def read_file(path: Path) -> list[TrialRecord]:
     """All whole records of one file, in order; raises RunError at the first corrupt line."""
-    lines = read_bytes(path, MAX_FILE_BYTES).split(b"\n")
-    whole = lines[:-1]  # what follows the last newline was torn off, or is empty
+    return _read_file(path)[0]
+
+
+def _read_file(path: Path) -> tuple[list[TrialRecord], bool]:
+    """The whole records of one file, and whether its last line was torn off."""
+    *whole, rest = read_bytes(path, MAX_FILE_BYTES).split(b"\n")
     records = []
     for number, raw in enumerate(whole, 1):
         try:
             records.append(from_line(raw.decode()))
         except ValueError as error:
             raise RunError(f"{path}, line {number}: {error}") from error
-    return records
+    return records, bool(rest)
 
 
 def differences(first: TrialRecord, second: TrialRecord) -> list[str]:
@@ -147,7 +156,7 @@ def merge(
 def read_records(folder: Path) -> dict[TrialKey, TrialRecord]:
     """One record per trial from all files of the run in `folder`."""
     merged: dict[TrialKey, TrialRecord] = {}
-    for path in sorted((folder / TRIALS).glob("*.jsonl")):
+    for path in _record_files(folder):
         merged = merge(read_file(path), merged)
     return merged
 
@@ -156,4 +165,17 @@ def read_run(folder: str | Path) -> Run:
     """The run in `folder`; raises RunError (or RepeatabilityError) if it cannot be trusted."""
     folder = Path(folder)
     manifest = read_manifest(folder)
-    return Run(folder, manifest, manifest_keys(manifest), read_records(folder))
+    records: dict[TrialKey, TrialRecord] = {}
+    results: Counter[TrialKey] = Counter()
+    torn: list[str] = []
+    for path in _record_files(folder):
+        found, was_torn = _read_file(path)
+        records = merge(found, records)
+        results.update(record.key for record in found if finished(record))
+        torn += [path.name] * was_torn
+    repeated = tuple(key for key, count in results.items() if count > 1)
+    return Run(folder, manifest, manifest_keys(manifest), records, tuple(torn), repeated)
+
+
+def _record_files(folder: Path) -> list[Path]:
+    return sorted((folder / TRIALS).glob("*.jsonl"))

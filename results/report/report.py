@@ -14,7 +14,8 @@ from robospa.categories import METRIC_NAMES
 from robospa.results.failures.labels import Failure, distribution, failures_of
 from robospa.results.figures.draw import draw
 from robospa.results.figures.series import FORMATS, Drawing, Series
-from robospa.results.paper.columns import Column, check_columns, column_of, published_results
+from robospa.results.paper.columns import Column, check_columns, column_of
+from robospa.results.paper.published_results import published_results
 from robospa.results.records.lint import lint_run, lint_runs
 from robospa.results.records.run_io import Run, finished
 from robospa.results.report.missing import loss_lines, missing_lines

@@ -11,7 +11,7 @@ from run_by_hand import outcomes, record, write
 from robospa.results.comparison.compare import Comparison, Difference, compare
 from robospa.results.comparison.drops import drops
 from robospa.results.comparison.early_stopping import stop_early
-from robospa.results.paper.columns import published_results
+from robospa.results.paper.published_results import published_results
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.scoring.model_results import ModelResults, results_of_run
 from robospa.results.scoring.setting import IncomparableError

@@ -101,7 +101,7 @@ def test_torn_and_repeated_records(tmp_path: Path) -> None:
     run = write(tmp_path / "a", records)
     again = tmp_path / "a" / "trials" / "0001.jsonl"
     again.write_text(to_line(records[0]) + to_line(records[1])[:50])
-    assert rules(lint_run(run)) == ["torn-line", "recorded-twice"]
+    assert rules(lint_run(read_run(run.folder))) == ["torn-line", "recorded-twice"]
 
 
 def test_records_that_cannot_be_read_are_one_sentence(tmp_path: Path) -> None:

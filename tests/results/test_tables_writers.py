@@ -15,9 +15,11 @@ import pytest
 from robospa.results.paper.columns import published_column
 from robospa.results.paper.published import load
 from robospa.results.paper.tables import FORMATS, TABLES, make_tables, write_tables
+from robospa.results.tables.csv import to_csv
 from robospa.results.tables.html import fragment, page
 from robospa.results.tables.latex import document, escape_latex, to_latex
-from robospa.results.tables.table import Table, TableCell, TableRow, to_csv, to_markdown
+from robospa.results.tables.markdown import to_markdown
+from robospa.results.tables.table import Table, TableCell, TableRow
 from robospa.results.tables.terminal import show
 
 EVIL = "=a|b_c & 100% <script>alert(1)</script> \\input{x} $#~^{} “é” 模型"

@@ -1,0 +1,46 @@
+"""Tables as CSV, for programs."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Sequence
+
+from robospa.results.tables.table import Table, TableCell
+
+FIELDS = ("table", "section", "row", "group", "column", "text", "value", "low", "high", "best")
+LACKS = ("sign", "missing", "worst_case", "best_case")
+"""Further columns: the mark, and what trials without a result leave open."""
+
+
+def to_csv(grids: Sequence[Table]) -> str:
+    """All cells of `grids`, one a line, for programs: FIELDS, then LACKS.
+
+    Values are not rounded. A text that a spreadsheet would run as a formula gets a quote before it.
+    """
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow((*FIELDS, *LACKS))
+    for grid in grids:
+        section = ""
+        for line in grid.lines:
+            if line.kind == "section":
+                section = line.label
+                continue
+            for group, head, entry in zip(grid.group_of, grid.heads, line.entries, strict=True):
+                numbers = ("" if x is None else f"{x:.10g}" for x in _numbers(entry))
+                words = (grid.name, section, line.label, group, head, entry.text)
+                best = "best" if entry.best else ""
+                lacks = (entry.missing or "", *(f"{x:.10g}" for x in entry.bounds or ()))
+                row = (*map(_no_formula, words), *numbers, best, entry.sign, *lacks)
+                writer.writerow((*row, *[""] * (len(FIELDS) + len(LACKS) - len(row))))
+    return out.getvalue()
+
+
+def _numbers(entry: TableCell) -> tuple[float | None, float | None, float | None]:
+    return entry.value, entry.low, entry.high
+
+
+def _no_formula(text: str) -> str:
+    dangerous = text[:1] in "=+@\t\r" and text[:1] != ""
+    return "'" + text if dangerous else text

@@ -1,0 +1,42 @@
+"""A table in Markdown."""
+
+from __future__ import annotations
+
+import re
+
+from robospa.results.tables.table import Table, TableCell, plain
+
+
+def escape_markdown(text: str) -> str:
+    """`text` with what Markdown or HTML inside it would take for markup made harmless."""
+    return re.sub(r"([\\|*_`<>\[\]])", r"\\\1", plain(text))
+
+
+def to_markdown(grid: Table) -> str:
+    """The table in Markdown, its title above and its notes below."""
+    names = [
+        f"{escape_markdown(group)} {escape_markdown(head)}".strip()
+        for group, head in zip(grid.group_of, grid.heads, strict=True)
+    ]
+    rule = "---" if grid.words else "---:"
+    lines = [
+        f"### {escape_markdown(grid.title)}",
+        "",
+        f"| {escape_markdown(grid.corner)} | " + " | ".join(names) + " |",
+        "|---|" + f"{rule}|" * len(names),
+    ]
+    for line in grid.lines:
+        label = escape_markdown(line.label)
+        shown = label if line.kind == "row" else f"*{label}*"
+        if line.kind == "section":
+            lines.append(f"| **{label}** | " + " | ".join([""] * len(names)) + " |")
+        else:
+            lines.append(f"| {shown} | " + " | ".join(map(_markdown_entry, line.entries)) + " |")
+    for note in grid.notes:
+        lines += ["", escape_markdown(note)]
+    return "\n".join(lines) + "\n"
+
+
+def _markdown_entry(entry: TableCell) -> str:
+    text = escape_markdown(entry.text)
+    return (f"**{text}**" if entry.best else text) + escape_markdown(entry.sign)
