@@ -52,15 +52,15 @@ class ModelResults:
         for (task, level), cell in self.scores.cells.items():
             if not cell.trials or cell.category not in categories_of(metric):
                 continue
+            if metric not in cell.samples and self.published:
+                raise IncomparableError(
+                    f"of {self.name} only the mean progress is published, without the trials: "
+                    "compare sr or onta"
+                )
             if metric not in cell.samples:
                 raise IncomparableError(
-                    f"{self.name}, {task} L{level}: "
-                    + (
-                        "of published progress only the mean is known, without the trials: compare "
-                        "sr or onta"
-                        if self.published
-                        else "trials differ in their number of candidates: no ONTA"
-                    )
+                    f"{self.name}, {task} L{level}: trials differ in their number of candidates, "
+                    "so there is no ONTA: compare sr"
                 )
             found[task, level] = cell.samples[metric]
         return found

@@ -10,14 +10,14 @@ from robospa.trial import TrialKey
 TABLE = ("embodiment", "mode", "suite", "split")
 COMPARISON = ("embodiment", "mode", "split", "step_scale")
 """Parts of a setting that have to be the same in one table, and in one comparison."""
-NAMES = {
-    "embodiment": "embodiment",
-    "mode": "scene mode",
-    "split": "instruction split",
-    "suite": "suite",
-    "step_scale": "step limits (times the official ones)",
+RAN_WITH = {
+    "embodiment": "the embodiments {} and {}",
+    "mode": "the scene modes {} and {}",
+    "split": "the instruction splits {} and {}",
+    "suite": "the suites {} and {}",
+    "step_scale": "{:g} and {:g} times the official step limits",
 }
-"""How the parts are called in messages."""
+"""How messages name two different values of each part."""
 
 
 class IncomparableError(ValueError):
@@ -60,8 +60,8 @@ def check_same(settings: Iterable[tuple[str, Setting]], parts: Sequence[str]) ->
     for name, setting in known:
         for part, values in setting.mixed():
             raise IncomparableError(
-                f"{name} mixes the {NAMES[part]}s {' and '.join(values)}, whose mean means "
-                "nothing: evaluate one at a time"
+                f"{name} mixes {RAN_WITH[part].format(', '.join(values[:-1]), values[-1])}, whose "
+                "mean means nothing: evaluate one at a time"
             )
     for part in parts:
         found: dict[str | float, str] = {}
@@ -71,6 +71,6 @@ def check_same(settings: Iterable[tuple[str, Setting]], parts: Sequence[str]) ->
         if len(found) > 1:
             (one, first), (other, second), *_ = found.items()
             raise IncomparableError(
-                f"{first} and {second} cannot be compared: they differ in {NAMES[part]} "
-                f"({one}, {other})"
+                f"{first} and {second} cannot be compared: they ran with "
+                f"{RAN_WITH[part].format(one, other)}"
             )
