@@ -151,9 +151,7 @@ def test_a_run_on_another_robot_is_a_row_of_the_embodiment_tables_only() -> None
     columns = [published_column("RDT"), run]
     (grid,) = make_tables(columns, ["embodiments-spatial"])
     assert grid.lines[-1].label == "mine, UR5"
-    with pytest.raises(
-        IncomparableError, match="RDT and mine .* the embodiments aloha-agilex and ur5"
-    ):
+    with pytest.raises(IncomparableError, match=r"RDT and mine .* aloha-agilex and ur5"):
         make_tables(columns, ["main"])
 
 
