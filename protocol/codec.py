@@ -62,7 +62,7 @@ _BINARY_KEYS = _ARRAY_KEYS | _SCALAR_KEYS
 # ---------------------------------------------------------------- encoding
 
 
-def encode(value: Any, limits: Limits = DEFAULT_LIMITS) -> bytes:
+def encode(value: object, limits: Limits = DEFAULT_LIMITS) -> bytes:
     """One contiguous message from None, bool, int, float, str, bytes, lists, maps and arrays.
 
     Tuples become lists and numpy scalars become Python numbers. Raises EncodeError.
@@ -82,16 +82,16 @@ class _Writer:
 
     def __init__(self, limits: Limits) -> None:
         self.limits = limits
-        self.parts: list[Any] = []
+        self.parts: list[Buffer] = []
         self.size = 0
         self.items = 0
         self.packer = msgpack.Packer(use_bin_type=True)
 
-    def add(self, part: Any, size: int) -> None:
+    def add(self, part: Buffer, size: int) -> None:
         self.parts.append(part)
         self.size += size
 
-    def value(self, value: Any, depth: int) -> None:
+    def value(self, value: object, depth: int) -> None:
         self.items += 1
         if depth > self.limits.depth or self.items > self.limits.items:
             raise EncodeError(
@@ -109,7 +109,7 @@ class _Writer:
         else:
             self.leaf(value)
 
-    def map(self, value: Mapping[Any, Any], depth: int) -> None:
+    def map(self, value: Mapping[object, object], depth: int) -> None:
         header = self.packer.pack_map_header(len(value))
         self.add(header, len(header))
         for key, item in value.items():
@@ -119,7 +119,7 @@ class _Writer:
             self.leaf(key)
             self.value(item, depth + 1)
 
-    def leaf(self, value: Any) -> None:
+    def leaf(self, value: object) -> None:
         if isinstance(value, np.generic):
             if value.dtype.kind not in "biuf":
                 raise EncodeError(f"numpy scalar of dtype {value.dtype} cannot be sent")
@@ -293,7 +293,7 @@ class _Reader:
         if count and self.bytes[self.pos] in _BIN:
             array = self.usual_array()
             return array if array is not None else self.numpy(count)
-        result: dict[Any, Any] = {}
+        result: dict[str | int, Any] = {}
         for _ in range(count):
             key = self.value(depth + 1)
             if type(key) is not str and type(key) is not int:
@@ -346,7 +346,7 @@ class _Reader:
     def _next_is_binary(self) -> bool:
         return self.pos < self.end and self.bytes[self.pos] in _BIN
 
-    def array(self, data: Any, name: Any, shape: Any) -> NDArray[np.generic]:
+    def array(self, data: object, name: object, shape: object) -> NDArray[np.generic]:
         dtype = DTYPES.get(name) if isinstance(name, str) else None
         if dtype is None:
             raise self.fail(f"array dtype {str(name)[:20]!r} is no plain number")
