@@ -105,20 +105,22 @@ def test_links_lead_to_files(page: Path) -> None:
 
 
 def test_the_example_task_draws_valid_scenes() -> None:
-    task = example("leftmost_block").TASK
+    task = example("leftmost_block/task").TASK
     for level, limits in task.levels.items():
         for seed in range(60):
             draft = task.draw(level, np.random.default_rng(seed), CELL)
             xs = sorted(item.pose.position[0] for item in draft.objects)
-            target = next(o for o in draft.objects if o.name == draft.facts["target"])
+            target = next(o for o in draft.objects if o.name == draft.facts.to_json()["target"])
             assert len(draft.objects) == limits.candidates
             assert target.pose.position[0] == xs[0] < xs[1] - 0.03
 
 
 def test_the_example_task_is_solved_by_lifting_its_target() -> None:
-    task = example("leftmost_block").TASK
+    task = example("leftmost_block/task").TASK
     draft = task.draw(3, np.random.default_rng(0), CELL)
-    scene = Scene("Pick_Leftmost_Block", 3, 0, "none", "clean", draft.objects, draft.facts)
+    scene = Scene(
+        "Pick_Leftmost_Block", 3, 0, "none", "clean", draft.objects, draft.facts.to_json()
+    )
     target = scene.facts["target"]
     assert task.plan(scene) == (Pick(target),)
     tracker = task.goal(scene)

@@ -11,19 +11,18 @@ from pathlib import Path
 
 import pytest
 
-from robospa.tasks import catalog
+from robospa.tasks import catalog, families
 from robospa.tasks.instructions.grammar import similarity
 from robospa.tasks.sentences import instruction, sentences, templates
 
 ROOT = Path(__file__).resolve().parents[1]
 NAME = "Pick_Leftmost_Block"
-ENTRY = "[robospa.tasks]\nPick_Leftmost_Block = leftmost_block:TASK\n"
+ENTRY = "[robospa.tasks]\nPick_Leftmost_Block = leftmost_block.task:TASK\n"
 
 
 def package(folder: Path, entry: str = ENTRY) -> Path:
-    """What an installer leaves behind: the module, its text, and a note of what it offers."""
-    for name in ("leftmost_block.py", "leftmost_block.toml"):
-        shutil.copy(ROOT / "docs" / "examples" / name, folder)
+    """What an installer leaves behind: the folder of the task, and a note of what it offers."""
+    shutil.copytree(ROOT / "docs" / "examples" / "leftmost_block", folder / "leftmost_block")
     note = folder / "leftmost_block-1.0.dist-info"
     note.mkdir()
     (note / "METADATA").write_text("Metadata-Version: 2.1\nName: leftmost-block\nVersion: 1.0\n")
@@ -37,7 +36,26 @@ def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]
     catalog.extensions.cache_clear()
     yield tmp_path
     catalog.extensions.cache_clear()
-    sys.modules.pop("leftmost_block", None)
+    forget()
+
+
+def forget() -> None:
+    """Let the example be imported anew, from wherever it is next."""
+    for name in ("leftmost_block", "leftmost_block.task"):
+        sys.modules.pop(name, None)
+
+
+def test_a_folder_and_one_line_make_it_part_of_the_suite(monkeypatch: pytest.MonkeyPatch) -> None:
+    examples = str(ROOT / "docs" / "examples")
+    monkeypatch.setattr(families, "__path__", [*families.__path__, examples])
+    monkeypatch.setattr(catalog, "MODULES", (*catalog.MODULES, "leftmost_block.task"))
+    catalog.tasks.cache_clear()
+    try:
+        scene = catalog.build_scene(NAME, 1, 500_000)
+        assert instruction(scene, "train") in sentences(scene, "train")
+        assert catalog.task(NAME).levels[1].candidates == len(scene.objects)
+    finally:
+        catalog.tasks.cache_clear()
 
 
 def test_an_installed_task_is_found_by_its_name(installed: Path) -> None:
@@ -70,15 +88,15 @@ def test_its_sentences_are_its_own(installed: Path) -> None:
 def test_an_entry_that_is_no_task_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    entry = "[robospa.tasks]\nPick_Leftmost_Block = leftmost_block:LEVELS\n"
+    entry = "[robospa.tasks]\nPick_Leftmost_Block = leftmost_block.task:LEVELS\n"
     monkeypatch.syspath_prepend(package(tmp_path, entry))
     catalog.extensions.cache_clear()
     try:
-        with pytest.raises(ValueError, match=r"leftmost_block:LEVELS\) offers no new task"):
+        with pytest.raises(ValueError, match=r"leftmost_block.task:LEVELS\) offers no new task"):
             catalog.task(NAME)
     finally:
         catalog.extensions.cache_clear()
-        sys.modules.pop("leftmost_block", None)
+        forget()
 
 
 @pytest.mark.sim

@@ -17,6 +17,7 @@ import numpy as np
 from robospa.geometry import Pose
 from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.action_chain.stations import frame_of
+from robospa.tasks.families.colors import first_colors
 from robospa.tasks.families.dustbin.floor_bin import reachable
 from robospa.tasks.families.tabletop import Item, draw_look, in_view, named, radius, standing
 from robospa.tasks.goals.checklist import Checklist, Counter
@@ -32,12 +33,7 @@ from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "mug_tower.toml")
 
-COLORS = {
-    "red": (1.0, 0.0, 0.0),
-    "green": (0.0, 1.0, 0.0),
-    "blue": (0.0, 0.0, 1.0),
-    "yellow": (1.0, 1.0, 0.0),
-}
+COLORS = first_colors(4)
 """Bottom to top; level n has the first n - 1."""
 
 HALF = 0.015

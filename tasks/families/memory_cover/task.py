@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from robospa.tasks.facts import SceneFacts
+from robospa.tasks.families.colors import first_colors
 from robospa.tasks.families.tabletop import Item, named, side, standing
 from robospa.tasks.goals.memory import Cover, UncoverInOrder
 from robospa.tasks.instructions.grammar import Slots
@@ -24,18 +25,7 @@ from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "instructions.toml")
 
-COLORS = {
-    "red": (1.0, 0.0, 0.0),
-    "green": (0.0, 1.0, 0.0),
-    "blue": (0.0, 0.0, 1.0),
-    "yellow": (1.0, 1.0, 0.0),
-    "cyan": (0.0, 1.0, 1.0),
-    "magenta": (1.0, 0.0, 1.0),
-    "orange": (1.0, 0.5, 0.0),
-    "purple": (0.5, 0.0, 0.5),
-    "white": (1.0, 1.0, 1.0),
-    "black": (0.1, 0.1, 0.1),
-}
+COLORS = first_colors(10)
 ROWS = {
     1: (0.0,),
     2: (-0.20, 0.20),

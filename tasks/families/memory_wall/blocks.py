@@ -14,6 +14,7 @@ import numpy as np
 
 from robospa.geometry import Pose
 from robospa.tasks.facts import SceneFacts
+from robospa.tasks.families.colors import COLORS
 from robospa.tasks.families.memory_wall.wall import HOLD_STILL, STAND_TOP, WALL, row, stand, wall
 from robospa.tasks.families.tabletop import Item, named, side, standing
 from robospa.tasks.goals.cue import AfterCue
@@ -31,20 +32,6 @@ from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "blocks.toml")
 
-COLORS = {
-    "red": (1.0, 0.0, 0.0),
-    "green": (0.0, 1.0, 0.0),
-    "blue": (0.0, 0.0, 1.0),
-    "yellow": (1.0, 1.0, 0.0),
-    "cyan": (0.0, 1.0, 1.0),
-    "magenta": (1.0, 0.0, 1.0),
-    "orange": (1.0, 0.5, 0.0),
-    "purple": (0.5, 0.0, 0.5),
-    "white": (1.0, 1.0, 1.0),
-    "black": (0.1, 0.1, 0.1),
-    "brown": (0.6, 0.3, 0.1),
-    "pink": (1.0, 0.75, 0.8),
-}
 HALF = 0.015
 STAND_Y, STAND_HALF, STAND_SHADE, SHOWN_X = 0.20, (0.26, 0.055, 0.01), 0.85, 0.18
 WALL_Y = 0.12

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from robospa.tasks.facts import SceneFacts
+from robospa.tasks.families.colors import first_colors
 from robospa.tasks.families.tabletop import Item, named, standing
 from robospa.tasks.goals.parts import Region
 from robospa.tasks.goals.placing import Destination, bring
@@ -28,15 +29,7 @@ from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "blocks.toml")
 
-COLORS = {
-    "red": (1.0, 0.0, 0.0),
-    "green": (0.0, 1.0, 0.0),
-    "blue": (0.0, 0.0, 1.0),
-    "yellow": (1.0, 1.0, 0.0),
-    "cyan": (0.0, 1.0, 1.0),
-    "magenta": (1.0, 0.0, 1.0),
-    "orange": (1.0, 0.5, 0.0),
-}
+COLORS = first_colors(7)
 TO_RIGHT = {2: 1, 3: 1, 4: 2, 5: 2}
 """How many of the blocks have the first colour, which goes right."""
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from robospa.geometry import Vec3
 from robospa.tasks.facts import SceneFacts
+from robospa.tasks.families.colors import first_colors
 from robospa.tasks.families.stack_blocks.towers import NEAR_BAND, draw_color
 from robospa.tasks.families.tabletop import Item, named, side, standing
 from robospa.tasks.goals.row import row
@@ -36,13 +37,7 @@ Color = list[float]
 Look = tuple[Vec3, Color]
 """Half sizes [m] and colour of one block."""
 
-COLORS = {
-    "red": [1.0, 0.0, 0.0],
-    "green": [0.0, 1.0, 0.0],
-    "blue": [0.0, 0.0, 1.0],
-    "yellow": [1.0, 1.0, 0.0],
-    "purple": [1.0, 0.0, 1.0],
-}
+COLORS = {**first_colors(4), "purple": (1.0, 0.0, 1.0)}
 """Left to right."""
 
 HALF_HEIGHTS = ((0.058, 0.060), (0.042, 0.044), (0.028, 0.030), (0.016, 0.018), (0.006, 0.008))
@@ -89,7 +84,7 @@ def _heights(level: int, rng: np.random.Generator) -> list[Look]:
 
 def _colors(level: int, rng: np.random.Generator) -> list[Look]:
     half = float(rng.uniform(0.015, 0.025))
-    return [((half, half, half), color) for color in list(COLORS.values())[:level]]
+    return [((half, half, half), color) for color in map(list, list(COLORS.values())[:level])]
 
 
 def _sizes(level: int, rng: np.random.Generator) -> list[Look]:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from robospa.tasks.families.colors import first_colors
 from robospa.tasks.families.stack_blocks.towers import (
     TowerFacts,
     building_place,
@@ -29,13 +30,7 @@ from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "color.toml")
 
-COLORS = {
-    "red": (1.0, 0.0, 0.0),
-    "green": (0.0, 1.0, 0.0),
-    "blue": (0.0, 0.0, 1.0),
-    "yellow": (1.0, 1.0, 0.0),
-    "purple": (0.6, 0.2, 0.8),
-}
+COLORS = {**first_colors(4), "purple": (0.6, 0.2, 0.8)}
 """Bottom to top."""
 
 HALF = 0.018

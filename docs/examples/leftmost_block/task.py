@@ -19,7 +19,7 @@ from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.task import Draft, Level, Task, Tracker
 from robospa.workcell import TABLE_TOP, Workcell
 
-TEXT = TaskText.beside(__file__, "leftmost_block.toml")
+TEXT = TaskText.beside(__file__, "instructions.toml")
 HALF = 0.022  # [m]
 AREA = Area(x=(-0.25, 0.25), y=(-0.15, 0.08), clear_middle=True)
 LEVELS = {k: Level(candidates=k + 1, subtasks=1, steps=150) for k in range(1, 6)}
