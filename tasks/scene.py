@@ -14,6 +14,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from robospa.geometry import Pose, Vec3
+from robospa.tasks.shapes import Params
 from robospa.workcell import TABLE_TOP
 
 SUITE = "robospa-1"
@@ -32,7 +33,7 @@ class SceneObject:
     name: str
     asset: str
     pose: Pose
-    params: Mapping[str, Any] = field(default_factory=dict)
+    params: Params = field(default_factory=dict)
     fixed: bool = False
     appears_at: float | None = None
 

@@ -9,11 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 from robospa.geometry import Pose, Vec3, axis_rotation
 
 Color = tuple[float, float, float]
 """Linear RGB, each 0..1."""
+Params = Mapping[str, Any]
+"""What an asset is made with (half sizes, colour, which look...): JSON values by name."""
 
 
 @dataclass(frozen=True)

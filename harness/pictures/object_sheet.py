@@ -87,6 +87,8 @@ class Booth:
 
         shapes = (*model.shapes, *_opened(model.hinge))
         entity = self._render_body(shapes, model.asset)
+        if entity is None:
+            raise ValueError(f"asset {model.asset!r} has no visual shape to draw")
         place = FLOOR if model.size[2] > TALL else PLACE
         origin = (place[0], place[1], place[2] - model.bottom)
         entity.pose = to_sapien(Pose(origin, yaw_rotation(turn)))

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 import sapien
@@ -38,12 +37,14 @@ Z_TO_X: Quat = axis_rotation((0, 1, 0), -math.pi / 2)
 """Turns SAPIEN's cylinders, which lie along x, to stand along z."""
 
 
-def to_sapien(pose: Pose) -> Any:
+def to_sapien(pose: Pose) -> sapien.Pose:
     """The same pose as a `sapien.Pose`."""
     return sapien.Pose(pose.position, pose.rotation)
 
 
-def _collision_shape(geometry: Geometry, material: Any) -> Any:
+def _collision_shape(
+    geometry: Geometry, material: physx.PhysxMaterial
+) -> physx.PhysxCollisionShape:
     if isinstance(geometry, Box):
         return physx.PhysxCollisionShapeBox(geometry.half, material)
     if isinstance(geometry, Sphere):
@@ -56,7 +57,7 @@ def _collision_shape(geometry: Geometry, material: Any) -> Any:
     )
 
 
-def local_pose(shape: Shape) -> Any:
+def local_pose(shape: Shape) -> sapien.Pose:
     """A shape's pose in SAPIEN's convention for its geometry."""
     pose = shape.pose
     if isinstance(shape.geometry, Cylinder):
@@ -65,9 +66,9 @@ def local_pose(shape: Shape) -> Any:
 
 
 def attach_collisions(
-    component: Any,
+    component: physx.PhysxRigidBaseComponent,
     shapes: Iterable[Shape],
-    material: Any,
+    material: physx.PhysxMaterial,
     density: float = DENSITY,
     groups: Sequence[int] | None = None,
 ) -> None:
@@ -83,7 +84,7 @@ def attach_collisions(
 
 
 @lru_cache(maxsize=1024)
-def material(friction: float = FRICTION) -> Any:
+def material(friction: float = FRICTION) -> physx.PhysxMaterial:
     """The material of that friction, without bounce. Materials carry no state."""
     return physx.PhysxMaterial(friction, friction, 0.0)
 
@@ -96,7 +97,9 @@ def _density(shapes: tuple[Shape, ...], mass: float) -> float:
     return DENSITY * mass / float(trial.mass)
 
 
-def dynamic_body(model: ObjectModel, name: str, pose: Pose, fixed: bool) -> tuple[Any, Any]:
+def dynamic_body(
+    model: ObjectModel, name: str, pose: Pose, fixed: bool
+) -> tuple[sapien.Entity, physx.PhysxRigidBaseComponent]:
     """Entity and PhysX component of an object; neither is in a scene yet.
 
     Its mass is `model.mass` with the inertia of a body of even density; a `fixed` one is static.
@@ -112,7 +115,9 @@ def dynamic_body(model: ObjectModel, name: str, pose: Pose, fixed: bool) -> tupl
     return entity_of(component, name, pose), component
 
 
-def hinged_body(model: ObjectModel, name: str, pose: Pose, fixed: bool) -> tuple[Any, Any, Any]:
+def hinged_body(
+    model: ObjectModel, name: str, pose: Pose, fixed: bool
+) -> tuple[sapien.Entity, sapien.Entity, physx.PhysxArticulation]:
     """Entities of a body and of its hinged part, and their articulation; in no scene yet.
 
     Both entities carry the object's name, so that a touch of the door is a touch of the object.
@@ -146,14 +151,14 @@ def hinged_body(model: ObjectModel, name: str, pose: Pose, fixed: bool) -> tuple
     return entities[0], entities[1], articulation
 
 
-def static_body(shapes: Iterable[Shape], name: str, pose: Pose) -> Any:
+def static_body(shapes: Iterable[Shape], name: str, pose: Pose) -> sapien.Entity:
     """A static entity made of `shapes`."""
     component = physx.PhysxRigidStaticComponent()
     attach_collisions(component, shapes, material())
     return entity_of(component, name, pose)
 
 
-def ground_body(name: str) -> Any:
+def ground_body(name: str) -> sapien.Entity:
     """The endless floor at z = 0."""
     component = physx.PhysxRigidStaticComponent()
     plane = physx.PhysxCollisionShapePlane(material())
@@ -162,7 +167,7 @@ def ground_body(name: str) -> Any:
     return entity_of(component, name, Pose())
 
 
-def entity_of(component: Any, name: str, pose: Pose) -> Any:
+def entity_of(component: sapien.Component, name: str, pose: Pose) -> sapien.Entity:
     """An entity holding `component`; both carry the name."""
     component.name = name
     entity = sapien.Entity()
@@ -172,7 +177,7 @@ def entity_of(component: Any, name: str, pose: Pose) -> Any:
     return entity
 
 
-def _link_inertia(arm: Arm, link: str, mass: float) -> tuple[Any, Array]:
+def _link_inertia(arm: Arm, link: str, mass: float) -> tuple[sapien.Pose, Array]:
     """Centre of mass (as pose) and principal inertia (3,) of `mass` [kg] spread over a link.
 
     A block from the link's own joint to those that it carries: it follows from the joints alone, so
@@ -183,7 +188,7 @@ def _link_inertia(arm: Arm, link: str, mass: float) -> tuple[Any, Array]:
 
 
 @lru_cache(maxsize=256)
-def _block_around(carried: tuple[Vec3, ...], mass: float) -> tuple[Any, Array]:
+def _block_around(carried: tuple[Vec3, ...], mass: float) -> tuple[sapien.Pose, Array]:
     points = np.array([(0.0, 0.0, 0.0), *carried])
     low, high = points.min(axis=0) - LINK_MARGIN, points.max(axis=0) + LINK_MARGIN
     x, y, z = high - low
@@ -192,7 +197,7 @@ def _block_around(carried: tuple[Vec3, ...], mass: float) -> tuple[Any, Array]:
 
 
 @lru_cache(maxsize=256)
-def _joint_frames(joint: Joint) -> tuple[Any, Any]:
+def _joint_frames(joint: Joint) -> tuple[sapien.Pose, sapien.Pose]:
     """Poses of the joint in parent and child; SAPIEN's joints move about or along their x axis."""
     axis = np.asarray(joint.axis, dtype=float)
     side = np.eye(3)[int(np.argmin(np.abs(axis)))]
@@ -200,19 +205,21 @@ def _joint_frames(joint: Joint) -> tuple[Any, Any]:
     return to_sapien(joint.origin * turn), to_sapien(turn)
 
 
-def build_arm(scene: Any, embodiment: Embodiment, arm: Arm, prefix: str) -> Any:
+def build_arm(
+    scene: sapien.Scene, embodiment: Embodiment, arm: Arm, prefix: str
+) -> physx.PhysxArticulation:
     """A fixed-base articulation of `arm` in `scene`, its links as in `arm.links`.
 
     Links that the gripper consists of (the last link and the fingers) are named `prefix`_gripper,
     the others `prefix`_arm. Robot links feel no gravity; all weigh `embodiment.link_mass`.
     """
-    from sapien.wrapper.articulation_builder import ArticulationBuilder
+    from sapien.wrapper.articulation_builder import ArticulationBuilder, LinkBuilder
 
     builder = ArticulationBuilder()
     builder.set_scene(scene)
     builder.set_initial_pose(to_sapien(arm.base))
     gripper = {arm.last_link, *(finger.child for finger in arm.fingers)}
-    made: dict[str, Any] = {}
+    made: dict[str, LinkBuilder] = {}
     incoming = {joint.child: joint for joint in (*arm.joints, *arm.fingers)}
     for link in arm.links:
         joint = incoming.get(link)

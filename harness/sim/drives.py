@@ -6,9 +6,9 @@ call and only for drives that change, so that the stepping loop does nothing but
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,11 @@ from numpy.typing import NDArray
 from robospa.harness.robots.embodiment import Arm, Embodiment
 from robospa.harness.sim.motion import Trajectory
 
+if TYPE_CHECKING:
+    from sapien import physx
+
 Array = NDArray[np.float64]
+Opening = TypeVar("Opening", float, Array)
 Setter = Callable[[float], None]
 Pair = tuple[tuple[float, ...], tuple[float, ...]]
 
@@ -25,7 +29,7 @@ Pair = tuple[tuple[float, ...], tuple[float, ...]]
 class _ArmDrives:
     """SAPIEN's setters of one arm's drives, and where its joints are in qpos."""
 
-    articulation: Any
+    articulation: physx.PhysxArticulation
     position: list[Setter]
     velocity: list[Setter]
     fingers: list[Setter]
@@ -44,7 +48,9 @@ class Drives:
     damping / stiffness = 0.2 s; arm joints get position and velocity targets.
     """
 
-    def __init__(self, embodiment: Embodiment, articulations: list[Any]) -> None:
+    def __init__(
+        self, embodiment: Embodiment, articulations: list[physx.PhysxArticulation]
+    ) -> None:
         self._embodiment = embodiment
         self._arms = [
             _bind(arm, articulation)
@@ -87,7 +93,7 @@ class Drives:
                 joint.set_drive_target(value)
                 joint.set_drive_velocity_target(0.0)
 
-    def _travel(self, arm: int, opening: Any) -> Any:
+    def _travel(self, arm: int, opening: Opening) -> Opening:
         """Finger travel [m] of gripper values 0..1."""
         closed, opened = self._embodiment.arms[arm].gripper
         return closed + opening * (opened - closed)
@@ -128,7 +134,8 @@ class Drives:
         """Joints [rad] and gripper 0..1 of left and right (D,): as commanded, or as they are."""
         parts: list[float] = []
         gripper = self.gripper
-        joints: Any = self.measured() if measured else self.joints.tolist()
+        joints: Sequence[Sequence[float]]
+        joints = self.measured() if measured else self.joints.tolist()
         for a, arm in enumerate(self._arms):
             opening = float(gripper[a])
             if measured:
@@ -139,7 +146,7 @@ class Drives:
         return np.array(parts, dtype=np.float32)
 
 
-def _bind(arm: Arm, articulation: Any) -> _ArmDrives:
+def _bind(arm: Arm, articulation: physx.PhysxArticulation) -> _ArmDrives:
     """Look up the joints of `arm` once."""
     active = articulation.active_joints
     column = {joint.name: i for i, joint in enumerate(active)}

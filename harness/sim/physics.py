@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 import sapien
@@ -34,27 +33,27 @@ class Physics:
 
     def __init__(self, embodiment: Embodiment, table_at: Vec3) -> None:
         """`table_at` is how far [m] the table is moved from where the robot's workcell has it."""
-        self.system: Any = physx.PhysxCpuSystem()
+        self.system: physx.PhysxCpuSystem = physx.PhysxCpuSystem()
         self.system.timestep = 1.0 / RATE
-        self.scene: Any = sapien.Scene([self.system])
+        self.scene: sapien.Scene = sapien.Scene([self.system])
         self.step = self.system.step
         self._pack = self.scene.pack_poses
         self.links: list[dict[str, int]] = []
         self.rows: dict[str, int] = {}
-        self.components: dict[str, Any] = {}
-        self._moving: dict[str, Any] = {}
-        self._hinged: dict[str, Any] = {}
+        self.components: dict[str, physx.PhysxRigidBaseComponent] = {}
+        self._moving: dict[str, physx.PhysxRigidBaseComponent] = {}
+        self._hinged: dict[str, physx.PhysxArticulation] = {}
         self._add(bodies.ground_body("ground"))
         table = furniture.table(embodiment.workcell.table)
         self._add(bodies.static_body(table, "table", Pose(table_at)))
         self._add(bodies.static_body(furniture.wall(), "wall", Pose()))
-        self.arms: list[Any] = []
+        self.arms: list[physx.PhysxArticulation] = []
         for name, arm in zip(ARMS, embodiment.arms, strict=True):
             first = len(self.scene.entities)
             self.arms.append(bodies.build_arm(self.scene, embodiment, arm, name))
             self.links.append({link: first + i for i, link in enumerate(arm.links)})
 
-    def _add(self, entity: Any) -> int:
+    def _add(self, entity: sapien.Entity) -> int:
         """Put an entity into the scene; its row in the packed state."""
         self.scene.add_entity(entity)
         return len(self.scene.entities) - 1
@@ -110,7 +109,7 @@ class Physics:
                     found.append((one, other, (x, y, z)))
         return tuple([Contact(*pair) for pair in sorted(found)])
 
-    def moving(self) -> dict[str, Any]:
+    def moving(self) -> dict[str, physx.PhysxRigidBaseComponent]:
         """Components of the objects that can move, by name."""
         return self._moving
 

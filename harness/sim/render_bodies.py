@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 import sapien
@@ -29,7 +28,7 @@ RINGS = 10
 """Of a drawn sphere, from pole to pole."""
 
 
-def render_body(shapes: Sequence[Shape], name: str) -> Any:
+def render_body(shapes: Sequence[Shape], name: str) -> sapien.Entity | None:
     """An entity with the visual ones of `shapes`; None if there is none."""
     visual = [shape for shape in shapes if shape.visual]
     if not visual:
@@ -46,7 +45,9 @@ def render_body(shapes: Sequence[Shape], name: str) -> Any:
 
 
 @lru_cache(maxsize=4096)
-def _prototype(geometry: Geometry, color: Color, roughness: float, metallic: float) -> Any:
+def _prototype(
+    geometry: Geometry, color: Color, roughness: float, metallic: float
+) -> render.RenderShape:
     """A drawable of which clones are used; it belongs to no entity."""
     material = render.RenderMaterial(
         base_color=[*color, 1.0], roughness=roughness, metallic=metallic, specular=0.5
@@ -60,7 +61,7 @@ def _prototype(geometry: Geometry, color: Color, roughness: float, metallic: flo
     return _mesh(geometry, material)
 
 
-def _mesh(mesh: Mesh, material: Any) -> Any:
+def _mesh(mesh: Mesh, material: render.RenderMaterial) -> render.RenderShape:
     vertices, normals = shaded_corners(mesh)
     return render.RenderShapeTriangleMesh(
         vertices=vertices.astype(np.float32),

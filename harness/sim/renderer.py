@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,8 +23,11 @@ from robospa.harness.sim.shaders import shader_folder
 from robospa.harness.world import RenderUnavailable
 from robospa.observation import CameraSpec
 from robospa.tasks.scene import Scene
-from robospa.tasks.shapes import Hinge, ObjectModel
+from robospa.tasks.shapes import Hinge, ObjectModel, Params, Shape
 from robospa.tasks.snapshot import ARMS
+
+if TYPE_CHECKING:
+    import sapien
 
 Links = Sequence[Mapping[str, Pose]]
 """World pose of every link of the left and of the right arm."""
@@ -43,7 +46,7 @@ LARGEST = 4096
 ADVICE = "run `robospa doctor` to see what is missing"
 
 
-def open_render_system() -> Any:
+def open_render_system() -> sapien.render.RenderSystem:
     """A SAPIEN render system; RenderUnavailable, with the reason, where there is no device."""
     try:
         import sapien
@@ -60,15 +63,15 @@ class Renderer:
         self._system = open_render_system()
         import sapien
 
-        self._scene: Any = sapien.Scene([self._system])
-        self._cameras: dict[tuple[str, int, int], Any] = {}
-        self._robot: list[dict[str, Any]] = []
-        self._objects: dict[str, Any] = {}
-        self._parts: dict[str, tuple[Any, Hinge]] = {}
+        self._scene: sapien.Scene = sapien.Scene([self._system])
+        self._cameras: dict[tuple[str, int, int], sapien.render.RenderCameraComponent] = {}
+        self._robot: list[dict[str, sapien.Entity]] = []
+        self._objects: dict[str, sapien.Entity] = {}
+        self._parts: dict[str, tuple[sapien.Entity, Hinge]] = {}
         self._loaded: Scene | None = None
         self._embodiment: Embodiment | None = None
-        self._stand: Any = None
-        self._table: Any = None
+        self._stand: sapien.Entity | None = None
+        self._table: sapien.Entity | None = None
         self._light()
         self._draw(furniture.wall(), "wall")
         self._draw(furniture.floor(), "floor")
@@ -89,7 +92,7 @@ class Renderer:
         for position in LAMPS:
             self._scene.add_point_light(position, LAMP_COLOR)
 
-    def _draw(self, shapes: Sequence[Any], name: str) -> Any:
+    def _draw(self, shapes: Sequence[Shape], name: str) -> sapien.Entity | None:
         """An entity in the drawn scene; None if none of the shapes is visual."""
         from robospa.harness.sim.render_bodies import render_body
 
@@ -102,7 +105,7 @@ class Renderer:
         self,
         scene: Scene,
         embodiment: Embodiment,
-        model: Callable[[str, Mapping[str, Any]], ObjectModel],
+        model: Callable[[str, Params], ObjectModel],
     ) -> None:
         """Take the objects of `scene` and the robot; costs nothing if they are here already."""
         new_robot = self._embodiment is not embodiment
@@ -164,7 +167,7 @@ class Renderer:
             images.append(_rgb(camera.get_picture("Color")))
         return images
 
-    def _new_object(self, name: str) -> Any:
+    def _new_object(self, name: str) -> sapien.Entity | None:
         assert self._loaded is not None
         item = self._loaded.object(name)
         model = self._model(item.asset, item.params)
@@ -173,12 +176,12 @@ class Renderer:
         return self._draw(model.shapes, name)
 
     @staticmethod
-    def _place(entity: Any, pose: Pose) -> None:
+    def _place(entity: sapien.Entity, pose: Pose) -> None:
         from robospa.harness.sim.bodies import to_sapien
 
         entity.pose = to_sapien(pose)
 
-    def _camera(self, spec: CameraSpec, links: Links) -> Any:
+    def _camera(self, spec: CameraSpec, links: Links) -> sapien.render.RenderCameraComponent:
         """The camera of `spec`, made on first use and put where it is now."""
         import sapien
 
@@ -241,7 +244,7 @@ def focal_length(height: int, fov: float) -> float:
     return height / 2 / math.tan(fov / 2)
 
 
-def _rgb(picture: Any) -> NDArray[np.uint8]:
+def _rgb(picture: NDArray[np.float32]) -> NDArray[np.uint8]:
     """uint8 (height, width, 3) of SAPIEN's float colours 0..1."""
     colors = np.asarray(picture)[..., :3]
     if colors.dtype == np.uint8:

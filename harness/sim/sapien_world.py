@@ -25,7 +25,7 @@ from robospa.harness.world import Poll, RenderUnavailable, SceneUnstable, StepRe
 from robospa.observation import CameraSpec, Observation
 from robospa.protocol.policy import PolicySpec
 from robospa.tasks.scene import Scene
-from robospa.tasks.shapes import ObjectModel
+from robospa.tasks.shapes import ObjectModel, Params
 from robospa.tasks.snapshot import Contact, Snapshot, snapshot_to_json
 
 if TYPE_CHECKING:
@@ -115,7 +115,7 @@ class SapienWorld:
         model = self._model(item.asset, item.params)
         physics.add_object(item.name, model, item.pose, item.fixed)
 
-    def _model(self, asset: str, params: Mapping[str, Any]) -> ObjectModel:
+    def _model(self, asset: str, params: Params) -> ObjectModel:
         if self._models is None:
             from robospa.tasks.objects import object_model
 

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from robospa.tasks.objects import object_model
 from robospa.tasks.plan import Pick, Skill
 from robospa.tasks.sampling.region import LayoutError
 from robospa.tasks.scene import Scene
+from robospa.tasks.shapes import Params
 from robospa.tasks.task import Tracker
 from robospa.workcell import Workcell
 
@@ -75,7 +75,7 @@ def drawn_yaw(
     rng: np.random.Generator,
     workcell: Workcell,
     asset: str,
-    params: Mapping[str, Any],
+    params: Params,
     y: float,
     half_range: float,
 ) -> float:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -12,7 +11,7 @@ from robospa.geometry import Pose, yaw_rotation
 from robospa.tasks import objects
 from robospa.tasks.sampling.region import Point
 from robospa.tasks.scene import SceneObject
-from robospa.tasks.shapes import ObjectModel
+from robospa.tasks.shapes import ObjectModel, Params
 from robospa.workcell import TABLE_TOP, Workcell
 
 
@@ -23,7 +22,7 @@ class Item:
     role: str
     asset: str
     pose: Pose
-    params: Mapping[str, Any] = field(default_factory=dict)
+    params: Params = field(default_factory=dict)
     fixed: bool = False
     appears_at: float | None = None
 
@@ -48,7 +47,7 @@ def draw_look(rng: np.random.Generator, asset: str) -> dict[str, int]:
     return {"look": int(rng.integers(objects.looks(asset)))}
 
 
-def radius(asset: str, params: Mapping[str, Any]) -> float:
+def radius(asset: str, params: Params) -> float:
     """Radius [m] of the asset's footprint around its origin."""
     model: ObjectModel = objects.object_model(asset, params)
     return model.radius
@@ -59,7 +58,7 @@ def standing(point: Point, yaw: float = 0.0, height: float = 0.0) -> Pose:
     return Pose((point[0], point[1], TABLE_TOP + height), yaw_rotation(yaw))
 
 
-def in_view(workcell: Workcell, asset: str, params: Mapping[str, Any]) -> Callable[[Point], bool]:
+def in_view(workcell: Workcell, asset: str, params: Params) -> Callable[[Point], bool]:
     """Whether the head camera sees the whole asset when it stands at a point."""
     model: ObjectModel = objects.object_model(asset, params)
 

@@ -32,7 +32,7 @@ from robospa.tasks.objects import (
 )
 from robospa.tasks.objects.build import Asset
 from robospa.tasks.objects.tint import TINTS, tinted
-from robospa.tasks.shapes import ObjectModel
+from robospa.tasks.shapes import ObjectModel, Params
 
 __all__ = ["assets", "looks", "object_model"]
 
@@ -69,7 +69,7 @@ def looks(asset: str) -> int:
     return _asset(asset).looks
 
 
-def object_model(asset: str, params: Mapping[str, Any] = MappingProxyType({})) -> ObjectModel:
+def object_model(asset: str, params: Params = MappingProxyType({})) -> ObjectModel:
     """The model of `asset`. `params` are JSON values: "look" (default 0); for `block` also "half"
     (three half sizes in metres) and "color" (linear RGB); for the assets of `tint` also "tint" (a
     word of the palette), which makes the object that colour.

@@ -7,9 +7,7 @@ right; inside are pale walls and a glass turntable. Body and door are boxes that
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 from robospa.geometry import Pose, look_rotation
 from robospa.tasks.objects import meshes as m
@@ -26,7 +24,7 @@ from robospa.tasks.objects.build import (
     solid,
     srgb,
 )
-from robospa.tasks.shapes import Box, Color, Cylinder, Hinge, ObjectModel, Shape
+from robospa.tasks.shapes import Box, Color, Cylinder, Hinge, ObjectModel, Params, Shape
 
 MICROWAVES = (
     ("#eceae4", "#26282c", "white", 0.0), ("#1f2024", "#3a3d44", "black", 0.0),
@@ -49,7 +47,7 @@ LIMIT = math.radians(90)
 """How far the door opens."""
 
 
-def microwave(look: int, params: Mapping[str, Any]) -> ObjectModel:
+def microwave(look: int, params: Params) -> ObjectModel:
     """A small microwave oven, closed; see the module's docstring."""
     housing, trim, word, metallic = MICROWAVES[look]
     paints = (srgb(housing), srgb(trim), metallic)

@@ -14,7 +14,7 @@ import numpy as np
 from robospa.geometry import Vec3
 from robospa.tasks.objects import meshes as m
 from robospa.tasks.objects.build import Asset, across, box_grasps, model, paint, solid, srgb
-from robospa.tasks.shapes import Box, Color, Grasp, ObjectModel, Shape
+from robospa.tasks.shapes import Box, Color, Grasp, ObjectModel, Params, Shape
 
 BLOCK_COLORS: Mapping[str, Color] = {
     "red": (1.0, 0.0, 0.0),
@@ -38,7 +38,7 @@ def _triple(value: Sequence[float], what: str) -> Vec3:
     return (float(value[0]), float(value[1]), float(value[2]))
 
 
-def block(look: int, params: Mapping[str, Any]) -> ObjectModel:
+def block(look: int, params: Params) -> ObjectModel:
     """A plain cuboid around its origin; params "half" [m] and "color" (linear RGB)."""
     names = list(BLOCK_COLORS)
     half = _triple(params.get("half", (0.02, 0.02, 0.02)), "half")
@@ -105,7 +105,7 @@ CUBES: tuple[tuple[str, bool, int, tuple[str, ...]], ...] = (
 )  # fmt: skip
 
 
-def rubikscube(look: int, params: Mapping[str, Any]) -> ObjectModel:
+def rubikscube(look: int, params: Params) -> ObjectModel:
     """A 3 x 3 puzzle cube of 5.6 cm."""
     body, mixed, seed, phrases = CUBES[look]
     h = CUBE_HALF

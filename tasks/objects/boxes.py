@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Any
 
 from robospa.geometry import Vec3
 from robospa.tasks.objects import meshes as m
@@ -20,7 +18,7 @@ from robospa.tasks.objects.build import (
     solid,
     srgb,
 )
-from robospa.tasks.shapes import Box, Color, Mesh, ObjectModel
+from robospa.tasks.shapes import Box, Color, Mesh, ObjectModel, Params
 
 SIDES = (-math.pi / 2, 0.0, math.pi / 2, math.pi)
 """Directions of an upright box's four faces: front (-y), right, back, left."""
@@ -46,7 +44,7 @@ TEAS: tuple[tuple[str, str, str], ...] = (
 )  # fmt: skip
 
 
-def tea_box(look: int, params: Mapping[str, Any]) -> ObjectModel:
+def tea_box(look: int, params: Params) -> ObjectModel:
     """A standing carton of tea bags, with a leaf in a pale oval on every side."""
     base, mark, word = TEAS[look]
     half = (0.026, 0.034, 0.038)
@@ -78,7 +76,7 @@ TISSUES = (
 )  # fmt: skip
 
 
-def tissue_box(look: int, params: Mapping[str, Any]) -> ObjectModel:
+def tissue_box(look: int, params: Params) -> ObjectModel:
     """A low carton with a paper tissue sticking out of its slot."""
     base, mark, word = TISSUES[look]
     half = (0.042, 0.0295, 0.023)
@@ -147,7 +145,7 @@ CARDS = (("red", "#ffffff", "red"), ("blue", "#ffffff", "blue"), ("black", "#d6a
          ("green", "#f6f4ec", "green"))  # fmt: skip
 
 
-def playing_cards(look: int, params: Mapping[str, Any]) -> ObjectModel:
+def playing_cards(look: int, params: Params) -> ObjectModel:
     """A pack of cards lying flat: a framed panel with a big spade-like suit sign on top."""
     base, mark, word = CARDS[look]
     half = (0.0175, 0.0262, 0.0105)
@@ -180,7 +178,7 @@ SOAPS: tuple[tuple[Color, str], ...] = (
 )  # fmt: skip
 
 
-def soap(look: int, params: Mapping[str, Any]) -> ObjectModel:
+def soap(look: int, params: Params) -> ObjectModel:
     """A bar of soap with softened edges and a pressed oval on top."""
     color, word = SOAPS[look]
     half = (0.0285, 0.0168, 0.0118)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Callable
 
 from robospa.geometry import yaw_rotation
 from robospa.tasks.objects import meshes as m
@@ -19,7 +18,7 @@ from robospa.tasks.objects.build import (
     round_grasps,
     srgb,
 )
-from robospa.tasks.shapes import Box, Grasp, Mesh, ObjectModel, Shape
+from robospa.tasks.shapes import Box, Grasp, Mesh, ObjectModel, Params, Shape
 
 CRUST = srgb("#b8692a")
 DARK_CRUST = srgb("#6b3a1a")
@@ -210,7 +209,7 @@ BREADS: tuple[tuple[Callable[[], Made], tuple[str, ...]], ...] = (
 )  # fmt: skip
 
 
-def bread(look: int, params: Mapping[str, Any]) -> ObjectModel:
+def bread(look: int, params: Params) -> ObjectModel:
     """One of seven kinds of bread."""
     make, phrases = BREADS[look]
     shapes, grasps = make()

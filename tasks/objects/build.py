@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -23,12 +22,13 @@ from robospa.tasks.shapes import (
     Hinge,
     Mesh,
     ObjectModel,
+    Params,
     Shape,
     Sphere,
 )
 
 Parts = Sequence[Shape]
-Look = Mapping[str, Any]
+Look = Params
 
 UPRIGHT: Quat = (1.0, 0.0, 0.0, 0.0)
 ALONG_X: Quat = (math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0)
@@ -49,7 +49,7 @@ class Asset:
     """
 
     looks: int
-    build: Callable[[int, Mapping[str, Any]], ObjectModel]
+    build: Callable[[int, Params], ObjectModel]
     params: frozenset[str] = frozenset()
 
 

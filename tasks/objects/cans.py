@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Any
 
 from robospa.tasks.objects import meshes as m
 from robospa.tasks.objects.build import (
@@ -20,7 +18,7 @@ from robospa.tasks.objects.build import (
     round_grasps,
     srgb,
 )
-from robospa.tasks.shapes import Cylinder, Mesh, ObjectModel, Shape
+from robospa.tasks.shapes import Cylinder, Mesh, ObjectModel, Params, Shape
 
 THIRDS = (-math.pi / 2, math.pi / 6, 5 * math.pi / 6)
 """Three directions about z, the first to the front."""
@@ -40,7 +38,7 @@ SAUCES = (
 )
 
 
-def sauce_can(look: int, params: Mapping[str, Any]) -> ObjectModel:
+def sauce_can(look: int, params: Params) -> ObjectModel:
     """A short tin with a paper label, a round picture and a pull ring on its lid."""
     base, field, mark, content, word = SAUCES[look]
     r, h = 0.030, 0.072
@@ -86,7 +84,7 @@ CANS = (
 )  # fmt: skip
 
 
-def can(look: int, params: Mapping[str, Any]) -> ObjectModel:
+def can(look: int, params: Params) -> ObjectModel:
     """A slim drink can with necked ends, a pull tab and a printed sign."""
     base, mark, sign = CANS[look]
     r, h = 0.027, 0.098
@@ -151,7 +149,7 @@ BOTTLES = (
 )
 
 
-def bottle(look: int, params: Mapping[str, Any]) -> ObjectModel:
+def bottle(look: int, params: Params) -> ObjectModel:
     """A standing drink bottle with shoulder, neck, screw cap and a wrapped label."""
     glass, label, cap, word, detail, r = BOTTLES[look]
     h = 0.136
@@ -191,7 +189,7 @@ PILLS = (
 )  # fmt: skip
 
 
-def pill_bottle(look: int, params: Mapping[str, Any]) -> ObjectModel:
+def pill_bottle(look: int, params: Params) -> ObjectModel:
     """A stubby medicine bottle with a wide ribbed cap and a white label."""
     shell, cap, word = PILLS[look]
     r, h = 0.0215, 0.070
@@ -236,7 +234,7 @@ GLUES = (
 )
 
 
-def glue(look: int, params: Mapping[str, Any]) -> ObjectModel:
+def glue(look: int, params: Params) -> ObjectModel:
     """A glue stick (cylinder with cap) or a squeeze bottle with a pointed nozzle."""
     base, tip, kind, extra = GLUES[look]
     shapes, width, z, tilt = _glue_stick(base, tip) if kind == "stick" else _glue_bottle(base, tip)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Any
 
 from robospa.geometry import Pose
 from robospa.tasks.objects import meshes as m
@@ -23,7 +21,7 @@ from robospa.tasks.objects.build import (
     srgb,
     wall_ring,
 )
-from robospa.tasks.shapes import Box, Color, Cylinder, Mesh, ObjectModel, Shape
+from robospa.tasks.shapes import Box, Color, Cylinder, Mesh, ObjectModel, Params, Shape
 
 BOWLS = (
     ("blue", "white", "blue"), ("white", "blue", "white"), ("green", "cream", "green"),
@@ -36,7 +34,7 @@ BOWL_NEST = 0.020
 """How much higher than a bowl the next one stacked into it stands [m]."""
 
 
-def bowl(look: int, params: Mapping[str, Any]) -> ObjectModel:
+def bowl(look: int, params: Params) -> ObjectModel:
     """An open bowl on a foot ring, glazed differently inside, with a painted rim.
 
     Frame "nest": where the origin of a bowl stacked into it goes.
@@ -77,7 +75,7 @@ MUGS = (
 )  # fmt: skip
 
 
-def mug(look: int, params: Mapping[str, Any]) -> ObjectModel:
+def mug(look: int, params: Params) -> ObjectModel:
     """An upright mug, its handle towards +x, with a painted band.
 
     Frame "handle": the middle of the hole of its handle, which runs along y.
@@ -124,7 +122,7 @@ BASKETS = (
 )  # fmt: skip
 
 
-def bread_basket(look: int, params: Mapping[str, Any]) -> ObjectModel:
+def bread_basket(look: int, params: Params) -> ObjectModel:
     """A low round wicker basket lined with a cloth; wide enough for a whole bread."""
     dark, pale, word, cloth = BASKETS[look]
     h, inside, outside = 0.038, 0.0735, 0.0785
@@ -170,7 +168,7 @@ BINS = (
 )  # fmt: skip
 
 
-def dustbin(look: int, params: Mapping[str, Any]) -> ObjectModel:
+def dustbin(look: int, params: Params) -> ObjectModel:
     """An open rectangular bin for the floor; its raised inner floor is 0.21 m above the ground."""
     shell, dark, word = BINS[look]
     hx, hy, h, wall, floor = 0.196, 0.296, 0.60, 0.014, 0.21
@@ -236,7 +234,7 @@ COVER_INNER_RADIUS = 0.0312
 COVER_INNER_HEIGHT = 0.047
 
 
-def cover(look: int, params: Mapping[str, Any]) -> ObjectModel:
+def cover(look: int, params: Params) -> ObjectModel:
     """An opaque domed cup turned upside down, a knob on top; a 4 cm cube fits under it."""
     shell, trim, word, metallic = COVERS[look]
     r, hollow, top = COVER_INNER_RADIUS, COVER_INNER_HEIGHT, 0.052

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 from robospa.geometry import axis_rotation
 from robospa.tasks.objects import meshes as m
@@ -23,7 +22,7 @@ from robospa.tasks.objects.build import (
     round_grasps,
     srgb,
 )
-from robospa.tasks.shapes import Box, Cylinder, Mesh, ObjectModel, Shape
+from robospa.tasks.shapes import Box, Cylinder, Mesh, ObjectModel, Params, Shape
 
 STAPLERS = (
     ("red", "black"), ("blue", "black"), ("black", "grey"), ("green", "white"),
@@ -31,7 +30,7 @@ STAPLERS = (
 )  # fmt: skip
 
 
-def stapler(look: int, params: Mapping[str, Any]) -> ObjectModel:
+def stapler(look: int, params: Params) -> ObjectModel:
     """A desk stapler along y, its pressing head towards -y."""
     top, base = STAPLERS[look]
     w = 0.0118
@@ -89,7 +88,7 @@ SEALS = (
 )  # fmt: skip
 
 
-def seal(look: int, params: Mapping[str, Any]) -> ObjectModel:
+def seal(look: int, params: Params) -> ObjectModel:
     """A hand stamp: a foot with a coloured edge, a thin neck and a round knob."""
     wood, edge, word, form, ink = SEALS[look]
     r, h = 0.0235, 0.064
@@ -128,7 +127,7 @@ MICE = (
 )  # fmt: skip
 
 
-def mouse(look: int, params: Mapping[str, Any]) -> ObjectModel:
+def mouse(look: int, params: Params) -> ObjectModel:
     """A wireless computer mouse, its buttons towards +y (away from the hand's heel)."""
     shell, detail, word = MICE[look]
     levels = (
@@ -191,7 +190,7 @@ BELLS = (
 )  # fmt: skip
 
 
-def bell(look: int, params: Mapping[str, Any]) -> ObjectModel:
+def bell(look: int, params: Params) -> ObjectModel:
     """A call bell: a round dome over a dark foot, with the button on top."""
     dome, foot, word, low, metallic = BELLS[look]
     r, h = 0.0300, 0.044
@@ -219,7 +218,7 @@ FANS = (
 )  # fmt: skip
 
 
-def fan(look: int, params: Mapping[str, Any]) -> ObjectModel:
+def fan(look: int, params: Params) -> ObjectModel:
     """A small desk fan blowing towards -y: round foot, stem, ringed blades."""
     frame, blade = FANS[look]
     r, z, deep = 0.0325, 0.068, 0.0105

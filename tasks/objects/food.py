@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Mapping
-from typing import Any
 
 from robospa.geometry import axis_rotation
 from robospa.tasks.objects import meshes as m
@@ -20,7 +18,7 @@ from robospa.tasks.objects.build import (
     round_grasps,
     srgb,
 )
-from robospa.tasks.shapes import Box, Cylinder, Mesh, ObjectModel, Shape
+from robospa.tasks.shapes import Box, Cylinder, Mesh, ObjectModel, Params, Shape
 
 BURGERS = (
     ("#c9812f", "#f3b524", (
@@ -38,7 +36,7 @@ BURGERS = (
 )  # fmt: skip
 
 
-def hamburger(look: int, params: Mapping[str, Any]) -> ObjectModel:
+def hamburger(look: int, params: Params) -> ObjectModel:
     """Bun, lettuce, patty, cheese, tomato, and a domed bun with sesame seeds."""
     bun, cheese, phrases = BURGERS[look]
     r = 0.030
@@ -94,7 +92,7 @@ FRIES = (
 )  # fmt: skip
 
 
-def french_fries(look: int, params: Mapping[str, Any]) -> ObjectModel:
+def french_fries(look: int, params: Params) -> ObjectModel:
     """A flared carton full of fries."""
     base, mark = FRIES[look]
     foot, mouth, h = (0.022, 0.0155), (0.0315, 0.0215), 0.056

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Any
 
 from robospa.geometry import axis_rotation
 from robospa.tasks.objects import meshes as m
@@ -23,7 +21,7 @@ from robospa.tasks.objects.build import (
     paint,
     srgb,
 )
-from robospa.tasks.shapes import Box, Cylinder, Mesh, ObjectModel, Shape
+from robospa.tasks.shapes import Box, Cylinder, Mesh, ObjectModel, Params, Shape
 
 PHONES = (
     ("black", "#1f4f9c"), ("white", "#3aa6a0"), ("red", "#2b2e63"), ("gold", "#7a3d8f"),
@@ -32,7 +30,7 @@ PHONES = (
 ICONS = ("#5ad35a", "#f6c12d", "#f05a4e", "#ffffff")
 
 
-def phone(look: int, params: Mapping[str, Any]) -> ObjectModel:
+def phone(look: int, params: Params) -> ObjectModel:
     """A phone lying on its back, screen up, with rows of coloured icons."""
     body, wall = PHONES[look]
     hx, hy, h = 0.0235, 0.0445, 0.0100
@@ -82,7 +80,7 @@ REMOTES = (
 )  # fmt: skip
 
 
-def remote_control(look: int, params: Mapping[str, Any]) -> ObjectModel:
+def remote_control(look: int, params: Params) -> ObjectModel:
     """A remote control lying on its back, its power button towards +y."""
     body, keys, power = REMOTES[look]
     hx, hy, h = 0.0155, 0.0385, 0.0145
@@ -128,7 +126,7 @@ CLOCKS = (
 )  # fmt: skip
 
 
-def alarm_clock(look: int, params: Mapping[str, Any]) -> ObjectModel:
+def alarm_clock(look: int, params: Params) -> ObjectModel:
     """A twin-bell alarm clock facing -y, showing ten past ten."""
     body, metal = CLOCKS[look]
     r, z, deep = 0.0310, 0.0385, 0.0150
@@ -207,7 +205,7 @@ CARS = (
 )  # fmt: skip
 
 
-def toycar(look: int, params: Mapping[str, Any]) -> ObjectModel:
+def toycar(look: int, params: Params) -> ObjectModel:
     """A toy car, its bonnet towards -y."""
     body, stripe = CARS[look]
     w = 0.0165

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Mapping
-from typing import Any
 
 from robospa.tasks.objects import meshes as m
 from robospa.tasks.objects.boxes import SIDES, on_side
@@ -26,7 +24,7 @@ from robospa.tasks.objects.build import (
     srgb,
     wall_ring,
 )
-from robospa.tasks.shapes import Box, Cylinder, Mesh, ObjectModel, Shape
+from robospa.tasks.shapes import Box, Cylinder, Mesh, ObjectModel, Params, Shape
 
 CUPS = (
     ("red", "white", "dots"), ("blue", "yellow", "bands"), ("green", "white", "bands"),
@@ -36,7 +34,7 @@ CUP_LEAN = 0.09
 """How far the wall of a cup leans outwards [rad]."""
 
 
-def cup(look: int, params: Mapping[str, Any]) -> ObjectModel:
+def cup(look: int, params: Params) -> ObjectModel:
     """A drinking cup without handle, wider at the top, with painted dots or bands."""
     base, mark, style = CUPS[look]
     h, foot, wall, floor = 0.076, 0.0222, 0.0028, 0.006
@@ -90,7 +88,7 @@ APPLES = (
 )  # fmt: skip
 
 
-def apple(look: int, params: Mapping[str, Any]) -> ObjectModel:
+def apple(look: int, params: Params) -> ObjectModel:
     """An apple with a dimple, a stalk and a leaf; it stands on a small flat base."""
     skin, hollow, word = APPLES[look]
     base = [(0.0, 0.0), (0.0135, 0.0), (0.0205, 0.0045), (0.0262, 0.0145), (0.0288, 0.0260)]
@@ -123,7 +121,7 @@ PERFUMES = (
 )  # fmt: skip
 
 
-def perfume(look: int, params: Mapping[str, Any]) -> ObjectModel:
+def perfume(look: int, params: Params) -> ObjectModel:
     """A perfume flask: a thick glass body, square or round, a collar and a tall cap."""
     glass, cap, word, form = PERFUMES[look]
     pale = "#f6efe6" if word != "black" else "#d6a52c"
@@ -177,7 +175,7 @@ COFFEES = (
 )  # fmt: skip
 
 
-def coffee_box(look: int, params: Mapping[str, Any]) -> ObjectModel:
+def coffee_box(look: int, params: Params) -> ObjectModel:
     """A standing carton of coffee with a steaming cup on its broad sides and a bean on its lid."""
     base, mark, word = COFFEES[look]
     half = (0.029, 0.021, 0.042)
@@ -221,7 +219,7 @@ def coffee_box(look: int, params: Mapping[str, Any]) -> ObjectModel:
 SIGNS = ("blue", "green", "red", "orange", "purple")
 
 
-def payment_sign(look: int, params: Mapping[str, Any]) -> ObjectModel:
+def payment_sign(look: int, params: Params) -> ObjectModel:
     """A standing plate for paying by phone: a coloured head and a square code, on a foot."""
     word = SIGNS[look]
     hx, hy, foot, z0, z1 = 0.0270, 0.0060, 0.021, 0.006, 0.086

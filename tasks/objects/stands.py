@@ -6,8 +6,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Any
 
 from robospa.geometry import Pose, axis_rotation
 from robospa.tasks.objects import meshes as m
@@ -24,7 +22,7 @@ from robospa.tasks.objects.build import (
     paint,
     srgb,
 )
-from robospa.tasks.shapes import Box, Cylinder, Mesh, ObjectModel
+from robospa.tasks.shapes import Box, Cylinder, Mesh, ObjectModel, Params
 
 PHONE_SLOPE = 0.6
 """How far a phone on its stand is tipped from lying flat [rad]."""
@@ -35,7 +33,7 @@ PHONE_STANDS = (
 )  # fmt: skip
 
 
-def phone_stand(look: int, params: Mapping[str, Any]) -> ObjectModel:
+def phone_stand(look: int, params: Params) -> ObjectModel:
     """A desk stand: a foot, two cheeks and a sloped back with a lip towards -y.
 
     Frame "support": where the body frame of a phone goes, its screen up the slope.
@@ -92,7 +90,7 @@ DISPLAYS = (
 )  # fmt: skip
 
 
-def display_stand(look: int, params: Mapping[str, Any]) -> ObjectModel:
+def display_stand(look: int, params: Params) -> ObjectModel:
     """A low round plinth for showing one thing, with a felt top in another colour."""
     base, felt, word = DISPLAYS[look]
     r, h = 0.050, 0.032
@@ -124,7 +122,7 @@ SEGMENTS = {"0": "abcdef", "1": "bc", "2": "abged", "3": "abgcd", "4": "fgbc", "
 """Which of the seven bars of a digit are dark: a top, then clockwise b to f, g in the middle."""
 
 
-def electronic_scale(look: int, params: Mapping[str, Any]) -> ObjectModel:
+def electronic_scale(look: int, params: Params) -> ObjectModel:
     """A kitchen scale: a flat body, a steel plate to weigh on and a lit read-out in front."""
     word, light = SCALES[look]
     hx, hy, h, top = 0.047, 0.058, 0.017, 0.021
@@ -185,7 +183,7 @@ PEG_RISE = 0.2
 """How far the pegs of a mug rack point up [rad]."""
 
 
-def mug_rack(look: int, params: Mapping[str, Any]) -> ObjectModel:
+def mug_rack(look: int, params: Params) -> ObjectModel:
     """A post on a foot with a peg towards -y, from which a mug hangs by its handle.
 
     Frame "hang" is on the peg's axis, where the middle of the handle goes; its y axis runs along

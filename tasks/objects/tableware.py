@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Any
 
 from robospa.geometry import Pose
 from robospa.tasks.objects import meshes as m
@@ -22,7 +20,7 @@ from robospa.tasks.objects.build import (
     srgb,
     wall_ring,
 )
-from robospa.tasks.shapes import Box, Color, Cylinder, Mesh, ObjectModel
+from robospa.tasks.shapes import Box, Color, Cylinder, Mesh, ObjectModel, Params
 
 POTS: tuple[tuple[Color, Color, str, float], ...] = (
     (STEEL, DARK, "silver", 0.5), (colour("red"), DARK, "red", 0.0),
@@ -36,7 +34,7 @@ HANDLE_HEIGHT, HANDLE_OUT, HANDLE_HALF, HANDLE_THICK = 0.058, 0.033, 0.028, 0.00
 Between wall and bar there is room for an open finger."""
 
 
-def kitchen_pot(look: int, params: Mapping[str, Any]) -> ObjectModel:
+def kitchen_pot(look: int, params: Params) -> ObjectModel:
     """An open cooking pot with two loop handles, on its left (-x) and right (+x).
 
     Grasp 0 holds the left handle, grasp 1 the right one; frames "left" and "right" are there too.
@@ -86,7 +84,7 @@ PLATES = (
 )  # fmt: skip
 
 
-def plate(look: int, params: Mapping[str, Any]) -> ObjectModel:
+def plate(look: int, params: Params) -> ObjectModel:
     """A shallow round plate with a raised rim and two painted rings."""
     base, stripe, word = PLATES[look]
     r, flat, h, low = 0.070, 0.046, 0.0135, 0.0045
@@ -127,7 +125,7 @@ COASTERS = (
 )  # fmt: skip
 
 
-def coaster(look: int, params: Mapping[str, Any]) -> ObjectModel:
+def coaster(look: int, params: Params) -> ObjectModel:
     """A thin round coaster with a darker edge and rings on top."""
     base, mark = COASTERS[look]
     r, h = 0.043, 0.0050
@@ -154,7 +152,7 @@ TRAYS = (
 )  # fmt: skip
 
 
-def tray(look: int, params: Mapping[str, Any]) -> ObjectModel:
+def tray(look: int, params: Params) -> ObjectModel:
     """A wide serving tray with a low rim and two grips.
 
     Frames "left" and "right" are the two places on it, either side of its middle.

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -27,7 +26,7 @@ from robospa.tasks.objects.build import (
     solid,
     srgb,
 )
-from robospa.tasks.shapes import Box, Color, Mesh, ObjectModel, Shape
+from robospa.tasks.shapes import Box, Color, Mesh, ObjectModel, Params, Shape
 
 HAMMERS = (
     ("black", "tan", "black"), ("red", "tan", "red"), ("brown", "tan", "wooden"),
@@ -35,7 +34,7 @@ HAMMERS = (
 )  # fmt: skip
 
 
-def hammer(look: int, params: Mapping[str, Any]) -> ObjectModel:
+def hammer(look: int, params: Params) -> ObjectModel:
     """A mallet standing on its striking face, its handle level and towards -y.
 
     Frame "head": the middle of the face that strikes, where the mallet stands (z up).
@@ -94,7 +93,7 @@ def numbers(value: Sequence[float], what: str) -> Vec3:
     return (float(value[0]), float(value[1]), float(value[2]))
 
 
-def pad(look: int, params: Mapping[str, Any]) -> ObjectModel:
+def pad(look: int, params: Params) -> ObjectModel:
     """A flat square on the table; params "half" [m], "color" (linear RGB) and "solid".
 
     Seen but not felt unless "solid" is true: what is not solid must be fixed in its scene.
@@ -118,7 +117,7 @@ def pad(look: int, params: Mapping[str, Any]) -> ObjectModel:
 TEES = ("red", "blue", "green", "yellow", "orange", "purple")
 
 
-def t_block(look: int, params: Mapping[str, Any]) -> ObjectModel:
+def t_block(look: int, params: Params) -> ObjectModel:
     """A flat block shaped like a T, its bar towards +y and its stem towards -y.
 
     Param "kind": 0 has square ends, 1 round ends and a pale dot on its bar; same sizes.
@@ -177,7 +176,7 @@ WOODS = (
 )  # fmt: skip
 
 
-def wooden_block(look: int, params: Mapping[str, Any]) -> ObjectModel:
+def wooden_block(look: int, params: Params) -> ObjectModel:
     """A toy block of wood with grain on its sides; some are painted on top."""
     paint_code, grain, word = WOODS[look]
     half = (0.0260, 0.0180, 0.0180)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Any
 
 from robospa.geometry import axis_rotation, multiply
 from robospa.tasks.objects import meshes as m
@@ -19,7 +17,7 @@ from robospa.tasks.objects.build import (
     round_grasps,
     solid,
 )
-from robospa.tasks.shapes import Box, Mesh, ObjectModel, Sphere
+from robospa.tasks.shapes import Box, Mesh, ObjectModel, Params, Sphere
 
 TRASH_BINS = (
     ("blue", "white"), ("green", "white"), ("silver", "black"), ("pink", "white"),
@@ -27,7 +25,7 @@ TRASH_BINS = (
 )  # fmt: skip
 
 
-def table_trash_bin(look: int, params: Mapping[str, Any]) -> ObjectModel:
+def table_trash_bin(look: int, params: Params) -> ObjectModel:
     """A small open bin for a table, square, wider at the top, that a gripper can take around.
 
     Grasps 0 and 1 hold it from outside, the four others by one of its walls.
@@ -109,7 +107,7 @@ BALLS = ("red", "blue", "green", "yellow")
 BALL_RADIUS = 0.008
 
 
-def garbage(look: int, params: Mapping[str, Any]) -> ObjectModel:
+def garbage(look: int, params: Params) -> ObjectModel:
     """A small ball to be thrown away."""
     word = BALLS[look]
     r = BALL_RADIUS

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -22,12 +21,13 @@ from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.instructions.words import ordinal
 from robospa.tasks.sampling.grid import GridLayout
 from robospa.tasks.scene import Scene, SceneObject
+from robospa.tasks.shapes import Params
 from robospa.tasks.task import Draft, Draw, Level, Task
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "instructions.toml")
 
-Thing = tuple[str, Mapping[str, Any]]
+Thing = tuple[str, Params]
 """Asset and parameters."""
 Things = Callable[[np.random.Generator, int], Sequence[Thing]]
 """Draws what stands on the `count` cells, in any order."""

@@ -16,10 +16,11 @@ from robospa.tasks.plan import Press
 from robospa.tasks.sampling.region import Area, Point
 from robospa.tasks.sampling.scatter import candidates, scatter
 from robospa.tasks.scene import Scene, SceneObject
+from robospa.tasks.shapes import Params
 from robospa.tasks.snapshot import ARMS
 from robospa.workcell import Workcell
 
-Look = tuple[str, Mapping[str, Any]]
+Look = tuple[str, Params]
 """An asset and its parameters."""
 
 TRIES = 60

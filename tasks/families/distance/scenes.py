@@ -9,10 +9,9 @@ of objects also serve the basic tasks that name the target's colour.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
 
 import numpy as np
 
@@ -27,12 +26,13 @@ from robospa.tasks.objects import object_model
 from robospa.tasks.sampling.markov import Fits, keeps_apart, pool, walk
 from robospa.tasks.sampling.region import LayoutError, Mask
 from robospa.tasks.scene import Scene, SceneObject
+from robospa.tasks.shapes import Params
 from robospa.tasks.task import Draft, Level, Task
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "instructions.toml")
 
-Thing = tuple[str, Mapping[str, Any] | None]
+Thing = tuple[str, Params | None]
 """Asset and parameters of an object; None for a look to be drawn."""
 
 CHAINS = 256
