@@ -2,47 +2,58 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import TypedDict
 
 import numpy as np
+from numpy.typing import NDArray
 
 from robospa.geometry import Array
+from robospa.observation import Observation, View
+
+Image = NDArray[np.uint8]
+
+
+class Known(TypedDict, total=False):
+    """What else is known of a frame: `measured` joints and grippers (D,)."""
+
+    measured: Array | None
+
+
+Undo = Callable[[Observation, Known], Observation | None]
 
 
 @dataclass(frozen=True)
 class ObservationFault:
     """One mistake in what a policy is shown. `undo` gives the observation that it may have been
-    trained on, or None where that cannot be told; `extra` has what else is known of the frame.
-    `touches` is what it changes: a policy that is not shown that need not be asked again."""
+    trained on, or None where that cannot be told. `touches` is what it changes: a policy that is
+    not shown that need not be asked again."""
 
     name: str
     phrase: str
     touches: str
-    undo: Callable[[Mapping[str, Any], Mapping[str, Any]], Mapping[str, Any] | None]
+    undo: Undo
 
 
-def _images(change: Callable[[str, Any], Any]) -> Any:
-    """Changes every image, those of history as well."""
-
-    def undo(seen: Mapping[str, Any], extra: Mapping[str, Any]) -> Mapping[str, Any] | None:
-        return _each(seen, lambda view: {"images": change_all(view["images"])})
-
-    def change_all(images: Mapping[str, Any]) -> Mapping[str, Any]:
-        return {name: change(name, image) for name, image in images.items()}
-
-    return undo
-
-
-def _each(seen: Mapping[str, Any], change: Callable[[Mapping[str, Any]], Any]) -> dict[str, Any]:
-    turned = {**seen, **change(seen)}
+def _each(seen: Observation, change: Callable[[View], View]) -> Observation:
+    """`seen` with its own view and those of history changed."""
+    turned: Observation = {**seen, **change(seen)}
     if "history" in seen:
         turned["history"] = {o: {**v, **change(v)} for o, v in seen["history"].items()}
     return turned
 
 
-def _wrists(seen: Mapping[str, Any], extra: Mapping[str, Any]) -> Mapping[str, Any] | None:
+def _images(change: Callable[[Image], Image]) -> Undo:
+    """Changes every image, those of history as well."""
+
+    def changed(view: View) -> View:
+        return {"images": {name: change(image) for name, image in view["images"].items()}}
+
+    return lambda seen, known: _each(seen, changed)
+
+
+def _wrists(seen: Observation, known: Known) -> Observation | None:
     other = {"left_wrist": "right_wrist", "right_wrist": "left_wrist"}
     if not set(other) <= set(seen["images"]):
         return None
@@ -52,22 +63,21 @@ def _wrists(seen: Mapping[str, Any], extra: Mapping[str, Any]) -> Mapping[str, A
     )
 
 
-def _state(change: Callable[[Array], Array], poses: Callable[[Array], Array] | None = None) -> Any:
-    """Changes the joints shown, and the poses."""
+def _state(change: Callable[[Array], Array], poses: Callable[[Array], Array] | None = None) -> Undo:
+    """Changes the joints shown, rows (2, J + 1) of the arms, and the `poses` (2, 8)."""
 
-    def undo(seen: Mapping[str, Any], extra: Mapping[str, Any]) -> Mapping[str, Any] | None:
-        if len(seen.get("state", ())) % 2:  # arms of different joint counts
+    def changed(view: View) -> View:
+        new: View = {}
+        if "state" in view:
+            rows = np.asarray(view["state"], float).reshape(2, -1)
+            new["state"] = change(rows).reshape(-1).astype(np.float32)
+        if poses is not None and "ee" in view:
+            new["ee"] = poses(np.asarray(view["ee"], float)).astype(np.float32)
+        return new
+
+    def undo(seen: Observation, known: Known) -> Observation | None:
+        if "state" in seen and len(seen["state"]) % 2:  # arms of different joint counts
             return None
-
-        def changed(view: Mapping[str, Any]) -> dict[str, Any]:
-            new: dict[str, Any] = {}
-            if "state" in view:
-                rows = np.asarray(view["state"], float).reshape(2, -1)
-                new["state"] = change(rows).reshape(-1).astype(np.float32)
-            if poses is not None and "ee" in view:
-                new["ee"] = poses(np.asarray(view["ee"], float)).astype(np.float32)
-            return new
-
         return _each(seen, changed)
 
     return undo
@@ -77,10 +87,11 @@ def _hands(rows: Array) -> Array:
     return np.hstack([rows[:, :-1], 1 - rows[:, -1:]])
 
 
-def _shown_measured(seen: Mapping[str, Any], extra: Mapping[str, Any]) -> Mapping[str, Any] | None:
-    if "state" not in seen or extra.get("measured") is None:
+def _shown_measured(seen: Observation, known: Known) -> Observation | None:
+    measured = known.get("measured")
+    if "state" not in seen or measured is None:
         return None
-    return {**seen, "state": np.asarray(extra["measured"], np.float32)}
+    return {**seen, "state": np.asarray(measured, np.float32)}
 
 
 VIEWS: tuple[ObservationFault, ...] = (
@@ -91,13 +102,13 @@ VIEWS: tuple[ObservationFault, ...] = (
         "blue for red",
         "it was trained on images with red and blue swapped",
         "images",
-        _images(lambda name, image: np.ascontiguousarray(image[..., ::-1])),
+        _images(lambda image: np.ascontiguousarray(image[..., ::-1])),
     ),
     ObservationFault(
         "images upside down",
         "it was trained on images turned by 180 degrees",
         "images",
-        _images(lambda name, image: np.ascontiguousarray(image[::-1, ::-1])),
+        _images(lambda image: np.ascontiguousarray(image[::-1, ::-1])),
     ),
     ObservationFault(
         "arms of the state swapped",
