@@ -38,7 +38,7 @@ def acting_arm(side: str) -> Slots:
 
 
 def color_orders(colors: Sequence[str]) -> Phrasings:
-    """How the order of two or more colours is said, from the first to the last."""
+    """Phrasings for the order of two or more colours, from the first to the last."""
     steps = (", then " if len(colors) > 2 else " and then ").join(colors)
     places = (*("first", "second", "third", "fourth")[: len(colors) - 1], "last")
     placed = ", ".join(f"{c} {p}" for c, p in zip(colors, places, strict=True))
@@ -53,7 +53,7 @@ _HELDOUT_LINKS = (" followed by ", ", next ", ", after that ")
 
 
 def one_after_another(nouns: Sequence[Phrasings]) -> Phrasings:
-    """How things are said in their order; each noun has two train and four held-out phrasings."""
+    """Phrasings for things in their order; each noun has two train and four held-out phrasings."""
     train = tuple(
         link.join(noun[0][k] for noun in nouns) for k in range(2) for link in _TRAIN_LINKS
     )

@@ -17,14 +17,14 @@ from robospa.geometry import Array
 from robospa.tasks.sampling.region import LayoutError, Mask
 
 Fits = Callable[[Array, Array, int], Mask]
-"""Whether place i of each chain's layout (chains, count, 2) may move to `wanted` (chains, 2)."""
+"""Whether place i of each chain's layout (chains, count, 2) may move to `moved_to` (chains, 2)."""
 
 SEED = 0
 
 
-def keeps_apart(points: Array, wanted: Array, i: int, least: float) -> Mask:
-    """Whether `wanted` is at least `least` [m] from all places of its chain but `i`."""
-    delta = points - wanted[:, None]
+def keeps_apart(points: Array, moved_to: Array, i: int, least: float) -> Mask:
+    """Whether `moved_to` is at least `least` [m] from all places of its chain but `i`."""
+    delta = points - moved_to[:, None]
     square = delta[..., 0] ** 2 + delta[..., 1] ** 2
     square[:, i] = np.inf
     return np.asarray(square.min(axis=1) >= least**2)
@@ -33,9 +33,9 @@ def keeps_apart(points: Array, wanted: Array, i: int, least: float) -> Mask:
 def walk(rng: np.random.Generator, points: Array, fits: Fits, step: float) -> None:
     """One sweep, in place: each place of each chain moves by up to `step` [m] if it fits there."""
     for i in range(points.shape[1]):
-        wanted = points[:, i] + step * (2 * rng.random((len(points), 2)) - 1)
-        good = fits(points, wanted, i)
-        points[good, i] = wanted[good]
+        moved_to = points[:, i] + step * (2 * rng.random((len(points), 2)) - 1)
+        good = fits(points, moved_to, i)
+        points[good, i] = moved_to[good]
 
 
 def pool(starts: Array, fits: Fits, sweeps: int = 160, samples: int = 8, seed: int = SEED) -> Array:

@@ -139,7 +139,7 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
 
 
 def slots(scene: Scene) -> Slots:
-    """How the things are said."""
+    """Phrasings for the things."""
     things = ("can", "bread", "basket", "bottle", "pad")
     return TEXT.slots(*things[: {1: 1, 2: 3, 3: 3}.get(scene.level, 5)])
 

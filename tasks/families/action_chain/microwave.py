@@ -194,14 +194,14 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
 
 
 def slots(scene: Scene) -> Slots:
-    """How the things are said."""
+    """Phrasings for the things."""
     facts = Facts.of(scene)
     things = [scene.object(name) for name in (facts.object, facts.reference) if name]
     phrasings = [look_phrasings(objects.object_model(o.asset, o.params)) for o in things]
-    said = TEXT.slots("arm", "bell", *(("microwave",) if scene.level >= 2 else ()))
+    phrases = TEXT.slots("arm", "bell", *(("microwave",) if scene.level >= 2 else ()))
     for role, (train, held) in zip(("object", "reference"), phrasings, strict=False):
-        said[role] = tuple(f"the {p}" for p in train), tuple(f"the {p}" for p in held)
-    return said
+        phrases[role] = tuple(f"the {p}" for p in train), tuple(f"the {p}" for p in held)
+    return phrases
 
 
 TASK = Task(

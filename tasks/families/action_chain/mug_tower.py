@@ -191,7 +191,7 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
 
 
 def slots(scene: Scene) -> Slots:
-    """How mug, rack and blocks are said."""
+    """Phrasings for mug, rack and blocks."""
     colors = list(COLORS)[: scene.level - 1]
     blocks = {color: TEXT.phrasings("block", color=color) for color in colors}
     return TEXT.slots("mug", "rack", *(("area",) if colors else ())) | blocks

@@ -142,11 +142,11 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
 
 
 def slots(scene: Scene) -> Slots:
-    """How the things are said."""
-    said = TEXT.slots("phone", "stand")
+    """Phrasings for the things."""
+    phrases = TEXT.slots("phone", "stand")
     if PRESSES[scene.level]:
-        said |= TEXT.slots("stapler") | {"times": times(PRESSES[scene.level])}
-    return said | (TEXT.slots("bin", "dustbin") if scene.level == DUMP_LEVEL else {})
+        phrases |= TEXT.slots("stapler") | {"times": times(PRESSES[scene.level])}
+    return phrases | (TEXT.slots("bin", "dustbin") if scene.level == DUMP_LEVEL else {})
 
 
 TASK = Task(

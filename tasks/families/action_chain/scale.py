@@ -157,11 +157,11 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
 
 
 def slots(scene: Scene) -> Slots:
-    """How the things are said."""
-    said = TEXT.slots("bell", "scale")
+    """Phrasings for the things."""
+    phrases = TEXT.slots("bell", "scale")
     if scene.level >= 2:
-        said |= TEXT.slots(f"object.{scene.object(Facts.of(scene).object).asset}", "stand")
-    return said | (TEXT.slots("cards") if scene.level >= 3 else {})
+        phrases |= TEXT.slots(f"object.{scene.object(Facts.of(scene).object).asset}", "stand")
+    return phrases | (TEXT.slots("cards") if scene.level >= 3 else {})
 
 
 TASK = Task(

@@ -125,16 +125,16 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
 
 
 def slots(scene: Scene) -> Slots:
-    """How the things are said."""
+    """Phrasings for the things."""
     level = scene.level
     if level < 3:
         return TEXT.slots("seal", "pad") | {"times": times(level)}
-    said = TEXT.slots(*(("stapler",) if level == 5 else ()))
-    said |= {"left_times": times(2), "right_times": times(1 if level == 3 else 2)}
+    phrases = TEXT.slots(*(("stapler",) if level == 5 else ()))
+    phrases |= {"left_times": times(2), "right_times": times(1 if level == 3 else 2)}
     for at in ("left", "right"):
-        said[f"{at}_seal"] = TEXT.phrasings("side_seal", side=at)
-        said[f"{at}_pad"] = TEXT.phrasings("side_pad", side=at)
-    return said
+        phrases[f"{at}_seal"] = TEXT.phrasings("side_seal", side=at)
+        phrases[f"{at}_pad"] = TEXT.phrasings("side_pad", side=at)
+    return phrases
 
 
 TASK = Task(

@@ -149,7 +149,7 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
 
 
 def slots(scene: Scene) -> Slots:
-    """How food, tray and bell are said."""
+    """Phrasings for food, tray and bell."""
     return TEXT.slots(*("burger", "tray", "fries", "bell")[: scene.level + 1])
 
 

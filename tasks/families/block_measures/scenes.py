@@ -211,7 +211,7 @@ def rank_task(measure: Measure, layouts: Mapping[int, Layout]) -> Task:
         else:
             which = "first" if rank == 1 else "other"
         number, spelled = ordinal(rank)
-        fixed: Slots = {slot: ((said,), (said,)) for slot, said in WORDS[word].items()}
+        fixed: Slots = {slot: ((text,), (text,)) for slot, text in WORDS[word].items()}
         return fixed | TEXT.slots(f"block.{word}.{which}", number=number, word=spelled)
 
     return Task(

@@ -125,7 +125,7 @@ def line_task(line: Line, basic: bool = False) -> Task:
         facts = Facts.of(scene)
         number, word = ordinal(facts.column)
         a, b = facts.column_direction.split("_to_")
-        said = {
+        phrases = {
             **TEXT.slots("viewer", f"noun.{line.noun}"),
             "column": TEXT.phrasings("rank", number=number, word=word),
             "column_direction": TEXT.phrasings("column_direction", a=a, b=b),
@@ -134,11 +134,11 @@ def line_task(line: Line, basic: bool = False) -> Task:
             number, word = ordinal(facts.row)
             a, b = facts.row_direction.split("_to_")
             most = {"near": "nearest", "far": "farthest"}
-            said["row"] = TEXT.phrasings("rank", number=number, word=word)
-            said["row_direction"] = TEXT.phrasings(
+            phrases["row"] = TEXT.phrasings("rank", number=number, word=word)
+            phrases["row_direction"] = TEXT.phrasings(
                 "row_direction", a=a, b=b, most_a=most[a], most_b=most[b]
             )
-        return said
+        return phrases
 
     wording = "noun" if basic else line.wording
     counted = ", counted from the left and from the far side" if basic else ""

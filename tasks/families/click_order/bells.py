@@ -125,17 +125,17 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
 
 
 def slots(scene: Scene) -> Slots:
-    """How the bells and their order are said, and the arm on the side of the first."""
+    """Phrasings for the bells and their order, and the arm on the side of the first."""
     first = scene.object(Facts.of(scene).order[0])
     count = len(Facts.of(scene).order)
     if count == 1:
-        said = objects.TEXT.slots("thing.bell")
+        phrases = objects.TEXT.slots("thing.bell")
     elif count == 2:
         pair = TEXT.phrasings("far"), TEXT.phrasings("near")
-        said = TEXT.slots() | {"order": one_after_another(pair)}
+        phrases = TEXT.slots() | {"order": one_after_another(pair)}
     else:
-        said = TEXT.slots("bells", "way", count=count, word=NUMBERS[count])
-    return said | acting_arm(side(first.pose.position[0]))
+        phrases = TEXT.slots("bells", "way", count=count, word=NUMBERS[count])
+    return phrases | acting_arm(side(first.pose.position[0]))
 
 
 def templates(level: int) -> Templates:

@@ -67,7 +67,7 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
 
 
 def slots(scene: Scene) -> Slots:
-    """How the things are said, and the arm on the side of the first."""
+    """Phrasings for the things, and the arm on the side of the first."""
     order = [scene.object(name) for name in Facts.of(scene).order]
     arm = acting_arm(side(order[0].pose.position[0]))
     if len(order) == 1:

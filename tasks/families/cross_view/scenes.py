@@ -103,26 +103,28 @@ class Spread:
         inside &= y <= 0.095 - self.inset
         return inside & workcell.in_view(x, y, self.radius, self.tall, MARGIN)
 
-    def apart(self, workcell: Workcell, points: Array, wanted: Array, i: int) -> Mask:
-        """Whether `wanted` is far enough from its chain's other places, on table and image."""
-        dx = np.abs(points[..., 0] - wanted[:, None, 0])
-        dy = np.abs(points[..., 1] - wanted[:, None, 1])
+    def apart(self, workcell: Workcell, points: Array, moved_to: Array, i: int) -> Mask:
+        """Whether `moved_to` is far enough from its chain's other places, on table and image."""
+        dx = np.abs(points[..., 0] - moved_to[:, None, 0])
+        dy = np.abs(points[..., 1] - moved_to[:, None, 1])
         free = ((dx >= self.spacing[0]) | (dy >= self.spacing[1])) & (
             dx**2 + dy**2 >= self.spacing[2] ** 2
         )
         if self.alike:
-            free &= self._separate(workcell, points, wanted)
+            free &= self._separate(workcell, points, moved_to)
         else:
             u, v = workcell.head.pixel(points[..., 0], points[..., 1], TABLE_TOP + self.tall / 2)
-            wu, wv = workcell.head.pixel(wanted[:, :1], wanted[:, 1:], TABLE_TOP + self.tall / 2)
+            wu, wv = workcell.head.pixel(
+                moved_to[:, :1], moved_to[:, 1:], TABLE_TOP + self.tall / 2
+            )
             free &= (u - wu) ** 2 + (v - wv) ** 2 >= PIXELS**2
         free[:, i] = True
         return np.asarray(free.all(axis=1))
 
-    def _separate(self, workcell: Workcell, points: Array, wanted: Array) -> Mask:
+    def _separate(self, workcell: Workcell, points: Array, moved_to: Array) -> Mask:
         """Whether the bounding boxes in the head image do not overlap."""
         left, right, top, bottom = self._box(workcell, points[..., 0], points[..., 1])
-        wl, wr, wt, wb = self._box(workcell, wanted[:, :1], wanted[:, 1:])
+        wl, wr, wt, wb = self._box(workcell, moved_to[:, :1], moved_to[:, 1:])
         return np.asarray((left >= wr) | (wl >= right) | (top >= wb) | (wt >= bottom))
 
     def _box(self, workcell: Workcell, x: Array, y: Array) -> tuple[Array, Array, Array, Array]:
@@ -149,15 +151,15 @@ def fits(workcell: Workcell, spread: Spread, level: int, roles: NDArray[np.int64
     """
     middle = TABLE_TOP + spread.tall / 2
 
-    def rule(points: Array, wanted: Array, i: int) -> Mask:
+    def rule(points: Array, moved_to: Array, i: int) -> Mask:
         moved = points.copy()
-        moved[:, i] = wanted
+        moved[:, i] = moved_to
         place, lead = leaders(moved)
         u, v = workcell.head.pixel(moved[..., 0], moved[..., 1], middle)
         seen = leaders(np.stack([u, -v], axis=-1))[0]
         clear = ((place == roles) & (seen == roles) & (lead >= LEADS[level])).all(axis=1)
-        allowed = spread.allowed(workcell, wanted[:, 0], wanted[:, 1])
-        return np.asarray(clear & allowed & spread.apart(workcell, points, wanted, i))
+        allowed = spread.allowed(workcell, moved_to[:, 0], moved_to[:, 1])
+        return np.asarray(clear & allowed & spread.apart(workcell, points, moved_to, i))
 
     return rule
 

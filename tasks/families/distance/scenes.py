@@ -101,9 +101,9 @@ def fits(workcell: Workcell, rules: Rules, level: int) -> Fits:
     """The rule of the level's layouts."""
     least = rules.apart[level - 1]
 
-    def good(points: Array, wanted: Array, i: int) -> Mask:
-        mask = keeps_apart(points, wanted, i, least)
-        return mask & allowed(workcell, rules, wanted[:, 0], wanted[:, 1]) if mask.any() else mask
+    def good(points: Array, place: Array, i: int) -> Mask:
+        mask = keeps_apart(points, place, i, least)
+        return mask & allowed(workcell, rules, place[:, 0], place[:, 1]) if mask.any() else mask
 
     return good
 
@@ -144,11 +144,11 @@ def clearing(workcell: Workcell, rules: Rules, level: int) -> Fits:
     """As `fits`, and no move makes the distances from place 0 less clear than they are."""
     valid, gap = fits(workcell, rules, level), rules.gap[level - 1]
 
-    def good(points: Array, wanted: Array, i: int) -> Mask:
-        mask = valid(points, wanted, i)
+    def good(points: Array, place: Array, i: int) -> Mask:
+        mask = valid(points, place, i)
         if mask.any():
             moved = points.copy()
-            moved[:, i] = wanted
+            moved[:, i] = place
             mask &= unclear(moved, gap) <= unclear(points, gap)
         return mask
 
@@ -274,8 +274,8 @@ def distance_task(family: Family, name: str, what: str) -> Task:
         rank = Facts.of(scene).distance_rank
         number, word = ordinal(rank)
         entry = "rank.first" if rank == 1 else "rank.other"
-        said = TEXT.slots(entry, "object", number=number, word=word, noun=family.noun)
-        return {**said, "reference": names}
+        phrases = TEXT.slots(entry, "object", number=number, word=word, noun=family.noun)
+        return {**phrases, "reference": names}
 
     return Task(
         name=name,

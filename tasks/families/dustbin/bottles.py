@@ -100,13 +100,13 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
 
 
 def bottle_slots(count: int) -> Slots:
-    """How so many bottles and the bin are said."""
+    """Phrasings for so many bottles and the bin."""
     bottles = f"bottles.{by_count(count)}"
     return TEXT.slots(bottles, "bin", "side", count=count, word=NUMBERS[count])
 
 
 def slots(scene: Scene) -> Slots:
-    """How the bottles and the bin are said."""
+    """Phrasings for the bottles and the bin."""
     return bottle_slots(len(Facts.of(scene).bottles))
 
 

@@ -168,9 +168,9 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
 
 
 def slots(scene: Scene) -> Slots:
-    """How bottles, bin, cups and coasters are said."""
-    said, cups = only_bottles.bottle_slots(BOTTLES[scene.level]), CUPS[scene.level]
-    return said | (
+    """Phrasings for bottles, bin, cups and coasters."""
+    phrases, cups = only_bottles.bottle_slots(BOTTLES[scene.level]), CUPS[scene.level]
+    return phrases | (
         TEXT.slots(*(f"{w}.{by_count(cups)}" for w in ("cup", "coaster"))) if cups else {}
     )
 

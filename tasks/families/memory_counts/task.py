@@ -85,7 +85,7 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
 
 
 def slots(scene: Scene) -> Slots:
-    """How the counts are said."""
+    """Phrasings for the counts."""
     counts = Facts.of(scene).counts
     if len(counts) == 1:
         return TEXT.slots("stapler") | {"times": _times(counts[0])}

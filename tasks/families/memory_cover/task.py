@@ -101,7 +101,7 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
 
 
 def slots(scene: Scene) -> Slots:
-    """How the order of the colours is said, and where a cover goes."""
+    """Phrasings for the order of the colours, and where a cover goes."""
     colors = Facts.of(scene).colors
     if len(colors) == 1:
         return TEXT.slots("where", "block", color=colors[0])

@@ -145,7 +145,7 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
 
 
 def slots(scene: Scene) -> Slots:
-    """How the colours and sides are said."""
+    """Phrasings for the colours and sides."""
     facts = Facts.of(scene)
     if scene.level == 1:
         side, color = ("right" if facts.right else "left"), facts.right_color or facts.left_color

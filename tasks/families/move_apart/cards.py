@@ -105,7 +105,7 @@ def _rows(wanted: list[float]) -> list[float]:
 
 
 def slots(scene: Scene) -> Slots:
-    """How the boxes are said."""
+    """Phrasings for the boxes."""
     boxes = Facts.of(scene).boxes
     count = len(boxes)
     if count > 1:

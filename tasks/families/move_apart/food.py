@@ -105,7 +105,7 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
 
 
 def slots(scene: Scene) -> Slots:
-    """How the kinds and the directions are said."""
+    """Phrasings for the kinds and the directions."""
     facts = Facts.of(scene)
     if scene.level == 1:
         way = "forward" if facts.forward else "backward"

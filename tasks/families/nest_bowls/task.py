@@ -99,7 +99,7 @@ def _nested(scene: Scene, below: str) -> Vec3:
 
 
 def slots(scene: Scene) -> Slots:
-    """How the bowls and the plate are said."""
+    """Phrasings for the bowls and the plate."""
     count = len(Facts.of(scene).bowls)
     bowls = "bowl" if count == 1 else f"bowls.{by_count(count)}"
     return TEXT.slots("plate", bowls, count=count, word=NUMBERS[count])

@@ -166,7 +166,7 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
 
 
 def _falling(count: int, ends: tuple[str, str], measure: str) -> Phrasings:
-    """How an order by a measure is said: comparatives for two blocks, superlatives for more."""
+    """Phrasings for an order by a measure: comparatives for two blocks, superlatives for more."""
     ending = "er" if count == 2 else "est"
     most, least = (word.removesuffix("e") + ending for word in ends)
     return TEXT.phrasings("order.falling", most=most, least=least, measure=measure)
@@ -186,21 +186,21 @@ def _slots(kind: Kind, count: int) -> Slots:
     if count == 1:
         return TEXT.slots(kind.single) | {"middle": COMMON.phrasings("middle.near")}
     blocks = TEXT.slots(f"blocks.{by_count(count)}", count=count, word=NUMBERS[count])
-    return blocks | {"order": kind.said(count)}
+    return blocks | {"order": kind.phrases(count)}
 
 
 @dataclass(frozen=True)
 class Kind:
-    """What distinguishes the three tasks: how the blocks look and how their order is said.
+    """What distinguishes the three tasks: looks, phrasings and order of the blocks.
 
-    `single` is the entry of the phrasings for the only block of level 1, `said(count)` are those of
-    the order of several.
+    `single` is the entry of the phrasings for the only block of level 1, `phrases(count)` are those
+    of the order of several.
     """
 
     name: str
     looks: Callable[[int, np.random.Generator], list[Look]]
     single: str
-    said: Callable[[int], Phrasings]
+    phrases: Callable[[int], Phrasings]
     summary: str
     order: str
 

@@ -254,7 +254,7 @@ def drawer(crowd: Crowd) -> Draw:
 
 
 def _slots(direction: str, reference: str, level: int, noun: str) -> Slots:
-    """How the neighbour in `direction` of the object at the place called `reference` is said.
+    """Phrasings for the neighbour in `direction` of the object at the place called `reference`.
 
     From level 2 on an axis neighbour is "directly" there (official wording); from level 4 on a
     diagonal neighbour is "immediately" there, because another object may lie further out on the

@@ -75,7 +75,7 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
 
 
 def slots(scene: Scene) -> Slots:
-    """How the bell, the arm on its side and the count are said."""
+    """Phrasings for the bell, the arm on its side and the count."""
     bell = scene.object(Facts.of(scene).bell)
     arm = acting_arm(side(bell.pose.position[0]))
     count = Facts.of(scene).count

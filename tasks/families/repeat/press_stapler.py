@@ -64,7 +64,7 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
 
 
 def slots(scene: Scene) -> Slots:
-    """How the stapler and the count are said."""
+    """Phrasings for the stapler and the count."""
     count = Facts.of(scene).count
     if count == 1:
         return TEXT.slots("stapler")

@@ -72,7 +72,7 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
 
 
 def slots(scene: Scene) -> Slots:
-    """How the order of the colours is said."""
+    """Phrasings for the order of the colours."""
     colors, count = Facts.of(scene).colors, len(Facts.of(scene).colors)
     if count == 1:
         middle = COMMON.phrasings("middle.near")

@@ -88,7 +88,7 @@ def _wide(level: int, points: Points) -> bool:
 
 
 def slots(scene: Scene) -> Slots:
-    """How the order of the lengths is said."""
+    """Phrasings for the order of the lengths."""
     return tower_slots(LENGTH, len(TowerFacts.of(scene).order))
 
 

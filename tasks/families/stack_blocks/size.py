@@ -67,7 +67,7 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
 
 
 def slots(scene: Scene) -> Slots:
-    """How the order of the sizes is said."""
+    """Phrasings for the order of the sizes."""
     return tower_slots(SIZE, len(TowerFacts.of(scene).order))
 
 

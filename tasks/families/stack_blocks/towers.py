@@ -70,7 +70,7 @@ LENGTH = Scale(
 
 
 def tower_slots(scale: Scale, count: int) -> Slots:
-    """How a tower by size or length is said, largest or longest at the bottom."""
+    """Phrasings for a tower by size or length, largest or longest at the bottom."""
     if count == 1:
         return TEXT.slots("block") | {"middle": COMMON.phrasings("middle.near")}
     most, least = scale.two if count == 2 else scale.more

@@ -113,7 +113,7 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
 
 
 def slots(scene: Scene) -> Slots:
-    """How the order of the colours is said."""
+    """Phrasings for the order of the colours."""
     colors = Facts.of(scene).colors
     if len(colors) == 1:
         return TEXT.slots("hammer", "block", color=colors[0])

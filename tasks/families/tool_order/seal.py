@@ -128,7 +128,7 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
 
 
 def slots(scene: Scene) -> Slots:
-    """How the seal, the pads and their order are said."""
+    """Phrasings for the seal, the pads and their order."""
     facts = Facts.of(scene)
     colors, seal = facts.colors, scene.object(facts.seal)
     count = len(colors)
