@@ -1,6 +1,7 @@
-"""What a run's files may say: plain names, whole numbers that are some, text that can be printed.
+"""Validation of a run's files, which may come from anywhere: field types, ranges, printable text.
 
-Imports nothing of ours but the record. The leaderboard is stricter still (`leaderboard.strict`).
+Names become parts of paths, so only plain ones pass. The leaderboard is stricter still
+(`leaderboard.strict_json`).
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ MANIFEST_VALUES: dict[str, tuple[type, ...]] = {
 NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,99}")
 """Names that become parts of paths."""
 MAX_INTEGER = 2**53
-"""Whole numbers beyond this are none that anything of ours counts."""
+"""Largest integer of a field: larger ones are not exact as a double."""
 TEXTS = (
     "category",
     "instruction",

@@ -27,8 +27,8 @@ class TrialRecord:
     `end` is one of END_REASONS and `message` says why where that needs words. `done` of `total`
     subtasks hold at the end, `best` is the most that ever held at once. `events` are plain dicts
     (see `robospa.tasks.events`). `digest` is the world's final state, `scene_digest` the start's,
-    `actions_digest` the hash of all executed actions. `latency` has p50, p95, p99 and max, and if
-    the policy's server told them the means of `queue` (before its model ran), `infer` (in it) and
+    `actions_digest` the hash of all executed actions. `latency` has p50, p95, p99 and max, and
+    where the server reports them the means of `queue` (before its model ran), `infer` (in it) and
     `batch` (observations in one call).
     """
 

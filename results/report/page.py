@@ -148,7 +148,7 @@ def inline_svg(svg: str, prefix: str, label: str) -> str:
     body = re.sub(r"url\(#([^)]+)\)", rf"url(#{prefix}-\1)", body)
     body = body.replace(INK, "currentColor").replace(GRID, "var(--line)")
     body = re.sub(r'\b(width|height)="[0-9.]+pt" ?', "", body, count=2)
-    # Glyphs have no colour of their own: they are black unless told otherwise.
+    # Glyphs have no colour of their own: they are black by default.
     style = "fill: currentColor; stroke-linejoin: round; stroke-linecap: butt"
     return body.replace(
         "<svg ", f'<svg role="img" style="{style}" aria-label="{escape(label)}" ', 1

@@ -66,19 +66,19 @@ def ends(run: Run) -> dict[str, int]:
 def latency(run: Run) -> dict[str, float]:
     """Milliseconds that the policy took to answer: median and largest of the trials' p50, p99.
 
-    Where its server told them, also the means of `queue`, `infer` and of the size of a `batch`.
+    Where its server reports them, also the means of `queue`, `infer` and of the size of a `batch`.
     """
     found = [r.latency for r in run.records.values() if r.latency]
     if not found:
         return {}
     middle = sorted(x["p50"] for x in found)[len(found) // 2]
-    told = {
+    server = {
         name: sum(values) / len(values)
         for name in ("queue", "infer", "batch")
         if (values := [x[name] for x in found if name in x])
     }
     worst = {name: max(x[name] for x in found) for name in ("p99", "max")}
-    return {"p50": middle, **worst, **told}
+    return {"p50": middle, **worst, **server}
 
 
 def timing(run: Run) -> dict[str, float]:
@@ -99,13 +99,13 @@ def facts(run: Run) -> list[tuple[str, str]]:
     info = run.info
     settings, spec = info.settings, info.spec
     seeded = "honours the trial's policy seed" if info.seeded else "ignores the policy seed"
-    asked = ", ".join(str(c.get("name", c)) if isinstance(c, Mapping) else str(c)
+    cameras = ", ".join(str(c.get("name", c)) if isinstance(c, Mapping) else str(c)
                       for c in spec.get("cameras") or ()) or "no camera"  # fmt: skip
-    sees = "the exact state (privileged)" if info.privileged else f"observations: {asked}"
+    sees = "the exact state (privileged)" if info.privileged else f"observations: {cameras}"
     found = [
         ("policy", info.policy or "unknown"),
         ("sees", sees),
-        ("actions", _words(f"{said}{spec[n]}" for n, said in ACTIONS.items() if spec.get(n))),
+        ("actions", _words(f"{words}{spec[n]}" for n, words in ACTIONS.items() if spec.get(n))),
         ("seeding", f"{seeded}; seed {settings.get('policy_seed', 0)}" if spec else ""),
         ("trials", f"{len(run.keys) - len(run.missing)} of {len(run.keys)} with a result"),
         ("ends", _words(f"{count} {name}" for name, count in ends(run).items())),

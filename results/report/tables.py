@@ -54,8 +54,8 @@ def report_tables(columns: Sequence[Column]) -> list[ReportTable]:
 
 
 def _has(column: Column, metric: str) -> bool:
-    wanted = METRIC_CATEGORIES[metric]
-    return any(cell.category in wanted and cell.trials for cell in column.scores.cells.values())
+    categories = METRIC_CATEGORIES[metric]
+    return any(cell.category in categories and cell.trials for cell in column.scores.cells.values())
 
 
 def _heads(columns: Sequence[Column], levels: Sequence[int], metric: str) -> tuple[str, ...]:
