@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from robospa.results.failures.labels import KINDS
+from robospa.results.failures.labels import KINDS, distribution
 from robospa.results.figures.draw import draw
 from robospa.results.figures.failure_bars import FILLS
 from robospa.results.figures.levels import chance_levels
@@ -53,7 +53,8 @@ def small_run(name: str = "mine") -> Series:
         for seed in range(4)
     ]
     by_key = {r.key: r for r in records}
-    return Series(name, score(by_key, by_key), tuple(records))
+    failures = distribution(records)
+    return Series(name, score(by_key, by_key), tuple(records), failures=failures)
 
 
 def test_a_run_gets_all_figures_in_all_formats(tmp_path: Path) -> None:
