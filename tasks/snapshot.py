@@ -9,8 +9,6 @@ from typing import Any
 from robospa.geometry import Pose, Vec3
 from robospa.workcell import Workcell
 
-ARMS = ("left", "right")
-
 GRIPPER_OPEN = 0.8
 """A commanded gripper above this is open (official predicate)."""
 GRIPPER_CLOSED = 0.2

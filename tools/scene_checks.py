@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from robospa.action_space import ARMS
 from robospa.geometry import Pose, to_matrix
 from robospa.harness.robots import embodiment
 from robospa.harness.robots.kinematics import chain_of, end_effector, inverse
@@ -25,7 +26,7 @@ from robospa.tasks.families.distance import object_sets
 from robospa.tasks.objects import object_model
 from robospa.tasks.plan import Pick
 from robospa.tasks.scene import Scene, SceneObject
-from robospa.tasks.snapshot import ARMS, Snapshot
+from robospa.tasks.snapshot import Snapshot
 from robospa.workcell import HEIGHT, TABLE_TOP, WIDTH
 
 TOUCH = 5e-4

@@ -15,13 +15,14 @@ import sapien
 from numpy.typing import NDArray
 from sapien import physx
 
+from robospa.action_space import ARMS
 from robospa.geometry import Pose, Vec3
 from robospa.harness.robots.embodiment import Embodiment
 from robospa.harness.sim import bodies, furniture
 from robospa.harness.sim.lazy_snapshot import NO_HINGES
 from robospa.harness.sim.motion import RATE
 from robospa.tasks.shapes import ObjectModel
-from robospa.tasks.snapshot import ARMS, Contact
+from robospa.tasks.snapshot import Contact
 
 Array = NDArray[np.float64]
 

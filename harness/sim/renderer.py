@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from robospa.action_space import ARMS
 from robospa.geometry import Pose
 from robospa.harness.robots.embodiment import Embodiment
 from robospa.harness.sim import furniture
@@ -24,7 +25,6 @@ from robospa.harness.world import RenderUnavailable
 from robospa.observation import CameraSpec
 from robospa.tasks.scene import Scene
 from robospa.tasks.shapes import Hinge, ObjectModel, Params, Shape
-from robospa.tasks.snapshot import ARMS
 
 if TYPE_CHECKING:
     import sapien

@@ -11,6 +11,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from robospa.action_space import ARMS
 from robospa.harness.robots import embodiment
 from robospa.harness.skills.dock import dock
 from robospa.harness.skills.hang import hang
@@ -42,7 +43,7 @@ from robospa.tasks.plan import (
     Wait,
 )
 from robospa.tasks.scene import Scene
-from robospa.tasks.snapshot import ARMS, Snapshot
+from robospa.tasks.snapshot import Snapshot
 
 HOLD_SECONDS = 0.2
 """An action in which nothing moves takes 50 physics steps of 1/250 s."""

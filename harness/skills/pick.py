@@ -8,12 +8,12 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from robospa.action_space import ARMS
 from robospa.geometry import Pose
 from robospa.harness.skills.grasping import LEANS, LEVEL, Reach, reachable_grasps
 from robospa.harness.skills.moving import clear_other, line, retreat_home, rise, travel
 from robospa.harness.skills.workspace import SkillFailed, Steps, Workspace, backed
 from robospa.tasks.plan import Pick
-from robospa.tasks.snapshot import ARMS
 
 Array = NDArray[np.float64]
 Fits = Callable[[Reach], bool]

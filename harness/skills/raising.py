@@ -11,6 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from robospa.action_space import ARMS
 from robospa.harness.skills.grasping import LEANS, LEVEL, Reach, reachable_grasps
 from robospa.harness.skills.moving import clear_other, line, retreat_home, rise, travel
 from robospa.harness.skills.workspace import (
@@ -22,7 +23,6 @@ from robospa.harness.skills.workspace import (
     raised,
 )
 from robospa.tasks.plan import RaiseLower
-from robospa.tasks.snapshot import ARMS
 
 STANDOFF = 0.08
 ATTEMPTS = 4

@@ -13,13 +13,14 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from robospa.action_space import ARMS
 from robospa.geometry import Pose, Vec3, rotate
 from robospa.harness.robots.embodiment import Embodiment
 from robospa.harness.robots.kinematics import Chain, chain_of, inverse
 from robospa.tasks.objects import object_model
 from robospa.tasks.scene import Scene
 from robospa.tasks.shapes import ObjectModel
-from robospa.tasks.snapshot import ARMS, Snapshot
+from robospa.tasks.snapshot import Snapshot
 from robospa.workcell import Gripper
 
 Array = NDArray[np.float64]

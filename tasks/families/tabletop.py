@@ -44,7 +44,7 @@ def named(
 
 def draw_look(rng: np.random.Generator, asset: str) -> dict[str, int]:
     """Parameters of one of the asset's looks, each equally likely."""
-    return {"look": int(rng.integers(objects.looks(asset)))}
+    return {"look": int(rng.integers(objects.look_count(asset)))}
 
 
 def radius(asset: str, params: Params) -> float:

@@ -11,11 +11,12 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
+from robospa.action_space import ARMS
 from robospa.geometry import Vec3
 from robospa.tasks.events import Event
 from robospa.tasks.objects import object_model
 from robospa.tasks.scene import Scene
-from robospa.tasks.snapshot import ARMS, GRIPPER_CLOSED, Contact, Snapshot
+from robospa.tasks.snapshot import GRIPPER_CLOSED, Contact, Snapshot
 
 LOOK = 0.1
 """Seconds between two looks at the grippers; at what they approach, every second time."""

@@ -34,7 +34,7 @@ from robospa.tasks.objects.build import Asset
 from robospa.tasks.objects.tint import TINTS, tinted
 from robospa.tasks.shapes import ObjectModel, Params
 
-__all__ = ["assets", "looks", "object_model"]
+__all__ = ["assets", "look_count", "object_model"]
 
 FAMILIES = (
     blocks,
@@ -64,9 +64,9 @@ def assets() -> tuple[str, ...]:
     return tuple(sorted(_library()))
 
 
-def looks(asset: str) -> int:
+def look_count(asset: str) -> int:
     """How many looks `asset` has: params {"look": k} takes k = 0 .. looks - 1."""
-    return _asset(asset).looks
+    return _asset(asset).look_count
 
 
 def object_model(asset: str, params: Params = MappingProxyType({})) -> ObjectModel:
@@ -103,7 +103,7 @@ def _build(name: str, text: str) -> ObjectModel:
         allowed = ", ".join(sorted(known))
         raise ValueError(f"asset {name!r} has no parameter {unknown[0]!r}; it takes {allowed}")
     look = params.get("look", 0)
-    if isinstance(look, bool) or not isinstance(look, int) or not 0 <= look < asset.looks:
-        raise ValueError(f"asset {name!r} has looks 0 to {asset.looks - 1}, not {look!r}")
+    if isinstance(look, bool) or not isinstance(look, int) or not 0 <= look < asset.look_count:
+        raise ValueError(f"asset {name!r} has looks 0 to {asset.look_count - 1}, not {look!r}")
     made = asset.build(look, params)
     return tinted(made, str(params["tint"])) if "tint" in params else made

@@ -16,13 +16,13 @@ from robospa.tasks.objects.build import (
     DARK,
     STEEL,
     Asset,
+    collision,
     colour,
-    feel,
+    fill_phrases,
     model,
-    named,
-    paint,
     solid,
     srgb,
+    visual,
 )
 from robospa.tasks.shapes import Box, Color, Cylinder, Hinge, ObjectModel, Params, Shape
 
@@ -61,7 +61,7 @@ def microwave(look: int, params: Params) -> ObjectModel:
         damping=0.08,
         mass=0.15,
     )
-    phrases = named(
+    phrases = fill_phrases(
         word, "{} microwave", "{} microwave oven", "microwave in {}", "small {} microwave",
         "{} kitchen microwave", "microwave with a {} housing",
     )  # fmt: skip
@@ -97,7 +97,7 @@ def _housing(color: Color, trim: Color, metallic: float) -> list[Shape]:
     slits = m.merge(
         *(m.flat(m.rectangle(0.024, 0.0014, 0.078, 0.012 + 0.009 * i), 0.0) for i in range(5))
     )
-    vents = paint(slits, srgb("#3a3d44"), (0.0, 0.0, HIGH + 0.0004))
+    vents = visual(slits, srgb("#3a3d44"), (0.0, 0.0, HIGH + 0.0004))
     return [*shell, *feet, vents]
 
 
@@ -125,9 +125,9 @@ def _inside() -> list[Shape]:
     )
     plate = m.lathe([(0.052, 0.0), (0.056, 0.004), (0.053, 0.005), (0.0, 0.002)], 24)
     return [
-        paint(lining, pale, roughness=0.6),
-        paint(plate, srgb("#9cc4d8"), (middle, -0.004, low + 0.002), roughness=0.15),
-        paint(Cylinder(0.012, 0.002), srgb("#6d7f8a"), (middle, -0.004, low + 0.0052)),
+        visual(lining, pale, roughness=0.6),
+        visual(plate, srgb("#9cc4d8"), (middle, -0.004, low + 0.002), roughness=0.15),
+        visual(Cylinder(0.012, 0.002), srgb("#6d7f8a"), (middle, -0.004, low + 0.0052)),
     ]
 
 
@@ -148,11 +148,11 @@ def _controls(trim: Color) -> list[Shape]:
     ]
     ink = srgb("#c9ced4") if dark_panel else srgb("#5a5f66")
     return [
-        paint(plate, trim, roughness=0.3),
-        paint(display, srgb("#101418"), roughness=0.2),
-        paint(m.merge(*digits), srgb("#35e07a")),
-        paint(m.merge(*keys), ink),
-        paint(
+        visual(plate, trim, roughness=0.3),
+        visual(display, srgb("#101418"), roughness=0.2),
+        visual(m.merge(*digits), srgb("#35e07a")),
+        visual(m.merge(*keys), ink),
+        visual(
             m.lathe([(0.0165, 0.0), (0.0155, 0.009), (0.0, 0.0095)], 20),
             STEEL,
             (x, -DEEP, 0.042),
@@ -160,7 +160,7 @@ def _controls(trim: Color) -> list[Shape]:
             0.3,
             0.3,
         ),
-        paint(
+        visual(
             m.upright(m.rectangle(0.0015, 0.006), (x, -DEEP - 0.0102, 0.049)),
             srgb("#c8202a"),
         ),
@@ -178,11 +178,11 @@ def _door(color: Color, trim: Color, metallic: float) -> list[Shape]:
     bar = (HANDLE_X, FRONT - HANDLE_OUT, HANDLE_Z)
     return [
         solid(Box((wide, DOOR / 2, high)), color, (x, y, z), roughness=0.35, metallic=metallic),
-        paint(m.upright(window, (x + shift, FRONT - 0.0005, z)), srgb("#14171b"), roughness=0.1),
-        paint(m.upright(glint, (x + shift, FRONT - 0.0009, z)), srgb("#2c343c"), roughness=0.1),
-        paint(m.upright(window, (x + shift, -DEEP + 0.0005, z), math.pi / 2), srgb("#1c2024")),
-        feel(Cylinder(HANDLE_RADIUS, HANDLE_HALF), bar),
-        paint(
+        visual(m.upright(window, (x + shift, FRONT - 0.0005, z)), srgb("#14171b"), roughness=0.1),
+        visual(m.upright(glint, (x + shift, FRONT - 0.0009, z)), srgb("#2c343c"), roughness=0.1),
+        visual(m.upright(window, (x + shift, -DEEP + 0.0005, z), math.pi / 2), srgb("#1c2024")),
+        collision(Cylinder(HANDLE_RADIUS, HANDLE_HALF), bar),
+        visual(
             m.lathe(
                 [
                     (0.0, -HANDLE_HALF),

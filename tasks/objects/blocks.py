@@ -4,17 +4,25 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
 from robospa.geometry import Vec3
 from robospa.tasks.objects import meshes as m
-from robospa.tasks.objects.build import Asset, across, box_grasps, model, paint, solid, srgb
-from robospa.tasks.shapes import Box, Color, Grasp, ObjectModel, Params, Shape
+from robospa.tasks.objects.build import (
+    Asset,
+    box_grasps,
+    model,
+    solid,
+    srgb,
+    three_numbers,
+    top_grasp,
+    visual,
+)
+from robospa.tasks.shapes import Box, Color, Grasp, Mesh, ObjectModel, Params, Shape
 
 BLOCK_COLORS: Mapping[str, Color] = {
     "red": (1.0, 0.0, 0.0),
@@ -32,17 +40,11 @@ BLOCK_COLORS: Mapping[str, Color] = {
 _KNOWN = np.array(list(BLOCK_COLORS.values()))
 
 
-def _triple(value: Sequence[float], what: str) -> Vec3:
-    if len(value) != 3:
-        raise ValueError(f"block {what} must be three numbers, not {list(value)}")
-    return (float(value[0]), float(value[1]), float(value[2]))
-
-
 def block(look: int, params: Params) -> ObjectModel:
     """A plain cuboid around its origin; params "half" [m] and "color" (linear RGB)."""
     names = list(BLOCK_COLORS)
-    half = _triple(params.get("half", (0.02, 0.02, 0.02)), "half")
-    color = _triple(params.get("color", BLOCK_COLORS[names[look]]), "color")
+    half = three_numbers(params.get("half", (0.02, 0.02, 0.02)), "block half")
+    color = three_numbers(params.get("color", BLOCK_COLORS[names[look]]), "block color")
     if min(half) <= 0:
         raise ValueError(f"block half sizes must be positive, not {list(half)}")
     shape = solid(Box(half), color, roughness=0.6)
@@ -114,7 +116,7 @@ def rubikscube(look: int, params: Params) -> ObjectModel:
     if mixed:
         colors = random.Random(seed).sample([n for n in STICKERS for _ in range(9)], 45)
         colors[4::9] = list(faces)
-    patches: dict[str, list[Any]] = {}
+    patches: dict[str, list[Mesh]] = {}
     cell = 2 * h / 3
     tile = m.rounded_rectangle(cell * 0.43, cell * 0.43, cell * 0.1, 2)
     for i, name in enumerate(colors):
@@ -128,13 +130,13 @@ def rubikscube(look: int, params: Params) -> ObjectModel:
             patch = m.upright(tile, (at[0], at[1], h + v), facing)
         patches.setdefault(name, []).append(patch)
     parts: list[Shape] = [solid(Box((h, h, h)), srgb(body), (0.0, 0.0, h), roughness=0.4)]
-    parts += [paint(m.merge(*p), STICKERS[n], roughness=0.35) for n, p in patches.items()]
+    parts += [visual(m.merge(*p), STICKERS[n], roughness=0.35) for n, p in patches.items()]
     return model(
         "rubikscube",
         parts,
         "Rubik's cube",
         phrases,
-        [across((0.0, 0.0, h), 2 * h, 0.0), across((0.0, 0.0, h), 2 * h, math.pi / 2)],
+        [top_grasp((0.0, 0.0, h), 2 * h, 0.0), top_grasp((0.0, 0.0, h), 2 * h, math.pi / 2)],
         mass=0.06,
         support=(0.0, 0.0, 2 * h),
     )

@@ -10,13 +10,13 @@ from robospa.tasks.objects.build import (
     PAPER,
     Asset,
     box_grasps,
+    collision,
     colour,
-    feel,
+    fill_phrases,
     model,
-    named,
-    paint,
     solid,
     srgb,
+    visual,
 )
 from robospa.tasks.shapes import Box, Color, Mesh, ObjectModel, Params
 
@@ -58,11 +58,11 @@ def tea_box(look: int, params: Params) -> ObjectModel:
     badge = m.flat(leaf(0.017), 2 * half[2] + 0.0008)
     parts = [
         solid(Box(half), colour(base), (0.0, 0.0, half[2]), roughness=0.7),
-        paint(m.merge(*ovals, lid), PAPER),
-        paint(m.merge(*leaves, badge), srgb(mark) if base != "cream" else colour("green")),
-        paint(m.merge(*bands), srgb(mark)),
+        visual(m.merge(*ovals, lid), PAPER),
+        visual(m.merge(*leaves, badge), srgb(mark) if base != "cream" else colour("green")),
+        visual(m.merge(*bands), srgb(mark)),
     ]
-    phrases = named(
+    phrases = fill_phrases(
         word, "{} tea box", "{} box of tea", "{} carton of tea bags", "tea box in {} cardboard",
         "{} package of tea", "box of tea with {} sides", "{} tea carton",
     )  # fmt: skip
@@ -95,11 +95,11 @@ def tissue_box(look: int, params: Params) -> ObjectModel:
     slot = m.flat(m.ellipse(0.027, 0.012, 14), 2 * half[2] + 0.0004)
     parts = [
         solid(Box(half), colour(base), (0.0, 0.0, half[2]), roughness=0.8),
-        paint(m.merge(*dots), colour(mark)),
-        paint(slot, srgb("#3a3f46")),
-        paint(_tissue(2 * half[2]), srgb("#ffffff"), roughness=0.9),
+        visual(m.merge(*dots), colour(mark)),
+        visual(slot, srgb("#3a3f46")),
+        visual(_tissue(2 * half[2]), srgb("#ffffff"), roughness=0.9),
     ]
-    phrases = named(
+    phrases = fill_phrases(
         word, "{} tissue box", "{} box of tissues", "tissue box in {}",
         "{} carton of paper tissues",        "{} box with a tissue sticking out",
         "box of tissues with {} sides", "{} facial tissue box",
@@ -161,10 +161,10 @@ def playing_cards(look: int, params: Params) -> ObjectModel:
     ]
     parts = [
         solid(Box(half), colour(base), (0.0, 0.0, half[2])),
-        paint(m.merge(frame, diamond, *small, *edges), srgb(mark)),
-        paint(panel, colour(base)),
+        visual(m.merge(frame, diamond, *small, *edges), srgb(mark)),
+        visual(panel, colour(base)),
     ]
-    phrases = named(
+    phrases = fill_phrases(
         word, "{} pack of playing cards", "{} card box", "{} deck of cards", "{} playing cards",
         "boxed deck of cards in {}", "{} box of playing cards", "card pack with a {} back",
     )  # fmt: skip
@@ -186,13 +186,13 @@ def soap(look: int, params: Params) -> ObjectModel:
     pale: Color = (min(1, color[0] * 1.12), min(1, color[1] * 1.12), min(1, color[2] * 1.12))
     top = 2 * half[2]
     parts = [
-        feel(Box((half[0], half[1] - 0.0005, half[2])), (0.0, 0.0, half[2])),
-        paint(m.slab(half[0], half[1], top, 0.008, 0.004, 4), color, roughness=0.35),
-        paint(m.flat(m.ellipse(0.019, 0.0088, 18), top + 0.0003), dark),
-        paint(m.flat(m.ellipse(0.0172, 0.0073, 18), top + 0.0006), pale),
-        paint(m.merge(*_letters(top + 0.0009)), dark),
+        collision(Box((half[0], half[1] - 0.0005, half[2])), (0.0, 0.0, half[2])),
+        visual(m.slab(half[0], half[1], top, 0.008, 0.004, 4), color, roughness=0.35),
+        visual(m.flat(m.ellipse(0.019, 0.0088, 18), top + 0.0003), dark),
+        visual(m.flat(m.ellipse(0.0172, 0.0073, 18), top + 0.0006), pale),
+        visual(m.merge(*_letters(top + 0.0009)), dark),
     ]
-    phrases = named(
+    phrases = fill_phrases(
         word, "{} soap bar", "{} bar of soap", "bar of {} soap", "{} soap", "soap bar in {}",
         "{} hand soap", "{} block of soap",
     )  # fmt: skip

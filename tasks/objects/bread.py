@@ -10,13 +10,13 @@ from robospa.geometry import yaw_rotation
 from robospa.tasks.objects import meshes as m
 from robospa.tasks.objects.build import (
     Asset,
-    across,
     box_grasps,
-    feel,
+    collision,
     model,
-    paint,
     round_grasps,
     srgb,
+    top_grasp,
+    visual,
 )
 from robospa.tasks.shapes import Box, Grasp, Mesh, ObjectModel, Params, Shape
 
@@ -46,12 +46,12 @@ def _loaf() -> Made:
     ends = [m.upright(inner, (0.0, s * 0.0404, 0.0), s * math.pi / 2) for s in (-1, 1)]
     scores = [_stroke(0.012, 0.0022, 0.0, y, 0.0446) for y in (-0.024, -0.008, 0.008, 0.024)]
     shapes = [
-        feel(m.front_prism(section, 0.040, -0.040)),
-        paint(m.front_prism(section, 0.040, -0.040), CRUST, roughness=0.8),
-        paint(m.merge(*ends), CRUMB, roughness=0.9),
-        paint(m.merge(*scores), GOLD, roughness=0.9),
+        collision(m.front_prism(section, 0.040, -0.040)),
+        visual(m.front_prism(section, 0.040, -0.040), CRUST, roughness=0.8),
+        visual(m.merge(*ends), CRUMB, roughness=0.9),
+        visual(m.merge(*scores), GOLD, roughness=0.9),
     ]
-    return shapes, (across((0.0, 0.0, 0.022), 0.0475),)
+    return shapes, (top_grasp((0.0, 0.0, 0.022), 0.0475),)
 
 
 def _stroke(hx: float, hy: float, x: float, y: float, z: float, turn: float = 0.0) -> Mesh:
@@ -104,9 +104,9 @@ def _bun(
 ) -> list[Shape]:  # fmt: skip
     body = m.pillow(_dome(rx, ry, h), 16, power)
     return [
-        feel(body),
-        paint(body, crust, roughness=0.75),
-        paint(m.merge(*cuts), pale, roughness=0.9),
+        collision(body),
+        visual(body, crust, roughness=0.75),
+        visual(m.merge(*cuts), pale, roughness=0.9),
     ]
 
 
@@ -119,7 +119,7 @@ def _roll() -> Made:
 def _baguette() -> Made:
     rx, ry, h = 0.0180, 0.0470, 0.030
     cuts = [_slash(rx, ry, h, 0.0, y, 0.024, 0.0065, 0.9) for y in (-0.027, -0.009, 0.009, 0.027)]
-    return _bun(rx, ry, h, CRUST, cuts, CRUMB, 0.85), (across((0.0, 0.0, 0.013), 2 * rx),)
+    return _bun(rx, ry, h, CRUST, cuts, CRUMB, 0.85), (top_grasp((0.0, 0.0, 0.013), 2 * rx),)
 
 
 def _croissant() -> Made:
@@ -135,14 +135,14 @@ def _croissant() -> Made:
         part = m.moved(m.pillow(sections, 8), at, yaw_rotation(a - math.pi / 2))
         (golden if i % 2 else brown).append(part)
         if i in (1, 3, 5):
-            shapes.append(feel(part))
+            shapes.append(collision(part))
     middle = [(0.0105, 0.0162, 0.0), (0.0105, 0.0162, 0.026)]
-    shapes.append(feel(m.moved(m.pillow(middle, 10), (0.0, bend - 0.021, 0.0))))
+    shapes.append(collision(m.moved(m.pillow(middle, 10), (0.0, bend - 0.021, 0.0))))
     shapes += [
-        paint(m.merge(*golden), srgb("#d18a35"), roughness=0.5),
-        paint(m.merge(*brown), srgb("#a9611f"), roughness=0.5),
+        visual(m.merge(*golden), srgb("#d18a35"), roughness=0.5),
+        visual(m.merge(*brown), srgb("#a9611f"), roughness=0.5),
     ]
-    grasp = across((0.0, bend - 0.021, 0.014), 0.0324, math.pi / 2)
+    grasp = top_grasp((0.0, bend - 0.021, 0.014), 0.0324, math.pi / 2)
     return shapes, (grasp,)
 
 
@@ -156,10 +156,10 @@ def _toast() -> Made:
     inner = [(x * 0.88, y * 0.88) for x, y in outline]
     height = 0.014
     shapes = [
-        feel(Box((0.026, 0.029, height / 2)), (0.0, 0.0, height / 2)),
-        paint(m.prism(outline, 0.0, height), CRUST, roughness=0.9),
-        paint(m.flat(inner, height + 0.0004), CRUMB, roughness=0.95),
-        paint(m.flat(m.ellipse(0.012, 0.011, 9, 0.3), height + 0.0008), srgb("#e3b876")),
+        collision(Box((0.026, 0.029, height / 2)), (0.0, 0.0, height / 2)),
+        visual(m.prism(outline, 0.0, height), CRUST, roughness=0.9),
+        visual(m.flat(inner, height + 0.0004), CRUMB, roughness=0.95),
+        visual(m.flat(m.ellipse(0.012, 0.011, 9, 0.3), height + 0.0008), srgb("#e3b876")),
     ]
     return shapes, box_grasps(0.026, 0.029, 0.008, 0.5)
 
@@ -167,14 +167,14 @@ def _toast() -> Made:
 def _rye() -> Made:
     rx, ry, h = 0.0275, 0.0425, 0.036
     cuts = [_slash(rx, ry, h, 0.0, y, 0.038, 0.0055, 0.0) for y in (-0.022, -0.0075, 0.0075, 0.022)]
-    return _bun(rx, ry, h, DARK_CRUST, cuts, FLOUR), (across((0.0, 0.0, 0.014), 2 * rx),)
+    return _bun(rx, ry, h, DARK_CRUST, cuts, FLOUR), (top_grasp((0.0, 0.0, 0.014), 2 * rx),)
 
 
 def _long_bun() -> Made:
     rx, ry, h = 0.0205, 0.0430, 0.032
     cut = _slash(rx, ry, h, 0.0, 0.0, 0.066, 0.008, math.pi / 2)
     shapes = _bun(rx, ry, h, srgb("#d98f3d"), [cut], FLOUR, 0.8)
-    return shapes, (across((0.0, 0.0, 0.013), 2 * rx),)
+    return shapes, (top_grasp((0.0, 0.0, 0.013), 2 * rx),)
 
 
 BREADS: tuple[tuple[Callable[[], Made], tuple[str, ...]], ...] = (

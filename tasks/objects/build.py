@@ -27,9 +27,6 @@ from robospa.tasks.shapes import (
     Sphere,
 )
 
-Parts = Sequence[Shape]
-Look = Params
-
 UPRIGHT: Quat = (1.0, 0.0, 0.0, 0.0)
 ALONG_X: Quat = (math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0)
 """Turns a cylinder's axis from z to x."""
@@ -43,12 +40,12 @@ MAX_WIDTH = 0.07
 
 @dataclass(frozen=True)
 class Asset:
-    """How one asset is made: the number of its looks, and `build(look, params)`.
+    """An asset: how many looks it has, and `build(look, params)`, which makes its model.
 
     `params` are the allowed names of further parameters.
     """
 
-    looks: int
+    look_count: int
     build: Callable[[int, Params], ObjectModel]
     params: frozenset[str] = frozenset()
 
@@ -82,7 +79,14 @@ def colour(name: str) -> Color:
     return PALETTE[name]
 
 
-def paint(
+def three_numbers(value: object, what: str) -> Vec3:
+    """Three floats of a parameter's JSON value; ValueError, naming `what`, for anything else."""
+    if not isinstance(value, list | tuple) or len(value) != 3:
+        raise ValueError(f"{what} must be three numbers, not {value!r}")
+    return (float(value[0]), float(value[1]), float(value[2]))
+
+
+def visual(
     geometry: Geometry,
     color: Color,
     at: Vec3 = (0.0, 0.0, 0.0),
@@ -90,12 +94,12 @@ def paint(
     roughness: float = 0.5,
     metallic: float = 0.0,
 ) -> Shape:
-    """A piece that is seen but not felt."""
+    """A shape that is only drawn: nothing collides with it."""
     return Shape(geometry, Pose(at, rotation), color, True, False, roughness, metallic)
 
 
-def feel(geometry: Geometry, at: Vec3 = (0.0, 0.0, 0.0), rotation: Quat = UPRIGHT) -> Shape:
-    """A piece that is felt but not seen."""
+def collision(geometry: Geometry, at: Vec3 = (0.0, 0.0, 0.0), rotation: Quat = UPRIGHT) -> Shape:
+    """A shape that only collides: it is not drawn."""
     return Shape(geometry, Pose(at, rotation), visual=False)
 
 
@@ -107,7 +111,7 @@ def solid(
     roughness: float = 0.5,
     metallic: float = 0.0,
 ) -> Shape:
-    """A piece that is seen and felt."""
+    """A shape that is drawn and collides."""
     return Shape(geometry, Pose(at, rotation), color, True, True, roughness, metallic)
 
 
@@ -139,14 +143,14 @@ def _ball(sphere: Sphere) -> Array:
     return np.asarray(rows) * sphere.radius
 
 
-def _up(value: float, digits: int = 4) -> float:
+def _round_up(value: float, digits: int = 4) -> float:
     """`value` rounded up, so that a bound stays a bound."""
     return math.ceil(value * 10.0**digits - 1e-6) / 10.0**digits
 
 
 def model(
     asset: str,
-    parts: Parts,
+    parts: Sequence[Shape],
     noun: str,
     phrases: Iterable[str],
     grasps: Iterable[Grasp] = (),
@@ -167,8 +171,8 @@ def model(
     return ObjectModel(
         asset=asset,
         shapes=tuple(parts),
-        size=(_up(float(span[0])), _up(float(span[1])), _up(float(span[2]))),
-        radius=_up(float(np.hypot(points[:, 0], points[:, 1]).max())),
+        size=(_round_up(float(span[0])), _round_up(float(span[1])), _round_up(float(span[2]))),
+        radius=_round_up(float(np.hypot(points[:, 0], points[:, 1]).max())),
         noun=noun,
         phrases=tuple(phrases),
         bottom=round(float(points[:, 2].min()), 6),
@@ -180,12 +184,12 @@ def model(
     )
 
 
-def framed(made: ObjectModel, **frames: Pose) -> ObjectModel:
+def with_frames(made: ObjectModel, **frames: Pose) -> ObjectModel:
     """`made` with further named frames, or other ones in place of "press" and "support"."""
     return replace(made, frames={**made.frames, **frames})
 
 
-def across(
+def top_grasp(
     point: Vec3, width: float, angle: float = 0.0, tilt: float = 0.7, approach: Vec3 = DOWN
 ) -> Grasp:
     """A grasp from above whose fingers close along the direction `angle` [rad] about z."""
@@ -197,9 +201,9 @@ def box_grasps(hx: float, hy: float, z: float, tilt: float = 0.7) -> tuple[Grasp
     """Grasps of an upright box of half sizes `hx`, `hy` with the fingertips at height `z`."""
     found = []
     if 2 * hx <= MAX_WIDTH:
-        found.append(across((0.0, 0.0, z), 2 * hx, 0.0, tilt))
+        found.append(top_grasp((0.0, 0.0, z), 2 * hx, 0.0, tilt))
     if 2 * hy <= MAX_WIDTH:
-        found.append(across((0.0, 0.0, z), 2 * hy, math.pi / 2, tilt))
+        found.append(top_grasp((0.0, 0.0, z), 2 * hy, math.pi / 2, tilt))
     return tuple(found)
 
 
@@ -208,7 +212,7 @@ def round_grasps(
 ) -> tuple[Grasp, ...]:
     """Grasps of something round, `width` thick at height `z`, closing every pi / `count`."""
     return tuple(
-        across((0.0, 0.0, z), width, start + math.pi * i / count, tilt) for i in range(count)
+        top_grasp((0.0, 0.0, z), width, start + math.pi * i / count, tilt) for i in range(count)
     )
 
 
@@ -239,7 +243,7 @@ def rim_grasps(
 def wall_ring(
     inner: float, thickness: float, low: float, high: float, count: int = 8, lean: float = 0.0
 ) -> list[Shape]:
-    """Felt walls of something round: `count` boxes around `inner`, leaning out by `lean` [rad]."""
+    """Collision boxes of a round wall: `count` around `inner`, leaning by `lean` [rad]."""
     pieces = []
     middle = inner + thickness / 2
     half_width = (inner + thickness) * math.tan(math.pi / count)
@@ -250,10 +254,10 @@ def wall_ring(
         rotation = (Pose((0.0, 0.0, 0.0), turn) * Pose((0.0, 0.0, 0.0), tip)).rotation
         at = (middle * math.cos(a), middle * math.sin(a), (low + high) / 2)
         box = Box((thickness / 2, half_width, (high - low) / 2 / math.cos(lean)))
-        pieces.append(feel(box, at, rotation))
+        pieces.append(collision(box, at, rotation))
     return pieces
 
 
-def named(adjective: str, *patterns: str) -> tuple[str, ...]:
-    """`patterns` with `{}` replaced by `adjective`."""
+def fill_phrases(adjective: str, *patterns: str) -> tuple[str, ...]:
+    """The noun phrases `patterns` with `{}` replaced by `adjective`."""
     return tuple(p.format(adjective) for p in patterns)

@@ -9,14 +9,14 @@ from robospa.tasks.objects.build import (
     PAPER,
     STEEL,
     Asset,
-    across,
+    collision,
     colour,
-    feel,
+    fill_phrases,
     model,
-    named,
-    paint,
     round_grasps,
     srgb,
+    top_grasp,
+    visual,
 )
 from robospa.tasks.shapes import Cylinder, Mesh, ObjectModel, Params, Shape
 
@@ -51,15 +51,15 @@ def sauce_can(look: int, params: Params) -> ObjectModel:
         (r - 0.0025, h - 0.003),
     ]
     parts = [
-        feel(Cylinder(r, h / 2), (0.0, 0.0, h / 2)),
-        paint(m.lathe(rim, 16), STEEL, roughness=0.3, metallic=0.5),
-        paint(m.lathe([(r, 0.008), (r, h - 0.008)], 16, False), colour(base), roughness=0.6),
-        paint(around(m.ellipse(0.020, 0.019, 12), r + 0.0006, h / 2), srgb(field)),
-        paint(around(m.ellipse(0.0125, 0.0115, 10), r + 0.0013, h / 2 - 0.002), srgb(mark)),
-        paint(around(_sprig(), r + 0.0017, h / 2 + 0.008), colour("green")),
-        paint(_pull_ring(0.010, h - 0.0024), srgb("#8d9298"), roughness=0.3, metallic=0.4),
+        collision(Cylinder(r, h / 2), (0.0, 0.0, h / 2)),
+        visual(m.lathe(rim, 16), STEEL, roughness=0.3, metallic=0.5),
+        visual(m.lathe([(r, 0.008), (r, h - 0.008)], 16, False), colour(base), roughness=0.6),
+        visual(around(m.ellipse(0.020, 0.019, 12), r + 0.0006, h / 2), srgb(field)),
+        visual(around(m.ellipse(0.0125, 0.0115, 10), r + 0.0013, h / 2 - 0.002), srgb(mark)),
+        visual(around(_sprig(), r + 0.0017, h / 2 + 0.008), colour("green")),
+        visual(_pull_ring(0.010, h - 0.0024), srgb("#8d9298"), roughness=0.3, metallic=0.4),
     ]
-    phrases = named(
+    phrases = fill_phrases(
         word, "{} sauce can", "{} tin of sauce", "can of sauce with a {} label", "{} sauce tin",
         "sauce can wrapped in {}", "{}-labelled can of sauce",
     )  # fmt: skip
@@ -93,13 +93,13 @@ def can(look: int, params: Params) -> ObjectModel:
     top = [(r - 0.001, h - 0.012), (r - 0.0055, h - 0.003), (r - 0.005, h), (r - 0.0068, h)]
     top += [(r - 0.0075, h - 0.003)]
     parts = [
-        feel(Cylinder(r, h / 2), (0.0, 0.0, h / 2)),
-        paint(m.lathe(body, 16, False), colour(base), roughness=0.35, metallic=0.2),
-        paint(m.merge(m.lathe(bottom, 16), m.lathe(top, 16)), STEEL, roughness=0.3, metallic=0.5),
-        paint(_sign(sign, r, h), colour(mark), roughness=0.4),
-        paint(_tab(h - 0.0026), srgb("#7f858c"), roughness=0.3, metallic=0.4),
+        collision(Cylinder(r, h / 2), (0.0, 0.0, h / 2)),
+        visual(m.lathe(body, 16, False), colour(base), roughness=0.35, metallic=0.2),
+        visual(m.merge(m.lathe(bottom, 16), m.lathe(top, 16)), STEEL, roughness=0.3, metallic=0.5),
+        visual(_sign(sign, r, h), colour(mark), roughness=0.4),
+        visual(_tab(h - 0.0026), srgb("#7f858c"), roughness=0.3, metallic=0.4),
     ]
-    phrases = named(
+    phrases = fill_phrases(
         base, "{} drink can", "{} soda can", "can in {}", "{} can", "{} beverage can",
         "{} aluminium can", "can of soda with a {} body",
     )  # fmt: skip
@@ -156,15 +156,15 @@ def bottle(look: int, params: Params) -> ObjectModel:
     body = [(r - 0.003, 0.0), (r, 0.003), (r, 0.078), (r * 0.82, 0.093), (0.0105, 0.108)]
     body += [(0.0095, 0.122)]
     parts = [
-        feel(Cylinder(r, 0.042), (0.0, 0.0, 0.042)),
-        feel(m.lathe([(r * 0.95, 0.084), (0.0125, 0.107)], 10)),
-        feel(Cylinder(0.01225, 0.0155), (0.0, 0.0, h - 0.0155)),
-        paint(m.lathe(body, 16), srgb(glass), roughness=0.15),
-        paint(m.lathe([(r + 0.0004, 0.028), (r + 0.0004, 0.068)], 16, False), colour(label)),
-        paint(around(m.ellipse(0.0105, 0.0135, 10), r + 0.0011, 0.048), _emblem(label)),
-        paint(_cap(0.0122, 0.118, h), colour(cap), roughness=0.4),
+        collision(Cylinder(r, 0.042), (0.0, 0.0, 0.042)),
+        collision(m.lathe([(r * 0.95, 0.084), (0.0125, 0.107)], 10)),
+        collision(Cylinder(0.01225, 0.0155), (0.0, 0.0, h - 0.0155)),
+        visual(m.lathe(body, 16), srgb(glass), roughness=0.15),
+        visual(m.lathe([(r + 0.0004, 0.028), (r + 0.0004, 0.068)], 16, False), colour(label)),
+        visual(around(m.ellipse(0.0105, 0.0135, 10), r + 0.0011, 0.048), _emblem(label)),
+        visual(_cap(0.0122, 0.118, h), colour(cap), roughness=0.4),
     ]
-    phrases = named(
+    phrases = fill_phrases(
         word, "{} bottle", "{} drink bottle", "bottle in {}", "{} plastic bottle",
         "{} bottle with a cap", "tall {} bottle",
     )  # fmt: skip
@@ -198,13 +198,13 @@ def pill_bottle(look: int, params: Params) -> ObjectModel:
     cross = m.rectangle(0.0024, 0.0075), m.rectangle(0.0075, 0.0024)
     print_color = srgb("#c8202a") if word != "orange" else srgb("#1f55c4")
     parts = [
-        feel(Cylinder(r, h / 2), (0.0, 0.0, h / 2)),
-        paint(m.lathe(body, 16), srgb(shell), roughness=0.2),
-        paint(m.lathe([(r + 0.0004, 0.009), (r + 0.0004, 0.030)], 16, False), label),
-        paint(m.merge(*(around(c, r + 0.0009, 0.0195) for c in cross)), print_color),
-        paint(_ribbed(r - 0.0022, 0.053, h), colour(cap), roughness=0.5),
+        collision(Cylinder(r, h / 2), (0.0, 0.0, h / 2)),
+        visual(m.lathe(body, 16), srgb(shell), roughness=0.2),
+        visual(m.lathe([(r + 0.0004, 0.009), (r + 0.0004, 0.030)], 16, False), label),
+        visual(m.merge(*(around(c, r + 0.0009, 0.0195) for c in cross)), print_color),
+        visual(_ribbed(r - 0.0022, 0.053, h), colour(cap), roughness=0.5),
     ]
-    phrases = named(
+    phrases = fill_phrases(
         word, "{} pill bottle", "{} medicine bottle", "{} bottle of pills", "pill bottle in {}",
         "small {} medicine bottle", "{} pill container",
     )  # fmt: skip
@@ -246,7 +246,10 @@ def glue(look: int, params: Params) -> ObjectModel:
     if kind == "stick":
         grasps = round_grasps(width, z, tilt)
     else:
-        grasps = (across((0.0, 0.0, z), width, math.pi / 2, tilt), across((0.0, 0.0, z), 0.046))
+        grasps = (
+            top_grasp((0.0, 0.0, z), width, math.pi / 2, tilt),
+            top_grasp((0.0, 0.0, z), 0.046),
+        )
     return model("glue", shapes, "glue", phrases, grasps, mass=0.04)
 
 
@@ -256,11 +259,11 @@ def _glue_stick(base: str, cap: str) -> tuple[list[Shape], float, float, float]:
     label = around(m.rectangle(0.0085, 0.014), r - 0.0007, 0.030)
     drop = around(_drop(0.0075), r - 0.0001, 0.030)
     parts = [
-        feel(Cylinder(r, h / 2), (0.0, 0.0, h / 2)),
-        paint(m.lathe(profile, 14), colour(base)),
-        paint(_cap(r, 0.053, h), colour(cap)),
-        paint(label, PAPER),
-        paint(drop, srgb("#c8202a") if base != "red" else srgb("#1f55c4")),
+        collision(Cylinder(r, h / 2), (0.0, 0.0, h / 2)),
+        visual(m.lathe(profile, 14), colour(base)),
+        visual(_cap(r, 0.053, h), colour(cap)),
+        visual(label, PAPER),
+        visual(drop, srgb("#c8202a") if base != "red" else srgb("#1f55c4")),
     ]
     return parts, 2 * r, 0.048, 1.0
 
@@ -276,12 +279,12 @@ def _glue_bottle(base: str, tip: str) -> tuple[list[Shape], float, float, float]
     ]
     panel = colour("blue") if base == "white" else PAPER
     parts = [
-        feel(m.pillow(levels[:3], 12, 0.7)),
-        feel(Cylinder(0.006, 0.0175), (0.0, 0.0, 0.0805)),
-        paint(m.pillow(levels, 16, 0.7), colour(base)),
-        paint(m.lathe(nozzle, 10), colour(tip)),
-        paint(m.merge(*sides), panel),
-        paint(m.merge(*signs), PAPER if base == "white" else colour("red")),
+        collision(m.pillow(levels[:3], 12, 0.7)),
+        collision(Cylinder(0.006, 0.0175), (0.0, 0.0, 0.0805)),
+        visual(m.pillow(levels, 16, 0.7), colour(base)),
+        visual(m.lathe(nozzle, 10), colour(tip)),
+        visual(m.merge(*sides), panel),
+        visual(m.merge(*signs), PAPER if base == "white" else colour("red")),
     ]
     return parts, 2 * ry, 0.036, 0.8
 

@@ -9,17 +9,17 @@ from robospa.tasks.objects import meshes as m
 from robospa.tasks.objects.build import (
     STEEL,
     Asset,
-    across,
+    collision,
     colour,
-    feel,
-    framed,
+    fill_phrases,
     model,
-    named,
-    paint,
     rim_grasps,
     round_grasps,
     srgb,
+    top_grasp,
+    visual,
     wall_ring,
+    with_frames,
 )
 from robospa.tasks.shapes import Box, Color, Cylinder, Mesh, ObjectModel, Params, Shape
 
@@ -48,16 +48,16 @@ def bowl(look: int, params: Params) -> ObjectModel:
     ring = [(0.0557, 0.0325), (0.0574, 0.0395)]
     inside = [(0.0538, 0.0425), (0.0522, 0.0365)]
     parts = [
-        paint(m.lathe([(0.0, 0.0), *outer], 18, False), colour(outside), roughness=0.25),
-        paint(m.lathe([outer[-1], inner[0]], 18, False), colour(stripe), roughness=0.25),
-        paint(m.lathe(inner, 18, False), lining, roughness=0.25),
-        paint(m.lathe(ring, 18, False), colour(stripe), roughness=0.25),
-        paint(m.lathe(inside, 18, False), colour(stripe), roughness=0.25),
-        feel(Cylinder(0.030, 0.0035), (0.0, 0.0, 0.0035)),
+        visual(m.lathe([(0.0, 0.0), *outer], 18, False), colour(outside), roughness=0.25),
+        visual(m.lathe([outer[-1], inner[0]], 18, False), colour(stripe), roughness=0.25),
+        visual(m.lathe(inner, 18, False), lining, roughness=0.25),
+        visual(m.lathe(ring, 18, False), colour(stripe), roughness=0.25),
+        visual(m.lathe(inside, 18, False), colour(stripe), roughness=0.25),
+        collision(Cylinder(0.030, 0.0035), (0.0, 0.0, 0.0035)),
         *wall_ring(0.0407, 0.004, 0.007, 0.026, 12, 0.77),
         *wall_ring(0.0520, 0.004, 0.0245, h, 12, BOWL_LEAN),
     ]
-    phrases = named(
+    phrases = fill_phrases(
         word, "{} bowl", "{} soup bowl", "bowl in {}", "round {} bowl", "{} cereal bowl",
         "bowl that is {} on the outside", "{} ceramic bowl",
     )  # fmt: skip
@@ -66,7 +66,7 @@ def bowl(look: int, params: Params) -> ObjectModel:
         "bowl", parts, "bowl", phrases, grasps, 0.06, 0.8,
         support=(0.0, 0.0, 0.007), press=(0.0, 0.0, 0.007),
     )  # fmt: skip
-    return framed(made, nest=Pose((0.0, 0.0, BOWL_NEST)))
+    return with_frames(made, nest=Pose((0.0, 0.0, BOWL_NEST)))
 
 
 MUGS = (
@@ -90,29 +90,29 @@ def mug(look: int, params: Params) -> ObjectModel:
     ]
     glaze = colour("white") if base != "white" else colour("cream")
     parts = [
-        paint(m.lathe([(0.0, 0.0), *outer], 18, False), colour(base), roughness=0.25),
-        paint(m.lathe([(r, h), (inside, h)], 18, False), colour(base), roughness=0.25),
-        paint(m.lathe(inner[1:], 18, False), glaze, roughness=0.25),
-        paint(m.lathe([(r + 0.0004, 0.050), (r + 0.0004, 0.058)], 18, False), colour(mark)),
-        paint(m.tube(arc, 0.0045, 6), colour(base), roughness=0.25),
-        feel(Cylinder(0.0285, 0.003), (0.0, 0.0, 0.003)),
+        visual(m.lathe([(0.0, 0.0), *outer], 18, False), colour(base), roughness=0.25),
+        visual(m.lathe([(r, h), (inside, h)], 18, False), colour(base), roughness=0.25),
+        visual(m.lathe(inner[1:], 18, False), glaze, roughness=0.25),
+        visual(m.lathe([(r + 0.0004, 0.050), (r + 0.0004, 0.058)], 18, False), colour(mark)),
+        visual(m.tube(arc, 0.0045, 6), colour(base), roughness=0.25),
+        collision(Cylinder(0.0285, 0.003), (0.0, 0.0, 0.003)),
         *wall_ring(inside, 0.0035, 0.0, h),
-        feel(Box((0.009, 0.004, 0.004)), (0.0385, 0.0, 0.054)),
-        feel(Box((0.0035, 0.004, 0.023)), (0.051, 0.0, 0.035)),
-        feel(Box((0.009, 0.004, 0.004)), (0.0385, 0.0, 0.016)),
+        collision(Box((0.009, 0.004, 0.004)), (0.0385, 0.0, 0.054)),
+        collision(Box((0.0035, 0.004, 0.023)), (0.051, 0.0, 0.035)),
+        collision(Box((0.009, 0.004, 0.004)), (0.0385, 0.0, 0.016)),
     ]
-    phrases = named(
+    phrases = fill_phrases(
         base, "{} mug", "{} coffee mug", "mug in {}", "{} cup with a handle", "{} ceramic mug",
         "{} tea mug",
     )  # fmt: skip
     phrases = (*phrases[:4], f"{base} mug with a {mark} stripe", *phrases[4:])
-    body = [across((0.0, 0.0, 0.040), 2 * r, k * math.pi / 4, 0.8) for k in (2, 1, 3)]
+    body = [top_grasp((0.0, 0.0, 0.040), 2 * r, k * math.pi / 4, 0.8) for k in (2, 1, 3)]
     rims = rim_grasps((r + inside) / 2, 0.0035, 0.058, 8)
     made = model(
         "mug", parts, "mug", phrases, [*body, *rims[1:]], 0.06, 0.8,
         support=(0.0, 0.0, 0.006), press=(0.0, 0.0, 0.006),
     )  # fmt: skip
-    return framed(made, handle=Pose((0.0386, 0.0, 0.035)))
+    return with_frames(made, handle=Pose((0.0386, 0.0, 0.035)))
 
 
 BASKETS = (
@@ -141,16 +141,16 @@ def bread_basket(look: int, params: Params) -> ObjectModel:
         path = [(middle * x, middle * y, h) for x, y in ends]
         weave[dark if i % 2 else pale].append(m.tube(path, 0.0042, 4))
     parts = [
-        paint(m.merge(*weave[dark]), srgb(dark), roughness=0.9),
-        paint(m.merge(*weave[pale]), srgb(pale), roughness=0.9),
-        paint(
+        visual(m.merge(*weave[dark]), srgb(dark), roughness=0.9),
+        visual(m.merge(*weave[pale]), srgb(pale), roughness=0.9),
+        visual(
             m.lathe([(inside, h - 0.012), (inside, floor), (0.0, floor)], 20, False), colour(cloth)
         ),
-        paint(m.lathe([(inside, h), (inside, h - 0.012)], 20, False), srgb(dark), roughness=0.9),
-        feel(Cylinder(0.077, floor / 2), (0.0, 0.0, floor / 2)),
+        visual(m.lathe([(inside, h), (inside, h - 0.012)], 20, False), srgb(dark), roughness=0.9),
+        collision(Cylinder(0.077, floor / 2), (0.0, 0.0, floor / 2)),
         *wall_ring(inside, 0.005, 0.0, h, 16),
     ]
-    phrases = named(
+    phrases = fill_phrases(
         word, "{} bread basket", "{} basket", "{} wicker basket", "basket for bread in {}",
         "round {} basket",
     )  # fmt: skip
@@ -180,22 +180,22 @@ def dustbin(look: int, params: Params) -> ObjectModel:
     well = [[(x, y, h) for x, y in inner], [(x, y, floor) for x, y in inner]]
     band = [[(x, y, h - 0.05) for x, y in outer], [(x, y, h) for x, y in outer]]
     parts = [
-        paint(m.loft(rings, False), srgb(shell), roughness=0.6),
-        paint(m.loft(band, False), srgb(dark), roughness=0.6),
-        paint(m.loft(lip, False), srgb(dark), roughness=0.6),
-        paint(m.loft(well, False), srgb("#2b2e32"), roughness=0.8),
-        paint(m.flat(inner, floor), srgb("#3a3e43"), roughness=0.8),
-        paint(_recycling(hx, h), colour("white")),
-        feel(Box((hx * foot, hy * foot, floor / 2)), (0.0, 0.0, floor / 2)),
+        visual(m.loft(rings, False), srgb(shell), roughness=0.6),
+        visual(m.loft(band, False), srgb(dark), roughness=0.6),
+        visual(m.loft(lip, False), srgb(dark), roughness=0.6),
+        visual(m.loft(well, False), srgb("#2b2e32"), roughness=0.8),
+        visual(m.flat(inner, floor), srgb("#3a3e43"), roughness=0.8),
+        visual(_recycling(hx, h), colour("white")),
+        collision(Box((hx * foot, hy * foot, floor / 2)), (0.0, 0.0, floor / 2)),
     ]
     for sign in (-1.0, 1.0):
         half = (h - floor) / 2
         at_x = (sign * (hx - wall / 2), 0.0, floor + half)
         at_y = (0.0, sign * (hy - wall / 2), floor + half)
-        parts.append(feel(Box((wall / 2, hy, half)), at_x))
-        parts.append(feel(Box((hx, wall / 2, half)), at_y))
-    parts.append(feel(Box((hx - wall, hy - wall, 0.02)), (0.0, 0.0, floor - 0.02)))
-    phrases = named(
+        parts.append(collision(Box((wall / 2, hy, half)), at_x))
+        parts.append(collision(Box((hx, wall / 2, half)), at_y))
+    parts.append(collision(Box((hx - wall, hy - wall, 0.02)), (0.0, 0.0, floor - 0.02)))
+    phrases = fill_phrases(
         word, "{} dustbin", "{} trash bin", "{} waste bin", "dustbin in {}", "open {} bin",
         "{} rubbish bin", "{} garbage bin",
     )  # fmt: skip
@@ -244,15 +244,15 @@ def cover(look: int, params: Params) -> ObjectModel:
     knob += [(0.0112, top + 0.019), (0.0085, top + 0.024), (0.0, top + 0.025)]
     ring = [(r + 0.0037, 0.004), (r + 0.0037, 0.010)]
     parts: list[Shape] = [
-        paint(m.lathe(outer, 18, False), shell, roughness=0.35, metallic=metallic),
-        paint(m.lathe(inner, 18, False), trim, roughness=0.8),
-        paint(m.lathe(knob, 14, False), trim, roughness=0.4),
-        paint(m.lathe(ring, 18, False), trim, roughness=0.5),
-        feel(Cylinder(0.0285, (top - hollow) / 2), (0.0, 0.0, (top + hollow) / 2)),
-        feel(Cylinder(0.0112, 0.0125), (0.0, 0.0, top + 0.0125)),
+        visual(m.lathe(outer, 18, False), shell, roughness=0.35, metallic=metallic),
+        visual(m.lathe(inner, 18, False), trim, roughness=0.8),
+        visual(m.lathe(knob, 14, False), trim, roughness=0.4),
+        visual(m.lathe(ring, 18, False), trim, roughness=0.5),
+        collision(Cylinder(0.0285, (top - hollow) / 2), (0.0, 0.0, (top + hollow) / 2)),
+        collision(Cylinder(0.0112, 0.0125), (0.0, 0.0, top + 0.0125)),
         *wall_ring(r, 0.0033, 0.0, hollow, 12),
     ]
-    phrases = named(
+    phrases = fill_phrases(
         word, "{} cover", "{} lid", "{} dome", "cover in {}", "{} cup turned upside down",
         "{} cover with a knob", "{} domed lid",
     )  # fmt: skip

@@ -13,14 +13,14 @@ from robospa.tasks.objects.build import (
     DARK,
     STEEL,
     Asset,
-    across,
+    collision,
     colour,
-    feel,
+    fill_phrases,
     model,
-    named,
-    paint,
     round_grasps,
     srgb,
+    top_grasp,
+    visual,
 )
 from robospa.tasks.shapes import Box, Cylinder, Mesh, ObjectModel, Params, Shape
 
@@ -51,21 +51,21 @@ def stapler(look: int, params: Params) -> ObjectModel:
     ]
     stripe = m.flat(m.rectangle(0.0016, 0.0135, 0.0, -0.006), 0.0390)
     parts = [
-        feel(Box((w, 0.0412, 0.0035)), (0.0, 0.0, 0.0035)),
-        feel(m.side_prism(arm, w)),
-        feel(Box((w, 0.006, 0.008)), (0.0, 0.033, 0.013)),
-        paint(m.slab(0.0124, 0.0415, 0.0075, 0.005, 0.0015), colour(base), roughness=0.5),
-        paint(m.side_prism(rail, 0.0078), STEEL, roughness=0.3, metallic=0.5),
-        paint(_rounded_arm(arm, w), colour(top), roughness=0.3),
-        paint(m.merge(*ridges, stripe), colour(base) if base != "black" else srgb("#3a3c42")),
-        paint(m.prism(m.rectangle(0.0062, 0.0045, 0.0, -0.034), 0.0074, 0.0084), STEEL),
-        paint(Cylinder(0.0048, 0.0128), STEEL, (0.0, 0.0345, 0.0165), ALONG_X, 0.3, 0.4),
+        collision(Box((w, 0.0412, 0.0035)), (0.0, 0.0, 0.0035)),
+        collision(m.side_prism(arm, w)),
+        collision(Box((w, 0.006, 0.008)), (0.0, 0.033, 0.013)),
+        visual(m.slab(0.0124, 0.0415, 0.0075, 0.005, 0.0015), colour(base), roughness=0.5),
+        visual(m.side_prism(rail, 0.0078), STEEL, roughness=0.3, metallic=0.5),
+        visual(_rounded_arm(arm, w), colour(top), roughness=0.3),
+        visual(m.merge(*ridges, stripe), colour(base) if base != "black" else srgb("#3a3c42")),
+        visual(m.prism(m.rectangle(0.0062, 0.0045, 0.0, -0.034), 0.0074, 0.0084), STEEL),
+        visual(Cylinder(0.0048, 0.0128), STEEL, (0.0, 0.0345, 0.0165), ALONG_X, 0.3, 0.4),
     ]
-    phrases = named(
+    phrases = fill_phrases(
         top, "{} stapler", "stapler with a {} top", "{} desk stapler", "stapler in {}",
         "{} paper stapler", "{} office stapler", "small {} stapler",
     )  # fmt: skip
-    grasps = (across((0.0, 0.0, 0.020), 2 * w), across((0.0, 0.012, 0.020), 2 * w))
+    grasps = (top_grasp((0.0, 0.0, 0.020), 2 * w), top_grasp((0.0, 0.012, 0.020), 2 * w))
     return model(
         "stapler", parts, "stapler", phrases, grasps, 0.07, 0.7,
         press=(0.0, -0.026, 0.0385), support=(0.0, -0.010, 0.0385),
@@ -97,22 +97,22 @@ def seal(look: int, params: Params) -> ObjectModel:
     if form == "round":
         foot = m.lathe([(r, 0.0), (r, 0.006)], 18)
         block = m.lathe([(r - 0.001, 0.006), (r - 0.001, 0.0135), (r - 0.004, 0.0155)], 18)
-        under: Shape = feel(Cylinder(r, 0.0077), (0.0, 0.0, 0.0077))
+        under: Shape = collision(Cylinder(r, 0.0077), (0.0, 0.0, 0.0077))
     else:
         foot = m.slab(r - 0.002, r - 0.002, 0.006, 0.002, 0.0, 2)
         block = m.moved(m.slab(r - 0.003, r - 0.003, 0.0095, 0.003, 0.002, 2), (0.0, 0.0, 0.006))
-        under = feel(Box((r - 0.002, r - 0.002, 0.0077)), (0.0, 0.0, 0.0077))
+        under = collision(Box((r - 0.002, r - 0.002, 0.0077)), (0.0, 0.0, 0.0077))
     band = m.lathe([(0.0098, 0.0295), (0.0098, 0.033)], 12, False)
     parts = [
         under,
-        feel(Cylinder(0.0085, 0.011), (0.0, 0.0, 0.026)),
-        feel(m.lathe([(0.0125, 0.037), (0.0150, 0.043), (0.0150, 0.049), (0.0085, h)], 12)),
-        paint(foot, srgb(edge), roughness=0.9),
-        paint(block, srgb(wood), roughness=0.4),
-        paint(m.lathe(handle, 14), srgb(wood), roughness=0.3),
-        paint(band, colour("gold"), roughness=0.3, metallic=0.4),
+        collision(Cylinder(0.0085, 0.011), (0.0, 0.0, 0.026)),
+        collision(m.lathe([(0.0125, 0.037), (0.0150, 0.043), (0.0150, 0.049), (0.0085, h)], 12)),
+        visual(foot, srgb(edge), roughness=0.9),
+        visual(block, srgb(wood), roughness=0.4),
+        visual(m.lathe(handle, 14), srgb(wood), roughness=0.3),
+        visual(band, colour("gold"), roughness=0.3, metallic=0.4),
     ]
-    phrases = named(
+    phrases = fill_phrases(
         word, "{} stamp", "{} hand stamp", "{} seal", "stamp with a {} handle", "{} stamper",
         "{} rubber stamp",
     )  # fmt: skip
@@ -137,19 +137,19 @@ def mouse(look: int, params: Params) -> ObjectModel:
     body = m.pillow(levels, 16, 0.85)
     belt = m.pillow([(0.0207, 0.0377, 0.0045), (0.0203, 0.0370, 0.0085)], 16, 0.85)
     parts = [
-        feel(m.pillow(levels[:5], 14, 0.85)),
-        paint(body, srgb(shell), roughness=0.35),
-        paint(belt, srgb(detail), roughness=0.5),
-        paint(m.merge(*_seams(levels)), srgb(detail)),
-        paint(Cylinder(0.0052, 0.0024), DARK, (0.0, 0.020, 0.0215), ALONG_X),
+        collision(m.pillow(levels[:5], 14, 0.85)),
+        visual(body, srgb(shell), roughness=0.35),
+        visual(belt, srgb(detail), roughness=0.5),
+        visual(m.merge(*_seams(levels)), srgb(detail)),
+        visual(Cylinder(0.0052, 0.0024), DARK, (0.0, 0.020, 0.0215), ALONG_X),
     ]
-    phrases = named(
+    phrases = fill_phrases(
         word, "{} computer mouse", "{} mouse", "mouse in {}", "{} wireless mouse",
         "computer mouse with a {} shell", "{} PC mouse",
     )  # fmt: skip
     grasps = (
-        across((0.0, 0.0, 0.010), 0.0405, 0.0, 0.6),
-        across((0.0, -0.006, 0.010), 0.040, 0.0, 0.6),
+        top_grasp((0.0, 0.0, 0.010), 0.0405, 0.0, 0.6),
+        top_grasp((0.0, -0.006, 0.010), 0.040, 0.0, 0.6),
     )
     return model("mouse", parts, "computer mouse", phrases, grasps, mass=0.06, friction=0.8)
 
@@ -197,14 +197,14 @@ def bell(look: int, params: Params) -> ObjectModel:
     shell = [(r - 0.0005, 0.0085), (r - 0.0005, 0.0115), (r - 0.0025, 0.0180), (r - 0.0075, 0.0247)]
     shell += [(r - 0.0150, 0.0295), (r - 0.0245, 0.0315)]
     parts = [
-        feel(m.lathe([(r, 0.0), (r, 0.0125), *shell[2:]], 16)),
-        feel(Cylinder(0.0065, 0.0065), (0.0, 0.0, h - 0.0065)),
-        paint(m.lathe([(r, 0.0), (r, 0.006), (r - 0.003, 0.0085)], 18), srgb(foot), roughness=0.5),
-        paint(m.lathe(shell, 18), srgb(dome), roughness=0.25, metallic=metallic),
-        paint(m.lathe([(0.0038, 0.031), (0.0038, 0.038)], 8), STEEL, roughness=0.3),
-        paint(m.lathe([(0.0070, 0.037), (0.0073, 0.041), (0.0045, h), (0.0, h)], 12), srgb(foot)),
+        collision(m.lathe([(r, 0.0), (r, 0.0125), *shell[2:]], 16)),
+        collision(Cylinder(0.0065, 0.0065), (0.0, 0.0, h - 0.0065)),
+        visual(m.lathe([(r, 0.0), (r, 0.006), (r - 0.003, 0.0085)], 18), srgb(foot), roughness=0.5),
+        visual(m.lathe(shell, 18), srgb(dome), roughness=0.25, metallic=metallic),
+        visual(m.lathe([(0.0038, 0.031), (0.0038, 0.038)], 8), STEEL, roughness=0.3),
+        visual(m.lathe([(0.0070, 0.037), (0.0073, 0.041), (0.0045, h), (0.0, h)], 12), srgb(foot)),
     ]
-    phrases = named(
+    phrases = fill_phrases(
         word, "{} bell", "{} call bell", "{} desk bell", "bell with a {} dome", "{} service bell",
         "{} reception bell",
     )  # fmt: skip
@@ -240,33 +240,33 @@ def fan(look: int, params: Params) -> ObjectModel:
     at = (0.0, 0.0, z)
     rim = srgb("#c6cbd1") if frame != "black" else srgb("#70757c")
     parts = [
-        feel(Cylinder(0.034, 0.006), (0.0, 0.0, 0.006)),
-        feel(Cylinder(0.008, 0.012), (0.0, 0.0, 0.024)),
-        feel(Cylinder(r, deep), at, ALONG_Y),
-        paint(m.lathe(foot, 18), colour(frame), roughness=0.35),
-        paint(m.lathe([(0.007, 0.012), (0.006, 0.037)], 10), colour(frame), roughness=0.35),
-        paint(hoop, colour(frame), at, ALONG_Y, 0.35),
-        paint(
+        collision(Cylinder(0.034, 0.006), (0.0, 0.0, 0.006)),
+        collision(Cylinder(0.008, 0.012), (0.0, 0.0, 0.024)),
+        collision(Cylinder(r, deep), at, ALONG_Y),
+        visual(m.lathe(foot, 18), colour(frame), roughness=0.35),
+        visual(m.lathe([(0.007, 0.012), (0.006, 0.037)], 10), colour(frame), roughness=0.35),
+        visual(hoop, colour(frame), at, ALONG_Y, 0.35),
+        visual(
             back, srgb("#e4e8ec" if frame == "black" else "#4a5058"), (0.0, 0.003, z), ALONG_Y, 0.8
         ),
-        paint(_blades(), colour(blade), (0.0, -0.004, z), ALONG_Y, 0.4),
-        paint(m.merge(*spokes, guard), rim, at, ALONG_Y, 0.3),
-        paint(
+        visual(_blades(), colour(blade), (0.0, -0.004, z), ALONG_Y, 0.4),
+        visual(m.merge(*spokes, guard), rim, at, ALONG_Y, 0.3),
+        visual(
             m.lathe([(0.0055, 0.0), (0.0055, deep), (0.003, deep + 0.001)], 12),
             colour(frame),
             at,
             ALONG_Y,
         ),
-        paint(m.lathe([(0.004, 0.0), (0.004, 0.002)], 8), colour("red"), (0.0, -0.025, 0.0108)),
+        visual(m.lathe([(0.004, 0.0), (0.004, 0.002)], 8), colour("red"), (0.0, -0.025, 0.0108)),
     ]
-    phrases = named(
+    phrases = fill_phrases(
         frame, "{} fan", "small {} fan", "{} desk fan", "fan with a {} frame", "{} electric fan",
         "{} table fan",
     )  # fmt: skip
     phrases = (*phrases, f"{frame} fan with {blade} blades")
     grasps = (
-        across((0.0, 0.0, z + 0.012), 2 * deep, math.pi / 2, 0.8),
-        across((0.0, 0.0, z), 2 * r, 0.0, 0.5),
+        top_grasp((0.0, 0.0, z + 0.012), 2 * deep, math.pi / 2, 0.8),
+        top_grasp((0.0, 0.0, z), 2 * r, 0.0, 0.5),
     )
     return model("fan", parts, "fan", phrases, grasps, mass=0.06)
 

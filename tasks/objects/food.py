@@ -9,14 +9,14 @@ from robospa.geometry import axis_rotation
 from robospa.tasks.objects import meshes as m
 from robospa.tasks.objects.build import (
     Asset,
-    across,
+    collision,
     colour,
-    feel,
+    fill_phrases,
     model,
-    named,
-    paint,
     round_grasps,
     srgb,
+    top_grasp,
+    visual,
 )
 from robospa.tasks.shapes import Box, Cylinder, Mesh, ObjectModel, Params, Shape
 
@@ -47,15 +47,17 @@ def hamburger(look: int, params: Params) -> ObjectModel:
     square = m.rectangle(0.0238, 0.0238)
     turned = [((x - y) * math.sqrt(0.5), (x + y) * math.sqrt(0.5)) for x, y in square]
     parts = [
-        feel(Cylinder(r, 0.0155), (0.0, 0.0, 0.0155)),
-        feel(m.lathe([(r, 0.031), (r - 0.004, 0.040), (r - 0.013, 0.047), (0.004, 0.050)], 14)),
-        paint(m.lathe(low, 16), srgb(bun), roughness=0.8),
-        paint(_lettuce(r, 0.0125), srgb("#57b030"), roughness=0.8),
-        paint(m.lathe(patty, 14), srgb("#4b2413"), roughness=0.9),
-        paint(m.prism(turned, 0.0225, 0.0245), srgb(cheese), roughness=0.5),
-        paint(m.lathe(tomato, 14), srgb("#cf2a1c"), roughness=0.5),
-        paint(m.lathe(top, 16), srgb(bun), roughness=0.6),
-        paint(_seeds(r), srgb("#fbeecb")),
+        collision(Cylinder(r, 0.0155), (0.0, 0.0, 0.0155)),
+        collision(
+            m.lathe([(r, 0.031), (r - 0.004, 0.040), (r - 0.013, 0.047), (0.004, 0.050)], 14)
+        ),
+        visual(m.lathe(low, 16), srgb(bun), roughness=0.8),
+        visual(_lettuce(r, 0.0125), srgb("#57b030"), roughness=0.8),
+        visual(m.lathe(patty, 14), srgb("#4b2413"), roughness=0.9),
+        visual(m.prism(turned, 0.0225, 0.0245), srgb(cheese), roughness=0.5),
+        visual(m.lathe(tomato, 14), srgb("#cf2a1c"), roughness=0.5),
+        visual(m.lathe(top, 16), srgb(bun), roughness=0.6),
+        visual(_seeds(r), srgb("#fbeecb")),
     ]
     grasps = round_grasps(2 * r, 0.018, 0.6)
     return model("hamburger", parts, "hamburger", phrases, grasps, mass=0.06)
@@ -115,18 +117,18 @@ def french_fries(look: int, params: Params) -> ObjectModel:
         )
     hull = m.loft([low, [(x, y, h - 0.003) for x, y in lip]])
     parts: list[Shape] = [
-        feel(hull),
-        feel(Box((0.024, 0.014, 0.014)), (0.0, 0.0, h + 0.010)),
-        paint(m.merge(carton, underside), colour(base), roughness=0.7),
-        paint(m.merge(*emblem), colour(mark)),
+        collision(hull),
+        collision(Box((0.024, 0.014, 0.014)), (0.0, 0.0, h + 0.010)),
+        visual(m.merge(carton, underside), colour(base), roughness=0.7),
+        visual(m.merge(*emblem), colour(mark)),
         *_sticks(h),
     ]
-    phrases = named(
+    phrases = fill_phrases(
         base, "box of french fries in {}", "{} box of french fries", "french fries in a {} box",
         "{} carton of fries", "fries in a {} carton", "{} packet of french fries",
     )  # fmt: skip
     phrases = (*phrases, f"french fries box with a {mark} spot on {base}")
-    grasps = (across((0.0, 0.0, 0.034), 0.038, math.pi / 2), across((0.0, 0.0, 0.034), 0.055))
+    grasps = (top_grasp((0.0, 0.0, 0.034), 0.038, math.pi / 2), top_grasp((0.0, 0.0, 0.034), 0.055))
     return model("french_fries", parts, "box of french fries", phrases, grasps, mass=0.05)
 
 
@@ -144,7 +146,7 @@ def _sticks(h: float) -> list[Shape]:
             mid = (top + 0.035) / 2
             stick = m.box_mesh((0.0036, 0.0036, (top - 0.035) / 2), (x, y, mid), lean)
             shades[names[(i + 2 * j) % 3]].append(stick)
-    return [paint(m.merge(*p), srgb(c), roughness=0.7) for c, p in shades.items()]
+    return [visual(m.merge(*p), srgb(c), roughness=0.7) for c, p in shades.items()]
 
 
 ASSETS = {

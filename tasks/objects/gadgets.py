@@ -13,13 +13,13 @@ from robospa.tasks.objects.build import (
     PAPER,
     STEEL,
     Asset,
-    across,
+    collision,
     colour,
-    feel,
+    fill_phrases,
     model,
-    named,
-    paint,
     srgb,
+    top_grasp,
+    visual,
 )
 from robospa.tasks.shapes import Box, Cylinder, Mesh, ObjectModel, Params, Shape
 
@@ -46,28 +46,28 @@ def phone(look: int, params: Params) -> ObjectModel:
         for s, y in ((0.005, 0.018), (0.0085, 0.001))
     ]
     parts = [
-        feel(Box((hx, hy, h / 2)), (0.0, 0.0, h / 2)),
-        paint(m.slab(hx, hy, h, 0.006, 0.0015), colour(body), roughness=0.3),
-        paint(
+        collision(Box((hx, hy, h / 2)), (0.0, 0.0, h / 2)),
+        visual(m.slab(hx, hy, h, 0.006, 0.0015), colour(body), roughness=0.3),
+        visual(
             m.flat(m.rounded_rectangle(hx - 0.0018, hy - 0.0018, 0.0045), h + 0.0003),
             srgb("#0c0d10"),
         ),
-        paint(
+        visual(
             m.flat(m.rounded_rectangle(hx - 0.0035, hy - 0.0040, 0.003), h + 0.0006),
             srgb(wall),
             roughness=0.2,
         ),
-        paint(dock, srgb("#dfe5ee")),
-        *(paint(m.merge(*p), srgb(c)) for p, c in zip(icons, ICONS, strict=True)),
-        paint(m.merge(*side), DARK),
+        visual(dock, srgb("#dfe5ee")),
+        *(visual(m.merge(*p), srgb(c)) for p, c in zip(icons, ICONS, strict=True)),
+        visual(m.merge(*side), DARK),
     ]
-    phrases = named(
+    phrases = fill_phrases(
         body, "{} phone", "{} mobile phone", "{} smartphone", "phone in a {} case", "{} cell phone",
         "phone with a {} frame", "{} touchscreen phone",
     )  # fmt: skip
     grasps = (
-        across((0.0, 0.0, 0.006), 2 * hx, 0.0, 0.5),
-        across((0.0, -0.015, 0.006), 2 * hx, 0.0, 0.5),
+        top_grasp((0.0, 0.0, 0.006), 2 * hx, 0.0, 0.5),
+        top_grasp((0.0, -0.015, 0.006), 2 * hx, 0.0, 0.5),
     )
     return model("phone", parts, "phone", phrases, grasps, mass=0.06, friction=0.8)
 
@@ -94,24 +94,24 @@ def remote_control(look: int, params: Params) -> ObjectModel:
     bars = [_key(m.rectangle(0.0016, 0.0042), h, (s * 0.009, 0.0255)) for s in (-1, 1)]
     shade = srgb("#3a3d44") if body == "black" else DARK
     parts = [
-        feel(Box((hx, hy, h / 2)), (0.0, 0.0, h / 2)),
-        paint(m.slab(hx, hy, h, 0.006, 0.0025), colour(body), roughness=0.45),
-        paint(m.merge(*buttons, *bars), srgb(keys), roughness=0.6),
-        paint(pad, srgb(keys) if look % 2 else shade, roughness=0.5),
-        paint(m.flat(ring_in, h + 0.0012, (0.0, 0.0085)), shade if look % 2 else srgb(keys)),
-        paint(_key(m.ellipse(0.0036, 0.0036, 10), h, (0.0, 0.0310)), srgb(power)),
-        paint(
+        collision(Box((hx, hy, h / 2)), (0.0, 0.0, h / 2)),
+        visual(m.slab(hx, hy, h, 0.006, 0.0025), colour(body), roughness=0.45),
+        visual(m.merge(*buttons, *bars), srgb(keys), roughness=0.6),
+        visual(pad, srgb(keys) if look % 2 else shade, roughness=0.5),
+        visual(m.flat(ring_in, h + 0.0012, (0.0, 0.0085)), shade if look % 2 else srgb(keys)),
+        visual(_key(m.ellipse(0.0036, 0.0036, 10), h, (0.0, 0.0310)), srgb(power)),
+        visual(
             m.upright(m.rectangle(0.0075, 0.0035), (0.0, hy + 0.0003, h / 2), math.pi / 2),
             srgb("#400c14"),
         ),
     ]
-    phrases = named(
+    phrases = fill_phrases(
         body, "{} remote control", "{} remote", "{} TV remote", "remote control in {}",
         "{} television remote", "{} remote with buttons", "{} TV control",
     )  # fmt: skip
     grasps = (
-        across((0.0, 0.0, 0.008), 2 * hx, 0.0, 0.6),
-        across((0.0, 0.014, 0.008), 2 * hx, 0.0, 0.6),
+        top_grasp((0.0, 0.0, 0.008), 2 * hx, 0.0, 0.6),
+        top_grasp((0.0, 0.014, 0.008), 2 * hx, 0.0, 0.6),
     )
     return model("remote_control", parts, "remote control", phrases, grasps, mass=0.05)
 
@@ -165,25 +165,25 @@ def alarm_clock(look: int, params: Params) -> ObjectModel:
     )
     trim = colour(metal)
     parts: list[Shape] = [
-        feel(Cylinder(r, deep), at, ALONG_Y),
-        feel(Box((0.025, 0.012, 0.011)), (0.0, 0.0, 0.011)),
-        feel(Box((0.024, 0.010, 0.007)), (0.0, 0.0, z + r)),
-        paint(m.lathe(drum, 22), colour(body), at, ALONG_Y, 0.35),
-        paint(dial, PAPER, at, ALONG_Y),
-        paint(m.merge(*ticks, *hands), DARK, at, ALONG_Y),
-        paint(
+        collision(Cylinder(r, deep), at, ALONG_Y),
+        collision(Box((0.025, 0.012, 0.011)), (0.0, 0.0, 0.011)),
+        collision(Box((0.024, 0.010, 0.007)), (0.0, 0.0, z + r)),
+        visual(m.lathe(drum, 22), colour(body), at, ALONG_Y, 0.35),
+        visual(dial, PAPER, at, ALONG_Y),
+        visual(m.merge(*ticks, *hands), DARK, at, ALONG_Y),
+        visual(
             m.merge(*domes, handle), trim, roughness=0.3, metallic=0.4 if metal != "black" else 0.0
         ),
-        paint(_grounded(m.merge(*legs)), trim, roughness=0.4),
+        visual(_grounded(m.merge(*legs)), trim, roughness=0.4),
     ]
-    phrases = named(
+    phrases = fill_phrases(
         body, "{} alarm clock", "{} clock", "alarm clock in {}", "{} twin-bell alarm clock",
         "round {} alarm clock", "{} clock with two bells",
     )  # fmt: skip
     phrases = (*phrases, f"{body} alarm clock with {metal} bells")
     grasps = (
-        across((0.0, 0.0, z + 0.006), 2 * deep, math.pi / 2, 0.7),
-        across((0.0, 0.0, z), 2 * r, 0.0, 0.5),
+        top_grasp((0.0, 0.0, z + 0.006), 2 * deep, math.pi / 2, 0.7),
+        top_grasp((0.0, 0.0, z), 2 * r, 0.0, 0.5),
     )
     return model("alarm_clock", parts, "alarm clock", phrases, grasps, 0.07)
 
@@ -251,34 +251,34 @@ def toycar(look: int, params: Params) -> ObjectModel:
         m.lathe([(0.0046, -0.0039), (0.0046, 0.0039)], 8),
     )
     parts: list[Shape] = [
-        feel(Box((0.0183, 0.0360, 0.0105)), (0.0, 0.0, 0.0105)),
-        feel(_cabin(0.0210, 0.0350)),
-        paint(m.side_prism(low, w), colour(body), roughness=0.25),
-        paint(glass, srgb("#1d2a3a"), roughness=0.15),
-        paint(m.merge(roof, *posts), colour(body), roughness=0.25),
-        paint(m.merge(*bands), colour(stripe), roughness=0.3),
-        paint(m.merge(*lamps), srgb("#fff3b0")),
-        paint(m.merge(*tails), srgb("#a3101a") if body != "red" else srgb("#ffb0a0")),
-        paint(m.merge(*bumper), STEEL, roughness=0.3, metallic=0.3),
-        paint(
+        collision(Box((0.0183, 0.0360, 0.0105)), (0.0, 0.0, 0.0105)),
+        collision(_cabin(0.0210, 0.0350)),
+        visual(m.side_prism(low, w), colour(body), roughness=0.25),
+        visual(glass, srgb("#1d2a3a"), roughness=0.15),
+        visual(m.merge(roof, *posts), colour(body), roughness=0.25),
+        visual(m.merge(*bands), colour(stripe), roughness=0.3),
+        visual(m.merge(*lamps), srgb("#fff3b0")),
+        visual(m.merge(*tails), srgb("#a3101a") if body != "red" else srgb("#ffb0a0")),
+        visual(m.merge(*bumper), STEEL, roughness=0.3, metallic=0.3),
+        visual(
             m.merge(*(m.moved(tyre, (x, y, 0.0088), ALONG_X) for x, y in wheels)),
             srgb("#18181a"),
             roughness=0.9,
         ),
-        paint(
+        visual(
             m.merge(*(m.moved(hub, (x, y, 0.0088), ALONG_X) for x, y in wheels)),
             srgb("#cfd3d8"),
             roughness=0.3,
         ),
     ]
-    phrases = named(
+    phrases = fill_phrases(
         body, "{} toy car", "{} car", "small {} car", "toy car in {}", "{} model car",
         "{} racing car",
     )  # fmt: skip
     phrases = (*phrases, f"{body} toy car with a {stripe} stripe")
     grasps = (
-        across((0.0, 0.0, 0.012), 0.0366, 0.0, 0.6),
-        across((0.0, 0.010, 0.012), 0.0366, 0.0, 0.6),
+        top_grasp((0.0, 0.0, 0.012), 0.0366, 0.0, 0.6),
+        top_grasp((0.0, 0.010, 0.012), 0.0366, 0.0, 0.6),
     )
     return model("toycar", parts, "toy car", phrases, grasps, 0.05, 0.7)
 

@@ -11,17 +11,17 @@ from robospa.tasks.objects.build import (
     PAPER,
     STEEL,
     Asset,
-    across,
     box_grasps,
+    collision,
     colour,
-    feel,
+    fill_phrases,
     model,
-    named,
-    paint,
     rim_grasps,
     round_grasps,
     solid,
     srgb,
+    top_grasp,
+    visual,
     wall_ring,
 )
 from robospa.tasks.shapes import Box, Cylinder, Mesh, ObjectModel, Params, Shape
@@ -60,21 +60,21 @@ def cup(look: int, params: Params) -> ObjectModel:
             for a, b in ((0.014, 0.020), (0.050, 0.064))
         ]
     parts = [
-        paint(m.lathe(outer, 18, False), colour(base), roughness=0.3),
-        paint(m.lathe([(top, h), inner[0]], 18, False), colour(base), roughness=0.3),
-        paint(m.lathe(inner, 18, False), glaze, roughness=0.3),
-        paint(m.merge(*marks), colour(mark), roughness=0.3),
-        feel(Cylinder(foot, floor / 2), (0.0, 0.0, floor / 2)),
+        visual(m.lathe(outer, 18, False), colour(base), roughness=0.3),
+        visual(m.lathe([(top, h), inner[0]], 18, False), colour(base), roughness=0.3),
+        visual(m.lathe(inner, 18, False), glaze, roughness=0.3),
+        visual(m.merge(*marks), colour(mark), roughness=0.3),
+        collision(Cylinder(foot, floor / 2), (0.0, 0.0, floor / 2)),
         *wall_ring(radius(h / 2) - wall, wall, 0.0005, h - 0.0003, 12, CUP_LEAN),
     ]
     word = {"dots": "dotted", "bands": "striped"}[style]
-    phrases = named(
+    phrases = fill_phrases(
         base, "{} cup", "{} drinking cup", "cup in {}", "{} cup without a handle",
         "{} tumbler", "round {} drinking cup",
     )  # fmt: skip
     phrases = (*phrases[:4], f"{word} {base} cup", *phrases[4:], f"{base} cup with {mark} {style}")
     z = 0.046
-    body = [across((0.0, 0.0, z), 2 * radius(z), k * math.pi / 4, 0.8) for k in (2, 1, 3, 0)]
+    body = [top_grasp((0.0, 0.0, z), 2 * radius(z), k * math.pi / 4, 0.8) for k in (2, 1, 3, 0)]
     rims = rim_grasps(radius(0.064) - wall / 2, wall, 0.064, 8, lean=CUP_LEAN)
     return model(
         "cup", parts, "cup", phrases, [*body, *rims], 0.05, 0.8,
@@ -99,14 +99,14 @@ def apple(look: int, params: Params) -> ObjectModel:
             (0.006, 0.0042)]  # fmt: skip
     turned = m.moved(m.prism(leaf, -0.0004, 0.0004), (0.0, 0.0, 0.0545), (0.96, 0.0, -0.20, 0.20))
     parts = [
-        feel(m.lathe(hull, 16)),
-        paint(m.lathe([*base, *cheek, *crown], 20, False), srgb(skin), roughness=0.3),
-        paint(m.lathe([(0.0072, 0.0518), (0.0, 0.0468)], 12, False), srgb(hollow), roughness=0.6),
-        paint(m.tube([(0.0, 0.0, 0.044), (0.0008, 0.0, 0.054), (0.003, 0.0, 0.060)], 0.0012, 6),
+        collision(m.lathe(hull, 16)),
+        visual(m.lathe([*base, *cheek, *crown], 20, False), srgb(skin), roughness=0.3),
+        visual(m.lathe([(0.0072, 0.0518), (0.0, 0.0468)], 12, False), srgb(hollow), roughness=0.6),
+        visual(m.tube([(0.0, 0.0, 0.044), (0.0008, 0.0, 0.054), (0.003, 0.0, 0.060)], 0.0012, 6),
               colour("brown"), roughness=0.8),
-        paint(turned, srgb("#3c8a2e"), roughness=0.6),
+        visual(turned, srgb("#3c8a2e"), roughness=0.6),
     ]  # fmt: skip
-    phrases = named(
+    phrases = fill_phrases(
         word, "{} apple", "round {} apple", "apple with {} skin", "fresh {} apple", "apple in {}",
         "{} fruit", "ripe {} apple",
     )  # fmt: skip
@@ -127,8 +127,8 @@ def perfume(look: int, params: Params) -> ObjectModel:
     pale = "#f6efe6" if word != "black" else "#d6a52c"
     if form == "square":
         hx, hy, h = 0.0225, 0.0145, 0.050
-        body: Shape = paint(m.slab(hx, hy, h, 0.005, 0.003), srgb(glass), roughness=0.1)
-        felt = feel(Box((hx, hy, h / 2)), (0.0, 0.0, h / 2))
+        body: Shape = visual(m.slab(hx, hy, h, 0.005, 0.003), srgb(glass), roughness=0.1)
+        felt = collision(Box((hx, hy, h / 2)), (0.0, 0.0, h / 2))
         half = (hx, hy, 0.024)
         label = m.merge(
             *(on_side(m.rectangle(0.013, 0.011), half, s) for s in (SIDES[0], SIDES[2]))
@@ -141,8 +141,8 @@ def perfume(look: int, params: Params) -> ObjectModel:
     else:
         r, h = 0.0215, 0.048
         profile = [(r - 0.004, 0.0), (r, 0.004), (r, h - 0.008), (r - 0.006, h - 0.001), (0.008, h)]
-        body = paint(m.lathe(profile, 20), srgb(glass), roughness=0.1)
-        felt = feel(m.lathe([(r - 0.003, 0.0), (r, 0.003), (r, h - 0.008), (0.012, h)], 16))
+        body = visual(m.lathe(profile, 20), srgb(glass), roughness=0.1)
+        felt = collision(m.lathe([(r - 0.003, 0.0), (r, 0.003), (r, h - 0.008), (0.012, h)], 16))
         label = m.decal(m.ellipse(0.012, 0.010, 14), r + 0.0004, 0.021, -math.pi / 2)
         line = m.merge(
             *(m.decal(m.rectangle(0.006, 0.001), r + 0.0009, z, -math.pi / 2)
@@ -154,14 +154,14 @@ def perfume(look: int, params: Params) -> ObjectModel:
     shine = 0.4 if cap != "black" else 0.0
     parts = [
         felt,
-        feel(Cylinder(0.0105, 0.011), (0.0, 0.0, h + 0.011)),
+        collision(Cylinder(0.0105, 0.011), (0.0, 0.0, h + 0.011)),
         body,
-        paint(label, srgb(pale), roughness=0.5),
-        paint(line, colour("brown") if word != "black" else srgb("#2a2b31")),
-        paint(m.lathe(collar, 12), STEEL, roughness=0.25, metallic=0.4),
-        paint(m.lathe(lid, 14), colour(cap), roughness=0.25, metallic=shine),
+        visual(label, srgb(pale), roughness=0.5),
+        visual(line, colour("brown") if word != "black" else srgb("#2a2b31")),
+        visual(m.lathe(collar, 12), STEEL, roughness=0.25, metallic=0.4),
+        visual(m.lathe(lid, 14), colour(cap), roughness=0.25, metallic=shine),
     ]
-    phrases = named(
+    phrases = fill_phrases(
         word, "{} perfume", "{} perfume bottle", "bottle of {} perfume", "{} fragrance bottle",
         "perfume in {} glass", "{} scent bottle",
     )  # fmt: skip
@@ -203,12 +203,12 @@ def coffee_box(look: int, params: Params) -> ObjectModel:
     cut = m.flat(m.rectangle(0.0115, 0.0009), top + 0.0008)
     parts = [
         solid(Box(half), colour(base), (0.0, 0.0, half[2]), roughness=0.7),
-        paint(m.merge(*field), PAPER),
-        paint(m.merge(*icon), colour(base) if base != "black" else srgb("#5a2f14")),
-        paint(m.merge(*beans, lid, *bands), colour(mark)),
-        paint(m.merge(*seams, cut), colour(base)),
+        visual(m.merge(*field), PAPER),
+        visual(m.merge(*icon), colour(base) if base != "black" else srgb("#5a2f14")),
+        visual(m.merge(*beans, lid, *bands), colour(mark)),
+        visual(m.merge(*seams, cut), colour(base)),
     ]
-    phrases = named(
+    phrases = fill_phrases(
         word, "{} coffee box", "{} box of coffee", "{} carton of coffee", "coffee box in {}",
         "{} package of coffee", "coffee carton with {} sides", "{} coffee package",
     )  # fmt: skip
@@ -236,21 +236,21 @@ def payment_sign(look: int, params: Params) -> ObjectModel:
     ]  # fmt: skip
     field = [(x, y + low + 5 * cell) for x, y in m.rounded_rectangle(0.0205, 0.0205, 0.003)]
     parts = [
-        feel(Box((hx, foot, z0 / 2)), (0.0, 0.0, z0 / 2)),
-        feel(Box((hx, hy, (z1 - z0) / 2)), (0.0, 0.0, middle)),
-        paint(m.slab(hx, foot, z0, 0.004, 0.0015), srgb("#d9dde2"), roughness=0.3),
-        paint(m.moved(m.slab(hx, hy, z1 - z0, 0.002, 0.001, 2), (0.0, 0.0, z0)), colour(word),
+        collision(Box((hx, foot, z0 / 2)), (0.0, 0.0, z0 / 2)),
+        collision(Box((hx, hy, (z1 - z0) / 2)), (0.0, 0.0, middle)),
+        visual(m.slab(hx, foot, z0, 0.004, 0.0015), srgb("#d9dde2"), roughness=0.3),
+        visual(m.moved(m.slab(hx, hy, z1 - z0, 0.002, 0.001, 2), (0.0, 0.0, z0)), colour(word),
               roughness=0.3),
-        paint(on_side(field, half, front, 0.0006), PAPER),
-        paint(m.merge(*dots), srgb("#16171a")),
-        paint(_waves(half, front), colour("white")),
-        paint(_waves(half, back), colour("white")),
+        visual(on_side(field, half, front, 0.0006), PAPER),
+        visual(m.merge(*dots), srgb("#16171a")),
+        visual(_waves(half, front), colour("white")),
+        visual(_waves(half, back), colour("white")),
     ]  # fmt: skip
-    phrases = named(
+    phrases = fill_phrases(
         word, "{} payment sign", "{} sign for paying by phone", "{} payment stand",
         "payment sign in {}", "{} sign with a square code", "{} QR code sign", "{} pay sign",
     )  # fmt: skip
-    grasps = (across((0.0, 0.0, 0.056), 2 * hy, math.pi / 2, 0.6),)
+    grasps = (top_grasp((0.0, 0.0, 0.056), 2 * hy, math.pi / 2, 0.6),)
     return model("payment_sign", parts, "payment sign", phrases, grasps, 0.05, 0.8)
 
 

@@ -13,14 +13,14 @@ from robospa.tasks.objects.build import (
     DARK,
     STEEL,
     Asset,
-    across,
+    collision,
     colour,
-    feel,
-    framed,
+    fill_phrases,
     model,
-    named,
-    paint,
     srgb,
+    top_grasp,
+    visual,
+    with_frames,
 )
 from robospa.tasks.shapes import Box, Cylinder, Mesh, ObjectModel, Params
 
@@ -58,30 +58,30 @@ def phone_stand(look: int, params: Params) -> ObjectModel:
     )
     cheeks = [m.moved(m.side_prism(cheek, 0.0025), (x, 0.0, 0.0)) for x in (-0.018, 0.018)]
     parts = [
-        feel(Box((hx, foot, 0.003)), (0.0, 0.0, 0.003)),
-        feel(Box((hx, long, thick)), under, tilt),
-        feel(Box((hx, 0.0025, 0.0075)), lip_at, tilt),
-        *(feel(c) for c in cheeks),
-        paint(m.slab(hx, foot, 0.006, 0.006, 0.0015), colour(body), roughness=0.4),
-        paint(m.moved(m.slab(hx, long, 2 * thick, 0.006, 0.001),
+        collision(Box((hx, foot, 0.003)), (0.0, 0.0, 0.003)),
+        collision(Box((hx, long, thick)), under, tilt),
+        collision(Box((hx, 0.0025, 0.0075)), lip_at, tilt),
+        *(collision(c) for c in cheeks),
+        visual(m.slab(hx, foot, 0.006, 0.006, 0.0015), colour(body), roughness=0.4),
+        visual(m.moved(m.slab(hx, long, 2 * thick, 0.006, 0.001),
                       (0.0, under[1] + thick * s, under[2] - thick * c), tilt),
               colour(body), roughness=0.4),
-        paint(m.moved(m.slab(hx, 0.0025, 0.015, 0.002, 0.0008, 2),
+        visual(m.moved(m.slab(hx, 0.0025, 0.015, 0.002, 0.0008, 2),
                       (0.0, lip_at[1] + 0.0075 * s, lip_at[2] - 0.0075 * c), tilt),
               colour(body), roughness=0.4),
-        paint(m.merge(*cheeks), colour(body), roughness=0.4),
-        paint(cushion, colour(pad), roughness=0.9),
+        visual(m.merge(*cheeks), colour(body), roughness=0.4),
+        visual(cushion, colour(pad), roughness=0.9),
     ]  # fmt: skip
-    phrases = named(
+    phrases = fill_phrases(
         body, "{} phone stand", "{} phone holder", "{} stand for a phone", "phone stand in {}",
         "{} mobile phone stand", "{} smartphone stand",
     )  # fmt: skip
     phrases = (*phrases[:4], f"{body} phone stand with a {pad} pad", *phrases[4:])
     at = 0.0445 + 0.0015  # the phone's underside rests against the lip with its lower end
     support = (0.0, low[0] + at * c - 0.0013 * s, low[1] + at * s + 0.0013 * c)
-    grasps = (across((0.0, 0.004, middle[1]), 2 * hx, 0.0, 0.5),)
+    grasps = (top_grasp((0.0, 0.004, middle[1]), 2 * hx, 0.0, 0.5),)
     made = model("phone_stand", parts, "phone stand", phrases, grasps, 0.06, 0.8, support, support)
-    return framed(made, support=Pose(support, tilt))
+    return with_frames(made, support=Pose(support, tilt))
 
 
 DISPLAYS = (
@@ -99,13 +99,13 @@ def display_stand(look: int, params: Params) -> ObjectModel:
     profile += [(r - 0.001, h)]
     shine = 0.4 if base == "gold" else 0.0
     parts = [
-        feel(Cylinder(r, h / 2), (0.0, 0.0, h / 2)),
-        paint(m.lathe(profile, 26), colour(base), roughness=0.4, metallic=shine),
-        paint(m.lathe([(r - 0.005, h + 0.0004), (0.0, h + 0.0004)], 26, False), colour(felt),
+        collision(Cylinder(r, h / 2), (0.0, 0.0, h / 2)),
+        visual(m.lathe(profile, 26), colour(base), roughness=0.4, metallic=shine),
+        visual(m.lathe([(r - 0.005, h + 0.0004), (0.0, h + 0.0004)], 26, False), colour(felt),
               roughness=0.95),
-        paint(m.lathe([(r - 0.0071, 0.0135), (r - 0.0071, h - 0.0125)], 26, False), colour(felt)),
+        visual(m.lathe([(r - 0.0071, 0.0135), (r - 0.0071, h - 0.0125)], 26, False), colour(felt)),
     ]  # fmt: skip
-    phrases = named(
+    phrases = fill_phrases(
         word, "{} display stand", "{} display platform", "round {} display stand", "{} plinth",
         "{} pedestal", "{} exhibition stand",
     )  # fmt: skip
@@ -137,16 +137,16 @@ def electronic_scale(look: int, params: Params) -> ObjectModel:
     button = m.moved(m.prism(m.ellipse(0.0046, 0.0046, 12), 0.0, 0.0012), (0.035, window[1], h))
     units = m.flat(m.rectangle(0.0016, 0.0022), h + 0.0012, (0.0150, window[1] - 0.003))
     parts = [
-        feel(Box((hx, hy, h / 2)), (0.0, 0.0, h / 2)),
-        feel(Box((size, size, (top - h) / 2)), (0.0, plate_y, (top + h) / 2)),
-        paint(m.slab(hx, hy, h, 0.012, 0.003, 4), colour(word), roughness=0.4),
-        paint(steel, STEEL, roughness=0.3, metallic=0.5),
-        paint(m.flat(m.rounded_rectangle(0.0245, 0.0088, 0.003), h + 0.0004, window), DARK),
-        paint(m.flat(m.rectangle(0.0225, 0.0072), h + 0.0008, window), srgb(light), roughness=0.9),
-        paint(m.merge(*digits, point, units), srgb("#101418")),
-        paint(button, colour("red") if word != "red" else DARK),
+        collision(Box((hx, hy, h / 2)), (0.0, 0.0, h / 2)),
+        collision(Box((size, size, (top - h) / 2)), (0.0, plate_y, (top + h) / 2)),
+        visual(m.slab(hx, hy, h, 0.012, 0.003, 4), colour(word), roughness=0.4),
+        visual(steel, STEEL, roughness=0.3, metallic=0.5),
+        visual(m.flat(m.rounded_rectangle(0.0245, 0.0088, 0.003), h + 0.0004, window), DARK),
+        visual(m.flat(m.rectangle(0.0225, 0.0072), h + 0.0008, window), srgb(light), roughness=0.9),
+        visual(m.merge(*digits, point, units), srgb("#101418")),
+        visual(button, colour("red") if word != "red" else DARK),
     ]
-    phrases = named(
+    phrases = fill_phrases(
         word, "{} electronic scale", "{} digital scale", "{} kitchen scale",
         "electronic scale in {}",
         "{} weighing scale", "{} scale with a digital display", "{} scale",
@@ -209,23 +209,23 @@ def mug_rack(look: int, params: Params) -> ObjectModel:
     knobs = [m.moved(m.lathe(knob, 10), p) for p in (on_peg(long), on_peg(0.042, -1.0, 0.138))]
     tilt = axis_rotation((1.0, 0.0, 0.0), -PEG_RISE)
     parts = [
-        feel(Box((0.052, 0.052, 0.007)), (0.0, 0.0, 0.007)),
-        feel(Cylinder(0.0065, (tall - 0.014) / 2), (0.0, post_y, (tall + 0.014) / 2)),
-        feel(Box((PEG_RADIUS * 0.8, long / 2, PEG_RADIUS * 0.9)), on_peg(long / 2), tilt),
-        paint(m.slab(0.052, 0.052, 0.014, 0.012, 0.003, 4), wood, roughness=0.6),
-        paint(m.moved(m.lathe([(0.0095, 0.013), (0.0065, 0.022), (0.0065, tall - 0.010)], 12),
+        collision(Box((0.052, 0.052, 0.007)), (0.0, 0.0, 0.007)),
+        collision(Cylinder(0.0065, (tall - 0.014) / 2), (0.0, post_y, (tall + 0.014) / 2)),
+        collision(Box((PEG_RADIUS * 0.8, long / 2, PEG_RADIUS * 0.9)), on_peg(long / 2), tilt),
+        visual(m.slab(0.052, 0.052, 0.014, 0.012, 0.003, 4), wood, roughness=0.6),
+        visual(m.moved(m.lathe([(0.0095, 0.013), (0.0065, 0.022), (0.0065, tall - 0.010)], 12),
                       (0.0, post_y, 0.0)), wood, roughness=0.6),
-        paint(m.moved(m.lathe(head, 12), (0.0, post_y, 0.0)), colour(trim), roughness=0.5),
-        paint(m.merge(peg, back), wood, roughness=0.6),
-        paint(m.merge(*knobs), colour(trim), roughness=0.5),
+        visual(m.moved(m.lathe(head, 12), (0.0, post_y, 0.0)), colour(trim), roughness=0.5),
+        visual(m.merge(peg, back), wood, roughness=0.6),
+        visual(m.merge(*knobs), colour(trim), roughness=0.5),
     ]  # fmt: skip
-    phrases = named(
+    phrases = fill_phrases(
         word, "{} mug rack", "{} mug holder", "{} mug tree", "{} rack for mugs", "{} cup rack",
         "{} stand for hanging mugs",
     )  # fmt: skip
     hang, tip = on_peg(0.047), on_peg(long)
     made = model("mug_rack", parts, "mug rack", phrases, (), 0.15, 0.6, support=hang)
-    return framed(made, hang=Pose(hang, tilt), tip=Pose(tip, tilt))
+    return with_frames(made, hang=Pose(hang, tilt), tip=Pose(tip, tilt))
 
 
 ASSETS = {

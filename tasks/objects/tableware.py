@@ -10,15 +10,15 @@ from robospa.tasks.objects.build import (
     DARK,
     STEEL,
     Asset,
-    across,
+    collision,
     colour,
-    feel,
-    framed,
+    fill_phrases,
     model,
-    named,
-    paint,
     srgb,
+    top_grasp,
+    visual,
     wall_ring,
+    with_frames,
 )
 from robospa.tasks.shapes import Box, Color, Cylinder, Mesh, ObjectModel, Params
 
@@ -46,11 +46,11 @@ def kitchen_pot(look: int, params: Params) -> ObjectModel:
     inner = [(r - wall, h), (r - wall, floor + 0.004), (r - 0.007, floor), (0.0, floor)]
     loops = []
     parts = [
-        paint(m.lathe(outer, 28, False), body, roughness=0.3, metallic=metallic),
-        paint(m.lathe([outer[-1], inner[0]], 28, False), body, roughness=0.3, metallic=metallic),
-        paint(m.lathe(inner, 28, False), srgb("#9aa0a6"), roughness=0.45, metallic=0.2),
-        paint(m.lathe([(r + 0.0004, 0.018), (r + 0.0004, 0.022)], 28, False), grip),
-        feel(Cylinder(r - 0.004, floor / 2), (0.0, 0.0, floor / 2)),
+        visual(m.lathe(outer, 28, False), body, roughness=0.3, metallic=metallic),
+        visual(m.lathe([outer[-1], inner[0]], 28, False), body, roughness=0.3, metallic=metallic),
+        visual(m.lathe(inner, 28, False), srgb("#9aa0a6"), roughness=0.45, metallic=0.2),
+        visual(m.lathe([(r + 0.0004, 0.018), (r + 0.0004, 0.022)], 28, False), grip),
+        collision(Cylinder(r - 0.004, floor / 2), (0.0, 0.0, floor / 2)),
         *wall_ring(r - wall, wall, 0.001, h, 16),
     ]
     for side in (-1.0, 1.0):
@@ -59,23 +59,23 @@ def kitchen_pot(look: int, params: Params) -> ObjectModel:
         path = [(root, bar), (tip - 0.006, bar), (tip, bar - 0.006), (tip, 0.006 - bar)]
         path += [(tip - 0.006, -bar), (root, -bar)]
         loops.append(m.tube([(side * x, y, HANDLE_HEIGHT) for x, y in path], t, 6))
-        parts.append(feel(Box((t, HANDLE_HALF - 0.004, t)), (side * tip, 0.0, HANDLE_HEIGHT)))
+        parts.append(collision(Box((t, HANDLE_HALF - 0.004, t)), (side * tip, 0.0, HANDLE_HEIGHT)))
         for y in (-bar, bar):
             out = HANDLE_OUT / 2 - 0.002
-            parts.append(feel(Box((out, t, t)), (side * (r + out - 0.001), y, HANDLE_HEIGHT)))
-    parts.append(paint(m.merge(*loops), grip, roughness=0.4))
-    phrases = named(
+            parts.append(collision(Box((out, t, t)), (side * (r + out - 0.001), y, HANDLE_HEIGHT)))
+    parts.append(visual(m.merge(*loops), grip, roughness=0.4))
+    phrases = fill_phrases(
         word, "{} pot", "{} cooking pot", "{} kitchen pot", "pot in {}", "{} pot with two handles",
         "{} soup pot", "open {} cooking pot",
     )  # fmt: skip
     hold = r + HANDLE_OUT - HANDLE_THICK
     points = {"left": (-hold, 0.0, HANDLE_HEIGHT), "right": (hold, 0.0, HANDLE_HEIGHT)}
-    grasps = [across(p, 2 * HANDLE_THICK, 0.0, 0.7) for p in points.values()]
+    grasps = [top_grasp(p, 2 * HANDLE_THICK, 0.0, 0.7) for p in points.values()]
     made = model(
         "kitchen_pot", parts, "pot", phrases, grasps, 0.12, 0.8,
         support=(0.0, 0.0, floor), press=(0.0, 0.0, floor),
     )  # fmt: skip
-    return framed(made, **{side: Pose(p) for side, p in points.items()})
+    return with_frames(made, **{side: Pose(p) for side, p in points.items()})
 
 
 PLATES = (
@@ -100,15 +100,15 @@ def plate(look: int, params: Params) -> ObjectModel:
     red, g, b = colour(base)
     slope = math.atan2(h - low, r - 0.001 - flat)
     parts = [
-        paint(m.lathe(outer, 28, False), colour(base), roughness=0.25),
-        paint(m.lathe([outer[-1], inner[0]], 28, False), colour(base), roughness=0.25),
-        paint(m.lathe(inner[:2], 28, False), colour(base), roughness=0.25),
-        paint(m.lathe(inner[1:], 28, False), (0.78 * red, 0.78 * g, 0.78 * b), roughness=0.25),
-        paint(m.merge(ring(0.0610, 0.0675), ring(0.0500, 0.0520)), colour(stripe), roughness=0.25),
-        feel(Cylinder(0.046, low / 2), (0.0, 0.0, low / 2)),
+        visual(m.lathe(outer, 28, False), colour(base), roughness=0.25),
+        visual(m.lathe([outer[-1], inner[0]], 28, False), colour(base), roughness=0.25),
+        visual(m.lathe(inner[:2], 28, False), colour(base), roughness=0.25),
+        visual(m.lathe(inner[1:], 28, False), (0.78 * red, 0.78 * g, 0.78 * b), roughness=0.25),
+        visual(m.merge(ring(0.0610, 0.0675), ring(0.0500, 0.0520)), colour(stripe), roughness=0.25),
+        collision(Cylinder(0.046, low / 2), (0.0, 0.0, low / 2)),
         *wall_ring(0.0565, 0.0035, low - 0.0005, h - 0.001, 16, math.pi / 2 - slope),
     ]
-    phrases = named(
+    phrases = fill_phrases(
         word, "{} plate", "{} dinner plate", "round {} plate", "plate in {}", "{} dish",
         "{} ceramic plate",
     )  # fmt: skip
@@ -135,11 +135,11 @@ def coaster(look: int, params: Params) -> ObjectModel:
         for a, b in ((0.0355, 0.0385), (0.0, 0.0100), (0.0160, 0.0180))
     ]
     parts = [
-        feel(Cylinder(r, h / 2), (0.0, 0.0, h / 2)),
-        paint(m.lathe(edge, 24), colour(base), roughness=0.9),
-        paint(m.merge(*rings), colour(mark), roughness=0.9),
+        collision(Cylinder(r, h / 2), (0.0, 0.0, h / 2)),
+        visual(m.lathe(edge, 24), colour(base), roughness=0.9),
+        visual(m.merge(*rings), colour(mark), roughness=0.9),
     ]
-    phrases = named(
+    phrases = fill_phrases(
         base, "{} coaster", "round {} coaster", "coaster in {}", "{} drink coaster",
         "{} cup coaster", "flat {} coaster", "{} cup mat",
     )  # fmt: skip
@@ -174,18 +174,18 @@ def tray(look: int, params: Params) -> ObjectModel:
         for x in (wall / 2 - hx, hx - wall / 2)
     ]
     parts = [
-        feel(Box((hx * 0.98, hy * 0.97, floor / 2)), (0.0, 0.0, floor / 2)),
-        paint(shell, colour(base), roughness=0.5),
-        paint(m.flat(well, floor), colour(base), roughness=0.5),
-        paint(m.flat(field, floor + 0.0005), colour(lining), roughness=0.7),
-        paint(m.merge(*grips), colour(lining), roughness=0.5),
+        collision(Box((hx * 0.98, hy * 0.97, floor / 2)), (0.0, 0.0, floor / 2)),
+        visual(shell, colour(base), roughness=0.5),
+        visual(m.flat(well, floor), colour(base), roughness=0.5),
+        visual(m.flat(field, floor + 0.0005), colour(lining), roughness=0.7),
+        visual(m.merge(*grips), colour(lining), roughness=0.5),
     ]
     for sign in (-1.0, 1.0):
         side = (sign * (hx - wall / 2 - 0.001), 0.0, h / 2)
-        parts.append(feel(Box((wall / 2, hy - 0.008, h / 2)), side))
+        parts.append(collision(Box((wall / 2, hy - 0.008, h / 2)), side))
         front = (0.0, sign * (hy - wall / 2 - 0.001), h / 2)
-        parts.append(feel(Box((hx - 0.008, wall / 2, h / 2)), front))
-    phrases = named(
+        parts.append(collision(Box((hx - 0.008, wall / 2, h / 2)), front))
+    phrases = fill_phrases(
         base, "{} tray", "{} serving tray", "tray in {}", "{} food tray", "wide {} tray",
         "{} meal tray",
     )  # fmt: skip
@@ -195,7 +195,7 @@ def tray(look: int, params: Params) -> ObjectModel:
         support=(0.0, 0.0, floor), press=(0.0, 0.0, floor),
     )  # fmt: skip
     places = {"left": (-0.068, 0.0, floor), "right": (0.068, 0.0, floor)}
-    return framed(made, **{side: Pose(p) for side, p in places.items()})
+    return with_frames(made, **{side: Pose(p) for side, p in places.items()})
 
 
 ASSETS = {

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from robospa.tasks.objects.build import PALETTE, colour, named
+from robospa.tasks.objects.build import PALETTE, colour, fill_phrases
 from robospa.tasks.shapes import ObjectModel, Shape
 
 
@@ -47,15 +47,15 @@ def tinted(model: ObjectModel, word: str) -> ObjectModel:
     rule = TINTS[model.asset]
     body, trim = colour(word), colour("grey" if word != "grey" else "white")
 
-    def paint(index: int, shape: Shape) -> Shape:
+    def recoloured(index: int, shape: Shape) -> Shape:
         if index in rule.body:
             return replace(shape, color=body, metallic=0.0)
         return replace(shape, color=trim) if index in rule.trim else shape
 
     return replace(
         model,
-        shapes=tuple(paint(i, s) for i, s in enumerate(model.shapes)),
-        phrases=named(
+        shapes=tuple(recoloured(i, s) for i, s in enumerate(model.shapes)),
+        phrases=fill_phrases(
             word,
             f"{{}} {model.noun}", f"{model.noun} in {{}}", f"{{}}-coloured {model.noun}",
             f"{model.noun} that is {{}}", f"{model.noun} of {{}} colour",

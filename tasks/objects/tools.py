@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
-from robospa.geometry import Pose, Vec3
+from robospa.geometry import Pose
 from robospa.tasks.objects import meshes as m
 from robospa.tasks.objects.boxes import SIDES, on_side
 from robospa.tasks.objects.build import (
@@ -15,16 +15,17 @@ from robospa.tasks.objects.build import (
     PAPER,
     STEEL,
     Asset,
-    across,
     box_grasps,
+    collision,
     colour,
-    feel,
-    framed,
+    fill_phrases,
     model,
-    named,
-    paint,
     solid,
     srgb,
+    three_numbers,
+    top_grasp,
+    visual,
+    with_frames,
 )
 from robospa.tasks.shapes import Box, Color, Mesh, ObjectModel, Params, Shape
 
@@ -54,23 +55,23 @@ def hammer(look: int, params: Params) -> ObjectModel:
     metallic = 0.5 if head == "silver" else 0.0
     middle = (near + far) / 2
     parts = [
-        feel(Box((hx, hy, h / 2)), (0.0, y, h / 2)),
-        feel(Box((bar, (near - far) / 2, bar)), (0.0, middle, z)),
-        paint(layer(ring, 0.010, h - 0.010), colour(head), roughness=0.4, metallic=metallic),
-        paint(m.merge(layer(cap, 0.0, 0.010), layer(cap, h - 0.010, h - 0.002),
+        collision(Box((hx, hy, h / 2)), (0.0, y, h / 2)),
+        collision(Box((bar, (near - far) / 2, bar)), (0.0, middle, z)),
+        visual(layer(ring, 0.010, h - 0.010), colour(head), roughness=0.4, metallic=metallic),
+        visual(m.merge(layer(cap, 0.0, 0.010), layer(cap, h - 0.010, h - 0.002),
                       layer(ring, h - 0.002, h, 0.93)), dark, roughness=0.7),
-        paint(m.moved(m.prism(handle, -bar, bar), (0.0, middle, z)), colour(shaft), roughness=0.6),
-        paint(m.moved(m.prism(sleeve, -bar - 0.0004, bar + 0.0004), (0.0, far + 0.022, z)),
+        visual(m.moved(m.prism(handle, -bar, bar), (0.0, middle, z)), colour(shaft), roughness=0.6),
+        visual(m.moved(m.prism(sleeve, -bar - 0.0004, bar + 0.0004), (0.0, far + 0.022, z)),
               colour(head) if head != "silver" else STEEL, roughness=0.6),
     ]  # fmt: skip
-    phrases = named(
+    phrases = fill_phrases(
         word, "{} hammer", "{} mallet", "{} hammer with a handle", "hammer with a {} head",
         "small {} hammer", "{} hand hammer",
     )  # fmt: skip
     phrases = (*phrases, f"{word} hammer with a {shaft} handle")
-    grasps = tuple(across((0.0, at, z), 2 * bar, 0.0, 0.7) for at in (0.005, -0.012, -0.030))
+    grasps = tuple(top_grasp((0.0, at, z), 2 * bar, 0.0, 0.7) for at in (0.005, -0.012, -0.030))
     made = model("hammer", parts, "hammer", phrases, grasps, 0.035, 0.9, support=(0.0, y, h))
-    return framed(made, head=Pose((0.0, y, 0.0)))
+    return with_frames(made, head=Pose((0.0, y, 0.0)))
 
 
 PADS: Mapping[str, Color] = {
@@ -86,28 +87,21 @@ PADS: Mapping[str, Color] = {
 """The official colours of pads, in the official order: look k is colour k."""
 
 
-def numbers(value: Sequence[float], what: str) -> Vec3:
-    """Three floats; ValueError, naming `what`, for anything else."""
-    if len(value) != 3:
-        raise ValueError(f"pad {what} must be three numbers, not {list(value)}")
-    return (float(value[0]), float(value[1]), float(value[2]))
-
-
 def pad(look: int, params: Params) -> ObjectModel:
     """A flat square on the table; params "half" [m], "color" (linear RGB) and "solid".
 
-    Seen but not felt unless "solid" is true: what is not solid must be fixed in its scene.
+    Only drawn unless "solid" is true: what is not solid must be fixed in its scene.
     """
     names = list(PADS)
-    half = numbers(params.get("half", (0.035, 0.035, 0.0005)), "half sizes")
-    color = numbers(params.get("color", PADS[names[look]]), "color")
+    half = three_numbers(params.get("half", (0.035, 0.035, 0.0005)), "pad half sizes")
+    color = three_numbers(params.get("color", PADS[names[look]]), "pad color")
     if min(half) <= 0:
         raise ValueError(f"pad half sizes must be positive, not {list(half)}")
     gaps = [float(np.linalg.norm(np.subtract(color, PADS[n]))) for n in names]
     word = names[int(np.argmin(gaps))]
     at = Pose((0.0, 0.0, half[2]))
     shape = Shape(Box(half), at, color, collision=bool(params.get("solid")), roughness=0.8)
-    phrases = named(
+    phrases = fill_phrases(
         word, "{} pad", "{} square", "pad in {}", "flat {} pad", "{} square pad", "{} mat",
     )  # fmt: skip
     grasps = box_grasps(half[0], half[1], half[2]) if half[2] > 0.005 else ()
@@ -136,23 +130,23 @@ def t_block(look: int, params: Params) -> ObjectModel:
         [(x, y, h) for x, y in top],
     ])  # fmt: skip
     parts = [
-        feel(Box((end, arm, h / 2)), (0.0, end - arm, h / 2)),
-        feel(Box((arm, (low + end) / 2, h / 2)), (0.0, (low - end) / 2, h / 2)),
-        paint(body, colour(word), roughness=0.5),
+        collision(Box((end, arm, h / 2)), (0.0, end - arm, h / 2)),
+        collision(Box((arm, (low + end) / 2, h / 2)), (0.0, (low - end) / 2, h / 2)),
+        visual(body, colour(word), roughness=0.5),
     ]
     if kind:
         dot = m.flat(m.ellipse(0.0055, 0.0055, 12), h + 0.0004, (0.0, end - arm))
-        parts.append(paint(dot, PAPER))
-    phrases = named(
+        parts.append(visual(dot, PAPER))
+    phrases = fill_phrases(
         word, "{} T-shaped block", "{} T block", "{} block in the shape of a T",
         "T-shaped {} block",
         "block shaped like a {} T", "{} letter T",
     )  # fmt: skip
     z = 0.017
     grasps = (
-        across((0.0, -0.004, z), 2 * arm, 0.0, 0.6),
-        across((0.0235, end - arm, z), 2 * arm, math.pi / 2, 0.6),
-        across((-0.0235, end - arm, z), 2 * arm, math.pi / 2, 0.6),
+        top_grasp((0.0, -0.004, z), 2 * arm, 0.0, 0.6),
+        top_grasp((0.0235, end - arm, z), 2 * arm, math.pi / 2, 0.6),
+        top_grasp((-0.0235, end - arm, z), 2 * arm, math.pi / 2, 0.6),
     )
     return model("t_block", parts, "T-shaped block", phrases, grasps, 0.05, 0.8)
 
@@ -192,16 +186,16 @@ def wooden_block(look: int, params: Params) -> ObjectModel:
     cap = m.moved(m.slab(half[0], half[1], 0.0008, 0.002, 0.0, 2), (0.0, 0.0, 2 * half[2] - 0.0002))
     parts = [
         solid(Box(half), srgb(wood), (0.0, 0.0, half[2]), roughness=0.8),
-        paint(m.merge(*streaks), srgb(lines), roughness=0.9),
-        paint(cap, srgb(paint_code), roughness=0.6),
+        visual(m.merge(*streaks), srgb(lines), roughness=0.9),
+        visual(cap, srgb(paint_code), roughness=0.6),
     ]
     if look < 2:
         rings = [
             m.flat(m.rectangle(half[0] * w, 0.0007, 0.0, y), 2 * half[2] + 0.0010)
             for y, w in ((-0.009, 0.75), (-0.002, 0.85), (0.006, 0.6))
         ]
-        parts.append(paint(m.merge(*rings), srgb(lines), roughness=0.9))
-    phrases = named(
+        parts.append(visual(m.merge(*rings), srgb(lines), roughness=0.9))
+    phrases = fill_phrases(
         word, "{} wooden block", "{} toy block of wood", "{} block of wood", "{} piece of wood",
         "wooden block with a {} top", "{} wood block", "{} wooden toy block",
     )  # fmt: skip

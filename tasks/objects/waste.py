@@ -8,14 +8,14 @@ from robospa.geometry import axis_rotation, multiply
 from robospa.tasks.objects import meshes as m
 from robospa.tasks.objects.build import (
     Asset,
-    across,
+    collision,
     colour,
-    feel,
+    fill_phrases,
     model,
-    named,
-    paint,
     round_grasps,
     solid,
+    top_grasp,
+    visual,
 )
 from robospa.tasks.shapes import Box, Mesh, ObjectModel, Params, Sphere
 
@@ -51,15 +51,15 @@ def table_trash_bin(look: int, params: Params) -> ObjectModel:
     underside = m.mesh(under, m.triangulate([(x, -y) for x, y, _ in under]))
     shade = tuple(0.55 * c for c in colour(body))
     parts = [
-        paint(shell, colour(body), roughness=0.5),
-        paint(lip, colour(body), roughness=0.5),
-        paint(inner, (shade[0], shade[1], shade[2]), roughness=0.7),
-        paint(m.flat(base, floor), (shade[0], shade[1], shade[2]), roughness=0.7),
-        paint(
+        visual(shell, colour(body), roughness=0.5),
+        visual(lip, colour(body), roughness=0.5),
+        visual(inner, (shade[0], shade[1], shade[2]), roughness=0.7),
+        visual(m.flat(base, floor), (shade[0], shade[1], shade[2]), roughness=0.7),
+        visual(
             m.merge(stripe, *_can_icons(half_at(0.036) + 0.0006, lean)), colour(band), roughness=0.5
         ),
-        paint(underside, colour(body), roughness=0.5),
-        feel(Box((low, low, floor / 2)), (0.0, 0.0, floor / 2)),
+        visual(underside, colour(body), roughness=0.5),
+        collision(Box((low, low, floor / 2)), (0.0, 0.0, floor / 2)),
     ]
     middle = half_at(h / 2) - wall / 2
     for k in range(4):
@@ -67,17 +67,17 @@ def table_trash_bin(look: int, params: Params) -> ObjectModel:
         turned = multiply(axis_rotation((0.0, 0.0, 1.0), a), axis_rotation((0.0, 1.0, 0.0), lean))
         at = (middle * math.cos(a), middle * math.sin(a), h / 2)
         parts.append(
-            feel(Box((wall / 2, high - 0.0015, h / 2 / math.cos(lean) - 0.0005)), at, turned)
+            collision(Box((wall / 2, high - 0.0015, h / 2 / math.cos(lean) - 0.0005)), at, turned)
         )
-    phrases = named(
+    phrases = fill_phrases(
         body, "{} trash bin", "{} table bin", "small {} trash bin", "{} desktop trash bin",
         "little {} bin", "{} tabletop bin", "{} desk bin",
     )  # fmt: skip
     z, rim = 0.052, 0.066
-    around = [across((0.0, 0.0, z), 2 * half_at(z), a, 0.7) for a in (0.0, math.pi / 2)]
+    around = [top_grasp((0.0, 0.0, z), 2 * half_at(z), a, 0.7) for a in (0.0, math.pi / 2)]
     out = half_at(rim) - wall / 2
     rims = [
-        across((round(out * math.cos(a), 6), round(out * math.sin(a), 6), rim), wall, a, 0.5)
+        top_grasp((round(out * math.cos(a), 6), round(out * math.sin(a), 6), rim), wall, a, 0.5)
         for a in (math.pi / 2 * k for k in range(4))
     ]
     return model(
@@ -112,7 +112,7 @@ def garbage(look: int, params: Params) -> ObjectModel:
     word = BALLS[look]
     r = BALL_RADIUS
     parts = [solid(Sphere(r), colour(word), (0.0, 0.0, r), roughness=0.7)]
-    phrases = named(
+    phrases = fill_phrases(
         word, "{} ball", "{} piece of garbage", "small {} ball", "ball of {} garbage",
         "{} piece of trash", "little {} ball",
     )  # fmt: skip

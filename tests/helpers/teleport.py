@@ -10,6 +10,7 @@ from collections.abc import Iterable
 
 from snapshots_by_hand import AWAY, DOWN, TICK
 
+from robospa.action_space import ARMS
 from robospa.geometry import Pose, Vec3, rotate, yaw_rotation
 from robospa.tasks.events import Event
 from robospa.tasks.objects import object_model
@@ -30,7 +31,7 @@ from robospa.tasks.plan import (
     Wait,
 )
 from robospa.tasks.scene import Scene
-from robospa.tasks.snapshot import ARMS, Contact, Snapshot
+from robospa.tasks.snapshot import Contact, Snapshot
 from robospa.tasks.task import Tracker
 
 STEP = 0.01

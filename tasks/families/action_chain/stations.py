@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from robospa.action_space import ARMS
 from robospa.geometry import Pose, Vec3
 from robospa.tasks import objects
 from robospa.tasks.families.tabletop import side
 from robospa.tasks.goals.repeat import PRESS_BOX, PressCounter
 from robospa.tasks.plan import Pick, Place, Press, Skill
 from robospa.tasks.scene import Scene
-from robospa.tasks.snapshot import ARMS
 
 CLICK = "c"
 """The letter of a click among the steps of a level."""

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from robospa.action_space import ARMS
 from robospa.geometry import Vec3
 from robospa.tasks import objects
 from robospa.tasks.families.tabletop import side
@@ -17,7 +18,6 @@ from robospa.tasks.sampling.region import Area, Point
 from robospa.tasks.sampling.scatter import candidates, scatter
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.shapes import Params
-from robospa.tasks.snapshot import ARMS
 from robospa.workcell import Workcell
 
 Look = tuple[str, Params]
@@ -40,7 +40,7 @@ TURNS: Mapping[str, float] = {
 
 def clickable_look(rng: np.random.Generator, asset: str) -> dict[str, Any]:
     """Parameters of one of the looks of `asset` that click tasks use, each equally likely."""
-    looks = LOOKS.get(asset) or range(objects.looks(asset))
+    looks = LOOKS.get(asset) or range(objects.look_count(asset))
     return {"look": int(looks[int(rng.integers(len(looks)))])}
 
 

@@ -63,7 +63,7 @@ def _usable(workcell: Workcell, point: Point) -> bool:
 def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     """Bottles anywhere in the region but the middle strip; different looks up to level 3."""
     points = scatter_points(rng, level, X, Y, DISTANCE, partial(_usable, workcell))
-    count = objects.looks("bottle")
+    count = objects.look_count("bottle")
     looks = rng.choice(count, size=level, replace=level > min(3, count))
     items = [Item("dustbin", "dustbin", BIN, {"look": 0}, fixed=True)]
     for i, (point, look) in enumerate(zip(points, looks, strict=True)):

@@ -58,7 +58,7 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     shown = [int(i) for i in rng.integers(4, size=level)]
     start = [(turn + int(rng.integers(1, 4))) % 4 for turn in shown]
     far_kind = int(rng.integers(2))
-    look = int(rng.integers(objects.looks("t_block")))
+    look = int(rng.integers(objects.look_count("t_block")))
     items = [wall(WALL_Y)]
     for i, (x, turn) in enumerate(zip(row(level, FAR_X), shown, strict=True)):
         pose = standing((x, FAR_Y), TURNS[turn])

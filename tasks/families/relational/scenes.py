@@ -29,7 +29,7 @@ from robospa.tasks.families.tabletop import standing
 from robospa.tasks.goals.pick import Lift
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText
-from robospa.tasks.objects import looks, object_model
+from robospa.tasks.objects import look_count, object_model
 from robospa.tasks.sampling.grid import StraightLines
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.task import Draft, Draw, Level, Task
@@ -146,7 +146,7 @@ def weights(level: int) -> Array:
 @cache
 def widest(asset: str) -> float:
     """Radius [m] of the largest footprint among an asset's looks."""
-    return max(object_model(asset, {"look": k}).radius for k in range(looks(asset)))
+    return max(object_model(asset, {"look": k}).radius for k in range(look_count(asset)))
 
 
 def least_distances(crowd: Crowd, families: Sequence[Family], scale: float) -> Array:

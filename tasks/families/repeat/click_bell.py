@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from robospa.action_space import ARMS
 from robospa.tasks import objects
 from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.tabletop import Item, draw_look, named, side, standing
@@ -20,7 +21,6 @@ from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.instructions.words import NUMBERS, acting_arm, by_count
 from robospa.tasks.plan import Press, Skill
 from robospa.tasks.scene import Scene
-from robospa.tasks.snapshot import ARMS
 from robospa.tasks.task import Draft, Level, Task
 from robospa.workcell import Workcell
 

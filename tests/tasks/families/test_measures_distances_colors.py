@@ -18,7 +18,7 @@ from robospa.tasks.events import outcome
 from robospa.tasks.families.basic_color.task import COLORS
 from robospa.tasks.families.block_measures.task import none_hidden
 from robospa.tasks.families.distance import object_sets
-from robospa.tasks.objects import looks, object_model
+from robospa.tasks.objects import look_count, object_model
 from robospa.tasks.objects.build import PALETTE
 from robospa.tasks.objects.tint import TINTS
 from robospa.tasks.plan import Pick, Skill
@@ -223,7 +223,7 @@ def test_colors_are_far_apart() -> None:
 
 @pytest.mark.parametrize("asset", TINTS)
 def test_a_tint_changes_colors_only(asset: str) -> None:
-    for look in range(looks(asset)):
+    for look in range(look_count(asset)):
         plain = object_model(asset, {"look": look})
         tinted = object_model(asset, {"look": look, "tint": "purple"})
         assert (tinted.grasps, tinted.size, tinted.mass) == (plain.grasps, plain.size, plain.mass)

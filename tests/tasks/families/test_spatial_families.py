@@ -18,7 +18,7 @@ from robospa.tasks.families.cross_view.task import SPREADS
 from robospa.tasks.families.picking import pick_name
 from robospa.tasks.families.relational import scenes as relational
 from robospa.tasks.families.relational.task import CROWDS
-from robospa.tasks.objects import looks, object_model
+from robospa.tasks.objects import look_count, object_model
 from robospa.tasks.plan import Pick
 from robospa.tasks.scene import Scene
 from robospa.tasks.snapshot import Contact
@@ -177,7 +177,7 @@ def test_bounds_hold_for_all_looks() -> None:
     for crowd in CROWDS:
         for family in crowd.families:
             if family.asset != "block":
-                for k in range(looks(family.asset)):
+                for k in range(look_count(family.asset)):
                     model = object_model(family.asset, {"look": k})
                     assert model.radius <= crowd.radius
                     # of soaps, which are flat, only the footprint is kept in view

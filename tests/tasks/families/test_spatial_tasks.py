@@ -19,7 +19,7 @@ from robospa.tasks.families.cross_view.scenes import LEADS
 from robospa.tasks.families.cross_view.task import SPREADS
 from robospa.tasks.families.distance import object_sets
 from robospa.tasks.families.relational import scenes as relational
-from robospa.tasks.objects import looks, object_model
+from robospa.tasks.objects import look_count, object_model
 from robospa.tasks.plan import Pick
 from robospa.tasks.sampling.region import Area
 from robospa.tasks.scene import Scene
@@ -293,7 +293,7 @@ def test_target_is_the_nearest_soap_in_its_direction(level: int) -> None:
 @each_level
 def test_soaps_of_a_scene_look_the_same(level: int) -> None:
     assert all(len({str(o.params) for o in s.objects}) == 1 for s in scenes(SOAPS, level))
-    assert len({str(s.objects[0].params) for s in scenes(SOAPS, level)}) == looks("soap")
+    assert len({str(s.objects[0].params) for s in scenes(SOAPS, level)}) == look_count("soap")
 
 
 # Pick Mixed Objects Multi View A
@@ -326,7 +326,7 @@ def test_extremes_views_and_families_are_uniform(level: int) -> None:
 def test_layout_pools_have_the_bounds_of_the_assets() -> None:
     for spread in SPREADS:
         for asset in set(spread.assets) - {"block"}:
-            for look in range(looks(asset)):
+            for look in range(look_count(asset)):
                 model = object_model(asset, {"look": look})
                 assert model.radius <= spread.radius and model.size[2] <= spread.tall
     for asset in object_sets.ASSETS_B:

@@ -11,14 +11,14 @@ import pytest
 from numpy.typing import NDArray
 
 from robospa.geometry import to_matrix
-from robospa.tasks.objects import assets, looks, object_model
+from robospa.tasks.objects import assets, look_count, object_model
 from robospa.tasks.objects import meshes as m
 from robospa.tasks.objects.containers import COVER_INNER_HEIGHT, COVER_INNER_RADIUS
 from robospa.tasks.shapes import Box, Cylinder, Grasp, Mesh, ObjectModel, Shape, Sphere
 
 Array = NDArray[np.float64]
 
-EVERY = [(asset, look) for asset in assets() for look in range(looks(asset))]
+EVERY = [(asset, look) for asset in assets() for look in range(look_count(asset))]
 NOT_PICKED = {
     *("dustbin", "microwave", "pad", "plate", "coaster", "tray"),
     *("display_stand", "electronic_scale", "mug_rack"),
@@ -114,12 +114,12 @@ def test_collision_shapes_stand_on_the_underside(model: ObjectModel) -> None:
 
 @pytest.mark.parametrize("asset", RADIUS_LIMITS)
 def test_footprints_fit_the_layouts(asset: str) -> None:
-    for look in range(looks(asset)):
+    for look in range(look_count(asset)):
         assert object_model(asset, {"look": look}).radius <= RADIUS_LIMITS[asset]
 
 
 def test_soap_fits_between_its_neighbours() -> None:
-    for look in range(looks("soap")):
+    for look in range(look_count("soap")):
         size = object_model("soap", {"look": look}).size
         assert size[0] <= 0.058 and size[1] <= 0.034 and size[2] <= 0.0255
 
@@ -241,14 +241,14 @@ def test_phrases_describe_a_look_in_several_ways(model: ObjectModel) -> None:
 
 @pytest.mark.parametrize("asset", assets())
 def test_looks_of_an_asset_share_no_phrase(asset: str) -> None:
-    found = [p for k in range(looks(asset)) for p in object_model(asset, {"look": k}).phrases]
+    found = [p for k in range(look_count(asset)) for p in object_model(asset, {"look": k}).phrases]
     assert len(set(found)) == len(found)
 
 
 def test_covers_hide_a_block_of_four_centimetres() -> None:
     assert math.hypot(0.02, 0.02) + 0.002 < COVER_INNER_RADIUS
     assert COVER_INNER_HEIGHT >= 0.045
-    for look in range(looks("cover")):
+    for look in range(look_count("cover")):
         model = object_model("cover", {"look": look})
         for shape in (s for s in model.shapes if s.collision):
             for corner in [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (0, 2)]:
@@ -272,7 +272,7 @@ def test_the_dustbin_counts_what_lies_in_it() -> None:
 def test_the_basket_takes_every_bread() -> None:
     floor = object_model("bread_basket").frames["support"].position[2]
     assert floor < 0.01
-    for look in range(looks("bread")):
+    for look in range(look_count("bread")):
         assert object_model("bread", {"look": look}).radius < 0.07
 
 
@@ -335,7 +335,7 @@ def test_triangulate_handles_a_concave_polygon() -> None:
     ],
 )
 def test_assets_name_the_places_that_tasks_need(asset: str, frames: set[str]) -> None:
-    for look in range(looks(asset)):
+    for look in range(look_count(asset)):
         assert set(object_model(asset, {"look": look}).frames) >= frames
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from robospa.geometry import Pose, Vec3, axis_rotation, rotate, yaw_rotation
-from robospa.tasks.objects import looks, object_model
+from robospa.tasks.objects import look_count, object_model
 from robospa.tasks.shapes import ObjectModel
 
 pytestmark = pytest.mark.sim
@@ -67,7 +67,7 @@ def test_a_mug_let_go_on_the_peg_hangs_there(yaw: float, off: float) -> None:
     assert rotate(pose_of(entity).rotation, (1, 0, 0))[2] > 0.9  # by its handle
 
 
-@pytest.mark.parametrize("look", range(looks("phone")))
+@pytest.mark.parametrize("look", range(look_count("phone")))
 def test_a_phone_on_its_stand_stays(look: int) -> None:
     stand, phone = object_model("phone_stand"), object_model("phone", {"look": look})
     frame = stand.frames["support"]
