@@ -19,7 +19,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -53,8 +53,7 @@ class TaskText:
 
         KeyError for an unknown entry or a missing value.
         """
-        train, heldout = _phrasings(self.path, entry)
-        return _filled(train, values), _filled(heldout, values)
+        return _phrasings(self.path, entry, tuple(values.items()))
 
     def slots(self, *entries: str, **values: object) -> Slots:
         """The phrasings of several entries by slot, and those that every task may use.
@@ -73,10 +72,6 @@ COMMON = TaskText(SHARED)
 """Phrasings of slots that any task may use."""
 
 
-def _filled(texts: tuple[str, ...], values: Mapping[str, object]) -> tuple[str, ...]:
-    return tuple(text.format_map(values) for text in texts)
-
-
 @cache
 def _read(path: Path) -> Mapping[str, Any]:
     return tomllib.loads(path.read_text(encoding="utf-8"))
@@ -93,11 +88,15 @@ def _templates(path: Path, level: int, name: str) -> Templates:
     raise KeyError(f"{path} has no templates {name!r} for level {level}")
 
 
-@cache
-def _phrasings(path: Path, entry: str) -> Phrasings:
+@lru_cache(maxsize=4096)
+def _phrasings(path: Path, entry: str, values: tuple[tuple[str, object], ...]) -> Phrasings:
     found: Any = _read(path)["phrasings"]
     for part in entry.split("."):
         if part not in found:
             raise KeyError(f"{path} has no phrasings {entry!r}; {part!r} is none of {list(found)}")
         found = found[part]
-    return tuple(found["train"]), tuple(found["heldout"])
+    train, heldout = (
+        tuple(text.format_map(dict(values)) for text in found[split])
+        for split in ("train", "heldout")
+    )
+    return train, heldout
