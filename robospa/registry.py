@@ -1,5 +1,4 @@
-"""Find things by name: policies, robots, dialects, scene modes and tasks are entry points.
-
+"""Find things by name: policies, robots, dialects, tasks, objects and scene modes are entry points.
 
 A package adds one by a line in its pyproject.toml, ours and others' alike:
 
@@ -21,6 +20,8 @@ ROBOTS = "robospa.robots"
 """Objects of `robospa.harness.robots.embodiment.Embodiment`."""
 DIALECTS = "robospa.dialects"
 """Objects of `robospa.clients.dialect.Dialect`: servers that speak something else than ours."""
+ASSETS = "robospa.assets"
+"""Asset packs: maps from the name of an asset to its `robospa.tasks.objects.build.Asset`."""
 SCENE_MODES = "robospa.scene_modes"
 """Functions `robospa.tasks.modes.Mode`."""
 TASKS = "robospa.tasks"

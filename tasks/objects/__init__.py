@@ -2,7 +2,8 @@
 
 Assets are made by small functions from primitives and low-polygon meshes: nothing is downloaded
 and nothing here knows a simulator. Body frames stand on z = 0 with the origin at the centre of
-the underside (asset `block`: at its centre); the front looks towards -y.
+the underside (asset `block`: at its centre); the front looks towards -y. Other packages add
+assets by an entry point (`robospa.registry.ASSETS`).
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from functools import cache, lru_cache
 from types import MappingProxyType
 from typing import Any
 
+from robospa.registry import ASSETS, find, names
 from robospa.tasks.objects import (
     appliances,
     blocks,
@@ -59,8 +61,26 @@ def _library() -> Mapping[str, Asset]:
     return {name: asset for family in FAMILIES for name, asset in family.ASSETS.items()}
 
 
+@cache
+def _packs() -> Mapping[str, Asset]:
+    """The assets of other installed packages. ValueError for a pack that cannot be used."""
+    found: dict[str, Asset] = {}
+    for pack in names(ASSETS):
+        offered = find(ASSETS, pack, "asset pack")
+        if not isinstance(offered, Mapping):
+            raise ValueError(f"asset pack {pack!r} is no map from names to assets; see its package")
+        for name, asset in offered.items():
+            if not isinstance(asset, Asset) or name in _library() or name in found:
+                raise ValueError(
+                    f"asset pack {pack!r} offers {name!r}, which is no Asset or has a name that is "
+                    "taken: give it a name of its own"
+                )
+            found[name] = asset
+    return found
+
+
 def assets() -> tuple[str, ...]:
-    """All asset names, sorted."""
+    """Names of all assets of this package, sorted; those of other packages are found by name."""
     return tuple(sorted(_library()))
 
 
@@ -85,12 +105,13 @@ def object_model(asset: str, params: Params = MappingProxyType({})) -> ObjectMod
 
 
 def _asset(name: str) -> Asset:
-    library = _library()
-    if name not in library:
-        near = difflib.get_close_matches(name, list(library), n=3, cutoff=0.4)
-        hint = f"did you mean {', '.join(near)}?" if near else f"there are {', '.join(assets())}"
+    found = _library().get(name) or _packs().get(name)
+    if found is None:
+        known = (*assets(), *sorted(_packs()))
+        near = difflib.get_close_matches(name, known, n=3, cutoff=0.4)
+        hint = f"did you mean {', '.join(near)}?" if near else f"there are {', '.join(known)}"
         raise KeyError(f"no asset {name!r}; {hint}")
-    return library[name]
+    return found
 
 
 @lru_cache(maxsize=4096)
