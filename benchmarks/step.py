@@ -1,4 +1,4 @@
-"""What a step of the environment costs beside its physics, when the policy answers chunks of 50.
+"""Time of a step without its physics, when the policy answers chunks of 50.
 
     python benchmarks/step.py [--rounds 6] [--json]
 
@@ -14,26 +14,22 @@ from __future__ import annotations
 import json
 import statistics
 import time
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 from common import Result, Row, argument_parser, finish
+from idle_world import IdleWorld, endless_trial
 from numpy.typing import NDArray
 from peers import Peer
 from sides import line_of, peer_of, peers_for, sides, tell, versions_of
 from wire_sides import CAMERAS, frames
 
 from robospa.clients import connect
-from robospa.geometry import Pose
 from robospa.harness.trial import TrialParts, run_trial
 from robospa.harness.world import Poll, StepResult
-from robospa.observation import CameraSpec
+from robospa.observation import CameraSpec, Observation
 from robospa.protocol.policy import Policy, PolicySpec
-from robospa.tasks.events import Event
 from robospa.tasks.scene import Scene
-from robospa.tasks.snapshot import Contact, Snapshot
-from robospa.tasks.task import Level, Task
 from robospa.trial import TrialKey
 
 STEPS = 500
@@ -50,12 +46,17 @@ NAMES = {
 }
 
 
-class Still:
-    """A world in which nothing happens; it notes when it is called."""
+class TimedWorld(IdleWorld):
+    """An idle world that measures the time between two of its steps [ms].
 
-    def __init__(self, images: Any) -> None:
-        self._seen = {
-            "images": dict(zip(CAMERAS, images, strict=True)),
+    `buffered` are the steps before which nothing was observed, `asked` the others.
+    """
+
+    def __init__(self, images: Sequence[NDArray[np.uint8]]) -> None:
+        super().__init__()
+        self._images = dict(zip(CAMERAS, images, strict=True))
+        self._view: Observation = {
+            "images": self._images,
             "state": np.zeros(14, np.float32),
             "ee": np.zeros((2, 8), np.float32),
         }
@@ -76,56 +77,20 @@ class Still:
         self._left = time.perf_counter()
         return StepResult(50, False)
 
-    def observe(self, spec: PolicySpec) -> dict[str, Any]:
+    def observe(self, spec: PolicySpec) -> Observation:
         self.views += 1
-        return dict(self._seen)
+        return self._view.copy()
 
     def render(self, camera: CameraSpec) -> NDArray[np.uint8]:
-        image: NDArray[np.uint8] = self._seen["images"][camera.name]
-        return image
-
-    def snapshot(self) -> Snapshot:
-        here = Pose()
-        points = (here.position, here.position)
-        return Snapshot(0.0, {}, (1.0, 1.0), (here, here), grasp_points=points)
-
-    def contacts(self) -> tuple[Contact, ...]:
-        return ()
-
-    def digest(self) -> str:
-        return "0"
-
-    def info(self) -> Mapping[str, Any]:
-        return {"simulator": "none"}
-
-    def close(self) -> None: ...
-
-
-class Never:
-    """A goal that is never met."""
-
-    needs_contacts = False
-    total = 1
-
-    def start(self, snapshot: Snapshot) -> tuple[Event, ...]:
-        return ()
-
-    update = start
-
-
-def _unused(*_: Any) -> Any:
-    raise AssertionError("the task of this benchmark is never drawn")
+        return self._images[camera.name]
 
 
 def parts(key: TrialKey) -> TrialParts:
-    """A task without an end."""
-    levels = {1: Level(candidates=1, subtasks=1, steps=STEPS)}
-    task = Task(key.task, "GAC", levels, _unused, _unused, _unused, _unused, "nothing", "nothing")
-    scene = Scene(key.task, 1, key.seed, "aloha-agilex", "clean", (), {})
-    return TrialParts(scene, task, Never(), "Do nothing.")
+    """A trial of STEPS steps."""
+    return endless_trial(key, STEPS)
 
 
-def our_block(world: Still, policy: Policy) -> int:
+def our_block(world: TimedWorld, policy: Policy) -> int:
     """One trial of STEPS steps; how often the policy was asked."""
     return run_trial(world, policy, KEY, policy_seed=0, parts=parts).policy_calls
 
@@ -145,7 +110,7 @@ def measure(rounds: int) -> Result:
     times: dict[str, list[float]] = {kind: [] for kind in NAMES}
     usable = [kind for kind in NAMES if peers[peer_of(kind)].python]
     with sides() as running:
-        world = Still(frames(str(running.frames)))
+        world = TimedWorld(frames(str(running.frames)))
         policy = connect(running.serve("robospa"))
         servers = {"openpi steps": "openpi"}
         clients = {}

@@ -22,34 +22,29 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from common import Result, Row, argument_parser, finish, line
+from idle_world import IdleWorld, endless_trial
 from numpy.typing import NDArray
 
-from robospa.geometry import Pose
 from robospa.harness.running.autoscaling import cores, most_workers
 from robospa.harness.running.runner import Runner, RunOptions
 from robospa.harness.running.status import Status
 from robospa.harness.running.worker import WorkerConfig
 from robospa.harness.trial import TrialParts
 from robospa.harness.world import Poll, StepResult
+from robospa.observation import Observation
 from robospa.protocol.policy import PolicySpec, TrialInfo
 from robospa.protocol.server import ServerThread
-from robospa.tasks.events import Event
-from robospa.tasks.scene import Scene
-from robospa.tasks.snapshot import Contact, Snapshot
-from robospa.tasks.task import Level, Task
 from robospa.trial import TrialKey
 
 BASE, ITEM, BATCH = 0.100, 0.002, 8
 CALLS = 25
 """Answers that one trial takes."""
-HERE = Pose((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
 
 
 class Model:
@@ -63,12 +58,12 @@ class Model:
     def reset(self, trial: TrialInfo) -> None:
         """Nothing is remembered."""
 
-    def infer(self, observation: Mapping[str, Any]) -> NDArray[np.float32]:
+    def infer(self, observation: Observation) -> NDArray[np.float32]:
         """One sample alone."""
         return self.infer_batch([observation], [0])[0]
 
     def infer_batch(
-        self, observations: Sequence[Mapping[str, Any]], sessions: Sequence[int]
+        self, observations: Sequence[Observation], sessions: Sequence[int]
     ) -> list[NDArray[np.float32]]:
         """Takes as long as it says."""
         if self.base:
@@ -77,75 +72,24 @@ class Model:
         return [np.zeros((1, 14), np.float32) for _ in observations]
 
 
-class World:
-    """Burns `busy` seconds of the processor an action and does nothing else."""
+class BusyWorld(IdleWorld):
+    """An idle world whose step takes `busy` seconds of the processor."""
 
     def __init__(self, busy: float) -> None:
-        self.busy, self.steps = busy, 0
-
-    def load(self, scene: Scene, contacts: bool = False) -> None:
-        """A new trial."""
-        self.steps = 0
+        super().__init__()
+        self.busy = busy
 
     def step(self, action: NDArray[np.float32], space: str, poll: Poll) -> StepResult:
-        """One action."""
+        """Compute for `busy` seconds."""
         until = time.thread_time() + self.busy
         while time.thread_time() < until:
             pass
-        self.steps += 1
-        return StepResult(1, poll(self.snapshot()))
-
-    def observe(self, spec: PolicySpec) -> dict[str, Any]:
-        """Joints only."""
-        return {"images": {}, "state": np.zeros(14, np.float32)}
-
-    def snapshot(self) -> Snapshot:
-        """Nothing to see."""
-        points = (HERE.position, HERE.position)
-        poses = {"block": HERE}
-        return Snapshot(0.02 * self.steps, poses, (0.0, 0.0), (HERE, HERE), grasp_points=points)
-
-    def contacts(self) -> tuple[Contact, ...]:
-        """None."""
-        return ()
-
-    def digest(self) -> str:
-        """All trials end alike."""
-        return str(self.steps)
-
-    def info(self) -> Mapping[str, Any]:
-        """For the manifest."""
-        return {"simulator": "busy loop"}
-
-    def close(self) -> None:
-        """Nothing to free."""
-
-
-class Never:
-    """A goal that is never met: every trial takes all of its steps."""
-
-    needs_contacts = False
-    total = 1
-
-    def start(self, snapshot: Snapshot) -> tuple[Event, ...]:
-        """Not met."""
-        return ()
-
-    def update(self, snapshot: Snapshot) -> tuple[Event, ...]:
-        """Not met."""
-        return ()
-
-
-def _unused(*_: Any) -> Any:
-    raise AssertionError("the task is never drawn")
+        return super().step(action, space, poll)
 
 
 def parts(key: TrialKey) -> TrialParts:
     """A trial of CALLS steps."""
-    levels = {1: Level(candidates=1, subtasks=1, steps=CALLS)}
-    task = Task(key.task, "GAC", levels, _unused, _unused, _unused, _unused, "busy", "busy")
-    scene = Scene(key.task, key.level, key.seed, key.embodiment, key.mode, (), {})
-    return TrialParts(scene, task, Never(), "wait")
+    return endless_trial(key, CALLS)
 
 
 @dataclass
@@ -226,7 +170,7 @@ def measure(busy: float, workers: int, seconds: float, base: float, item: float)
     window = Window(seconds if workers else 3 * seconds)  # growing takes whole rounds of trials
     with tempfile.TemporaryDirectory() as folder, serving(base, item) as served:
         config = WorkerConfig(
-            Path(folder), served.url, world="throughput:World",
+            Path(folder), served.url, world="throughput:BusyWorld",
             world_arguments={"busy": busy}, parts="throughput:parts",
             expects={served.url: Model(base, item).spec},
         )  # fmt: skip

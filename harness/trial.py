@@ -16,7 +16,7 @@ import hashlib
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, replace
-from typing import Any, ParamSpec, Protocol, TypeVar
+from typing import ParamSpec, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +31,7 @@ from robospa.results.records.trial_record import PROCESSOR, TrialRecord
 from robospa.tasks.catalog import build_scene
 from robospa.tasks.catalog import task as find_task
 from robospa.tasks.events import Event, outcome
-from robospa.tasks.goals.hands import Hands
+from robospa.tasks.goals.grasp_events import GraspMonitor
 from robospa.tasks.scene import Scene
 from robospa.tasks.snapshot import Snapshot
 from robospa.tasks.task import Task, Tracker
@@ -114,7 +114,7 @@ class _Run:
     parts: TrialParts
     recorder: Recorder | None
     stopwatch: _Stopwatch = field(default_factory=_Stopwatch)
-    hands: Hands | None = None
+    grasps: GraspMonitor | None = None
     events: list[Event] = field(default_factory=list)
     event_steps: list[int] = field(default_factory=list)
     """For every event the number of actions started by then."""
@@ -144,8 +144,8 @@ class _Run:
     def _update_goal(self, snapshot: Snapshot) -> tuple[Event, ...]:
         """New events of the goal and of the grippers."""
         new = self.parts.tracker.update(snapshot)
-        if self.hands is not None:
-            attempts = self.hands.update(snapshot)
+        if self.grasps is not None:
+            attempts = self.grasps.update(snapshot)
             return (*attempts, *new) if attempts else new
         return new
 
@@ -280,12 +280,11 @@ def _play(run: _Run, info: TrialInfo, limit: int) -> tuple[str, str]:
         return "policy_error", str(error)
 
 
-def _diagnostics(run: _Run) -> dict[str, Any]:
-    """What stands beside the result: the goal's own, and actions that were not done as asked."""
-    own = getattr(run.parts.tracker, "diagnostics", None)
-    found = dict(own()) if own is not None else {}
-    if run.hands is not None:
-        found.update(run.hands.diagnostics())
+def _diagnostics(run: _Run) -> dict[str, object]:
+    """The goal's own diagnostics, roles of objects, and actions that were out of reach."""
+    found = dict(run.parts.tracker.diagnostics())
+    if run.grasps is not None:
+        found.update(run.grasps.diagnostics())
     if run.unreachable:
         found["unreachable_actions"] = run.unreachable
         found["first_unreachable"] = run.first_problem
@@ -313,9 +312,8 @@ def run_trial(
     run = _Run(world, policy, setup, recorder)
     tracker = setup.tracker
     run.stopwatch.call("loading", world.load, setup.scene, tracker.needs_contacts)
-    roles = getattr(tracker, "roles", None)
-    if roles:
-        run.hands = Hands(roles, setup.scene, world.contacts)
+    if tracker.roles:
+        run.grasps = GraspMonitor(tracker.roles, setup.scene, world.contacts)
     info = TrialInfo(
         task=key.task,
         level=key.level,
@@ -328,8 +326,8 @@ def run_trial(
     )
     limit = max(1, round(setup.task.levels[key.level].steps * step_scale))
     end, message = _play(run, info, limit)
-    if run.hands is not None:
-        run.note(run.hands.finish(world.snapshot().time))
+    if run.grasps is not None:
+        run.note(run.grasps.finish(world.snapshot().time))
     if recorder is not None:
         run.stopwatch.call("recording", recorder.ended, world)
     record = _record(run, key, end, message, policy_seed)

@@ -35,6 +35,17 @@ class Event:
     note: str = ""
 
 
+@dataclass(frozen=True)
+class ObjectRole:
+    """The subtasks that need an object; a distractor has none.
+
+    A `pressed` object is touched with a closed gripper: closing near it is no grasp attempt.
+    """
+
+    subtasks: tuple[int, ...] = ()
+    pressed: bool = False
+
+
 @dataclass(frozen=True, slots=True)
 class Outcome:
     """`done` counts the subtasks that hold at the end, `best` the most that ever held at once."""

@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from robospa.categories import BASIC, SPATIAL
-from robospa.tasks.events import Event
+from robospa.tasks.events import Event, ObjectRole
 from robospa.tasks.facts import SceneFacts
 from robospa.tasks.instructions.grammar import Phrasings, Templates
 from robospa.tasks.plan import Skill
@@ -22,15 +22,26 @@ class Tracker(Protocol):
     """A goal as a state machine over snapshots; see `robospa.tasks.goals`.
 
     `start` is called once with the settled scene, `update` at 50 Hz of simulated time from the
-    first action on. `update` returns the events of this instant (usually none).
+    first action on.
+
+    `needs_contacts` asks for `Snapshot.contacts`; without `roles` grasp attempts are not recorded.
     """
 
     total: int
     needs_contacts: bool
 
-    def start(self, snapshot: Snapshot) -> tuple[Event, ...]: ...
+    @property
+    def roles(self) -> Mapping[str, ObjectRole]:
+        """The objects of the goal and its distractors, by name."""
 
-    def update(self, snapshot: Snapshot) -> tuple[Event, ...]: ...
+    def start(self, snapshot: Snapshot) -> tuple[Event, ...]:
+        """Events that hold before the first action."""
+
+    def update(self, snapshot: Snapshot) -> tuple[Event, ...]:
+        """Events of this instant."""
+
+    def diagnostics(self) -> Mapping[str, object]:
+        """JSON values for the record: how the goal was met or missed."""
 
 
 @dataclass(frozen=True)

@@ -10,11 +10,10 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol, TypeGuard
 
 from robospa.geometry import Vec3
-from robospa.tasks.events import Event
-from robospa.tasks.goals.flags import Flags, both_open
-from robospa.tasks.goals.handling import Handling
-from robospa.tasks.goals.hands import Role
+from robospa.tasks.events import Event, ObjectRole
+from robospa.tasks.goals.lift_tracker import LiftTracker
 from robospa.tasks.goals.parts import Part
+from robospa.tasks.goals.subtask_flags import SubtaskFlags, grippers_open
 from robospa.tasks.snapshot import Snapshot
 
 
@@ -38,7 +37,7 @@ class Watch(Protocol):
     """
 
     @property
-    def roles(self) -> Mapping[str, Role]: ...
+    def roles(self) -> Mapping[str, ObjectRole]: ...
 
     def start(self, snapshot: Snapshot) -> tuple[Event, ...]: ...
 
@@ -98,30 +97,32 @@ class Checklist:
         self._tools = dict(tools or {})
         self.needs_contacts = not all(_is_carried(c) for c in self._counters.values())
         self._released = released
-        self._flags = Flags(self.total)
+        self._flags = SubtaskFlags(self.total)
         names = {part.name for part in self._parts.values()}
         names |= set(self._tools)
         names |= {name for name, counter in self._counters.items() if _is_carried(counter)}
-        self._handling = Handling(sorted(names) if handled is None else handled, radius, may_fall)
+        self._lift_tracker = LiftTracker(
+            sorted(names) if handled is None else handled, radius, may_fall
+        )
         self._idle = 0
         self._out_of_order = 0
 
     @property
-    def roles(self) -> dict[str, Role]:
+    def roles(self) -> dict[str, ObjectRole]:
         """What is moved and what is pressed; mere places are distractors."""
-        found: dict[str, Role] = dict(self._watch.roles) if self._watch else {}
-        found |= {t: Role() for p in self._parts.values() for t in p.targets}
+        found: dict[str, ObjectRole] = dict(self._watch.roles) if self._watch else {}
+        found |= {t: ObjectRole() for p in self._parts.values() for t in p.targets}
         for i, part in self._parts.items():
             for name in part.movers:
-                found[name] = Role((*found.get(name, Role()).subtasks, i))
-        found |= {name: Role((index,)) for name, index in self._tools.items()}
+                found[name] = ObjectRole((*found.get(name, ObjectRole()).subtasks, i))
+        found |= {name: ObjectRole((index,)) for name, index in self._tools.items()}
         for name, indices in self._counts.items():
-            found[name] = Role(tuple(indices), pressed=not _is_carried(self._counters[name]))
+            found[name] = ObjectRole(tuple(indices), pressed=not _is_carried(self._counters[name]))
         return found
 
     def start(self, snapshot: Snapshot) -> tuple[Event, ...]:
         """What holds already, if anything."""
-        self._handling.start(snapshot)
+        self._lift_tracker.start(snapshot)
         for counter in self._counters.values():
             counter.start(snapshot)
         for part in self._parts.values():
@@ -134,7 +135,7 @@ class Checklist:
 
     def update(self, snapshot: Snapshot) -> tuple[Event, ...]:
         """Changes of the flags, counts beyond the last, drops; success."""
-        events = self._handling.update(snapshot)
+        events = self._lift_tracker.update(snapshot)
         for name, counter in self._counters.items():
             if counter.update(snapshot):
                 events += self._count(name, counter.count, snapshot.time)
@@ -144,7 +145,7 @@ class Checklist:
             if any(event.kind == "failed" for event in watched):
                 return events
         events += self._look(snapshot)
-        if self._flags.all and (not self._released or both_open(snapshot)):
+        if self._flags.all and (not self._released or grippers_open(snapshot)):
             events += (Event(snapshot.time, "success"),)
         return events
 
@@ -194,5 +195,5 @@ class Checklist:
             found["raw_presses"] = sum(c.raw_count for c in counters)
         if self._watch:
             found |= self._watch.diagnostics()
-        found["drops"] = self._handling.drops
+        found["drops"] = self._lift_tracker.drops
         return found

@@ -10,10 +10,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Protocol
 
-from robospa.tasks.events import Event
-from robospa.tasks.goals.flags import Flags
-from robospa.tasks.goals.hands import Role
+from robospa.tasks.events import Event, ObjectRole
 from robospa.tasks.goals.repeat import PressCounter
+from robospa.tasks.goals.subtask_flags import SubtaskFlags
 from robospa.tasks.snapshot import Snapshot
 
 
@@ -40,16 +39,18 @@ class ClickInOrder:
         self.total = len(counters)
         self._counters = tuple(counters)
         self._others = tuple(others)
-        self._flags = Flags(self.total)
+        self._flags = SubtaskFlags(self.total)
         self._early = 0
         self._again = 0
         self._wrong = 0
 
     @property
-    def roles(self) -> dict[str, Role]:
+    def roles(self) -> dict[str, ObjectRole]:
         """The objects in their order, and those that are not asked for."""
-        wrong = {c.name: Role(pressed=True) for c in self._others}
-        return wrong | {c.name: Role((i,), pressed=True) for i, c in enumerate(self._counters)}
+        wrong = {c.name: ObjectRole(pressed=True) for c in self._others}
+        return wrong | {
+            c.name: ObjectRole((i,), pressed=True) for i, c in enumerate(self._counters)
+        }
 
     def start(self, snapshot: Snapshot) -> tuple[Event, ...]:
         """Nothing is clicked yet."""
@@ -104,14 +105,14 @@ class PressCounts:
         self.total = len(counters)
         self._counters = tuple(counters)
         self._times = tuple(times)
-        self._flags = Flags(self.total)
+        self._flags = SubtaskFlags(self.total)
         self._excess = 0
         self._out_of_order = 0
 
     @property
-    def roles(self) -> dict[str, Role]:
+    def roles(self) -> dict[str, ObjectRole]:
         """Every object."""
-        return {c.name: Role((i,), pressed=True) for i, c in enumerate(self._counters)}
+        return {c.name: ObjectRole((i,), pressed=True) for i, c in enumerate(self._counters)}
 
     def start(self, snapshot: Snapshot) -> tuple[Event, ...]:
         """Nothing is pressed yet; at least one press is asked of every object."""

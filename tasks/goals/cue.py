@@ -8,12 +8,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, Protocol
 
 from robospa.geometry import Vec3
-from robospa.tasks.events import Event
-from robospa.tasks.goals.hands import Role
+from robospa.tasks.events import Event, ObjectRole
 from robospa.tasks.snapshot import Snapshot
+from robospa.tasks.task import Tracker
 
 STILL = 0.03
 """No end effector may be farther [m] from its start before the cue is hidden."""
@@ -22,7 +21,7 @@ MOVED_EARLY = "moved before the cue was hidden"
 
 
 class Stillness:
-    """How far the end effectors have been from where they were at the start."""
+    """Largest distance [m] of an end effector from where it was at the start."""
 
     def __init__(self) -> None:
         self.motion = 0.0
@@ -39,26 +38,10 @@ class Stillness:
         return self.motion > STILL
 
 
-class Remembered(Protocol):
-    """What is to be done once the cue is hidden."""
-
-    total: int
-    needs_contacts: bool
-
-    @property
-    def roles(self) -> dict[str, Role]: ...
-
-    def start(self, snapshot: Snapshot) -> tuple[Event, ...]: ...
-
-    def update(self, snapshot: Snapshot) -> tuple[Event, ...]: ...
-
-    def diagnostics(self) -> Mapping[str, Any]: ...
-
-
 class AfterCue:
     """`goal`, which starts when the objects called `covers` have appeared; stillness before."""
 
-    def __init__(self, goal: Remembered, covers: Sequence[str]) -> None:
+    def __init__(self, goal: Tracker, covers: Sequence[str]) -> None:
         self.total = goal.total
         self.needs_contacts = goal.needs_contacts
         self._goal = goal
@@ -68,7 +51,7 @@ class AfterCue:
         self._over = False
 
     @property
-    def roles(self) -> dict[str, Role]:
+    def roles(self) -> Mapping[str, ObjectRole]:
         """Those of the goal."""
         return self._goal.roles
 
@@ -93,7 +76,7 @@ class AfterCue:
         self._over = any(e.kind in ("success", "failed") for e in events)
         return events
 
-    def diagnostics(self) -> dict[str, Any]:
+    def diagnostics(self) -> dict[str, object]:
         """The goal's own, when the cue was hidden (-1: not yet) and the motion [m] before."""
         return {
             **self._goal.diagnostics(),

@@ -10,11 +10,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from robospa.tasks.events import Event
+from robospa.tasks.events import Event, ObjectRole
 from robospa.tasks.goals.cue import MOVED_EARLY, Stillness
-from robospa.tasks.goals.flags import Flags, closed_near
-from robospa.tasks.goals.handling import Handling
-from robospa.tasks.goals.hands import Role
+from robospa.tasks.goals.lift_tracker import LiftTracker
+from robospa.tasks.goals.subtask_flags import SubtaskFlags, closed_near
 from robospa.tasks.snapshot import Snapshot
 
 OPEN_REACH = 0.045
@@ -45,17 +44,17 @@ class UncoverInOrder:
         self.total = len(covers)
         self._covers = tuple(covers)
         self._below = below
-        self._flags = Flags(self.total)
-        self._handling = Handling((c.name for c in covers), radius=HELD_RADIUS)
+        self._flags = SubtaskFlags(self.total)
+        self._lift_tracker = LiftTracker((c.name for c in covers), radius=HELD_RADIUS)
         self._stillness = Stillness()
         self._hidden_at: float | None = None
         self._wrong_lifts = 0
         self._over = False
 
     @property
-    def roles(self) -> dict[str, Role]:
+    def roles(self) -> dict[str, ObjectRole]:
         """The covers."""
-        return {cover.name: Role((i,)) for i, cover in enumerate(self._covers)}
+        return {cover.name: ObjectRole((i,)) for i, cover in enumerate(self._covers)}
 
     def start(self, snapshot: Snapshot) -> tuple[Event, ...]:
         """Remember where the end effectors are."""
@@ -106,7 +105,7 @@ class UncoverInOrder:
 
     def _handled(self, snapshot: Snapshot) -> tuple[Event, ...]:
         """Grasps and drops, and `wrong_object` for a lifted cover that is not due."""
-        events = self._handling.update(snapshot)
+        events = self._lift_tracker.update(snapshot)
         if not events:
             return ()
         due = self._covers[sum(self._flags.held)].name
@@ -129,5 +128,5 @@ class UncoverInOrder:
             "cue_hidden_at": -1.0 if self._hidden_at is None else self._hidden_at,
             "motion_before": self._stillness.motion,
             "wrong_lifts": self._wrong_lifts,
-            "drops": self._handling.drops,
+            "drops": self._lift_tracker.drops,
         }

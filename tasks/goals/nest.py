@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 from robospa.geometry import Vec3
 from robospa.tasks.goals.checklist import Checklist
-from robospa.tasks.goals.flags import closed_near
+from robospa.tasks.goals.subtask_flags import closed_near
 from robospa.tasks.snapshot import Snapshot
 
 OVER_BASE, OVER_TOP = 0.05, 0.04

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from robospa.geometry import Pose, Vec3
-from robospa.tasks.goals.flags import closed_near
+from robospa.tasks.goals.subtask_flags import closed_near
 from robospa.tasks.snapshot import Snapshot
 
 HELD_RADIUS = 0.07

@@ -11,9 +11,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from robospa.geometry import Vec3
-from robospa.tasks.events import Event
-from robospa.tasks.goals.handling import Handling
-from robospa.tasks.goals.hands import Role
+from robospa.tasks.events import Event, ObjectRole
+from robospa.tasks.goals.lift_tracker import LiftTracker
 from robospa.tasks.snapshot import GRIPPER_CLOSED, GRIPPER_OPEN, Snapshot
 
 CARRY_DISTANCE = 0.15
@@ -59,12 +58,12 @@ class PickTracker:
         self._begin()
 
     @property
-    def roles(self) -> dict[str, Role]:
+    def roles(self) -> dict[str, ObjectRole]:
         """The target and what it may be mistaken for."""
-        return {name: Role((0,) if name == self.target else ()) for name in self._names}
+        return {name: ObjectRole((0,) if name == self.target else ()) for name in self._names}
 
     def _begin(self) -> None:
-        self._handling = Handling(self._names, CARRY_DISTANCE)
+        self._lift_tracker = LiftTracker(self._names, CARRY_DISTANCE)
         self._heights: list[float] = []
         self._goal_height = float("inf")
         self._wrong: set[str] = set()
@@ -78,13 +77,13 @@ class PickTracker:
         if self.lift.rise is not None:
             heights.append(snapshot.height(self.target) + self.lift.rise)
         self._goal_height = max(heights)
-        return self._handling.update(snapshot)
+        return self._lift_tracker.update(snapshot)
 
     def update(self, snapshot: Snapshot) -> tuple[Event, ...]:
         """Events of this instant; none after success."""
         if self._done:
             return ()
-        events = self._handling.update(snapshot)
+        events = self._lift_tracker.update(snapshot)
         steady, most = True, self.lift.steady
         for name, start in zip(self.others, self._heights, strict=True):
             rise = snapshot.height(name) - start
@@ -103,8 +102,12 @@ class PickTracker:
             )
         return events
 
+    def diagnostics(self) -> dict[str, object]:
+        """None: the events say it all."""
+        return {}
+
     def _held(self, snapshot: Snapshot) -> bool:
-        """Whether a gripper carries the target, as far as this task looks."""
+        """True if a gripper carries the target by the rules of this lift."""
         opening = GRIPPER_CLOSED if self.lift.closed else GRIPPER_OPEN
         if not carried(snapshot, snapshot.position(self.target), opening):
             return False

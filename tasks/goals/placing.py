@@ -8,9 +8,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from robospa.tasks.events import Event
+from robospa.tasks.events import Event, ObjectRole
 from robospa.tasks.goals.checklist import Checklist
-from robospa.tasks.goals.hands import Role
 from robospa.tasks.goals.parts import (
     HELD_RADIUS,
     Container,
@@ -60,7 +59,7 @@ class _Strays:
     """Objects in regions that they were not asked for, and those that fell off the table."""
 
     def __init__(self, parts: Sequence[Destination], lowest: float) -> None:
-        self.roles: dict[str, Role] = {}
+        self.roles: dict[str, ObjectRole] = {}
         self._parts = tuple(parts)
         self._lowest = lowest
         self._astray: set[str] = set()
@@ -105,7 +104,7 @@ class _Intruders:
     """Objects that no one asked for: lifted, or in the region."""
 
     def __init__(self, others: Sequence[str], region: Region) -> None:
-        self.roles = {name: Role() for name in others}
+        self.roles = {name: ObjectRole() for name in others}
         self._region = region
         self._lifts = 0
 
@@ -146,7 +145,7 @@ class _Lost:
     """Objects that lie beside the container, too low to be fetched."""
 
     def __init__(self, names: Sequence[str], container: Container, below: float) -> None:
-        self.roles: dict[str, Role] = {}
+        self.roles: dict[str, ObjectRole] = {}
         self._names = tuple(names)
         self._container = container
         self._below = below

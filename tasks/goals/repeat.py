@@ -8,9 +8,8 @@ Where the gripper has to be closed, opening it on the object is no leaving (offi
 from __future__ import annotations
 
 from robospa.geometry import Pose, Vec3
-from robospa.tasks.events import Event
-from robospa.tasks.goals.flags import Flags, inside_box
-from robospa.tasks.goals.hands import Role
+from robospa.tasks.events import Event, ObjectRole
+from robospa.tasks.goals.subtask_flags import SubtaskFlags, inside_box
 from robospa.tasks.snapshot import GRIPPER_CLOSED, Snapshot
 
 PRESS_BOX: Vec3 = (0.03, 0.03, 0.03)
@@ -89,12 +88,12 @@ class Repeat:
     def __init__(self, counter: PressCounter, times: int) -> None:
         self.total = times
         self.counter = counter
-        self._flags = Flags(times)
+        self._flags = SubtaskFlags(times)
 
     @property
-    def roles(self) -> dict[str, Role]:
+    def roles(self) -> dict[str, ObjectRole]:
         """The pressed object."""
-        return {self.counter.name: Role(tuple(range(self.total)), pressed=True)}
+        return {self.counter.name: ObjectRole(tuple(range(self.total)), pressed=True)}
 
     def start(self, snapshot: Snapshot) -> tuple[Event, ...]:
         """Nothing is done yet."""

@@ -11,10 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from robospa.geometry import Quat
-from robospa.tasks.events import Event
-from robospa.tasks.goals.flags import Flags, both_open, closed_near
-from robospa.tasks.goals.handling import Handling
-from robospa.tasks.goals.hands import Role
+from robospa.tasks.events import Event, ObjectRole
+from robospa.tasks.goals.lift_tracker import LiftTracker
+from robospa.tasks.goals.subtask_flags import SubtaskFlags, closed_near, grippers_open
 from robospa.tasks.snapshot import Snapshot
 
 NEAR = 0.03
@@ -48,28 +47,28 @@ class Restore:
         self.total = len(wanted)
         self._wanted = tuple(wanted)
         self._references = tuple(references)
-        self._flags = Flags(self.total)
+        self._flags = SubtaskFlags(self.total)
         self._places: dict[str, tuple[float, float]] = {}
         names = [*(w.name for w in wanted), *references]
-        self._handling = Handling(names, radius=0.08)
+        self._lift_tracker = LiftTracker(names, radius=0.08)
         self._wrong_lifts = 0
         self._out_of_order = 0
 
     @property
-    def roles(self) -> dict[str, Role]:
+    def roles(self) -> dict[str, ObjectRole]:
         """The objects to turn, and those that show how."""
-        shown = {name: Role() for name in self._references}
-        return shown | {w.name: Role((i,)) for i, w in enumerate(self._wanted)}
+        shown = {name: ObjectRole() for name in self._references}
+        return shown | {w.name: ObjectRole((i,)) for i, w in enumerate(self._wanted)}
 
     def start(self, snapshot: Snapshot) -> tuple[Event, ...]:
         """Remember the places; an object never lies as wanted at the start."""
-        self._handling.start(snapshot)
+        self._lift_tracker.start(snapshot)
         self._places = {w.name: snapshot.poses[w.name].position[:2] for w in self._wanted}
         return ()
 
     def update(self, snapshot: Snapshot) -> tuple[Event, ...]:
         """Changes of the flags, lifted references; success."""
-        events = self._handling.update(snapshot)
+        events = self._lift_tracker.update(snapshot)
         time = snapshot.time
         for event in events:
             if event.kind == "grasped" and event.object in self._references:
@@ -84,7 +83,7 @@ class Restore:
                     self._out_of_order += 1
                     events += (Event(time, "wrong_order", wanted.name, i),)
             events += self._flags.set(i, now, time, wanted.name)
-        if self._flags.all and both_open(snapshot):
+        if self._flags.all and grippers_open(snapshot):
             events += (Event(time, "success"),)
         return events
 
@@ -104,7 +103,7 @@ class Restore:
             "idle_progress": 0.0,
             "wrong_lifts": self._wrong_lifts,
             "out_of_order": self._out_of_order,
-            "drops": self._handling.drops,
+            "drops": self._lift_tracker.drops,
         }
 
 

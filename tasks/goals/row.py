@@ -10,11 +10,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import pairwise
 
-from robospa.tasks.events import Event
+from robospa.tasks.events import Event, ObjectRole
 from robospa.tasks.goals.checklist import Checklist
-from robospa.tasks.goals.flags import closed_near
-from robospa.tasks.goals.hands import Role
 from robospa.tasks.goals.parts import HELD_RADIUS, Given
+from robospa.tasks.goals.subtask_flags import closed_near
 from robospa.tasks.snapshot import Snapshot
 
 ALIGNED = 0.03
@@ -58,7 +57,7 @@ class _ChancePairs:
     """How many pairs were in place before anything was done."""
 
     def __init__(self, pairs: Sequence[Pair]) -> None:
-        self.roles: dict[str, Role] = {}
+        self.roles: dict[str, ObjectRole] = {}
         self._pairs = tuple(pairs)
         self._count = 0
 

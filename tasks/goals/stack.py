@@ -11,10 +11,9 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 from robospa.geometry import Vec3
-from robospa.tasks.events import Event
-from robospa.tasks.goals.flags import Flags, both_open, closed_near
-from robospa.tasks.goals.handling import Handling
-from robospa.tasks.goals.hands import Role
+from robospa.tasks.events import Event, ObjectRole
+from robospa.tasks.goals.lift_tracker import LiftTracker
+from robospa.tasks.goals.subtask_flags import SubtaskFlags, closed_near, grippers_open
 from robospa.tasks.snapshot import Snapshot
 
 HEIGHT_TOLERANCE = 0.02
@@ -52,26 +51,26 @@ class Stack:
         for below, above in pairwise(thick):
             self._rises.append(self._rises[-1] + (below + above) / 2)
         self._within = within
-        self._flags = Flags(self.total)
-        self._handling = Handling(order, radius=0.06)
+        self._flags = SubtaskFlags(self.total)
+        self._lift_tracker = LiftTracker(order, radius=0.06)
         self._idle = 0
         self._out_of_order = 0
 
     @property
-    def roles(self) -> dict[str, Role]:
+    def roles(self) -> dict[str, ObjectRole]:
         """Every part."""
-        return {name: Role((i,)) for i, name in enumerate(self._order)}
+        return {name: ObjectRole((i,)) for i, name in enumerate(self._order)}
 
     def start(self, snapshot: Snapshot) -> tuple[Event, ...]:
         """The bottom part counts as done."""
-        self._handling.start(snapshot)
+        self._lift_tracker.start(snapshot)
         events = self._flags.set(0, True, snapshot.time, self._order[0])
         self._idle = 1
         return events
 
     def update(self, snapshot: Snapshot) -> tuple[Event, ...]:
         """Changes of the flags; success once all hold and both grippers are open."""
-        events = self._handling.update(snapshot)
+        events = self._lift_tracker.update(snapshot)
         time, held = snapshot.time, self._flags.held
         places = [snapshot.position(name) for name in self._order]
         for i in range(1, self.total):
@@ -84,7 +83,7 @@ class Stack:
                 events += (Event(time, "wrong_order", name, i),)
             if now != held[i]:
                 events += self._flags.set(i, now, time, name)
-        if self._flags.all and both_open(snapshot):
+        if self._flags.all and grippers_open(snapshot):
             events += (Event(time, "success"),)
         return events
 
@@ -102,7 +101,7 @@ class Stack:
         return {
             "idle_progress": self._idle / self.total,
             "out_of_order": self._out_of_order,
-            "drops": self._handling.drops,
+            "drops": self._lift_tracker.drops,
         }
 
 
@@ -123,34 +122,34 @@ class Bring:
         self._x = x
         self._y = y
         self._height = 0.0
-        self._flags = Flags(1)
-        self._handling = Handling((name,), radius=0.06)
+        self._flags = SubtaskFlags(1)
+        self._lift_tracker = LiftTracker((name,), radius=0.06)
 
     @property
-    def roles(self) -> dict[str, Role]:
+    def roles(self) -> dict[str, ObjectRole]:
         """The object."""
-        return {self._name: Role((0,))}
+        return {self._name: ObjectRole((0,))}
 
     def start(self, snapshot: Snapshot) -> tuple[Event, ...]:
         """Remember the height at which the object rests."""
-        self._handling.start(snapshot)
+        self._lift_tracker.start(snapshot)
         self._height = snapshot.poses[self._name].position[2]
         return ()
 
     def update(self, snapshot: Snapshot) -> tuple[Event, ...]:
         """Done and success at once when the object lies in the region, released."""
-        events = self._handling.update(snapshot)
+        events = self._lift_tracker.update(snapshot)
         x, y, z = snapshot.position(self._name)
         there = (
             self._x[0] < x < self._x[1]
             and self._y[0] < y < self._y[1]
             and abs(z - self._height) <= HEIGHT_TOLERANCE
         )
-        if there and not self._flags.all and both_open(snapshot):
+        if there and not self._flags.all and grippers_open(snapshot):
             events += self._flags.set(0, True, snapshot.time, self._name)
             events += (Event(snapshot.time, "success"),)
         return events
 
     def diagnostics(self) -> dict[str, float]:
         """Idle progress (none) and drops."""
-        return {"idle_progress": 0.0, "drops": self._handling.drops}
+        return {"idle_progress": 0.0, "drops": self._lift_tracker.drops}

@@ -9,10 +9,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from robospa.geometry import Pose
-from robospa.tasks.events import Event
+from robospa.tasks.events import Event, ObjectRole
 from robospa.tasks.goals.clicks import ClickInOrder, Countable
-from robospa.tasks.goals.handling import Handling
-from robospa.tasks.goals.hands import Role
+from robospa.tasks.goals.lift_tracker import LiftTracker
 from robospa.tasks.goals.repeat import PressCounter
 from robospa.tasks.snapshot import Snapshot
 
@@ -48,23 +47,23 @@ class UseInOrder(ClickInOrder):
     def __init__(self, counters: Sequence[Countable], tool: str) -> None:
         super().__init__(counters)
         self._tool = tool
-        self._handling = Handling((tool,), radius=0.15)
+        self._lift_tracker = LiftTracker((tool,), radius=0.15)
 
     @property
-    def roles(self) -> dict[str, Role]:
+    def roles(self) -> dict[str, ObjectRole]:
         """The tool serves all; the objects are only places where it is used."""
-        places = {name: Role(pressed=True) for name in super().roles}
-        return places | {self._tool: Role(tuple(range(self.total)))}
+        places = {name: ObjectRole(pressed=True) for name in super().roles}
+        return places | {self._tool: ObjectRole(tuple(range(self.total)))}
 
     def start(self, snapshot: Snapshot) -> tuple[Event, ...]:
         """Nothing is done yet; remember where the tool lies."""
-        self._handling.start(snapshot)
+        self._lift_tracker.start(snapshot)
         return super().start(snapshot)
 
     def update(self, snapshot: Snapshot) -> tuple[Event, ...]:
         """Grasps and drops of the tool, and what the order says."""
-        return (*self._handling.update(snapshot), *super().update(snapshot))
+        return (*self._lift_tracker.update(snapshot), *super().update(snapshot))
 
     def diagnostics(self) -> dict[str, float]:
         """Those of the order, and drops of the tool."""
-        return {**super().diagnostics(), "drops": self._handling.drops}
+        return {**super().diagnostics(), "drops": self._lift_tracker.drops}

@@ -23,7 +23,7 @@ from robospa.harness.trial import TrialParts
 from robospa.harness.world import ActionError, Poll, SceneUnstable, StepResult
 from robospa.observation import CameraSpec
 from robospa.protocol.policy import PolicySpec, TrialInfo
-from robospa.tasks.events import Event
+from robospa.tasks.events import Event, ObjectRole
 from robospa.tasks.scene import Scene
 from robospa.tasks.snapshot import Contact, Snapshot
 from robospa.tasks.task import Level, Task
@@ -82,6 +82,7 @@ class FakeWorld:
 
 class SumTracker:
     needs_contacts = False
+    roles: Mapping[str, ObjectRole] = {}
 
     def __init__(self, wanted: float, total: int) -> None:
         self.wanted, self.total, self.done = wanted, total, 0

@@ -19,8 +19,8 @@ from robospa.tasks.families.action_chain.stations import button, frame_of
 from robospa.tasks.families.dustbin.floor_bin import BIN, TABLE_SHIFT, container
 from robospa.tasks.families.tabletop import Item, draw_look, in_view, named, radius, standing
 from robospa.tasks.goals.checklist import Checklist, Counter
-from robospa.tasks.goals.flags import inside_box
 from robospa.tasks.goals.parts import Inside, Near, Part, Rests
+from robospa.tasks.goals.subtask_flags import inside_box
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.instructions.words import times

@@ -15,7 +15,7 @@ import numpy as np
 from robospa.tasks import objects
 from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.tabletop import Item, draw_look, named, side, standing
-from robospa.tasks.goals.cycles import Cycles, back_home, held_up, put_down, raised
+from robospa.tasks.goals.lift_cycles import LiftCycles, back_home, held_up, put_down, raised
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.instructions.words import NUMBERS, by_count
@@ -46,18 +46,18 @@ class Facts(SceneFacts):
     count: int
 
 
-def _pot_goal(scene: Scene) -> Cycles:
+def _pot_goal(scene: Scene) -> LiftCycles:
     pot = scene.object(Facts.of(scene).thing)
     model = objects.object_model(pot.asset, pot.params)
     handles = [model.frames[arm].position for arm in ("left", "right")]
     up, down = held_up(pot.name, UP + scene.table_rise, handles), put_down(pot.name, DOWN, ASIDE)
-    return Cycles(pot.name, Facts.of(scene).count, up, down, radius=0.2)
+    return LiftCycles(pot.name, Facts.of(scene).count, up, down, radius=0.2)
 
 
-def _fan_goal(scene: Scene) -> Cycles:
+def _fan_goal(scene: Scene) -> LiftCycles:
     name = Facts.of(scene).thing
     up, down = raised(name, FAN_UP), back_home(name, FAN_WAY, FAN_TURN)
-    return Cycles(name, Facts.of(scene).count, up, down)
+    return LiftCycles(name, Facts.of(scene).count, up, down)
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class Thing:
     y: tuple[float, float]
     yaw: float
     rise: float
-    goal: Callable[[Scene], Cycles]
+    goal: Callable[[Scene], LiftCycles]
     both: bool
     success: str
 

@@ -8,7 +8,7 @@ from snapshots_by_hand import AWAY, TICK, held, kinds, snap
 
 from robospa.geometry import Vec3
 from robospa.tasks.events import Event
-from robospa.tasks.goals.handling import Handling
+from robospa.tasks.goals.lift_tracker import LiftTracker
 
 Step = tuple[float, float, float | None]
 REST: Vec3 = (0.0, 0.0, 0.74)
@@ -16,7 +16,7 @@ REST: Vec3 = (0.0, 0.0, 0.74)
 
 def play(steps: Iterable[Step]) -> list[Event]:
     """Steps are (object height, gripper opening, grasp height above the object or None)."""
-    handling = Handling(["o"])
+    handling = LiftTracker(["o"])
     handling.start(snap(0, {"o": REST}))
     events: list[Event] = []
     for i, (z, opening, above) in enumerate(steps, 1):

@@ -7,7 +7,7 @@ from robospa.tasks.events import Event
 from robospa.tasks.snapshot import GRIPPER_OPEN, Snapshot
 
 
-class Flags:
+class SubtaskFlags:
     """The state of `total` subtasks; every change becomes an event."""
 
     def __init__(self, total: int) -> None:
@@ -16,7 +16,7 @@ class Flags:
         """Indices in the order in which they were first done."""
 
     def set(self, index: int, value: bool, time: float, name: str = "") -> tuple[Event, ...]:
-        """Give subtask `index` a value; an event if that is news."""
+        """Give subtask `index` a value; an event if it changes."""
         if self.held[index] == value:
             return ()
         self.held[index] = value
@@ -30,7 +30,7 @@ class Flags:
         return all(self.held)
 
 
-def both_open(snapshot: Snapshot) -> bool:
+def grippers_open(snapshot: Snapshot) -> bool:
     """Whether both grippers are commanded open."""
     left, right = snapshot.gripper
     return left > GRIPPER_OPEN and right > GRIPPER_OPEN

@@ -7,8 +7,8 @@ from collections.abc import Iterable
 from snapshots_by_hand import AWAY, TICK, kinds, snap
 
 from robospa.geometry import Pose, Vec3
-from robospa.tasks.events import Event
-from robospa.tasks.goals.hands import BESIDE, TOUCHING, Hands, Role
+from robospa.tasks.events import Event, ObjectRole
+from robospa.tasks.goals.grasp_events import BESIDE, TOUCHING, GraspMonitor
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.snapshot import Contact
 
@@ -18,16 +18,16 @@ SCENE = Scene(
     "Fake", 1, 1, "aloha-agilex", "clean",
     tuple(SceneObject(name, "block", Pose(at), CUBE) for name, at in AT.items()), {},
 )  # fmt: skip
-ROLES = {"a": Role((0,)), "b": Role()}
+ROLES = {"a": ObjectRole((0,)), "b": ObjectRole()}
 
 
 class Play:
-    """Hands over time: grippers, where the left one is, and what it touches."""
+    """GraspMonitor over time: grippers, where the left one is, and what it touches."""
 
-    def __init__(self, roles: dict[str, Role] = ROLES) -> None:
+    def __init__(self, roles: dict[str, ObjectRole] = ROLES) -> None:
         self.touched: tuple[str, ...] = ()
         self.asked = 0
-        self.hands = Hands(roles, SCENE, self._contacts)
+        self.hands = GraspMonitor(roles, SCENE, self._contacts)
         self.time = 0.0
 
     def _contacts(self) -> tuple[Contact, ...]:
@@ -83,7 +83,7 @@ def test_narrowing_an_open_gripper_is_no_closing() -> None:
 
 
 def test_closing_near_what_is_pressed_is_no_grasp() -> None:
-    assert not closings(Play({"a": Role((0, 1), pressed=True)}).go(2, AT["a"], 0.0, ["a"]))
+    assert not closings(Play({"a": ObjectRole((0, 1), pressed=True)}).go(2, AT["a"], 0.0, ["a"]))
 
 
 def test_contacts_are_asked_for_only_while_closing() -> None:
@@ -111,5 +111,5 @@ def test_an_approach_counts_once_until_the_gripper_left() -> None:
 
 
 def test_an_object_that_does_not_exist_yet_is_not_approached() -> None:
-    hands = Hands({"a": Role((0,))}, SCENE, lambda: ())
+    hands = GraspMonitor({"a": ObjectRole((0,))}, SCENE, lambda: ())
     assert hands.update(snap(1.0, {}, (0.0, 0.0), (AT["a"], AWAY[1]))) == ()

@@ -1,4 +1,4 @@
-"""Which objects are carried and which fall: events for the failure analysis, never for success.
+"""Objects that are lifted and dropped: events for the failure analysis, never for success.
 
 An object is grasped once it is 3 cm above its rest height with a gripper that is not open around
 it. It is dropped if it then falls faster than 0.6 m/s, which takes about 2 cm of free fall, away
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from robospa.geometry import Vec3
 from robospa.tasks.events import Event
-from robospa.tasks.goals.flags import holding_arm
+from robospa.tasks.goals.subtask_flags import holding_arm
 from robospa.tasks.snapshot import Snapshot
 
 LIFT = 0.03
@@ -31,7 +31,7 @@ SLIP = 0.01
 
 @dataclass
 class _Hold:
-    """Who held an object, when last, and how far [m] below the grasp centre its origin was."""
+    """Last time an arm held an object, and how far [m] below its grasp centre the origin was."""
 
     arm: int
     time: float
@@ -42,7 +42,7 @@ def _nowhere(position: Vec3) -> bool:
     return False
 
 
-class Handling:
+class LiftTracker:
     """Follows `names`; `radius` [m] bounds the distance from grasp centre to a held origin.
 
     `may_fall(position)` says where falling is part of the task (over a bin).
@@ -72,7 +72,7 @@ class Handling:
 
     def update(self, snapshot: Snapshot) -> tuple[Event, ...]:
         """`grasped` and `dropped` events of this instant."""
-        before, then = self._heights, self._time
+        before, last_time = self._heights, self._time
         heights = self._heights = snapshot.heights(self._names)
         time = self._time = snapshot.time
         events: tuple[Event, ...] = ()
@@ -83,7 +83,7 @@ class Handling:
                 if z is not None:
                     self._rest.setdefault(name, z)
             elif name in self._lifted:
-                speed = (last - z) / max(time - then, 1e-6)
+                speed = (last - z) / max(time - last_time, 1e-6)
                 events += self._carried(snapshot, name, snapshot.position(name), speed)
             elif z != last:
                 events += self._raised(snapshot, name, snapshot.position(name))

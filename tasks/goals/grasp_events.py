@@ -1,8 +1,9 @@
-"""What the grippers try: where they close, on what, and what they come near.
+"""Grasp attempts: where the grippers close, on what, and what they come near.
 
 Events for the failure analysis, never for success: a grasp that fails leaves no trace in a goal's
-own events. Looked at five or ten times a second, not at every poll, because grippers dwell where
-they try something. Contacts are asked for only while a gripper closes.
+own events. The grippers are sampled ten times a second and approaches five times, not at every
+poll, because grippers stay for a while where they try something. Contacts are read only while a
+gripper closes.
 """
 
 from __future__ import annotations
@@ -13,38 +14,27 @@ from dataclasses import dataclass, field
 
 from robospa.action_space import ARMS
 from robospa.geometry import Vec3
-from robospa.tasks.events import Event
+from robospa.tasks.events import Event, ObjectRole
 from robospa.tasks.objects import object_model
 from robospa.tasks.scene import Scene
 from robospa.tasks.snapshot import GRIPPER_CLOSED, Contact, Snapshot
 
-LOOK = 0.1
-"""Seconds between two looks at the grippers; at what they approach, every second time."""
+SAMPLE_INTERVAL = 0.1
+"""Seconds between two samples of the grippers; approaches are tested at every second one."""
 REOPENED = 0.3
 """A gripper commanded wider than this can close anew."""
 CLOSING = 0.5
-"""Seconds after the command to close during which a touch belongs to it: fingers lag by 0.2 s."""
+"""Seconds after the command to close in which a contact belongs to it: fingers lag by 0.2 s."""
 AROUND = 0.15
 """A gripper that closes farther [m] than this from everything tries nothing: no event."""
 NEAR, FAR = 0.055, 0.07
 """Distance [m] from grasp centre to an object's box that is an approach, and that ends it."""
 
 AT_REST = 0.002
-"""An arm that moved less than this [m] between two looks has approached nothing."""
+"""An arm that moved less than this [m] between two samples has approached nothing."""
 
 TOUCHING, BESIDE = "touching", "beside"
 """Notes of `closed` events."""
-
-
-@dataclass(frozen=True)
-class Role:
-    """What a goal wants of an object: the subtasks that need it (none: a distractor).
-
-    A `pressed` object is touched with closed gripper: closing near it is no attempt to grasp.
-    """
-
-    subtasks: tuple[int, ...] = ()
-    pressed: bool = False
 
 
 @dataclass
@@ -59,7 +49,7 @@ class _Arm:
     seen: Vec3 = (0.0, 0.0, 0.0)
 
 
-class Hands:
+class GraspMonitor:
     """Follows both grippers around the objects of `roles`.
 
     `touching()` gives the contacts of this instant.
@@ -67,7 +57,7 @@ class Hands:
 
     def __init__(
         self,
-        roles: Mapping[str, Role],
+        roles: Mapping[str, ObjectRole],
         scene: Scene,
         touching: Callable[[], tuple[Contact, ...]],
     ) -> None:
@@ -76,19 +66,19 @@ class Hands:
         self._boxes = {name: _box(scene, name) for name in self._roles}
         self._arms = (_Arm(), _Arm())
         self._due = 0.0
-        self._looks = 0
+        self._samples = 0
 
     def update(self, snapshot: Snapshot) -> tuple[Event, ...]:
-        """Closings that ended and approaches that began; looks only when it is due."""
+        """Closings that ended and approaches that began; nothing between two samples."""
         if snapshot.time < self._due - 1e-9:
             return ()
-        self._due = snapshot.time + LOOK
-        self._looks += 1
+        self._due = snapshot.time + SAMPLE_INTERVAL
+        self._samples += 1
         events: tuple[Event, ...] = ()
         commanded = snapshot.gripper
         for arm, state in enumerate(self._arms):
             if state.since >= 0.0:
-                self._feel(arm, state)
+                self._note_contacts(arm, state)
                 if commanded[arm] > REOPENED or snapshot.time - state.since > CLOSING:
                     events += self._closed(state, snapshot.time)
             elif commanded[arm] < GRIPPER_CLOSED and state.armed:
@@ -96,7 +86,7 @@ class Hands:
                 state.nearest = self._nearest(snapshot, arm)
             if commanded[arm] > REOPENED:
                 state.armed = True
-        if self._looks % 2:
+        if self._samples % 2:
             for arm, state in enumerate(self._arms):
                 events += self._approaches(snapshot, arm, state)
         return events
@@ -106,20 +96,20 @@ class Hands:
         events: tuple[Event, ...] = ()
         for arm, state in enumerate(self._arms):
             if state.since >= 0.0:
-                self._feel(arm, state)
+                self._note_contacts(arm, state)
                 if state.touched:
                     events += self._closed(state, time)
         return events
 
     def diagnostics(self) -> dict[str, object]:
-        """For whoever reads the events: subtasks by object, and which objects are pressed."""
+        """Subtasks by object and which objects are pressed, for the failure analysis."""
         roles = self._roles.items()
         return {
             "roles": {name: list(role.subtasks) for name, role in roles},
             "pressed": [name for name, role in roles if role.pressed],
         }
 
-    def _feel(self, arm: int, state: _Arm) -> None:
+    def _note_contacts(self, arm: int, state: _Arm) -> None:
         """Note which objects the gripper touches now."""
         mine = f"{ARMS[arm]}_gripper"
         for contact in self._touching():
@@ -129,7 +119,7 @@ class Hands:
                     state.touched[name] = state.touched.get(name, 0) + 1
 
     def _closed(self, state: _Arm, time: float) -> tuple[Event, ...]:
-        """The closing is over: on what it was."""
+        """The event of a closing that has ended."""
         state.since = -1.0
         name, note = state.nearest, BESIDE
         if state.touched:
@@ -153,7 +143,7 @@ class Hands:
         return found
 
     def _approaches(self, snapshot: Snapshot, arm: int, state: _Arm) -> tuple[Event, ...]:
-        """What a moving arm has come near to since the last look."""
+        """What a moving arm has come near to since the last sample."""
         at = snapshot.end_effector[arm].position
         if math.dist(at, state.seen) < AT_REST:
             return ()
@@ -189,7 +179,7 @@ class Hands:
 
 
 def _box(scene: Scene, name: str) -> tuple[float, Vec3, float]:
-    """Height [m] of the middle of an object's box in its own frame, half sizes, farthest corner."""
+    """An object's box in its own frame: height of its middle, half sizes, farthest corner [m]."""
     item = scene.object(name)
     model = object_model(item.asset, item.params)
     x, y, z = model.size

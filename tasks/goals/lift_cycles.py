@@ -10,11 +10,10 @@ import math
 from collections.abc import Callable, Sequence
 
 from robospa.geometry import Pose, Vec3, rotate
-from robospa.tasks.events import Event
-from robospa.tasks.goals.flags import Flags, closed_near
-from robospa.tasks.goals.handling import Handling
-from robospa.tasks.goals.hands import Role
+from robospa.tasks.events import Event, ObjectRole
+from robospa.tasks.goals.lift_tracker import LiftTracker
 from robospa.tasks.goals.parts import HELD_RADIUS
+from robospa.tasks.goals.subtask_flags import SubtaskFlags, closed_near
 from robospa.tasks.snapshot import Snapshot
 
 UPRIGHT = math.cos(math.radians(36.87))
@@ -23,11 +22,11 @@ UPRIGHT = math.cos(math.radians(36.87))
 AT_HANDLE = 0.03
 """A grasp centre this near [m] to a handle is at it."""
 
-Test = Callable[[Snapshot, Pose], bool]
-"""Whether something holds, given the pose that the object had at the start."""
+PoseTest = Callable[[Snapshot, Pose], bool]
+"""True if the condition holds, given the pose that the object had at the start."""
 
 
-def held_up(name: str, above: float, handles: Sequence[Vec3]) -> Test:
+def held_up(name: str, above: float, handles: Sequence[Vec3]) -> PoseTest:
     """Upright, origin above `above` [m, world], left and right grasp centre at the two handles.
 
     `handles` are given in the object's frame.
@@ -45,7 +44,7 @@ def held_up(name: str, above: float, handles: Sequence[Vec3]) -> Test:
     return test
 
 
-def put_down(name: str, height: tuple[float, float], aside: float) -> Test:
+def put_down(name: str, height: tuple[float, float], aside: float) -> PoseTest:
     """Upright, origin between so many metres over its first height, and nearly where it was.
 
     `aside` [m] bounds the way on the plan.
@@ -60,7 +59,7 @@ def put_down(name: str, height: tuple[float, float], aside: float) -> Test:
     return test
 
 
-def raised(name: str, rise: float) -> Test:
+def raised(name: str, rise: float) -> PoseTest:
     """The origin is more than `rise` [m] over its first height."""
 
     def test(snapshot: Snapshot, home: Pose) -> bool:
@@ -69,7 +68,7 @@ def raised(name: str, rise: float) -> Test:
     return test
 
 
-def back_home(name: str, way: float, turn: float) -> Test:
+def back_home(name: str, way: float, turn: float) -> PoseTest:
     """Each coordinate within `way` [m], each quaternion component within `turn` of the start."""
 
     def test(snapshot: Snapshot, home: Pose) -> bool:
@@ -88,18 +87,20 @@ def upright(pose: Pose) -> bool:
     return rotate(pose.rotation, (0.0, 0.0, 1.0))[2] > UPRIGHT
 
 
-class Cycles:
+class LiftCycles:
     """`times` cycles of `up`, then `down` while not `up`; subtask i is cycle i + 1, latched."""
 
     needs_contacts = False
 
-    def __init__(self, name: str, times: int, up: Test, down: Test, radius: float = 0.12) -> None:
+    def __init__(
+        self, name: str, times: int, up: PoseTest, down: PoseTest, radius: float = 0.12
+    ) -> None:
         self.total = times
         self._name = name
         self._up = up
         self._down = down
-        self._flags = Flags(times)
-        self._handling = Handling((name,), radius)
+        self._flags = SubtaskFlags(times)
+        self._lift_tracker = LiftTracker((name,), radius)
         self._home = Pose()
         self._was_up = False
         self._lifts = 0
@@ -108,19 +109,19 @@ class Cycles:
         self._released = 0
 
     @property
-    def roles(self) -> dict[str, Role]:
+    def roles(self) -> dict[str, ObjectRole]:
         """The lifted object."""
-        return {self._name: Role(tuple(range(self.total)))}
+        return {self._name: ObjectRole(tuple(range(self.total)))}
 
     def start(self, snapshot: Snapshot) -> tuple[Event, ...]:
         """Remember where the object stands."""
-        self._handling.start(snapshot)
+        self._lift_tracker.start(snapshot)
         self._home = snapshot.poses[self._name]
         return ()
 
     def update(self, snapshot: Snapshot) -> tuple[Event, ...]:
         """A subtask per cycle, success with the last one."""
-        events = self._handling.update(snapshot)
+        events = self._lift_tracker.update(snapshot)
         if self._done == self.total:
             return events
         if self._pending and not closed_near(
@@ -147,5 +148,5 @@ class Cycles:
             "idle_progress": 0.0,
             "lifts": self._lifts,
             "released": self._released,
-            "drops": self._handling.drops,
+            "drops": self._lift_tracker.drops,
         }

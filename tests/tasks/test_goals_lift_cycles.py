@@ -9,22 +9,29 @@ import pytest
 from snapshots_by_hand import AWAY, TICK, kinds, run, snap
 
 from robospa.geometry import Pose, Vec3, axis_rotation
-from robospa.tasks.goals.cycles import Cycles, Test, back_home, held_up, put_down, raised
+from robospa.tasks.goals.lift_cycles import (
+    LiftCycles,
+    PoseTest,
+    back_home,
+    held_up,
+    put_down,
+    raised,
+)
 from robospa.tasks.snapshot import Snapshot
 
 HOME: Vec3 = (0.0, -0.1, 0.74)
 HANDLES: tuple[Vec3, Vec3] = ((-0.1, 0.0, 0.05), (0.1, 0.0, 0.05))
 
 
-def fan(times: int) -> Cycles:
-    return Cycles("f", times, raised("f", 0.05), back_home("f", 0.04, 0.05))
+def fan(times: int) -> LiftCycles:
+    return LiftCycles("f", times, raised("f", 0.05), back_home("f", 0.04, 0.05))
 
 
 def at(rise: float, aside: float = 0.0) -> dict[str, Vec3]:
     return {"f": (HOME[0] + aside, HOME[1], HOME[2] + rise)}
 
 
-def play(goal: Cycles, *rises: float) -> list[str]:
+def play(goal: LiftCycles, *rises: float) -> list[str]:
     return kinds(run(goal, [snap(i * TICK, at(r)) for i, r in enumerate((0.0, *rises))]))
 
 
@@ -71,8 +78,8 @@ def hanging(rise: float, slip: float = 0.0, lean: float = 0.0) -> Snapshot:
     return replace(held, poses={"p": pose})
 
 
-UP: Test = held_up("p", 0.82, HANDLES)
-DOWN_AGAIN: Test = put_down("p", (-0.03, 0.07), 0.08)
+UP: PoseTest = held_up("p", 0.82, HANDLES)
+DOWN_AGAIN: PoseTest = put_down("p", (-0.03, 0.07), 0.08)
 
 
 @pytest.mark.parametrize(
