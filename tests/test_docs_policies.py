@@ -34,7 +34,6 @@ PAGES = [
     DOCS / "replay-check.md",
     DOCS / "clients.md",
     *sorted((DOCS / "policies").glob("*.md")),
-    *(page for page in [DOCS / "serving.md"] if page.exists()),
 ]
 MODELS = ("pi05", "go1", "rdt", "xvla", "lerobot")
 

@@ -26,8 +26,24 @@ def named(nav: Any) -> Iterator[str]:
 
 def test_the_navigation_has_every_page_of_docs() -> None:
     nav = list(named(tomllib.loads((ROOT / "zensical.toml").read_text())["project"]["nav"]))
-    top = [page.name for page in PAGES if page.parent == ROOT / "docs"]
-    assert sorted(nav) == sorted(top)
+    pages = [str(page.relative_to(ROOT / "docs")) for page in PAGES]
+    assert sorted(nav) == sorted(pages)
+
+
+def anchors(page: Path) -> set[str]:
+    """The ids of a page's headings, as the site makes them."""
+    text = page.read_text()
+    heads = [re.sub(r"[^a-z0-9_ -]", "", h.lower()) for h in re.findall(r"^#+ (.+)$", text, re.M)]
+    return {h.strip().replace(" ", "-") for h in heads} | set(
+        re.findall(r'<a id="([\w-]+)">', text)
+    )
+
+
+@pytest.mark.parametrize("page", TEXTS, ids=lambda page: str(page.relative_to(ROOT)))
+def test_links_to_a_section_find_its_heading(page: Path) -> None:
+    found = re.findall(r"\]\((?!https?:)([\w./-]*)#([\w-]+)\)", page.read_text())
+    targets = [((page.parent / target) if target else page, anchor) for target, anchor in found]
+    assert [(t.name, anchor) for t, anchor in targets if anchor not in anchors(t)] == []
 
 
 @pytest.mark.parametrize("page", TEXTS, ids=lambda page: str(page.relative_to(ROOT)))
