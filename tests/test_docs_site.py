@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pkgutil
 import re
 import tomllib
 from collections.abc import Iterator
@@ -10,9 +11,17 @@ from typing import Any
 
 import pytest
 
+from robospa import registry
+
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = sorted((ROOT / "docs").rglob("*.md"))
-TEXTS = [*PAGES, ROOT / "README.md", ROOT / "CONTRIBUTING.md"]
+TEXTS = [*PAGES, ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md"]
+PACKAGES = sorted(path.parent for path in ROOT.glob("[a-z]*/__init__.py"))
+FOLDERS = [path.name for path in PACKAGES] + ["benchmarks", "docs", "scripts", "tests", "tools"]
+THEIRS = {"scripts/serve_policy.py", "scripts/encode_lang.py"}
+"""Files in the repositories of openpi and RDT."""
+GROUPS = {str(v) for k, v in vars(registry).items() if k.isupper()}
+"""Groups of entry points: names with a dot that are no module, as is the wire's version."""
 
 
 def named(nav: Any) -> Iterator[str]:
@@ -55,3 +64,39 @@ def test_relative_links_lead_somewhere(page: Path) -> None:
 def test_the_version_is_the_same_everywhere() -> None:
     version = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
     assert f"version: {version}\n" in (ROOT / "CITATION.cff").read_text()
+
+
+def without_code(text: str) -> str:
+    """The page without its blocks of code."""
+    return re.sub(r"^```.*?^```$", "", text, flags=re.M | re.S)
+
+
+@pytest.mark.parametrize("page", TEXTS, ids=lambda page: str(page.relative_to(ROOT)))
+def test_paths_in_the_text_exist(page: Path) -> None:
+    text = without_code(page.read_text())
+    named = set(re.findall(rf"`((?:{'|'.join(FOLDERS)})/[^`\s]*)`", text))
+    named -= {"clients/<vendor>/", "leaderboard/submissions/NAME/", *THEIRS}
+    assert [name for name in sorted(named) if not list(ROOT.glob(name))] == []
+
+
+@pytest.mark.parametrize("page", TEXTS, ids=lambda page: str(page.relative_to(ROOT)))
+def test_python_names_in_the_text_exist(page: Path) -> None:
+    named = set(re.findall(r"(?<![\w./\"-])robospa(?:\.[a-zA-Z_]\w*)+", page.read_text()))
+    named -= {*GROUPS, "robospa.v1"}
+    assert [name for name in sorted(named) if not can_be_found(name)] == []
+
+
+def can_be_found(name: str) -> bool:
+    """Whether `name` is a module, or something in one."""
+    try:
+        pkgutil.resolve_name(name)
+    except (ImportError, AttributeError):
+        return False
+    return True
+
+
+def test_the_architecture_names_every_folder() -> None:
+    page = (ROOT / "docs" / "architecture.md").read_text()
+    rooms = [path.parent for package in PACKAGES for path in package.glob("*/__init__.py")]
+    folders = [path.relative_to(ROOT) for path in [*PACKAGES, *rooms] if not path.is_symlink()]
+    assert [str(name) for name in folders if f"`{name}/`" not in page] == []
