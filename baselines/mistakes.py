@@ -21,7 +21,7 @@ from robospa.baselines.oracle import Oracle
 from robospa.geometry import Pose
 from robospa.harness.skills import Expert
 from robospa.harness.skills.pick import pick
-from robospa.harness.skills.place import holder
+from robospa.harness.skills.place import arm_holding
 from robospa.harness.skills.press import press
 from robospa.harness.skills.workspace import Steps, Workspace
 from robospa.observation import Observation
@@ -78,7 +78,7 @@ class LetGo:
 
 
 class ClumsyExpert(Expert):
-    """An expert that also knows how to go wrong; `trouble` lists what it did not bring about."""
+    """An expert that also knows how to go wrong; `failures` lists what it did not bring about."""
 
     def _single(self, call: Any) -> Steps:
         ws = self.workspace
@@ -87,7 +87,7 @@ class ClumsyExpert(Expert):
         elif isinstance(call, Hover):
             yield from hover(ws, call)
         elif isinstance(call, LetGo):
-            arm = holder(ws, call.object)
+            arm = arm_holding(ws, call.object)
             ws.add(arm, gripper=1.0)
             ws.add(arm)
             ws.held[arm] = None
@@ -109,7 +109,7 @@ def beside(ws: Workspace, call: Beside) -> Steps:
     finally:
         ws.snapshot = seen
     steps.close()
-    ws.see((yield rows))
+    ws.update_state((yield rows))
     if isinstance(call.call, Pick):
         for arm in (0, 1):
             if ws.gripper[arm] < 0.5:
@@ -124,7 +124,7 @@ def hover(ws: Workspace, call: Hover) -> Steps:
     steps.close()
     half = rows.shape[1] // 2
     closed = [i for i, row in enumerate(rows) if min(row[half - 1], row[-1]) < 0.05]
-    ws.see((yield rows[: closed[0]] if closed else rows))
+    ws.update_state((yield rows[: closed[0]] if closed else rows))
     while True:  # going home would be another mistake
         ws.add(0)
         yield from ws.flush()

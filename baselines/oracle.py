@@ -58,9 +58,9 @@ class Oracle:
         return self._expert.next(snapshot)
 
     @property
-    def trouble(self) -> tuple[str, ...]:
-        """What the expert could not do in this trial, one sentence each."""
-        return tuple(self._expert.trouble) if self._expert is not None else ()
+    def failures(self) -> tuple[str, ...]:
+        """Skills that failed in this trial, one sentence each."""
+        return tuple(self._expert.failures) if self._expert is not None else ()
 
 
 def create() -> Oracle:

@@ -70,7 +70,7 @@ def measure(requests: int, rounds: int) -> Result:
         bar = 0.9 if kind == "robospa" else None
         what = f"{name}: share of a full batch, {CLIENTS} clients, a 50 ms model"
         if kind not in found:
-            rows.append(Row(what, None, note=peers[peer_of(kind)].trouble))
+            rows.append(Row(what, None, note=peers[peer_of(kind)].problem))
             continue
         side = found[kind]
         fill = statistics.fmean(side.sizes) / CLIENTS

@@ -83,7 +83,7 @@ def measure(world: SapienWorld, row: Row, level: int, seed: int) -> None:
     record = run_trial(world, policy, key, policy_seed=0, parts=parts)
     if not policy.applies:
         return
-    if record.success or policy.trouble:
+    if record.success or policy.failures:
         row.not_acted += 1
         return
     failure = label(record)

@@ -33,7 +33,7 @@ class Peer:
     name: str
     python: Path | None
     version: str = ""
-    trouble: str = ""
+    problem: str = ""
 
 
 @cache
@@ -44,10 +44,10 @@ def environment(name: str) -> Peer:
     wanted = REQUIREMENTS[name]
     mark = folder / "installed.txt"
     if not (mark.exists() and mark.read_text(encoding="utf-8") == " ".join(wanted)):
-        trouble = _install(folder, python, wanted)
-        if trouble:
+        problem = _install(folder, python, wanted)
+        if problem:
             shutil.rmtree(folder, ignore_errors=True)
-            return Peer(name, None, trouble=trouble)
+            return Peer(name, None, problem=problem)
         mark.write_text(" ".join(wanted), encoding="utf-8")
     return Peer(name, python, _version(python, wanted[0]))
 
@@ -76,7 +76,7 @@ def main() -> None:
     """Install and say what there is."""
     for name in REQUIREMENTS:
         peer = environment(name)
-        print(f"{name}: {peer.version or peer.trouble}")
+        print(f"{name}: {peer.version or peer.problem}")
 
 
 if __name__ == "__main__":

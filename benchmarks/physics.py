@@ -82,11 +82,11 @@ def hand_written(world: SapienWorld, actions: list[NDArray[np.float32]]) -> list
     drives, system = world._drives, world._loaded().system
     tables = []
     for action in actions:
-        goals = world._reader.goals(action, "joint", drives.joints)
+        goals = world._decoder.decode(action, "joint", drives.joints)
         plan = rest_to_rest(
             drives.joints, goals.joints, drives.gripper, goals.gripper, drives.opening
         )
-        setters, table = drives.program(plan)
+        setters, table = drives.schedule(plan)
         tables.append((setters, table.tolist()))
         drives.now = (plan, len(plan) - 1)
 

@@ -99,7 +99,7 @@ def peer_rows(kind: str, spent: list[float], peer: Peer) -> list[Row]:
     """Mean and median of a peer's steps."""
     what = f"{NAMES[kind]}: a step, mean"
     if not spent:
-        return [Row(what, None, "ms", note=peer.trouble)]
+        return [Row(what, None, "ms", note=peer.problem)]
     note = f"median {statistics.median(spent):.3f}, {len(spent)} steps"
     return [Row(what, round(statistics.fmean(spent), 4), "ms", note=note)]
 

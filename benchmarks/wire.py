@@ -96,7 +96,7 @@ def rows_of(name: str, times: dict[str, list[float]], peers: dict[str, Peer]) ->
     for kind in CLIENTS:
         what = f"{NAMES[kind]}, {name}: median"
         if kind not in medians:
-            rows.append(Row(what, None, "ms", note=peers[peer_of(kind)].trouble))
+            rows.append(Row(what, None, "ms", note=peers[peer_of(kind)].problem))
             continue
         p10, p99 = (float(np.percentile(times[kind], p)) for p in (10, 99))
         note = f"fastest tenth {p10:.2f}, p99 {p99:.1f}, {len(times[kind])} round trips"
@@ -108,7 +108,7 @@ def rows_of(name: str, times: dict[str, list[float]], peers: dict[str, Peer]) ->
             ratio = round(medians["robospa"] / medians[kind], 3)
             rows.append(Row(what, ratio, "x", at_most=bar))
         else:
-            rows.append(Row(what, None, "x", at_most=bar, note=peers[peer_of(kind)].trouble))
+            rows.append(Row(what, None, "x", at_most=bar, note=peers[peer_of(kind)].problem))
     return rows
 
 
@@ -130,7 +130,7 @@ def measure(requests: int, rounds: int) -> Result:
     ]
     missing = environment("xpolicylab")
     rows.append(
-        Row("XPolicyLab's own client", None, "ms", note=missing.trouble or "has a package now")
+        Row("XPolicyLab's own client", None, "ms", note=missing.problem or "has a package now")
     )
     data: dict[str, Any] = {"message_bytes": size, "frames": source}
     return Result(

@@ -54,7 +54,7 @@ def attempt(world: World, policy: Policy, name: str, level: int, seed: int) -> A
         record = run_trial(world, policy, TrialKey(name, level, seed), policy_seed=0)
     except SceneUnstable as error:
         return Attempt(seed, False, f"does not settle: {error}")
-    failures = "; ".join(getattr(policy, "trouble", ()))
+    failures = "; ".join(getattr(policy, "failures", ()))
     reason = "" if record.success else f"{record.end} {record.message} {failures}".strip()
     return Attempt(
         seed,

@@ -19,7 +19,7 @@ from robospa.action_space import ARMS
 from robospa.geometry import Pose, to_matrix
 from robospa.harness.robots import embodiment
 from robospa.harness.robots.kinematics import chain_of, end_effector, inverse
-from robospa.harness.skills.grasping import LEANS, LEVEL, candidate_poses, grasps_now
+from robospa.harness.skills.grasping import LEANS, LEVEL, candidate_poses, world_grasps
 from robospa.harness.skills.workspace import Workspace
 from robospa.tasks import catalog
 from robospa.tasks.families.distance import object_sets
@@ -170,7 +170,7 @@ def _reached(ws: Workspace, name: str, arms: tuple[int, ...]) -> bool:
     for leans in (LEVEL, LEANS):
         for arm in sorted(arms, key=lambda k: (body.position[0] > 0) != (k == 1)):
             hand = ws.hand(arm)
-            grasps = grasps_now(ws.models[name], body, hand)
+            grasps = world_grasps(ws.models[name], body, hand)
             upright = [replace(grasp, tilt=0.0) for grasp in grasps[:1]]  # takes most objects
             for grasp in (*upright, *grasps):
                 poses = [p for p, _, _ in candidate_poses(grasp, hand, ws.scene.table_top, leans)]

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.geometry import Pose, Vec3, look_rotation, yaw_rotation
-from robospa.harness.sim import furniture
+from robospa.harness.sim import room as furniture
 from robospa.tasks.objects import assets, look_count, object_model
 from robospa.tasks.shapes import Hinge, ObjectModel, Shape
 from robospa.workcell import TABLE_TOP, Table

@@ -1,4 +1,4 @@
-"""Both arms' drives: what they were told last, and what to tell them next.
+"""The joint drives of both arms: their last targets, and the setters of the next ones.
 
 All targets of an action become one table before its first physics step, with one column per SAPIEN
 call and only for drives that change, so that the stepping loop does nothing but these calls.
@@ -98,8 +98,8 @@ class Drives:
         closed, opened = self._embodiment.arms[arm].gripper
         return closed + opening * (opened - closed)
 
-    def program(self, path: Trajectory) -> tuple[list[Setter], Array]:
-        """What to call in every physics step of `path`, and with which values (n, calls)."""
+    def schedule(self, path: Trajectory) -> tuple[list[Setter], Array]:
+        """Setters to call in every physics step of `path`, and their values (n, setters)."""
         joints, opening = self.joints, self.opening
         calls: list[Setter] = []
         columns: list[Array] = []
@@ -116,8 +116,8 @@ class Drives:
             table[:, i] = column
         return calls, table
 
-    def halt(self) -> None:
-        """No joint is to move on: velocity targets to zero."""
+    def stop(self) -> None:
+        """Set all velocity targets to zero."""
         for arm in self._arms:
             for write in arm.velocity:
                 write(0.0)

@@ -1,9 +1,9 @@
-"""How one action becomes drive targets: a closed form, computed once per action.
+"""Trajectories of drive targets: a closed form, computed once per action.
 
 The official harness time-parameterises the straight joint line with a planner; for a line with one
 velocity and one acceleration limit the answer is a triangle or a trapezium of speed, so it is
 written down here instead. Everything is plain numpy and knows nothing of the simulator. It refuses
-nothing: actions are checked before they come here (`robospa.harness.actions`).
+nothing: actions are checked before they come here (`robospa.harness.action_decoder`).
 """
 
 from __future__ import annotations

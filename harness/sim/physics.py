@@ -18,7 +18,8 @@ from sapien import physx
 from robospa.action_space import ARMS
 from robospa.geometry import Pose, Vec3
 from robospa.harness.robots.embodiment import Embodiment
-from robospa.harness.sim import bodies, furniture
+from robospa.harness.sim import bodies
+from robospa.harness.sim import room as furniture
 from robospa.harness.sim.lazy_snapshot import NO_HINGES
 from robospa.harness.sim.motion import RATE
 from robospa.tasks.shapes import ObjectModel

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from robospa.action_space import ARMS
 from robospa.geometry import Pose
 from robospa.harness.robots.embodiment import Embodiment
-from robospa.harness.sim import furniture
+from robospa.harness.sim import room as furniture
 from robospa.harness.sim.shaders import shader_folder
 from robospa.harness.world import RenderUnavailable
 from robospa.observation import CameraSpec

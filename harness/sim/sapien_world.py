@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.harness.actions import ActionReader
+from robospa.harness.action_decoder import ActionDecoder
 from robospa.harness.robots import embodiment as embodiment_named
 from robospa.harness.sim.drives import Drives
 from robospa.harness.sim.lazy_snapshot import LazySnapshot, Pair, PoseTable, StateLayout, unpack
@@ -64,7 +64,7 @@ class SapienWorld:
         self._models = models
         self._physics: Physics | None = None
         self._renderer: Renderer | None = None
-        self._readers: dict[str, ActionReader] = {}
+        self._decoders: dict[str, ActionDecoder] = {}
         if render:
             self._open_renderer()
 
@@ -78,9 +78,9 @@ class SapienWorld:
         """
         self._drop_physics()
         self._embodiment = embodiment_named(scene.embodiment)
-        if scene.embodiment not in self._readers:
-            self._readers[scene.embodiment] = ActionReader(self._embodiment)
-        self._reader = self._readers[scene.embodiment]
+        if scene.embodiment not in self._decoders:
+            self._decoders[scene.embodiment] = ActionDecoder(self._embodiment)
+        self._decoder = self._decoders[scene.embodiment]
         self._scene = scene
         self._contacts = contacts
         self._steps = 0
@@ -130,14 +130,14 @@ class SapienWorld:
     # -- acting -------------------------------------------------------------------------------
 
     def step(self, action: NDArray[np.float32], space: str, poll: Poll) -> StepResult:
-        """Execute one action; see `robospa.harness.actions` for what is clipped and refused.
+        """Execute one action; see `robospa.harness.action_decoder` for what is clipped and refused.
 
         `poll` gets a snapshot whenever simulated time passes a multiple of POLL_STEPS steps; if it
         returns True the arms are told to stay where they were told to be, and the action ends.
         """
         physics = self._loaded()
         drives = self._drives
-        goals = self._reader.goals(action, space, drives.joints)
+        goals = self._decoder.decode(action, space, drives.joints)
         change = (drives.joints, goals.joints, drives.gripper, goals.gripper, drives.opening)
         if self._control == "rest_to_rest":
             path = rest_to_rest(*change)
@@ -149,7 +149,7 @@ class SapienWorld:
     def _follow(self, physics: Physics, path: Trajectory, poll: Poll) -> tuple[int, bool]:
         """Drive along `path`; physics steps taken and whether `poll` ended it."""
         drives = self._drives
-        writers, table = drives.program(path)
+        writers, table = drives.schedule(path)
         total, done, step = len(path), 0, physics.step
         while done < total:
             upto = min(total, done + POLL_STEPS - self._steps % POLL_STEPS)
@@ -167,7 +167,7 @@ class SapienWorld:
             if self._steps % POLL_STEPS == 0 and poll(
                 self._snapshot(self._measured_at, self._touching_at)
             ):
-                drives.halt()
+                drives.stop()
                 return done, True
         return done, False
 

@@ -1,4 +1,4 @@
-"""The expert: a task's plan, executed one skill after the other, looking after each.
+"""The expert: a task's plan, executed one skill after the other, with feedback after each.
 
 `Expert.next(snapshot)` gives the next actions. A skill that fails is not the end: the plan goes on
 with the next object, and what can be done again is done again.
@@ -16,13 +16,13 @@ from robospa.harness.robots import embodiment
 from robospa.harness.skills.dock import dock
 from robospa.harness.skills.hang import hang
 from robospa.harness.skills.hit import hit
-from robospa.harness.skills.moving import retreat_home
+from robospa.harness.skills.motion import retreat_home
 from robospa.harness.skills.open import pull_open
 from robospa.harness.skills.pick import pick
 from robospa.harness.skills.place import can_follow, drop, place, place_position
 from robospa.harness.skills.pour import pour
 from robospa.harness.skills.press import press
-from robospa.harness.skills.raising import raise_lower
+from robospa.harness.skills.raise_lower import raise_lower
 from robospa.harness.skills.stamp import stamp
 from robospa.harness.skills.workspace import SkillFailed, Steps, Workspace
 from robospa.tasks.catalog import task
@@ -61,7 +61,7 @@ class Expert:
         self, scene: Scene, snapshot: Snapshot, plan: tuple[Skill, ...] | None = None
     ) -> None:
         self.workspace = Workspace(scene, embodiment(scene.embodiment), snapshot)
-        self.trouble: list[str] = []
+        self.failures: list[str] = []
         self._steps = self._run(task(scene.task).plan(scene) if plan is None else plan)
         self._started = False
 
@@ -72,10 +72,10 @@ class Expert:
                 rows = self._steps.send(snapshot)
             else:
                 self._started = True
-                self.workspace.see(snapshot)
+                self.workspace.update_state(snapshot)
                 rows = next(self._steps)
         except StopIteration:
-            self.workspace.see(snapshot)
+            self.workspace.update_state(snapshot)
             rows = self.workspace.row()[None]
         return np.asarray(rows, dtype=np.float32)
 
@@ -94,8 +94,8 @@ class Expert:
                     yield from self._move(call, follow)
                 else:
                     yield from self._single(call)
-            except SkillFailed as trouble:
-                self.trouble.append(str(trouble))
+            except SkillFailed as error:
+                self.failures.append(str(error))
         ws = self.workspace
         for arm in range(len(ARMS)):
             if ws.held[arm] is None:

@@ -1,4 +1,4 @@
-"""Where to take an object: grasp frames of its model, tilted, tried against reach and neighbours.
+"""Grasp candidates of an object: its model's grasps, tilted, tested for reach and neighbours.
 
 Every candidate is an end-effector pose for one arm. Inverse kinematics runs on all of them at once;
 what is left is ranked by tilt, by room for the fingers and by how far the arm has to go.
@@ -27,8 +27,8 @@ from robospa.geometry import (
 from robospa.harness.robots.kinematics import inverse
 from robospa.harness.skills.workspace import (
     Workspace,
-    far_side,
     is_wall,
+    max_gripper_y,
     wall_front,
 )
 from robospa.tasks.shapes import Grasp, ObjectModel
@@ -50,7 +50,7 @@ WRONG_SIDE = 0.6
 
 
 @dataclass(frozen=True)
-class Reach:
+class GraspCandidate:
     """A grasp that the arm can take: end-effector pose, its joints, and how wide to open (0..1)."""
 
     arm: int
@@ -67,7 +67,7 @@ def upright(pose: Pose) -> bool:
     return rotate(pose.rotation, (0, 0, 1))[2] > 0.9
 
 
-def grasps_now(model: ObjectModel, pose: Pose, hand: Gripper) -> tuple[Grasp, ...]:
+def world_grasps(model: ObjectModel, pose: Pose, hand: Gripper) -> tuple[Grasp, ...]:
     """The model's grasps in the world; for a body that has tipped over, one across its axis."""
     if upright(pose):
         return tuple(
@@ -130,7 +130,7 @@ BEHIND = 0.2
 
 @dataclass(frozen=True)
 class _Box:
-    """What a neighbour occupies: `half` sizes [m] about `centre` of its frame, a little grown."""
+    """A neighbour's box: `half` sizes [m] about `centre` of its frame, a little grown."""
 
     position: Array
     turn: Array
@@ -162,7 +162,7 @@ def _grid(back: Sequence[float], side: Sequence[float], across: Sequence[float])
 
 @cache
 def _points(hand: Gripper) -> tuple[Array, Array, Array]:
-    """What is looked at of a gripper: points of both fingers and of the palm (`_grid`).
+    """Sample points of a gripper, on both fingers and on the palm (`_grid`).
 
     Half the opening is added to the fingers' side; the second array is what their outer points are
     farther out, (N, 1).
@@ -174,7 +174,7 @@ def _points(hand: Gripper) -> tuple[Array, Array, Array]:
     return fingers, thickness, palm
 
 
-def crowding(
+def penetration_depth(
     ws: Workspace,
     hand: Gripper,
     target: str,
@@ -208,17 +208,17 @@ def crowding(
 
 def reachable_grasps(
     ws: Workspace, name: str, arms: tuple[int, ...], leans: tuple[float, ...] = LEVEL
-) -> list[Reach]:
+) -> list[GraspCandidate]:
     """All grasps of `name` that one of `arms` can take now, best first."""
     model = ws.models[name]
     body = ws.pose(name)
     near = _boxes_near(ws, name)
     front = wall_front(ws)
-    found: list[Reach] = []
+    found: list[GraspCandidate] = []
     for arm in arms:
         hand, home = ws.hand(arm), ws.robot.arms[arm].home
         poses: list[tuple[Pose, Vec3, float, float]] = []
-        for grasp in grasps_now(model, body, hand):
+        for grasp in world_grasps(model, body, hand):
             opening = min(hand.opening, grasp.width + OPENING_MARGIN)
             found_poses = candidate_poses(grasp, hand, ws.scene.table_top, leans)
             poses += [(*c, opening) for c in found_poses]
@@ -230,11 +230,11 @@ def reachable_grasps(
             wrong *= abs(body.position[0]) / 0.04
         for i in np.flatnonzero(ok):
             pose, approach, tilt, opening = poses[i]
-            depth = crowding(ws, hand, name, pose, opening, near)
+            depth = penetration_depth(ws, hand, name, pose, opening, near)
             turned = joints[i] - home  # of the last two joints: how far hand and wrist turn
             roll = abs(float(turned[-1])) + 0.5 * abs(float(turned[-2]))
-            depth = max(depth, far_side(pose, hand) - front)
+            depth = max(depth, max_gripper_y(pose, hand) - front)
             cost = wrong + 0.5 * tilt + 0.25 * roll + 60.0 * depth
             share = opening / hand.opening
-            found.append(Reach(arm, pose, approach, joints[i], share, cost, tilt))
+            found.append(GraspCandidate(arm, pose, approach, joints[i], share, cost, tilt))
     return sorted(found, key=lambda r: r.cost)

@@ -1,15 +1,14 @@
-"""Hang: put an object by its handle onto a peg, along the peg, lower it and let go."""
+"""Hang: put an object by its handle onto a peg, along the peg, lower it and release it."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 from robospa.geometry import Pose, Vec3, axis_rotation, multiply, rotate, yaw_rotation
-from robospa.harness.skills.dock import ATTEMPTS, let_go, shifted, ways_in
-from robospa.harness.skills.grasping import Reach, reachable_grasps
-from robospa.harness.skills.moving import travel
-from robospa.harness.skills.pick import arms_for, pick
+from robospa.harness.skills.approach import approach_joints, bring_in, translated
+from robospa.harness.skills.dock import ATTEMPTS
+from robospa.harness.skills.grasping import GraspCandidate, reachable_grasps
+from robospa.harness.skills.pick import GraspFilter, arms_for, pick
 from robospa.harness.skills.place import grip_offset, place
 from robospa.harness.skills.workspace import Steps, Workspace
 from robospa.tasks.plan import Hang, Pick, Place
@@ -18,7 +17,7 @@ LIFT = 0.14
 OUT = 0.06
 """How far before the peg's place the object comes in, along the peg [m]."""
 SAG = 0.008
-"""How far the handle is lowered onto the peg before letting go [m]."""
+"""How far the handle is lowered onto the peg before the release [m]."""
 SWINGS = (0.0, 0.25, -0.25, 0.5, -0.5, 0.75, -0.75)
 """Turns of the object about the peg [rad]."""
 WOBBLES = (0.0, 0.1, -0.1, 0.2, -0.2)
@@ -32,7 +31,7 @@ ON_PEG = 0.03
 
 
 def hang(ws: Workspace, call: Hang) -> Steps:
-    """Pick, bring in along the peg, lower, let go; again if it does not hang."""
+    """Pick, bring in along the peg, lower, release; again if it does not hang."""
     peg = ws.pose(call.on) * ws.models[call.on].frames[call.frame]
     handle = ws.models[call.object].frames[call.handle]
     along = rotate(peg.rotation, (0.0, -OUT, 0.0))
@@ -40,40 +39,33 @@ def hang(ws: Workspace, call: Hang) -> Steps:
     planned, allowed = _targets(peg, handle, (0.0,)), _targets(peg, handle, WOBBLES)
     for _ in range(ATTEMPTS):
         x, y, z = ws.pose(call.object).position
-        strict, lenient = (_fits(ws, call, targets, path) for targets in (planned, allowed))
+        strict, lenient = (_grasp_filter(ws, call, targets, path) for targets in (planned, allowed))
         grasps = reachable_grasps(ws, call.object, arms_for(call.arm))
-        fits = strict if any(strict(grasp) for grasp in grasps) else lenient
-        yield from pick(ws, Pick(call.object, LIFT, call.arm), fits)
+        feasible = strict if any(strict(grasp) for grasp in grasps) else lenient
+        yield from pick(ws, Pick(call.object, LIFT, call.arm), feasible)
         arm = ws.held.index(call.object)
         offset = grip_offset(ws, arm, call.object)
-        way = ways_in(ws, arm, offset, allowed, path, ws.joints[arm])
+        way = approach_joints(ws, arm, offset, allowed, path, ws.joints[arm])
         if way is None:
             yield from place(ws, Place(call.object, (x, y, z)))
             continue
-        travel(ws, arm, way[0])
-        yield from ws.flush()
-        for joints in way[1:]:
-            ws.add(arm, joints)
-        let_go(ws, arm)
-        yield from ws.flush()
+        yield from bring_in(ws, arm, way)
         if math.dist((ws.pose(call.object) * handle).position, peg.position) < ON_PEG:
             return
 
 
-def _fits(
-    ws: Workspace, call: Hang, targets: list[Pose], path: list[Vec3]
-) -> Callable[[Reach], bool]:
-    """Whether a grasp is around the object's axis (else it turns) and what follows can be done."""
+def _grasp_filter(ws: Workspace, call: Hang, targets: list[Pose], path: list[Vec3]) -> GraspFilter:
+    """Accepts grasps around the object's axis (else it turns) from which a target is reachable."""
     body = ws.pose(call.object)
 
-    def fits(grasp: Reach) -> bool:
+    def feasible(grasp: GraspCandidate) -> bool:
         offset = grasp.pose.inverse() * body
         x, y, _ = offset.inverse().apply((ws.hand(grasp.arm).grasp_centre, 0.0, 0.0))
         if math.hypot(x, y) > OFF_AXIS:
             return False
-        return ways_in(ws, grasp.arm, offset, targets, path, grasp.joints) is not None
+        return approach_joints(ws, grasp.arm, offset, targets, path, grasp.joints) is not None
 
-    return fits
+    return feasible
 
 
 def _targets(peg: Pose, handle: Pose, wobbles: tuple[float, ...]) -> list[Pose]:
@@ -83,6 +75,6 @@ def _targets(peg: Pose, handle: Pose, wobbles: tuple[float, ...]) -> list[Pose]:
     for wobble in wobbles:
         for swing in SWINGS:
             turn = multiply(yaw_rotation(wobble), axis_rotation((0.0, 1.0, 0.0), swing))
-            turned = shifted(peg * Pose((0.0, 0.0, 0.0), turn), (0.0, 0.0, -SAG))
+            turned = translated(peg * Pose((0.0, 0.0, 0.0), turn), (0.0, 0.0, -SAG))
             found += [turned * Pose((0.0, 0.0, 0.0), yaw_rotation(side)) * back for side in SIDES]
     return found

@@ -9,10 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.geometry import Pose, yaw_rotation
-from robospa.harness.skills.grasping import Reach, reachable_grasps
-from robospa.harness.skills.moving import travel
-from robospa.harness.skills.pick import Fits, arms_for, pick
-from robospa.harness.skills.place import YAWS, Spot, grip_offset, place, place_targets, spots
+from robospa.harness.skills.grasping import GraspCandidate, reachable_grasps
+from robospa.harness.skills.motion import travel
+from robospa.harness.skills.pick import GraspFilter, arms_for, pick
+from robospa.harness.skills.place import (
+    YAWS,
+    Placement,
+    grip_offset,
+    place,
+    place_targets,
+    reachable_placements,
+)
 from robospa.harness.skills.workspace import SkillFailed, Steps, Workspace
 from robospa.tasks.plan import Hit, Pick, Place
 from robospa.tasks.snapshot import Snapshot
@@ -57,7 +64,7 @@ def _back(ws: Workspace, arm: int, tool: str, home: Pose) -> Place:
     w, _, _, z = home.rotation
     call = Place(tool, home.position, yaw=2 * math.atan2(z, w))
     offset = grip_offset(ws, arm, tool)
-    if spots(ws, arm, offset, place_targets(ws, call), ABOVE, ws.joints[arm]):
+    if reachable_placements(ws, arm, offset, place_targets(ws, call), ABOVE, ws.joints[arm]):
         return call
     return Place(tool, home.position)
 
@@ -81,10 +88,10 @@ def _strike(ws: Workspace, arm: int, tool: str, name: str) -> Generator[Array, S
     return False
 
 
-def _fitting(ws: Workspace, call: Hit, names: list[str]) -> Fits:
+def _fitting(ws: Workspace, call: Hit, names: list[str]) -> GraspFilter:
     """Which grasps will do: those with two ways to every object, or as good as there are."""
 
-    def ways(grasp: Reach) -> int:
+    def ways(grasp: GraspCandidate) -> int:
         offset = grasp.pose.inverse() * ws.pose(call.tool)
         found = SPARE
         for name in names:
@@ -107,5 +114,5 @@ def _targets(ws: Workspace, tool: str, name: str) -> list[Pose]:
     return [Pose((x, y, z - DEPTH), yaw_rotation(yaw)) * head for yaw in YAWS]
 
 
-def _spots(ws: Workspace, arm: int, offset: Pose, tool: str, name: str) -> list[Spot]:
-    return spots(ws, arm, offset, _targets(ws, tool, name), ABOVE, ws.joints[arm])
+def _spots(ws: Workspace, arm: int, offset: Pose, tool: str, name: str) -> list[Placement]:
+    return reachable_placements(ws, arm, offset, _targets(ws, tool, name), ABOVE, ws.joints[arm])

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from robospa.geometry import Pose, axis_rotation, multiply, rotate
 from robospa.harness.robots.kinematics import inverse
-from robospa.harness.skills.moving import clear_other, line, rise, travel
+from robospa.harness.skills.motion import clear_other, line_poses, rise, travel
 from robospa.harness.skills.pick import arms_for
-from robospa.harness.skills.workspace import SkillFailed, Steps, Workspace, backed
+from robospa.harness.skills.workspace import SkillFailed, Steps, Workspace, moved_back
 from robospa.tasks.plan import Open
 from robospa.tasks.shapes import Hinge
 
@@ -78,8 +78,8 @@ def _pull(ws: Workspace, way: Pull) -> Steps:
     for joints in way.arc:
         ws.add(arm, joints)
     ws.add(arm, gripper=1.0)
-    away = backed(way.last, way.approach_last, STANDOFF)
-    for joints in ws.straight(arm, way.arc[-1], line(way.last, away, 2)) or ():
+    away = moved_back(way.last, way.approach_last, STANDOFF)
+    for joints in ws.solve_path(arm, way.arc[-1], line_poses(way.last, away, 2)) or ():
         ws.add(arm, joints)
     rise(ws, arm)
     yield from ws.flush()
@@ -111,8 +111,8 @@ def _ways(ws: Workspace, call: Open, hinge: Hinge) -> Iterator[Pull]:
             rotation = multiply(turn, multiply(axis_rotation(across, down * tip), first.rotation))
             rotation = multiply(rotation, axis_rotation((1.0, 0.0, 0.0), flip))
             approach = rotate(rotation, (1.0, 0.0, 0.0))
-            poses.append(backed(Pose(spot.position, rotation), approach, reach))
-        start = backed(poses[0], rotate(poses[0].rotation, (1.0, 0.0, 0.0)), STANDOFF)
+            poses.append(moved_back(Pose(spot.position, rotation), approach, reach))
+        start = moved_back(poses[0], rotate(poses[0].rotation, (1.0, 0.0, 0.0)), STANDOFF)
         joints, ok = inverse(ws.chains[arm], [start, *poses])
         if ok.all():
             yield Pull(arm, joints[0], joints[1], joints[2:], approach, poses[-1])

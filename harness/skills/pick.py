@@ -1,4 +1,4 @@
-"""Pick: grasp an object and lift it; look whether it came along, and try again if it did not."""
+"""Pick: grasp an object and lift it; check that it came along, and try again if it did not."""
 
 from __future__ import annotations
 
@@ -10,33 +10,33 @@ from numpy.typing import NDArray
 
 from robospa.action_space import ARMS
 from robospa.geometry import Pose
-from robospa.harness.skills.grasping import LEANS, LEVEL, Reach, reachable_grasps
-from robospa.harness.skills.moving import clear_other, line, retreat_home, rise, travel
-from robospa.harness.skills.workspace import SkillFailed, Steps, Workspace, backed
+from robospa.harness.skills.grasping import LEANS, LEVEL, GraspCandidate, reachable_grasps
+from robospa.harness.skills.motion import clear_other, line_poses, retreat_home, rise, travel
+from robospa.harness.skills.workspace import SkillFailed, Steps, Workspace, moved_back
 from robospa.tasks.plan import Pick
 
 Array = NDArray[np.float64]
-Fits = Callable[[Reach], bool]
-"""Whether what comes after the grasp can be done with it."""
+GraspFilter = Callable[[GraspCandidate], bool]
+"""True for a grasp from which the next motion is possible."""
 
 STANDOFF = 0.08
 ATTEMPTS = 5
 PULLS = (0.0, 0.05, 0.1, 0.15)
 """How far a lift may come towards the arm's base where straight up is out of reach [m]."""
 LOOKAHEAD = 80
-"""How many of the best grasps are tested against what comes after."""
+"""How many of the best grasps are tested with the filter."""
 
 
 def arms_for(call_arm: str | None) -> tuple[int, ...]:
-    """Indices of the arms that may do it."""
+    """Indices of the arms that a call allows: its own, or both."""
     return (0, 1) if call_arm is None else (ARMS.index(call_arm),)
 
 
-def pick(ws: Workspace, call: Pick, fits: Fits | None = None) -> Steps:
-    """Grasp and lift; raises SkillFailed after a few attempts."""
-    tried: list[Reach] = []
+def pick(ws: Workspace, call: Pick, feasible: GraspFilter | None = None) -> Steps:
+    """Grasp and lift, preferring grasps that `feasible` accepts; SkillFailed after ATTEMPTS."""
+    tried: list[GraspCandidate] = []
     for _ in range(ATTEMPTS):
-        choice, way_in, way_up = _choose(ws, call, tried, fits)
+        choice, way_in, way_up = _choose(ws, call, tried, feasible)
         tried.append(choice)
         before = ws.pose(call.object).position[2]
         arm = choice.arm
@@ -61,22 +61,22 @@ def pick(ws: Workspace, call: Pick, fits: Fits | None = None) -> Steps:
 
 
 def _choose(
-    ws: Workspace, call: Pick, tried: list[Reach], fits: Fits | None
-) -> tuple[Reach, list[Array], list[Array]]:
+    ws: Workspace, call: Pick, tried: list[GraspCandidate], feasible: GraspFilter | None
+) -> tuple[GraspCandidate, list[Array], list[Array]]:
     """The best grasp not yet tried, with the joints of the way in and of the lift."""
     arms = tuple(a for a in arms_for(call.arm) if ws.held[a] is None)
-    spare: tuple[Reach, list[Array], list[Array]] | None = None
+    spare: tuple[GraspCandidate, list[Array], list[Array]] | None = None
     for leans in (LEVEL, LEANS):
         options = reachable_grasps(ws, call.object, arms, leans)
-        fresh = [o for o in options if not any(_alike(o, t) for t in tried)]
+        fresh = [o for o in options if not any(_same_grasp(o, t) for t in tried)]
         for rank, option in enumerate(fresh or options):
-            out = backed(option.pose, option.approach, STANDOFF)
-            back = ws.straight(option.arm, option.joints, line(option.pose, out, 2))
+            out = moved_back(option.pose, option.approach, STANDOFF)
+            back = ws.solve_path(option.arm, option.joints, line_poses(option.pose, out, 2))
             up = _lift(ws, call, option) if back is not None else None
             if back is None or up is None:
                 continue
             found = (option, [*reversed(back), option.joints], up)
-            if fits is None or fits(option):
+            if feasible is None or feasible(option):
                 return found
             spare = spare or found
             if rank >= LOOKAHEAD:
@@ -86,7 +86,7 @@ def _choose(
     raise SkillFailed(f"no arm can reach {call.object} at {ws.pose(call.object).position}")
 
 
-def _lift(ws: Workspace, call: Pick, option: Reach) -> list[Array] | None:
+def _lift(ws: Workspace, call: Pick, option: GraspCandidate) -> list[Array] | None:
     """Joints of the way up: straight, or towards the arm's base where that is out of reach."""
     x, y, z = option.pose.position
     base = ws.robot.arms[option.arm].base.position
@@ -96,13 +96,13 @@ def _lift(ws: Workspace, call: Pick, option: Reach) -> list[Array] | None:
             (x + (base[0] - x) * pull / away, y + (base[1] - y) * pull / away, z + call.lift),
             option.pose.rotation,
         )
-        up = ws.straight(option.arm, option.joints, line(option.pose, end, 2))
+        up = ws.solve_path(option.arm, option.joints, line_poses(option.pose, end, 2))
         if up is not None:
             return up
     return None
 
 
-def _alike(a: Reach, b: Reach) -> bool:
+def _same_grasp(a: GraspCandidate, b: GraspCandidate) -> bool:
     turned = min(
         math.dist(a.pose.rotation, b.pose.rotation),
         math.dist(a.pose.rotation, tuple(-c for c in b.pose.rotation)),

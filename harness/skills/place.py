@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from robospa.geometry import Pose, axis_rotation, multiply, rotate, yaw_rotation
 from robospa.harness.robots.kinematics import inverse
-from robospa.harness.skills.grasping import Reach
-from robospa.harness.skills.moving import line, retreat_home, rise, travel
-from robospa.harness.skills.workspace import SkillFailed, Steps, Workspace, backed, raised
+from robospa.harness.skills.grasping import GraspCandidate
+from robospa.harness.skills.motion import line_poses, retreat_home, rise, travel
+from robospa.harness.skills.workspace import SkillFailed, Steps, Workspace, moved_back, moved_up
 from robospa.tasks.plan import Drop, Place
 
 Array = NDArray[np.float64]
@@ -26,7 +26,7 @@ MOUTH = ((0.0, 0.0), (0.06, -0.08), (0.06, 0.0), (0.1, -0.12), (0.0, -0.12), (0.
 
 
 @dataclass(frozen=True)
-class Spot:
+class Placement:
     """An end-effector pose that puts the object where it should be, and its joints."""
 
     pose: Pose
@@ -34,7 +34,7 @@ class Spot:
     above: Array
 
 
-def holder(ws: Workspace, name: str) -> int:
+def arm_holding(ws: Workspace, name: str) -> int:
     """The arm that holds `name`; SkillFailed if none does."""
     if name not in ws.held:
         raise SkillFailed(f"{name} is not held by any arm")
@@ -55,18 +55,18 @@ def place_position(ws: Workspace, call: Place) -> tuple[float, float, float]:
     return (x, y, z - ws.models[call.object].bottom)
 
 
-def spots(
+def reachable_placements(
     ws: Workspace, arm: int, offset: Pose, targets: Iterable[Pose], above: float, near: Array
-) -> list[Spot]:
+) -> list[Placement]:
     """All reachable ways to bring an object held with `offset` to one of `targets`, best first."""
     poses = [target * offset.inverse() for target in targets]
     joints, ok = inverse(ws.chains[arm], poses)
     order = sorted(np.flatnonzero(ok), key=lambda i: float(np.abs(joints[i] - near).max()))
     found = []
     for i in order:
-        up = ws.solve(arm, raised(poses[i], above), joints[i])
+        up = ws.solve(arm, moved_up(poses[i], above), joints[i])
         if up is not None:
-            found.append(Spot(poses[i], joints[i], up))
+            found.append(Placement(poses[i], joints[i], up))
             if len(found) == 3:
                 break
     return found
@@ -101,21 +101,21 @@ def drop_targets(ws: Workspace, call: Drop) -> list[Pose]:
     return [Pose((x + dx, y + dy, z), yaw_rotation(yaw)) for dx, dy in MOUTH for yaw in YAWS[::2]]
 
 
-def can_follow(ws: Workspace, call: Place | Drop, grasp: Reach) -> bool:
+def can_follow(ws: Workspace, call: Place | Drop, grasp: GraspCandidate) -> bool:
     """Whether `grasp` would let the same arm do `call` afterwards."""
     offset = grasp.pose.inverse() * ws.pose(call.object)
     targets = place_targets(ws, call) if isinstance(call, Place) else drop_targets(ws, call)
     above = ABOVE if isinstance(call, Place) else 0.0
-    return bool(spots(ws, grasp.arm, offset, targets, above, grasp.joints))
+    return bool(reachable_placements(ws, grasp.arm, offset, targets, above, grasp.joints))
 
 
 def place(ws: Workspace, call: Place) -> Steps:
     """Carry, set down, let go, back off."""
-    arm = holder(ws, call.object)
+    arm = arm_holding(ws, call.object)
     offset = grip_offset(ws, arm, call.object)
     near = ws.joints[arm]
-    found = spots(ws, arm, offset, place_targets(ws, call), ABOVE, near)
-    found = found or spots(ws, arm, offset, tipped_targets(ws, call), ABOVE, near)
+    found = reachable_placements(ws, arm, offset, place_targets(ws, call), ABOVE, near)
+    found = found or reachable_placements(ws, arm, offset, tipped_targets(ws, call), ABOVE, near)
     if not found:
         raise SkillFailed(f"{call.object} cannot be brought to {place_position(ws, call)}")
     spot = found[0]
@@ -125,8 +125,8 @@ def place(ws: Workspace, call: Place) -> Steps:
     ws.add(arm)
     ws.add(arm, gripper=1.0)
     approach = rotate(spot.pose.rotation, (1, 0, 0))
-    away = backed(spot.pose, approach, call.retreat)
-    out = ws.straight(arm, spot.joints, line(spot.pose, away, 2)) or [spot.above]
+    away = moved_back(spot.pose, approach, call.retreat)
+    out = ws.solve_path(arm, spot.joints, line_poses(spot.pose, away, 2)) or [spot.above]
     for joints in out:
         ws.add(arm, joints)
     ws.held[arm] = None
@@ -136,9 +136,9 @@ def place(ws: Workspace, call: Place) -> Steps:
 
 def drop(ws: Workspace, call: Drop) -> Steps:
     """Carry over the container and open the gripper."""
-    arm = holder(ws, call.object)
+    arm = arm_holding(ws, call.object)
     offset = grip_offset(ws, arm, call.object)
-    found = spots(ws, arm, offset, drop_targets(ws, call), 0.0, ws.joints[arm])
+    found = reachable_placements(ws, arm, offset, drop_targets(ws, call), 0.0, ws.joints[arm])
     if not found:
         raise SkillFailed(f"{call.object} cannot be brought over {call.into}")
     travel(ws, arm, found[0].joints)

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from robospa.geometry import Pose, Quat, axis_rotation, multiply, rotate, yaw_rotation
 from robospa.harness.robots.kinematics import inverse
-from robospa.harness.skills.grasping import Reach
-from robospa.harness.skills.moving import travel
+from robospa.harness.skills.grasping import GraspCandidate
+from robospa.harness.skills.motion import travel
 from robospa.harness.skills.pick import pick
 from robospa.harness.skills.place import grip_offset
 from robospa.harness.skills.workspace import SkillFailed, Steps, Workspace
@@ -25,7 +25,7 @@ TIPS = (2.5, 2.1)
 AZIMUTHS = 8
 """About so many axes."""
 LAST_TIPS, LAST_AZIMUTHS = (2.3, 2.1, 1.9), 32
-"""What is tried if the object came to lie in the hand so that none of these can be reached."""
+"""Tried if the object lies in the hand so that none of the others can be reached."""
 SPINS = tuple(2 * math.pi * i / 12 for i in range(12))
 MOUTHS = ((0.05, -0.08), (0.0, -0.12), (0.0, 0.0), (0.05, 0.05))
 """Where the object's mouth goes, from the container's middle [m]."""
@@ -39,11 +39,11 @@ def pour(ws: Workspace, call: Pour) -> Steps:
     """Pick, carry, turn over, wait; then the same at other places, should anything be left."""
     targets = _targets(ws, call)
 
-    def fits(grasp: Reach) -> bool:
+    def feasible(grasp: GraspCandidate) -> bool:
         offset = grasp.pose.inverse() * ws.pose(call.object)
         return bool(_reachable(ws, grasp.arm, offset, targets, grasp.joints, 1))
 
-    yield from pick(ws, Pick(call.object, LIFT, call.arm), fits)
+    yield from pick(ws, Pick(call.object, LIFT, call.arm), feasible)
     arm = ws.held.index(call.object)
     offset = grip_offset(ws, arm, call.object)
     found = _reachable(ws, arm, offset, targets, ws.joints[arm], ROUNDS)

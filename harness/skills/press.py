@@ -8,15 +8,15 @@ import numpy as np
 
 from robospa.geometry import Pose, axis_rotation, look_rotation, rotate
 from robospa.harness.robots.kinematics import inverse
-from robospa.harness.skills.moving import clear_other, line, travel
+from robospa.harness.skills.motion import clear_other, line_poses, travel
 from robospa.harness.skills.pick import arms_for
 from robospa.harness.skills.workspace import (
     SkillFailed,
     Steps,
     Workspace,
-    backed,
-    far_side,
-    raised,
+    max_gripper_y,
+    moved_back,
+    moved_up,
     wall_front,
 )
 from robospa.tasks.plan import Press
@@ -56,7 +56,7 @@ def _plan(ws: Workspace, call: Press) -> tuple[int, np.ndarray, np.ndarray]:
                 for sign in (1, -1):
                     approach = rotate(axis_rotation(closing, sign * tilt), (0, 0, -1))
                     tip = Pose((x, y, z - DEPTH), look_rotation(approach, closing))
-                    position = backed(tip, approach, hand.tip).position
+                    position = moved_back(tip, approach, hand.tip).position
                     for side in (1, -1):
                         facing = tuple(side * c for c in closing)
                         poses.append(Pose(position, look_rotation(approach, facing)))
@@ -67,13 +67,15 @@ def _plan(ws: Workspace, call: Press) -> tuple[int, np.ndarray, np.ndarray]:
         ranked = sorted(
             np.flatnonzero(ok),
             key=lambda i: (
-                far_side(poses[i], hand) > front,
+                max_gripper_y(poses[i], hand) > front,
                 i // per_tilt,
                 float(np.abs(joints[i] - near).max()),
             ),
         )
         for i in ranked[:20]:
-            above = ws.straight(arm, joints[i], line(poses[i], raised(poses[i], call.hover), 1))
+            above = ws.solve_path(
+                arm, joints[i], line_poses(poses[i], moved_up(poses[i], call.hover), 1)
+            )
             if above is not None:
                 return arm, joints[i], above[0]
     raise SkillFailed(f"no arm can press {call.object} at {frame.position}")

@@ -4,10 +4,15 @@ from __future__ import annotations
 
 from functools import partial
 
-from robospa.harness.skills.grasping import Reach
-from robospa.harness.skills.moving import travel
+from robospa.harness.skills.motion import travel
 from robospa.harness.skills.pick import pick
-from robospa.harness.skills.place import can_follow, grip_offset, place, place_targets, spots
+from robospa.harness.skills.place import (
+    can_follow,
+    grip_offset,
+    place,
+    place_targets,
+    reachable_placements,
+)
 from robospa.harness.skills.workspace import SkillFailed, Steps, Workspace
 from robospa.tasks.plan import Pick, Place, Stamp
 
@@ -19,14 +24,15 @@ ATTEMPTS = 3
 
 
 def stamp(ws: Workspace, call: Stamp) -> Steps:
-    """All stamps; after a stamp that went beside, the object is taken anew for the rest."""
+    """All stamps with one grasp; the last one leaves the object on its target."""
     down = Place(call.object, on=call.on, drop=PRESSED, arm=call.arm)
-    fits = partial(_fits, ws, down)
-    yield from pick(ws, Pick(call.object, LIFT, call.arm), fits)
+    yield from pick(ws, Pick(call.object, LIFT, call.arm), partial(can_follow, ws, down))
     arm = ws.held.index(call.object)
     for _ in range(call.times - 1):
         offset = grip_offset(ws, arm, call.object)
-        found = spots(ws, arm, offset, place_targets(ws, down), call.lift, ws.joints[arm])
+        found = reachable_placements(
+            ws, arm, offset, place_targets(ws, down), call.lift, ws.joints[arm]
+        )
         if not found:
             raise SkillFailed(f"{call.object} cannot be brought to {call.on}")
         travel(ws, arm, found[0].above)
@@ -34,7 +40,3 @@ def stamp(ws: Workspace, call: Stamp) -> Steps:
         ws.add(arm, found[0].above)
         yield from ws.flush()
     yield from place(ws, down)
-
-
-def _fits(ws: Workspace, down: Place, grasp: Reach) -> bool:
-    return can_follow(ws, down, grasp)

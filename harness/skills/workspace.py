@@ -1,4 +1,4 @@
-"""What a skill knows: the scene, the robot, where everything is now, and what the arms were told.
+"""The state that skills plan on: scene, robot, poses at this instant, commanded joints.
 
 Skills are generators: they yield rows of joint actions, float64 (T, D), and get back the snapshot
 that these led to. Nothing here touches the simulator.
@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 Steps = Generator[Array, Snapshot, None]
 
 WALL_HEIGHT, WALL_DEPTH = 0.3, 0.03
-"""What is higher and less deep than this [m] is a wall."""
+"""An object higher and less deep than this [m] is a wall."""
 
 AXES: tuple[Vec3, Vec3, Vec3] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
@@ -61,8 +61,8 @@ class Workspace:
         """The gripper of an arm."""
         return self.robot.workcell.arms[arm].gripper
 
-    def see(self, snapshot: Snapshot) -> None:
-        """Take over what the world says now."""
+    def update_state(self, snapshot: Snapshot) -> None:
+        """Take over poses, joints [rad] and grippers of `snapshot`."""
         self.snapshot = snapshot
         self.joints = [np.asarray(j, dtype=float) for j in snapshot.joints]
         self.gripper = list(snapshot.gripper)
@@ -76,18 +76,18 @@ class Workspace:
         self.rows.append(self.row())
 
     def row(self) -> Array:
-        """The action that holds what was commanded last."""
+        """The action (D,) that holds what was commanded last."""
         parts = [np.append(self.joints[i], self.gripper[i]) for i in range(len(ARMS))]
         return np.concatenate(parts)
 
     def flush(self) -> Steps:
-        """Send the appended actions and look at the outcome."""
+        """Send the appended actions and take over the snapshot that they lead to."""
         if self.rows:
             rows, self.rows = np.stack(self.rows), []
-            self.see((yield rows))
+            self.update_state((yield rows))
 
     def pose(self, name: str) -> Pose:
-        """Where `name` is now."""
+        """Pose of the object called `name` at this instant."""
         return self.snapshot.poses[name]
 
     def solve(self, arm: int, target: Pose, near: Array | None = None) -> Array | None:
@@ -95,7 +95,7 @@ class Workspace:
         joints, found = inverse(self.chains[arm], [target], near)
         return joints[0] if found[0] else None
 
-    def straight(self, arm: int, start: Array, poses: list[Pose]) -> list[Array] | None:
+    def solve_path(self, arm: int, start: Array, poses: list[Pose]) -> list[Array] | None:
         """Joints along a list of nearby poses, each from the one before; None if one fails."""
         out: list[Array] = []
         for pose in poses:
@@ -117,7 +117,7 @@ def wall_front(ws: Workspace) -> float:
     return min((pose.position[1] - model.size[1] / 2 for pose, model in walls), default=math.inf)
 
 
-def far_side(pose: Pose, hand: Gripper) -> float:
+def max_gripper_y(pose: Pose, hand: Gripper) -> float:
     """Largest y [m] of a gripper's hand and wrist at an end-effector pose."""
     forward, closing, across = (rotate(pose.rotation, axis)[1] for axis in AXES)
     tip = pose.position[1] + forward * hand.tip
@@ -126,13 +126,13 @@ def far_side(pose: Pose, hand: Gripper) -> float:
     return max(tip - forward * hand.hand_back + wide, wrist)
 
 
-def raised(pose: Pose, height: float) -> Pose:
+def moved_up(pose: Pose, height: float) -> Pose:
     """`pose` moved up by `height` [m]."""
     x, y, z = pose.position
     return Pose((x, y, z + height), pose.rotation)
 
 
-def backed(pose: Pose, approach: Vec3, distance: float) -> Pose:
+def moved_back(pose: Pose, approach: Vec3, distance: float) -> Pose:
     """`pose` moved back by `distance` [m] against its approach direction."""
     x, y, z = pose.position
     return Pose(

@@ -33,7 +33,7 @@ def opened(world: SapienWorld, loaded: Scene) -> Snapshot:
     for _ in range(3):
         for row in expert.next(world.snapshot()):
             world.step(row, "joint", lambda snapshot: False)
-    assert expert.trouble == []
+    assert expert.failures == []
     return world.snapshot()
 
 

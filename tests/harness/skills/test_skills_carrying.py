@@ -10,7 +10,7 @@ from robospa.geometry import Pose, rotate
 from robospa.harness.robots import embodiment
 from robospa.harness.robots.kinematics import chain_of, end_effector
 from robospa.harness.skills import hang, pour
-from robospa.harness.skills.dock import shifted, ways_in
+from robospa.harness.skills.approach import approach_joints, translated
 from robospa.harness.skills.workspace import Workspace
 from robospa.tasks.catalog import build_scene
 from robospa.tasks.plan import Pour
@@ -38,18 +38,20 @@ def workspace(name: str, level: int) -> tuple[Scene, Workspace]:
 def test_a_path_ends_at_the_target_and_starts_where_it_is_told() -> None:
     _, ws = workspace("Hang_Mug_Stack_Blocks", 1)
     here = ws.snapshot.end_effector[1]
-    target = shifted(here, (0.0, 0.05, 0.0))
-    way = ways_in(ws, 1, Pose(), [target], [(0.0, 0.0, 0.04), (0.0, 0.0, 0.0)], ws.joints[1])
+    target = translated(here, (0.0, 0.05, 0.0))
+    way = approach_joints(
+        ws, 1, Pose(), [target], [(0.0, 0.0, 0.04), (0.0, 0.0, 0.0)], ws.joints[1]
+    )
     assert way is not None
     ends = [end_effector(ws.chains[1], tuple(joints)).position for joints in way]
     assert ends[1] == pytest.approx(target.position, abs=2e-3)
-    assert ends[0] == pytest.approx(shifted(target, (0.0, 0.0, 0.04)).position, abs=2e-3)
+    assert ends[0] == pytest.approx(translated(target, (0.0, 0.0, 0.04)).position, abs=2e-3)
 
 
 def test_there_is_no_path_to_what_is_out_of_reach() -> None:
     _, ws = workspace("Hang_Mug_Stack_Blocks", 1)
     far = Pose((0.0, 3.0, 1.0))
-    assert ways_in(ws, 1, Pose(), [far], [(0.0, 0.0, 0.0)], ws.joints[1]) is None
+    assert approach_joints(ws, 1, Pose(), [far], [(0.0, 0.0, 0.0)], ws.joints[1]) is None
 
 
 def test_a_mug_is_brought_with_the_peg_through_its_handle() -> None:
@@ -59,7 +61,7 @@ def test_a_mug_is_brought_with_the_peg_through_its_handle() -> None:
     handle = ws.models[mug].frames["handle"]
     for target in hang._targets(peg, handle, hang.WOBBLES):
         middle = (target * handle).position
-        assert middle == pytest.approx(shifted(peg, (0.0, 0.0, -hang.SAG)).position, abs=1e-9)
+        assert middle == pytest.approx(translated(peg, (0.0, 0.0, -hang.SAG)).position, abs=1e-9)
         through = rotate(target.rotation, (0.0, 1.0, 0.0))
         along = rotate(peg.rotation, (0.0, 1.0, 0.0))
         assert abs(sum(a * b for a, b in zip(through, along, strict=True))) > math.cos(0.25)

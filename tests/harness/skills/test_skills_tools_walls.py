@@ -8,7 +8,7 @@ from robospa.geometry import Pose, to_matrix
 from robospa.harness.robots import embodiment
 from robospa.harness.robots.kinematics import chain_of, end_effector
 from robospa.harness.skills.grasping import reachable_grasps
-from robospa.harness.skills.moving import tops, travel_height
+from robospa.harness.skills.motion import object_tops, travel_height
 from robospa.harness.skills.workspace import Workspace, wall_front
 from robospa.tasks.catalog import build_scene, task
 from robospa.tasks.scene import Scene, SceneObject
@@ -43,9 +43,9 @@ BEHIND = thing("behind", 0.2, (0.02, 0.02, 0.1))
 def test_a_wall_and_what_is_behind_it_are_not_travelled_over() -> None:
     ws = workspace(CUBE, WALL, BEHIND)
     assert wall_front(ws) == pytest.approx(WALL_Y - 0.005)
-    assert len(tops(ws, None)) == 1
+    assert len(object_tops(ws, None)) == 1
     assert travel_height(ws, 0) == TABLE_TOP + ROBOT.workcell.travel_height
-    assert len(tops(workspace(CUBE, BEHIND), None)) == 2
+    assert len(object_tops(workspace(CUBE, BEHIND), None)) == 2
 
 
 def test_the_gripper_stays_in_front_of_the_wall() -> None:

@@ -1,4 +1,4 @@
-"""Getting from here to there without sweeping things off the table."""
+"""Collision-avoiding travel of an arm above the objects on the table."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from robospa.geometry import Pose, from_transform
 from robospa.harness.robots.kinematics import forward
-from robospa.harness.skills.workspace import Workspace, raised, wall_front
+from robospa.harness.skills.workspace import Workspace, moved_up, wall_front
 
 Array = NDArray[np.float64]
 
@@ -24,7 +24,7 @@ def tip_heights(ws: Workspace, arm: int, joints: Array) -> Array:
     return np.asarray(frames[:, 2, 3] + frames[:, 2, 0] * ws.hand(arm).grasp_centre)
 
 
-def tops(ws: Workspace, but: str | None) -> list[tuple[Array, float, float]]:
+def object_tops(ws: Workspace, but: str | None) -> list[tuple[Array, float, float]]:
     """Centre (2,), footprint radius and top [m] of every object except `but`.
 
     Not of a wall, over which nothing goes, nor of what is behind it.
@@ -39,7 +39,7 @@ def tops(ws: Workspace, but: str | None) -> list[tuple[Array, float, float]]:
     return found
 
 
-def hangs(ws: Workspace, arm: int) -> float:
+def depth_below_grasp(ws: Workspace, arm: int) -> float:
     """How far the lowest point of the gripper, or of what it holds, is below the grasp centre."""
     name, fingertip = ws.held[arm], ws.hand(arm).fingertip
     if name is None:
@@ -51,23 +51,23 @@ def hangs(ws: Workspace, arm: int) -> float:
 def travel_height(ws: Workspace, arm: int) -> float:
     """Height [m] of the grasp centre at which the arm and what it holds clear everything."""
     table, cell = ws.scene.table_top, ws.robot.workcell
-    highest = max((top for _, _, top in tops(ws, ws.held[arm])), default=table)
-    lowest = max(table + cell.travel_height, highest + hangs(ws, arm) + SPARE)
+    highest = max((top for _, _, top in object_tops(ws, ws.held[arm])), default=table)
+    lowest = max(table + cell.travel_height, highest + depth_below_grasp(ws, arm) + SPARE)
     return min(table + cell.highest, lowest)
 
 
 def blocked(ws: Workspace, arm: int, start: Array, goal: Array) -> bool:
-    """Whether the joint line would lead the gripper or what it holds through another object.
+    """True if the joint line would lead the gripper or what it holds through another object.
 
-    The ends are the caller's business: only what is met on the way counts.
+    The ends themselves are not tested.
     """
     frames, _ = forward(ws.chains[arm], start + (goal - start) * SAMPLES)
     centres = frames[:, :3, 3] + frames[:, :3, 0] * ws.hand(arm).grasp_centre
-    low = centres[:, 2] - hangs(ws, arm)
+    low = centres[:, 2] - depth_below_grasp(ws, arm)
     name, wide = ws.held[arm], ws.hand(arm).radius
     if name is not None:
         wide = max(wide, ws.models[name].radius + 0.01)
-    for centre, radius, top in tops(ws, name):
+    for centre, radius, top in object_tops(ws, name):
         near = np.linalg.norm(centres[:, :2] - centre, axis=1) < radius + wide
         if bool((near & (low < top + 0.01)).any()):
             return True
@@ -83,7 +83,7 @@ def rise(ws: Workspace, arm: int, to: float | None = None) -> None:
     frames, _ = forward(ws.chains[arm], ws.joints[arm][None])
     here = from_transform(frames[0])
     for share in (1.0, 0.75, 0.5, 0.25):
-        joints = ws.solve(arm, raised(here, (to - height) * share), ws.joints[arm])
+        joints = ws.solve(arm, moved_up(here, (to - height) * share), ws.joints[arm])
         if joints is not None:
             ws.add(arm, joints)
             return
@@ -98,7 +98,7 @@ def travel(ws: Workspace, arm: int, goal: Array) -> None:
         here = from_transform(frames[0])
         climb = travel_height(ws, arm) - float(tip_heights(ws, arm, goal[None])[0])
         for share in (1.0, 0.7, 0.4):
-            above = ws.solve(arm, raised(here, climb * share), goal) if climb > 0.01 else None
+            above = ws.solve(arm, moved_up(here, climb * share), goal) if climb > 0.01 else None
             if above is not None:
                 ws.add(arm, above)
                 break
@@ -121,7 +121,7 @@ def clear_other(ws: Workspace, arm: int) -> None:
         retreat_home(ws, other)
 
 
-def line(start: Pose, end: Pose, pieces: int) -> list[Pose]:
+def line_poses(start: Pose, end: Pose, pieces: int) -> list[Pose]:
     """`pieces` poses from just after `start` to `end`, with `end`'s rotation."""
     a, b = np.array(start.position), np.array(end.position)
     out = []

@@ -10,7 +10,7 @@ import pytest
 from robospa.geometry import Pose
 from robospa.harness.robots import embodiment
 from robospa.harness.robots.kinematics import chain_of, end_effector
-from robospa.harness.skills.raising import raise_lower
+from robospa.harness.skills.raise_lower import raise_lower
 from robospa.harness.skills.workspace import SkillFailed, Workspace
 from robospa.tasks.plan import RaiseLower
 from robospa.tasks.scene import Scene, SceneObject

@@ -7,105 +7,105 @@ import pytest
 from unequal_arms import unequal_arms
 from world_scenes import READY, joint_action
 
-from robospa.harness.actions import ActionReader
+from robospa.harness.action_decoder import ActionDecoder
 from robospa.harness.robots import embodiment
 from robospa.harness.robots.kinematics import end_effector
 from robospa.harness.world import ActionError
 
 ROBOT = embodiment("aloha-agilex")
-READER = ActionReader(ROBOT)
+DECODER = ActionDecoder(ROBOT)
 START = np.array([READY, READY])
 
 
 def ee_action(space: str = "ee") -> np.ndarray:
     rows = []
-    for chain in READER.chains:
+    for chain in DECODER.chains:
         pose = end_effector(chain, READY)
         rows += [*pose.position, *pose.rotation, 0.5]
     return np.array(rows)
 
 
 def test_joint_goals_are_the_numbers_sent() -> None:
-    goals = READER.goals(joint_action(grip=(0.25, 1.0)), "joint", START)
-    assert goals.joints == pytest.approx(START)
-    assert goals.gripper == pytest.approx([0.25, 1.0])
+    targets = DECODER.decode(joint_action(grip=(0.25, 1.0)), "joint", START)
+    assert targets.joints == pytest.approx(START)
+    assert targets.gripper == pytest.approx([0.25, 1.0])
 
 
 def test_joints_beyond_their_limits_are_clipped() -> None:
-    goals = READER.goals(joint_action(left=(99.0, *READY[1:])), "joint", START)
-    assert goals.joints[0, 0] == ROBOT.arms[0].joints[0].upper
+    targets = DECODER.decode(joint_action(left=(99.0, *READY[1:])), "joint", START)
+    assert targets.joints[0, 0] == ROBOT.arms[0].joints[0].upper
 
 
 def test_gripper_outside_its_range_is_clipped() -> None:
-    goals = READER.goals(joint_action(grip=(-0.5, 1.5)), "joint", START)
-    assert goals.gripper.tolist() == [0.0, 1.0]
+    targets = DECODER.decode(joint_action(grip=(-0.5, 1.5)), "joint", START)
+    assert targets.gripper.tolist() == [0.0, 1.0]
 
 
 def test_a_number_that_is_not_finite_is_named() -> None:
     action = joint_action()
     action[9] = np.nan
     with pytest.raises(ActionError, match=r"right joint 3 \(index 9 of the joint action\) is nan"):
-        READER.goals(action, "joint", START)
+        DECODER.decode(action, "joint", START)
 
 
 @pytest.mark.parametrize("shape", [(13,), (16,), (1, 14), ()])
 def test_a_wrong_length_is_refused(shape: tuple[int, ...]) -> None:
     with pytest.raises(ActionError, match=r"shape \(14,\), got"):
-        READER.goals(np.zeros(shape), "joint", START)
+        DECODER.decode(np.zeros(shape), "joint", START)
 
 
 def test_an_unknown_space_is_refused() -> None:
     with pytest.raises(ActionError, match="no action space 'torque'"):
-        READER.goals(joint_action(), "torque", START)
+        DECODER.decode(joint_action(), "torque", START)
 
 
 def test_something_that_is_no_array_is_refused() -> None:
     with pytest.raises(ActionError, match="not an array of numbers"):
-        READER.goals([[1.0], "x"], "joint", START)
+        DECODER.decode([[1.0], "x"], "joint", START)
 
 
 def test_the_pose_of_the_present_posture_is_no_motion() -> None:
-    goals = READER.goals(ee_action(), "ee", START)
-    assert goals.joints == pytest.approx(START, abs=1e-3)
-    assert goals.problems == ()
+    targets = DECODER.decode(ee_action(), "ee", START)
+    assert targets.joints == pytest.approx(START, abs=1e-3)
+    assert targets.problems == ()
 
 
 def test_a_pose_nearby_is_reached() -> None:
     action = ee_action()
     action[2] -= 0.05
-    goals = READER.goals(action, "ee", START)
-    found = end_effector(READER.chains[0], goals.joints[0])
+    targets = DECODER.decode(action, "ee", START)
+    found = end_effector(DECODER.chains[0], targets.joints[0])
     assert found.position == pytest.approx(action[:3], abs=2e-3)
-    assert goals.joints[1] == pytest.approx(START[1], abs=1e-3)
+    assert targets.joints[1] == pytest.approx(START[1], abs=1e-3)
 
 
 def test_an_arm_that_cannot_reach_holds_and_says_so() -> None:
     action = ee_action()
     action[:3] = (5.0, 5.0, 5.0)
-    goals = READER.goals(action, "ee", START)
-    assert np.array_equal(goals.joints[0], START[0])
-    assert len(goals.problems) == 1 and "left arm cannot reach" in goals.problems[0]
+    targets = DECODER.decode(action, "ee", START)
+    assert np.array_equal(targets.joints[0], START[0])
+    assert len(targets.problems) == 1 and "left arm cannot reach" in targets.problems[0]
 
 
 def test_delta_moves_in_the_grippers_own_frame() -> None:
     row = [0.02, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
-    goals = READER.goals(np.array(row * 2), "delta_ee", START)
-    before = end_effector(READER.chains[0], READY)
-    after = end_effector(READER.chains[0], goals.joints[0])
+    targets = DECODER.decode(np.array(row * 2), "delta_ee", START)
+    before = end_effector(DECODER.chains[0], READY)
+    after = end_effector(DECODER.chains[0], targets.joints[0])
     assert after.position == pytest.approx(before.apply((0.02, 0.0, 0.0)), abs=2e-3)
 
 
 def test_an_identity_delta_moves_nothing() -> None:
     row = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
-    goals = READER.goals(np.array(row * 2), "delta_ee", START)
-    assert goals.joints == pytest.approx(START, abs=1e-12)
+    targets = DECODER.decode(np.array(row * 2), "delta_ee", START)
+    assert targets.joints == pytest.approx(START, abs=1e-12)
 
 
 def test_a_tiny_delta_is_not_swallowed() -> None:
     row = [1e-4, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
-    goals = READER.goals(np.array(row * 2), "delta_ee", START)
-    before = end_effector(READER.chains[0], READY)
-    after = end_effector(READER.chains[0], goals.joints[0])
+    targets = DECODER.decode(np.array(row * 2), "delta_ee", START)
+    before = end_effector(DECODER.chains[0], READY)
+    after = end_effector(DECODER.chains[0], targets.joints[0])
     assert after.position == pytest.approx(before.apply((1e-4, 0.0, 0.0)), abs=1e-6)
 
 
@@ -113,7 +113,7 @@ def test_a_quaternion_of_no_length_is_refused() -> None:
     action = ee_action()
     action[3:7] = 0.0
     with pytest.raises(ActionError, match="left quaternion"):
-        READER.goals(action, "ee", START)
+        DECODER.decode(action, "ee", START)
 
 
 @pytest.mark.parametrize(("space", "length"), [("joint", 14), ("ee", 16), ("delta_ee", 16)])
@@ -122,25 +122,25 @@ def test_every_number_has_a_name(space: str, length: int) -> None:
 
 
 def test_arms_may_have_different_joint_counts() -> None:
-    reader = ActionReader(unequal_arms())
+    decoder = ActionDecoder(unequal_arms())
     action = np.array([*READY, 0.25, *READY, 0.1, 0.75])
-    goals = reader.goals(action, "joint", np.zeros((2, 7)))
-    assert goals.joints.tolist() == [[*READY, 0.0], [*READY, 0.1]]
-    assert goals.gripper.tolist() == [0.25, 0.75]
+    targets = decoder.decode(action, "joint", np.zeros((2, 7)))
+    assert targets.joints.tolist() == [[*READY, 0.0], [*READY, 0.1]]
+    assert targets.gripper.tolist() == [0.25, 0.75]
     with pytest.raises(ActionError, match=r"shape \(15,\), got \(14,\)"):
-        reader.goals(action[:14], "joint", np.zeros((2, 7)))
+        decoder.decode(action[:14], "joint", np.zeros((2, 7)))
 
 
 def test_poses_move_arms_of_different_joint_counts() -> None:
-    reader = ActionReader(unequal_arms())
+    decoder = ActionDecoder(unequal_arms())
     start = np.array([[*READY, 0.0], [*READY, 0.1]])
     rows = []
-    for chain, joints in zip(reader.chains, (READY, (*READY, 0.1)), strict=True):
+    for chain, joints in zip(decoder.chains, (READY, (*READY, 0.1)), strict=True):
         pose = end_effector(chain, joints)
         x, y, z = pose.position
         rows += [x, y, z + 0.01, *pose.rotation, 0.5]
-    goals = reader.goals(np.array(rows), "ee", start)
-    assert goals.problems == ()
-    assert goals.joints[0, 6] == 0.0
-    moved = end_effector(reader.chains[1], goals.joints[1].tolist())
+    targets = decoder.decode(np.array(rows), "ee", start)
+    assert targets.problems == ()
+    assert targets.joints[0, 6] == 0.0
+    moved = end_effector(decoder.chains[1], targets.joints[1].tolist())
     assert moved.position == pytest.approx(rows[8:11], abs=1e-4)

@@ -38,5 +38,5 @@ def wall() -> tuple[Shape, ...]:
 
 
 def floor() -> tuple[Shape, ...]:
-    """What is drawn of the floor at z = 0."""
+    """A slab below z = 0, only drawn."""
     return (Shape(Box((4.0, 4.0, 0.01)), Pose((0.0, 0.0, -0.01)), FLOOR, collision=False),)

@@ -1,9 +1,9 @@
-"""From a policy's numbers to joint goals: lengths, finiteness, limits, inverse kinematics.
+"""From a policy's numbers to joint targets: lengths, finiteness, limits, inverse kinematics.
 
 What a policy sends is checked here, before anything moves. A wrong length or a number that is not
 finite refuses the whole action (`ActionError`); a joint beyond its limit or a gripper outside 0..1
 is clipped, as the drive would stop there; a pose out of reach leaves that arm where it is and is
-reported in `Goals.problems`.
+reported in `JointTargets.problems`.
 """
 
 from __future__ import annotations
@@ -30,21 +30,21 @@ Array = NDArray[np.float64]
 
 QUATERNION_TOLERANCE = 0.1
 """A quaternion's length may be off by this much: networks do not normalise."""
-POLISH = 2
-POLISH_DAMPING = 1e-6
+REFINEMENTS = 2
+DAMPING = 1e-6
 
 
 @dataclass(frozen=True)
-class Goals:
-    """`joints` (2, J) [rad], `gripper` (2,) in 0..1, and what could not be done as asked."""
+class JointTargets:
+    """`joints` (2, J) [rad], `gripper` (2,) in 0..1; `problems` names poses out of reach."""
 
     joints: Array
     gripper: Array
     problems: tuple[str, ...] = ()
 
 
-class ActionReader:
-    """Reads the actions of one embodiment. Holds its kinematics, no state of a trial."""
+class ActionDecoder:
+    """Decodes the actions of one embodiment. Holds its kinematics, no state of a trial."""
 
     def __init__(self, embodiment: Embodiment) -> None:
         self.embodiment = embodiment
@@ -84,8 +84,8 @@ class ActionReader:
             )
         return values, space
 
-    def goals(self, action: ArrayLike, kind: str, commanded: Array) -> Goals:
-        """Joint goals of `action`, given the commanded joints (2, J) at which it starts.
+    def decode(self, action: ArrayLike, kind: str, commanded: Array) -> JointTargets:
+        """Joint targets of `action`, given the commanded joints (2, J) at which it starts.
 
         J is the joint count of the arm that has more; the other's row ends in zeros.
 
@@ -95,7 +95,7 @@ class ActionReader:
         values, space = self.check(action, kind)
         gripper = np.clip(values[space.grippers], 0.0, 1.0)
         if kind == "joint":
-            return Goals(np.clip(values[self._columns], self._lower, self._upper), gripper)
+            return JointTargets(np.clip(values[self._columns], self._lower, self._upper), gripper)
         joints, problems = commanded.copy(), []
         for a, (arm, chain) in enumerate(zip(space.arms, self.chains, strict=True)):
             now = commanded[a, : space.joints[a]]
@@ -104,10 +104,10 @@ class ActionReader:
             if not reached[0]:
                 found, reached = inverse(chain, [target])
             if reached[0]:
-                joints[a, : space.joints[a]] = polished(chain, found[0], target)
+                joints[a, : space.joints[a]] = refined(chain, found[0], target)
             else:
                 problems.append(f"the {arm.name} arm cannot reach {_describe(target)} and holds")
-        return Goals(joints, gripper, tuple(problems))
+        return JointTargets(joints, gripper, tuple(problems))
 
     def _target(
         self, values: Array, arm: ArmColumns, kind: str, chain: Chain, commanded: Array
@@ -128,18 +128,18 @@ class ActionReader:
         return end_effector(chain, [float(v) for v in commanded]) * pose
 
 
-def polished(chain: Chain, joints: Array, target: Pose) -> Array:
-    """`joints` (J,) that almost reach `target`, brought onto it by POLISH Gauss-Newton steps.
+def refined(chain: Chain, joints: Array, target: Pose) -> Array:
+    """`joints` (J,) that almost reach `target`, brought onto it by REFINEMENTS Gauss-Newton steps.
 
     Inverse kinematics stops within half a millimetre, which would swallow small `delta_ee` actions.
     """
-    wanted = to_transform(target)
-    for _ in range(POLISH):
+    goal = to_transform(target)
+    for _ in range(REFINEMENTS):
         frames, jacobians = forward(chain, joints[None])
         frame, jacobian = frames[0], jacobians[0]
-        turn = wanted[:3, :3] @ frame[:3, :3].T
-        error = np.concatenate([wanted[:3, 3] - frame[:3, 3], turning_vector(turn) / 2])
-        square = jacobian.T @ jacobian + POLISH_DAMPING * np.eye(len(joints))
+        turn = goal[:3, :3] @ frame[:3, :3].T
+        error = np.concatenate([goal[:3, 3] - frame[:3, 3], turning_vector(turn) / 2])
+        square = jacobian.T @ jacobian + DAMPING * np.eye(len(joints))
         step = np.linalg.solve(square, jacobian.T @ error)
         joints = np.clip(joints + step, chain.lower, chain.upper)
     return joints

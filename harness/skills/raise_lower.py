@@ -12,15 +12,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from robospa.action_space import ARMS
-from robospa.harness.skills.grasping import LEANS, LEVEL, Reach, reachable_grasps
-from robospa.harness.skills.moving import clear_other, line, retreat_home, rise, travel
+from robospa.harness.skills.grasping import LEANS, LEVEL, GraspCandidate, reachable_grasps
+from robospa.harness.skills.motion import clear_other, line_poses, retreat_home, rise, travel
 from robospa.harness.skills.workspace import (
     Array,
     SkillFailed,
     Steps,
     Workspace,
-    backed,
-    raised,
+    moved_back,
+    moved_up,
 )
 from robospa.tasks.plan import RaiseLower
 
@@ -34,10 +34,10 @@ SHARE = 0.6
 """Share of the lift that the object must follow, or the grasp has failed."""
 
 
-class Hold:
+class ArmLift:
     """One arm's way to its grasp and from there up: joints, and how wide to open."""
 
-    def __init__(self, reach: Reach, way_in: list[Array], way_up: list[Array]) -> None:
+    def __init__(self, reach: GraspCandidate, way_in: list[Array], way_up: list[Array]) -> None:
         self.arm = reach.arm
         self.opening = reach.opening
         self.way_in = way_in
@@ -50,7 +50,7 @@ def raise_lower(ws: Workspace, call: RaiseLower) -> Steps:
     arms = tuple(ARMS.index(name) for name in call.arms)
     done, tried = 0, 0
     while done < call.times:
-        holds = [_hold(ws, call, arm, len(arms) > 1, tried) for arm in arms]
+        holds = [_plan_lift(ws, call, arm, len(arms) > 1, tried) for arm in arms]
         yield from _approach(ws, holds)
         while done < call.times:
             before = ws.pose(call.object).position[2]
@@ -80,7 +80,7 @@ def raise_lower(ws: Workspace, call: RaiseLower) -> Steps:
     yield from ws.flush()
 
 
-def _approach(ws: Workspace, holds: Sequence[Hold]) -> Steps:
+def _approach(ws: Workspace, holds: Sequence[ArmLift]) -> Steps:
     """Open and go to where the grippers close."""
     if len(holds) == 1:
         clear_other(ws, holds[0].arm)
@@ -93,39 +93,39 @@ def _approach(ws: Workspace, holds: Sequence[Hold]) -> Steps:
     yield from ws.flush()
 
 
-def _together(ws: Workspace, holds: Sequence[Hold], joints: Sequence[Array]) -> None:
+def _together(ws: Workspace, holds: Sequence[ArmLift], joints: Sequence[Array]) -> None:
     """One action in which every holding arm goes to its joints."""
     for hold, goal in zip(holds, joints, strict=True):
         ws.joints[hold.arm] = np.asarray(goal, dtype=float)
     ws.add(holds[0].arm)
 
 
-def _grip(ws: Workspace, holds: Sequence[Hold], openings: Sequence[float]) -> None:
+def _grip(ws: Workspace, holds: Sequence[ArmLift], openings: Sequence[float]) -> None:
     """One action in which every holding gripper goes to its opening."""
     for hold, opening in zip(holds, openings, strict=True):
         ws.gripper[hold.arm] = opening
     ws.add(holds[0].arm)
 
 
-def _hold(ws: Workspace, call: RaiseLower, arm: int, framed: bool, skip: int) -> Hold:
+def _plan_lift(ws: Workspace, call: RaiseLower, arm: int, framed: bool, skip: int) -> ArmLift:
     """The arm's best way to take and lift the object, the `skip` best left out."""
     pieces = max(2, math.ceil(call.rise / PIECE)) if framed else 2
     for leans in (LEVEL, LEANS):
         for reach in reachable_grasps(ws, call.object, (arm,), leans):
             if framed and not _at_frame(ws, call.object, ARMS[arm], reach):
                 continue
-            out = backed(reach.pose, reach.approach, STANDOFF)
-            back = ws.straight(arm, reach.joints, line(reach.pose, out, 2))
-            top = raised(reach.pose, call.rise)
-            up = ws.straight(arm, reach.joints, line(reach.pose, top, pieces))
+            out = moved_back(reach.pose, reach.approach, STANDOFF)
+            back = ws.solve_path(arm, reach.joints, line_poses(reach.pose, out, 2))
+            top = moved_up(reach.pose, call.rise)
+            up = ws.solve_path(arm, reach.joints, line_poses(reach.pose, top, pieces))
             if back is not None and up is not None:
                 if skip == 0:
-                    return Hold(reach, back[::-1], up)
+                    return ArmLift(reach, back[::-1], up)
                 skip -= 1
     raise SkillFailed(f"the {ARMS[arm]} arm finds no grasp of {call.object} to lift it with")
 
 
-def _at_frame(ws: Workspace, name: str, frame: str, reach: Reach) -> bool:
+def _at_frame(ws: Workspace, name: str, frame: str, reach: GraspCandidate) -> bool:
     ahead = ws.hand(reach.arm).grasp_centre
     x, y, z = reach.pose.position
     dx, dy, dz = reach.approach

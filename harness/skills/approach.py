@@ -1,0 +1,71 @@
+"""The last centimetres of a held object: a path that the arm can follow to one of many poses."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from robospa.geometry import Pose, Vec3, from_transform, rotate
+from robospa.harness.robots.kinematics import forward, inverse
+from robospa.harness.skills.motion import line_poses, rise, travel
+from robospa.harness.skills.workspace import Array, Steps, Workspace, moved_back
+
+RETREAT = 0.07
+"""How far the open gripper backs out [m]."""
+BEST = 12
+"""How many of the reachable end poses are tried along the whole path."""
+
+
+def translated(pose: Pose, by: Vec3) -> Pose:
+    """`pose` moved by `by` [m, world]."""
+    x, y, z = pose.position
+    return Pose((x + by[0], y + by[1], z + by[2]), pose.rotation)
+
+
+def approach_joints(
+    ws: Workspace,
+    arm: int,
+    offset: Pose,
+    targets: Sequence[Pose],
+    path: Sequence[Vec3],
+    near: Array,
+) -> list[Array] | None:
+    """Joints [rad] that bring an object held with `offset` along `path` to one of `targets`.
+
+    `path` has shifts [m, world] from the target, farthest first, the last one being none; nearest
+    to joints `near` first. None if no target can be reached that way.
+    """
+    back = offset.inverse()
+    ends = [target * back for target in targets]
+    joints, ok = inverse(ws.chains[arm], ends)
+    order = sorted(np.flatnonzero(ok), key=lambda i: float(np.abs(joints[i] - near).max()))
+    for i in order[:BEST]:
+        poses = [translated(ends[i], step) for step in reversed(path[:-1])]
+        before = ws.solve_path(arm, joints[i], poses)
+        if before is not None:
+            return [*reversed(before), joints[i]]
+    return None
+
+
+def release(ws: Workspace, arm: int) -> None:
+    """Open the gripper, back out along its approach, then rise."""
+    frames, _ = forward(ws.chains[arm], ws.joints[arm][None])
+    pose = from_transform(frames[0])
+    ws.add(arm)
+    ws.add(arm, gripper=1.0)
+    away = moved_back(pose, rotate(pose.rotation, (1, 0, 0)), RETREAT)
+    for joints in ws.solve_path(arm, ws.joints[arm], line_poses(pose, away, 2)) or []:
+        ws.add(arm, joints)
+    ws.held[arm] = None
+    rise(ws, arm)
+
+
+def bring_in(ws: Workspace, arm: int, path: Sequence[Array]) -> Steps:
+    """Travel to the first joints of `path`, follow the others, release the object there."""
+    travel(ws, arm, path[0])
+    yield from ws.flush()
+    for joints in path[1:]:
+        ws.add(arm, joints)
+    release(ws, arm)
+    yield from ws.flush()
