@@ -69,10 +69,10 @@ def published_entries() -> list[Entry]:
     made = []
     for model, budget in data.models.items():
         column = published_column(model)
-        parameters = str(budget["parameters"])
+        parameters = budget.parameters
         about = (
             ("parameters", parameters),
-            ("training", f"one checkpoint a base task, {budget['gpu_hours']:g} GPU hours each"),
+            ("training", f"one checkpoint a base task, {budget.gpu_hours:g} GPU hours each"),
             ("trials", f"{data.trials} a variant, seeds not published"),
         )
         text = "Numbers as printed in the paper; there are no records that could be verified."

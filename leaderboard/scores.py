@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
 
 from robospa.results.paper.columns import run_column
 from robospa.results.paper.tables import FORMATS
 from robospa.results.records.run_io import Run
 from robospa.results.report.tables import report_tables
-from robospa.results.scoring.score_json import to_json
+from robospa.results.scoring.score_json import ScoresData, to_json
 from robospa.results.scoring.scores import score_run
 from robospa.results.scoring.setting import IncomparableError
 
@@ -18,7 +17,7 @@ CLOSE = 1e-9
 """Two computations of one number may differ by this much: other numpy, other order of sums."""
 
 
-def scores_of(run: Run) -> dict[str, Any]:
+def scores_of(run: Run) -> ScoresData:
     """All scores of `run`, as `report.json` has them."""
     return to_json(score_run(run))
 
@@ -32,7 +31,7 @@ def tables_of(run: Run) -> dict[str, bytes]:
     return {ending: FORMATS[ending](grids).encode() for ending in ("csv", "md")}
 
 
-def compare_scores(right: Any, given: Any, where: str = "") -> str:
+def compare_scores(right: object, given: object, where: str = "") -> str:
     """Where `given` first differs from `right`, in words; "" if nowhere."""
     if isinstance(right, Mapping):
         if not isinstance(given, Mapping) or set(given) != set(right):
@@ -51,7 +50,7 @@ def compare_scores(right: Any, given: Any, where: str = "") -> str:
     return ""
 
 
-def _equal(right: Any, given: Any) -> bool:
+def _equal(right: object, given: object) -> bool:
     numbers = (int, float)
     if isinstance(right, numbers) and isinstance(given, numbers):
         if isinstance(right, bool) or isinstance(given, bool):

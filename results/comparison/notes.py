@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 from robospa.categories import METRIC_CATEGORIES
 from robospa.results.comparison.groups import weights_of
@@ -44,7 +43,7 @@ def notes(
     return found
 
 
-def _versions(model: ModelResults) -> dict[str, Any]:
+def _versions(model: ModelResults) -> dict[str, object]:
     return {} if model.published else {**model.info.versions, "code": model.info.code}
 
 

@@ -6,7 +6,6 @@ import csv
 import io
 import json
 from collections.abc import Iterable
-from typing import Any
 
 from robospa.results.failures.labels import KINDS, NAMES, OURS, distribution, label
 from robospa.results.records.trial_record import TrialRecord
@@ -30,7 +29,7 @@ def counts_table(records: Iterable[TrialRecord], by: str, layout: str) -> str:
 
 def trials_table(records: Iterable[TrialRecord], layout: str) -> str:
     """Every failed trial: type, evidence, when; as "markdown", "csv" or "json"."""
-    found: list[dict[str, Any]] = []
+    found: list[dict[str, object]] = []
     for record in sorted(records, key=lambda r: r.key):
         failure = label(record)
         if failure is not None:

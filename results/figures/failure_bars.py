@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING
 
 from robospa.results.figures.series import INK, label_of, new_figure, plain
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 LINE = 0.13
 """Height of a task's bar [inch]."""
@@ -25,7 +28,7 @@ FILLS = (
 
 def draw_failures(
     counts: Mapping[str, Mapping[str, int]], kinds: Sequence[str], names: Mapping[str, str]
-) -> Any:
+) -> Figure:
     """The figure of `counts` (task -> type -> failed trials), types in the order of `kinds`."""
     from matplotlib.patches import Patch
 

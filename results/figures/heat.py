@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 from robospa.results.figures.series import Series, label_of, new_figure, percent_of, tasks_in_order
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 LINE = 0.125
 """Height of a task's line [inch]."""
 
 
-def draw_heat(series: Series) -> Any:
+def draw_heat(series: Series) -> Figure:
     """The figure; a hatched cell has no result."""
     import numpy as np
 
@@ -44,7 +48,7 @@ def draw_heat(series: Series) -> Any:
     return figure
 
 
-def _number(axis: Any, line: int, column: int, value: float) -> None:
+def _number(axis: Axes, line: int, column: int, value: float) -> None:
     if value != value:  # no result: not a number
         from matplotlib.patches import Rectangle
 
@@ -56,7 +60,7 @@ def _number(axis: Any, line: int, column: int, value: float) -> None:
     axis.text(column, line, text, ha="center", va="center", fontsize=5, color=colour)
 
 
-def _categories(axis: Any, of_line: list[str]) -> None:
+def _categories(axis: Axes, of_line: list[str]) -> None:
     """A line between categories and their codes at the right."""
     start = 0
     for line in range(1, len(of_line) + 1):

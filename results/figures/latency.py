@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING
 
 from robospa.results.figures.series import (
     COLOURS,
@@ -15,6 +15,9 @@ from robospa.results.figures.series import (
     plain,
 )
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 MEASURES = (("p50", "-"), ("p95", "--"), ("p99", ":"))
 
 
@@ -23,7 +26,7 @@ def has_latency(series: Series) -> bool:
     return any(r.latency.get("p50", 0) > 0 for r in series.records)
 
 
-def draw_latency(shown: Sequence[Series]) -> Any:
+def draw_latency(shown: Sequence[Series]) -> Figure:
     """The figure: for every run the distribution over trials of their p50, p95 and p99."""
     from matplotlib.lines import Line2D
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING
 
 from robospa.categories import CATEGORY_NAMES, PROCEDURAL, SPATIAL
 from robospa.results.figures.series import (
@@ -18,6 +18,10 @@ from robospa.results.figures.series import (
     series_handles,
 )
 from robospa.results.scoring.scores import Scores
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 
 def chance_levels(scores: Scores) -> dict[tuple[str, int], float]:
@@ -34,7 +38,7 @@ def chance_levels(scores: Scores) -> dict[tuple[str, int], float]:
     return {place: sum(v) / len(v) for place, v in found.items()}
 
 
-def draw_levels(shown: Sequence[Series]) -> Any:
+def draw_levels(shown: Sequence[Series]) -> Figure:
     """The figure; categories that no series has get no panel."""
     present = {c for s in shown for (c, _) in s.scores.categories}
     columns = [[c for c in group if c in present] for group in (SPATIAL, PROCEDURAL)]
@@ -67,7 +71,7 @@ def draw_levels(shown: Sequence[Series]) -> Any:
 
 
 def _panel(
-    axis: Any,
+    axis: Axes,
     shown: Sequence[Series],
     category: str,
     levels: Sequence[int],

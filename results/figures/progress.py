@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING
 
 from robospa.results.figures.series import (
     COLOURS,
@@ -17,8 +17,13 @@ from robospa.results.figures.series import (
     plain,
 )
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.collections import PathCollection
+    from matplotlib.figure import Figure
 
-def draw_progress(shown: Sequence[Series]) -> Any:
+
+def draw_progress(shown: Sequence[Series]) -> Figure:
     """The figure: a point a variant; of a single series coloured by level."""
     figure = new_figure(2.9)
     axis = figure.subplots()
@@ -52,9 +57,12 @@ def _by_series(shown: Sequence[Series]) -> list[tuple[str, list[tuple[float, flo
     return [(label_of(s.name), _points(s)) for s in shown]
 
 
-def _scatter(axis: Any, index: int, name: str, points: Sequence[tuple[float, float]]) -> Any:
+def _scatter(
+    axis: Axes, index: int, name: str, points: Sequence[tuple[float, float]]
+) -> PathCollection:
     return axis.scatter(
-        *zip(*points, strict=True),
+        [success for success, _ in points],
+        [progress for _, progress in points],
         s=11,
         marker=MARKERS[index % len(MARKERS)],
         facecolor=COLOURS[index % len(COLOURS)] + "99",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING
 
 from robospa.categories import CATEGORIES
 from robospa.results.figures.series import (
@@ -19,10 +19,14 @@ from robospa.results.figures.series import (
     series_handles,
 )
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from matplotlib.projections.polar import PolarAxes
+
 LEVELS = (1, 5)
 
 
-def draw_radar(shown: Sequence[Series]) -> Any:
+def draw_radar(shown: Sequence[Series]) -> Figure:
     """The figure; a category without a result leaves a gap in its series' outline."""
     figure = new_figure(2.15)
     axes = figure.subplots(1, 2, subplot_kw={"projection": "polar"})
@@ -41,7 +45,7 @@ def _top(shown: Sequence[Series]) -> float:
     return float(min(100, max(20, 20 * math.ceil(largest / 20))))
 
 
-def _radar(axis: Any, shown: Sequence[Series], level: int, top: float) -> None:
+def _radar(axis: PolarAxes, shown: Sequence[Series], level: int, top: float) -> None:
     angles = [2 * math.pi * i / len(CATEGORIES) for i in range(len(CATEGORIES))]
     some = False
     for index, series in enumerate(shown):

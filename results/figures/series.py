@@ -10,11 +10,17 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Literal
 
 from robospa.categories import BASIC, CATEGORIES
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.scoring.scores import AverageScore, Scores, VariantScore
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
 
 WIDTH = 3.4
 """Width of a column [inch]."""
@@ -74,35 +80,36 @@ def styled() -> Iterator[None]:
     """Settings that every figure is drawn with; they make its files repeatable."""
     import matplotlib
 
-    settings: dict[Any, Any] = {
-        "font.size": 7,
-        "axes.titlesize": 7,
-        "axes.labelsize": 7,
-        "xtick.labelsize": 6.5,
-        "ytick.labelsize": 6.5,
-        "legend.fontsize": 6.5,
-        "legend.frameon": False,
-        "text.color": INK,
-        "axes.edgecolor": INK,
-        "axes.labelcolor": INK,
-        "xtick.color": INK,
-        "ytick.color": INK,
-        "axes.linewidth": 0.6,
-        "xtick.major.width": 0.6,
-        "ytick.major.width": 0.6,
-        "grid.color": GRID,
-        "grid.linewidth": 0.5,
-        "hatch.linewidth": 0.5,
-        "lines.linewidth": 1.1,
-        "svg.hashsalt": "robospa",
-        "svg.fonttype": "path",
-        "pdf.fonttype": 42,
-    }
-    with matplotlib.rc_context(settings):
+    with matplotlib.rc_context(
+        {
+            "font.size": 7,
+            "axes.titlesize": 7,
+            "axes.labelsize": 7,
+            "xtick.labelsize": 6.5,
+            "ytick.labelsize": 6.5,
+            "legend.fontsize": 6.5,
+            "legend.frameon": False,
+            "text.color": INK,
+            "axes.edgecolor": INK,
+            "axes.labelcolor": INK,
+            "xtick.color": INK,
+            "ytick.color": INK,
+            "axes.linewidth": 0.6,
+            "xtick.major.width": 0.6,
+            "ytick.major.width": 0.6,
+            "grid.color": GRID,
+            "grid.linewidth": 0.5,
+            "hatch.linewidth": 0.5,
+            "lines.linewidth": 1.1,
+            "svg.hashsalt": "robospa",
+            "svg.fonttype": "path",
+            "pdf.fonttype": 42,
+        }
+    ):
         yield
 
 
-def new_figure(height: float, layout: str = "constrained") -> Any:
+def new_figure(height: float, layout: str = "constrained") -> Figure:
     """An empty figure of one column's width, `height` [inch] high."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -112,12 +119,12 @@ def new_figure(height: float, layout: str = "constrained") -> Any:
     return figure
 
 
-def save(figure: Any, folder: Path, name: str, formats: Sequence[str] = FORMATS) -> None:
+def save(figure: Figure, folder: Path, name: str, formats: Sequence[str] = FORMATS) -> None:
     """Write `figure` in all `formats`; the bytes depend on nothing but what it shows."""
     figure.draw_without_rendering()
     figure.set_layout_engine("none")  # one layout serves all formats
     for ending in formats:
-        dated: dict[str, Any] = {
+        dated: dict[str, dict[str, None] | None] = {
             "svg": {"Date": None},
             "pdf": {"CreationDate": None},
             "png": None,
@@ -126,14 +133,14 @@ def save(figure: Any, folder: Path, name: str, formats: Sequence[str] = FORMATS)
         figure.savefig(path, dpi=300, metadata=dated[ending], transparent=ending == "svg")
 
 
-def plain(axis: Any, grid: str = "y") -> None:
+def plain(axis: Axes, grid: Literal["x", "y", "both"] = "y") -> None:
     """Frame on two sides only, and a grid behind the data."""
     axis.grid(axis=grid)
     axis.set_axisbelow(True)
     axis.spines[["top", "right"]].set_visible(False)
 
 
-def legend_below(figure: Any, handles: Sequence[Any], columns: int = 3) -> None:
+def legend_below(figure: Figure, handles: Sequence[Artist], columns: int = 3) -> None:
     """The series' names under the panels, where they hide nothing."""
     if handles:
         figure.legend(
@@ -145,7 +152,7 @@ def legend_below(figure: Any, handles: Sequence[Any], columns: int = 3) -> None:
         )
 
 
-def series_handles(shown: Sequence[Series]) -> list[Any]:
+def series_handles(shown: Sequence[Series]) -> list[Line2D]:
     """A legend entry for every series."""
     from matplotlib.lines import Line2D
 

@@ -186,18 +186,17 @@ def _per_task(data: Published) -> Iterator[Check]:
 
 def _intervals(data: Published, columns: Mapping[str, Column]) -> Iterator[Check]:
     table = data.intervals
-    level = int(table["level"])
-    for model, by_row in table["rows"].items():
+    for model, by_row in table.rows.items():
         for row, (point, low, high) in by_row.items():
-            value = columns[model].value("sr", row, level) or 0.0
-            found = interval_of(*columns[model].samples(row, level), method="bootstrap")
+            value = columns[model].value("sr", row, table.level) or 0.0
+            found = interval_of(*columns[model].samples(row, table.level), method="bootstrap")
             for name, shown, ours, allowed in (
                 ("value", point, value, 0.0),
                 ("low", low, 100 * found.low, ENDS),
                 ("high", high, 100 * found.high, ENDS),
             ):
                 yield Check(
-                    table["source"],
+                    table.source,
                     "intervals",
                     row,
                     model,
@@ -232,26 +231,24 @@ def _embodiments(data: Published) -> Iterator[Check]:
 
 def _basic(data: Published) -> Iterator[Check]:
     table = data.basic_grounding
-    trials = table["tasks"] * table["trials"]
-    for row, values in table["rows"].items():
-        for name, shown in zip(table["columns"], values, strict=True):
+    trials = table.tasks * table.trials
+    for row, values in table.rows.items():
+        for name, shown in zip(table.columns, values, strict=True):
             ours = rounded(100 * round(shown * trials / 100) / trials)
-            yield Check(
-                table["source"], "basic grounding", row, "", name, shown, ours, derived=False
-            )
+            yield Check(table.source, "basic grounding", row, "", name, shown, ours, derived=False)
 
 
 def _counts(data: Published) -> Iterator[Check]:
     """Numbers of the descriptive tables that follow from others."""
     for model, row in data.models.items():
-        hours = rounded(row["gpus"] * row["hours"])
+        hours = rounded(row.gpus * row.hours)
         yield Check(
-            data.budget_source, "model sizes", model, model, "GPU hours", row["gpu_hours"], hours
+            data.budget_source, "model sizes", model, model, "GPU hours", row.gpu_hours, hours
         )
     assets = data.assets
     for name, ours in (
-        ("categories", len(assets["rows"])),
-        ("variants", sum(assets["rows"].values())),
+        ("categories", len(assets.rows)),
+        ("variants", sum(assets.rows.values())),
     ):
-        shown = assets["text"][name]
-        yield Check(assets["source"], "assets", "total", "", name, shown, ours, digits=0)
+        shown = assets.text[name]
+        yield Check(assets.source, "assets", "total", "", name, shown, ours, digits=0)

@@ -20,16 +20,19 @@ def interval_table(columns: Sequence[Column]) -> Table:
     """Success at L5 with intervals by two methods; of published models also as printed."""
     check_columns(columns)
     data = load()
-    level, rows = int(data.intervals["level"]), (*DIMENSIONS, rounding.OVERALL)
+    level, rows = data.intervals.level, (*DIMENSIONS, rounding.OVERALL)
     lines = []
     for column in columns:
         entries = [
             _interval(column, row, level, method) for method, _ in INTERVAL_METHODS for row in rows
         ]
         lines.append(TableRow(column.title, tuple(entries)))
-        printed = data.intervals["rows"].get(column.published)
+        printed = data.intervals.rows.get(column.published)
         if printed:
-            given = [_with_ends(*(x / 100 for x in printed[row])) for row in rows]
+            given = [
+                _with_ends(value / 100, low / 100, high / 100)
+                for value, low, high in (printed[row] for row in rows)
+            ]
             blank = [TableCell()] * len(rows)
             lines.append(TableRow(f"{column.title}, as printed", (*given, *blank)))
     heads = ("Fine-grained", "Long-horizon", "Overall") * len(INTERVAL_METHODS)
@@ -130,17 +133,17 @@ def basic_table(columns: Sequence[Column] = ()) -> Table:
     """
     table = load().basic_grounding
     runs = [c for c in columns if c.covers_basic]
-    heads = tuple(table["columns"])
+    heads = table.columns
     names = {CATEGORY_NAMES[category]: category for category in BASIC}
     lines = []
-    for name, printed in table["rows"].items():
+    for name, printed in table.rows.items():
         entries = [TableCell(rounding.text(x), x) for x in printed]
         for run in runs:
-            entries += [_grounding(run, names[name], int(h[1]), table["tasks"]) for h in heads]
+            entries += [_grounding(run, names[name], int(h[1]), table.tasks) for h in heads]
         lines.append(TableRow(name, tuple(entries)))
     groups = (("Printed", len(heads)), *((c.title, len(heads)) for c in runs)) if runs else ()
     notes = [
-        f"Means over {table['tasks']} tasks of {table['trials']} trials; "
+        f"Means over {table.tasks} tasks of {table.trials} trials; "
         "the paper does not name the model."
     ]
     if runs:
@@ -172,10 +175,10 @@ def models_table() -> Table:
         TableRow(
             title(model),
             (
-                TableCell(row["parameters"]),
-                TableCell(str(row["gpus"]), row["gpus"]),
-                TableCell(f"{row['hours']:g}", row["hours"]),
-                TableCell(f"{row['gpu_hours']:g}", row["gpu_hours"]),
+                TableCell(row.parameters),
+                TableCell(str(row.gpus), row.gpus),
+                TableCell(f"{row.hours:g}", row.hours),
+                TableCell(f"{row.gpu_hours:g}", row.gpu_hours),
             ),
         )
         for model, row in load().models.items()
@@ -187,22 +190,25 @@ def models_table() -> Table:
 def datasets_table() -> Table:
     """Data sets and benchmarks beside RoboSPA."""
     table = load().datasets
-    given = ("categories", "tasks", "trajectories", "embodiments")
-    has = ("spatial_reasoning", "long_horizon", "step_level", "multi_difficulty", "scene_diversity")
     lines, last = [], ""
-    for row in table["rows"]:
-        if row["kind"] != last:
-            last = row["kind"]
+    for row in table.rows:
+        if row.kind != last:
+            last = row.kind
             lines.append(
                 TableRow({"dataset": "Datasets", "benchmark": "Benchmarks"}[last], (), "section")
             )
-        words = [row[key] or "–" for key in given] + ["yes" if row[key] else "no" for key in has]
-        lines.append(TableRow(row["name"], _words(*words)))
+        counts = (row.categories, row.tasks, row.trajectories, row.embodiments)
+        has = (
+            *(row.spatial_reasoning, row.long_horizon, row.step_level),
+            *(row.multi_difficulty, row.scene_diversity),
+        )
+        words = (*(count or "–" for count in counts), *("yes" if part else "no" for part in has))
+        lines.append(TableRow(row.name, _words(*words)))
     heads = (
         *("Categories", "Tasks", "Trajectories", "Embodiments", "Spatial reasoning"),
         *("Long-horizon", "Step-level", "Multi-difficulty", "Scene diversity"),
     )
-    notes = (table["note"],)
+    notes = (table.note,)
     name = "Robot manipulation datasets and benchmarks"
     return Table("datasets", name, "Name", heads, tuple(lines), notes=notes, words=True)
 
@@ -210,8 +216,8 @@ def datasets_table() -> Table:
 def assets_table() -> Table:
     """Object categories and their variants."""
     table = load().assets
-    rows = tuple(TableRow(name, (TableCell(str(n), n),)) for name, n in table["rows"].items())
-    total = sum(table["rows"].values())
+    rows = tuple(TableRow(name, (TableCell(str(n), n),)) for name, n in table.rows.items())
+    total = sum(table.rows.values())
     lines = (*rows, TableRow("Total", (TableCell(str(total), total),), "average"))
     name = f"Object categories ({len(rows)}) and variants of each"
     return Table("assets", name, "Asset", ("Variants",), lines)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
 
 from robospa.results.report.page import FIGURES, page
 from robospa.results.report.report import Report, draw_figures
@@ -44,7 +43,7 @@ def markdown(report: Report) -> str:
     return "\n".join([*lines, "", " ".join(report.method), ""])
 
 
-def to_data(report: Report) -> dict[str, Any]:
+def to_data(report: Report) -> dict[str, object]:
     """report.json: facts, scores and ends of every run."""
     return {
         "runs": [

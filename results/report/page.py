@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from robospa.categories import BASIC, CATEGORY_NAMES
 from robospa.results.failures.labels import NAMES, SIMULATED_PER_FILM
@@ -24,7 +25,31 @@ from robospa.results.report.tables import for_page
 from robospa.results.report.trials import failure_counts, trial_rows
 from robospa.results.scoring.scores import Scores
 
+if TYPE_CHECKING:
+    from markupsafe import Markup
+
 FIGURES = "figures"
+
+
+@dataclass(frozen=True)
+class ScoreCard:
+    """A model's overall success rate with its interval, and `lines` below it, as text."""
+
+    name: str
+    value: str
+    interval: str
+    lines: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class PageFigure:
+    """A figure on the page: `file` is its path without ending, from the page's folder."""
+
+    title: str
+    caption: str
+    file: str
+    formats: Sequence[str]
+    svg: Markup
 
 
 def page(
@@ -69,7 +94,7 @@ def page(
     )
 
 
-def render(template: str, **context: Any) -> str:
+def render(template: str, **context: object) -> str:
     """A page from one of our templates; whatever is put into it is escaped."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
@@ -96,7 +121,7 @@ def badges(runs: Sequence[Run], names: Sequence[str]) -> list[str]:
     return made
 
 
-def card(name: str, scores: Scores) -> dict[str, Any]:
+def card(name: str, scores: Scores) -> ScoreCard:
     """Overall success rate with its interval, and both dimensions."""
     overall = scores.overall.get(0)
     value, _, interval = percent(overall.values.get("sr") if overall else None).partition(" ")
@@ -113,26 +138,21 @@ def card(name: str, scores: Scores) -> dict[str, Any]:
         count = sum(cell.category not in BASIC for cell in scores.cells.values())
         covered = f"{count} variant{'' if count == 1 else 's'}"
         lines.append(f"mean over {covered}, {overall.trials} trials")
-    return {
-        "name": name,
-        "value": f"{value} %" if value != "–" else value,
-        "interval": f"95 % interval {interval}" if interval else "no value: results are missing",
-        "lines": lines,
-    }
+    return ScoreCard(
+        name,
+        f"{value} %" if value != "–" else value,
+        f"95 % interval {interval}" if interval else "no value: results are missing",
+        tuple(lines),
+    )
 
 
-def figure(drawing: Drawing, folder: Path, formats: Sequence[str] = FORMATS) -> dict[str, Any]:
+def figure(drawing: Drawing, folder: Path, formats: Sequence[str] = FORMATS) -> PageFigure:
     """A figure for the page: its SVG as markup, and where its files are."""
     from markupsafe import Markup
 
     svg = (folder / FIGURES / f"{drawing.name}.svg").read_text(encoding="utf-8")
-    return {
-        "title": drawing.title,
-        "caption": drawing.caption,
-        "file": f"{FIGURES}/{drawing.name}",
-        "formats": formats,
-        "svg": Markup(inline_svg(svg, drawing.name, f"{drawing.title}. {drawing.caption}")),
-    }
+    markup = Markup(inline_svg(svg, drawing.name, f"{drawing.title}. {drawing.caption}"))
+    return PageFigure(drawing.title, drawing.caption, f"{FIGURES}/{drawing.name}", formats, markup)
 
 
 def inline_svg(svg: str, prefix: str, label: str) -> str:

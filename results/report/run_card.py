@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
 
 from robospa.results.records.manifest import RunInfo
 from robospa.results.records.run_io import Run
@@ -33,7 +32,7 @@ def names_of(runs: Sequence[Run]) -> list[str]:
     return names
 
 
-def about(run: Run) -> dict[str, Any]:
+def about(run: Run) -> dict[str, object]:
     """The facts of the manifest that a reader needs."""
     info = run.info
     return {
@@ -152,7 +151,7 @@ def _repeats(run: Run) -> str:
     return f"{sum(again)} in {len(again)} trials" if again else ""
 
 
-def _pairs(values: Mapping[str, Any]) -> str:
+def _pairs(values: Mapping[str, object]) -> str:
     return _words(f"{name} {_line(v)}" for name, v in values.items() if v not in (None, "", {}))
 
 

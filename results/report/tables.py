@@ -7,10 +7,10 @@ open and are shown as dashes.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from robospa.categories import METRIC_CATEGORIES
 from robospa.results.paper.columns import Column
@@ -19,6 +19,9 @@ from robospa.results.paper.result_tables import DASH, summary_table, task_table
 from robospa.results.paper.tables import write_tables
 from robospa.results.tables.html import fragment
 from robospa.results.tables.table import Table, TableRow
+
+if TYPE_CHECKING:
+    from markupsafe import Markup
 
 FEW = 2
 """So many columns are shown with all their levels; more of them as in the paper."""
@@ -103,17 +106,27 @@ def _levels_that_were_run(grid: Table, runs: int) -> Table:
     )
 
 
-def for_page(tables: Sequence[ReportTable]) -> list[Mapping[str, Any]]:
-    """Title, markup, whether it is folded, and notes too long to stand below it, of each table."""
+@dataclass(frozen=True)
+class PageTable:
+    """A table on the page; `notes` are those too long to stand below it."""
+
+    title: str
+    html: Markup
+    folded: bool
+    notes: Sequence[str]
+
+
+def for_page(tables: Sequence[ReportTable]) -> list[PageTable]:
+    """The tables for a page."""
     from markupsafe import Markup
 
-    made: list[Mapping[str, Any]] = []
+    made = []
     for table in tables:
         grid = table.grid
         long = [note for note in grid.notes if len(note) > LONG]
         short = replace(grid, notes=tuple(note for note in grid.notes if note not in long))
         html = Markup(fragment(short))
-        made.append({"title": grid.title, "html": html, "folded": table.folded, "notes": long})
+        made.append(PageTable(grid.title, html, table.folded, long))
     return made
 
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
+from robospa.results.failures.attribution import Happened
 from robospa.results.failures.labels import NAMES, Failure
 from robospa.results.records.run_io import Run
 from robospa.results.records.trial_record import TrialRecord
@@ -23,7 +24,7 @@ Failures = Mapping[TrialKey, Failure]
 
 def trial_rows(
     runs: Sequence[Run], folder: Path, failures: Sequence[Failures]
-) -> list[dict[str, Any]]:
+) -> list[dict[str, object]]:
     """A row for every trial of `runs`, in their order, with the type of its failure; videos are put
     into `folder`."""
     pairs = [(number, run, key) for number, run in enumerate(runs) for key in run.keys]
@@ -42,10 +43,10 @@ def _succeeded(run: Run, key: TrialKey) -> bool:
 
 def _row(
     number: int, run: Run, key: TrialKey, folder: Path, failure: Failure | None, several: bool
-) -> dict[str, Any]:
+) -> dict[str, object]:
     """One trial; what is empty is left out, because 28,000 of them are one file."""
     record = run.records.get(key)
-    row: dict[str, Any] = {"run": number, "task": key.task, "level": key.level, "seed": key.seed}
+    row: dict[str, object] = {"run": number, "task": key.task, "level": key.level, "seed": key.seed}
     if record is None:
         return {**row, "end": NOT_RUN}
     place = folder / FILMS / str(number + 1) if several else folder / FILMS
@@ -69,7 +70,7 @@ def _row(
     return {name: value for name, value in row.items() if value not in ("", None, [])}
 
 
-def event_row(event: Mapping[str, Any]) -> list[Any]:
+def event_row(event: Happened) -> list[float | str]:
     """Simulated time [s], kind, and the rest in words."""
     kind = str(event.get("kind", "")).replace("_", " ")
     words = [str(event[name]) for name in ("object", "note") if event.get(name)]
@@ -78,14 +79,23 @@ def event_row(event: Mapping[str, Any]) -> list[Any]:
     return [round(float(event.get("time", 0.0)), 2), kind, " ".join(words)]
 
 
-def failure_counts(failures: Sequence[Failures]) -> list[dict[str, Any]]:
+@dataclass(frozen=True)
+class FailureCount:
+    """How often a type of failure occurs: `counts` has a number a run."""
+
+    kind: str
+    name: str
+    counts: Sequence[int]
+
+
+def failure_counts(failures: Sequence[Failures]) -> list[FailureCount]:
     """How often each type occurs in each run, by frequency; types that never occur are left out."""
     counts: dict[str, list[int]] = {}
     for number, found in enumerate(failures):
         for failure in found.values():
             counts.setdefault(failure.kind, [0] * len(failures))[number] += 1
-    made = [{"kind": k, "name": NAMES.get(k, k), "counts": n} for k, n in counts.items()]
-    return sorted(made, key=lambda row: -sum(row["counts"]))
+    made = [FailureCount(kind, NAMES.get(kind, kind), n) for kind, n in counts.items()]
+    return sorted(made, key=lambda row: -sum(row.counts))
 
 
 def film(run: Run, record: TrialRecord, place: Path) -> Path | None:

@@ -3,9 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any
+from typing import TypedDict
 
 from robospa.results.scoring.scores import AverageScore, Scores, VariantScore
+
+ScoreData = dict[str, int | list[float] | None]
+"""Counts, and by metric the estimate (value, low, high) and its bounds."""
+ByLevel = dict[str, dict[str, ScoreData]]
+"""By name and level (`level_name`)."""
+
+
+class ScoresData(TypedDict):
+    """All scores of a model; rates are fractions."""
+
+    estimate: list[str]
+    variants: ByLevel
+    tasks: dict[str, ScoreData]
+    categories: ByLevel
+    dimensions: ByLevel
+    overall: dict[str, ScoreData]
 
 
 def level_name(level: int) -> str:
@@ -13,11 +29,11 @@ def level_name(level: int) -> str:
     return f"L{level}" if level else "mean"
 
 
-def to_json(scores: Scores) -> dict[str, Any]:
+def to_json(scores: Scores) -> ScoresData:
     """All scores as JSON values; rates are fractions."""
 
-    def part(item: VariantScore | AverageScore) -> dict[str, Any]:
-        data: dict[str, Any] = {"trials": item.trials, "missing": item.missing}
+    def part(item: VariantScore | AverageScore) -> ScoreData:
+        data: ScoreData = {"trials": item.trials, "missing": item.missing}
         if isinstance(item, VariantScore):
             data["successes"] = item.successes
         for metric, found in item.values.items():
@@ -28,8 +44,8 @@ def to_json(scores: Scores) -> dict[str, Any]:
 
     def table(
         pairs: Iterable[tuple[tuple[str, int], VariantScore | AverageScore]],
-    ) -> dict[str, Any]:
-        made: dict[str, Any] = {}
+    ) -> ByLevel:
+        made: ByLevel = {}
         for (name, level), item in pairs:
             made.setdefault(name, {})[level_name(level)] = part(item)
         return made

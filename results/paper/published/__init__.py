@@ -8,11 +8,15 @@ Tasks have the names of the environments; `PublishedTask.printed` is the name in
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib.resources import files
-from typing import Any
+from typing import TypeVar
+
+from robospa.schema import read
+
+T = TypeVar("T")
 
 LEVELS = (1, 2, 3, 4, 5)
 TITLES = {"pi0.5": "π0.5"}
@@ -36,18 +40,27 @@ class PrintedTable:
     source: str
     metric: str
     columns: tuple[str, ...]
-    rows: Mapping[str, Mapping[str, Sequence[float]]]
-    best: Mapping[str, Mapping[str, Sequence[str]]]
+    rows: Mapping[str, Mapping[str, tuple[float, ...]]]
+    best: Mapping[str, Mapping[str, tuple[str, ...]]]
 
 
 @dataclass(frozen=True)
 class PerTask:
     """A printed per-task table of one model: values at L1 to L5 by task."""
 
-    source: str
     metric: str
     model: str
-    rows: Mapping[str, Sequence[float]]
+    rows: Mapping[str, tuple[float, ...]]
+    source: str = ""
+
+
+@dataclass(frozen=True)
+class IntervalTable:
+    """Success at `level` by model and row: value, lower and upper end of the 95 % interval."""
+
+    source: str
+    level: int
+    rows: Mapping[str, Mapping[str, tuple[float, float, float]]]
 
 
 @dataclass(frozen=True)
@@ -59,7 +72,62 @@ class Embodiments:
     columns: tuple[str, ...]
     tasks: Mapping[str, str]
     names: Mapping[str, str]
-    rows: Mapping[str, Mapping[str, Sequence[float]]]
+    rows: Mapping[str, Mapping[str, tuple[float, ...]]]
+
+
+@dataclass(frozen=True)
+class BasicGrounding:
+    """Basic grounding by row at `columns`: means over `tasks` tasks of `trials` trials each."""
+
+    source: str
+    columns: tuple[str, ...]
+    tasks: int
+    trials: int
+    rows: Mapping[str, tuple[float, ...]]
+
+
+@dataclass(frozen=True)
+class PublishedModel:
+    """A model's size and its training per base task."""
+
+    parameters: str
+    gpus: int
+    hours: float
+    gpu_hours: float
+
+
+@dataclass(frozen=True)
+class Dataset:
+    """A data set or benchmark (`kind`) that the paper compares with; counts are as printed."""
+
+    name: str
+    kind: str
+    categories: str
+    tasks: str
+    trajectories: str
+    embodiments: str
+    spatial_reasoning: bool
+    long_horizon: bool
+    step_level: bool
+    multi_difficulty: bool
+    scene_diversity: bool
+
+
+@dataclass(frozen=True)
+class Datasets:
+    """The table of data sets and benchmarks."""
+
+    note: str
+    rows: tuple[Dataset, ...]
+
+
+@dataclass(frozen=True)
+class Assets:
+    """Number of variants by object category; `text` has the totals that the paper's text gives."""
+
+    source: str
+    text: Mapping[str, int]
+    rows: Mapping[str, int]
 
 
 @dataclass(frozen=True)
@@ -69,17 +137,17 @@ class Published:
     trials: int
     embodiment: str
     mode: str
-    models: Mapping[str, Mapping[str, Any]]
+    models: Mapping[str, PublishedModel]
     tasks: Mapping[str, PublishedTask]
     per_task: Mapping[tuple[str, str], PerTask]
     main: PrintedTable
     onta: PrintedTable
     ps: PrintedTable
-    intervals: Mapping[str, Any]
+    intervals: IntervalTable
     embodiments: Embodiments
-    basic_grounding: Mapping[str, Any]
-    datasets: Mapping[str, Any]
-    assets: Mapping[str, Any]
+    basic_grounding: BasicGrounding
+    datasets: Datasets
+    assets: Assets
     budget_source: str
 
     @property
@@ -101,55 +169,67 @@ def title(model: str) -> str:
     return TITLES.get(model, model)
 
 
-def _read(name: str) -> dict[str, Any]:
-    text = files("robospa.results.paper.published").joinpath(name).read_text(encoding="utf-8")
-    data: dict[str, Any] = json.loads(text)
-    return data
+@dataclass(frozen=True)
+class _TaskRow:
+    printed: str
+    category: str
+    candidates: tuple[int, ...] = ()
+    subtasks: tuple[int, ...] = ()
 
 
-def _table(name: str) -> PrintedTable:
-    data = _read(name)
-    columns = tuple(data["columns"])
-    return PrintedTable(data["source"], data["metric"], columns, data["rows"], data["best"])
+@dataclass(frozen=True)
+class _Tasks:
+    tasks: Mapping[str, _TaskRow]
 
 
-def _embodiments() -> Embodiments:
-    data = _read("embodiments.json")
-    columns = tuple(data["columns"])
-    return Embodiments(
-        data["source"], data["model"], columns, data["tasks"], data["names"], data["rows"]
-    )
+@dataclass(frozen=True)
+class _PerTaskTables:
+    trials: int
+    tables: Mapping[str, PerTask]
+
+
+@dataclass(frozen=True)
+class _Models:
+    source: str
+    embodiment: str
+    mode: str
+    rows: Mapping[str, PublishedModel]
+
+
+def _content(name: str) -> object:
+    return json.loads(files(__name__).joinpath(name).read_text(encoding="utf-8"))
+
+
+def _read(schema: type[T], name: str) -> T:
+    """The file `name` as a `schema`."""
+    return read(schema, _content(name), name)
 
 
 @cache
 def load() -> Published:
     """The published results; read once."""
-    tasks = {
-        name: PublishedTask(
-            name, row["printed"], row["category"], tuple(row.get("candidates") or row["subtasks"])
-        )
-        for name, row in _read("tasks.json")["tasks"].items()
-    }
-    per_task = _read("per_task.json")
-    printed = [
-        PerTask(source, table["metric"], table["model"], table["rows"])
-        for source, table in per_task["tables"].items()
-    ]
-    models = _read("models.json")
+    tasks, models = _read(_Tasks, "tasks.json").tasks, _read(_Models, "models.json")
+    per_task = _read(_PerTaskTables, "per_task.json")
     return Published(
-        trials=per_task["trials"],
-        embodiment=models["embodiment"],
-        mode=models["mode"],
-        models=models["rows"],
-        tasks=tasks,
-        per_task={(t.model, t.metric): t for t in printed},
-        main=_table("main.json"),
-        onta=_table("onta.json"),
-        ps=_table("ps.json"),
-        intervals=_read("intervals.json"),
-        embodiments=_embodiments(),
-        basic_grounding=_read("basic_grounding.json"),
-        datasets=_read("datasets.json"),
-        assets=_read("assets.json"),
-        budget_source=models["source"],
+        trials=per_task.trials,
+        embodiment=models.embodiment,
+        mode=models.mode,
+        models=models.rows,
+        tasks={
+            name: PublishedTask(name, row.printed, row.category, row.candidates or row.subtasks)
+            for name, row in tasks.items()
+        },
+        per_task={
+            (table.model, table.metric): replace(table, source=source)
+            for source, table in per_task.tables.items()
+        },
+        main=_read(PrintedTable, "main.json"),
+        onta=_read(PrintedTable, "onta.json"),
+        ps=_read(PrintedTable, "ps.json"),
+        intervals=_read(IntervalTable, "intervals.json"),
+        embodiments=_read(Embodiments, "embodiments.json"),
+        basic_grounding=_read(BasicGrounding, "basic_grounding.json"),
+        datasets=_read(Datasets, "datasets.json"),
+        assets=_read(Assets, "assets.json"),
+        budget_source=models.source,
     )

@@ -39,7 +39,7 @@ KNOWN = [  # from a separate check of the paper's tables: table, row, model, col
 @pytest.fixture
 def edited(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
     """A function that changes the published data for one test."""
-    read = published._read
+    read = published._content
 
     def edit(name: str, change: Any) -> None:
         def changed(asked: str) -> dict[str, Any]:
@@ -48,7 +48,7 @@ def edited(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
                 change(data)
             return data
 
-        monkeypatch.setattr(published, "_read", changed)
+        monkeypatch.setattr(published, "_content", changed)
         published.load.cache_clear()
         checks.cache_clear()
 

@@ -127,7 +127,7 @@ def test_the_paper_shades_the_highest_printed_values() -> None:
             for column, shaded in by_column.items():
                 place = table.columns.index(column)
                 values = {m: v[place] for m, v in table.rows[row].items()}
-                assert shaded == [m for m, v in values.items() if v == max(values.values())]
+                assert list(shaded) == [m for m, v in values.items() if v == max(values.values())]
 
 
 def test_a_check_says_what_was_printed_and_what_follows() -> None:

@@ -39,7 +39,7 @@ def published_cells(
 def distances(seed: int, resamples: int) -> list[float]:
     """How far our 24 interval ends are from the printed ones, in points."""
     found = []
-    for model, row in load().intervals["rows"].items():
+    for model, row in load().intervals.rows.items():
         for column, categories in COLUMNS.items():
             drawn = draw(*published_cells(model, categories), seed, resamples)
             ours = 100 * np.percentile(drawn, [2.5, 97.5])
