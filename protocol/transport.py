@@ -54,8 +54,9 @@ class BadAddress(ValueError):
 
 @dataclass(frozen=True)
 class Timeouts:
-    """Deadlines in seconds. `wait`: how long to keep trying while nobody listens. `first_infer`
-    is for the first answer on a connection and after a change of task (compilation, loading)."""
+    """Deadlines in seconds. `wait`: how long to keep trying while nobody listens or the server
+    answers HTTP 503, as one does that shuts down to restart. `first_infer` is for the first answer
+    on a connection and after a change of task (compilation, loading)."""
 
     wait: float = 0.0
     connect: float = 30.0
@@ -173,7 +174,10 @@ def _open(
         except BadAddress:
             raise
         except InvalidStatus as error:
-            raise _refused(address, error) from error
+            unavailable = error.response.status_code == HTTPStatus.SERVICE_UNAVAILABLE
+            if not unavailable or time.monotonic() >= give_up:  # it may shut down to restart
+                raise _refused(address, error) from error
+            time.sleep(0.05)
         except TimeoutError as error:
             raise ConnectFailed(
                 f"{address.url} did not finish the handshake within {timeouts.connect:g} s; "

@@ -94,6 +94,24 @@ def test_waits_for_a_server_that_restarts_and_resets_who_had_come(start: Any) ->
     thread.join()
 
 
+def test_waits_for_a_server_that_is_shutting_down_to_restart(start: Any) -> None:
+    server = socket.create_server(("127.0.0.1", 0))
+    port = server.getsockname()[1]
+
+    def restart() -> None:
+        peer, _ = server.accept()
+        peer.recv(1000)
+        peer.sendall(b"HTTP/1.1 503 Service Unavailable\r\nContent-Length: 0\r\n\r\n")
+        peer.close()
+        server.close()
+        start(Recall(), port=port)
+
+    thread = threading.Thread(target=restart)
+    thread.start()
+    connect(f"ws://127.0.0.1:{port}", timeouts=replace(QUICK, wait=10)).close()
+    thread.join()
+
+
 def test_a_port_that_always_hangs_up() -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         thread = threading.Thread(target=lambda: server.accept()[0].close())
