@@ -17,7 +17,7 @@ from robospa.protocol.policy import PolicySpec, TrialInfo
 CHUNK = 100
 
 
-class Replay:
+class ReplayPolicy:
     """Plays the traces in `RUN/actions`. Needs no observation but the step."""
 
     def __init__(self, run: Path) -> None:
@@ -58,8 +58,8 @@ def _read(path: Path) -> tuple[NDArray[np.float32], str]:
         return np.asarray(data["actions"], dtype=np.float32), str(data["space"])
 
 
-def create(run: str = "") -> Replay:
+def create(run: str = "") -> ReplayPolicy:
     """A new policy, one per connection, that replays the run in the folder `run`."""
     if not run:
         raise ValueError("say which run to replay: robospa serve replay --arg run=runs/x")
-    return Replay(Path(run))
+    return ReplayPolicy(Path(run))

@@ -1,4 +1,4 @@
-"""How full the batches of a model get: our server and vla-eval's, side by side.
+"""Batch sizes of a model: our server and vla-eval's, side by side.
 
     python benchmarks/batching.py [--requests 120] [--rounds 2] [--json]
 
@@ -16,7 +16,7 @@ import statistics
 import time
 from dataclasses import dataclass, field
 
-from common import Result, Row, argument_parser, finish
+from common import Metric, Result, argument_parser, finish
 from sides import Sides, line_of, peer_of, peers_for, sides, tell, versions_of
 
 CLIENTS = 8
@@ -31,8 +31,8 @@ too early runs batches that are not full, one that waits too long leaves the mod
 
 
 @dataclass
-class Found:
-    """What one side did."""
+class SideResult:
+    """Batch sizes, requests, seconds and latencies [s] of one side."""
 
     sizes: list[int] = field(default_factory=list)
     requests: int = 0
@@ -40,7 +40,9 @@ class Found:
     latencies: list[float] = field(default_factory=list)
 
 
-def measure_side(running: Sides, client: str, server: str, found: Found, requests: int) -> None:
+def measure_side(
+    running: Sides, client: str, server: str, found: SideResult, requests: int
+) -> None:
     """One round."""
     url = running.serve(server)
     clients = running.clients(client, url, CLIENTS)
@@ -59,27 +61,29 @@ def measure_side(running: Sides, client: str, server: str, found: Found, request
 def measure(requests: int, rounds: int) -> Result:
     """All figures of one run."""
     peers = peers_for(list(KINDS.values()))
-    found = {k: Found() for k in KINDS if not peer_of(k) or peers[peer_of(k)].python}
+    found = {k: SideResult() for k in KINDS if not peer_of(k) or peers[peer_of(k)].python}
     with sides() as running:
         for _ in range(rounds):
             for kind, side in found.items():
                 measure_side(running, kind, KINDS[kind], side, requests)
         source = running.source
-    rows: list[Row] = []
+    rows: list[Metric] = []
     for kind, name in NAMES.items():
         bar = 0.9 if kind == "robospa" else None
         what = f"{name}: share of a full batch, {CLIENTS} clients, a 50 ms model"
         if kind not in found:
-            rows.append(Row(what, None, note=peers[peer_of(kind)].problem))
+            rows.append(Metric(what, None, note=peers[peer_of(kind)].problem))
             continue
         side = found[kind]
         fill = statistics.fmean(side.sizes) / CLIENTS
         note = f"{len(side.sizes)} calls of the model for {side.requests} requests"
-        rows.append(Row(what, round(fill, 3), at_least=bar, note=note))
+        rows.append(Metric(what, round(fill, 3), at_least=bar, note=note))
         rate = side.requests / side.seconds
-        rows.append(Row(f"{name}: throughput", round(rate, 1), "requests/s", note=f"of {IDEAL:g}"))
+        rows.append(
+            Metric(f"{name}: throughput", round(rate, 1), "requests/s", note=f"of {IDEAL:g}")
+        )
         middle = statistics.median(side.latencies)
-        rows.append(Row(f"{name}: median latency", round(middle, 1), "ms"))
+        rows.append(Metric(f"{name}: median latency", round(middle, 1), "ms"))
     return Result(
         "batching",
         "How full batches get",

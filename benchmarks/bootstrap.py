@@ -10,7 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from common import Result, Row, argument_parser, finish
+from common import Metric, Result, argument_parser, finish
 
 from robospa.results.paper.published import LEVELS, load
 from robospa.results.statistics import bootstrap, significance
@@ -63,18 +63,18 @@ def main() -> None:
     first, best = seconds(fast, repeat)
     part = seconds(slow, 1)[1]
     rows = [
-        Row(f"the paper's bootstrap: {size}", round(best, 3), "s", at_most=0.5,
+        Metric(f"the paper's bootstrap: {size}", round(best, 3), "s", at_most=0.5,
             note=f"the first time {first:.3f} s"),
-        Row("the same episode by episode", round(100 * part, 1), "s",
+        Metric("the same episode by episode", round(100 * part, 1), "s",
             note=f"from {RESAMPLES // 100} resamples"),
     ]  # fmt: skip
     for method in METHODS:
         first, best = seconds(lambda m=method: [interval_of([s], method=m) for s in table[0]], 1)
         note = f"the first time {1e3 * first:.2f} ms"
-        rows.append(Row(f"{method}, {len(models)} cells", round(1e3 * best, 2), "ms", note=note))
+        rows.append(Metric(f"{method}, {len(models)} cells", round(1e3 * best, 2), "ms", note=note))
     first, best = seconds(lambda: significance.separable(table), repeat)
     note = f"the first time {first:.3f} s"
-    rows.append(Row(f"marks of the best in {count} rows", round(best, 4), "s", note=note))
+    rows.append(Metric(f"marks of the best in {count} rows", round(best, 4), "s", note=note))
     finish(Result("bootstrap", "Statistics", tuple(rows)), options)
 
 

@@ -32,7 +32,7 @@ PACKAGES = ("numpy", "msgpack", "websockets", "sapien")
 
 
 @dataclass(frozen=True)
-class Row:
+class Metric:
     """One figure. `at_most` or `at_least` is its bar in the same unit, if it has one."""
 
     what: str
@@ -57,7 +57,7 @@ class Row:
 
     @property
     def met(self) -> bool | None:
-        """Whether the bar is met; None without a bar or a value."""
+        """True if the bar is met; None without a bar or a value."""
         if self.value is None or not self.bar:
             return None
         if self.at_most is not None:
@@ -75,7 +75,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Result:
-    """What one script found.
+    """The metrics of one script.
 
     `circumstances` are what else ran, and how often was measured; `text` is Markdown for the page;
     `data` any details, kept but not shown.
@@ -83,7 +83,7 @@ class Result:
 
     name: str
     title: str
-    rows: tuple[Row, ...]
+    rows: tuple[Metric, ...]
     text: str = ""
     circumstances: str = ""
     data: Mapping[str, Any] = field(default_factory=dict)
@@ -110,7 +110,7 @@ class Result:
 
 
 def machine() -> dict[str, Any]:
-    """What this runs on; `load` is the machine's at this moment."""
+    """Processor, memory, kernel and Python; `load` is the machine's at this moment."""
     return {
         "cores": os.cpu_count(),
         "cpu": platform.machine(),
@@ -131,7 +131,7 @@ def versions(packages: Iterable[str] = PACKAGES) -> dict[str, str]:
 
 
 def command() -> str:
-    """What was typed, without where to write."""
+    """The command line, without output options."""
     words = [f"benchmarks/{Path(sys.argv[0]).name}"]
     skip = False
     for word in sys.argv[1:]:
@@ -170,7 +170,7 @@ def finish(result: Result, options: argparse.Namespace) -> None:
         print(f"written to {path}; now: python benchmarks/report.py")
 
 
-def line(row: Row) -> str:
+def line(row: Metric) -> str:
     """A row for the terminal."""
     value = "not measured" if row.value is None else f"{row.value:g} {row.unit}".strip()
     bar = f"  (bar {row.bar}: {'met' if row.met else 'NOT met'})" if row.met is not None else ""

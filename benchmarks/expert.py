@@ -1,4 +1,4 @@
-"""What the expert solves, and what standing still or moving at random scores, over every variant.
+"""Success of the expert, and scores of standing still and of random motion, over every variant.
 
     python benchmarks/expert.py [--trials 3] [--first 900000] [--json]
 
@@ -19,7 +19,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from common import Result, Row, argument_parser, finish
+from common import Metric, Result, argument_parser, finish
 
 from robospa.results.records.run_io import read_run
 from robospa.results.records.trial_record import TrialRecord
@@ -78,8 +78,8 @@ def solved_table(records: Iterable[TrialRecord]) -> dict[str, str]:
     return table
 
 
-def lists() -> list[Row]:
-    """What the shipped lists say."""
+def lists() -> list[Metric]:
+    """Figures of the shipped seed lists."""
     tried: Mapping[Variant, int] = {
         (name, level): accepted(name, level)[-1] - FIRST_SEED + 1
         for name in tasks()
@@ -90,15 +90,15 @@ def lists() -> list[Row]:
     note = ", ".join(f"{name} {level}: {n}" for (name, level), n in worst if n > PER_VARIANT)
     most = int(PER_VARIANT * 100 / BAR)
     return [
-        Row(f"variants whose first {PER_VARIANT} accepted seeds took {most} tries or fewer",
+        Metric(f"variants whose first {PER_VARIANT} accepted seeds took {most} tries or fewer",
             sum(n <= most for n in tried.values()), f"of {len(tried)}", at_least=len(tried),
             command="robospa seeds all", note="the longest: " + note if note else ""),
-        Row("seeds tried in a row and accepted", round(100 * wanted / total, 2), "%", at_least=BAR,
+        Metric("seeds tried in a row and accepted", round(100 * wanted / total, 2), "%", None, BAR,
             command="robospa seeds all", note=f"{wanted:,} of {total:,}"),
     ]  # fmt: skip
 
 
-def oracle(trials: int, first: int) -> tuple[list[Row], dict[str, Any]]:
+def oracle(trials: int, first: int) -> tuple[list[Metric], dict[str, Any]]:
     """Seeds that no list has, in physics."""
     seeds = ("--trials", str(trials), "--seeds", f"{first}-{first + trials - 1}")
     records, wall, whole = evaluate("oracle", tasks(), *seeds)
@@ -107,7 +107,7 @@ def oracle(trials: int, first: int) -> tuple[list[Row], dict[str, Any]]:
     missed = f"; not {names}" if names else ""
     solved = len(records) - len(failed)
     rows = [
-        Row(
+        Metric(
             "unseen seeds solved",
             round(100 * solved / len(records), 2),
             "%",
@@ -119,7 +119,7 @@ def oracle(trials: int, first: int) -> tuple[list[Row], dict[str, Any]]:
         every = PER_VARIANT * len(LEVELS) * len(tasks())
         own = sum(record.wall_time for record in records)
         rows.append(
-            Row(
+            Metric(
                 f"all {every:,} trials without drawing, {WORKERS} workers, at the trials' own time",
                 round(own / WORKERS / len(records) * every / 3600, 2),
                 "h",
@@ -132,11 +132,11 @@ def oracle(trials: int, first: int) -> tuple[list[Row], dict[str, Any]]:
     return rows, {"solved at levels 1 to 5": solved_table(records)}
 
 
-def idle(policy: str, what: str, levels: str) -> Row:
-    """What a policy scores that knows nothing."""
+def idle(policy: str, what: str, levels: str) -> Metric:
+    """Scores of policies that know nothing."""
     records, _, _ = evaluate(policy, tasks(), "--trials", "1", "--levels", levels)
     moved = sorted({r.key.task for r in records if r.done})
-    return Row(
+    return Metric(
         f"{what}: successes",
         sum(r.success for r in records),
         f"of {len(records)}",

@@ -1,11 +1,11 @@
-"""How well failure types are told: scripted mistakes in the simulator, labelled from their records.
+"""Accuracy of failure types: scripted mistakes in the simulator, labelled from their records.
 
     python benchmarks/failure_labels.py [--seeds 3] [--tasks NAME,...] [--json]
 
-Every kind of mistake (`robospa.baselines.mistakes`) runs on every task that gives occasion for it.
-A trial counts only if the script came off: the trial failed, and the expert that acts it out had
-no trouble of its own. Nothing is drawn. Trials end some actions after the script is over instead of
-at the task's limit, which changes no label and saves the time of standing still.
+Every kind of mistake (`robospa.baselines.failure_policies`) runs on every task that gives occasion
+for it. A trial counts only if it failed and no skill of the expert that acts it out failed. Nothing
+is drawn. Trials end some actions after the script is over instead of at the task's limit, which
+changes no label and saves the time of standing still.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ import time
 from collections import Counter
 from dataclasses import dataclass, field, replace
 
+from common import LabelledFailure as Figure
 from common import Result, argument_parser, finish
-from common import Row as Figure
 
-from robospa.baselines.mistakes import create
+from robospa.baselines.failure_policies import create
 from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.harness.trial import TrialParts, run_trial, task_parts
 from robospa.results.failures.labels import NAMES, label
@@ -47,7 +47,7 @@ PROCEDURAL = {
 
 
 @dataclass
-class Row:
+class LabelledFailure:
     """One mistake on one task."""
 
     task: str
@@ -76,7 +76,7 @@ def parts(key: TrialKey) -> TrialParts:
     return replace(found, task=replace(found.task, levels={**found.task.levels, key.level: short}))
 
 
-def measure(world: SapienWorld, row: Row, level: int, seed: int) -> None:
+def measure(world: SapienWorld, row: LabelledFailure, level: int, seed: int) -> None:
     """Run one trial and note its label."""
     policy = create(row.kind)
     key = TrialKey(row.task, level, seed)
@@ -93,14 +93,14 @@ def measure(world: SapienWorld, row: Row, level: int, seed: int) -> None:
         row.wrong.append(f"L{level} seed {seed}: {kind}, {failure.evidence}")
 
 
-def rows(names: list[str], seeds: int) -> list[Row]:
+def rows(names: list[str], seeds: int) -> list[LabelledFailure]:
     """All measured rows that had an occasion."""
     world = SapienWorld(render=False)
     found = []
     for name in names:
         task = tasks()[name]
         for kind, expected in (SPATIAL if task.dimension == "spatial" else PROCEDURAL).items():
-            row = Row(name, kind, expected)
+            row = LabelledFailure(name, kind, expected)
             for level in LEVELS[task.dimension]:
                 for i in range(seeds):
                     measure(world, row, level, FIRST_SEED + i)
@@ -111,7 +111,7 @@ def rows(names: list[str], seeds: int) -> list[Row]:
     return found
 
 
-def table(found: list[Row]) -> str:
+def table(found: list[LabelledFailure]) -> str:
     """The result as Markdown."""
     lines = [
         "| task | mistake | should be | labelled so | otherwise | not acted out |",

@@ -1,4 +1,4 @@
-"""What a trial costs before its first action: its scene, its physics, coming to rest.
+"""Time of a trial before its first action: its scene, its physics, coming to rest.
 
     python benchmarks/loading.py [--rounds 3] [--json]
 
@@ -15,7 +15,7 @@ from collections import defaultdict
 from collections.abc import Callable
 from typing import Any
 
-from common import Result, Row, argument_parser, finish
+from common import Metric, Result, argument_parser, finish
 
 from robospa.harness.factory import policy_factory
 from robospa.harness.seeds import ORACLE
@@ -109,13 +109,13 @@ def measure(rounds: int, trials: int) -> Result:
     }
     chosen = names[:: max(1, len(names) // trials)]
     whole, step = whole_trials(world, chosen)
-    rows = [Row(what, round(best[part], 2), "ms") for part, what in PARTS.items()]
+    rows = [Metric(what, round(best[part], 2), "ms") for part, what in PARTS.items()]
     share = (best["scene"] + best["load"]) / (whole * 1e3)
     rows += [
-        Row("a whole trial of the expert, planning included", round(whole * 1e3, 1), "ms",
+        Metric("a whole trial of the expert, planning included", round(whole * 1e3, 1), "ms",
             note=f"{len(chosen)} of the variants"),
-        Row("the same for each of its physics steps", round(step * 1e6, 1), "us"),
-        Row("share of what comes before the first action", round(100 * share, 1), "%"),
+        Metric("the same for each of its physics steps", round(step * 1e6, 1), "us"),
+        Metric("share of what comes before the first action", round(100 * share, 1), "%"),
     ]  # fmt: skip
     return Result(
         "loading",

@@ -18,7 +18,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from common import Result, Row, argument_parser, finish
+from common import Metric, Result, argument_parser, finish
 
 COMMAND = [sys.executable, "-c", "from robospa.harness.cli.main import main; main()"]
 FIRST_SEED = 100_000
@@ -81,14 +81,16 @@ def main() -> None:
         server.wait(10)
     one = rates[min(counts)] / min(counts)
     rows = [
-        Row(f"{n} workers, of {n} times one worker", round(rates[n] / n / one, 3), at_least=0.9)
+        Metric(f"{n} workers, of {n} times one worker", round(rates[n] / n / one, 3), at_least=0.9)
         for n in counts
         if n > min(counts)
     ]
     rows.append(
-        Row(f"{most} workers beside {most} independent runs at once", round(rates[most] / alone, 3))
+        Metric(
+            f"{most} workers beside {most} independent runs at once", round(rates[most] / alone, 3)
+        )
     )
-    rows += [Row(f"{n} workers", round(rates[n], 2), "trials/s") for n in counts]
+    rows += [Metric(f"{n} workers", round(rates[n], 2), "trials/s") for n in counts]
     text = (
         "The driver and the server share the cores with the workers; runs that know nothing of "
         "each other say what the cores themselves give."

@@ -17,7 +17,7 @@ from collections.abc import Callable
 from functools import partial
 
 import numpy as np
-from common import Result, Row, argument_parser, finish
+from common import Metric, Result, argument_parser, finish
 from numpy.typing import NDArray
 
 from robospa.geometry import Pose
@@ -137,22 +137,22 @@ def measure(blocks: int, actions: int, rounds: int) -> Result:
     alone, _ = turns({"alone": [lambda: sum(idle.step() is None for _ in range(2000))]})
     best["alone"] = alone["alone"][0] / 2000 * 1e6
     rows = (
-        Row(
+        Metric(
             "trial loop beside bare SAPIEN stepping with the same drive targets",
             round(best["trial"] / best["bare"], 3),
             "x",
             at_most=BAR,
             note=f"{1e6 / best['trial']:,.0f} steps/s, {1e6 / best['trial'] / RATE:.0f} x real",
         ),
-        Row(
+        Metric(
             "the same with contacts gathered for the goal",
             round(best["contacts"] / best["bare"], 3),
             "x",
         ),
-        Row("trial loop, a physics step", round(best["trial"], 1), "us"),
-        Row("bare stepping, a physics step", round(best["bare"], 1), "us"),
-        Row("SAPIEN's step with everything at rest", round(best["alone"], 1), "us"),
-        Row(
+        Metric("trial loop, a physics step", round(best["trial"], 1), "us"),
+        Metric("bare stepping, a physics step", round(best["bare"], 1), "us"),
+        Metric("SAPIEN's step with everything at rest", round(best["alone"], 1), "us"),
+        Metric(
             "different final states of the sides",
             len(digests) - 1,
             "",

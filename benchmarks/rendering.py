@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 import sapien
-from common import Result, Row, argument_parser, finish
+from common import Metric, Result, argument_parser, finish
 from physics import table_of_blocks
 
 from robospa.harness.robots import embodiment
@@ -113,29 +113,29 @@ def measure(rounds: int) -> Result:
     none = replace(spec, cameras=())
     blind = [timed(lambda: worlds["observation"].observe(none))[0] for _ in range(rounds)]
     rows = [
-        Row(
+        Metric(
             "observation of three 320x240 cameras beside bare SAPIEN capture",
             round(wall["observation"] / wall["bare"], 3),
             "x",
             at_most=1.1,
             note=f"fastest of both: {best['observation'] / best['bare']:.3f} x",
         ),
-        Row("observation: median", round(wall["observation"], 1), "ms",
+        Metric("observation: median", round(wall["observation"], 1), "ms",
             note=f"CPU {cpu['observation']:.0f} ms"),
-        Row("bare SAPIEN capture of the same scene: median", round(wall["bare"], 1), "ms",
+        Metric("bare SAPIEN capture of the same scene: median", round(wall["bare"], 1), "ms",
             note=f"CPU {cpu['bare']:.0f} ms"),
-        Row("the same without the arms", round(wall["primitives"], 1), "ms"),
-        Row("one camera instead of three", round(statistics.median(single), 1), "ms"),
-        Row("no camera", round(statistics.median(blind), 2), "ms"),
-        Row("first picture of a process", round(first, 0), "ms"),
+        Metric("the same without the arms", round(wall["primitives"], 1), "ms"),
+        Metric("one camera instead of three", round(statistics.median(single), 1), "ms"),
+        Metric("no camera", round(statistics.median(blind), 2), "ms"),
+        Metric("first picture of a process", round(first, 0), "ms"),
     ]  # fmt: skip
     triangles = assets_triangles()
     rows += [
-        Row("triangles of an asset's drawn shapes, median",
+        Metric("triangles of an asset's drawn shapes, median",
             float(statistics.median(triangles.values())), "", note=f"{len(triangles)} assets"),
-        Row("triangles of the largest asset", float(max(triangles.values())), "",
+        Metric("triangles of the largest asset", float(max(triangles.values())), "",
             note=max(triangles, key=lambda name: triangles[name])),
-        Row("triangles of both arms", float(arm_triangles()), ""),
+        Metric("triangles of both arms", float(arm_triangles()), ""),
     ]  # fmt: skip
     renderer = worlds["observation"].info()["renderer"]
     drawn = f"{renderer['name']}, {renderer['version']}"

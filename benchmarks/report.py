@@ -117,7 +117,7 @@ def columns(rows: list[dict[str, Any]]) -> list[tuple[str, list[str]]]:
 
 
 def _origin(row: dict[str, Any]) -> str:
-    """Where a row comes from that the result's own command did not measure."""
+    """The source of a metric that the result's own command did not measure."""
     when = f"measured {row['date']}" if row.get("date") else ""
     how = f"`{row['command']}`" if row.get("command") else ""
     return " ".join(w for w in (when, how) if w)

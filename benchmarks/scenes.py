@@ -1,4 +1,4 @@
-"""How long it takes to build a scene: p50, p99 and the longest, for every variant.
+"""Time to build a scene: p50, p99 and the longest, for every variant.
 
     python benchmarks/scenes.py [--scenes 1000] [--first 200] [--tasks A,B] [--levels 1,5] [--json]
 
@@ -16,7 +16,7 @@ import time
 from typing import Any
 
 import numpy as np
-from common import Result, Row, argument_parser, finish
+from common import Metric, Result, argument_parser, finish
 
 from robospa.tasks import catalog
 
@@ -61,17 +61,17 @@ def result(found: list[dict[str, Any]]) -> Result:
     slow, middle = found[0], float(np.median([row["p50"] for row in found]))
     first = max(found, key=lambda row: row["first"])
     rows = [
-        Row(f"variants with p99 of {BAR:g} ms or more", over, f"of {len(found)}", at_most=0),
-        Row("slowest variant: p99", round(slow["p99"], 2), "ms",
+        Metric(f"variants with p99 of {BAR:g} ms or more", over, f"of {len(found)}", at_most=0),
+        Metric("slowest variant: p99", round(slow["p99"], 2), "ms",
             note=f"{slow['task']} level {slow['level']}, of {slow['scenes']} scenes"),
-        Row("median variant: p50", round(middle, 2), "ms"),
-        Row("slowest first scene of a process", round(first["first"], 0), "ms",
+        Metric("median variant: p50", round(middle, 2), "ms"),
+        Metric("slowest first scene of a process", round(first["first"], 0), "ms",
             note=f"{first['task']} level {first['level']}: its pool of layouts"),
-        Row("seeds refused", sum(row["refused"] for row in found),
+        Metric("seeds refused", sum(row["refused"] for row in found),
             f"of {sum(row['scenes'] for row in found):,}"),
     ]  # fmt: skip
     rows += [
-        Row(f"{row['task']} level {row['level']}: p99", round(row["p99"], 2), "ms",
+        Metric(f"{row['task']} level {row['level']}: p99", round(row["p99"], 2), "ms",
             note=f"p50 {row['p50']:.2f}, longest {row['max']:.2f}")
         for row in found[:SHOWN]
     ]  # fmt: skip

@@ -22,7 +22,7 @@ OURS = ("bare", "robospa")
 
 
 def peer_of(kind: str) -> str:
-    """Which of `peers.REQUIREMENTS` a kind of server or client needs; "" for ours."""
+    """The entry of `peers.REQUIREMENTS` that a kind of server or client needs; "" for ours."""
     if kind.startswith("vla-eval"):
         return "vla-eval"
     if kind.startswith("xpolicylab"):

@@ -17,7 +17,7 @@ import time
 from collections.abc import Sequence
 
 import numpy as np
-from common import Result, Row, argument_parser, finish
+from common import Metric, Result, argument_parser, finish
 from idle_world import IdleWorld, endless_trial
 from numpy.typing import NDArray
 from peers import Peer
@@ -95,13 +95,13 @@ def our_block(world: TimedWorld, policy: Policy) -> int:
     return run_trial(world, policy, KEY, policy_seed=0, parts=parts).policy_calls
 
 
-def peer_rows(kind: str, spent: list[float], peer: Peer) -> list[Row]:
+def peer_rows(kind: str, spent: list[float], peer: Peer) -> list[Metric]:
     """Mean and median of a peer's steps."""
     what = f"{NAMES[kind]}: a step, mean"
     if not spent:
-        return [Row(what, None, "ms", note=peer.problem)]
+        return [Metric(what, None, "ms", note=peer.problem)]
     note = f"median {statistics.median(spent):.3f}, {len(spent)} steps"
-    return [Row(what, round(statistics.fmean(spent), 4), "ms", note=note)]
+    return [Metric(what, round(statistics.fmean(spent), 4), "ms", note=note)]
 
 
 def measure(rounds: int) -> Result:
@@ -133,17 +133,17 @@ def measure(rounds: int) -> Result:
     p99 = float(np.percentile(world.buffered, 99))
     note = f"median {statistics.median(world.buffered):.4f}, p99 {p99:.4f}, {steps} steps"
     rows = [
-        Row("a buffered step, mean", round(statistics.fmean(world.buffered), 4), "ms",
+        Metric("a buffered step, mean", round(statistics.fmean(world.buffered), 4), "ms",
             at_most=0.1, note=note),
-        Row("observations beyond one a query", world.views - queries, "", at_most=0,
+        Metric("observations beyond one a query", world.views - queries, "", at_most=0,
             note=f"{queries} queries in {steps + rounds} steps"),
-        Row("ours: a step, queries included, mean", round(mean, 4), "ms"),
+        Metric("ours: a step, queries included, mean", round(mean, 4), "ms"),
     ]  # fmt: skip
     for kind in NAMES:
         rows += peer_rows(kind, times[kind], peers[peer_of(kind)])
         if times[kind]:
             what = f"our step, queries included, beside {NAMES[kind]}"
-            rows.append(Row(what, round(mean / statistics.fmean(times[kind]), 4), "x"))
+            rows.append(Metric(what, round(mean / statistics.fmean(times[kind]), 4), "x"))
     circumstances = f"{running.source}; sides take turns"
     return Result(
         "step",

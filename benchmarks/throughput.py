@@ -27,7 +27,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from common import Result, Row, argument_parser, finish, line
+from common import Metric, Result, argument_parser, finish, line
 from idle_world import IdleWorld, endless_trial
 from numpy.typing import NDArray
 
@@ -47,7 +47,7 @@ CALLS = 25
 """Answers that one trial takes."""
 
 
-class Model:
+class SimulatedModel:
     """Answers with one action each; counts when it answered how many."""
 
     def __init__(self, base: float, item: float) -> None:
@@ -122,7 +122,7 @@ def serving(base: float, item: float) -> Iterator[Served]:
 
 def serve(base: float, item: float) -> None:
     """The process of `serving`."""
-    model = Model(base, item)
+    model = SimulatedModel(base, item)
     begun, rounds = time.perf_counter(), 20
     for _ in range(rounds):
         model.infer_batch([{}] * BATCH, [0] * BATCH)
@@ -135,8 +135,8 @@ def serve(base: float, item: float) -> None:
 
 
 @dataclass(frozen=True)
-class Seen:
-    """What a run did: answers a second, samples a call, workers at its end, the model's limit."""
+class RunFigures:
+    """A run's answers a second, samples a call, workers at its end, and the model's limit."""
 
     rate: float
     batch: float
@@ -164,7 +164,7 @@ class Window:
             raise Enough
 
 
-def measure(busy: float, workers: int, seconds: float, base: float, item: float) -> Seen:
+def measure(busy: float, workers: int, seconds: float, base: float, item: float) -> RunFigures:
     """One run; `workers` 0 for as many as the driver finds right."""
     keys = [TrialKey("Busy", 1, seed) for seed in range(20_000)]
     window = Window(seconds if workers else 3 * seconds)  # growing takes whole rounds of trials
@@ -172,7 +172,7 @@ def measure(busy: float, workers: int, seconds: float, base: float, item: float)
         config = WorkerConfig(
             Path(folder), served.url, world="throughput:BusyWorld",
             world_arguments={"busy": busy}, parts="throughput:parts",
-            expects={served.url: Model(base, item).spec},
+            expects={served.url: SimulatedModel(base, item).spec},
         )  # fmt: skip
         options = RunOptions(workers or cores(), most=workers or most_workers())
         runner = Runner(config, keys, options, on_status=window.look)
@@ -182,16 +182,16 @@ def measure(busy: float, workers: int, seconds: float, base: float, item: float)
         calls = [c for c in served.calls() if window.begun <= c[0] <= until - 0.5]
     answers = sum(size for _, size in calls[1:])
     rate = answers / (calls[-1][0] - calls[0][0])
-    return Seen(rate, answers / (len(calls) - 1), window.workers, served.limit)
+    return RunFigures(rate, answers / (len(calls) - 1), window.workers, served.limit)
 
 
 @functools.cache
-def cores_alone(busy: float, seconds: float) -> Seen:
+def cores_alone(busy: float, seconds: float) -> RunFigures:
     """A worker a core and a model that answers at once."""
     return measure(busy, cores(), seconds, 0.0, 0.0)
 
 
-def case(name: str, busy: float, workers: int, seconds: float, bar: float | None) -> Row:
+def case(name: str, busy: float, workers: int, seconds: float, bar: float | None) -> Metric:
     """A run beside both limits."""
     few = cores()
     alone = cores_alone(busy, seconds)
@@ -205,7 +205,7 @@ def case(name: str, busy: float, workers: int, seconds: float, bar: float | None
     )
     if workers:
         note += f"; {workers} workers in step could have {min(limit, together):.1f}"
-    return Row(name, round(seen.rate / limit, 3), "of the limit", at_least=bar, note=note)
+    return Metric(name, round(seen.rate / limit, 3), "of the limit", at_least=bar, note=note)
 
 
 def main() -> None:

@@ -1,4 +1,4 @@
-"""What a round trip costs: bare `websockets`, ours and the peers', side by side in one run.
+"""Time of a round trip: bare `websockets`, ours and the peers', side by side in one run.
 
     python benchmarks/wire.py [--requests 300] [--rounds 6] [--json]
 
@@ -17,7 +17,7 @@ import time
 from typing import Any
 
 import numpy as np
-from common import Result, Row, argument_parser, finish
+from common import Metric, Result, argument_parser, finish
 from peers import Peer, environment
 from sides import Sides, line_of, peer_of, peers_for, sides, tell, versions_of
 
@@ -89,26 +89,26 @@ def many_clients(
     return {kind: (times[kind], len(times[kind]) / walls[kind]) for kind in clients}
 
 
-def rows_of(name: str, times: dict[str, list[float]], peers: dict[str, Peer]) -> list[Row]:
+def rows_of(name: str, times: dict[str, list[float]], peers: dict[str, Peer]) -> list[Metric]:
     """Medians, and ours beside the limit and every peer."""
     medians = {kind: statistics.median(values) for kind, values in times.items()}
     rows = []
     for kind in CLIENTS:
         what = f"{NAMES[kind]}, {name}: median"
         if kind not in medians:
-            rows.append(Row(what, None, "ms", note=peers[peer_of(kind)].problem))
+            rows.append(Metric(what, None, "ms", note=peers[peer_of(kind)].problem))
             continue
         p10, p99 = (float(np.percentile(times[kind], p)) for p in (10, 99))
         note = f"fastest tenth {p10:.2f}, p99 {p99:.1f}, {len(times[kind])} round trips"
-        rows.append(Row(what, round(medians[kind], 3), "ms", note=note))
+        rows.append(Metric(what, round(medians[kind], 3), "ms", note=note))
     for kind in [kind for kind in CLIENTS if kind != "robospa"]:
         what = f"round trip beside {NAMES[kind]}, {name}"
         bar = 1.25 if kind == "bare" else 1.0
         if kind in medians:
             ratio = round(medians["robospa"] / medians[kind], 3)
-            rows.append(Row(what, ratio, "x", at_most=bar))
+            rows.append(Metric(what, ratio, "x", at_most=bar))
         else:
-            rows.append(Row(what, None, "x", at_most=bar, note=peers[peer_of(kind)].problem))
+            rows.append(Metric(what, None, "x", at_most=bar, note=peers[peer_of(kind)].problem))
     return rows
 
 
@@ -125,12 +125,12 @@ def measure(requests: int, rounds: int) -> Result:
     rows = rows_of("1 client", single, peers)
     rows += rows_of(f"{MANY} clients", {k: v[0] for k, v in crowd.items()}, peers)
     rows += [
-        Row(f"{NAMES[kind]}, {MANY} clients: throughput", round(rate, 1), "round trips/s")
+        Metric(f"{NAMES[kind]}, {MANY} clients: throughput", round(rate, 1), "round trips/s")
         for kind, (_, rate) in crowd.items()
     ]
     missing = environment("xpolicylab")
     rows.append(
-        Row("XPolicyLab's own client", None, "ms", note=missing.problem or "has a package now")
+        Metric("XPolicyLab's own client", None, "ms", note=missing.problem or "has a package now")
     )
     data: dict[str, Any] = {"message_bytes": size, "frames": source}
     return Result(

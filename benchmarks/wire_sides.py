@@ -44,7 +44,7 @@ def frames(path: str) -> Any:
 
 
 def observation(path: str) -> dict[str, Any]:
-    """What we send: three frames, 14 joints, 16 numbers of poses, 20 words."""
+    """The observation that we send: three frames, 14 joints, 16 numbers of poses, 20 words."""
     rng = np.random.default_rng(0)
     return {
         "images": dict(zip(CAMERAS, frames(path), strict=True)),

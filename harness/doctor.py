@@ -1,4 +1,4 @@
-"""What a machine needs to simulate and to draw, checked one by one, each with the one thing to do.
+"""Checks of what a machine needs to simulate and to draw, each with the one thing to do.
 
 Every check runs in a process of its own with a time limit: a broken driver may end or hang the
 process that asks it, and the doctor is there to say so.
@@ -23,7 +23,7 @@ TIME_LIMIT = 120.0
 
 
 @dataclass(frozen=True)
-class Check:
+class Finding:
     """One finding: `fix` is the one thing to do, empty if `ok`."""
 
     name: str
@@ -32,7 +32,7 @@ class Check:
     fix: str = ""
 
 
-def run_checks() -> Iterator[Check]:
+def run_checks() -> Iterator[Finding]:
     """All checks, in the order in which they build on each other, as they are done.
 
     After a failed "simulator" check the ones that need it are left out.
@@ -47,20 +47,20 @@ def run_checks() -> Iterator[Check]:
         yield _run("first picture", "check_picture", DRIVER)
 
 
-def _run(name: str, function: str, fix: str) -> Check:
+def _run(name: str, function: str, fix: str) -> Finding:
     """One check function of this module, in a child process."""
     code = f"from robospa.harness import doctor; doctor.report(doctor.{function})"
     command = [sys.executable, "-W", "ignore", "-c", code]
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=TIME_LIMIT)
     except subprocess.TimeoutExpired:
-        return Check(name, False, f"no answer within {TIME_LIMIT:g} s", fix)
+        return Finding(name, False, f"no answer within {TIME_LIMIT:g} s", fix)
     lines = done.stdout.splitlines()
     if lines and lines[-1].startswith("{"):
         found = json.loads(lines[-1])
-        return Check(name, found["ok"], found["detail"], "" if found["ok"] else fix)
+        return Finding(name, found["ok"], found["detail"], "" if found["ok"] else fix)
     why = (done.stderr.strip().splitlines() or [f"it ended with code {done.returncode}"])[-1]
-    return Check(name, False, f"the check itself broke: {why}", fix)
+    return Finding(name, False, f"the check itself broke: {why}", fix)
 
 
 def report(check: Callable[[], str]) -> None:

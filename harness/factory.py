@@ -39,7 +39,7 @@ def load_function(path: str) -> Callable[..., Any]:
 
 
 def is_url(target: str) -> bool:
-    """Whether `target` names a server rather than a policy of this process."""
+    """True if `target` names a server, not a policy of this process."""
     return "://" in target
 
 

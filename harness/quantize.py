@@ -25,7 +25,7 @@ def quantize(actions: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def is_quantized(actions: NDArray[np.float32]) -> bool:
-    """Whether `quantize` leaves every bit of `actions` as it is."""
+    """True if `quantize` leaves every bit of `actions` as it is."""
     if not np.isfinite(actions).all():
         return False
     return quantize(actions).tobytes() == np.ascontiguousarray(actions, dtype=np.float32).tobytes()

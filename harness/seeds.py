@@ -1,4 +1,4 @@
-"""Which seeds count: scenes that settle and that the expert solves.
+"""Accepted seeds: scenes that settle and that the expert solves.
 
 The expert runs in this process, without a wire and without rendering, through the same `run_trial`
 as every policy. Used to make the shipped seed lists and to measure the expert on other seeds.

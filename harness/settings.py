@@ -39,7 +39,7 @@ class SettingsError(ValueError):
 
 @dataclass(frozen=True)
 class Selection:
-    """Which trials."""
+    """The trials of a run."""
 
     tasks: str = option(
         "all",
@@ -61,7 +61,7 @@ class Selection:
 
 @dataclass(frozen=True)
 class Simulation:
-    """How a trial runs; part of what decides its result."""
+    """Execution of a trial; part of what decides its result."""
 
     control: str = option("rest_to_rest", "rest_to_rest or fixed_rate", CONTROLS)
     run_seed: int = option(0, "enters the policy's seed of every trial")
@@ -77,7 +77,7 @@ class Simulation:
 
 @dataclass(frozen=True)
 class Connection:
-    """How policy servers are spoken to; times in seconds."""
+    """Connection to policy servers; times in seconds."""
 
     timeout: float = option(120.0, "seconds for one answer")
     first_timeout: float = option(600.0, "seconds for the first answer")
@@ -98,7 +98,7 @@ class Connection:
 
 @dataclass(frozen=True)
 class Retries:
-    """When an attempt at a trial is given up, and how often it is repeated."""
+    """Limits of an attempt at a trial, and how often it is repeated."""
 
     trial_timeout: float = option(1800.0, "seconds for one trial before its worker is killed")
     stuck_timeout: float = option(
@@ -118,7 +118,7 @@ class Retries:
 
 @dataclass(frozen=True)
 class Compute:
-    """Where trials run, and how many at once."""
+    """Processes and machines that trials run on."""
 
     workers: int = option(0, "worker processes; 0 for as many as keep the cores busy")
     executor: str = option(
@@ -143,7 +143,7 @@ class Compute:
 
 @dataclass(frozen=True)
 class Recording:
-    """What a run keeps beside its records."""
+    """Files that a run keeps beside its records."""
 
     video: str = option(
         "none", "which trials to film: none, failures, first (of each task), all", VIDEO

@@ -112,6 +112,6 @@ def _known(group: str, values: Mapping[str, object]) -> Mapping[str, object]:
 
 
 def _place(name: str) -> str:
-    """Where a setting belongs, for people."""
+    """The place of a setting in a file, for messages."""
     group = group_of().get(name)
     return f"{name} of [{group}]" if group else f"[{name}]" if name in GROUPS else name

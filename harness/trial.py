@@ -61,7 +61,7 @@ class Recorder(Protocol):
 
 @dataclass(frozen=True)
 class TrialParts:
-    """What a trial needs of its task; tests replace it to run without the task catalog."""
+    """Scene, task, goal and instruction of a trial; tests replace them."""
 
     scene: Scene
     task: Task
@@ -155,7 +155,7 @@ class _Run:
         self.event_steps.extend([len(self.actions)] * len(new))
 
     def observation(self, spec: PolicySpec) -> Observation:
-        """What the policy asked for, at this instant."""
+        """The observation of this instant that `spec` asks for."""
         step = len(self.actions)
         view: Observation = self.stopwatch.call("rendering", self.world.observe, spec)
         observation = view.copy()
@@ -193,7 +193,7 @@ class _Run:
         return quantize(check_chunk(answer, spec))
 
     def execute(self, action: NDArray[np.float32], space: str) -> bool:
-        """Whether the goal was met or lost during `action`."""
+        """Execute `action`; True if the goal was met or lost during it."""
         self.actions.append(action)
         started, other = time.perf_counter(), self.stopwatch.sum("goal", "recording")
         done = self.world.step(action, space, self.poll)

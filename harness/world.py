@@ -65,7 +65,7 @@ class World(Protocol):
         ...
 
     def observe(self, spec: PolicySpec) -> Observation:
-        """What `spec` asks for at this instant: see `robospa.observation`."""
+        """The observation that `spec` asks for, at this instant: see `robospa.observation`."""
         ...
 
     def render(self, camera: CameraSpec) -> NDArray[np.uint8]:
@@ -77,7 +77,7 @@ class World(Protocol):
         ...
 
     def contacts(self) -> tuple[Contact, ...]:
-        """What touches what at this instant: for rare questions, whatever `load` was asked for."""
+        """All contacts at this instant, for rare queries: independent of the argument of `load`."""
         ...
 
     def digest(self) -> str:

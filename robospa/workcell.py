@@ -30,7 +30,7 @@ TABLE_TOP = 0.74
 
 
 @dataclass(frozen=True)
-class Table:
+class TableGeometry:
     """A table: the height of its top and its size in x and y; its middle is at x = y = 0."""
 
     top: float = TABLE_TOP
@@ -184,7 +184,7 @@ class Workcell:
     """Grasp centres move sideways at least so high above the table."""
     highest: float
     """Grasp centres need not go higher above the table than this."""
-    table: Table = Table()
+    table: TableGeometry = TableGeometry()
 
     @property
     def head(self) -> FixedCamera:

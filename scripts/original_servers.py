@@ -1,4 +1,4 @@
-"""What the checks against original servers share: a server in another Python, what it is shown,
+"""Shared by the checks against original servers: a server in another Python, its observations,
 and a line for every check.
 
 The server is a script of its own; it prints JSON lines, first its port, then what it has seen.

@@ -1,4 +1,4 @@
-"""What happened in a trial: the one source of success, progress and failure types.
+"""Events of a trial: the one source of success, progress and failure types.
 
 A tracker emits events; everything else is derived from the list of them by `outcome`.
 """

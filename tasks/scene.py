@@ -63,7 +63,7 @@ class Scene:
 
     @property
     def table_at(self) -> Vec3:
-        """How far the table is moved from its usual place, x, y and z [m]."""
+        """Shift of the table from its usual place, x, y and z [m]."""
         return (*self.table_shift, self.table_rise)
 
     @property

@@ -1,4 +1,4 @@
-"""What an object is made of: shapes to draw and to collide with, and the frames that skills use.
+"""Models of objects: shapes to draw and to collide with, and the frames that skills use.
 
 All values are in the object's body frame: z up when the object stands on the table as placed.
 The origin is the centre of the underside for modelled objects and the centre for box primitives
@@ -57,7 +57,7 @@ Geometry = Box | Sphere | Cylinder | Mesh
 
 @dataclass(frozen=True)
 class Shape:
-    """One piece of a body: drawn if `visual`, felt if `collision`."""
+    """One piece of a body: drawn if `visual`, colliding if `collision`."""
 
     geometry: Geometry
     pose: Pose = Pose()
@@ -104,7 +104,7 @@ class Hinge:
     mass: float = 0.1
 
     def turned(self, angle: float) -> Pose:
-        """Where the part is, in the body frame, when it has turned by `angle` [rad]."""
+        """Pose of the part in the body frame when it has turned by `angle` [rad]."""
         turn = Pose(self.point, axis_rotation(self.axis, angle))
         x, y, z = self.point
         return turn * Pose((-x, -y, -z))

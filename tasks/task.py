@@ -1,4 +1,4 @@
-"""What a task is: facts per level and three pure functions of its scene."""
+"""The definition of a task: figures per level and pure functions of its scene."""
 
 from __future__ import annotations
 
@@ -45,8 +45,8 @@ class Tracker(Protocol):
 
 
 @dataclass(frozen=True)
-class Draft:
-    """What a task draws for a seed: its objects, its facts and, rarely, a shifted table."""
+class SceneSample:
+    """A task's random draw for a seed: objects, facts and, rarely, a shifted table [m]."""
 
     objects: tuple[SceneObject, ...]
     facts: SceneFacts
@@ -62,7 +62,7 @@ class Level:
     steps: int
 
 
-Draw = Callable[[int, np.random.Generator, Workcell], Draft]
+Draw = Callable[[int, np.random.Generator, Workcell], SceneSample]
 """A level's draw. Scenes are the same for every robot: the workcell is that of the suite's own."""
 
 

@@ -44,22 +44,22 @@ def test_a_result_has_the_common_form(path: Path, common: Any) -> None:
     assert found["command"] and found["date"]
     assert {"cores", "cpu"} <= set(found["machine"]) and "python" in found["versions"]
     for row in found["rows"]:
-        again = common.Row(**{k: v for k, v in row.items() if k != "met"})
+        again = common.Metric(**{k: v for k, v in row.items() if k != "met"})
         assert again.to_json() == row
         assert row["value"] is not None or row["note"], "what was not measured says why"
 
 
 def test_a_bar_is_judged_by_its_numbers(common: Any) -> None:
-    assert common.Row("a", 1.2, "x", at_most=1.25).met is True
-    assert common.Row("a", 1.3, "x", at_most=1.25).met is False
-    assert common.Row("a", 0.89, "", at_least=0.9).met is False
-    assert common.Row("a", None, "", at_least=0.9, note="no peer").met is None
+    assert common.Metric("a", 1.2, "x", at_most=1.25).met is True
+    assert common.Metric("a", 1.3, "x", at_most=1.25).met is False
+    assert common.Metric("a", 0.89, "", at_least=0.9).met is False
+    assert common.Metric("a", None, "", at_least=0.9, note="no peer").met is None
 
 
 def test_figures_from_before_are_kept(tmp_path: Path, common: Any) -> None:
     path = tmp_path / "x.json"
-    common.write(common.Result("x", "X", (common.Row("a", 2.0, before=3.0),)), path)
-    common.write(common.Result("x", "X", (common.Row("a", 1.0),)), path)
+    common.write(common.Result("x", "X", (common.Metric("a", 2.0, before=3.0),)), path)
+    common.write(common.Result("x", "X", (common.Metric("a", 1.0),)), path)
     assert json.loads(path.read_text())["rows"][0]["before"] == 3.0
 
 

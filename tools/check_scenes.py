@@ -32,7 +32,7 @@ SHOWN = 5
 
 
 def look(name: str, level: int, scenes: int) -> dict[str, Any]:
-    """What was found in `scenes` scenes of one variant."""
+    """The findings in `scenes` scenes of one variant."""
     from scene_checks import RULES, drawn
 
     begun = time.process_time()
@@ -66,7 +66,7 @@ def look(name: str, level: int, scenes: int) -> dict[str, Any]:
 
 
 def off(counts: dict[str, int]) -> float:
-    """How far the rarest or commonest value is from an even share, as a share of that."""
+    """Largest deviation of a value's frequency from an even share, relative to that share."""
     even = sum(counts.values()) / len(counts)
     return max(abs(count - even) for count in counts.values()) / even
 

@@ -1,4 +1,4 @@
-"""How diverse instructions are: `python tools/instruction_figures.py` prints the table.
+"""Diversity of instructions: `python tools/instruction_figures.py` prints the table.
 
 Of templates, slots masked: "mean" is the mean pairwise similarity of the train ones, "self-BLEU"
 their BLEU-4 against each other, "held-out BLEU" that of the held-out ones against the train ones,

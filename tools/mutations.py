@@ -269,7 +269,7 @@ def place_of(mutation: Mutation, tree: Path) -> tuple[Path, str, str] | None:
 
 
 def try_one(mutation: Mutation, tree: Path) -> dict[str, object]:
-    """What the tests said of the broken code: caught, by which test, in how many seconds."""
+    """Result of the tests on the mutated code: caught, by which test, in how many seconds."""
     place = place_of(mutation, tree)
     if place is None:
         return {"name": mutation.name, "place": None, "caught": None}

@@ -90,9 +90,10 @@ def __getattr__(name: str) -> Any:
     """`same_results:KIND` is the policy that makes mistakes of that kind."""
     if name not in MISTAKES:
         raise AttributeError(name)
-    from robospa.baselines import mistakes
 
-    return lambda: mistakes.create(kind=name)
+    from robospa.baselines import failure_policies
+
+    return lambda: failure_policies.create(kind=name)
 
 
 def write_scenes(folder: Path) -> None:

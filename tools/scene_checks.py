@@ -1,4 +1,4 @@
-"""What must hold of every scene, each rule as a function that returns what is wrong with it.
+"""Rules that every scene obeys, each a function that returns its violations.
 
 The tests look at a few scenes of every variant, `tools/check_scenes.py` at thousands. No
 simulator; nothing here asks the code that draws the scenes.
@@ -37,7 +37,7 @@ SIGNS = np.array(list(itertools.product((-0.5, 0.5), (-0.5, 0.5), (0.0, 1.0))))
 
 
 def movable(scene: Scene) -> list[SceneObject]:
-    """What lies there from the start and can be moved."""
+    """Objects that exist from the start and can be moved."""
     return [o for o in scene.objects if not o.fixed and o.appears_at is None]
 
 
@@ -68,7 +68,7 @@ def near(items: Sequence[SceneObject]) -> Iterator[tuple[int, int, float]]:
 
 
 def overlap(a: SceneObject, b: SceneObject) -> float:
-    """How deep [m] two objects are inside each other, 0 if apart.
+    """Depth [m] of the overlap of two objects, 0 if there is none.
 
     As boxes, by the separating axes of both, and as upright cylinders: round things are no boxes.
     """
@@ -82,7 +82,7 @@ def overlap(a: SceneObject, b: SceneObject) -> float:
 
 
 def rests_in(a: SceneObject, b: SceneObject) -> bool:
-    """Whether one of the two starts inside or on the other, as things in a bin do."""
+    """True if one of the two starts inside or on the other, as things in a bin do."""
     boxes = dict(zip((a.name, b.name), corners((a, b)), strict=True))
     upper, lower = sorted((a, b), key=lambda item: -boxes[item.name][:, 2].min())
     (left, fore), (right, far) = (
@@ -165,7 +165,7 @@ def _home() -> tuple[Pose, Pose]:
 
 
 def _reached(ws: Workspace, name: str, arms: tuple[int, ...]) -> bool:
-    """Whether inverse kinematics finds joints of one of `arms` for a grasp of the object."""
+    """True if inverse kinematics finds joints of one of `arms` for a grasp of the object."""
     body = ws.pose(name)
     for leans in (LEVEL, LEANS):
         for arm in sorted(arms, key=lambda k: (body.position[0] > 0) != (k == 1)):
@@ -180,7 +180,7 @@ def _reached(ws: Workspace, name: str, arms: tuple[int, ...]) -> bool:
 
 
 def misplaced(scene: Scene) -> Iterator[str]:
-    """Whether the facts of a single-target scene single out another object, or none, or two."""
+    """True if the facts of a single-target scene name another object, or none, or two."""
     if "target" in scene.facts and (found := targets_of(scene)) != [scene.facts["target"]]:
         yield f"the facts single out {found}, not {scene.facts['target']}"
 
@@ -214,7 +214,7 @@ def color_of(item: SceneObject) -> str:
 
 
 def _measures(scene: Scene, key: str) -> dict[str, float]:
-    """What objects are ranked by, largest first."""
+    """The measure that objects are ranked by, largest first."""
     if key == "distance_rank":
         reference = scene.object(str(scene.facts["reference"]))
         x, y, _ = reference.pose.position
@@ -304,7 +304,7 @@ RULES: Mapping[str, Callable[[Scene], Iterator[str]]] = {
 
 
 def drawn(scene: Scene) -> dict[str, Any]:
-    """What was drawn for the question, by name of the fact: ranks, directions, counts, colours."""
+    """The drawn values by name of the fact: ranks, directions, counts, colours."""
     facts = {k: v for k, v in scene.facts.items() if isinstance(v, str | int) and k != "reference"}
     return {key: _word(scene, value) for key, value in facts.items()}
 

@@ -36,7 +36,7 @@ RATE, DECAY, PENALTY = 0.1, 0.9, 3.0
 
 @dataclass(frozen=True)
 class Question:
-    """What is to be guessed of a scene: which of `names` is `answer`."""
+    """The question about a scene: which of `names` is `answer`."""
 
     names: Sequence[str]
     answer: str
@@ -55,7 +55,7 @@ def _target(scene: Scene) -> Question:
 
 
 def _first_of(fact: str, *others: str) -> Ask:
-    """Which object comes first in the list `fact`, among it and the lists `others`."""
+    """The question which object comes first in the list `fact`, among it and the lists `others`."""
 
     def ask(scene: Scene) -> Question:
         names = [name for key in (fact, *others) for name in scene.facts[key]]
@@ -73,7 +73,7 @@ MEMORY: Mapping[str, Ask] = {
 
 
 def question_of(name: str) -> Ask | None:
-    """What a guesser is asked about the task called `name`; None where the scene may show it."""
+    """The question about the task called `name`; None where the scene may show the answer."""
     if catalog.task(name).dimension in ("spatial", "basic"):
         return _target
     return MEMORY.get(name)
@@ -91,7 +91,7 @@ def order_lists(scene: Scene) -> dict[str, Question]:
 
 
 @dataclass(frozen=True)
-class Sample:
+class GuessingSet:
     """Features (scenes, objects, d) of the objects asked about, and the answers' indices."""
 
     features: Array
@@ -166,18 +166,18 @@ def _order(column: Array) -> Array:
 Look = Callable[[Scene, Sequence[str]], Array]
 
 
-def sample(scenes: Iterable[Scene], ask: Ask, look: Look = appearance) -> Sample:
-    """What a guesser sees of `scenes`; all must ask about equally many objects."""
+def sample(scenes: Iterable[Scene], ask: Ask, look: Look = appearance) -> GuessingSet:
+    """The features of `scenes` and their answers; all must ask about equally many objects."""
     features, answers = [], []
     for scene in scenes:
         question = ask(scene)
         features.append(look(scene, question.names))
         answers.append(list(question.names).index(question.answer))
-    return Sample(np.stack(features), np.array(answers))
+    return GuessingSet(np.stack(features), np.array(answers))
 
 
-def hits(seen: Sample, seed: int = 0) -> dict[str, int]:
-    """How many answers each guesser finds, every scene guessed by one that did not learn from it.
+def hits(seen: GuessingSet, seed: int = 0) -> dict[str, int]:
+    """Correct answers of each guesser, cross-validated: no scene is guessed by one trained on it.
 
     Objects are shuffled first, so that their order in the arrays is no cue of its own.
     """
@@ -239,8 +239,8 @@ def tail(found: int, count: int, chance: float) -> float:
 
 
 @dataclass(frozen=True)
-class Verdict:
-    """What the best guesser of a variant got, beside the `chance` that the level names."""
+class GuessResult:
+    """Result of a variant's best guesser, beside the `chance` that the level gives."""
 
     name: str
     level: int
@@ -254,7 +254,7 @@ class Verdict:
         return min(1.0, 2 * tail(self.found, self.scenes, self.chance))
 
 
-def examine(name: str, level: int, seeds: Sequence[int], look: Look = appearance) -> Verdict:
+def examine(name: str, level: int, seeds: Sequence[int], look: Look = appearance) -> GuessResult:
     """Let the guessers try a variant; chance is that of its candidates (the paper's n)."""
     ask = question_of(name)
     if ask is None:
@@ -263,7 +263,7 @@ def examine(name: str, level: int, seeds: Sequence[int], look: Look = appearance
     chance = seen.chance
     if catalog.task(name).dimension != "procedural":
         chance = max(chance, 1.0 / catalog.task(name).levels[level].candidates)
-    return Verdict(name, level, len(seeds), max(hits(seen).values()), chance)
+    return GuessResult(name, level, len(seeds), max(hits(seen).values()), chance)
 
 
 def main() -> None:

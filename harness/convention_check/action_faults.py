@@ -13,7 +13,7 @@ from itertools import permutations
 import numpy as np
 
 from robospa.geometry import Array
-from robospa.harness.convention_check.samples import Sample
+from robospa.harness.convention_check.samples import AnswerSample
 from robospa.rotations import product, quaternion_to_matrix
 
 TCP_AHEAD = 0.12
@@ -22,7 +22,7 @@ PI_SIGNS = (1, 2)
 """The joints of an arm whose sign openpi's `adapt_to_pi` changes."""
 
 
-Undo = Callable[[Sample], "Sample | None"]
+Undo = Callable[[AnswerSample], "AnswerSample | None"]
 
 
 @dataclass(frozen=True)
@@ -36,8 +36,8 @@ class ActionFault:
     undo: Undo
 
 
-def _given(change: Callable[[Sample], Array], kind: str = "") -> Undo:
-    def undo(case: Sample) -> Sample | None:
+def _given(change: Callable[[AnswerSample], Array], kind: str = "") -> Undo:
+    def undo(case: AnswerSample) -> AnswerSample | None:
         if kind and case.space.kind != kind:
             return None
         return replace(case, given=change(case))
@@ -52,7 +52,7 @@ def _columns(order: Callable[[Columns, Columns], Columns], kind: str = "") -> Un
     """Column i of ours is column order(left, right)[i] of the answer; `left` and `right` are our
     columns of the arms, the gripper last."""
 
-    def changed(case: Sample) -> Array:
+    def changed(case: AnswerSample) -> Array:
         rows = list(range(case.space.width))
         left, right = (rows[arm.all] for arm in case.space.arms)
         return case.given[:, order(left, right)]
@@ -61,7 +61,7 @@ def _columns(order: Callable[[Columns, Columns], Columns], kind: str = "") -> Un
 
 
 def _grippers(change: Callable[[Array], Array]) -> Undo:
-    def changed(case: Sample) -> Array:
+    def changed(case: AnswerSample) -> Array:
         given, grippers = case.given.copy(), case.space.grippers
         given[:, grippers] = change(given[:, grippers])
         return given
@@ -69,8 +69,8 @@ def _grippers(change: Callable[[Array], Array]) -> Undo:
     return _given(changed)
 
 
-def _joints(change: Callable[[Sample, Array], Array]) -> Undo:
-    def changed(case: Sample) -> Array:
+def _joints(change: Callable[[AnswerSample, Array], Array]) -> Undo:
+    def changed(case: AnswerSample) -> Array:
         given, joints = case.given.copy(), case.space.bodies
         given[:, joints] = change(case, given[:, joints])
         return given
@@ -79,7 +79,7 @@ def _joints(change: Callable[[Sample, Array], Array]) -> Undo:
 
 
 def _positions(change: Callable[[Array], Array]) -> Undo:
-    def changed(case: Sample) -> Array:
+    def changed(case: AnswerSample) -> Array:
         given = case.given.copy()
         for arm in case.space.arms:
             given[:, arm.position] = change(given[:, arm.position])
@@ -91,7 +91,7 @@ def _positions(change: Callable[[Array], Array]) -> Undo:
 def _quaternions(order: Columns) -> Undo:
     """Number i of our quaternions, w x y z, is number order[i] of theirs."""
 
-    def changed(case: Sample) -> Array:
+    def changed(case: AnswerSample) -> Array:
         given = case.given.copy()
         for arm in case.space.arms:
             given[:, arm.quaternion] = given[:, arm.quaternion][:, order]
@@ -103,7 +103,7 @@ def _quaternions(order: Columns) -> Undo:
 def _later(shift: int, stride: int = 1) -> Undo:
     """Compare action k with frame t + shift + (k + 1) * stride."""
 
-    def undo(case: Sample) -> Sample | None:
+    def undo(case: AnswerSample) -> AnswerSample | None:
         if case.track is None:
             return None
         rows = case.t + shift + (np.arange(len(case.given)) + 1) * stride
@@ -115,7 +115,7 @@ def _later(shift: int, stride: int = 1) -> Undo:
     return undo
 
 
-def _interleaved(case: Sample) -> Sample | None:
+def _interleaved(case: AnswerSample) -> AnswerSample | None:
     """Columns that alternate between two arms of equally many joints."""
     left, right = case.space.joints
     if case.space.kind == "joint" and left != right:
@@ -124,20 +124,20 @@ def _interleaved(case: Sample) -> Sample | None:
     return replace(case, given=case.given[:, order])
 
 
-def _slower(case: Sample) -> Sample | None:
+def _slower(case: AnswerSample) -> AnswerSample | None:
     """Two actions for every recorded frame."""
     given = case.given[1::2]
     return replace(case, given=given, wanted=case.wanted[: len(given)]) if len(given) > 1 else None
 
 
-def _measured(case: Sample) -> Sample | None:
+def _measured(case: AnswerSample) -> AnswerSample | None:
     if case.measured is None:
         return None
     rows = case.t + 1 + np.arange(len(case.given))
     return replace(case, wanted=case.measured[rows])
 
 
-def _moved(case: Sample, along: float) -> Array:
+def _moved(case: AnswerSample, along: float) -> Array:
     """Positions shifted by `along` [m] on the x axis of each rotation."""
     given = case.given.copy()
     for arm in case.space.arms:
@@ -148,7 +148,7 @@ def _moved(case: Sample, along: float) -> Array:
     return given
 
 
-def _pose_delta(case: Sample, each: bool) -> Array:
+def _pose_delta(case: AnswerSample, each: bool) -> Array:
     """Differences of position added to the pose at the start; rotations turned on from it."""
     given = case.given.copy()
     for arm in case.space.arms:
@@ -312,7 +312,7 @@ PARTS: tuple[ActionFault, ...] = (
 )
 
 
-def fitted(cases: Sequence[Sample]) -> list[ActionFault]:
+def fitted(cases: Sequence[AnswerSample]) -> list[ActionFault]:
     """Parts that depend on all `cases`: order and signs of an arm's joints, origin of positions."""
     space = cases[0].space
     if space.kind == "ee":
@@ -354,7 +354,7 @@ def _signs(name: str, flips: tuple[int, ...], size: int) -> ActionFault:
     pi = " (as if openpi's adapt_to_pi were on)" if flips == PI_SIGNS else ""
     columns = [i + arm * (size + 1) for arm in (0, 1) for i in flips]
 
-    def changed(case: Sample) -> Array:
+    def changed(case: AnswerSample) -> Array:
         given = case.given.copy()
         about = case.now[columns] if name == "signs of motion" else 0.0
         given[:, columns] = 2 * about - given[:, columns]
@@ -365,7 +365,7 @@ def _signs(name: str, flips: tuple[int, ...], size: int) -> ActionFault:
     return ActionFault(name, phrase, "signs", _given(changed, "joint"))
 
 
-def _offset(cases: Sequence[Sample]) -> ActionFault:
+def _offset(cases: Sequence[AnswerSample]) -> ActionFault:
     gap = np.concatenate([c.given - c.wanted for c in cases])
     middle = np.median(gap, axis=0)
     shift = np.zeros_like(middle)

@@ -23,7 +23,7 @@ from robospa.geometry import Array
 from robospa.harness.convention_check.action_faults import PARTS, ActionFault, fitted
 from robospa.harness.convention_check.episodes import Episode, EpisodeError
 from robospa.harness.convention_check.observation_faults import VIEWS, ObservationFault
-from robospa.harness.convention_check.samples import UNITS, Sample, errors, groups, score
+from robospa.harness.convention_check.samples import UNITS, AnswerSample, errors, groups, score
 from robospa.protocol.policy import Policy, PolicySpec, TrialInfo
 from robospa.rotations import product
 from robospa.trial import REFERENCE
@@ -78,7 +78,7 @@ class Guess:
 
     @property
     def phrase(self) -> str:
-        """What goes after "it looks as if"."""
+        """The clause that follows "it looks as if"."""
         shown = (self.view.phrase,) if self.view is not None else ()
         return " and ".join((*shown, *(part.phrase for part in self.parts)))
 
@@ -120,7 +120,7 @@ def replay(policy: Policy, episode: Episode, points: int = POINTS) -> Findings:
     frames = _frames(len(episode), spec, points)
     plain = [_case(policy, episode, t, None) for t in frames]
     cases = [case for case in plain if case is not None]
-    shown: dict[str, list[Sample]] = {}
+    shown: dict[str, list[AnswerSample]] = {}
     untried = [] if episode.measured is not None else ["measured joints: not in this file"]
     for view in (view for view in VIEWS if _shown(spec, view)):
         answers = [_case(policy, episode, t, view) for t in frames]
@@ -139,7 +139,9 @@ def _frames(length: int, spec: PolicySpec, points: int) -> list[int]:
     return list(dict.fromkeys(round(float(t)) for t in chosen))
 
 
-def _case(policy: Policy, episode: Episode, t: int, view: ObservationFault | None) -> Sample | None:
+def _case(
+    policy: Policy, episode: Episode, t: int, view: ObservationFault | None
+) -> AnswerSample | None:
     """The answer at frame `t`, seen as `view` undoes it; None if there is nothing to undo."""
     spec = policy.spec
     seen: Any = episode.observation(spec, t)
@@ -165,11 +167,11 @@ def _case(policy: Policy, episode: Episode, t: int, view: ObservationFault | Non
     if spec.action == "delta_ee":
         given = absolute(given, track[t], space)
     measured = episode.measured if joint else None
-    return Sample(space, given, wanted, track[t], track, t, measured)
+    return AnswerSample(space, given, wanted, track[t], track, t, measured)
 
 
 def _shown(spec: PolicySpec, view: ObservationFault) -> bool:
-    """Whether the policy is shown what `view` changes."""
+    """True if the policy's spec asks for what `view` changes."""
     poses = spec.action != "joint"
     return {
         "images": bool(spec.cameras),
@@ -211,13 +213,13 @@ def absolute(chunk: Array, now: Array, space: ActionSpace) -> Array:
 
 
 def judge(
-    cases: Sequence[Sample],
-    shown: dict[str, list[Sample]],
+    cases: Sequence[AnswerSample],
+    shown: dict[str, list[AnswerSample]],
     frames: tuple[int, ...] = (),
     untried: tuple[str, ...] = (),
     gain: float = GAIN,
 ) -> Findings:
-    """What explains `cases`, the answers as they are; `shown` has those to faulty views by name."""
+    """The faults that explain `cases`, the answers; `shown` has those to faulty views by name."""
     before = [score(case) for case in cases]
     base = _guess((), None, cases, before)
     still = _guess((), None, [_held(case) for case in cases], before)
@@ -240,7 +242,7 @@ def judge(
 
 
 def _tried(
-    cases: Sequence[Sample],
+    cases: Sequence[AnswerSample],
     view: ObservationFault | None,
     parts: Iterable[ActionFault],
     before: Sequence[float],
@@ -250,9 +252,9 @@ def _tried(
     for chosen in combinations(parts, size):
         if len({part.family for part in chosen}) < size:
             continue
-        undone: list[Sample] = []
+        undone: list[AnswerSample] = []
         for case in cases:
-            now: Sample | None = case
+            now: AnswerSample | None = case
             for part in chosen:
                 now = part.undo(now) if now is not None else None
             if now is not None:
@@ -264,7 +266,7 @@ def _tried(
 def _guess(
     parts: tuple[ActionFault, ...],
     view: ObservationFault | None,
-    cases: Sequence[Sample],
+    cases: Sequence[AnswerSample],
     before: Sequence[float],
 ) -> Guess:
     each = np.array([errors(case) for case in cases])
@@ -276,7 +278,7 @@ def _guess(
     return Guess(parts, view, each.mean(axis=0), float(np.mean(after)), float(helped), held)
 
 
-def _held(case: Sample) -> Sample:
+def _held(case: AnswerSample) -> AnswerSample:
     """The same with a policy that does not move."""
     return replace(case, given=np.tile(case.now, (len(case.wanted), 1)))
 

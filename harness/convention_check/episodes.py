@@ -104,7 +104,7 @@ class Episode:
         return np.ascontiguousarray(frame)
 
     def observation(self, spec: PolicySpec, t: int) -> Observation:
-        """What a policy with `spec` is shown at frame `t`; `step` is t. Raises EpisodeError."""
+        """Frame `t` as a policy with `spec` observes it; `step` is t. Raises EpisodeError."""
         seen = self._view(spec, t)
         seen["instruction"], seen["step"] = self.instruction, t
         if spec.history:
@@ -298,7 +298,7 @@ class EpisodeRecorder:
     def episode(
         self, name: str, instruction: str, about: Mapping[str, Any], space: ActionSpace
     ) -> Episode:
-        """What was recorded of a robot whose joint actions are of `space`."""
+        """The recorded episode of a robot whose joint actions are of `space`."""
         commanded, measured, ee = (np.stack(rows) for rows in zip(*self._rows, strict=True))
         return Episode(name, commanded, ee, self._frames, space, instruction, measured, about)
 

@@ -16,7 +16,7 @@ import numpy as np
 from robospa.action_space import ActionSpace
 from robospa.geometry import Array
 from robospa.harness.convention_check.check import judge
-from robospa.harness.convention_check.samples import Sample
+from robospa.harness.convention_check.samples import AnswerSample
 from robospa.harness.robots import embodiment
 from robospa.harness.robots.kinematics import chain_of, end_effector
 from robospa.observation import Observation
@@ -62,7 +62,7 @@ def postures(spec: PolicySpec, count: int = POSTURES) -> list[Observation]:
 
 
 def hints(policy: Policy) -> tuple[list[str], str]:
-    """What looks odd about the first actions, a sentence each; and what was seen.
+    """Suspicious properties of the first actions, a sentence each, and the figures behind them.
 
     Raises what the policy raises. Nothing is said of policies that need the exact state, or drive
     another robot than REFERENCE.
@@ -78,7 +78,7 @@ def hints(policy: Policy) -> tuple[list[str], str]:
     return odd(cases, spec.action)
 
 
-def _case(policy: Policy, seen: Observation) -> Sample | None:
+def _case(policy: Policy, seen: Observation) -> AnswerSample | None:
     kind = policy.spec.action
     space = embodiment(REFERENCE).action_space("joint" if kind == "joint" else "ee")
     policy.reset(TRIAL)
@@ -90,10 +90,10 @@ def _case(policy: Policy, seen: Observation) -> Sample | None:
         now = np.tile([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0], 2)
     first = chunk[:1].copy()
     wanted = now[None].copy()
-    return Sample(space, first, wanted, now)
+    return AnswerSample(space, first, wanted, now)
 
 
-def odd(cases: Sequence[Sample], action: str = "joint") -> tuple[list[str], str]:
+def odd(cases: Sequence[AnswerSample], action: str = "joint") -> tuple[list[str], str]:
     """The same for first actions `given` (1, D) at the postures `wanted` (1, D)."""
     space = cases[0].space
     given = np.concatenate([case.given for case in cases])

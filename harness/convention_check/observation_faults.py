@@ -15,13 +15,13 @@ from robospa.observation import Observation, View
 Image = NDArray[np.uint8]
 
 
-class Known(TypedDict, total=False):
-    """What else is known of a frame: `measured` joints and grippers (D,)."""
+class FrameFacts(TypedDict, total=False):
+    """Further data of a frame: `measured` joints [rad] and grippers (D,)."""
 
     measured: Array | None
 
 
-Undo = Callable[[Observation, Known], Observation | None]
+Undo = Callable[[Observation, FrameFacts], Observation | None]
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ def _images(change: Callable[[Image], Image]) -> Undo:
     return lambda seen, known: _each(seen, changed)
 
 
-def _wrists(seen: Observation, known: Known) -> Observation | None:
+def _wrists(seen: Observation, known: FrameFacts) -> Observation | None:
     other = {"left_wrist": "right_wrist", "right_wrist": "left_wrist"}
     if not set(other) <= set(seen["images"]):
         return None
@@ -75,7 +75,7 @@ def _state(change: Callable[[Array], Array], poses: Callable[[Array], Array] | N
             new["ee"] = poses(np.asarray(view["ee"], float)).astype(np.float32)
         return new
 
-    def undo(seen: Observation, known: Known) -> Observation | None:
+    def undo(seen: Observation, known: FrameFacts) -> Observation | None:
         if "state" in seen and len(seen["state"]) % 2:  # arms of different joint counts
             return None
         return _each(seen, changed)
@@ -87,7 +87,7 @@ def _hands(rows: Array) -> Array:
     return np.hstack([rows[:, :-1], 1 - rows[:, -1:]])
 
 
-def _shown_measured(seen: Observation, known: Known) -> Observation | None:
+def _shown_measured(seen: Observation, known: FrameFacts) -> Observation | None:
     measured = known.get("measured")
     if "state" not in seen or measured is None:
         return None

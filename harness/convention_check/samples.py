@@ -18,7 +18,7 @@ WORST = 20.0
 
 
 @dataclass(frozen=True)
-class Sample:
+class AnswerSample:
     """One answer: `given` (K, D) beside what came next in the record, `wanted` (K, D).
 
     `now` (D,) is the command at that frame, `track` (T, D) the whole record of which `now` is row
@@ -36,12 +36,12 @@ class Sample:
 
 
 def groups(space: ActionSpace) -> list[str]:
-    """What errors are told of, in order."""
+    """The groups of columns that errors are reported for, in order."""
     parts = ("joints", "gripper") if space.kind == "joint" else ("position", "rotation", "gripper")
     return [f"{arm} {part}" for arm in ARMS for part in parts]
 
 
-def errors(case: Sample) -> Array:
+def errors(case: AnswerSample) -> Array:
     """Mean error of each of `groups`: [rad] over joints, [m], [rad] of turning, gripper 0..1."""
     found = []
     a, b = case.given, case.wanted
@@ -56,7 +56,7 @@ def errors(case: Sample) -> Array:
     return np.array(found)
 
 
-def score(case: Sample) -> float:
+def score(case: AnswerSample) -> float:
     """All errors in one number: about 1 for an answer as good as it should be."""
     scales = np.array([SCALES[name.split()[1]] for name in groups(case.space)])
     return float(np.minimum(errors(case) / scales, WORST).mean())

@@ -1,1 +1,1 @@
-"""What is made to be looked at: galleries, sheets, the page of tasks, videos."""
+"""Pictures: galleries, object sheets, the page of tasks, videos."""

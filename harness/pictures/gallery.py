@@ -45,7 +45,7 @@ class Cell:
 
 
 @dataclass(frozen=True)
-class Row:
+class GalleryRow:
     """One task and its levels."""
 
     title: str
@@ -56,7 +56,7 @@ class Row:
 def first_frame(
     world: World, scene: Scene, camera: str = "head", size: tuple[int, int] = CELL
 ) -> NDArray[np.uint8]:
-    """What `camera` sees of the settled scene: RGB, uint8 (height, width, 3).
+    """The settled scene as `camera` sees it: RGB, uint8 (height, width, 3).
 
     Raises SceneUnstable or RenderUnavailable.
     """
@@ -76,17 +76,19 @@ def settled_scene(world: World, name: str, level: int, seed: int) -> Scene:
     raise SceneUnstable(f"{name} level {level}: none of the seeds {seed}..{attempt} comes to rest")
 
 
-def task_row(world: World, task: Task, seed: int, sentence: Callable[[Scene], str]) -> Row:
+def task_row(world: World, task: Task, seed: int, sentence: Callable[[Scene], str]) -> GalleryRow:
     """The row of `task`: one settled scene a level, seen by the head camera."""
     cells = []
     for level in sorted(task.levels):
         scene = settled_scene(world, task.name, level, seed)
         image = world.render(CameraSpec("head", 2 * CELL[0], 2 * CELL[1]))
         cells.append(Cell(level, sentence(scene), image))
-    return Row(task.name.replace("_", " "), f"{task.category} · {task.summary}", tuple(cells))
+    return GalleryRow(
+        task.name.replace("_", " "), f"{task.category} · {task.summary}", tuple(cells)
+    )
 
 
-def sheet(rows: Sequence[Row], title: str) -> Image.Image:
+def sheet(rows: Sequence[GalleryRow], title: str) -> Image.Image:
     """The contact sheet as a Pillow image; every row is as wide as the longest one."""
     from PIL import Image, ImageDraw
 

@@ -21,7 +21,7 @@ from robospa.geometry import Pose, Vec3, look_rotation, yaw_rotation
 from robospa.harness.sim import room as furniture
 from robospa.tasks.objects import assets, look_count, object_model
 from robospa.tasks.shapes import Hinge, ObjectModel, Shape
-from robospa.workcell import TABLE_TOP, Table
+from robospa.workcell import TABLE_TOP, TableGeometry
 
 if TYPE_CHECKING:
     from PIL import Image
@@ -63,7 +63,7 @@ class Booth:
         )
         for lamp in cameras.LAMPS:
             self._scene.add_point_light(lamp, cameras.LAMP_COLOR)
-        for shapes in (furniture.table(Table()), furniture.wall(), furniture.floor()):
+        for shapes in (furniture.table(TableGeometry()), furniture.wall(), furniture.floor()):
             self._scene.add_entity(render_body(shapes, "room"))
         self._near = self._camera(LARGE, LARGE)
         self._head = self._camera(320, 240)

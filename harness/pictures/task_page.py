@@ -117,7 +117,7 @@ def _varied(scenes: Mapping[int, Sequence[Scene]]) -> list[str]:
 
 
 def _is_counted(values: Mapping[int, Sequence[Any]]) -> bool:
-    """Whether a fact is a number, or a list, whose size the level alone decides."""
+    """True if a fact is a number, or a list, whose size the level alone decides."""
     if not all(isinstance(v, int | list) for level in values.values() for v in level):
         return False
     sizes = [{_count(v) for v in level} for level in values.values()]
@@ -129,7 +129,7 @@ def _count(value: Any) -> int:
 
 
 def _is_drawn(scenes: Sequence[Scene], key: str) -> bool:
-    """Whether the scenes of one level differ in this fact, which names no object and no place."""
+    """True if the scenes of one level differ in this fact, which names no object and no place."""
     said = set()
     for scene in scenes:
         value = scene.facts[key]
@@ -142,7 +142,7 @@ def _is_drawn(scenes: Sequence[Scene], key: str) -> bool:
 
 
 def _things(scenes: Mapping[int, Sequence[Scene]]) -> str:
-    """How many objects there are, and which kinds at which levels."""
+    """Number of objects, and their kinds by level."""
     levels = sorted(scenes)
     counts = {level: sorted({len(s.objects) for s in scenes[level]}) for level in levels}
     exact = all(len(counts[level]) == 1 for level in levels)
@@ -164,7 +164,7 @@ def _kinds(scene: Scene) -> set[str]:
 
 
 def _noun(item: SceneObject) -> str:
-    """What a thing is called; boxes that are made flat or huge are pads and walls."""
+    """The noun of an object; boxes that are made flat or huge are pads and walls."""
     half = item.params.get("half")
     if half and min(half) < FLAT:
         return "pad"

@@ -1,4 +1,4 @@
-"""What the Aloha-AgileX arms are made of: rounded bars, housings and pins of the real links' size.
+"""Shapes of the Aloha-AgileX arms: rounded bars, housings and pins of the real links' size.
 
 Each entry is in its link's frame. What is drawn and what collides are separate: the fingers carry
 the contacts that matter; palm, wrist and forearm collide too, as plain boxes, so that a

@@ -74,7 +74,7 @@ class PoseTable(Mapping[str, Pose]):
 
 @dataclass(frozen=True, slots=True)
 class StateLayout:
-    """What the rows and columns of a state mean: of one embodiment in one scene.
+    """Meaning of the rows and columns of a state, of one embodiment in one scene.
 
     `tools` are, per arm, the row of the last link and the end-effector frame in it; `joints` how
     many joints each arm has.

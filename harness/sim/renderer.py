@@ -1,4 +1,4 @@
-"""What cameras see: a scene that is only drawn, posed like the physics when the picture is taken.
+"""Rendering: a scene that is only drawn, posed like the physics when the picture is taken.
 
 Drawing has its own scene, without physics: a world that never looks pays nothing, and looking
 cannot change a trial. Robot, table, lights and cameras stay from trial to trial (they hold no

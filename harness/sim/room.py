@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from robospa.geometry import Pose
 from robospa.tasks.shapes import Box, Color, Shape
-from robospa.workcell import Table
+from robospa.workcell import TableGeometry
 
 WHITE: Color = (0.86, 0.86, 0.85)
 WALL: Color = (1.0, 0.9, 0.9)
@@ -14,7 +14,7 @@ LEG = 0.05
 """Side of the square legs, and how far they stand in from the edge [m]."""
 
 
-def table(dimensions: Table) -> tuple[Shape, ...]:
+def table(dimensions: TableGeometry) -> tuple[Shape, ...]:
     """Top and four legs; the frame's origin is on the floor below the table's centre."""
     width, depth = dimensions.size
     under = dimensions.top - dimensions.thickness

@@ -257,7 +257,7 @@ class SapienWorld:
         return self._renderer
 
     def contacts(self) -> tuple[Contact, ...]:
-        """What touches what at this instant."""
+        """All contacts at this instant."""
         return self._loaded().contacts()
 
     def digest(self) -> str:

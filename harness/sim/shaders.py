@@ -84,7 +84,7 @@ def trimmed(folder: Path) -> bool:
 
 
 def cache_folder() -> Path:
-    """Where this user's caches go."""
+    """The folder of this user's caches."""
     base = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
     return Path(base) / "robospa"
 

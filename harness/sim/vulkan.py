@@ -1,4 +1,4 @@
-"""Which Vulkan devices this machine has and which driver serves them, asked without SAPIEN.
+"""The machine's Vulkan devices and their drivers, queried without SAPIEN.
 
 SAPIEN does not tell a driver's version, and the version decides: software rendering needs Mesa 24.3
 or newer. So the loader is asked directly (ctypes, a handful of calls). Asking can end the process
@@ -40,7 +40,7 @@ class Device:
 
     @property
     def too_old(self) -> bool:
-        """Whether this is a software device that SAPIEN is known not to start on."""
+        """True for a software device that SAPIEN is known not to start on."""
         found = re.search(r"Mesa (\d+)\.(\d+)", self.version)
         if self.driver != "llvmpipe" or not found:
             return False

@@ -63,7 +63,7 @@ class GraspCandidate:
 
 
 def upright(pose: Pose) -> bool:
-    """Whether the body's z axis points up within 25 degrees."""
+    """True if the body's z axis points up within 25 degrees."""
     return rotate(pose.rotation, (0, 0, 1))[2] > 0.9
 
 
@@ -182,7 +182,7 @@ def penetration_depth(
     opening: float,
     near: Sequence[_Box] | None = None,
 ) -> float:
-    """How deep [m] the opened fingers of `hand` would be inside neighbours at `pose` (0 = free).
+    """Depth [m] of the opened fingers of `hand` inside neighbours at `pose` (0 = free).
 
     `near` are the target's neighbours, for a caller that asks about many poses.
     """

@@ -60,7 +60,7 @@ def hit(ws: Workspace, call: Hit) -> Steps:
 
 
 def _back(ws: Workspace, arm: int, tool: str, home: Pose) -> Place:
-    """How the tool is put back: turned as it lay, if that can be done."""
+    """The call that puts the tool back: turned as it lay, if that can be done."""
     w, _, _, z = home.rotation
     call = Place(tool, home.position, yaw=2 * math.atan2(z, w))
     offset = grip_offset(ws, arm, tool)
@@ -89,7 +89,7 @@ def _strike(ws: Workspace, arm: int, tool: str, name: str) -> Generator[Array, S
 
 
 def _fitting(ws: Workspace, call: Hit, names: list[str]) -> GraspFilter:
-    """Which grasps will do: those with two ways to every object, or as good as there are."""
+    """Accepts grasps with SPARE placements on every object, or as many as the best grasp has."""
 
     def ways(grasp: GraspCandidate) -> int:
         offset = grasp.pose.inverse() * ws.pose(call.tool)

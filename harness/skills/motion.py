@@ -40,7 +40,7 @@ def object_tops(ws: Workspace, but: str | None) -> list[tuple[Array, float, floa
 
 
 def depth_below_grasp(ws: Workspace, arm: int) -> float:
-    """How far the lowest point of the gripper, or of what it holds, is below the grasp centre."""
+    """Distance [m] of the lowest point of the gripper, or of its load, below the grasp centre."""
     name, fingertip = ws.held[arm], ws.hand(arm).fingertip
     if name is None:
         return fingertip

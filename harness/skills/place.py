@@ -47,7 +47,7 @@ def grip_offset(ws: Workspace, arm: int, name: str) -> Pose:
 
 
 def place_position(ws: Workspace, call: Place) -> tuple[float, float, float]:
-    """Where the object's origin goes in the world [m]."""
+    """World position [m] at which the call puts the object's origin."""
     if call.on is None:
         return call.position
     support = ws.pose(call.on) * ws.models[call.on].frames["support"]
@@ -102,7 +102,7 @@ def drop_targets(ws: Workspace, call: Drop) -> list[Pose]:
 
 
 def can_follow(ws: Workspace, call: Place | Drop, grasp: GraspCandidate) -> bool:
-    """Whether `grasp` would let the same arm do `call` afterwards."""
+    """True if the same arm could do `call` after `grasp`."""
     offset = grasp.pose.inverse() * ws.pose(call.object)
     targets = place_targets(ws, call) if isinstance(call, Place) else drop_targets(ws, call)
     above = ABOVE if isinstance(call, Place) else 0.0

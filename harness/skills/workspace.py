@@ -107,7 +107,7 @@ class Workspace:
 
 
 def is_wall(model: ObjectModel) -> bool:
-    """Whether the object stands across the table like a wall: too high to be carried over."""
+    """True for an object across the table like a wall: too high to carry anything over it."""
     return model.size[2] > WALL_HEIGHT and model.size[1] < WALL_DEPTH
 
 

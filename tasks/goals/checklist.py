@@ -30,7 +30,7 @@ class Counter(Protocol):
 
 
 class Watch(Protocol):
-    """What is looked at beside the subtasks: it reports events and diagnostics of its own.
+    """A monitor beside the subtasks, with events and diagnostics of its own.
 
     `roles` are the objects that no subtask moves. `events` are those of this instant so far; an
     event "failed" among what `update` returns ends the trial.
@@ -55,7 +55,7 @@ def _is_counter(item: Counter | Part) -> TypeGuard[Counter]:
 
 
 def _is_carried(counter: Counter) -> bool:
-    """Whether what is counted is done with the object in hand (a stamp), not to it (a press)."""
+    """True if the action is done with the object in hand (a stamp), not to it (a press)."""
     return bool(getattr(counter, "carried", False))
 
 
@@ -109,7 +109,7 @@ class Checklist:
 
     @property
     def roles(self) -> dict[str, ObjectRole]:
-        """What is moved and what is pressed; mere places are distractors."""
+        """Objects that are moved or pressed; targets of placements count as distractors."""
         found: dict[str, ObjectRole] = dict(self._watch.roles) if self._watch else {}
         found |= {t: ObjectRole() for p in self._parts.values() for t in p.targets}
         for i, part in self._parts.items():
@@ -121,7 +121,7 @@ class Checklist:
         return found
 
     def start(self, snapshot: Snapshot) -> tuple[Event, ...]:
-        """What holds already, if anything."""
+        """Subtasks that hold before the first action."""
         self._lift_tracker.start(snapshot)
         for counter in self._counters.values():
             counter.start(snapshot)

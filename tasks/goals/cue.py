@@ -32,7 +32,7 @@ class Stillness:
         self._origins = tuple(pose.position for pose in snapshot.end_effector)
 
     def broken(self, snapshot: Snapshot) -> bool:
-        """Whether an end effector has left its place by now."""
+        """True once an end effector has moved more than STILL from its start."""
         for origin, pose in zip(self._origins, snapshot.end_effector, strict=True):
             self.motion = max(self.motion, math.dist(origin, pose.position))
         return self.motion > STILL

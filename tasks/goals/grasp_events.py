@@ -143,7 +143,7 @@ class GraspMonitor:
         return found
 
     def _approaches(self, snapshot: Snapshot, arm: int, state: _Arm) -> tuple[Event, ...]:
-        """What a moving arm has come near to since the last sample."""
+        """Objects that a moving arm has come near to since the last sample."""
         at = snapshot.end_effector[arm].position
         if math.dist(at, state.seen) < AT_REST:
             return ()

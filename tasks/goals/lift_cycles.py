@@ -83,7 +83,7 @@ def back_home(name: str, way: float, turn: float) -> PoseTest:
 
 
 def upright(pose: Pose) -> bool:
-    """Whether the object stands within about 37 degrees of upright."""
+    """True if the object stands within about 37 degrees of upright."""
     return rotate(pose.rotation, (0.0, 0.0, 1.0))[2] > UPRIGHT
 
 

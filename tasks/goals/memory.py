@@ -122,7 +122,7 @@ class UncoverInOrder:
         return Event(snapshot.time, "failed", name, index, note)
 
     def diagnostics(self) -> dict[str, float]:
-        """When the cue was hidden (-1: not yet), motion [m] before, wrong lifts, drops."""
+        """Time at which the cue was hidden (-1: not yet), motion [m] before, wrong lifts, drops."""
         return {
             "idle_progress": 0.0,
             "cue_hidden_at": -1.0 if self._hidden_at is None else self._hidden_at,

@@ -78,7 +78,7 @@ class Nested:
         """Nothing to remember."""
 
     def holds(self, snapshot: Snapshot, before: bool) -> bool:
-        """Whether it stands there, given whether it did `before`."""
+        """True if it stands there; `before` is the last value."""
         if self.name not in self._tower.at(snapshot):
             return False
         return before or not closed_near(snapshot, snapshot.position(self.name), HELD_RADIUS)

@@ -25,5 +25,5 @@ class Opened:
         """Nothing to remember."""
 
     def holds(self, snapshot: Snapshot, before: bool) -> bool:
-        """Whether it is open far enough at this instant."""
+        """True if it is open far enough at this instant."""
         return snapshot.hinges[self.name] >= self._angle

@@ -97,7 +97,7 @@ class Rests:
         self._home = snapshot.poses[self.name]
 
     def holds(self, snapshot: Snapshot, before: bool) -> bool:
-        """Whether it lies there, given whether it did `before`."""
+        """True if it lies there; `before` is the last value."""
         pose = snapshot.poses[self.name]
         against = [snapshot.poses[t] for t in self.targets] or [self._home]
         if not any(self.near(pose, other) for other in against):
@@ -115,12 +115,12 @@ class Container:
         self._to_local = pose.inverse()
 
     def over(self, point: Vec3) -> bool:
-        """Whether `point` [m, world] lies inside the walls, at any height."""
+        """True if `point` [m, world] lies inside the walls, at any height."""
         x, y, _ = self._to_local.apply(point)
         return abs(x) < self.half[0] and abs(y) < self.half[1]
 
     def inside(self, point: Vec3) -> bool:
-        """Whether `point` [m, world] lies inside the walls and between ground and rim.
+        """True if `point` [m, world] lies inside the walls and between ground and rim.
 
         Containers stand upright.
         """
@@ -151,7 +151,7 @@ class Inside:
         self._last, self._time = snapshot.position(self.name), snapshot.time
 
     def holds(self, snapshot: Snapshot, before: bool) -> bool:
-        """Whether it is inside, and slow if it was not there `before`."""
+        """True if it is inside, and slow if it was not there `before`."""
         here = snapshot.position(self.name)
         elapsed = max(snapshot.time - self._time, 1e-6)
         slow = math.dist(here, self._last) < SLOW * elapsed
@@ -195,11 +195,11 @@ class Region:
     y: tuple[float, float] = (-math.inf, math.inf)
 
     def holds(self, x: float, y: float) -> bool:
-        """Whether the point lies in it, its edge included."""
+        """True if the point lies in it, its edge included."""
         return self.x[0] <= x <= self.x[1] and self.y[0] <= y <= self.y[1]
 
     def over(self, point: Vec3) -> bool:
-        """Whether `point` [m, world] lies inside, at any height, its edge left out."""
+        """True if `point` [m, world] lies inside, at any height, its edge left out."""
         return self.x[0] < point[0] < self.x[1] and self.y[0] < point[1] < self.y[1]
 
 

@@ -25,7 +25,7 @@ BACK = 0.01
 
 @dataclass(frozen=True)
 class Lift:
-    """What counts as picked; tests that are None or False are not made.
+    """The conditions of a lift; those that are None or False are not tested.
 
     `above`: the origin is higher than this [m, world]. `rise`: it is higher than at the start by
     more than this [m]. `steady`: every other object is within this [m] of its start height.
@@ -115,7 +115,7 @@ class PickTracker:
 
 
 def carried(snapshot: Snapshot, point: Vec3, opening: float) -> bool:
-    """Whether an arm commanded to less than `opening` has its grasp centre near `point`."""
+    """True if an arm commanded to less than `opening` has its grasp centre near `point`."""
     for commanded, (x, y, z) in zip(snapshot.gripper, snapshot.grasp_points, strict=True):
         if commanded < opening:
             dx, dy, dz = x - point[0], y - point[1], z - point[2]

@@ -40,7 +40,7 @@ class PressCounter:
         self._last_touch = float("-inf")
 
     def touched(self, snapshot: Snapshot) -> bool:
-        """Whether a gripper touches the object inside the box at this instant."""
+        """True if a gripper touches the object inside the box at this instant."""
         if not snapshot.contacts:
             return False
         contacts = snapshot.gripper_contacts(self.name)
@@ -58,7 +58,7 @@ class PressCounter:
             self._last_touch = snapshot.time
 
     def update(self, snapshot: Snapshot) -> bool:
-        """Whether a press begins at this instant."""
+        """True if a press begins at this instant."""
         touching = self.touched(snapshot)
         if touching:
             self._left |= snapshot.time - self._last_touch >= REARM - 1e-9

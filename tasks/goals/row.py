@@ -40,7 +40,7 @@ class Pair:
         self._ceilings = [snapshot.height(name) + RAISED for name in self.movers]
 
     def holds(self, snapshot: Snapshot, before: bool) -> bool:
-        """Whether they are in place, given whether they were `before`."""
+        """True if both are in place; `before` is the last value."""
         left, right = places = [snapshot.position(name) for name in self.movers]
         in_place = (
             right[0] > left[0]
@@ -54,7 +54,7 @@ class Pair:
 
 
 class _ChancePairs:
-    """How many pairs were in place before anything was done."""
+    """Counts the pairs that are in place before the first action."""
 
     def __init__(self, pairs: Sequence[Pair]) -> None:
         self.roles: dict[str, ObjectRole] = {}

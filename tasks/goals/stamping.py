@@ -41,7 +41,7 @@ class StampCounter:
         self._armed = self._raw_armed = not (level < ON and height < ON)
 
     def update(self, snapshot: Snapshot) -> bool:
-        """Whether a stamp begins at this instant."""
+        """True if a stamp begins at this instant."""
         level, height = self.offset(snapshot)
         if level > OFF or height > OFF:
             self._armed = True

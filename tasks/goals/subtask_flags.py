@@ -26,18 +26,18 @@ class SubtaskFlags:
 
     @property
     def all(self) -> bool:
-        """Whether every subtask holds."""
+        """True if every subtask holds."""
         return all(self.held)
 
 
 def grippers_open(snapshot: Snapshot) -> bool:
-    """Whether both grippers are commanded open."""
+    """True if both grippers are commanded open."""
     left, right = snapshot.gripper
     return left > GRIPPER_OPEN and right > GRIPPER_OPEN
 
 
 def closed_near(snapshot: Snapshot, point: Vec3, radius: float) -> bool:
-    """Whether a gripper that is not open has its grasp centre within `radius` [m] of `point`."""
+    """True if a gripper that is not open has its grasp centre within `radius` [m] of `point`."""
     return holding_arm(snapshot, point, radius) is not None
 
 
@@ -53,7 +53,7 @@ def holding_arm(snapshot: Snapshot, point: Vec3, radius: float) -> int | None:
 
 
 def inside_box(point: Vec3, centre: Vec3, half: Vec3) -> bool:
-    """Whether `point` lies strictly inside the axis-aligned box around `centre`."""
+    """True if `point` lies strictly inside the axis-aligned box around `centre`."""
     return (
         abs(point[0] - centre[0]) < half[0]
         and abs(point[1] - centre[1]) < half[1]

@@ -32,7 +32,7 @@ class HitCounter(PressCounter):
         self._head = head
 
     def touched(self, snapshot: Snapshot) -> bool:
-        """Whether the tool touches the object with its head over the frame at this instant."""
+        """True if the tool touches the object with its head over the frame at this instant."""
         x, y, _ = snapshot.poses[self._tool].apply(self._head.position)
         fx, fy, _ = snapshot.poses[self.name].apply(self.frame.position)
         if abs(x - fx) >= HIT_REACH or abs(y - fy) >= HIT_REACH:

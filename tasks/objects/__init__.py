@@ -85,7 +85,7 @@ def assets() -> tuple[str, ...]:
 
 
 def look_count(asset: str) -> int:
-    """How many looks `asset` has: params {"look": k} takes k = 0 .. looks - 1."""
+    """Number of looks of `asset`: params {"look": k} takes k = 0 .. count - 1."""
     return _asset(asset).look_count
 
 

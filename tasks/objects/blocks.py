@@ -53,7 +53,7 @@ def block(look: int, params: Params) -> ObjectModel:
 
 @lru_cache(maxsize=1024)
 def _block_phrases(color: Color) -> tuple[str, ...]:
-    """What a block of that colour is called: by the nearest colour that has a word."""
+    """Noun phrases of a block: by the nearest colour that has a word."""
     gaps = [math.sqrt(float(d.dot(d))) for d in _KNOWN - color]
     word = list(BLOCK_COLORS)[gaps.index(min(gaps))]
     return (

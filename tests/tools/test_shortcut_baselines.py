@@ -14,7 +14,7 @@ from functools import cache
 import numpy as np
 import pytest
 import shortcut_baselines as guessers
-from shortcut_baselines import Sample
+from shortcut_baselines import GuessingSet
 
 from robospa.tasks import catalog
 from robospa.tasks.scene import Scene
@@ -62,13 +62,13 @@ def test_objects_are_not_created_in_the_order_that_is_asked_for(name: str, level
 # The guessers themselves
 
 
-def guessed(seen: Sample) -> float:
+def guessed(seen: GuessingSet) -> float:
     """Probability of what the better guesser got, if it knew nothing."""
     return 2 * guessers.tail(max(guessers.hits(seen).values()), len(seen.answers), seen.chance)
 
 
 @cache
-def honest() -> Sample:
+def honest() -> GuessingSet:
     """Scenes of a variant that gives nothing away."""
     made = [catalog.build_scene("Pick_Blocks_Size", 3, s) for s in range(600_000, 600_300)]
     ask = guessers.question_of("Pick_Blocks_Size")
@@ -119,7 +119,7 @@ def test_a_target_that_is_never_at_the_rim_is_found_by_the_bent_guesser() -> Non
     rng = np.random.default_rng(2)
     features = rng.uniform(-1, 1, (400, 4, 3))
     answers = np.argmin(np.abs(features[:, :, 0]), axis=1)
-    found = guessers.hits(Sample(features, answers))
+    found = guessers.hits(GuessingSet(features, answers))
     assert found["random"] > 200 > 1.4 * found["linear"]
 
 

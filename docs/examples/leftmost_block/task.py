@@ -16,7 +16,7 @@ from robospa.tasks.plan import Pick, Skill
 from robospa.tasks.sampling.region import Area, Mask, Points
 from robospa.tasks.sampling.scatter import scatter
 from robospa.tasks.scene import Scene, SceneObject
-from robospa.tasks.task import Draft, Level, Task, Tracker
+from robospa.tasks.task import Level, SceneSample, Task, Tracker
 from robospa.workcell import TABLE_TOP, Workcell
 
 TEXT = TaskText.beside(__file__, "instructions.toml")
@@ -25,7 +25,7 @@ AREA = Area(x=(-0.25, 0.25), y=(-0.15, 0.08), clear_middle=True)
 LEVELS = {k: Level(candidates=k + 1, subtasks=1, steps=150) for k in range(1, 6)}
 
 
-def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
     """Blocks scattered at least 9 cm apart, the leftmost one by a clear 3 cm."""
     count = LEVELS[level].candidates
 
@@ -49,7 +49,7 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
         for i, (x, y) in enumerate(points)
     )
     target = min(blocks, key=lambda block: block.pose.position[0])
-    return Draft(blocks, PickFacts(target.name))
+    return SceneSample(blocks, PickFacts(target.name))
 
 
 def goal(scene: Scene) -> Tracker:

@@ -24,7 +24,7 @@ from robospa.tasks.plan import Home, Pick, Place, Press, Skill
 from robospa.tasks.sampling.points import free_point, retry
 from robospa.tasks.sampling.region import Point
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Draft, Level, Task
+from robospa.tasks.task import Level, SceneSample, Task
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "can_basket.toml")
@@ -60,14 +60,14 @@ class Facts(SceneFacts):
     pad: str = ""
 
 
-def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
     """The things of this level, each in its region, no two touching."""
     return retry(
         lambda: _draw(level, rng, workcell), f"objects of Click_Can_Place_Items level {level}"
     )
 
 
-def _draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft | None:
+def _draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample | None:
     can = draw_look(rng, "can")
     items: list[Item] = []
     far: list[tuple[Point, float]] = []  # what the can must keep away from, and how far [m]
@@ -98,7 +98,7 @@ def _draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft | N
         return None
     items.append(Item("can", "can", standing(place), can, fixed=True))
     scene_objects, names = named(rng, items)
-    return Draft(scene_objects, Facts(**names))
+    return SceneSample(scene_objects, Facts(**names))
 
 
 def goal(scene: Scene) -> Checklist:

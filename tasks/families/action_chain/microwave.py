@@ -36,7 +36,7 @@ from robospa.tasks.sampling.points import retry
 from robospa.tasks.sampling.region import Point
 from robospa.tasks.scene import Scene
 from robospa.tasks.shapes import Hinge
-from robospa.tasks.task import Draft, Level, Task
+from robospa.tasks.task import Level, SceneSample, Task
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "microwave.toml")
@@ -86,14 +86,14 @@ class Facts(SceneFacts):
     reference: str = ""
 
 
-def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
     """Bell, microwave and things, each in its region, none where the door swings."""
     return retry(
         lambda: _draw(level, rng, workcell), f"objects around the microwave, level {level}"
     )
 
 
-def _draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft | None:
+def _draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample | None:
     bell, look = _point(rng, BELL_X, BELL_Y), draw_look(rng, "bell")
     items = [Item("bell", "bell", standing(bell), look, fixed=True)]
     if level >= 2:
@@ -107,7 +107,7 @@ def _draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft | N
                 return None
             items += things
     scene_objects, names = named(rng, items)
-    return Draft(scene_objects, Facts(**names))
+    return SceneSample(scene_objects, Facts(**names))
 
 
 def _point(rng: np.random.Generator, x: tuple[float, float], y: tuple[float, float]) -> Point:

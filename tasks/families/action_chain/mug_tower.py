@@ -28,7 +28,7 @@ from robospa.tasks.plan import Hang, Pick, Place, Skill
 from robospa.tasks.sampling.points import free_point, retry
 from robospa.tasks.sampling.region import Point
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Draft, Level, Task
+from robospa.tasks.task import Level, SceneSample, Task
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "mug_tower.toml")
@@ -73,14 +73,14 @@ class Facts(SceneFacts):
     yellow: str = ""
 
 
-def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
     """Mug and rack on the right, blocks on the left."""
     return retry(
         lambda: _draw(level, rng, workcell), f"objects of Hang_Mug_Stack_Blocks level {level}"
     )
 
 
-def _draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft | None:
+def _draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample | None:
     mug, rack = draw_look(rng, "mug"), draw_look(rng, "mug_rack")
     at = free_point(rng, MUG_X, MUG_Y, [], allowed=in_view(workcell, "mug", mug))
     stand = free_point(rng, RACK_X, RACK_Y, [], allowed=partial(_rack_seen, workcell))
@@ -102,7 +102,7 @@ def _draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft | N
         paint = {"half": [HALF] * 3, "color": list(COLORS[color])}
         items.append(Item(color, "block", pose, paint))
     scene_objects, names = named(rng, items)
-    return Draft(scene_objects, Facts(**names))
+    return SceneSample(scene_objects, Facts(**names))
 
 
 def _rack_seen(workcell: Workcell, point: Point) -> bool:

@@ -28,7 +28,7 @@ from robospa.tasks.plan import Dock, Home, Pour, Press, Skill
 from robospa.tasks.sampling.points import free_point, retry
 from robospa.tasks.sampling.region import Point
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Draft, Level, Task
+from robospa.tasks.task import Level, SceneSample, Task
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "phone_stapler.toml")
@@ -72,14 +72,14 @@ class Facts(SceneFacts):
     dustbin: str = ""
 
 
-def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
     """This level's things, each in its region, no two touching."""
     return retry(
         lambda: _draw(level, rng, workcell), f"objects of Place_Phone_Press_Stapler level {level}"
     )
 
 
-def _draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft | None:
+def _draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample | None:
     items: list[Item] = []
     taken: list[tuple[Point, float]] = []
     wanted = ["phone", "phone_stand", *(["stapler"] if PRESSES[level] else [])]
@@ -102,7 +102,7 @@ def _draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft | N
         items.append(Item("garbage", "garbage", start, {"look": 0}))
         items.append(Item("dustbin", "dustbin", BIN, {"look": 0}, fixed=True))
     scene_objects, names = named(rng, items)
-    return Draft(scene_objects, Facts(**names), TABLE_SHIFT)
+    return SceneSample(scene_objects, Facts(**names), TABLE_SHIFT)
 
 
 def _within(box: tuple[float, float, float], frame: Pose) -> Near:

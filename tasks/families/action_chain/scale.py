@@ -26,7 +26,7 @@ from robospa.tasks.plan import Place, Skill
 from robospa.tasks.sampling.points import free_point, retry
 from robospa.tasks.sampling.region import Point
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Draft, Level, Task
+from robospa.tasks.task import Level, SceneSample, Task
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "scale.toml")
@@ -80,14 +80,14 @@ class Facts(SceneFacts):
         return {"b": (self.bell, self.scale), "o": (self.object, self.stand)}
 
 
-def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
     """This level's things, each in its region."""
     return retry(
         lambda: _draw(level, rng, workcell), f"objects of Place_Object_Scale_Click level {level}"
     )
 
 
-def _draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft | None:
+def _draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample | None:
     items: list[Item] = []
     taken: dict[str, tuple[Point, float]] = {}
     thing = THINGS[int(rng.integers(len(THINGS)))]
@@ -105,7 +105,7 @@ def _draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft | N
         pose = standing(point, float(rng.uniform(-turn, turn)))
         items.append(Item(role, asset, pose, look, fixed=role in FIXED))
     scene_objects, names = named(rng, items)
-    return Draft(scene_objects, Facts(**names))
+    return SceneSample(scene_objects, Facts(**names))
 
 
 def _allowed(

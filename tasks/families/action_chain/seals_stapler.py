@@ -24,7 +24,7 @@ from robospa.tasks.instructions.words import times
 from robospa.tasks.plan import Press, Skill, Stamp
 from robospa.tasks.sampling.points import free_point, retry
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Draft, Level, Task
+from robospa.tasks.task import Level, SceneSample, Task
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "seals_stapler.toml")
@@ -63,14 +63,14 @@ class Facts(SceneFacts):
         return {"l": (self.left_seal, self.left_pad), "r": (self.right_seal, self.right_pad)}
 
 
-def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
     """Seals and pads of this level's sides, and the stapler between them."""
     return retry(
         lambda: _draw(level, rng, workcell), f"objects of Stamp_Seals_Press_Stapler level {level}"
     )
 
 
-def _draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft | None:
+def _draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample | None:
     items: list[Item] = []
     taken: list[tuple[tuple[float, float], float]] = []
     for at in ("left", "right")[: 1 + ("r" in STEPS[level])]:
@@ -95,7 +95,7 @@ def _draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft | N
         pose = standing(spot, float(rng.uniform(-math.pi, math.pi)))
         items.append(Item("stapler", "stapler", pose, look, fixed=True))
     scene_objects, names = named(rng, items)
-    return Draft(scene_objects, Facts(**names))
+    return SceneSample(scene_objects, Facts(**names))
 
 
 def goal(scene: Scene) -> Checklist:

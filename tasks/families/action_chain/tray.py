@@ -26,7 +26,7 @@ from robospa.tasks.plan import Place, Skill
 from robospa.tasks.sampling.points import free_point, retry
 from robospa.tasks.sampling.region import Point
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Draft, Level, Task
+from robospa.tasks.task import Level, SceneSample, Task
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "tray.toml")
@@ -71,13 +71,13 @@ class Facts(SceneFacts):
         return {"burger": self.burger, "fries": self.fries}
 
 
-def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
     """The tray in the middle, food beside it, the bell behind."""
     what = f"objects of Place_Burger_Fries_Click_Bell level {level}"
     return retry(lambda: _draw(level, rng, workcell), what)
 
 
-def _draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft | None:
+def _draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample | None:
     look = draw_look(rng, "tray")
     middle = (0.0, float(rng.uniform(*TRAY_Y)))
     items = [Item("tray", "tray", standing(middle), look, fixed=True)]
@@ -107,7 +107,7 @@ def _draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft | N
             return None
         items.append(Item("bell", "bell", standing(place), look, fixed=True))
     scene_objects, names = named(rng, items)
-    return Draft(scene_objects, Facts(**names))
+    return SceneSample(scene_objects, Facts(**names))
 
 
 def _at_home(pose: Pose, start: Pose) -> bool:

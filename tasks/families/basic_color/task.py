@@ -18,7 +18,7 @@ from robospa.tasks.goals.pick import Lift
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Draft, Task
+from robospa.tasks.task import SceneSample, Task
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "instructions.toml")
@@ -103,14 +103,14 @@ def color_task(family: Family, colored: Colored, what: str) -> Task:
     """The task that names the target of `family` by its colour."""
     rules = family.rules
 
-    def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
+    def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
         found = layouts(workcell, rules, level)
         layout = found[int(rng.integers(len(found)))]
         points = shifted(rng, workcell, rules, level, layout)
         things, words = colored(level, rng)
         objects, order = put_down(rng, workcell, points, things, family.yaw)
         target = int(rng.integers(len(objects)))
-        return Draft(objects, Facts(f"object_{target}", words[order[target]]))
+        return SceneSample(objects, Facts(f"object_{target}", words[order[target]]))
 
     def slots(scene: Scene) -> Slots:
         return TEXT.slots("target", color=Facts.of(scene).color, noun=family.noun)

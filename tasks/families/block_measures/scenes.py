@@ -22,7 +22,7 @@ from robospa.tasks.instructions.words import ordinal
 from robospa.tasks.sampling.region import Area, Mask, Points, spread
 from robospa.tasks.sampling.scatter import scatter
 from robospa.tasks.scene import Scene, SceneObject
-from robospa.tasks.task import Draft, Level, Task
+from robospa.tasks.task import Level, SceneSample, Task
 from robospa.workcell import TABLE_TOP, FixedCamera, Workcell
 
 TEXT = TaskText.beside(__file__, "instructions.toml")
@@ -158,7 +158,7 @@ def diagonal(half: Vec3) -> float:
 
 def draw(
     level: int, rng: np.random.Generator, workcell: Workcell, measure: Measure, layout: Layout
-) -> Draft:
+) -> SceneSample:
     """Blocks of the first n ranks in random order, scattered, and a uniform target rank."""
     ranges = measure.ranges(level)
     count = len(ranges)
@@ -197,7 +197,7 @@ def draw(
     )
     target = int(rng.integers(count))
     rank = {f"{measure.word}_rank": ranks[target]}
-    return Draft(objects, Facts(f"object_{target}", **rank))
+    return SceneSample(objects, Facts(f"object_{target}", **rank))
 
 
 def rank_task(measure: Measure, layouts: Mapping[int, Layout]) -> Task:

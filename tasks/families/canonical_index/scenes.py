@@ -22,7 +22,7 @@ from robospa.tasks.instructions.words import ordinal
 from robospa.tasks.sampling.grid import GridLayout
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.shapes import Params
-from robospa.tasks.task import Draft, Draw, Level, Task
+from robospa.tasks.task import Draw, Level, SceneSample, Task
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "instructions.toml")
@@ -87,7 +87,7 @@ def drawer(line: Line, fixed: bool) -> Draw:
     Directions are uniform too, or, if `fixed`, left to right and far to near.
     """
 
-    def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
+    def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
         grid = line.layouts[level]
         count = grid.rows * grid.columns
         place = grid.places(rng, workcell)
@@ -113,7 +113,7 @@ def drawer(line: Line, fixed: bool) -> Draw:
                 row=grid.rows - row if from_far else row + 1,
                 row_direction="far_to_near" if from_far else "near_to_far",
             )
-        return Draft(tuple(objects), facts)
+        return SceneSample(tuple(objects), facts)
 
     return draw
 

@@ -23,7 +23,7 @@ from robospa.tasks.instructions.words import NUMBERS, acting_arm, one_after_anot
 from robospa.tasks.plan import Skill
 from robospa.tasks.sampling.region import LayoutError, Point, apart
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Draft, Level, Task
+from robospa.tasks.task import Level, SceneSample, Task
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "bells.toml")
@@ -48,7 +48,7 @@ class Facts(SceneFacts):
     order: tuple[str, ...]
 
 
-def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
     """The ring of bells, all of one look, shifted to a random place of the region."""
     params = clickable_look(rng, "bell")
     points = _ring(level, rng, in_view(workcell, "bell", params))
@@ -57,7 +57,7 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
         for i, point in enumerate(points)
     ]
     scene_objects, names = named(rng, items)
-    return Draft(scene_objects, Facts(tuple(names[item.role] for item in items)))
+    return SceneSample(scene_objects, Facts(tuple(names[item.role] for item in items)))
 
 
 def _ring(level: int, rng: np.random.Generator, seen: Callable[[Point], bool]) -> list[Point]:

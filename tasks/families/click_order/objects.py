@@ -26,7 +26,7 @@ from robospa.tasks.instructions.words import acting_arm, one_after_another
 from robospa.tasks.plan import Skill
 from robospa.tasks.sampling.region import Area
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Draft, Level, Task
+from robospa.tasks.task import Level, SceneSample, Task
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "objects.toml")
@@ -44,7 +44,7 @@ class Facts(SceneFacts):
     order: tuple[str, ...]
 
 
-def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
     """The first things of the order, at random places off the middle."""
     looks = [(asset, clickable_look(rng, asset)) for asset in ORDER[:level]]
     points = scattered(rng, workcell, AREA, MIDDLE, DISTANCE, looks)
@@ -53,7 +53,7 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
         for (asset, look), point in zip(looks, points, strict=True)
     ]
     scene_objects, names = named(rng, items)
-    return Draft(scene_objects, Facts(tuple(names[asset] for asset in ORDER[:level])))
+    return SceneSample(scene_objects, Facts(tuple(names[asset] for asset in ORDER[:level])))
 
 
 def goal(scene: Scene) -> ClickInOrder:

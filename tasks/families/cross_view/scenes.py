@@ -32,7 +32,7 @@ from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.sampling.markov import Fits, pool, walk
 from robospa.tasks.sampling.region import LayoutError, Mask
 from robospa.tasks.scene import Scene, SceneObject
-from robospa.tasks.task import Draft, Draw, Level, Task
+from robospa.tasks.task import Draw, Level, SceneSample, Task
 from robospa.workcell import TABLE_TOP, Workcell
 
 TEXT = TaskText.beside(__file__, "instructions.toml")
@@ -207,7 +207,7 @@ def drawer(spread: Spread, views: tuple[str, ...]) -> Draw:
     the objects that are extreme there, each equally likely: the scene does not tell which.
     """
 
-    def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
+    def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
         count = OBJECTS[level]
         view = views[int(rng.integers(len(views)))]
         known = layouts(workcell, spread, level)
@@ -235,7 +235,7 @@ def drawer(spread: Spread, views: tuple[str, ...]) -> Draw:
             viewpoint=view,
             position=SEEN_AS[view][extreme],
         )
-        return Draft(tuple(objects), facts)
+        return SceneSample(tuple(objects), facts)
 
     return draw
 

@@ -27,7 +27,7 @@ from robospa.tasks.sampling.markov import Fits, keeps_apart, pool, walk
 from robospa.tasks.sampling.region import LayoutError, Mask
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.shapes import Params
-from robospa.tasks.task import Draft, Level, Task
+from robospa.tasks.task import Level, SceneSample, Task
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "instructions.toml")
@@ -252,7 +252,7 @@ class Facts(PickFacts):
     distance_rank: int
 
 
-def draw(level: int, rng: np.random.Generator, workcell: Workcell, family: Family) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell, family: Family) -> SceneSample:
     """A layout with clear distances, a uniform rank, then what lies where."""
     rules = family.rules
     found = clear_layouts(workcell, rules, level)
@@ -263,7 +263,7 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell, family: Famil
     things = family.things(level, rng)
     objects, order = put_down(rng, workcell, points, things, family.yaw)
     facts = Facts(f"object_{order.index(target)}", f"object_{order.index(0)}", rank)
-    return Draft(objects, facts)
+    return SceneSample(objects, facts)
 
 
 def distance_task(family: Family, name: str, what: str) -> Task:

@@ -32,7 +32,7 @@ from robospa.tasks.plan import Skill
 from robospa.tasks.sampling.points import scatter_points
 from robospa.tasks.sampling.region import Point
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Draft, Level, Task, Tracker
+from robospa.tasks.task import Level, SceneSample, Task, Tracker
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "bottles.toml")
@@ -60,7 +60,7 @@ def _usable(workcell: Workcell, point: Point) -> bool:
     )
 
 
-def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
     """Bottles anywhere in the region but the middle strip; different looks up to level 3."""
     points = scatter_points(rng, level, X, Y, DISTANCE, partial(_usable, workcell))
     count = objects.look_count("bottle")
@@ -70,7 +70,7 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
         items.append(Item(f"bottle {i}", "bottle", standing(point), {"look": int(look)}))
     scene_objects, names = named(rng, items)
     facts = Facts(names["dustbin"], tuple(names[f"bottle {i}"] for i in range(level)))
-    return Draft(scene_objects, facts, TABLE_SHIFT)
+    return SceneSample(scene_objects, facts, TABLE_SHIFT)
 
 
 def goal(scene: Scene) -> Tracker:

@@ -33,7 +33,7 @@ from robospa.tasks.plan import Pick, Place, Skill
 from robospa.tasks.sampling.points import free_point, retry
 from robospa.tasks.sampling.region import Point
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Draft, Level, Task
+from robospa.tasks.task import Level, SceneSample, Task
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "bottles_and_cups.toml")
@@ -93,12 +93,12 @@ class Facts(SceneFacts):
         return _there(self.coaster_0, self.coaster_1)
 
 
-def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
     """Bottles on the far half, cups and coasters on the near one."""
     return retry(lambda: _draw(level, rng, workcell), f"objects of Place_Bottle_Cup level {level}")
 
 
-def _draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft | None:
+def _draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample | None:
     items = [Item("dustbin", "dustbin", BIN, {"look": 0}, fixed=True)]
     points: list[Point] = []
 
@@ -132,7 +132,7 @@ def _draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft | N
         if put(f"coaster_{i}", COASTER_X[i], CUP_Y, far) is None:
             return None
     scene_objects, names = named(rng, items)
-    return Draft(scene_objects, Facts(**names), TABLE_SHIFT)
+    return SceneSample(scene_objects, Facts(**names), TABLE_SHIFT)
 
 
 def _there(*names: str) -> tuple[str, ...]:

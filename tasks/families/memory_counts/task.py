@@ -21,7 +21,7 @@ from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.instructions.words import NUMBERS, by_count, ordinal
 from robospa.tasks.plan import Press, Skill
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Draft, Level, Task
+from robospa.tasks.task import Level, SceneSample, Task
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "instructions.toml")
@@ -51,7 +51,7 @@ class Facts(SceneFacts):
     counts: tuple[int, ...]
 
 
-def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
     """A row of staplers, and how often each is to be pressed."""
     y = float(rng.uniform(*Y))
     items = [
@@ -66,7 +66,7 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     ]
     counts = tuple(int(n) for n in rng.integers(1, MOST + 1, level))
     scene_objects, names = named(rng, items)
-    return Draft(scene_objects, Facts(tuple(names[item.role] for item in items), counts))
+    return SceneSample(scene_objects, Facts(tuple(names[item.role] for item in items), counts))
 
 
 def goal(scene: Scene) -> PressCounts:

@@ -20,7 +20,7 @@ from robospa.tasks.instructions.words import color_orders
 from robospa.tasks.plan import Home, Pick, Place, Skill, Wait
 from robospa.tasks.sampling.region import shuffled
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Draft, Level, Task
+from robospa.tasks.task import Level, SceneSample, Task
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "instructions.toml")
@@ -57,7 +57,7 @@ class Facts(SceneFacts):
     blocks: tuple[str, ...]
 
 
-def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
     """Different colours in a fixed row, opened in a uniformly random order."""
     chosen = [list(COLORS)[int(i)] for i in rng.permutation(len(COLORS))[:level]]
     items = []
@@ -74,7 +74,7 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
         covers=tuple(names[f"{color} cover"] for color in order),
         blocks=tuple(names[f"{color} block"] for color in order),
     )
-    return Draft(scene_objects, facts)
+    return SceneSample(scene_objects, facts)
 
 
 def _open_place(scene: Scene, block: str) -> tuple[float, float]:

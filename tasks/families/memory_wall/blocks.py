@@ -27,7 +27,7 @@ from robospa.tasks.plan import Home, Pick, Place, Skill
 from robospa.tasks.sampling.region import Area, shuffled
 from robospa.tasks.sampling.scatter import candidates, scatter
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Draft, Level, Task
+from robospa.tasks.task import Level, SceneSample, Task
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "blocks.toml")
@@ -55,7 +55,7 @@ class Facts(SceneFacts):
     wall: str
 
 
-def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
     """Colours on the stand; the same and as many others on the table, all places alike."""
     colors = [list(COLORS)[int(i)] for i in rng.permutation(len(COLORS))[: 2 * level]]
     shape, radius = (2 * level, TRIES), HALF * math.sqrt(2)
@@ -74,7 +74,7 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
         others=tuple(names[color] for color in colors[level:]),
         wall=names[WALL],
     )
-    return Draft(scene_objects, facts)
+    return SceneSample(scene_objects, facts)
 
 
 def _look(color: str) -> dict[str, list[float]]:

@@ -31,7 +31,7 @@ from robospa.tasks.instructions.words import NUMBERS, by_count
 from robospa.tasks.plan import Skill
 from robospa.tasks.sampling.region import Area
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Draft, Level, Task
+from robospa.tasks.task import Level, SceneSample, Task
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "objects.toml")
@@ -54,7 +54,7 @@ class Facts(SceneFacts):
     wall: str
 
 
-def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
     """Different kinds, in random order on the stand, at random places on the table."""
     kinds = [KINDS[int(i)] for i in rng.permutation(len(KINDS))[:level]]
     looks = [(kind, clickable_look(rng, kind)) for kind in kinds]
@@ -68,7 +68,7 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
         items.append(Item(kind, kind, standing(point, yaw), look, fixed=True))
     scene_objects, names = named(rng, items)
     facts = Facts(tuple(names[kind] for kind in kinds), tuple(kinds), names[WALL])
-    return Draft(scene_objects, facts)
+    return SceneSample(scene_objects, facts)
 
 
 def goal(scene: Scene) -> AfterCue:

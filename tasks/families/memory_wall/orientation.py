@@ -24,7 +24,7 @@ from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.instructions.words import NUMBERS
 from robospa.tasks.plan import Home, Pick, Place, Skill
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Draft, Level, Task
+from robospa.tasks.task import Level, SceneSample, Task
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "orientation.toml")
@@ -53,7 +53,7 @@ class Facts(SceneFacts):
     wall: str
 
 
-def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
     """Two rows; a near block never lies as its partner does. All blocks of a row look alike."""
     shown = [int(i) for i in rng.integers(4, size=level)]
     start = [(turn + int(rng.integers(1, 4))) % 4 for turn in shown]
@@ -74,7 +74,7 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
         start=tuple(start),
         wall=names[WALL],
     )
-    return Draft(scene_objects, facts)
+    return SceneSample(scene_objects, facts)
 
 
 def goal(scene: Scene) -> AfterCue:

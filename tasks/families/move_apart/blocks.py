@@ -24,7 +24,7 @@ from robospa.tasks.plan import Pick, Place, Skill
 from robospa.tasks.sampling.points import LAYOUTS, TRIES_PER_POINT
 from robospa.tasks.sampling.region import LayoutError, shuffled
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Draft, Level, Task, Tracker
+from robospa.tasks.task import Level, SceneSample, Task, Tracker
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "blocks.toml")
@@ -95,7 +95,7 @@ def _squares(rng: np.random.Generator, count: int, half: float) -> list[Square]:
     raise LayoutError(f"no free column of {count} blocks in {LAYOUTS} draws; skip this seed")
 
 
-def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
     """Two colours, the first for the right side (level 1: one colour, either side)."""
     first, second = (list(COLORS)[int(i)] for i in rng.permutation(len(COLORS))[:2])
     right = TO_RIGHT[level] if level > 1 else int(rng.integers(2))
@@ -118,7 +118,7 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
         right_color=first if right else None,
         left_color=second if right < level else None,
     )
-    return Draft(scene_objects, facts)
+    return SceneSample(scene_objects, facts)
 
 
 def goal(scene: Scene) -> Tracker:

@@ -24,7 +24,7 @@ from robospa.tasks.plan import Pick, Place, Skill
 from robospa.tasks.sampling.points import scatter_points
 from robospa.tasks.sampling.region import shuffled
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Draft, Level, Task, Tracker
+from robospa.tasks.task import Level, SceneSample, Task, Tracker
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "cards.toml")
@@ -48,7 +48,7 @@ class Facts(SceneFacts):
     boxes: tuple[str, ...]
 
 
-def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
     """Boxes anywhere in the region, each turned any way that a gripper can take."""
     items = []
     points = shuffled(rng, scatter_points(rng, level, X, Y, DISTANCE, tries=10))
@@ -57,7 +57,7 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
         yaw = drawn_yaw(rng, workcell, "playing_cards", look, point[1], math.pi)
         items.append(Item(str(i), "playing_cards", standing(point, yaw), look))
     scene_objects, names = named(rng, items)
-    return Draft(scene_objects, Facts(tuple(names[item.role] for item in items)))
+    return SceneSample(scene_objects, Facts(tuple(names[item.role] for item in items)))
 
 
 def _sides(scene: Scene) -> dict[str, list[str]]:

@@ -21,7 +21,7 @@ from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.instructions.words import NUMBERS
 from robospa.tasks.plan import Pick, Place, Skill
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Draft, Level, Task, Tracker
+from robospa.tasks.task import Level, SceneSample, Task, Tracker
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "food.toml")
@@ -60,7 +60,7 @@ class Facts(SceneFacts):
     backward_kind: str
 
 
-def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
     """Which kind goes forward is a fair coin, and so is the direction at level 1."""
     kinds = ["bread", "fries"] if rng.random() < 0.5 else ["fries", "bread"]
     first = FIRST[level] if level > 1 else int(rng.integers(2))
@@ -78,7 +78,7 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     scene_objects, names = named(rng, items)
     foods = tuple(names[str(i)] for i in range(level))
     facts = Facts(foods[:first], foods[first:], kinds[0], kinds[1])
-    return Draft(scene_objects, facts)
+    return SceneSample(scene_objects, facts)
 
 
 def goal(scene: Scene) -> Tracker:

@@ -22,7 +22,7 @@ from robospa.tasks.plan import Pick, Place, Skill
 from robospa.tasks.sampling.region import Area, Mask, shuffled
 from robospa.tasks.sampling.scatter import candidates, scatter
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Draft, Level, Task, Tracker
+from robospa.tasks.task import Level, SceneSample, Task, Tracker
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "instructions.toml")
@@ -44,7 +44,7 @@ class Facts(SceneFacts):
     bowls: tuple[str, ...]
 
 
-def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
     """The plate on either side, then bowls of one look, off the middle, in view and in reach."""
     left = rng.random() < 0.5
     plate_x = (-PLATE_X if left else PLATE_X) + float(rng.uniform(-PLATE_SPREAD, PLATE_SPREAD))
@@ -62,7 +62,7 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     items = [Item("plate", "plate", standing(plate), draw_look(rng, "plate"), fixed=True)]
     items += [Item(str(i), "bowl", standing(point), look) for i, point in enumerate(points)]
     scene_objects, names = named(rng, items)
-    return Draft(
+    return SceneSample(
         scene_objects,
         Facts(names["plate"], tuple(names[str(i)] for i in range(level))),
     )

@@ -28,7 +28,7 @@ from robospa.tasks.plan import Pick, Place, Skill
 from robospa.tasks.sampling.points import LAYOUTS, scatter_points
 from robospa.tasks.sampling.region import LayoutError, Point, apart, shuffled
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Draft, Level, Task, Tracker
+from robospa.tasks.task import Level, SceneSample, Task, Tracker
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "instructions.toml")
@@ -126,7 +126,7 @@ def _places(looks: Sequence[Look], rng: np.random.Generator, workcell: Workcell)
     raise LayoutError(f"no mixed-up layout of {len(looks)} blocks; skip this seed")
 
 
-def _draw(looks: Sequence[Look], rng: np.random.Generator, workcell: Workcell) -> Draft:
+def _draw(looks: Sequence[Look], rng: np.random.Generator, workcell: Workcell) -> SceneSample:
     items = [
         Item(
             str(rank),
@@ -139,7 +139,7 @@ def _draw(looks: Sequence[Look], rng: np.random.Generator, workcell: Workcell) -
         )
     ]
     scene_objects, names = named(rng, items)
-    return Draft(scene_objects, Facts(tuple(names[item.role] for item in items)))
+    return SceneSample(scene_objects, Facts(tuple(names[item.role] for item in items)))
 
 
 def goal(scene: Scene) -> Tracker:

@@ -32,7 +32,7 @@ from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.objects import look_count, object_model
 from robospa.tasks.sampling.grid import StraightLines
 from robospa.tasks.scene import Scene, SceneObject
-from robospa.tasks.task import Draft, Draw, Level, Task
+from robospa.tasks.task import Draw, Level, SceneSample, Task
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "instructions.toml")
@@ -213,7 +213,7 @@ class Facts(PickFacts):
 def drawer(crowd: Crowd) -> Draw:
     """The draw of `crowd`: direction and target slot, other slots, a straight layout, turns."""
 
-    def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
+    def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
         shape = SHAPES[level]
         cells, table = shape.cells, weights(level).ravel()
         pick = min(int(np.searchsorted(np.cumsum(table), rng.random())), len(table) - 1)
@@ -248,7 +248,7 @@ def drawer(crowd: Crowd) -> Draw:
             relation=direction,
             reference_label=_label(shape, reference, used),
         )
-        return Draft(tuple(objects), facts)
+        return SceneSample(tuple(objects), facts)
 
     return draw
 

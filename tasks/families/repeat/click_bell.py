@@ -21,7 +21,7 @@ from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.instructions.words import NUMBERS, acting_arm, by_count
 from robospa.tasks.plan import Press, Skill
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Draft, Level, Task
+from robospa.tasks.task import Level, SceneSample, Task
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "click_bell.toml")
@@ -44,7 +44,7 @@ class Facts(SceneFacts):
     count: int
 
 
-def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
     """One bell in view and off the middle strip; left and right are equally likely."""
     look = draw_look(rng, "bell")
     model = objects.object_model("bell", look)
@@ -56,7 +56,7 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
         x = float(rng.uniform(MIDDLE, min(FAR, high)))
     items = [Item("bell", "bell", standing((x, y)), look, fixed=True)]
     scene_objects, names = named(rng, items)
-    return Draft(scene_objects, Facts(names["bell"], level))
+    return SceneSample(scene_objects, Facts(names["bell"], level))
 
 
 def goal(scene: Scene) -> Repeat:

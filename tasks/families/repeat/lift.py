@@ -21,7 +21,7 @@ from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.instructions.words import NUMBERS, by_count
 from robospa.tasks.plan import RaiseLower, Skill
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Draft, Level, Task
+from robospa.tasks.task import Level, SceneSample, Task
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "lift.toml")
@@ -103,12 +103,12 @@ THINGS = (
 )
 
 
-def _draw(thing: Thing, level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
+def _draw(thing: Thing, level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
     point = (float(rng.uniform(*thing.x)), float(rng.uniform(*thing.y)))
     pose = standing(point, float(rng.uniform(-thing.yaw, thing.yaw)))
     items = [Item("thing", thing.asset, pose, draw_look(rng, thing.asset))]
     scene_objects, names = named(rng, items)
-    return Draft(scene_objects, Facts(names["thing"], level))
+    return SceneSample(scene_objects, Facts(names["thing"], level))
 
 
 def _plan(thing: Thing, scene: Scene) -> tuple[Skill, ...]:

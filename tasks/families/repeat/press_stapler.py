@@ -21,7 +21,7 @@ from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.instructions.words import NUMBERS, by_count
 from robospa.tasks.plan import Press, Skill
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Draft, Level, Task
+from robospa.tasks.task import Level, SceneSample, Task
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "press_stapler.toml")
@@ -39,13 +39,13 @@ class Facts(SceneFacts):
     count: int
 
 
-def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
     """One stapler anywhere in the region, turned any way."""
     point = (float(rng.uniform(*X)), float(rng.uniform(*Y)))
     pose = standing(point, float(rng.uniform(-math.pi, math.pi)))
     items = [Item("stapler", "stapler", pose, draw_look(rng, "stapler"), fixed=True)]
     scene_objects, names = named(rng, items)
-    return Draft(scene_objects, Facts(names["stapler"], level))
+    return SceneSample(scene_objects, Facts(names["stapler"], level))
 
 
 def goal(scene: Scene) -> Repeat:

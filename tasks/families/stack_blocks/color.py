@@ -25,7 +25,7 @@ from robospa.tasks.instructions.words import NUMBERS, by_count, color_orders
 from robospa.tasks.sampling.points import scatter_points
 from robospa.tasks.sampling.region import Point, apart
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Draft, Level, Task
+from robospa.tasks.task import Level, SceneSample, Task
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "color.toml")
@@ -45,7 +45,7 @@ class Facts(TowerFacts):
     colors: tuple[str, ...]
 
 
-def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
     """Scattered cubes; at level 1 the only one starts away from the place it must go to."""
 
     def away(point: Point) -> bool:
@@ -68,7 +68,7 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     scene_objects, names = named(rng, items)
     order = tuple(names[item.role] for item in items)
     facts = Facts(order, place, tuple(item.role for item in items))
-    return Draft(scene_objects, facts)
+    return SceneSample(scene_objects, facts)
 
 
 def slots(scene: Scene) -> Slots:

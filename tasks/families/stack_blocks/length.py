@@ -26,7 +26,7 @@ from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.sampling.batch import Ground, scatter_blocks
 from robospa.tasks.sampling.region import Area, Points, spread
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Draft, Level, Task
+from robospa.tasks.task import Level, SceneSample, Task
 from robospa.workcell import Workcell
 
 HALF_LENGTHS = {
@@ -58,7 +58,7 @@ GAP, YAW = 0.045, 0.20
 LEVELS = {n: Level(candidates=n, subtasks=n, steps=200 * n) for n in range(1, 6)}
 
 
-def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
     """Scattered bars, away from the middle of the near edge."""
     half_y, half_z = (round(float(v), 5) for v in rng.uniform(*SECTION, 2))
     halves = [(round(float(rng.uniform(*ends)), 5), half_y, half_z) for ends in HALF_LENGTHS[level]]
@@ -79,7 +79,7 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     place = building_place(level, rng, points)
     scene_objects, names = named(rng, items)
     facts = TowerFacts(tuple(names[item.role] for item in items), place)
-    return Draft(scene_objects, facts)
+    return SceneSample(scene_objects, facts)
 
 
 def _wide(level: int, points: Points) -> bool:

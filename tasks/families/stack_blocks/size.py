@@ -24,7 +24,7 @@ from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.sampling.batch import Ground, scatter_blocks
 from robospa.tasks.sampling.region import Area
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Draft, Level, Task
+from robospa.tasks.task import Level, SceneSample, Task
 from robospa.workcell import Workcell
 
 HALVES = {
@@ -44,7 +44,7 @@ MIDDLE = (0.0, -0.10)
 LEVELS = {n: Level(candidates=n, subtasks=n, steps=200 * n) for n in range(1, 6)}
 
 
-def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
     """Scattered cubes, away from the middle of the near edge."""
     halves = HALVES.get(level) or (round(float(rng.uniform(*ONE)), 5),)
     cubes = [(half, half, half) for half in halves]
@@ -63,7 +63,7 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     place = building_place(level, rng, points)
     scene_objects, names = named(rng, items)
     facts = TowerFacts(tuple(names[item.role] for item in items), place)
-    return Draft(scene_objects, facts)
+    return SceneSample(scene_objects, facts)
 
 
 def slots(scene: Scene) -> Slots:

@@ -25,7 +25,7 @@ from robospa.tasks.plan import Hit, Skill
 from robospa.tasks.sampling.region import Area, Mask, Point, shuffled
 from robospa.tasks.sampling.scatter import scatter
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Draft, Level, Task
+from robospa.tasks.task import Level, SceneSample, Task
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "hammer.toml")
@@ -52,7 +52,7 @@ class Facts(SceneFacts):
     order: tuple[str, ...]
 
 
-def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
     """The first block on a random side, the others where the same arm gets to."""
     left = bool(rng.random() < 0.5)
     arm = workcell.arms[0 if left else 1]
@@ -80,7 +80,7 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
     scene_objects, names = named(rng, items)
     colors = tuple(COLORS)[:level]
     facts = Facts(names["hammer"], colors, tuple(names[c] for c in colors))
-    return Draft(scene_objects, facts)
+    return SceneSample(scene_objects, facts)
 
 
 def _beside_hammer(x: Array, y: Array) -> Mask:

@@ -24,7 +24,7 @@ from robospa.tasks.sampling.points import free_point
 from robospa.tasks.sampling.region import LayoutError, Point
 from robospa.tasks.scene import Scene
 from robospa.tasks.shapes import ObjectModel
-from robospa.tasks.task import Draft, Level, Task
+from robospa.tasks.task import Level, SceneSample, Task
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "seal.toml")
@@ -70,7 +70,7 @@ class Facts(SceneFacts):
     order: tuple[str, ...]
 
 
-def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
+def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
     """Pads of different colours, the seal not too near to any."""
     groups = [COLORS[int(i)] for i in rng.permutation(len(COLORS))[:level]]
     colors = tuple(group[int(rng.integers(len(group)))] for group in groups)
@@ -81,7 +81,7 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> Draft:
         items.append(Item(color, "pad", standing(point), {"look": PADS.index(color)}, fixed=True))
     scene_objects, names = named(rng, items)
     facts = Facts(names["seal"], colors, tuple(names[c] for c in colors))
-    return Draft(scene_objects, facts)
+    return SceneSample(scene_objects, facts)
 
 
 def _layout(

@@ -112,8 +112,8 @@ def test_text_that_is_too_long_ends_in_an_ellipsis() -> None:
 
 def test_the_sheet_has_a_row_a_task_and_a_column_a_level() -> None:
     rows = [
-        gallery.Row("First", "GAC", (cell(1), cell(2))),
-        gallery.Row("Second", "RPF", (cell(5),)),
+        gallery.GalleryRow("First", "GAC", (cell(1), cell(2))),
+        gallery.GalleryRow("Second", "RPF", (cell(5),)),
     ]
     page = gallery.sheet(rows, "title")
     left, top = gallery.MARGIN, gallery.TITLE + gallery.HEADER
@@ -123,13 +123,13 @@ def test_the_sheet_has_a_row_a_task_and_a_column_a_level() -> None:
 
 
 def test_a_jpeg_stays_below_its_limit(tmp_path: Path) -> None:
-    page = gallery.sheet([gallery.Row("First", "GAC", (cell(),))], "title")
+    page = gallery.sheet([gallery.GalleryRow("First", "GAC", (cell(),))], "title")
     size = gallery.save_jpeg(page, tmp_path / "new" / "sheet.jpg", limit=40_000)
     assert (tmp_path / "new" / "sheet.jpg").stat().st_size == size < 40_000
 
 
 def test_a_jpeg_that_cannot_be_small_enough_is_not_written(tmp_path: Path) -> None:
-    page = gallery.sheet([gallery.Row("First", "GAC", (cell(),))], "title")
+    page = gallery.sheet([gallery.GalleryRow("First", "GAC", (cell(),))], "title")
     with pytest.raises(ValueError, match="show fewer tasks"):
         gallery.save_jpeg(page, tmp_path / "sheet.jpg", limit=10)
     assert list(tmp_path.iterdir()) == []

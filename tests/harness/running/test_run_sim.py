@@ -32,13 +32,13 @@ def test_records_are_equal_to_the_bit_whatever_the_workers_and_the_camera(tmp_pa
 
 
 def test_replaying_recorded_actions_gives_the_same_record(tmp_path: Path) -> None:
-    from robospa.baselines.replay import Replay
+    from robospa.baselines.replay import ReplayPolicy
     from robospa.harness.sim.sapien_world import SapienWorld
     from robospa.harness.trial import run_trial
 
     config = WorkerConfig(tmp_path, "robospa.baselines.oracle:create")
     Runner(config, KEYS[:1], RunOptions()).run()
     world = SapienWorld(render=False)
-    again = run_trial(world, Replay(tmp_path), KEYS[0], policy_seed=0)
+    again = run_trial(world, ReplayPolicy(tmp_path), KEYS[0], policy_seed=0)
     world.close()
     assert differences(read_records(tmp_path)[KEYS[0]], again) == []

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from robospa.baselines.mistakes import KINDS, Mistaken, create, steps_of, wrong_plan
+from robospa.baselines.failure_policies import KINDS, FailingOracle, create, split_steps, wrong_plan
 from robospa.geometry import Pose
 from robospa.harness.robots import embodiment
 from robospa.harness.skills.workspace import Workspace
@@ -55,7 +55,7 @@ def test_a_repetition_presses_again_and_goes_no_further() -> None:
 
 def test_who_stops_early_does_the_first_part() -> None:
     scene, plan = planned("stops", "Put_Bottles_Dustbin", 5)
-    assert steps_of(plan) == steps_of(task(scene.task).plan(scene))[:2]  # type: ignore[arg-type]
+    assert split_steps(plan) == split_steps(task(scene.task).plan(scene))[:2]  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -80,7 +80,7 @@ def test_an_unknown_mistake_is_refused_at_once() -> None:
 
 def test_the_spec_says_which_mistake_it_is() -> None:
     for kind in KINDS:
-        spec = Mistaken(kind).spec
+        spec = FailingOracle(kind).spec
         assert (spec.name, spec.privileged) == (f"mistakes:{kind}", True)
 
 

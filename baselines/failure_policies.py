@@ -56,7 +56,7 @@ PRESS_BESIDE = 0.06
 
 
 @dataclass(frozen=True)
-class Beside:
+class ActBeside:
     """Do `call` as if its object lay shifted by `by` [m] in the plane."""
 
     call: Pick | Press
@@ -71,22 +71,22 @@ class Hover:
 
 
 @dataclass(frozen=True)
-class LetGo:
+class ReleaseAnywhere:
     """Open the gripper that holds `object`, wherever it is, and lift the arm out of the way."""
 
     object: str
 
 
-class ClumsyExpert(Expert):
+class FailingExpert(Expert):
     """An expert that also knows how to go wrong; `failures` lists what it did not bring about."""
 
     def _single(self, call: Any) -> Steps:
         ws = self.workspace
-        if isinstance(call, Beside):
-            yield from beside(ws, call)
+        if isinstance(call, ActBeside):
+            yield from act_beside(ws, call)
         elif isinstance(call, Hover):
             yield from hover(ws, call)
-        elif isinstance(call, LetGo):
+        elif isinstance(call, ReleaseAnywhere):
             arm = arm_holding(ws, call.object)
             ws.add(arm, gripper=1.0)
             ws.add(arm)
@@ -96,7 +96,7 @@ class ClumsyExpert(Expert):
             yield from super()._single(call)
 
 
-def beside(ws: Workspace, call: Beside) -> Steps:
+def act_beside(ws: Workspace, call: ActBeside) -> Steps:
     """One attempt at a place that is off by `call.by`."""
     name, seen = call.call.object, ws.snapshot
     pose = seen.poses[name]
@@ -158,7 +158,7 @@ def free_side(scene: Scene, ws: Workspace, name: str) -> tuple[float, float]:
     return found
 
 
-def steps_of(plan: tuple[Skill, ...]) -> list[list[Skill]]:
+def split_steps(plan: tuple[Skill, ...]) -> list[list[Skill]]:
     """The plan by steps: calls about one object that follow each other, each press for itself."""
     steps: list[list[Skill]] = []
     last = ""
@@ -174,13 +174,13 @@ def steps_of(plan: tuple[Skill, ...]) -> list[list[Skill]]:
     return steps
 
 
-def joined(plan: tuple[Skill, ...], steps: list[list[Skill]]) -> tuple[Skill, ...]:
+def join_steps(plan: tuple[Skill, ...], steps: list[list[Skill]]) -> tuple[Skill, ...]:
     """`steps` with the waits that stand before everything else in `plan`."""
     waits = [call for call in plan if isinstance(call, Wait)]
     return (*waits, *(call for step in steps for call in step))
 
 
-def believing(scene: Scene, **facts: Any) -> Scene:
+def with_wrong_facts(scene: Scene, **facts: Any) -> Scene:
     """The scene with other facts: what somebody plans on who has them wrong."""
     return replace(scene, facts={**scene.facts, **facts})
 
@@ -191,33 +191,33 @@ def wrong_plan(kind: str, scene: Scene, ws: Workspace) -> tuple[Any, ...]:
         raise ValueError(f"no mistake {kind!r}; there are {', '.join(KINDS)}")
     found = find_task(scene.task)
     plan = found.plan(scene)
-    steps = steps_of(plan)
+    steps = split_steps(plan)
     if kind == "nothing":
         return ()
     if kind == "stops" and len(steps) > 1:
-        return joined(plan, steps[: max(1, len(steps) // 2)])
+        return join_steps(plan, steps[: max(1, len(steps) // 2)])
     if kind == "neighbour" and "target" in scene.facts:
-        return found.plan(believing(scene, target=neighbour(scene)))
+        return found.plan(with_wrong_facts(scene, target=neighbour(scene)))
     if kind == "hovers" and "target" in scene.facts:
         return (Hover(scene.facts["target"]),)
     if kind in ("beside", "drops"):
-        return joined(plan, failing(kind, scene, ws, steps))
+        return join_steps(plan, plan_with_failure(kind, scene, ws, steps))
     if kind == "swaps" and "order" in scene.facts and len(steps) > 1:
         order = list(scene.facts["order"])
         i = min(1, len(order) - 2)
         order[i], order[i + 1] = order[i + 1], order[i]
-        return found.plan(believing(scene, order=order))
+        return found.plan(with_wrong_facts(scene, order=order))
     if kind == "repeats" and len(steps) > 1:
-        repeated = again(scene, steps)
+        repeated = repeat_step(scene, steps)
         if repeated:
-            return joined(plan, repeated)
+            return join_steps(plan, repeated)
     if "covers" in scene.facts:
         covers, blocks = list(scene.facts["covers"]), list(scene.facts["blocks"])
         if kind == "hasty":
             return (Pick(blocks[0]),)
         if kind == "forgets" and len(covers) > 1:
             turned = {"covers": covers[1:] + covers[:1], "blocks": blocks[1:] + blocks[:1]}
-            return found.plan(believing(scene, **turned))
+            return found.plan(with_wrong_facts(scene, **turned))
     raise ValueError(f"{scene.task} level {scene.level} gives no occasion for {kind!r}")
 
 
@@ -228,7 +228,9 @@ def neighbour(scene: Scene) -> str:
     return min(others, key=lambda o: math.dist(o.pose.position[:2], target.pose.position[:2])).name
 
 
-def failing(kind: str, scene: Scene, ws: Workspace, steps: list[list[Skill]]) -> list[list[Skill]]:
+def plan_with_failure(
+    kind: str, scene: Scene, ws: Workspace, steps: list[list[Skill]]
+) -> list[list[Skill]]:
     """The steps with one that goes wrong: the second pick if there is one, else the only one."""
     picks = [i for i, step in enumerate(steps) if isinstance(step[0], Pick)]
     if not picks and kind == "drops":
@@ -237,17 +239,17 @@ def failing(kind: str, scene: Scene, ws: Workspace, steps: list[list[Skill]]) ->
     call: Any = steps[wrong][0]
     if kind == "drops":
         alone = "target" in scene.facts
-        bad: list[Any] = [replace(call, lift=LOW) if alone else call, LetGo(call.object)]
+        bad: list[Any] = [replace(call, lift=LOW) if alone else call, ReleaseAnywhere(call.object)]
     elif isinstance(call, Press):
-        bad = [Beside(call, (0.0, PRESS_BESIDE))]
+        bad = [ActBeside(call, (0.0, PRESS_BESIDE))]
     elif not isinstance(call, Pick):
         raise ValueError(f"{scene.task} ends with {type(call).__name__}: no place beside it")
     else:
-        bad = [Beside(call, free_side(scene, ws, call.object))]
+        bad = [ActBeside(call, free_side(scene, ws, call.object))]
     return [*steps[:wrong], bad, *steps[wrong + 1 :]]
 
 
-def again(scene: Scene, steps: list[list[Skill]]) -> list[list[Skill]]:
+def repeat_step(scene: Scene, steps: list[list[Skill]]) -> list[list[Skill]]:
     """The first step that can be done again, twice over, and nothing after it; [] if none can."""
     first = steps[0]
     if isinstance(first[0], Press):
@@ -260,7 +262,7 @@ def again(scene: Scene, steps: list[list[Skill]]) -> list[list[Skill]]:
     return []
 
 
-class Mistaken(Oracle):
+class FailingOracle(Oracle):
     """Makes one mistake, the same one in every trial; where a task has no occasion, it holds."""
 
     def __init__(self, kind: str) -> None:
@@ -278,16 +280,16 @@ class Mistaken(Oracle):
         state: Mapping[str, Any] = observation["privileged"]
         snapshot = snapshot_from_json(state, workcell(self._scene.embodiment))
         if self._expert is None:
-            expert = ClumsyExpert(self._scene, snapshot, ())
+            expert = FailingExpert(self._scene, snapshot, ())
             try:
                 plan = wrong_plan(self.kind, self._scene, expert.workspace)
                 self.applies = True
             except ValueError:
                 plan, self.applies = (), False
-            self._expert = ClumsyExpert(self._scene, snapshot, plan)
+            self._expert = FailingExpert(self._scene, snapshot, plan)
         return self._expert.next(snapshot)
 
 
-def create(kind: str = "neighbour") -> Mistaken:
+def create(kind: str = "neighbour") -> FailingOracle:
     """A new policy that makes the mistake `kind`, one per connection."""
-    return Mistaken(kind)
+    return FailingOracle(kind)
