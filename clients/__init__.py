@@ -77,10 +77,26 @@ def connect(
     ssl: ssl_module.SSLContext | None = None,
     expect: PolicySpec | None = None,
 ) -> RemotePolicy:
-    """A `Policy` behind `url`; `options` are those of the URL's dialect.
+    """A `Policy` behind a server: `spec`, `reset`, `infer` and `close`.
 
-    `expect`: refuse (SpecMismatch) a server with another spec. Raises ValueError for a URL or an
-    option that cannot be, and the errors of `robospa.protocol.errors`.
+        with robospa.connect("ws://127.0.0.1:8000") as policy:
+            policy.reset(trial)
+            chunk = policy.infer(observation)
+
+    Args:
+        url: Address of the server; its scheme is the dialect, its query has the dialect's options.
+        token: Sent to the server if it asks for one.
+        timeouts: Limits of each kind of answer [s].
+        options: Options of the dialect; those in the URL win.
+        limits: Sizes that a message may have.
+        ssl: Context for `wss://` and `https://`.
+        expect: The spec that the server must have.
+
+    Raises:
+        ValueError: The URL or an option is impossible.
+        SpecMismatch: The server has another spec than `expect`.
+        WireError: No server answers there, or not as its dialect requires; all such errors are in
+            `robospa.protocol.errors`.
     """
     endpoint, chosen = _prepare(url, options)
     params = ConnectionParams(endpoint, timeouts or Timeouts(), limits, token, ssl)

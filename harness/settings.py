@@ -155,7 +155,14 @@ class Recording:
 
 @dataclass(frozen=True)
 class EvaluationSettings:
-    """Everything that `robospa eval` can be told. Raises SettingsError if a value is impossible."""
+    """All settings of an evaluation, in the groups of a settings file (docs/runs.md lists them).
+
+        settings = EvaluationSettings(policy=("ws://gpu:8000",), out=Path("runs/mine"))
+        run = robospa.evaluate(config=settings, tasks="spatial")
+
+    Raises:
+        SettingsError: A value is impossible.
+    """
 
     policy: tuple[str, ...] = option((), "URLs of a policy's servers, or one name or module:Class")
     policy_map: Path | None = option(

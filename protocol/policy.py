@@ -32,30 +32,38 @@ Offset = Annotated[int, Meta(ge=-10_000, lt=0)]
 
 @dataclass(frozen=True)
 class PolicySpec:
-    """What a policy wants to see and what it answers.
+    """What a policy reads and what it answers.
 
-    `state`: joints as commanded (official convention) or as measured, or none. `action`: the
-    space of its actions. `horizon`: actions per chunk (the most it may send); `execute`: how many
-    of them are executed before the next query, None for all. `history`: offsets in executed
-    actions, all negative, whose observations it needs besides the present one. `batch`: how many
-    observations one call of `infer_batch` may hold. `seeded`: whether it honours the policy seed.
-    `privileged`: whether it needs the exact state (no honest learned policy does). `action_dim`:
-    columns of a chunk, None for 14 or 16, whichever the embodiment and the space have.
+    PolicySpec("my-policy", cameras=(CameraSpec("head", 224, 224),), action="joint", horizon=8)
     """
 
     name: str
+    """Appears in results: printable, at most 200 characters."""
     cameras: tuple[CameraSpec, ...] = DEFAULT_CAMERAS
+    """The images that are rendered and sent; head and both wrists at 320x240 by default."""
     state: Annotated[str, one_of(STATES)] = "commanded"
+    """Joints as `commanded` (the official convention), as `measured`, or `none`."""
     action: Annotated[str, one_of(KINDS)] = "joint"
+    """Space of the actions: `joint` (absolute targets, laid out as the observation's `state`), `ee`
+    (per arm x y z [m], qw qx qy qz, gripper) or `delta_ee`."""
     horizon: Annotated[int, Meta(ge=1, le=10_000)] = 50
+    """The most actions that a chunk may hold."""
     execute: Annotated[int, Meta(ge=1)] | None = None
+    """Actions of a chunk that are executed before the next query; None for all."""
     history: Annotated[tuple[Offset, ...], Meta(max_length=64)] = ()
+    """Earlier observations that it reads as well: negative offsets in executed actions."""
     image_codec: Annotated[str, one_of(CODECS)] = "raw"
+    """How images travel: `raw`, or `jpeg` (quality 90)."""
     batch: Annotated[int, Meta(ge=1, le=4096)] = 1
+    """Observations that one call of `infer_batch` may hold."""
     seeded: bool = False
+    """Whether equal policy seeds and observations give equal actions."""
     privileged: bool = False
+    """Whether it reads the exact state of the simulation, as no learned policy does."""
     embodiments: tuple[str, ...] = ()
+    """Names of the robots that it can drive; empty for any."""
     action_dim: Annotated[int, Meta(ge=1, le=256)] | None = None
+    """Columns of a chunk; None for those of the robot and the space (14 or 16, `ee`: 16)."""
 
     def to_json(self) -> dict[str, Any]:
         """Plain JSON values; `from_json` is the inverse."""
@@ -100,7 +108,10 @@ def check_printable(what: str, text: str) -> None:
 
 @dataclass(frozen=True)
 class TrialInfo:
-    """What a policy learns at reset. `policy_seed` makes a stochastic policy repeatable."""
+    """The argument of `Policy.reset`: the trial that begins.
+
+    The first six fields are those of its `TrialKey`.
+    """
 
     task: Identifier
     level: Whole
@@ -109,8 +120,11 @@ class TrialInfo:
     mode: Identifier
     split: Identifier
     instruction: str
+    """The sentence of the trial."""
     policy_seed: Seed = 0
+    """Seed of all randomness of the policy in this trial, 0 to 2^64 - 1."""
     extra: Mapping[str, Any] = field(default_factory=dict)
+    """More JSON values; may be empty."""
 
     def to_json(self) -> dict[str, Any]:
         """Plain JSON values; `from_json` is the inverse."""
@@ -123,14 +137,17 @@ class TrialInfo:
 
 
 class Policy(Protocol):
-    """A robot policy. `infer` returns float32 (T, D) with 1 <= T <= spec.horizon."""
+    """A robot policy, in process or behind a server."""
 
     @property
-    def spec(self) -> PolicySpec: ...
+    def spec(self) -> PolicySpec:
+        """What the policy reads and answers."""
 
-    def reset(self, trial: TrialInfo) -> None: ...
+    def reset(self, trial: TrialInfo) -> None:
+        """A trial begins: forget the one before."""
 
-    def infer(self, observation: Observation) -> NDArray[np.float32]: ...
+    def infer(self, observation: Observation) -> NDArray[np.float32]:
+        """The next actions: float32 (T, D) with 1 <= T <= spec.horizon, all numbers finite."""
 
 
 class BatchPolicy(Policy, Protocol):

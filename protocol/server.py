@@ -285,9 +285,22 @@ def serve(
     options: ServerOptions | None = None,
     on_ready: Callable[[str], None] | None = None,
 ) -> None:
-    """Serve until SIGINT or SIGTERM; arguments as for `PolicyServer`.
+    """Serve a policy over WebSocket until SIGINT or SIGTERM.
 
-    `on_ready` is called with the URL once clients can connect. Raises OSError if the port is taken.
+        robospa.serve(policy_factory=MyPolicy, host="0.0.0.0", port=8000, token="...")
+
+    Args:
+        policy: One object: for all connections if it has `infer_batch`, else for one at a time.
+        host: Address to listen on.
+        port: Port to listen on; 0 for any free one.
+        token: What clients must send (`ROBOSPA_TOKEN`); without one, everybody can connect.
+        policy_factory: Makes one policy per connection, in place of `policy`.
+        ssl: Context for `wss://`.
+        options: Limits and times.
+        on_ready: Called with the URL once clients can connect.
+
+    Raises:
+        OSError: The port is taken.
     """
     server = PolicyServer(
         policy, host, port, token, policy_factory=policy_factory, ssl=ssl, options=options

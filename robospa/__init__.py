@@ -5,8 +5,8 @@
     run = robospa.evaluate("ws://127.0.0.1:8000", tasks="spatial", trials=10)
 
 The names below are public. Each is imported when it is first used, so that a policy server needs
-neither the simulator nor the statistics. The modules of this folder (`geometry`, `trial`, ...)
-are the words that all folders share; they import nothing else of ours.
+neither the simulator nor the statistics. The modules of this folder (`geometry`, `trial`, ...) are
+what all folders share; they import nothing else of ours.
 """
 
 from __future__ import annotations

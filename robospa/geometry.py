@@ -23,10 +23,12 @@ Number = TypeVar("Number", float, Array)
 
 @dataclass(frozen=True, slots=True)
 class Pose:
-    """A rigid transform: `position` [m] and `rotation` (unit quaternion, wxyz)."""
+    """A rigid transform; `a * b` is the pose `b` of `a`'s frame, in the frame that `a` is in."""
 
     position: Vec3 = (0.0, 0.0, 0.0)
+    """x, y, z [m]."""
     rotation: Quat = (1.0, 0.0, 0.0, 0.0)
+    """Unit quaternion w, x, y, z."""
 
     def __mul__(self, other: Pose) -> Pose:
         """The pose of `other`'s frame when `other` is given in this pose's frame."""

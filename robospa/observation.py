@@ -1,7 +1,7 @@
-"""What a policy is shown: the keys, shapes and units of an observation, and the names of cameras.
+"""The observation: its keys, shapes and units, and the names of cameras.
 
 An observation is a plain dict of numpy arrays and scalars. A policy gets exactly the images that
-its spec names, `state` unless it wants none, `history` and `privileged` only if it asks for them.
+its spec names, `state` unless that is `none`, `history` and `privileged` only if the spec has them.
 """
 
 from __future__ import annotations
@@ -24,18 +24,21 @@ Pixels = Annotated[int, Meta(ge=1, le=8192)]
 
 @dataclass(frozen=True)
 class CameraSpec:
-    """One wanted image; `width` and `height` [px]."""
+    """An image that a policy reads."""
 
     name: Annotated[str, one_of(CAMERAS)]
+    """`head`, `left_wrist`, `right_wrist`, `front` or `third`."""
     width: Pixels = 320
+    """In pixels, 1 to 8192."""
     height: Pixels = 240
+    """In pixels, 1 to 8192."""
 
 
 DEFAULT_CAMERAS = (CameraSpec("head"), CameraSpec("left_wrist"), CameraSpec("right_wrist"))
 
 
 class View(TypedDict, total=False):
-    """What is seen at one instant."""
+    """Images and robot state at one instant."""
 
     images: dict[str, NDArray[np.uint8]]
     """By camera, (height, width, 3) RGB."""
@@ -46,12 +49,19 @@ class View(TypedDict, total=False):
 
 
 class Observation(View, total=False):
-    """What a policy is asked with: the present view, and what goes with it."""
+    """The argument of `Policy.infer`: a dict of the present view and what goes with it.
+
+    Besides the keys below it has those of a view, at the top level: `images`, a dict from camera to
+    uint8 (height, width, 3) RGB; `state`, float32 (D,): left arm joints [rad], left gripper 0
+    closed to 1 open, right arm, right gripper; `ee`, float32 (2, 8): per arm x y z [m],
+    qw qx qy qz, gripper, in the world frame.
+    """
 
     instruction: str
+    """The sentence of the trial."""
     step: int
     """Number of actions executed so far in this trial."""
     history: dict[int, View]
-    """Earlier views by their offset in executed actions, for the offsets in the spec."""
+    """Earlier views by their offset in executed actions (negative), for `PolicySpec.history`."""
     privileged: Mapping[str, Any]
-    """The exact state as JSON values."""
+    """The exact state of the simulation as JSON values, for `PolicySpec.privileged`."""

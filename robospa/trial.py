@@ -10,21 +10,27 @@ REFERENCE = "aloha-agilex"
 
 @dataclass(frozen=True, order=True)
 class TrialKey:
-    """What a trial is. The same key and the same actions give the same record."""
+    """Identifies a trial: the same key and the same actions give the same record, to the bit."""
 
     task: str
+    """Name of the task, such as `Pick_Blocks_Size`."""
     level: int
+    """1 to 5."""
     seed: int
+    """Decides the scene and the instruction."""
     embodiment: str = REFERENCE
+    """Name of the robot."""
     mode: str = "clean"
+    """Name of the scene mode."""
     split: str = "heldout"
+    """Instruction split, `train` or `heldout`."""
 
     @property
     def variant(self) -> tuple[str, int]:
-        """(task, level)."""
+        """Task and level."""
         return (self.task, self.level)
 
     @property
     def slug(self) -> str:
-        """A file name for what belongs to this trial."""
+        """A file name for this trial, without an ending."""
         return f"{self.task}-L{self.level}-{self.seed}-{self.embodiment}-{self.mode}-{self.split}"

@@ -124,10 +124,24 @@ def build_scene(
 ) -> Scene:
     """The scene of one trial: a pure function of its arguments.
 
+        scene = robospa.build_scene("Pick_Blocks_Size", level=1, seed=100000)
+        [(item.name, item.pose.position) for item in scene.objects]
+
     The task's objects are drawn by one generator seeded by (suite, task, level, seed), for the
-    workcell of the suite's own robot: every robot and every mode meets the same ones. What the
-    mode varies has generators of its own, seeded by the part's name too. KeyError for an unknown
-    task, ValueError for an unknown level or mode.
+    workcell of the suite's own robot: every robot and every mode gets the same ones. What the
+    mode varies has generators of its own, seeded by the part's name too.
+
+    Args:
+        name: Name of the task.
+        level: 1 to 5.
+        seed: A whole number; the benchmark's begin at 100000.
+        embodiment: Name of the robot; written into the scene, it changes nothing else.
+        mode: Name of the scene mode.
+
+    Raises:
+        KeyError: There is no such task.
+        ValueError: There is no such level or mode.
+        LayoutError: The seed has no valid scene.
     """
     found = task(name)
     if level not in found.levels:

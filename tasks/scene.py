@@ -40,11 +40,7 @@ class SceneObject:
 
 @dataclass(frozen=True)
 class Scene:
-    """Everything that a world needs to load a trial and that a goal or a plan needs to judge it.
-
-    `facts` holds what the task drew (target, order, reference, directions...): JSON values, read
-    by the task's own goal, plan and instruction slots. `table_shift` moves the table in x, y [m],
-    `table_rise` is how much higher it stands than TABLE_TOP [m].
+    """The start of a trial as a value: all that a world, a goal, a plan and an instruction need.
 
     What only some scene modes change has a default and is left out of the JSON form where it has
     that value, so that the digests of all other scenes do not depend on it.
@@ -56,10 +52,15 @@ class Scene:
     embodiment: str
     mode: str
     objects: tuple[SceneObject, ...]
+    """In the order in which the world creates them."""
     facts: Mapping[str, Any]
+    """What the task drew besides (target, order, reference, ...), as JSON values."""
     table_shift: tuple[float, float] = (0.0, 0.0)
+    """How far the table is moved, x and y [m]."""
     suite: str = SUITE
+    """Version of the benchmark's scenes."""
     table_rise: float = 0.0
+    """How much higher than `TABLE_TOP` the table stands [m]."""
 
     @property
     def table_at(self) -> Vec3:
@@ -72,7 +73,11 @@ class Scene:
         return TABLE_TOP + self.table_rise
 
     def object(self, name: str) -> SceneObject:
-        """The object called `name`; KeyError, naming what exists, if there is none."""
+        """The object called `name`.
+
+        Raises:
+            KeyError: There is none; the message names those that exist.
+        """
         for item in self.objects:
             if item.name == name:
                 return item

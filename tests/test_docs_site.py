@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 
+import robospa
 from robospa import registry
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -59,6 +60,11 @@ def test_links_to_a_section_find_its_heading(page: Path) -> None:
 def test_relative_links_lead_somewhere(page: Path) -> None:
     targets = re.findall(r"\]\((?!https?:|#|mailto:)([^)#\s]+)", page.read_text())
     assert [t for t in targets if not (page.parent / t).exists()] == []
+
+
+def test_the_api_page_has_every_public_name() -> None:
+    listed = re.findall(r"^::: robospa\.(\w+)$", (ROOT / "docs" / "api.md").read_text(), re.M)
+    assert sorted(listed) == sorted(set(robospa.__all__) - {"__version__"})
 
 
 def test_the_version_is_the_same_everywhere() -> None:

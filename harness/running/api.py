@@ -35,7 +35,7 @@ def evaluate(
     """Evaluate a policy on a fixed list of seeded trials, and return the run.
 
         run = robospa.evaluate("ws://gpu:8000", tasks="spatial", levels=[1, 3], trials=20)
-        rate = sum(record.success for record in run.records.values()) / len(run.records)
+        successes = sum(record.success for record in run.records.values())
 
     Trials run in worker processes, so a script calls this under `if __name__ == "__main__":`.
 
@@ -53,7 +53,7 @@ def evaluate(
         trials: Trials per variant; 100 by default.
         workers: Worker processes; by default, or 0, as many as keep the cores busy.
         out: Folder of the run; by default a new one under `runs`.
-        resume: Go on with the run in `out`.
+        resume: Continue the run in `out`.
         token: Bearer token of the policy's servers; kept nowhere.
         config: Settings, or a file of them, that the other arguments win over.
         settings: Any other setting of `robospa eval`, such as video="failures" or timeout=30.
@@ -64,8 +64,8 @@ def evaluate(
     Raises:
         SettingsError: A setting is unknown or impossible; nothing was written.
         RunError: `out` holds another run, or what it holds cannot be read.
-        RunAborted: The run cannot go on; what is finished is kept, and `resume` goes on from there.
-        WireError: No policy answers there, or not as the protocol says.
+        RunAborted: The run stopped; what is finished is kept, and `resume` continues it.
+        WireError: No policy server answers at the URL, or not as the protocol requires.
     """
     named = {"tasks": tasks, "levels": levels, "trials": trials, "workers": workers, "out": out}
     given = {name: value for name, value in named.items() if value is not None}

@@ -56,20 +56,24 @@ class RepeatabilityError(RunError):
 
 @dataclass(frozen=True)
 class Run:
-    """A run read back: its manifest, the trials it is to hold, and one record per finished one."""
+    """A run that was read: its manifest, its list of trials, and one record per finished trial."""
 
     folder: Path
+    """The run's folder."""
     manifest: Mapping[str, Any]
+    """What `run.json` holds."""
     keys: tuple[TrialKey, ...]
+    """The listed trials."""
     records: Mapping[TrialKey, TrialRecord]
+    """The finished trials, those lost to infrastructure included."""
     torn: tuple[str, ...] = ()
-    """Names of the record files whose last line was torn off."""
+    """Names of the record files whose last line is incomplete."""
     repeated: tuple[TrialKey, ...] = ()
     """Trials that have more than one result; these agree."""
 
     @cached_property
     def info(self) -> RunInfo:
-        """What the manifest says of the run."""
+        """The manifest, typed."""
         return run_info(self.manifest)
 
     @property
@@ -162,7 +166,15 @@ def read_records(folder: Path) -> dict[TrialKey, TrialRecord]:
 
 
 def read_run(folder: str | Path) -> Run:
-    """The run in `folder`; raises RunError (or RepeatabilityError) if it cannot be trusted."""
+    """The run in `folder`, finished or not.
+
+        run = robospa.load_run("runs/mine")
+        ends = {key: record.end for key, record in run.records.items()}
+
+    Raises:
+        RunError: There is no run, or a file of it is damaged or contradicts itself.
+        RepeatabilityError: Two records of one trial differ in more than times.
+    """
     folder = Path(folder)
     manifest = read_manifest(folder)
     records: dict[TrialKey, TrialRecord] = {}

@@ -22,37 +22,54 @@ END_REASONS = (
 
 @dataclass(frozen=True)
 class TrialRecord:
-    """One finished trial. Times in seconds, latencies in milliseconds.
-
-    `end` is one of END_REASONS and `message` says why where that needs words. `done` of `total`
-    subtasks hold at the end, `best` is the most that ever held at once. `events` are plain dicts
-    (see `robospa.tasks.events`). `digest` is the world's final state, `scene_digest` the start's,
-    `actions_digest` the hash of all executed actions. `latency` has p50, p95, p99 and max, and
-    where the server reports them the means of `queue` (before its model ran), `infer` (in it) and
-    `batch` (observations in one call).
-    """
+    """One finished trial."""
 
     key: TrialKey
+    """Which trial it is."""
     category: str
+    """Abbreviation of the task's category, such as `GAC`."""
     instruction: str
+    """The sentence of the trial."""
     scene_digest: str
+    """Hash of the scene at the start."""
     end: str
+    """`success`, `step_limit`, `goal_lost`, `policy_error` or `infrastructure`."""
     success: bool
+    """Whether the goal was met."""
     done: int
+    """Subtasks that hold at the end."""
     best: int
+    """The most subtasks that ever held at once."""
     total: int
+    """Subtasks of the variant."""
     candidates: int
+    """The n of ONTA: objects that could be meant."""
     steps: int
+    """Policy actions executed."""
     physics_steps: int
+    """Steps of the simulation, of 1/250 s."""
     policy_calls: int
+    """Queries of the policy."""
     digest: str
+    """Hash of the world's exact final state."""
     actions_digest: str
+    """Hash of all executed actions."""
     wall_time: float
+    """Duration of the trial [s]."""
     policy_seed: int = 0
+    """Seed that the policy got."""
     message: str = ""
+    """Why the trial ended, for errors."""
     attempts: int = 1
+    """How often the trial was started."""
     events: tuple[Mapping[str, Any], ...] = ()
+    """What happened, in order: plain dicts, see `robospa.tasks.events`."""
     latency: Mapping[str, float] = field(default_factory=dict)
+    """`p50`, `p95`, `p99` and `max` of the round trip [ms]; where the server reports them also
+    the means of `queue` (before its model ran), `infer` (in it) and `batch` (observations)."""
     timing: Mapping[str, float] = field(default_factory=dict)
+    """Seconds by purpose, and `processor`: processor time."""
     diagnostics: Mapping[str, Any] = field(default_factory=dict)
+    """What the task measured besides success."""
     video: str = ""
+    """File of the video in the run's folder; empty for none."""
