@@ -18,7 +18,8 @@ from robospa.results.comparison.compare import Difference, compare, over_levels
 from robospa.results.records.manifest import RunInfo
 from robospa.results.records.run_io import Run
 from robospa.results.records.trial_record import TrialRecord
-from robospa.results.scoring.model_results import ModelResults, Variant, results_of_records
+from robospa.results.scoring.model_results import ModelResults, results_of_records
+from robospa.results.scoring.scores import Variant
 from robospa.results.scoring.setting import IncomparableError
 from robospa.trial import TrialKey
 

@@ -14,7 +14,8 @@ from dataclasses import dataclass, replace
 from robospa.results.comparison.groups import collections, weights_of
 from robospa.results.comparison.notes import notes, worst_and_best
 from robospa.results.comparison.pairs import VariantPair, discordant, paired_variants
-from robospa.results.scoring.model_results import ModelResults, Variant, categories_of
+from robospa.results.scoring.model_results import ModelResults, categories_of
+from robospa.results.scoring.scores import Variant
 from robospa.results.scoring.setting import IncomparableError
 from robospa.results.statistics.intervals import (
     METHODS,

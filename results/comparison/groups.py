@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from robospa.categories import BASIC, CATEGORIES, DIMENSIONS
-from robospa.results.scoring.model_results import Variant
+from robospa.results.scoring.scores import Variant
 
 
 def collections(category: Mapping[str, str]) -> list[tuple[str, str, tuple[str, ...]]]:

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from robospa.categories import METRIC_CATEGORIES
 from robospa.results.comparison.groups import weights_of
 from robospa.results.comparison.pairs import common_seeds
-from robospa.results.scoring.model_results import ModelResults, Variant
+from robospa.results.scoring.model_results import ModelResults
+from robospa.results.scoring.scores import Variant
 
 
 def notes(

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from robospa.results.records.trial_record import TrialRecord
-from robospa.results.scoring.model_results import ModelResults, Variant
-from robospa.results.scoring.scores import sample_of
+from robospa.results.scoring.model_results import ModelResults
+from robospa.results.scoring.scores import Variant, sample_of
 from robospa.results.scoring.setting import COMPARISON, IncomparableError, check_same
 from robospa.results.statistics.bootstrap import Sample
 

@@ -19,7 +19,6 @@ from robospa.results.figures.series import (
     percent_of,
     save,
     styled,
-    tasks_in_order,
 )
 
 CAPTIONS = {
@@ -67,7 +66,9 @@ def _own_figures(
     ending = f"-{number}" if number else ""
     of = f": {series.name}" if number else ""
     found = series.failures
-    counts = {t: found[t] for t in tasks_in_order(series.scores) if any(found.get(t, {}).values())}
+    counts = {
+        t: found[t] for t in series.scores.tasks_by_category if any(found.get(t, {}).values())
+    }
     if counts:
         name = f"failures{ending}"
         save(draw_failures(counts, KINDS, NAMES), folder, name, formats)

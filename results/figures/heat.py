@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from robospa.results.figures.series import Series, label_of, new_figure, percent_of, tasks_in_order
+from robospa.results.figures.series import Series, label_of, new_figure, percent_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,8 +19,7 @@ def draw_heat(series: Series) -> Figure:
     import numpy as np
 
     scores = series.scores
-    category_of = {task: cell.category for (task, _), cell in scores.cells.items()}
-    tasks = tasks_in_order(scores)
+    tasks = scores.tasks_by_category
     levels = list(scores.levels)
     values = np.full((len(tasks), len(levels)), np.nan)
     for line, task in enumerate(tasks):
@@ -41,7 +40,7 @@ def draw_heat(series: Series) -> Figure:
     axis.tick_params(length=0)
     axis.xaxis.tick_top()
     axis.spines[:].set_visible(False)
-    _categories(axis, [category_of[t] for t in tasks])
+    _categories(axis, [scores.category_of[t] for t in tasks])
     bar = figure.colorbar(image, ax=axis, location="bottom", aspect=40, shrink=0.9, pad=0.01)
     bar.set_label("SR [%]")
     bar.outline.set_visible(False)

@@ -12,7 +12,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from robospa.categories import BASIC, CATEGORIES
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.scoring.scores import AverageScore, Scores, VariantScore
 
@@ -60,12 +59,6 @@ def percent_of(part: VariantScore | AverageScore | None, metric: str) -> float |
     """The value of `metric` in percent, None where there is no result."""
     estimate = None if part is None else part.values.get(metric)
     return None if estimate is None else 100 * estimate.value
-
-
-def tasks_in_order(scores: Scores) -> list[str]:
-    """All tasks, by category."""
-    category_of = {task: cell.category for (task, _), cell in scores.cells.items()}
-    return [t for c in (*CATEGORIES, *BASIC, "") for t in category_of if category_of[t] == c]
 
 
 def label_of(name: str, most: int = 28) -> str:

@@ -48,12 +48,10 @@ def rows(scores: Scores) -> list[ScoreRow]:
     tasks come last among tasks, their categories after all else, because they enter no average."""
     levels = (*scores.levels, 0)
     made: list[ScoreRow] = []
-    category_of = {task: cell.category for (task, _), cell in scores.cells.items()}
-    ordered = [t for c in (*CATEGORIES, *BASIC, "") for t in category_of if category_of[t] == c]
-    for task in ordered:
+    for task in scores.tasks_by_category:
         cells = [(n, scores.cells.get((task, n))) for n in scores.levels]
         parts = (*cells, (0, scores.tasks[task]))
-        made.append(ScoreRow(task.replace("_", " "), "task", parts, category_of[task]))
+        made.append(ScoreRow(task.replace("_", " "), "task", parts, scores.category_of[task]))
     made += _category_rows(scores, CATEGORIES, levels)
     for dimension in DIMENSIONS:
         if (dimension, 0) in scores.dimensions:
@@ -84,8 +82,7 @@ def _averages(
 
 def category_size(scores: Scores, row: ScoreRow) -> int:
     """How many tasks a category's row sums up; 0 for other rows."""
-    tasks = {task for (task, _), cell in scores.cells.items() if cell.category == row.category}
-    return len(tasks) if row.kind == "category" else 0
+    return [*scores.category_of.values()].count(row.category) if row.kind == "category" else 0
 
 
 def score_table(run: Run, scores: Scores) -> Table:

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 from robospa.categories import BASIC, METRIC_CATEGORIES
 from robospa.results.records.manifest import RunInfo
 from robospa.results.records.run_io import Run, finished
 from robospa.results.records.trial_record import TrialRecord
-from robospa.results.scoring.scores import Scores, score
+from robospa.results.scoring.scores import Scores, Variant, score
 from robospa.results.scoring.setting import IncomparableError, Setting, setting_of
 from robospa.results.statistics.bootstrap import Sample
 from robospa.results.statistics.intervals import METHODS
 from robospa.trial import TrialKey
-
-Variant = tuple[str, int]
 
 
 @dataclass(frozen=True)
@@ -36,9 +35,9 @@ class ModelResults:
     @property
     def categories(self) -> dict[str, str]:
         """The category of every task that a trial is listed of."""
-        return {task: cell.category for (task, _), cell in self.scores.cells.items()}
+        return self.scores.category_of
 
-    @property
+    @cached_property
     def listed(self) -> dict[Variant, int]:
         """Number of listed trials by variant."""
         return {variant: cell.listed for variant, cell in self.scores.cells.items()}

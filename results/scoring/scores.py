@@ -12,6 +12,7 @@ from __future__ import annotations
 import zlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -30,6 +31,8 @@ from robospa.results.statistics.intervals import (
 from robospa.results.statistics.onta import of_bound
 from robospa.trial import TrialKey
 
+Variant = tuple[str, int]
+"""Task and level."""
 Weighted = tuple[tuple[Sample, float], ...]
 Range = tuple[float, float]
 
@@ -110,14 +113,76 @@ class AverageScore:
 
 @dataclass(frozen=True)
 class Scores:
-    """Everything that a run's tables show. Level 0, like `tasks`, is the mean over levels."""
+    """The scores of all variants, and the averages above them, computed when first asked for.
 
-    cells: Mapping[tuple[str, int], VariantScore]
-    levels: tuple[int, ...]
-    tasks: Mapping[str, AverageScore]
-    categories: Mapping[tuple[str, int], AverageScore]
-    dimensions: Mapping[tuple[str, int], AverageScore]
-    overall: Mapping[int, AverageScore]
+    Level 0, like `tasks`, is the mean over levels. Intervals are by the method `ci`
+    (`intervals.METHODS`). Under `bootstrap` an average resamples the episodes of all variants below
+    it, as the paper does.
+    """
+
+    cells: Mapping[Variant, VariantScore]
+    ci: str = METHODS[0]
+
+    @cached_property
+    def levels(self) -> tuple[int, ...]:
+        """All levels, in order."""
+        return tuple(sorted({level for _, level in self.cells}))
+
+    @cached_property
+    def category_of(self) -> dict[str, str]:
+        """The category of every task."""
+        return {task: cell.category for (task, _), cell in self.cells.items()}
+
+    @property
+    def tasks_by_category(self) -> list[str]:
+        """All tasks: of the benchmark's categories, then of basic grounding, then the others."""
+        order = (*CATEGORIES, *BASIC, "")
+        return [t for c in order for t, category in self.category_of.items() if category == c]
+
+    @cached_property
+    def tasks(self) -> Mapping[str, AverageScore]:
+        """The mean over levels of every task."""
+        cells, levels = self.cells, self.levels
+        return {
+            task: _join([cells[task, n] for n in levels if (task, n) in cells], self.ci)
+            for task in self.category_of
+        }
+
+    @cached_property
+    def categories(self) -> Mapping[tuple[str, int], AverageScore]:
+        """The mean of every category's tasks, by category and level."""
+        members = {
+            c: [task for task, category in self.category_of.items() if category == c]
+            for c in CATEGORIES + BASIC
+        }
+        return self._by_level(
+            members, lambda task, n: self.cells.get((task, n)) if n else self.tasks[task]
+        )
+
+    @cached_property
+    def dimensions(self) -> Mapping[tuple[str, int], AverageScore]:
+        """The mean of every dimension's categories, by dimension and level."""
+        return self._by_level(DIMENSIONS, lambda c, n: self.categories.get((c, n)))
+
+    @cached_property
+    def overall(self) -> Mapping[int, AverageScore]:
+        """The mean of all categories, by level."""
+        found = self._by_level({"": CATEGORIES}, lambda c, n: self.categories.get((c, n)))
+        return {level: average for (_, level), average in found.items()}
+
+    def _by_level(
+        self,
+        groups: Mapping[str, Sequence[str]],
+        find: Callable[[str, int], VariantScore | AverageScore | None],
+    ) -> dict[tuple[str, int], AverageScore]:
+        """Average of each group's members at every level, and at level 0 of what `find` gives."""
+        made: dict[tuple[str, int], AverageScore] = {}
+        for name, members in groups.items():
+            for level in (*self.levels, 0):
+                parts = [p for m in members if (p := find(m, level)) is not None]
+                if parts:
+                    made[name, level] = _join(parts, self.ci)
+        return made
 
 
 def _seed(task: str, level: int) -> int:
@@ -226,22 +291,6 @@ def _flat(parts: Sequence[VariantScore | AverageScore], metric: str) -> Weighted
     return tuple(flat)
 
 
-def _by_level(
-    groups: Mapping[str, Sequence[str]],
-    levels: Sequence[int],
-    find: Callable[[str, int], VariantScore | AverageScore | None],
-    ci: str,
-) -> dict[tuple[str, int], AverageScore]:
-    """Average of each group's members at every level, and at level 0 of what `find` gives there."""
-    made: dict[tuple[str, int], AverageScore] = {}
-    for name, members in groups.items():
-        for level in (*levels, 0):
-            parts = [p for m in members if (p := find(m, level)) is not None]
-            if parts:
-                made[name, level] = _join(parts, ci)
-    return made
-
-
 def score(
     keys: Iterable[TrialKey],
     records: Mapping[TrialKey, TrialRecord],
@@ -264,26 +313,9 @@ def score(
     return combine(cells, ci)
 
 
-def combine(cells: Mapping[tuple[str, int], VariantScore], ci: str = METHODS[0]) -> Scores:
-    """All averages above `cells`, and their intervals by the method `ci` (`intervals.METHODS`).
-
-    Under `bootstrap` an average resamples the episodes of all variants below it, as the paper does.
-    """
-    cells = {place: with_intervals(cell, ci) for place, cell in cells.items()}
-    levels = tuple(sorted({level for _, level in cells}))
-    category = {task: cell.category for (task, _), cell in cells.items()}
-    names = list(category)
-    tasks = {t: _join([cells[t, n] for n in levels if (t, n) in cells], ci) for t in names}
-
-    def cell_or_mean(task: str, level: int) -> VariantScore | AverageScore | None:
-        return cells.get((task, level)) if level else tasks[task]
-
-    members_of = {c: [t for t in names if category.get(t) == c] for c in CATEGORIES + BASIC}
-    categories = _by_level(members_of, levels, cell_or_mean, ci)
-    dimensions = _by_level(DIMENSIONS, levels, lambda c, n: categories.get((c, n)), ci)
-    everything = _by_level({"": CATEGORIES}, levels, lambda c, n: categories.get((c, n)), ci)
-    overall = {level: average for (_, level), average in everything.items()}
-    return Scores(cells, levels, tasks, categories, dimensions, overall)
+def combine(cells: Mapping[Variant, VariantScore], ci: str = METHODS[0]) -> Scores:
+    """The scores of `cells`, whose intervals are made by the method `ci`."""
+    return Scores({variant: with_intervals(cell, ci) for variant, cell in cells.items()}, ci)
 
 
 def score_run(run: Run, ci: str = METHODS[0]) -> Scores:

@@ -154,22 +154,35 @@ def draw_over_tasks(
     drawn = np.zeros(resamples)
     for number, group in enumerate(groups):
         minus = against[number] if against else ()
+        fixed = np.array([_constant_value(sample) for sample in group])
+        if minus:
+            fixed -= [_constant_value(sample) for sample in minus]
+        varying = [
+            place
+            for place, pair in enumerate(zip(group, minus or group, strict=True))
+            if not all(sample.constant for sample in pair)
+        ]
         chosen = generator.integers(0, len(group), size=(len(group), resamples))
         for choice in chosen:
-            values = np.zeros(resamples)
-            for place, sample in enumerate(group):
+            values = fixed.take(choice)
+            for place in varying:
+                sample = group[place]
                 picked = np.flatnonzero(choice == place)
-                values[picked] += _values(sample, len(picked), generator)
-                if minus:
+                if not sample.constant:
+                    values[picked] += _values(sample, len(picked), generator)
+                if minus and not minus[place].constant:
                     values[picked] -= _values(minus[place], len(picked), generator)
             drawn += values / (len(group) * len(groups))
     return drawn
 
 
+def _constant_value(sample: Sample) -> float:
+    """The value of a variant whose trials are all alike, 0 for others."""
+    return sample.value if sample.constant else 0.0
+
+
 def _values(sample: Sample, resamples: int, generator: np.random.Generator) -> NDArray[np.float64]:
-    """Resampled values of one variant."""
-    if sample.constant:
-        return np.full(resamples, sample.value)
+    """Resampled values of a variant whose trials are not all alike."""
     random = generator.integers(0, GRID, size=resamples, dtype=np.uint16)
     step = sample.scale / sample.trials
     return np.asarray(sample.shift + step * _deck(sample.counts).take(random), dtype=np.float64)
