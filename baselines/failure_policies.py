@@ -10,9 +10,8 @@ the plan short, repeat a part of it, or replace a skill by one that goes wrong.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,10 +76,13 @@ class ReleaseAnywhere:
     object: str
 
 
+Call = Skill | ActBeside | Hover | ReleaseAnywhere
+
+
 class FailingExpert(Expert):
     """An expert that also knows how to go wrong; `failures` lists what it did not bring about."""
 
-    def _single(self, call: Any) -> Steps:
+    def _single(self, call: object) -> Steps:
         ws = self.workspace
         if isinstance(call, ActBeside):
             yield from act_beside(ws, call)
@@ -174,18 +176,18 @@ def split_steps(plan: tuple[Skill, ...]) -> list[list[Skill]]:
     return steps
 
 
-def join_steps(plan: tuple[Skill, ...], steps: list[list[Skill]]) -> tuple[Skill, ...]:
+def join_steps(plan: tuple[Skill, ...], steps: Sequence[Sequence[Call]]) -> tuple[Call, ...]:
     """`steps` with the waits that stand before everything else in `plan`."""
     waits = [call for call in plan if isinstance(call, Wait)]
     return (*waits, *(call for step in steps for call in step))
 
 
-def with_wrong_facts(scene: Scene, **facts: Any) -> Scene:
+def with_wrong_facts(scene: Scene, **facts: object) -> Scene:
     """The scene with other facts: what somebody plans on who has them wrong."""
     return replace(scene, facts={**scene.facts, **facts})
 
 
-def wrong_plan(kind: str, scene: Scene, ws: Workspace) -> tuple[Any, ...]:
+def wrong_plan(kind: str, scene: Scene, ws: Workspace) -> tuple[Call, ...]:
     """The plan of a policy that makes the mistake `kind`; ValueError where that makes no sense."""
     if kind not in KINDS:
         raise ValueError(f"no mistake {kind!r}; there are {', '.join(KINDS)}")
@@ -230,16 +232,17 @@ def neighbour(scene: Scene) -> str:
 
 def plan_with_failure(
     kind: str, scene: Scene, ws: Workspace, steps: list[list[Skill]]
-) -> list[list[Skill]]:
+) -> list[Sequence[Call]]:
     """The steps with one that goes wrong: the second pick if there is one, else the only one."""
     picks = [i for i, step in enumerate(steps) if isinstance(step[0], Pick)]
     if not picks and kind == "drops":
         raise ValueError(f"{scene.task} has nothing to drop")
     wrong = picks[min(1, len(picks) - 1)] if picks else len(steps) - 1
-    call: Any = steps[wrong][0]
-    if kind == "drops":
+    call = steps[wrong][0]
+    bad: list[Call]
+    if kind == "drops" and isinstance(call, Pick):
         alone = "target" in scene.facts
-        bad: list[Any] = [replace(call, lift=LOW) if alone else call, ReleaseAnywhere(call.object)]
+        bad = [replace(call, lift=LOW) if alone else call, ReleaseAnywhere(call.object)]
     elif isinstance(call, Press):
         bad = [ActBeside(call, (0.0, PRESS_BESIDE))]
     elif not isinstance(call, Pick):
@@ -277,8 +280,7 @@ class FailingOracle(Oracle):
         """The next actions, float32 (T, 14)."""
         if self._scene is None:
             raise RuntimeError("the policy was asked for actions before a reset")
-        state: Mapping[str, Any] = observation["privileged"]
-        snapshot = snapshot_from_json(state, workcell(self._scene.embodiment))
+        snapshot = snapshot_from_json(observation["privileged"], workcell(self._scene.embodiment))
         if self._expert is None:
             expert = FailingExpert(self._scene, snapshot, ())
             try:

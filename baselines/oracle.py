@@ -6,9 +6,6 @@ numbers are an upper bound of the setup, never a policy's result.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -51,8 +48,7 @@ class Oracle:
         """The next skill's actions, float32 (T, 14)."""
         if self._scene is None:
             raise RuntimeError("the oracle was asked for actions before a reset")
-        state: Mapping[str, Any] = observation["privileged"]
-        snapshot = snapshot_from_json(state, workcell(self._scene.embodiment))
+        snapshot = snapshot_from_json(observation["privileged"], workcell(self._scene.embodiment))
         if self._expert is None:
             self._expert = Expert(self._scene, snapshot)
         return self._expert.next(snapshot)

@@ -28,6 +28,8 @@ from pathlib import Path
 from typing import Any
 
 RESULTS = Path(__file__).parent / "results"
+Json = dict[str, Any]
+"""An object of a JSON file."""
 PACKAGES = ("numpy", "msgpack", "websockets", "sapien")
 
 
@@ -64,7 +66,7 @@ class Metric:
             return self.value <= self.at_most
         return self.at_least is not None and self.value >= self.at_least
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> Json:
         """All that is set, `what`, `value` and `unit` always, and with a bar whether it is met."""
         found = {"what": self.what, "value": self.value, "unit": self.unit}
         found.update(
@@ -86,14 +88,14 @@ class Result:
     rows: tuple[Metric, ...]
     text: str = ""
     circumstances: str = ""
-    data: Mapping[str, Any] = field(default_factory=dict)
+    data: Mapping[str, object] = field(default_factory=dict)
     versions: Mapping[str, str] = field(default_factory=dict)
     """Besides those of Python and PACKAGES: the peers'."""
-    machine: Mapping[str, Any] = field(default_factory=lambda: machine())
+    machine: Mapping[str, object] = field(default_factory=lambda: machine())
     command: str = ""
     date: str = ""
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> Json:
         """The file's content."""
         return {
             "benchmark": self.name,
@@ -109,7 +111,7 @@ class Result:
         }
 
 
-def machine() -> dict[str, Any]:
+def machine() -> Json:
     """Processor, memory, kernel and Python; `load` is the machine's at this moment."""
     return {
         "cores": os.cpu_count(),

@@ -17,9 +17,8 @@ import sys
 import time
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
 
-from common import Metric, Result, argument_parser, finish
+from common import Json, Metric, Result, argument_parser, finish
 
 from robospa.results.records.run_io import read_run
 from robospa.results.records.trial_record import TrialRecord
@@ -98,7 +97,7 @@ def lists() -> list[Metric]:
     ]  # fmt: skip
 
 
-def oracle(trials: int, first: int) -> tuple[list[Metric], dict[str, Any]]:
+def oracle(trials: int, first: int) -> tuple[list[Metric], Json]:
     """Seeds that no list has, in physics."""
     seeds = ("--trials", str(trials), "--seeds", f"{first}-{first + trials - 1}")
     records, wall, whole = evaluate("oracle", tasks(), *seeds)
@@ -158,7 +157,7 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=900_000)
     options = parser.parse_args()
     rows = lists()
-    data: dict[str, Any] = {}
+    data: Json = {}
     if options.trials:
         found, data = oracle(options.trials, options.first)
         rows += found

@@ -13,7 +13,6 @@ import functools
 import time
 from collections import defaultdict
 from collections.abc import Callable
-from typing import Any
 
 from common import Metric, Result, argument_parser, finish
 
@@ -47,12 +46,12 @@ class Clock:
     def __init__(self) -> None:
         self.spent: dict[str, float] = defaultdict(float)
 
-    def wrap(self, place: Any, name: str) -> None:
+    def wrap(self, place: object, name: str) -> None:
         """Have every call of `place.name` timed."""
-        work: Callable[..., Any] = getattr(place, name)
+        work: Callable[..., object] = getattr(place, name)
 
         @functools.wraps(work)
-        def timed(*args: Any, **kwargs: Any) -> Any:
+        def timed(*args: object, **kwargs: object) -> object:
             began = time.thread_time()
             try:
                 return work(*args, **kwargs)

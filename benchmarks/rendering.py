@@ -16,11 +16,11 @@ import time
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 import sapien
 from common import Metric, Result, argument_parser, finish
+from numpy.typing import NDArray
 from physics import table_of_blocks
 
 from robospa.harness.robots import embodiment
@@ -38,7 +38,12 @@ bare capture takes the same pictures of the same scene with SAPIEN's calls and d
 READY = (0.0, 1.6, 1.5, 0.0, 0.0, 0.0, 1.0)
 
 
-def bare_cameras(world: SapienWorld) -> tuple[Any, list[Any]]:
+Cameras = list[sapien.render.RenderCameraComponent]
+
+
+def bare_cameras(
+    world: SapienWorld,
+) -> tuple[sapien.Scene, Cameras]:
     """SAPIEN cameras with its default shader where the world's are, in the world's drawn scene."""
     renderer = world._renderer
     assert renderer is not None
@@ -55,7 +60,7 @@ def bare_cameras(world: SapienWorld) -> tuple[Any, list[Any]]:
     return renderer._scene, cameras
 
 
-def capture(scene: Any, cameras: list[Any]) -> list[Any]:
+def capture(scene: sapien.Scene, cameras: Cameras) -> list[NDArray[np.uint8]]:
     """Three pictures as one would write it by hand."""
     scene.update_render()
     images = []
@@ -66,7 +71,7 @@ def capture(scene: Any, cameras: list[Any]) -> list[Any]:
     return images
 
 
-def timed(run: Callable[[], Any]) -> tuple[float, float]:
+def timed(run: Callable[[], object]) -> tuple[float, float]:
     """Wall and CPU time [ms] of one call."""
     wall, cpu = time.perf_counter(), time.process_time()
     run()
@@ -86,7 +91,7 @@ def measure(rounds: int) -> Result:
     spec = PolicySpec("benchmark")
     worlds = {"observation": open_world(), "bare": open_world(), "primitives": open_world()}
     first, _ = timed(lambda: worlds["observation"].observe(spec))
-    sides: dict[str, Callable[[], Any]] = {
+    sides: dict[str, Callable[[], object]] = {
         "observation": lambda: worlds["observation"].observe(spec)
     }
     for name in ("bare", "primitives"):

@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
 
-from common import RESULTS
+from common import RESULTS, Json
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "benchmarks.md"
 ORDER = (
@@ -36,7 +35,7 @@ in `benchmarks/results/`, from which `python benchmarks/report.py` writes this p
 """
 
 
-def load(folder: Path = RESULTS) -> list[dict[str, Any]]:
+def load(folder: Path = RESULTS) -> list[Json]:
     """All results in the page's order."""
     found = [json.loads(p.read_text(encoding="utf-8")) for p in sorted(folder.glob("*.json"))]
     place = {name: i for i, name in enumerate(ORDER)}
@@ -63,13 +62,13 @@ def table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
     return "\n".join("| " + " | ".join(cell(c) for c in line) + " |" for line in lines)
 
 
-def measured(row: dict[str, Any], key: str = "value") -> str:
+def measured(row: Json, key: str = "value") -> str:
     """Value and unit."""
     value = row.get(key)
     return number(value) + (f" {row['unit']}" if value is not None and row["unit"] else "")
 
 
-def bar(row: dict[str, Any]) -> str:
+def bar(row: Json) -> str:
     """The bar in words."""
     for key, sign in (("at_most", "<="), ("at_least", ">=")):
         if row.get(key) is not None:
@@ -77,7 +76,7 @@ def bar(row: dict[str, Any]) -> str:
     return ""
 
 
-def verdict(row: dict[str, Any]) -> str:
+def verdict(row: Json) -> str:
     """Met, or not; "" where there is nothing to meet."""
     met = row.get("met")
     if met is None:
@@ -85,7 +84,7 @@ def verdict(row: dict[str, Any]) -> str:
     return "met" if met else "**not met**"
 
 
-def summary(results: list[dict[str, Any]]) -> str:
+def summary(results: list[Json]) -> str:
     """All figures that have a bar."""
     rows = [
         (
@@ -102,7 +101,7 @@ def summary(results: list[dict[str, Any]]) -> str:
     return table(("what", "bar", "measured", "", "before"), rows)
 
 
-def columns(rows: list[dict[str, Any]]) -> list[tuple[str, list[str]]]:
+def columns(rows: list[Json]) -> list[tuple[str, list[str]]]:
     """Heads and cells of a section's table; columns in which nothing stands are left out."""
     all_of = {
         "what": [row["what"] for row in rows],
@@ -116,14 +115,14 @@ def columns(rows: list[dict[str, Any]]) -> list[tuple[str, list[str]]]:
     return [(head, cells) for head, cells in all_of.items() if any(cells)]
 
 
-def _origin(row: dict[str, Any]) -> str:
+def _origin(row: Json) -> str:
     """The source of a metric that the result's own command did not measure."""
     when = f"measured {row['date']}" if row.get("date") else ""
     how = f"`{row['command']}`" if row.get("command") else ""
     return " ".join(w for w in (when, how) if w)
 
 
-def section(result: dict[str, Any]) -> str:
+def section(result: Json) -> str:
     """One benchmark."""
     cells = columns(result["rows"])
     body = table(
@@ -138,7 +137,7 @@ def section(result: dict[str, Any]) -> str:
     return "\n\n".join(part for part in parts if part)
 
 
-def page(results: list[dict[str, Any]]) -> str:
+def page(results: list[Json]) -> str:
     """The whole page."""
     parts = [HEAD.rstrip(), summary(results), *(section(result) for result in results)]
     return "\n\n".join(parts) + "\n"

@@ -13,10 +13,9 @@ from __future__ import annotations
 
 import gc
 import time
-from typing import Any
 
 import numpy as np
-from common import Metric, Result, argument_parser, finish
+from common import Json, Metric, Result, argument_parser, finish
 
 from robospa.tasks import catalog
 
@@ -26,7 +25,7 @@ BAR = 5.0
 SHOWN = 12
 
 
-def measure(name: str, level: int, scenes: int) -> dict[str, Any]:
+def measure(name: str, level: int, scenes: int) -> Json:
     """Milliseconds of CPU per scene of one variant."""
     begun = time.process_time()
     catalog.build_scene(name, level, FIRST_SEED - 1)
@@ -54,7 +53,7 @@ def measure(name: str, level: int, scenes: int) -> dict[str, Any]:
     }
 
 
-def result(found: list[dict[str, Any]]) -> Result:
+def result(found: list[Json]) -> Result:
     """The figures of all variants."""
     found = sorted(found, key=lambda row: -row["p99"])
     over = sum(row["p99"] >= BAR for row in found)

@@ -14,10 +14,9 @@ import json
 import statistics
 import subprocess
 import time
-from typing import Any
 
 import numpy as np
-from common import Metric, Result, argument_parser, finish
+from common import Json, Metric, Result, argument_parser, finish
 from peers import Peer, environment
 from sides import Sides, line_of, peer_of, peers_for, sides, tell, versions_of
 
@@ -132,7 +131,7 @@ def measure(requests: int, rounds: int) -> Result:
     rows.append(
         Metric("XPolicyLab's own client", None, "ms", note=missing.problem or "has a package now")
     )
-    data: dict[str, Any] = {"message_bytes": size, "frames": source}
+    data: Json = {"message_bytes": size, "frames": source}
     return Result(
         "wire",
         "What a round trip costs",

@@ -27,20 +27,27 @@ import json
 import os
 import sys
 import time
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Awaitable, Callable, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from websockets.asyncio.server import ServerConnection
 
 CAMERAS = ("head", "left_wrist", "right_wrist")
-CHUNK = np.zeros((50, 14), np.float32)
+Chunk = NDArray[np.float32]
+Handler = Callable[["ServerConnection"], Awaitable[None]]
+CHUNK: Chunk = np.zeros((50, 14), np.float32)
 WORDS = " ".join(["word"] * 20)
-Call = Callable[[], Any]
+Call = Callable[[], object]
 
 
-def frames(path: str) -> Any:
+def frames(path: str) -> NDArray[np.uint8]:
     """Three pictures (3, 240, 320, 3) uint8."""
-    return np.load(path)
+    images: NDArray[np.uint8] = np.load(path)
+    return images
 
 
 def observation(path: str) -> dict[str, Any]:
@@ -64,7 +71,7 @@ def plain(path: str) -> dict[str, Any]:
 # ---------------------------------------------------------------- servers
 
 
-async def _listen(handler: Any, **settings: Any) -> None:
+async def _listen(handler: Handler, **settings: object) -> None:
     from websockets.asyncio.server import serve
 
     async with serve(handler, "127.0.0.1", 0, max_size=None, **settings) as server:
@@ -75,7 +82,7 @@ async def _listen(handler: Any, **settings: Any) -> None:
 def serve_bare() -> None:
     answer = bytes(CHUNK.nbytes)
 
-    async def handler(socket: Any) -> None:
+    async def handler(socket: ServerConnection) -> None:
         async for _ in socket:
             await socket.send(answer)
 
@@ -85,7 +92,7 @@ def serve_bare() -> None:
 def serve_openpi() -> None:
     from openpi_client import msgpack_numpy
 
-    async def handler(socket: Any) -> None:
+    async def handler(socket: ServerConnection) -> None:
         packer = msgpack_numpy.Packer()
         await socket.send(packer.pack({"reset_pose": [0.0] * 6}))
         async for data in socket:
@@ -97,19 +104,19 @@ def serve_openpi() -> None:
     asyncio.run(_listen(handler, compression=None))
 
 
-def _robospa_model(batch: int) -> Any:
+def _robospa_model(batch: int) -> type:
     from robospa.protocol.policy import PolicySpec
 
     class Model:
         spec = PolicySpec("echo", action_dim=14, batch=batch)
 
-        def reset(self, trial: Any) -> None:
+        def reset(self, trial: object) -> None:
             return None
 
-        def infer(self, observation: Any) -> Any:
+        def infer(self, observation: object) -> Chunk:
             return CHUNK
 
-        def infer_batch(self, observations: Any, sessions: Any) -> Any:
+        def infer_batch(self, observations: Sequence[object], sessions: object) -> list[Chunk]:
             slow(len(observations))
             return [CHUNK] * len(observations)
 
@@ -142,10 +149,12 @@ def serve_vla_eval(chunk_size: int | None = None, batch: int = 1) -> None:
     from vla_eval.model_servers.serve import serve_async
 
     class Model(PredictModelServer):
-        def predict(self, obs: Any, ctx: Any) -> Any:
+        def predict(self, obs: object, ctx: object) -> dict[str, Chunk]:
             return {"actions": CHUNK}
 
-        def predict_batch(self, obs_batch: Any, ctx_batch: Any) -> Any:
+        def predict_batch(
+            self, obs_batch: Sequence[object], ctx_batch: object
+        ) -> list[dict[str, Chunk]]:
             slow(len(obs_batch))
             return [{"actions": CHUNK}] * len(obs_batch)
 
@@ -162,7 +171,7 @@ def serve_xpolicylab() -> None:
     import msgpack
     import msgpack_numpy
 
-    async def handler(socket: Any) -> None:
+    async def handler(socket: ServerConnection) -> None:
         async for data in socket:
             asked = msgpack.unpackb(data, object_hook=msgpack_numpy.decode, raw=False)
             start = time.perf_counter()
@@ -261,7 +270,7 @@ def call_xpolicylab(url: str, path: str) -> Call:
         "state": {"left_arm_joint_state": seen["state"][:7], "right": seen["state"][7:]},
     }
 
-    async def ask() -> Any:
+    async def ask() -> object:
         envelope = {
             "message_type": "infer",
             "message_id": str(uuid.uuid4()),

@@ -18,7 +18,7 @@ def policy_names() -> tuple[str, ...]:
     return names(POLICIES)
 
 
-def policy_factory(name: str) -> Callable[..., Any]:
+def policy_factory(name: str) -> Callable[..., Policy]:
     """The function that makes a policy, by entry-point name or `module:function`."""
     if ":" in name:
         if os.getcwd() not in sys.path:

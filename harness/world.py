@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,7 +84,7 @@ class World(Protocol):
         """Hash of the exact state (poses, velocities, joints): equal only if equal to the bit."""
         ...
 
-    def info(self) -> Mapping[str, Any]:
+    def info(self) -> Mapping[str, object]:
         """Simulator, version, device and renderer, for the run's manifest."""
         ...
 

@@ -110,5 +110,5 @@ class Scene:
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
-OPTIONAL: Mapping[str, Any] = {"table_rise": 0.0}
+OPTIONAL: Mapping[str, object] = {"table_rise": 0.0}
 """Fields that the JSON form leaves out where they have this value."""

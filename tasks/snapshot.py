@@ -120,10 +120,10 @@ def _flat(pose: Pose) -> list[float]:
     return [*pose.position, *pose.rotation]
 
 
-def _floats(row: Any) -> tuple[float, ...]:
+def _floats(row: Iterable[float]) -> tuple[float, ...]:
     return tuple(float(v) for v in row)
 
 
-def _pose(row: Any) -> Pose:
+def _pose(row: Iterable[float]) -> Pose:
     x, y, z, qw, qx, qy, qz = _floats(row)
     return Pose((x, y, z), (qw, qx, qy, qz))

@@ -19,9 +19,8 @@ import json
 import re
 import subprocess
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,11 +58,11 @@ class PoseWalk:
         self.spec = PolicySpec(name=action, cameras=(), action=action, horizon=4, seeded=True)
         self._seed = 0
 
-    def reset(self, trial: Any) -> None:
+    def reset(self, trial: object) -> None:
         """Start the walk of this trial."""
         self._seed = trial.policy_seed
 
-    def infer(self, observation: Any) -> NDArray[np.float32]:
+    def infer(self, observation: object) -> NDArray[np.float32]:
         """The next four poses, float32 (4, D)."""
         generator = np.random.default_rng([self._seed, int(observation["step"])])
         if self.spec.action == "ee":
@@ -86,7 +85,7 @@ def delta_walk() -> PoseWalk:
     return PoseWalk("delta_ee")
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> Callable[[], object]:
     """`same_results:KIND` is the policy that makes mistakes of that kind."""
     if name not in MISTAKES:
         raise AttributeError(name)

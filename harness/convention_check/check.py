@@ -14,7 +14,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import Any
 
 import numpy as np
 
@@ -144,7 +143,7 @@ def _case(
 ) -> AnswerSample | None:
     """The answer at frame `t`, seen as `view` undoes it; None if there is nothing to undo."""
     spec = policy.spec
-    seen: Any = episode.observation(spec, t)
+    seen = episode.observation(spec, t)
     if view is not None:
         measured = None if episode.measured is None else episode.measured[t]
         changed = view.undo(seen, {"measured": measured})

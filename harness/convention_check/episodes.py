@@ -18,11 +18,12 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from types import ModuleType
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +35,9 @@ from robospa.observation import CameraSpec, Observation
 from robospa.protocol.errors import DecodeError
 from robospa.protocol.images import decode_jpeg
 from robospa.protocol.policy import PolicySpec
+
+if TYPE_CHECKING:
+    import h5py
 
 Array = NDArray[np.float64]
 Picture = NDArray[np.uint8]
@@ -56,6 +60,10 @@ EVERY = 15
 RATE = 250
 
 
+Frame = bytes | NDArray[np.uint8]
+"""A picture as JPEG (official colours) or as an array (H, W, 3) RGB."""
+
+
 class EpisodeError(Exception):
     """A file is no demonstration that can be read, or lacks something; the message says what."""
 
@@ -73,11 +81,11 @@ class Episode:
     name: str
     commanded: Array
     ee: Array
-    frames: Mapping[str, Any]
+    frames: Mapping[str, Sequence[Frame]]
     space: ActionSpace
     instruction: str = ""
     measured: Array | None = None
-    about: Mapping[str, Any] = field(default_factory=dict)
+    about: Mapping[str, str | int] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.commanded)
@@ -148,7 +156,7 @@ def read_episode(path: Path, instruction: str | None = None) -> Episode:
         raise EpisodeError(f"{path} cannot be read as an HDF5 demonstration: {why}") from error
 
 
-def _read(file: Any, path: Path, instruction: str | None) -> Episode:
+def _read(file: h5py.File, path: Path, instruction: str | None) -> Episode:
     name = path.name
     commanded = _numbers(file, "joint_action/vector", name)
     length, width = commanded.shape
@@ -174,11 +182,12 @@ def _read(file: Any, path: Path, instruction: str | None) -> Episode:
     about = {key: _plain(file.attrs[key]) for key in ABOUT if key in file.attrs}
     if not about and len(path.resolve().parents) > 2:  # <task>/<configuration>/data/episode0.hdf5
         about = {"task": path.resolve().parents[2].name}
-    told = instruction or str(_plain(file.attrs.get("instruction", ""))) or _beside(path)
-    return Episode(name, commanded, np.stack(arms, axis=1), frames, space, told, measured, about)
+    text = instruction or str(_plain(file.attrs.get("instruction", "")))
+    text = text or _official_instruction(path)
+    return Episode(name, commanded, np.stack(arms, axis=1), frames, space, text, measured, about)
 
 
-def _space(file: Any, width: int) -> ActionSpace | None:
+def _space(file: h5py.File, width: int) -> ActionSpace | None:
     """The columns of `joint_action/vector`: two arms of six or of seven joints, or, in files that
     have the arms one by one as well, of as many as those have. None where it is neither."""
     counts = [SIX_JOINT_ARMS, SEVEN_JOINT_ARMS]
@@ -190,7 +199,7 @@ def _space(file: Any, width: int) -> ActionSpace | None:
     return next((space for space in spaces if space.width == width), None)
 
 
-def _numbers(file: Any, at: str, name: str) -> Array:
+def _numbers(file: h5py.File, at: str, name: str) -> Array:
     if at not in file or not hasattr(file[at], "dtype"):
         raise EpisodeError(f"{name} has no {at}: it is not in the layout of RoboTwin 2.0")
     found = file[at]
@@ -202,7 +211,7 @@ def _numbers(file: Any, at: str, name: str) -> Array:
     return values if values.ndim > 1 else values.reshape(-1, 1)
 
 
-def _frames(found: Any, at: str, name: str, length: int) -> list[Any]:
+def _frames(found: h5py.Dataset, at: str, name: str, length: int) -> list[Frame]:
     if not hasattr(found, "dtype"):
         raise EpisodeError(f"{name}: {at} is a group, not frames")
     if found.shape[:1] != (length,):
@@ -214,14 +223,15 @@ def _frames(found: Any, at: str, name: str, length: int) -> list[Any]:
     return [bytes(frame) for frame in found[()]]
 
 
-def _plain(value: Any) -> Any:
+def _plain(value: object) -> str | int:
     """An attribute as a JSON value."""
     if isinstance(value, bytes):
         return value.decode("utf-8", "replace")
-    return value.item() if isinstance(value, np.generic) else value
+    plain = value.item() if isinstance(value, np.generic) else value
+    return plain if isinstance(plain, int) else str(plain)
 
 
-def _beside(path: Path) -> str:
+def _official_instruction(path: Path) -> str:
     """The first training instruction that official data keep beside an episode, or nothing."""
     at = path.resolve().parent.parent / "instructions" / f"{path.stem}.json"
     with suppress(OSError, ValueError, LookupError, TypeError, AttributeError):
@@ -251,7 +261,7 @@ def write_episode(path: Path, episode: Episode) -> None:
     replace_file(path, stream.getvalue())
 
 
-def to_jpeg(frame: Any) -> bytes:
+def to_jpeg(frame: Frame) -> bytes:
     """uint8 (H, W, 3) RGB as official recordings keep it; bytes stay what they are."""
     if isinstance(frame, bytes):
         return frame
@@ -266,8 +276,8 @@ class EpisodeRecorder:
 
     def __init__(self, cameras: tuple[str, ...] = ("head", "left_wrist", "right_wrist")) -> None:
         specs = tuple(CameraSpec(name) for name in cameras)
-        self._looks = PolicySpec("recorder", specs)
-        self._blind = PolicySpec("recorder", (), state="measured")
+        self._spec = PolicySpec("recorder", specs)
+        self._measured_spec = PolicySpec("recorder", (), state="measured")
         self._rows: list[tuple[Array, Array, Array]] = []
         self._frames: dict[str, list[bytes]] = {name: [] for name in cameras}
 
@@ -288,15 +298,15 @@ class EpisodeRecorder:
         self._keep(world)
 
     def _keep(self, world: World) -> None:
-        seen = world.observe(self._looks)
-        measured = world.observe(self._blind)["state"]
+        seen = world.observe(self._spec)
+        measured = world.observe(self._measured_spec)["state"]
         rows = (seen["state"], measured, seen["ee"])
         self._rows.append(tuple(np.asarray(row, dtype=float) for row in rows))  # type: ignore[arg-type]
         for name, frames in self._frames.items():
             frames.append(to_jpeg(seen["images"][name]))
 
     def episode(
-        self, name: str, instruction: str, about: Mapping[str, Any], space: ActionSpace
+        self, name: str, instruction: str, about: Mapping[str, str | int], space: ActionSpace
     ) -> Episode:
         """The recorded episode of a robot whose joint actions are of `space`."""
         commanded, measured, ee = (np.stack(rows) for rows in zip(*self._rows, strict=True))
@@ -309,17 +319,18 @@ def require() -> None:
     _pillow()
 
 
-def _h5py() -> Any:
+def _h5py() -> ModuleType:
     try:
         import h5py
     except ImportError as error:
         raise EpisodeError(
             "demonstrations need h5py, which is not installed: pip install 'robospa[demos]'"
         ) from error
-    return h5py
+    module: ModuleType = h5py
+    return module
 
 
-def _pillow() -> Any:
+def _pillow() -> ModuleType:
     try:
         from PIL import Image
     except ImportError as error:

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,7 @@ from robospa.tasks.scene import Scene
 from robospa.tasks.task import Task
 
 if TYPE_CHECKING:
-    from PIL import Image
+    from PIL import Image, ImageFont
 
 CELL = (320, 240)
 """Size of a picture on the sheet [px]; it is rendered at twice that and averaged."""
@@ -139,7 +139,7 @@ def wrapped(text: str, width: float, measure: Callable[[str], float]) -> list[st
     return [*lines[: LINES - 1], last + " …"]
 
 
-def _font(size: int) -> Any:
+def _font(size: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
     from PIL import ImageFont
 
     return ImageFont.load_default(size)

@@ -12,18 +12,19 @@ import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robospa.geometry import Pose, Vec3, look_rotation, yaw_rotation
-from robospa.harness.sim import room as furniture
+from robospa.harness.sim import room
 from robospa.tasks.objects import assets, look_count, object_model
 from robospa.tasks.shapes import Hinge, ObjectModel, Shape
 from robospa.workcell import TABLE_TOP, TableGeometry
 
 if TYPE_CHECKING:
+    import sapien
     from PIL import Image
 
 HEAD = (-0.032, -0.45, 1.35)
@@ -49,7 +50,7 @@ class Booth:
         from robospa.harness.sim.render_bodies import render_body
 
         self._render_body = render_body
-        self._scene: Any = sapien.Scene([cameras.open_render_system()])
+        self._scene = sapien.Scene([cameras.open_render_system()])
         self._scene.set_ambient_light(cameras.AMBIENT)
         self._scene.add_directional_light(
             cameras.SUN_DIRECTION,
@@ -63,12 +64,12 @@ class Booth:
         )
         for lamp in cameras.LAMPS:
             self._scene.add_point_light(lamp, cameras.LAMP_COLOR)
-        for shapes in (furniture.table(TableGeometry()), furniture.wall(), furniture.floor()):
+        for shapes in (room.table(TableGeometry()), room.wall(), room.floor()):
             self._scene.add_entity(render_body(shapes, "room"))
         self._near = self._camera(LARGE, LARGE)
         self._head = self._camera(320, 240)
 
-    def _camera(self, width: int, height: int) -> Any:
+    def _camera(self, width: int, height: int) -> sapien.render.RenderCameraComponent:
         import sapien
 
         camera = sapien.render.RenderCameraComponent(width, height)
@@ -112,7 +113,7 @@ class Booth:
         return large, shown
 
     @staticmethod
-    def _take(camera: Any) -> NDArray[np.uint8]:
+    def _take(camera: sapien.render.RenderCameraComponent) -> NDArray[np.uint8]:
         camera.take_picture()
         picture = np.asarray(camera.get_picture("Color"))[..., :3]
         image: NDArray[np.uint8] = (np.clip(picture, 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)

@@ -12,7 +12,6 @@ import sys
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import groupby, pairwise
 from pathlib import Path
-from typing import Any
 
 from robospa.categories import CATEGORY_NAMES
 from robospa.harness.world import RenderUnavailable, SceneUnstable
@@ -116,7 +115,7 @@ def _varied(scenes: Mapping[int, Sequence[Scene]]) -> list[str]:
     return [*lines, "drawn: " + ", ".join(drawn)] if drawn else lines
 
 
-def _is_counted(values: Mapping[int, Sequence[Any]]) -> bool:
+def _is_counted(values: Mapping[int, Sequence[object]]) -> bool:
     """True if a fact is a number, or a list, whose size the level alone decides."""
     if not all(isinstance(v, int | list) for level in values.values() for v in level):
         return False
@@ -124,8 +123,14 @@ def _is_counted(values: Mapping[int, Sequence[Any]]) -> bool:
     return all(len(size) == 1 for size in sizes) and len(set().union(*sizes)) > 1
 
 
-def _count(value: Any) -> int:
-    return len(value) if isinstance(value, list) else int(value)
+def _number(value: object) -> int:
+    assert isinstance(value, int)
+    return int(value)
+
+
+def _count(value: object) -> int:
+    """Length of a list, or the number itself."""
+    return len(value) if isinstance(value, list) else _number(value)
 
 
 def _is_drawn(scenes: Sequence[Scene], key: str) -> bool:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +31,7 @@ from robospa.tasks.snapshot import Contact, Snapshot, snapshot_to_json
 if TYPE_CHECKING:
     from robospa.harness.sim.renderer import Renderer
 
-Models = Callable[[str, Mapping[str, Any]], ObjectModel]
+Models = Callable[[str, Params], ObjectModel]
 
 POLL_STEPS = 5
 """Physics steps between two polls (50 Hz)."""
@@ -264,7 +264,7 @@ class SapienWorld:
         """Hash of the exact state: poses, velocities, joints."""
         return self._loaded().digest()
 
-    def info(self) -> Mapping[str, Any]:
+    def info(self) -> Mapping[str, object]:
         """Simulator, versions, control, and the render device if it is open."""
         return {
             "simulator": "sapien",

@@ -6,6 +6,7 @@ with the next object, and what can be done again is done again.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
@@ -38,7 +39,6 @@ from robospa.tasks.plan import (
     Pour,
     Press,
     RaiseLower,
-    Skill,
     Stamp,
     Wait,
 )
@@ -58,7 +58,7 @@ class Expert:
     """Solves one trial from exact state. Not for comparison with learned policies."""
 
     def __init__(
-        self, scene: Scene, snapshot: Snapshot, plan: tuple[Skill, ...] | None = None
+        self, scene: Scene, snapshot: Snapshot, plan: Sequence[object] | None = None
     ) -> None:
         self.workspace = Workspace(scene, embodiment(scene.embodiment), snapshot)
         self.failures: list[str] = []
@@ -79,7 +79,7 @@ class Expert:
             rows = self.workspace.row()[None]
         return np.asarray(rows, dtype=np.float32)
 
-    def _run(self, plan: tuple[Skill, ...]) -> Steps:
+    def _run(self, plan: Sequence[object]) -> Steps:
         calls = list(plan)
         while calls:
             call = calls.pop(0)
@@ -102,7 +102,7 @@ class Expert:
                 retreat_home(ws, arm)
         yield from ws.flush()
 
-    def _single(self, call: Skill) -> Steps:
+    def _single(self, call: object) -> Steps:
         ws = self.workspace
         if isinstance(call, Pick):
             yield from pick(ws, call)
