@@ -25,10 +25,10 @@ def scores_of(run: Run) -> ScoresData:
 def tables_of(run: Run) -> dict[str, bytes]:
     """The report's tables of `run` as files, by ending."""
     try:
-        grids = [shown.grid for shown in report_tables([run_column(run, "model")])]
+        tables = [shown.table for shown in report_tables([run_column(run, "model")])]
     except IncomparableError:
-        grids = []  # of variants that no table has
-    return {ending: FORMATS[ending](grids).encode() for ending in ("csv", "md")}
+        tables = []  # of variants that no table has
+    return {ending: FORMATS[ending](tables).encode() for ending in ("csv", "md")}
 
 
 def compare_scores(right: object, given: object, where: str = "") -> str:

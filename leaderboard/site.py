@@ -194,7 +194,7 @@ def _partial(entry: Entry) -> str:
 def _tables(entry: Entry) -> list[ReportTable]:
     """The report's tables; those of all tasks are opened by hand."""
     shown = report_tables([entry.column])
-    return [replace(table, folded=table.grid.name.endswith("-tasks")) for table in shown]
+    return [replace(table, folded=table.table.name.endswith("-tasks")) for table in shown]
 
 
 def failure_rows(failures: Mapping[str, Mapping[str, int]]) -> list[dict[str, Any]]:

@@ -39,9 +39,9 @@ def paper(
     published = [published_column(model) for model in load().models]
     runs = [read_run(folder) for folder in run or []]
     added = [run_column(one) for one in runs]
-    grids = make_tables([*published, *added], table or None, mark)
-    written = write_tables(grids, out, endings)
-    show(grids[0])
+    tables = make_tables([*published, *added], table or None, mark)
+    written = write_tables(tables, out, endings)
+    show(tables[0])
     print()
     print(f"{len(checks())} printed cells walked; {len(errata())} do not follow from the others:")
     for number, check in enumerate(errata(), 1):

@@ -98,7 +98,7 @@ def embodiment_table(dimension: str, columns: Sequence[Column] = ()) -> Table:
         lines.append(TableRow(f"{column.title}, {robot}", tuple(entries)))
     groups = tuple((short, len(levels)) for short in shorts)
     names = "; ".join(f"{s} {data.tasks[table.tasks[s]].printed}" for s in shorts)
-    lost = any(entry.sign for line in lines for entry in line.entries)
+    lost = any(entry.sign for line in lines for entry in line.cells)
     notes = (f"{names}.", *((f"{MISSING} Some trials have no result.",) if lost else ()))
     return Table(
         f"embodiments-{dimension}",
@@ -151,7 +151,7 @@ def basic_table(columns: Sequence[Column] = ()) -> Table:
             "Intervals of runs are 95 % intervals of the mean over the tasks; it stays open where "
             "not all of them were run."
         )
-    if any(entry.sign for line in lines for entry in line.entries):
+    if any(entry.sign for line in lines for entry in line.cells):
         notes.append(f"{MISSING} Some trials have no result.")
     name = "Success rate (SR) in percent on basic spatial tasks"
     return Table("basic", name, "Task", heads * (1 + len(runs)), tuple(lines), groups, tuple(notes))

@@ -35,9 +35,9 @@ TABLES: dict[str, Maker] = {
 """Name -> what makes it from columns and a way of marking the best (`tables_paper.MARKS`)."""
 
 FORMATS: dict[str, Callable[[Sequence[Table]], str]] = {
-    "md": lambda grids: "\n".join(to_markdown(grid) for grid in grids),
+    "md": lambda tables: "\n".join(to_markdown(table) for table in tables),
     "tex": document,
-    "html": lambda grids: page(grids, "RoboSPA: results"),
+    "html": lambda tables: page(tables, "RoboSPA: results"),
     "csv": to_csv,
 }
 """Ending -> what writes several tables as one file."""
@@ -58,17 +58,17 @@ def make_tables(
     return [TABLES[name](columns if name == "basic" else base, mark) for name in chosen]
 
 
-def write_tables(grids: Sequence[Table], folder: Path, formats: Sequence[str]) -> list[Path]:
-    """Write `tables.<ending>` with all of `grids`; for LaTeX also one file each, to be input."""
+def write_tables(tables: Sequence[Table], folder: Path, formats: Sequence[str]) -> list[Path]:
+    """Write `tables.<ending>` with all of `tables`; for LaTeX also one file each, to be input."""
     folder.mkdir(parents=True, exist_ok=True)
     written = []
     for ending in formats:
         path = folder / f"tables.{ending}"
-        path.write_text(FORMATS[ending](grids), encoding="utf-8")
+        path.write_text(FORMATS[ending](tables), encoding="utf-8")
         written.append(path)
         if ending == "tex":
-            for grid in grids:
-                path = folder / f"{grid.name}.tex"
-                path.write_text(to_latex(grid), encoding="utf-8")
+            for table in tables:
+                path = folder / f"{table.name}.tex"
+                path.write_text(to_latex(table), encoding="utf-8")
                 written.append(path)
     return written

@@ -39,7 +39,7 @@ def markdown(report: Report) -> str:
     for what, found in (("missing", report.missing), ("findings", report.findings)):
         lines += [f"* **{what}**: {escape_markdown(text)}" for text in found]
     for table in report.tables:
-        lines += ["", to_markdown(table.grid)]
+        lines += ["", to_markdown(table.table)]
     return "\n".join([*lines, "", " ".join(report.method), ""])
 
 

@@ -34,7 +34,7 @@ SUMMARIES = (("main", "sr"), ("onta", "onta"), ("ps", "ps"))
 class ReportTable:
     """A table of the report; a `folded` one is opened by hand."""
 
-    grid: Table
+    table: Table
     folded: bool
 
 
@@ -45,15 +45,15 @@ def report_tables(columns: Sequence[Column]) -> list[ReportTable]:
     made = []
     for name, metric in SUMMARIES:
         if any(_has(c, metric) for c in runs):
-            grid = summary_table(columns, name, metric, _heads(columns, levels, metric))
-            made.append(ReportTable(covered(grid, len(runs)), False))
+            table = summary_table(columns, name, metric, _heads(columns, levels, metric))
+            made.append(ReportTable(covered(table, len(runs)), False))
     if any(c.covers_basic for c in runs):
         made.append(ReportTable(basic_table(columns), False))
     for _, metric in SUMMARIES:
         if any(_has(c, metric) for c in runs):
-            grid = task_table(columns, f"{metric}-tasks", metric)
-            made.append(ReportTable(covered(grid, len(runs)), len(columns) > 1))
-    return [s for s in made if any(line.entries for line in s.grid.lines)]
+            table = task_table(columns, f"{metric}-tasks", metric)
+            made.append(ReportTable(covered(table, len(runs)), len(columns) > 1))
+    return [s for s in made if any(line.cells for line in s.table.rows)]
 
 
 def _has(column: Column, metric: str) -> bool:
@@ -67,42 +67,42 @@ def _heads(columns: Sequence[Column], levels: Sequence[int], metric: str) -> tup
     return ("L1", "L3", "L5") if metric != "sr" else ("L1", "L5", "Drop")
 
 
-def covered(grid: Table, runs: int) -> Table:
-    """`grid` without the rows that none of its first `runs` columns has a value in."""
-    width = len(grid.heads) // max(1, len(grid.groups)) * runs
+def covered(table: Table, runs: int) -> Table:
+    """`table` without the rows that none of its first `runs` columns has a value in."""
+    width = len(table.heads) // max(1, len(table.groups)) * runs
     kept: list[TableRow] = []
-    for line in grid.lines:
-        if line.kind == "section" or any(e.text != DASH.text for e in line.entries[:width]):
+    for line in table.rows:
+        if line.kind == "section" or any(e.text != DASH.text for e in line.cells[:width]):
             kept.append(line)
     after = [line.kind for line in kept[1:]] + ["section"]
     pairs = list(zip(kept, after, strict=False))
     full = [line for line, kind in pairs if line.kind != "section" or kind != "section"]
-    return _levels_that_were_run(replace(grid, lines=tuple(full)), runs)
+    return _levels_that_were_run(replace(table, rows=tuple(full)), runs)
 
 
-def _levels_that_were_run(grid: Table, runs: int) -> Table:
-    """`grid` without the levels at which its first `runs` groups have no value at all."""
-    width = len(grid.heads) // max(1, len(grid.groups))
-    rows = [line.entries for line in grid.lines if line.kind != "section"]
+def _levels_that_were_run(table: Table, runs: int) -> Table:
+    """`table` without the levels at which its first `runs` groups have no value at all."""
+    width = len(table.heads) // max(1, len(table.groups))
+    cells = [line.cells for line in table.rows if line.kind != "section"]
     kept = [
         place
         for place in range(width)
-        if any(row[n * width + place].text != DASH.text for row in rows for n in range(runs))
+        if any(row[n * width + place].text != DASH.text for row in cells for n in range(runs))
     ]
-    if not rows or len(kept) == width:
-        return grid
-    places = [n * width + place for n in range(len(grid.heads) // width) for place in kept]
+    if not cells or len(kept) == width:
+        return table
+    places = [n * width + place for n in range(len(table.heads) // width) for place in kept]
     lines = [
         line
         if line.kind == "section"
-        else replace(line, entries=tuple(line.entries[p] for p in places))
-        for line in grid.lines
+        else replace(line, cells=tuple(line.cells[p] for p in places))
+        for line in table.rows
     ]
     return replace(
-        grid,
-        heads=tuple(grid.heads[p] for p in places),
-        groups=tuple((title, len(kept)) for title, _ in grid.groups),
-        lines=tuple(lines),
+        table,
+        heads=tuple(table.heads[p] for p in places),
+        groups=tuple((title, len(kept)) for title, _ in table.groups),
+        rows=tuple(lines),
     )
 
 
@@ -122,15 +122,15 @@ def for_page(tables: Sequence[ReportTable]) -> list[PageTable]:
 
     made = []
     for table in tables:
-        grid = table.grid
-        long = [note for note in grid.notes if len(note) > LONG]
-        short = replace(grid, notes=tuple(note for note in grid.notes if note not in long))
+        shown = table.table
+        long = [note for note in shown.notes if len(note) > LONG]
+        short = replace(shown, notes=tuple(note for note in shown.notes if note not in long))
         html = Markup(fragment(short))
-        made.append(PageTable(grid.title, html, table.folded, long))
+        made.append(PageTable(shown.title, html, table.folded, long))
     return made
 
 
 def write_files(tables: Sequence[ReportTable], folder: Path) -> None:
     """The same tables for papers and programs: LaTeX and CSV."""
     if tables:
-        write_tables([t.grid for t in tables], folder, ("tex", "csv"))
+        write_tables([t.table for t in tables], folder, ("tex", "csv"))

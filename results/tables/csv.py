@@ -13,27 +13,27 @@ LACKS = ("sign", "missing", "worst_case", "best_case")
 """Further columns: the mark, and what trials without a result leave open."""
 
 
-def to_csv(grids: Sequence[Table]) -> str:
-    """All cells of `grids`, one a line, for programs: FIELDS, then LACKS.
+def to_csv(tables: Sequence[Table]) -> str:
+    """All cells of `tables`, one a line, for programs: FIELDS, then LACKS.
 
     Values are not rounded. A text that a spreadsheet would run as a formula gets a quote before it.
     """
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow((*FIELDS, *LACKS))
-    for grid in grids:
+    for table in tables:
         section = ""
-        for line in grid.lines:
-            if line.kind == "section":
-                section = line.label
+        for row in table.rows:
+            if row.kind == "section":
+                section = row.label
                 continue
-            for group, head, entry in zip(grid.group_of, grid.heads, line.entries, strict=True):
+            for group, head, entry in zip(table.group_of, table.heads, row.cells, strict=True):
                 numbers = ("" if x is None else f"{x:.10g}" for x in _numbers(entry))
-                words = (grid.name, section, line.label, group, head, entry.text)
+                words = (table.name, section, row.label, group, head, entry.text)
                 best = "best" if entry.best else ""
                 lacks = (entry.missing or "", *(f"{x:.10g}" for x in entry.bounds or ()))
-                row = (*map(_no_formula, words), *numbers, best, entry.sign, *lacks)
-                writer.writerow((*row, *[""] * (len(FIELDS) + len(LACKS) - len(row))))
+                texts = (*map(_no_formula, words), *numbers, best, entry.sign, *lacks)
+                writer.writerow((*texts, *[""] * (len(FIELDS) + len(LACKS) - len(texts))))
     return out.getvalue()
 
 

@@ -24,29 +24,29 @@ td.best { background: #4a7dff33; font-weight: 700; }
 """
 
 
-def fragment(grid: Table) -> str:
+def fragment(table: Table) -> str:
     """The table with its title as caption and its notes below, to put into a page."""
-    kind = ' class="words"' if grid.words else ""
+    kind = ' class="words"' if table.words else ""
     parts = [
-        f'<section id="{_text(grid.name)}">',
-        f"<h2>{_text(grid.title)}</h2>",
+        f'<section id="{_text(table.name)}">',
+        f"<h2>{_text(table.title)}</h2>",
         f'<div class="scroll"><table{kind}>',
         "<thead>",
-        *_head(grid),
+        *_head(table),
         "</thead>",
         "<tbody>",
-        *(_line(line, len(grid.heads)) for line in grid.lines),
+        *(_line(row, len(table.heads)) for row in table.rows),
         "</tbody></table></div>",
-        *(f'<p class="notes">{_text(note)}</p>' for note in grid.notes),
+        *(f'<p class="notes">{_text(note)}</p>' for note in table.notes),
         "</section>",
     ]
     return "\n".join(parts)
 
 
-def page(grids: Sequence[Table], title: str) -> str:
+def page(tables: Sequence[Table], title: str) -> str:
     """A whole page with all tables."""
-    links = " · ".join(f'<a href="#{_text(g.name)}">{_text(g.name)}</a>' for g in grids)
-    body = "\n".join(fragment(grid) for grid in grids)
+    links = " · ".join(f'<a href="#{_text(g.name)}">{_text(g.name)}</a>' for g in tables)
+    body = "\n".join(fragment(table) for table in tables)
     return (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
@@ -55,25 +55,25 @@ def page(grids: Sequence[Table], title: str) -> str:
     )
 
 
-def _head(grid: Table) -> list[str]:
-    names = "".join(f'<th scope="col">{_text(name)}</th>' for name in (grid.corner, *grid.heads))
+def _head(table: Table) -> list[str]:
+    names = "".join(f'<th scope="col">{_text(name)}</th>' for name in (table.corner, *table.heads))
     rows = [f"<tr>{names}</tr>"]
-    if grid.groups:
+    if table.groups:
         spans = "".join(
             f'<th colspan="{width}" scope="colgroup">{_text(title)}</th>'
-            for title, width in grid.groups
+            for title, width in table.groups
         )
         rows.insert(0, f"<tr><td></td>{spans}</tr>")
     return rows
 
 
-def _line(line: TableRow, width: int) -> str:
-    if line.kind == "section":
-        name = f'<th colspan="{width + 1}" scope="rowgroup">{_text(line.label)}</th>'
+def _line(row: TableRow, width: int) -> str:
+    if row.kind == "section":
+        name = f'<th colspan="{width + 1}" scope="rowgroup">{_text(row.label)}</th>'
         return f'<tr class="section">{name}</tr>'
-    kind = ' class="average"' if line.kind == "average" else ""
-    cells = "".join(map(_entry, line.entries))
-    return f'<tr{kind}><th scope="row">{_text(line.label)}</th>{cells}</tr>'
+    kind = ' class="average"' if row.kind == "average" else ""
+    cells = "".join(map(_entry, row.cells))
+    return f'<tr{kind}><th scope="row">{_text(row.label)}</th>{cells}</tr>'
 
 
 def _entry(entry: TableCell) -> str:

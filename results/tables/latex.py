@@ -55,44 +55,44 @@ def _ascii(character: str) -> str:
     return "".join(_SPECIAL.get(c, c) for c in letters) or "?"
 
 
-def to_latex(grid: Table) -> str:
+def to_latex(table: Table) -> str:
     """The table as a float of two columns' width."""
-    width = len(grid.heads)
-    align = "l" * width if grid.words else "r" * width
+    width = len(table.heads)
+    align = "l" * width if table.words else "r" * width
     lines = [
         r"\begin{table*}[p]",
         r"\centering",
-        rf"\caption{{{escape_latex(grid.title)}}}",
-        rf"\label{{tab:{re.sub(r'[^a-z0-9-]', '-', grid.name)}}}",
-        _fit(grid),
+        rf"\caption{{{escape_latex(table.title)}}}",
+        rf"\label{{tab:{re.sub(r'[^a-z0-9-]', '-', table.name)}}}",
+        _fit(table),
         rf"\begin{{tabular}}{{l{align}}}",
         r"\toprule",
-        *_head(grid),
+        *_head(table),
         r"\midrule",
     ]
-    for number, line in enumerate(grid.lines):
-        label = escape_latex(line.label)
-        if line.kind == "section":
+    for number, row in enumerate(table.rows):
+        label = escape_latex(row.label)
+        if row.kind == "section":
             lines += [r"\midrule"] * (number > 0)
             lines += [rf"\multicolumn{{{width + 1}}}{{l}}{{\textbf{{{label}}}}} \\", r"\midrule"]
             continue
-        if line.kind == "average":
+        if row.kind == "average":
             lines.append(r"\addlinespace[2pt]")
             label = rf"\textit{{{label}}}"
-        lines.append(" & ".join([label, *map(_entry, line.entries)]) + r" \\")
+        lines.append(" & ".join([label, *map(_entry, row.cells)]) + r" \\")
     lines += [r"\bottomrule", r"\end{tabular}}"]
     lines += [
-        rf"\par\smallskip{{\footnotesize\raggedright {escape_latex(n)}\par}}" for n in grid.notes
+        rf"\par\smallskip{{\footnotesize\raggedright {escape_latex(n)}\par}}" for n in table.notes
     ]
     return "\n".join([*lines, r"\end{table*}", ""])
 
 
-def _fit(grid: Table) -> str:
+def _fit(table: Table) -> str:
     """A table that would not fit is scaled by whichever of width and height is the tighter."""
-    texts = [(line.label, *(e.text for e in line.entries)) for line in grid.lines if line.entries]
-    columns = zip(*texts, (grid.corner, *grid.heads), strict=True)
+    texts = [(row.label, *(e.text for e in row.cells)) for row in table.rows if row.cells]
+    columns = zip(*texts, (table.corner, *table.heads), strict=True)
     width = sum(5.2 * max(map(len, column)) + 12 for column in columns)
-    height = sum(12.5 + 6 * (line.kind != "row") for line in grid.lines) + 40
+    height = sum(12.5 + 6 * (row.kind != "row") for row in table.rows) + 40
     wide, high = width / PAGE[0], height / PAGE[1]
     if max(wide, high) <= 1:
         return "{%"
@@ -101,16 +101,16 @@ def _fit(grid: Table) -> str:
     return rf"\resizebox*{{!}}{{{PAGE[1]:.0f}pt}}{{%"  # the star counts the depth as well
 
 
-def _head(grid: Table) -> list[str]:
+def _head(table: Table) -> list[str]:
     lines = []
-    if grid.groups:
+    if table.groups:
         spans, rules, place = [], [], 2
-        for title, width in grid.groups:
+        for title, width in table.groups:
             spans.append(rf"\multicolumn{{{width}}}{{c}}{{{escape_latex(title)}}}")
             rules.append(rf"\cmidrule(lr){{{place}-{place + width - 1}}}")
             place += width
         lines += [" & ".join(["", *spans]) + r" \\", "".join(rules)]
-    names = [escape_latex(name) for name in (grid.corner, *grid.heads)]
+    names = [escape_latex(name) for name in (table.corner, *table.heads)]
     return [*lines, " & ".join(names) + r" \\"]
 
 
@@ -128,7 +128,7 @@ def _sign(sign: str) -> str:
     return "".join({"*": r"\ast", "†": r"\dagger"}[c] for c in sign)
 
 
-def document(grids: Sequence[Table]) -> str:
+def document(tables: Sequence[Table]) -> str:
     """All tables as one document."""
-    body = "\n\\clearpage\n".join(to_latex(grid) for grid in grids)
+    body = "\n\\clearpage\n".join(to_latex(table) for table in tables)
     return f"{PREAMBLE}\\begin{{document}}\n{body}\n\\end{{document}}\n"

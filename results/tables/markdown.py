@@ -12,27 +12,27 @@ def escape_markdown(text: str) -> str:
     return re.sub(r"([\\|*_`<>\[\]])", r"\\\1", plain(text))
 
 
-def to_markdown(grid: Table) -> str:
+def to_markdown(table: Table) -> str:
     """The table in Markdown, its title above and its notes below."""
     names = [
         f"{escape_markdown(group)} {escape_markdown(head)}".strip()
-        for group, head in zip(grid.group_of, grid.heads, strict=True)
+        for group, head in zip(table.group_of, table.heads, strict=True)
     ]
-    rule = "---" if grid.words else "---:"
+    rule = "---" if table.words else "---:"
     lines = [
-        f"### {escape_markdown(grid.title)}",
+        f"### {escape_markdown(table.title)}",
         "",
-        f"| {escape_markdown(grid.corner)} | " + " | ".join(names) + " |",
+        f"| {escape_markdown(table.corner)} | " + " | ".join(names) + " |",
         "|---|" + f"{rule}|" * len(names),
     ]
-    for line in grid.lines:
-        label = escape_markdown(line.label)
-        shown = label if line.kind == "row" else f"*{label}*"
-        if line.kind == "section":
+    for row in table.rows:
+        label = escape_markdown(row.label)
+        shown = label if row.kind == "row" else f"*{label}*"
+        if row.kind == "section":
             lines.append(f"| **{label}** | " + " | ".join([""] * len(names)) + " |")
         else:
-            lines.append(f"| {shown} | " + " | ".join(map(_markdown_entry, line.entries)) + " |")
-    for note in grid.notes:
+            lines.append(f"| {shown} | " + " | ".join(map(_markdown_entry, row.cells)) + " |")
+    for note in table.notes:
         lines += ["", escape_markdown(note)]
     return "\n".join(lines) + "\n"
 

@@ -1,6 +1,6 @@
 """A table as a value; every format has a writer beside this module.
 
-A `Table` knows no metric and no model: labels, entries that are already text, marks and notes. What
+A `Table` knows no metric and no model: labels, cells that are already text, marks and notes. What
 comes from outside (names of models) is escaped by every writer.
 """
 
@@ -35,7 +35,7 @@ class TableRow:
     """One row. Of a `section` only the label is shown; an `average` is set apart."""
 
     label: str
-    entries: tuple[TableCell, ...] = ()
+    cells: tuple[TableCell, ...] = ()
     kind: str = "row"
 
 
@@ -47,18 +47,18 @@ class Table:
     title: str
     corner: str
     heads: tuple[str, ...]
-    lines: tuple[TableRow, ...]
+    rows: tuple[TableRow, ...]
     groups: tuple[tuple[str, int], ...] = ()
     notes: tuple[str, ...] = ()
     words: bool = False
-    """Entries are words rather than numbers: set them flush left."""
+    """Cells are words rather than numbers: set them flush left."""
 
     def __post_init__(self) -> None:
         if self.groups and sum(width for _, width in self.groups) != len(self.heads):
             raise ValueError(f"the groups of table {self.name} do not span its columns")
-        for line in self.lines:
-            if line.kind != "section" and len(line.entries) != len(self.heads):
-                raise ValueError(f"row {line.label} of table {self.name} has the wrong length")
+        for row in self.rows:
+            if row.kind != "section" and len(row.cells) != len(self.heads):
+                raise ValueError(f"row {row.label} of table {self.name} has the wrong length")
 
     @property
     def group_of(self) -> list[str]:

@@ -18,12 +18,12 @@ def show(table: Table) -> None:
         name = f"{group if group != last else ''}\n{head}" if table.groups else head
         shown.add_column(name, justify="left" if table.words else "right", no_wrap=True)
         last = group
-    for row in table.lines:
+    for row in table.rows:
         if row.kind == "section":
             shown.add_section()
             shown.add_row(Text(row.label, style="bold"))
             continue
-        cells = [Text(e.text + e.sign, style="bold" if e.best else "") for e in row.entries]
+        cells = [Text(e.text + e.sign, style="bold" if e.best else "") for e in row.cells]
         shown.add_row(Text(row.label, style="bold" * (row.kind == "average")), *cells)
     console = Console()
     if not console.is_terminal:

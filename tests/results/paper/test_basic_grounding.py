@@ -64,25 +64,25 @@ def test_a_run_of_them_alone_has_no_overall_value(tmp_path: Path) -> None:
 
 
 def test_the_table_sets_own_runs_beside_the_printed_values(mixed: Run) -> None:
-    (grid,) = make_tables([published_column("pi0.5"), run_column(mixed)], ["basic"])
-    assert [width for _, width in grid.groups] == [5, 5]
-    color, position, _ = grid.lines
-    assert [e.text for e in color.entries[:2]] == ["80.6", "77.8"]
-    assert color.entries[5].value == pytest.approx(85.0)
-    assert color.entries[5].text.startswith("85.0 [")
-    assert color.entries[6].value == pytest.approx(50.0)
-    assert {e.text for e in (*color.entries[7:], *position.entries[5:])} == {"–"}
+    (table,) = make_tables([published_column("pi0.5"), run_column(mixed)], ["basic"])
+    assert [width for _, width in table.groups] == [5, 5]
+    color, position, _ = table.rows
+    assert [e.text for e in color.cells[:2]] == ["80.6", "77.8"]
+    assert color.cells[5].value == pytest.approx(85.0)
+    assert color.cells[5].text.startswith("85.0 [")
+    assert color.cells[6].value == pytest.approx(50.0)
+    assert {e.text for e in (*color.cells[7:], *position.cells[5:])} == {"–"}
 
 
 def test_a_mean_over_some_of_the_sets_stays_open(tmp_path: Path) -> None:
     column = run_column(run_of(tmp_path / "run", grounding(sets=4)))
-    (grid,) = make_tables([column], ["basic"])
-    assert {e.text for e in grid.lines[0].entries[5:]} == {"–"}
+    (table,) = make_tables([column], ["basic"])
+    assert {e.text for e in table.rows[0].cells[5:]} == {"–"}
 
 
 def test_without_such_runs_the_table_is_the_printed_one() -> None:
-    (grid,) = make_tables([published_column("pi0.5")], ["basic"])
-    assert grid.groups == () and len(grid.heads) == 5
+    (table,) = make_tables([published_column("pi0.5")], ["basic"])
+    assert table.groups == () and len(table.heads) == 5
 
 
 def test_runs_of_them_alone_are_in_no_table_of_the_benchmark(tmp_path: Path) -> None:
@@ -92,6 +92,6 @@ def test_runs_of_them_alone_are_in_no_table_of_the_benchmark(tmp_path: Path) -> 
 
 
 def test_the_report_shows_the_table(mixed: Run, tmp_path: Path) -> None:
-    assert "basic" in [s.grid.name for s in report_tables([run_column(mixed)])]
+    assert "basic" in [s.table.name for s in report_tables([run_column(mixed)])]
     alone = run_column(run_of(tmp_path / "alone", grounding()))
-    assert [s.grid.name for s in report_tables([alone])] == ["basic"]
+    assert [s.table.name for s in report_tables([alone])] == ["basic"]

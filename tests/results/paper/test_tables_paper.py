@@ -72,18 +72,18 @@ def full_run(model: str, trials: int = 100, **key: Any) -> list[TrialRecord]:
     return made
 
 
-def entry(grid: Table, row: str, column: int) -> TableCell:
-    return next(line for line in grid.lines if line.label == row).entries[column]
+def entry(table: Table, row: str, column: int) -> TableCell:
+    return next(line for line in table.rows if line.label == row).cells[column]
 
 
 def test_a_run_with_the_published_counts_prints_the_published_digits() -> None:
     run = run_column(make_run(full_run("RDT"), name="again"))
     for name in ("main", "onta", "sr-tasks", "onta-tasks", "ps-tasks"):
-        (grid,) = make_tables([published_column("RDT"), run], [name], mark="none")
-        for line in grid.lines:
-            half = len(line.entries) // 2
+        (table,) = make_tables([published_column("RDT"), run], [name], mark="none")
+        for line in table.rows:
+            half = len(line.cells) // 2
             first, second = (
-                [e.text for e in part] for part in (line.entries[:half], line.entries[half:])
+                [e.text for e in part] for part in (line.cells[:half], line.cells[half:])
             )
             assert first == second, (name, line.label)
 
@@ -93,22 +93,22 @@ def test_lost_trials_are_marked_with_the_range_they_leave_open() -> None:
     place = next(n for n, r in enumerate(records) if r.key.task == "Pick_Blocks_Size")
     records[place] = replace(records[place], end="infrastructure", success=False)
     run = run_column(make_run(records))
-    grid = summary_table([run], "main", "sr", ("L1", "L5", "Drop"))
-    assert entry(grid, "Geometric Attribute Cognition", 0).sign == "†"
-    assert entry(grid, "Geometric Attribute Cognition", 1).sign == ""
-    assert entry(grid, "Overall average", 0).sign == "†"
-    assert any("GAC L1 lacks 1, SR between" in note for note in grid.notes)
-    assert any("up to 10 trials a variant" in note for note in grid.notes)
+    table = summary_table([run], "main", "sr", ("L1", "L5", "Drop"))
+    assert entry(table, "Geometric Attribute Cognition", 0).sign == "†"
+    assert entry(table, "Geometric Attribute Cognition", 1).sign == ""
+    assert entry(table, "Overall average", 0).sign == "†"
+    assert any("GAC L1 lacks 1, SR between" in note for note in table.notes)
+    assert any("up to 10 trials a variant" in note for note in table.notes)
 
 
 def test_a_task_that_was_not_run_leaves_all_averages_above_it_open() -> None:
     records = [r for r in full_run("RDT", trials=2) if r.key.variant != ("Pick_Blocks_Size", 5)]
     run = run_column(make_run(records))
-    grid = summary_table([published_column("RDT"), run], "main", "sr", ("L1", "L5", "Drop"))
+    table = summary_table([published_column("RDT"), run], "main", "sr", ("L1", "L5", "Drop"))
     for row in ("Geometric Attribute Cognition", "Overall average"):
-        assert [entry(grid, row, n).text == "–" for n in (3, 4, 5)] == [False, True, True]
-    assert entry(grid, "Spatial Distance Estimation", 4).text != "–"
-    assert any("of 56 tasks 1 at L5 were not run" in note for note in grid.notes)
+        assert [entry(table, row, n).text == "–" for n in (3, 4, 5)] == [False, True, True]
+    assert entry(table, "Spatial Distance Estimation", 4).text != "–"
+    assert any("of 56 tasks 1 at L5 were not run" in note for note in table.notes)
     (intervals,) = make_tables([run], ["intervals"])
     assert entry(intervals, "mine", 2).text == "–"
     assert entry(intervals, "mine", 1).text != "–"
@@ -119,8 +119,8 @@ def test_a_variant_that_lost_everything_is_no_zero() -> None:
         replace(r, end="infrastructure") if r.key.variant == ("Pick_Seals_Multi_View", 1) else r
         for r in full_run("RDT", trials=2)
     ]
-    grid = task_table([run_column(make_run(records))], "sr-tasks", "sr")
-    assert entry(grid, "Pick Seals Multi View", 0).text == "–"
+    table = task_table([run_column(make_run(records))], "sr-tasks", "sr")
+    assert entry(table, "Pick Seals Multi View", 0).text == "–"
 
 
 def test_the_best_is_marked_in_every_model_that_cannot_be_told_from_it() -> None:
@@ -128,29 +128,29 @@ def test_the_best_is_marked_in_every_model_that_cannot_be_told_from_it() -> None
     tied = summary_table(columns, "main", "sr", ("L1", "L5", "Drop"), "tied")
     highest = summary_table(columns, "main", "sr", ("L1", "L5", "Drop"), "highest")
 
-    def marked(grid: Table, row: str) -> list[int]:
-        line = next(x for x in grid.lines if x.label == row)
-        return [n for n, e in enumerate(line.entries) if e.best]
+    def marked(table: Table, row: str) -> list[int]:
+        line = next(x for x in table.rows if x.label == row)
+        return [n for n, e in enumerate(line.cells) if e.best]
 
     assert marked(highest, "Cross-View Reasoning") == [6, 7]
     assert marked(tied, "Cross-View Reasoning") == [6, 7, 9, 10]
     assert marked(highest, "Memory-Intensive Planning") == [1, 4, 6, 7, 10]
-    for line, other in zip(highest.lines, tied.lines, strict=True):
-        best = {n for n, e in enumerate(line.entries) if e.best}
-        assert best <= {n for n, e in enumerate(other.entries) if e.best}
-        assert not any(line.entries[n].best for n in range(2, len(line.entries), 3))  # no drop
+    for line, other in zip(highest.rows, tied.rows, strict=True):
+        best = {n for n, e in enumerate(line.cells) if e.best}
+        assert best <= {n for n, e in enumerate(other.cells) if e.best}
+        assert not any(line.cells[n].best for n in range(2, len(line.cells), 3))  # no drop
 
 
 def test_one_model_alone_is_not_marked_as_best() -> None:
-    (grid,) = make_tables([published_column("RDT")], ["main"])
-    assert not any(e.best for line in grid.lines for e in line.entries)
+    (table,) = make_tables([published_column("RDT")], ["main"])
+    assert not any(e.best for line in table.rows for e in line.cells)
 
 
 def test_a_run_on_another_robot_is_a_row_of_the_embodiment_tables_only() -> None:
     run = run_column(make_run(full_run("RDT", trials=2, embodiment="ur5")))
     columns = [published_column("RDT"), run]
-    (grid,) = make_tables(columns, ["embodiments-spatial"])
-    assert grid.lines[-1].label == "mine, UR5"
+    (table,) = make_tables(columns, ["embodiments-spatial"])
+    assert table.rows[-1].label == "mine, UR5"
     with pytest.raises(IncomparableError, match=r"RDT and mine .* aloha-agilex and ur5"):
         make_tables(columns, ["main"])
 
@@ -202,10 +202,10 @@ def test_a_privileged_policy_is_called_so() -> None:
     oracle = run_column(replace(run, manifest={"settings": settings}))
     assert oracle.title == "mine (privileged)"
     columns = [published_column("RDT"), oracle, published_column("X-VLA")]
-    (grid,) = make_tables(columns, ["sr-tasks"], mark="highest")
-    shown = entry(grid, "Hang Mug Stack Blocks", 5), entry(grid, "Hang Mug Stack Blocks", 0)
+    (table,) = make_tables(columns, ["sr-tasks"], mark="highest")
+    shown = entry(table, "Hang Mug Stack Blocks", 5), entry(table, "Hang Mug Stack Blocks", 0)
     assert [e.best for e in shown] == [False, False]  # competes with nobody
-    assert not any(e.best for line in grid.lines for e in line.entries[5:10])
+    assert not any(e.best for line in table.rows for e in line.cells[5:10])
 
 
 def test_values_that_do_not_follow_are_marked_and_the_printed_ones_told() -> None:

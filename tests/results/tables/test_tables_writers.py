@@ -42,13 +42,13 @@ SMALL = Table(
 
 
 @pytest.fixture(scope="module")
-def grids() -> list[Table]:
+def tables() -> list[Table]:
     return make_tables([published_column(model) for model in load().models])
 
 
-def test_every_table_of_the_paper_is_there(grids: list[Table]) -> None:
-    assert [g.name for g in grids] == list(TABLES)
-    assert {g.name: len([x for x in g.lines if x.kind != "section"]) for g in grids} == {
+def test_every_table_of_the_paper_is_there(tables: list[Table]) -> None:
+    assert [g.name for g in tables] == list(TABLES)
+    assert {g.name: len([x for x in g.rows if x.kind != "section"]) for g in tables} == {
         "main": 13,
         "onta": 6,
         "ps": 6,
@@ -72,21 +72,21 @@ def latex_columns(line: str) -> int:
     return len(re.findall(r"(?<!\\)&", line)) + 1 + sum(n - 1 for n in spans)
 
 
-def test_latex_is_balanced_and_every_row_fills_its_columns(grids: list[Table]) -> None:
-    for grid in (*grids, SMALL):
-        text = to_latex(grid)
+def test_latex_is_balanced_and_every_row_fills_its_columns(tables: list[Table]) -> None:
+    for table in (*tables, SMALL):
+        text = to_latex(table)
         bare = re.sub(r"\\[\\{}]", "", text)
-        assert bare.count("{") == bare.count("}"), grid.name
+        assert bare.count("{") == bare.count("}"), table.name
         begun, ended = (re.findall(rf"\\{word}\{{([a-z*]+)\}}", text) for word in ("begin", "end"))
         assert begun == ended[::-1] == ["table*", "tabular"]
         rows = [x for x in text.splitlines() if x.endswith(r"\\")]
-        assert {latex_columns(row) for row in rows} == {len(grid.heads) + 1}, grid.name
-        assert text.isascii(), grid.name
+        assert {latex_columns(row) for row in rows} == {len(table.heads) + 1}, table.name
+        assert text.isascii(), table.name
 
 
 @pytest.mark.skipif(shutil.which("pdflatex") is None, reason="needs pdflatex")
-def test_latex_compiles(grids: list[Table], tmp_path: Path) -> None:
-    (tmp_path / "all.tex").write_text(document([*grids, SMALL]))
+def test_latex_compiles(tables: list[Table], tmp_path: Path) -> None:
+    (tmp_path / "all.tex").write_text(document([*tables, SMALL]))
     command = ["pdflatex", "-interaction=nonstopmode", "-halt-on-error", "all.tex"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stdout[-2000:]
@@ -101,11 +101,11 @@ def test_what_latex_takes_for_commands_is_escaped() -> None:
     assert "$-1.2$" in to_latex(SMALL)
 
 
-def test_markdown_rows_have_equal_columns_and_no_markup_from_outside(grids: list[Table]) -> None:
-    for grid in (*grids, SMALL):
-        text = to_markdown(grid)
+def test_markdown_rows_have_equal_columns_and_no_markup_from_outside(tables: list[Table]) -> None:
+    for table in (*tables, SMALL):
+        text = to_markdown(table)
         rows = [x for x in text.splitlines() if x.startswith("|")]
-        assert {len(re.findall(r"(?<!\\)\|", row)) for row in rows} == {len(grid.heads) + 2}
+        assert {len(re.findall(r"(?<!\\)\|", row)) for row in rows} == {len(table.heads) + 2}
     text = to_markdown(SMALL)
     assert "**12.5**" in text
     assert "<script" not in text.replace("\\<script", "")
@@ -133,22 +133,22 @@ class Tags(HTMLParser):
         assert self.open.pop() == tag
 
 
-def test_html_nests_and_takes_nothing_from_outside(grids: list[Table]) -> None:
-    for grid in (*grids, SMALL):
+def test_html_nests_and_takes_nothing_from_outside(tables: list[Table]) -> None:
+    for table in (*tables, SMALL):
         reader = Tags()
-        reader.feed(fragment(grid))
+        reader.feed(fragment(table))
         assert reader.open == []
-        assert set(reader.widths) == {len(grid.heads) + 1}, grid.name
+        assert set(reader.widths) == {len(table.heads) + 1}, table.name
         assert "script" not in reader.seen
-    whole = page([*grids, SMALL], EVIL)
+    whole = page([*tables, SMALL], EVIL)
     assert "http" not in whole
     assert 'class="best" title="95 %: 10.0 to 15.0"' in whole
 
 
-def test_csv_has_a_line_a_cell_with_unrounded_numbers(grids: list[Table]) -> None:
-    rows = list(csv.DictReader(io.StringIO(to_csv(grids))))
+def test_csv_has_a_line_a_cell_with_unrounded_numbers(tables: list[Table]) -> None:
+    rows = list(csv.DictReader(io.StringIO(to_csv(tables))))
     assert len(rows) == sum(
-        len(line.entries) for grid in grids for line in grid.lines if line.kind != "section"
+        len(line.cells) for table in tables for line in table.rows if line.kind != "section"
     )
     first = rows[0]
     assert (first["table"], first["group"], first["column"]) == ("main", "RDT", "L1")
@@ -173,8 +173,8 @@ def test_tables_of_the_wrong_shape_are_refused() -> None:
         Table("x", "", "", ("a", "b"), (), groups=(("g", 3),))
 
 
-def test_every_format_is_written(tmp_path: Path, grids: list[Table]) -> None:
-    written = write_tables(grids[:2], tmp_path / "out", list(FORMATS))
+def test_every_format_is_written(tmp_path: Path, tables: list[Table]) -> None:
+    written = write_tables(tables[:2], tmp_path / "out", list(FORMATS))
     assert {path.name for path in written} == {
         *(f"tables.{ending}" for ending in FORMATS),
         "main.tex",
@@ -184,8 +184,8 @@ def test_every_format_is_written(tmp_path: Path, grids: list[Table]) -> None:
 
 
 def test_the_terminal_gets_every_cell(
-    capsys: pytest.CaptureFixture[str], grids: list[Table]
+    capsys: pytest.CaptureFixture[str], tables: list[Table]
 ) -> None:
-    show(grids[0])
+    show(tables[0])
     out = capsys.readouterr().out
     assert re.search(r"Overall average +16\.8 +6\.9 +9\.9 +25\.6\* +8\.8", out)
