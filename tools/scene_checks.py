@@ -1,7 +1,8 @@
 """Rules that every scene obeys, each a function that returns its violations.
 
 The tests look at a few scenes of every variant, `tools/check_scenes.py` at thousands. No
-simulator; nothing here asks the code that draws the scenes.
+simulator; nothing here asks the code that draws the scenes: what the head camera sees follows from
+the camera's pose and field of view, what an arm reaches from the inverse kinematics of the robot.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from robospa.action_space import ARMS
-from robospa.geometry import Pose, to_matrix
+from robospa.geometry import Pose, look_rotation, to_matrix
 from robospa.harness.robots import embodiment
 from robospa.harness.robots.kinematics import chain_of, end_effector, inverse
 from robospa.harness.skills.grasping import LEANS, LEVEL, candidate_poses, world_grasps
@@ -29,10 +30,29 @@ from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.snapshot import Snapshot
 from robospa.workcell import HEIGHT, TABLE_TOP, WIDTH
 
+TILTS = (0.0, 0.3, 0.6, 0.9, 1.2)
+"""How far a gripper may lean away from the arm's base [rad]."""
 TOUCH = 5e-4
 """Boxes may share this much [m]: what stands beside another thing is no overlap."""
 ROBOT = embodiment("aloha-agilex")
+LOWER = ("dustbin", "garbage")
+"""Assets that stand on the floor or lie in a bin."""
+LARGE = ("tray", "bread_basket")
+"""Assets that are only partly in the picture at some of their places (official regions)."""
+PARTLY_SEEN = (
+    "Put_Bottles_Dustbin",
+    "Stack_Blocks_Color_Order",
+    "Click_Can_Place_Items",
+    "Remember_Color_Cover",
+    "Stamp_Seals_Press_Stapler",
+)
+"""Tasks whose official regions end at the picture's edge: only middles have to be seen there."""
+BEYOND_REACH = ("Remember_Orientation_Restore",)
+"""Tasks that show things which no arm is meant to reach."""
 
+_TURN = np.linspace(0.0, 2 * math.pi, 17)[:-1]
+RING = np.stack([np.cos(_TURN), np.sin(_TURN), np.zeros(16)], axis=1)
+CHAINS = tuple(chain_of(arm) for arm in ROBOT.arms)
 SIGNS = np.array(list(itertools.product((-0.5, 0.5), (-0.5, 0.5), (0.0, 1.0))))
 
 
@@ -94,40 +114,75 @@ def rests_in(a: SceneObject, b: SceneObject) -> bool:
     return bool(higher and left < x < right and fore < y < far)
 
 
+def standing(scene: Scene) -> list[SceneObject]:
+    """What stands on the table from the start: nothing in a bin, on a stand or on the floor."""
+    there = [o for o in scene.objects if o.appears_at is None]
+    return [o for o in there if o.asset not in LOWER and _low(o) < TABLE_TOP + 0.03]
+
+
+def _low(item: SceneObject) -> float:
+    """Height [m] of an object's underside; all stand upright at the start."""
+    return float(item.pose.position[2]) + object_model(item.asset, item.params).bottom
+
+
 def overlaps(scene: Scene) -> Iterator[str]:
-    """Movable objects that are inside each other."""
-    items = movable(scene)
+    """Objects that are inside each other, of those that are there together."""
+    items = [o for o in scene.objects if o.asset not in LOWER]
     for i, j, _ in near(items):
         a, b = items[i], items[j]
-        if overlap(a, b) > TOUCH and not rests_in(a, b):
+        together = a.appears_at == b.appears_at and _different(a, b)
+        if together and overlap(a, b) > TOUCH and not rests_in(a, b):
             yield f"{a.name} ({a.asset}) is in {b.name} ({b.asset})"
 
 
-def _boxes(scene: Scene) -> tuple[list[SceneObject], np.ndarray]:
-    """The movable objects and their corners; kept for the rule that asks next."""
-    if _last[0] is not scene:
-        items = movable(scene)
-        _last[:] = [scene, items, corners(items)]
-    return _last[1], _last[2]
+def _different(a: SceneObject, b: SceneObject) -> bool:
+    """Whether both may be moved or stand on the table: furniture is made of touching pieces."""
+    return not (a.fixed and b.fixed) or max(_low(a), _low(b)) < TABLE_TOP + 0.03
 
 
-_last: list[Any] = [None, [], None]
+def _head_matrix() -> np.ndarray:
+    """(3, 4) pinhole projection of the head camera: homogeneous pixels of points in the world."""
+    camera = ROBOT.workcell.head
+    focal = HEIGHT / 2 / math.tan(camera.fov / 2)
+    intrinsic = np.array([[focal, 0.0, WIDTH / 2], [0.0, focal, HEIGHT / 2], [0.0, 0.0, 1.0]])
+    axes = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])  # right, down, ahead
+    turn = axes @ to_matrix(camera.pose.rotation).T
+    shift = -turn @ np.array(camera.pose.position)
+    return np.asarray(intrinsic @ np.column_stack([turn, shift]))
+
+
+HEAD = _head_matrix()
+
+
+def pixels(points: np.ndarray) -> np.ndarray:
+    """(..., 2) columns and rows [px] of points (..., 3) [m] in the head camera's picture."""
+    seen = points @ HEAD[:, :3].T + HEAD[:, 3]
+    return np.asarray(seen[..., :2] / seen[..., 2:])
 
 
 def unseen(scene: Scene) -> Iterator[str]:
-    """Movable objects whose middle the head camera does not see."""
-    items, boxes = _boxes(scene)
-    x, y, z = boxes.mean(axis=1).T
-    u, v = ROBOT.workcell.head.pixel(x, y, z)
-    for k in np.flatnonzero((u < 0) | (u >= WIDTH) | (v < 0) | (v >= HEIGHT)):
-        yield f"{items[k].name} ({items[k].asset}) is out of view"
+    """Objects on the table that the head camera does not see whole (see `PARTLY_SEEN`)."""
+    spatial = catalog.task(scene.task).dimension != "procedural"
+    free = 0.02 * np.array([WIDTH, HEIGHT]) - 0.5 if spatial else np.array([-1.0, -1.0])
+    middle_only = scene.task in PARTLY_SEEN
+    for item in (*standing(scene), *movable(scene)):
+        model = object_model(item.asset, item.params)
+        wide = 0.0 if middle_only or item.asset in LARGE else model.radius
+        x, y, z = item.pose.position
+        foot = RING * wide + (x, y, z + model.bottom)
+        tall = 0.0 if wide == 0.0 else model.size[2]
+        at = pixels(np.vstack([foot, [(x, y, z + model.bottom + tall)]]))
+        if (at < free).any() or (at > np.array([WIDTH, HEIGHT]) - free).any():
+            yield f"{item.name} ({item.asset}) is out of view"
 
 
 def sunk(scene: Scene) -> Iterator[str]:
-    """Movable objects that start below the table's top."""
-    items, boxes = _boxes(scene)
-    for k in np.flatnonzero(boxes[:, :, 2].min(axis=1) <= TABLE_TOP - 1e-3):
-        yield f"{items[k].name} ({items[k].asset}) is below the table's top"
+    """Objects that do not rest on the table: sunk into it, or above it though they can move."""
+    for item in scene.objects:
+        if item.appears_at is None and item.asset not in LOWER:
+            high = _low(item) - TABLE_TOP
+            if high < -1e-6 or (high > 1e-6 and not item.fixed):
+                yield f"{item.name} ({item.asset}) is {1000 * high:.1f} mm above the table's top"
 
 
 def named(scene: Scene) -> Iterator[str]:
@@ -138,6 +193,33 @@ def named(scene: Scene) -> Iterator[str]:
 
 
 def unreachable(scene: Scene) -> Iterator[str]:
+    """Movable objects above which no arm can bring its gripper to a grasp, tilted or not."""
+    items = [] if scene.task in BEYOND_REACH else standing(scene)
+    for item in items:
+        if not item.fixed and not any(_graspable(item, arm) for arm in _nearer_first(item)):
+            yield f"{item.name} ({item.asset}) is out of reach"
+
+
+def _nearer_first(item: SceneObject) -> tuple[int, int]:
+    return (1, 0) if item.pose.position[0] > 0 else (0, 1)
+
+
+def _graspable(item: SceneObject, arm: int) -> bool:
+    """Whether inverse kinematics finds joints for a gripper around the object's origin."""
+    ahead = ROBOT.workcell.arms[arm].gripper.grasp_centre
+    point = np.add(item.pose.position, (0.0, 0.0, 0.02))
+    away = point[:2] - ROBOT.arms[arm].base.position[:2]
+    out = np.append(away / np.hypot(*away), 0.0)
+    poses = []
+    for tilt in TILTS:
+        approach = math.sin(tilt) * out - (0.0, 0.0, math.cos(tilt))
+        across = (-float(out[1]), float(out[0]), 0.0)
+        x, y, z = point - ahead * approach
+        poses.append(Pose((x, y, z), look_rotation(tuple(approach), across)))
+    return bool(inverse(CHAINS[arm], poses)[1].any())
+
+
+def unpickable(scene: Scene) -> Iterator[str]:
     """Objects whose first pick no grasp of the plan's arm reaches where they lie at the start."""
     ws, seen = _at_start(scene), set()
     for call in catalog.task(scene.task).plan(scene):
@@ -299,6 +381,7 @@ RULES: Mapping[str, Callable[[Scene], Iterator[str]]] = {
     "table": sunk,
     "names": named,
     "reach": unreachable,
+    "pick": unpickable,
     "answer": misplaced,
 }
 

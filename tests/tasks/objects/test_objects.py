@@ -18,7 +18,6 @@ from robospa.tasks.shapes import Box, Cylinder, Grasp, Mesh, ObjectModel, Shape,
 
 Array = NDArray[np.float64]
 
-EVERY = [(asset, look) for asset in assets() for look in range(look_count(asset))]
 NOT_PICKED = {
     *("dustbin", "microwave", "pad", "plate", "coaster", "tray"),
     *("display_stand", "electronic_scale", "mug_rack"),
@@ -55,10 +54,12 @@ NEEDED = """
 """
 
 
-@pytest.fixture(params=EVERY, ids=lambda pair: f"{pair[0]}-{pair[1]}")
-def model(request: pytest.FixtureRequest) -> ObjectModel:
-    asset, look = request.param
-    return object_model(asset, {"look": look})
+each_asset = pytest.mark.parametrize("asset", assets())
+
+
+def models(asset: str) -> Iterator[ObjectModel]:
+    """Every look of an asset; a failing assertion names the model that it is about."""
+    return (object_model(asset, {"look": look}) for look in range(look_count(asset)))
 
 
 def corners(shape: Shape) -> Array:
@@ -86,30 +87,36 @@ def test_the_tasks_assets_exist() -> None:
     assert set(assets()) >= set(NEEDED.split())
 
 
-def test_bounds_are_those_of_the_shapes(model: ObjectModel) -> None:
-    closed = (*model.shapes, *(model.hinge.shapes if model.hinge else ()))
-    points = np.concatenate([corners(s) for s in closed])
-    span = points.max(axis=0) - points.min(axis=0)
-    assert np.all(span <= np.array(model.size) + 1e-9)
-    assert np.all(span >= np.array(model.size) - 1.1e-3)
-    radius = float(np.hypot(points[:, 0], points[:, 1]).max())
-    assert model.radius - 5e-4 <= radius <= model.radius + 1e-9
+@each_asset
+def test_bounds_are_those_of_the_shapes(asset: str) -> None:
+    for model in models(asset):
+        closed = (*model.shapes, *(model.hinge.shapes if model.hinge else ()))
+        points = np.concatenate([corners(s) for s in closed])
+        span = points.max(axis=0) - points.min(axis=0)
+        assert np.all(span <= np.array(model.size) + 1e-9)
+        assert np.all(span >= np.array(model.size) - 1.1e-3)
+        radius = float(np.hypot(points[:, 0], points[:, 1]).max())
+        assert model.radius - 5e-4 <= radius <= model.radius + 1e-9
 
 
-def test_the_origin_is_the_middle_of_the_underside(model: ObjectModel) -> None:
-    points = np.concatenate([corners(s) for s in model.shapes])
-    expected = -model.size[2] / 2 if model.asset == "block" else 0.0
-    assert model.bottom == pytest.approx(expected, abs=1e-6)
-    assert points[:, 2].min() == pytest.approx(model.bottom, abs=1e-6)
+@each_asset
+def test_the_origin_is_the_middle_of_the_underside(asset: str) -> None:
+    for model in models(asset):
+        points = np.concatenate([corners(s) for s in model.shapes])
+        expected = -model.size[2] / 2 if model.asset == "block" else 0.0
+        assert model.bottom == pytest.approx(expected, abs=1e-6)
+        assert points[:, 2].min() == pytest.approx(model.bottom, abs=1e-6)
 
 
-def test_collision_shapes_stand_on_the_underside(model: ObjectModel) -> None:
-    felt = [corners(s) for s in model.shapes if s.collision]
-    assert felt or model.asset in SEEN_ONLY
-    for points in [np.concatenate(felt)] if felt else []:
-        assert points[:, 2].min() == pytest.approx(model.bottom, abs=3e-4)
-    drawn = np.concatenate([corners(s) for s in model.shapes if s.visual])
-    assert abs(drawn[:, 2].min() - model.bottom) < 6e-4
+@each_asset
+def test_collision_shapes_stand_on_the_underside(asset: str) -> None:
+    for model in models(asset):
+        felt = [corners(s) for s in model.shapes if s.collision]
+        assert felt or model.asset in SEEN_ONLY
+        for points in [np.concatenate(felt)] if felt else []:
+            assert points[:, 2].min() == pytest.approx(model.bottom, abs=3e-4)
+        drawn = np.concatenate([corners(s) for s in model.shapes if s.visual])
+        assert abs(drawn[:, 2].min() - model.bottom) < 6e-4
 
 
 @pytest.mark.parametrize("asset", RADIUS_LIMITS)
@@ -124,10 +131,12 @@ def test_soap_fits_between_its_neighbours() -> None:
         assert size[0] <= 0.058 and size[1] <= 0.034 and size[2] <= 0.0255
 
 
-def test_masses_are_those_of_small_things(model: ObjectModel) -> None:
-    least = 0.001 if model.asset == "garbage" else 0.03
-    assert least <= model.mass <= (2.0 if model.asset in FURNISHING else 0.15)
-    assert 0.5 <= model.friction <= 1.0
+@each_asset
+def test_masses_are_those_of_small_things(asset: str) -> None:
+    for model in models(asset):
+        least = 0.001 if model.asset == "garbage" else 0.03
+        assert least <= model.mass <= (2.0 if model.asset in FURNISHING else 0.15)
+        assert 0.5 <= model.friction <= 1.0
 
 
 def planes(shape: Shape) -> Iterator[tuple[Array, float]]:
@@ -178,65 +187,79 @@ def chords(model: ObjectModel, grasp: Grasp) -> list[tuple[float, float]]:
     return found
 
 
-def test_everything_to_be_picked_has_a_grasp(model: ObjectModel) -> None:
-    if model.asset in NOT_PICKED:
-        assert model.grasps == ()
-    else:
-        assert min(g.width for g in model.grasps) <= 0.0605
+@each_asset
+def test_everything_to_be_picked_has_a_grasp(asset: str) -> None:
+    for model in models(asset):
+        if model.asset in NOT_PICKED:
+            assert model.grasps == ()
+        else:
+            assert min(g.width for g in model.grasps) <= 0.0605
 
 
-def test_grasps_are_well_formed(model: ObjectModel) -> None:
-    for grasp in model.grasps:
-        assert np.linalg.norm(grasp.approach) == pytest.approx(1.0)
-        assert np.linalg.norm(grasp.closing) == pytest.approx(1.0)
-        assert np.dot(grasp.approach, grasp.closing) == pytest.approx(0.0, abs=1e-9)
-        assert 0 < grasp.width <= 0.07
-        assert 0.0 <= grasp.tilt <= 1.2
-        assert grasp.point[2] >= model.bottom + 0.005
+@each_asset
+def test_grasps_are_well_formed(asset: str) -> None:
+    for model in models(asset):
+        for grasp in model.grasps:
+            assert np.linalg.norm(grasp.approach) == pytest.approx(1.0)
+            assert np.linalg.norm(grasp.closing) == pytest.approx(1.0)
+            assert np.dot(grasp.approach, grasp.closing) == pytest.approx(0.0, abs=1e-9)
+            assert 0 < grasp.width <= 0.07
+            assert 0.0 <= grasp.tilt <= 1.2
+            assert grasp.point[2] >= model.bottom + 0.005
 
 
-def test_grasps_hold_the_object_at_the_stated_width(model: ObjectModel) -> None:
-    for grasp in model.grasps:
-        inside = chords(model, grasp)
-        astride = [c for c in inside if c[0] <= 1e-3 and c[1] >= -1e-3]
-        around = astride or inside  # a hollow thing may be empty at the point itself
-        assert around, f"nothing between the fingers at {grasp.point}"
-        low, high = min(c[0] for c in around), max(c[1] for c in around)
-        assert high - low == pytest.approx(grasp.width, abs=2.5e-3)
-        assert (low + high) / 2 == pytest.approx(0.0, abs=2e-3)
+@each_asset
+def test_grasps_hold_the_object_at_the_stated_width(asset: str) -> None:
+    for model in models(asset):
+        for grasp in model.grasps:
+            inside = chords(model, grasp)
+            astride = [c for c in inside if c[0] <= 1e-3 and c[1] >= -1e-3]
+            around = astride or inside  # a hollow thing may be empty at the point itself
+            assert around, f"nothing between the fingers at {grasp.point}"
+            low, high = min(c[0] for c in around), max(c[1] for c in around)
+            assert high - low == pytest.approx(grasp.width, abs=2.5e-3)
+            assert (low + high) / 2 == pytest.approx(0.0, abs=2e-3)
 
 
-def test_meshes_look_outwards_and_are_small(model: ObjectModel) -> None:
-    count = 0
-    for shape in model.shapes:
-        if isinstance(shape.geometry, Mesh):
-            count += len(shape.geometry.faces) if shape.visual else 0
-            if shape.collision:
-                assert m.volume(shape.geometry) > 0
-    assert count <= 1000
+@each_asset
+def test_meshes_look_outwards_and_are_small(asset: str) -> None:
+    for model in models(asset):
+        count = 0
+        for shape in model.shapes:
+            if isinstance(shape.geometry, Mesh):
+                count += len(shape.geometry.faces) if shape.visual else 0
+                if shape.collision:
+                    assert m.volume(shape.geometry) > 0
+        assert count <= 1000
 
 
-def test_colliding_meshes_are_convex(model: ObjectModel) -> None:
-    for shape in model.shapes:
-        if shape.collision and isinstance(shape.geometry, Mesh):
-            points = np.array(shape.geometry.vertices)
-            for n, d in planes(Shape(shape.geometry)):
-                assert float((points @ n).max()) <= d + 6e-4
+@each_asset
+def test_colliding_meshes_are_convex(asset: str) -> None:
+    for model in models(asset):
+        for shape in model.shapes:
+            if shape.collision and isinstance(shape.geometry, Mesh):
+                points = np.array(shape.geometry.vertices)
+                for n, d in planes(Shape(shape.geometry)):
+                    assert float((points @ n).max()) <= d + 6e-4
 
 
-def test_frames_lie_on_the_object(model: ObjectModel) -> None:
-    assert {"press", "support"} <= set(model.frames)
-    for frame in model.frames.values():
-        x, y, z = frame.position
-        assert math.hypot(x, y) <= model.radius
-        assert model.bottom <= z <= model.bottom + model.size[2]
+@each_asset
+def test_frames_lie_on_the_object(asset: str) -> None:
+    for model in models(asset):
+        assert {"press", "support"} <= set(model.frames)
+        for frame in model.frames.values():
+            x, y, z = frame.position
+            assert math.hypot(x, y) <= model.radius
+            assert model.bottom <= z <= model.bottom + model.size[2]
 
 
-def test_phrases_describe_a_look_in_several_ways(model: ObjectModel) -> None:
-    assert len(set(model.phrases)) == len(model.phrases) >= 6
-    for phrase in model.phrases:
-        assert phrase == phrase.strip() and "  " not in phrase
-        assert phrase.split()[0] not in {"a", "an", "the"}
+@each_asset
+def test_phrases_describe_a_look_in_several_ways(asset: str) -> None:
+    for model in models(asset):
+        assert len(set(model.phrases)) == len(model.phrases) >= 6
+        for phrase in model.phrases:
+            assert phrase == phrase.strip() and "  " not in phrase
+            assert phrase.split()[0] not in {"a", "an", "the"}
 
 
 @pytest.mark.parametrize("asset", assets())
