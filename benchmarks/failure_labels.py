@@ -14,8 +14,7 @@ import time
 from collections import Counter
 from dataclasses import dataclass, field, replace
 
-from common import LabelledFailure as Figure
-from common import Result, argument_parser, finish
+from common import Metric, Result, argument_parser, finish
 
 from robospa.baselines.failure_policies import create
 from robospa.harness.sim.sapien_world import SapienWorld
@@ -148,11 +147,11 @@ def main() -> None:
     print(table(found))
     idle = sum(r.not_acted for r in found)
     figures = [
-        Figure("labelled as scripted", round(100 * right / counted, 2), "%", at_least=95,
+        Metric("labelled as scripted", round(100 * right / counted, 2), "%", at_least=95,
             note=f"{right} of {counted}; {idle} scripts did not come off")
     ]  # fmt: skip
     figures += [
-        Figure(NAMES[kind], round(100 * cell["right"] / max(1, cell["of"]), 1), "%",
+        Metric(NAMES[kind], round(100 * cell["right"] / max(1, cell["of"]), 1), "%",
             note=f"{cell['right']} of {cell['of']}")
         for kind, cell in by_label.items()
     ]  # fmt: skip

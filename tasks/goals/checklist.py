@@ -13,20 +13,9 @@ from robospa.geometry import Vec3
 from robospa.tasks.events import Event, ObjectRole
 from robospa.tasks.goals.lift_tracker import LiftTracker
 from robospa.tasks.goals.parts import Part
+from robospa.tasks.goals.repeat import ActionCounter
 from robospa.tasks.goals.subtask_flags import SubtaskFlags, grippers_open
 from robospa.tasks.snapshot import Snapshot
-
-
-class Counter(Protocol):
-    """Something that is counted on object `name`: `update` is true when a count is added."""
-
-    name: str
-    count: int
-    raw_count: int
-
-    def start(self, snapshot: Snapshot) -> None: ...
-
-    def update(self, snapshot: Snapshot) -> bool: ...
 
 
 class Watch(Protocol):
@@ -46,17 +35,12 @@ class Watch(Protocol):
     def diagnostics(self) -> Mapping[str, float]: ...
 
 
-def _is_part(item: Counter | Part) -> TypeGuard[Part]:
+def _is_part(item: ActionCounter | Part) -> TypeGuard[Part]:
     return hasattr(item, "holds")
 
 
-def _is_counter(item: Counter | Part) -> TypeGuard[Counter]:
+def _is_counter(item: ActionCounter | Part) -> TypeGuard[ActionCounter]:
     return hasattr(item, "count")
-
-
-def _is_carried(counter: Counter) -> bool:
-    """True if the action is done with the object in hand (a stamp), not to it (a press)."""
-    return bool(getattr(counter, "carried", False))
 
 
 class Checklist:
@@ -71,7 +55,7 @@ class Checklist:
 
     def __init__(
         self,
-        subtasks: Sequence[Counter | Part],
+        subtasks: Sequence[ActionCounter | Part],
         released: bool = False,
         radius: float = 0.12,
         may_fall: Callable[[Vec3], bool] = lambda position: False,
@@ -86,7 +70,7 @@ class Checklist:
         self._watch = watch
         self._turns = tuple(range(self.total)) if turns is None else tuple(turns)
         self._parts: dict[int, Part] = {}
-        self._counters: dict[str, Counter] = {}
+        self._counters: dict[str, ActionCounter] = {}
         self._counts: dict[str, list[int]] = {}
         for i, item in enumerate(subtasks):
             if _is_part(item):
@@ -95,12 +79,12 @@ class Checklist:
                 self._counters[item.name] = item
                 self._counts.setdefault(item.name, []).append(i)
         self._tools = dict(tools or {})
-        self.needs_contacts = not all(_is_carried(c) for c in self._counters.values())
+        self.needs_contacts = not all(c.carried for c in self._counters.values())
         self._released = released
         self._flags = SubtaskFlags(self.total)
         names = {part.name for part in self._parts.values()}
         names |= set(self._tools)
-        names |= {name for name, counter in self._counters.items() if _is_carried(counter)}
+        names |= {name for name, counter in self._counters.items() if counter.carried}
         self._lift_tracker = LiftTracker(
             sorted(names) if handled is None else handled, radius, may_fall
         )
@@ -117,7 +101,7 @@ class Checklist:
                 found[name] = ObjectRole((*found.get(name, ObjectRole()).subtasks, i))
         found |= {name: ObjectRole((index,)) for name, index in self._tools.items()}
         for name, indices in self._counts.items():
-            found[name] = ObjectRole(tuple(indices), pressed=not _is_carried(self._counters[name]))
+            found[name] = ObjectRole(tuple(indices), pressed=not self._counters[name].carried)
         return found
 
     def start(self, snapshot: Snapshot) -> tuple[Event, ...]:

@@ -8,23 +8,11 @@ and diagnostics say how many there were.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Protocol
 
 from robospa.tasks.events import Event, ObjectRole
-from robospa.tasks.goals.repeat import PressCounter
+from robospa.tasks.goals.repeat import ActionCounter, PressCounter
 from robospa.tasks.goals.subtask_flags import SubtaskFlags
 from robospa.tasks.snapshot import Snapshot
-
-
-class Countable(Protocol):
-    """Something that is done to object `name`, and counted: `update` is true when it begins."""
-
-    name: str
-    count: int
-
-    def start(self, snapshot: Snapshot) -> None: ...
-
-    def update(self, snapshot: Snapshot) -> bool: ...
 
 
 class ClickInOrder:
@@ -35,7 +23,9 @@ class ClickInOrder:
 
     needs_contacts = True
 
-    def __init__(self, counters: Sequence[Countable], others: Sequence[Countable] = ()) -> None:
+    def __init__(
+        self, counters: Sequence[ActionCounter], others: Sequence[ActionCounter] = ()
+    ) -> None:
         self.total = len(counters)
         self._counters = tuple(counters)
         self._others = tuple(others)

@@ -7,6 +7,8 @@ Where the gripper has to be closed, opening it on the object is no leaving (offi
 
 from __future__ import annotations
 
+from typing import Protocol
+
 from robospa.geometry import Pose, Vec3
 from robospa.tasks.events import Event, ObjectRole
 from robospa.tasks.goals.subtask_flags import SubtaskFlags, inside_box
@@ -19,11 +21,31 @@ REARM = 0.1
 """Seconds without a touch before the next press can count."""
 
 
+class ActionCounter(Protocol):
+    """Counts what is done to object `name`, or with it in hand if it is `carried` (a stamp).
+
+    `raw_count` is the count without the rule against chatter.
+    """
+
+    name: str
+    count: int
+    raw_count: int
+    carried: bool
+
+    def start(self, snapshot: Snapshot) -> None:
+        """Take over the settled scene: what holds now is not counted."""
+
+    def update(self, snapshot: Snapshot) -> bool:
+        """True if a count is added at this instant."""
+
+
 class PressCounter:
     """Counts presses of object `name` at `frame` (given in the object's frame).
 
     With `arm` (0 left, 1 right) a touch counts only while that arm's gripper is commanded closed.
     """
+
+    carried = False
 
     def __init__(
         self, name: str, frame: Pose, box: Vec3 = PRESS_BOX, arm: int | None = None

@@ -10,9 +10,9 @@ from collections.abc import Sequence
 
 from robospa.geometry import Pose
 from robospa.tasks.events import Event, ObjectRole
-from robospa.tasks.goals.clicks import ClickInOrder, Countable
+from robospa.tasks.goals.clicks import ClickInOrder
 from robospa.tasks.goals.lift_tracker import LiftTracker
-from robospa.tasks.goals.repeat import PressCounter
+from robospa.tasks.goals.repeat import ActionCounter, PressCounter
 from robospa.tasks.snapshot import Snapshot
 
 HIT_REACH = 0.02
@@ -44,7 +44,7 @@ class HitCounter(PressCounter):
 class UseInOrder(ClickInOrder):
     """Use `tool` on the objects of `counters` one after the other; subtask i is counter i."""
 
-    def __init__(self, counters: Sequence[Countable], tool: str) -> None:
+    def __init__(self, counters: Sequence[ActionCounter], tool: str) -> None:
         super().__init__(counters)
         self._tool = tool
         self._lift_tracker = LiftTracker((tool,), radius=0.15)

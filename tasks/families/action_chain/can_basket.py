@@ -15,9 +15,9 @@ import numpy as np
 from robospa.tasks import objects
 from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.tabletop import Item, draw_look, named, radius, standing
-from robospa.tasks.goals.checklist import Checklist, Counter
+from robospa.tasks.goals.checklist import Checklist
 from robospa.tasks.goals.parts import Part, Rests, level_with
-from robospa.tasks.goals.repeat import PressCounter
+from robospa.tasks.goals.repeat import ActionCounter, PressCounter
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.plan import Home, Pick, Place, Press, Skill
@@ -107,7 +107,7 @@ def goal(scene: Scene) -> Checklist:
     can = scene.object(facts.can)
     model = objects.object_model(can.asset, can.params)
     counter = PressCounter(can.name, model.frames["press"], CAN_BOX)
-    subtasks: list[Counter | Part] = []
+    subtasks: list[ActionCounter | Part] = []
     for step in STEPS[scene.level]:
         if step == "b":
             basket = scene.object(facts.basket)

@@ -25,10 +25,10 @@ from robospa.tasks.families.tabletop import (
     side,
     standing,
 )
-from robospa.tasks.goals.checklist import Checklist, Counter
+from robospa.tasks.goals.checklist import Checklist
 from robospa.tasks.goals.opening import Opened
 from robospa.tasks.goals.parts import Part, Rests
-from robospa.tasks.goals.repeat import PressCounter
+from robospa.tasks.goals.repeat import ActionCounter, PressCounter
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.plan import Open, Pick, Place, Press, Skill
@@ -165,7 +165,7 @@ def goal(scene: Scene) -> Checklist:
     facts = Facts.of(scene)
     bell = scene.object(facts.bell)
     press = objects.object_model(bell.asset, bell.params).frames["press"]
-    parts: dict[str, Counter | Part] = {"c": PressCounter(bell.name, press, BELL_BOX, arm=0)}
+    parts: dict[str, ActionCounter | Part] = {"c": PressCounter(bell.name, press, BELL_BOX, arm=0)}
     if facts.microwave:
         parts["o"] = Opened(facts.microwave, OPEN * _door().upper)
     if facts.object:

@@ -20,8 +20,9 @@ from robospa.tasks.families.action_chain.stations import frame_of
 from robospa.tasks.families.colors import first_colors
 from robospa.tasks.families.dustbin.floor_bin import reachable
 from robospa.tasks.families.tabletop import Item, draw_look, in_view, named, radius, standing
-from robospa.tasks.goals.checklist import Checklist, Counter
+from robospa.tasks.goals.checklist import Checklist
 from robospa.tasks.goals.parts import Near, Part, Rests
+from robospa.tasks.goals.repeat import ActionCounter
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.plan import Hang, Pick, Place, Skill
@@ -164,7 +165,7 @@ def goal(scene: Scene) -> Checklist:
     mug, rack = facts.mug, facts.rack
     handle, peg = frame_of(scene, mug, "handle"), frame_of(scene, rack, "hang")
     near = _hangs(handle, peg, HANGING + scene.table_rise)
-    parts: list[Counter | Part] = [Rests(mug, (rack,), near, grip=MUG_GRIP)]
+    parts: list[ActionCounter | Part] = [Rests(mug, (rack,), near, grip=MUG_GRIP)]
     blocks = _blocks(scene)
     if blocks:
         parts.append(

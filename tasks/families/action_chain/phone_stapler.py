@@ -18,8 +18,9 @@ from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.action_chain.stations import button, frame_of
 from robospa.tasks.families.dustbin.floor_bin import BIN, TABLE_SHIFT, container
 from robospa.tasks.families.tabletop import Item, draw_look, in_view, named, radius, standing
-from robospa.tasks.goals.checklist import Checklist, Counter
+from robospa.tasks.goals.checklist import Checklist
 from robospa.tasks.goals.parts import Inside, Near, Part, Rests
+from robospa.tasks.goals.repeat import ActionCounter
 from robospa.tasks.goals.subtask_flags import inside_box
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText
@@ -119,7 +120,7 @@ def goal(scene: Scene) -> Checklist:
     facts = Facts.of(scene)
     stand = facts.phone_stand
     near = _within(BOX, frame_of(scene, stand))
-    subtasks: list[Counter | Part] = [Rests(facts.phone, (stand,), near)]
+    subtasks: list[ActionCounter | Part] = [Rests(facts.phone, (stand,), near)]
     if facts.stapler:
         subtasks += [button(scene, facts.stapler)] * PRESSES[scene.level]
     if scene.level == DUMP_LEVEL:

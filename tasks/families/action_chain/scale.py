@@ -18,8 +18,9 @@ from robospa.geometry import Pose
 from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.action_chain.stations import button, frame_of, there_and_back
 from robospa.tasks.families.tabletop import Item, draw_look, in_view, named, radius, standing
-from robospa.tasks.goals.checklist import Checklist, Counter
+from robospa.tasks.goals.checklist import Checklist
 from robospa.tasks.goals.parts import Part, Rests, on_spot
+from robospa.tasks.goals.repeat import ActionCounter
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.plan import Place, Skill
@@ -130,7 +131,7 @@ def _back(pose: Pose, start: Pose) -> bool:
 def goal(scene: Scene) -> Checklist:
     """On scale and stand (latched once it has to go back), a click, back on the table."""
     facts, steps = Facts.of(scene), STEPS[scene.level]
-    subtasks: list[Counter | Part] = []
+    subtasks: list[ActionCounter | Part] = []
     for step in steps:
         if step == "c":
             subtasks.append(button(scene, facts.cards, own_side_closed=True))

@@ -15,8 +15,9 @@ import numpy as np
 from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.action_chain.stations import button, frame_of
 from robospa.tasks.families.tabletop import Item, draw_look, named, radius, side, standing
-from robospa.tasks.goals.checklist import Checklist, Counter
+from robospa.tasks.goals.checklist import Checklist
 from robospa.tasks.goals.parts import Part
+from robospa.tasks.goals.repeat import ActionCounter
 from robospa.tasks.goals.stamping import StampCounter
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText
@@ -101,7 +102,7 @@ def _draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSamp
 def goal(scene: Scene) -> Checklist:
     """Three counters at most; the flags follow the asked order."""
     facts = Facts.of(scene)
-    counters: dict[str, Counter | Part] = {
+    counters: dict[str, ActionCounter | Part] = {
         key: StampCounter(seal, pad) for key, (seal, pad) in facts.pairs.items() if seal
     }
     if facts.stapler:

@@ -18,8 +18,9 @@ from robospa.tasks import objects
 from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.action_chain.stations import button, frame_of, there_and_back
 from robospa.tasks.families.tabletop import Item, draw_look, in_view, named, radius, standing
-from robospa.tasks.goals.checklist import Checklist, Counter
+from robospa.tasks.goals.checklist import Checklist
 from robospa.tasks.goals.parts import Part, Rests, on_spot
+from robospa.tasks.goals.repeat import ActionCounter
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.plan import Place, Skill
@@ -120,7 +121,7 @@ def goal(scene: Scene) -> Checklist:
     """Food on the tray (latched once it has to go back), a click, food at home again."""
     facts, steps = Facts.of(scene), STEPS[scene.level]
     back = "B" in steps
-    subtasks: list[Counter | Part] = []
+    subtasks: list[ActionCounter | Part] = []
     for step in steps:
         if step == "c":
             subtasks.append(button(scene, facts.bell, CLICK_BOX, own_side_closed=True))

@@ -24,8 +24,9 @@ from robospa.tasks.families.dustbin.floor_bin import (
     reachable,
 )
 from robospa.tasks.families.tabletop import Item, draw_look, in_view, named, radius, side, standing
-from robospa.tasks.goals.checklist import Checklist, Counter
+from robospa.tasks.goals.checklist import Checklist
 from robospa.tasks.goals.parts import Inside, Part, Rests, on_spot
+from robospa.tasks.goals.repeat import ActionCounter
 from robospa.tasks.instructions.grammar import Slots, Templates
 from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.instructions.words import by_count
@@ -143,7 +144,9 @@ def goal(scene: Scene) -> Checklist:
     """Bottles in the bin, then cups on coasters, any cup on any coaster; everything latches."""
     facts = Facts.of(scene)
     inside = container(scene.object(facts.dustbin))
-    parts: list[Counter | Part] = [Inside(name, facts.dustbin, inside) for name in facts.bottles]
+    parts: list[ActionCounter | Part] = [
+        Inside(name, facts.dustbin, inside) for name in facts.bottles
+    ]
     turns = [0] * len(parts)
     for name in facts.cups:
         near = on_spot(REACH, -HEIGHT, HEIGHT, Pose(), frame_of(scene, facts.coasters[0]))
