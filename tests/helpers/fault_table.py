@@ -1,4 +1,4 @@
-"""Every fault that a policy server is put through, how its trial ends, and what the user is told.
+"""Every fault that a policy server is put through, how its trial ends, and the error message.
 
 `docs/faults.md` repeats this table. In a sentence {url} is the server's address.
 """
@@ -49,7 +49,7 @@ SILENT = [
         True,
     ),
     silent(
-        "greeting", "never says hello", "hello", f"{{url}} did not send hello within 0.4 s; {LATE}"
+        "greeting", "never sends hello", "hello", f"{{url}} did not send hello within 0.4 s; {LATE}"
     ),
     silent(
         "reset", "hangs in a reset", "reset", f"{{url}} did not send ready within 0.4 s; {LATE}"
@@ -165,7 +165,7 @@ ACTIONS = [
     ),
     Case(
         "far",
-        "asks for a joint angle that cannot be",
+        "commands an impossible joint angle",
         "first",
         do.chunk(np.full((2, 14), 99, np.float32)),
         POLICY,
@@ -175,7 +175,7 @@ ACTIONS = [
 FRAMES = [
     Case(
         "times",
-        "says that its answer took NaN and infinite milliseconds",
+        "reports NaN and infinite milliseconds",
         "first",
         do.chunk(ONES, infer_ms=np.nan, queue_ms=np.inf),
         UNHARMED,
@@ -253,7 +253,7 @@ ORDER = [
     ),
     Case(
         "unasked",
-        "sends what nobody asked for",
+        "sends an answer without a request",
         "first",
         do.unasked,
         REPEATED,
@@ -261,7 +261,7 @@ ORDER = [
     ),
     Case(
         "type",
-        "answers something else than was asked",
+        "answers with another type of message",
         "later",
         do.of_other_type,
         REPEATED,
@@ -271,7 +271,7 @@ ORDER = [
 ERRORS = [
     Case(
         "again",
-        "says error, and that trying again may help",
+        "reports a retriable error",
         "first",
         do.error("policy_failed", "CUDA error: device lost", True),
         REPEATED,
@@ -279,7 +279,7 @@ ERRORS = [
     ),
     Case(
         "never",
-        "says error, and that trying again is pointless",
+        "reports an error that is not retriable",
         "reset",
         do.error("policy_failed", "no checkpoint for this task"),
         LOST,
@@ -287,7 +287,7 @@ ERRORS = [
     ),
     Case(
         "long",
-        "says error in a megabyte of text with colours and bells",
+        "reports an error in a megabyte of text with control characters",
         "first",
         do.error("policy_failed", "\x1b[31mCUDA\x07 error\r\n" + 10**6 * "A", True),
         REPEATED,
@@ -295,7 +295,7 @@ ERRORS = [
     ),
     Case(
         "answer",
-        "says that the policy's answer was none",
+        "reports that the policy's answer was invalid",
         "first",
         do.error("bad_answer", "the policy answered a list"),
         POLICY,
@@ -303,7 +303,7 @@ ERRORS = [
     ),
     Case(
         "goodbye",
-        "says that it gives up the connection",
+        "reports that it closes the connection",
         "first",
         do.instead(Error(0, "going", "the machine is pre-empted")),
         REPEATED,
@@ -313,7 +313,7 @@ ERRORS = [
 HELLOS = [
     Case(
         "garbage",
-        "says hello in no known language",
+        "sends a hello that is no msgpack",
         "hello",
         do.instead(b"\xc1"),
         REPEATED,
@@ -322,7 +322,7 @@ HELLOS = [
     ),
     Case(
         "first-words",
-        "says something else than hello",
+        "sends something else than hello",
         "hello",
         do.instead(Ready(0)),
         REPEATED,
@@ -338,7 +338,7 @@ HELLOS = [
     ),
     Case(
         "cameras",
-        "wants 10,000 cameras",
+        "requests 10,000 cameras",
         "hello",
         do.instead(hello(cameras=[{"name": "head"}] * 10_000)),
         REPEATED,
@@ -346,7 +346,7 @@ HELLOS = [
     ),
     Case(
         "pixels",
-        "wants an image of a thousand million pixels",
+        "requests an image of a thousand million pixels",
         "hello",
         do.instead(hello(cameras=[{"name": "head", "width": 10**9, "height": 1}])),
         REPEATED,
@@ -364,7 +364,7 @@ HELLOS = [
     ),
     Case(
         "too-large",
-        "comes back and wants images that fit into no message",
+        "comes back and requests images that fit into no message",
         "first",
         do.come_back_as(hello(cameras=[{"name": "head", "width": 8192, "height": 8192}])),
         STOPS,

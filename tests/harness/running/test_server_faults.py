@@ -183,7 +183,7 @@ def test_at_the_start_a_run_is_refused(case: Case) -> None:
 
 def table() -> str:
     """The table of `docs/faults.md`."""
-    rows = ["| A server that ... | its trial is | and the user is told |", "|---|---|---|"]
+    rows = ["| A server that ... | its trial is | error message |", "|---|---|---|"]
     for case in CASES.values():
         said = re.sub("A{9,}", "AAAA", case.seen(SAID).replace("0.4 s", "120 s"))
         said = said.replace("|O", "\\|O") or "nothing"
