@@ -8,7 +8,7 @@ from pathlib import Path
 
 from robospa.categories import BASIC, CATEGORIES, DIMENSIONS
 from robospa.harness.settings import Selection, SettingsError
-from robospa.results.records.schema import MAX_INTEGER, parse
+from robospa.schema import MAX_INTEGER, parse_json
 from robospa.trial import TrialKey
 
 GROUPS = {"all": CATEGORIES, **DIMENSIONS, "basic": BASIC}
@@ -77,7 +77,7 @@ def parse_seeds(text: str | None) -> Seeds:
         numbers = parse_numbers(text, "seeds")
         return lambda task, level: numbers
     try:
-        data = parse(Path(text).read_text())
+        data = parse_json(Path(text).read_text())
     except (OSError, ValueError) as error:
         raise SettingsError(f"cannot read the seeds in {text}: {error}") from error
 

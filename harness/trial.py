@@ -15,7 +15,7 @@ from __future__ import annotations
 import hashlib
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from typing import ParamSpec, Protocol, TypeVar
 
 import numpy as np
@@ -27,7 +27,7 @@ from robospa.observation import Observation, View
 from robospa.protocol.errors import PolicyAnswerError
 from robospa.protocol.policy import Policy, PolicySpec, TrialInfo
 from robospa.protocol.validation import check_chunk
-from robospa.results.records.trial_record import PROCESSOR, TrialRecord
+from robospa.results.records.trial_record import PROCESSOR, EventRow, TrialRecord
 from robospa.tasks.catalog import build_scene
 from robospa.tasks.catalog import task as find_task
 from robospa.tasks.events import Event, outcome
@@ -363,7 +363,14 @@ def _record(run: _Run, key: TrialKey, end: str, message: str, policy_seed: int) 
         policy_seed=policy_seed,
         message=message,
         events=tuple(
-            {**asdict(event), "step": step}
+            EventRow(
+                time=event.time,
+                kind=event.kind,
+                object=event.object,
+                index=event.index,
+                note=event.note,
+                step=step,
+            )
             for event, step in zip(run.events, run.event_steps, strict=True)
         ),
         latency=_answer_times(run.latencies, run.server_timings),

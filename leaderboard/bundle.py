@@ -22,7 +22,12 @@ import json
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeGuard
+
+import msgspec
+from msgspec import Struct
+
+from robospa.schema import Sha256
 
 FORMAT = 1
 """Version of this layout. A newer one is refused, an older one is read as long as it is known."""
@@ -60,6 +65,35 @@ class Limits:
     row: int = 256 * 1024
 
 
+class FileEntry(Struct, frozen=True, forbid_unknown_fields=True):
+    """Size [bytes] and hash of a file."""
+
+    size: int
+    sha256: Sha256
+
+
+class Chain(Struct, frozen=True, forbid_unknown_fields=True):
+    """How many rows there are, and the hash of the last one."""
+
+    rows: int
+    last: Sha256
+
+
+class Manifest(Struct, frozen=True, forbid_unknown_fields=True):
+    """`manifest.json`. `robospa` is the version that packed it, `inputs` the hash of what was fixed
+    before the first trial, `seeds` that of the seed lists, `bundle` that of all the rest."""
+
+    format: int
+    suite: str
+    robospa: str
+    practice: bool
+    inputs: Sha256
+    seeds: Sha256
+    chain: Chain
+    files: dict[str, FileEntry]
+    bundle: str = ""
+
+
 class BundleError(Exception):
     """A bundle, or a run that was to become one, is refused; the message is one sentence."""
 
@@ -74,9 +108,16 @@ def actions_name(task: str, level: int) -> str:
     return f"actions/{task}-L{level}.bin"
 
 
-def canonical(value: Any) -> bytes:
-    """The one way to write a JSON value down, for hashes; ValueError for NaN and infinities."""
-    text = json.dumps(value, sort_keys=True, separators=(",", ":"), allow_nan=False)
+def canonical(value: object) -> bytes:
+    """The one way to write a JSON value or a Struct down, for hashes; ValueError for NaN and
+    infinities."""
+    text = json.dumps(
+        value,
+        sort_keys=True,
+        separators=(",", ":"),
+        allow_nan=False,
+        default=msgspec.to_builtins,
+    )
     return text.encode()
 
 
@@ -85,12 +126,17 @@ def sha256(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()
 
 
-def bundle_hash(manifest: Mapping[str, Any]) -> str:
+def is_sha256(value: object) -> TypeGuard[str]:
+    """Whether `value` is a sha256 in lower-case hexadecimal."""
+    return isinstance(value, str) and re.fullmatch(r"[0-9a-f]{64}", value) is not None
+
+
+def bundle_hash(manifest: Mapping[str, object]) -> str:
     """The hash that names a bundle: of its manifest, which has the hash of every other file."""
     return sha256(canonical({k: v for k, v in manifest.items() if k != "bundle"}))
 
 
-def inputs_hash(run: Mapping[str, Any], lists: Mapping[str, Any]) -> str:
+def inputs_hash(run: Mapping[str, Any], lists: Mapping[str, object]) -> str:
     """Hash of what is fixed before the first trial: the chain starts from it, and it decides which
     trials are filmed."""
     settings = run["settings"]

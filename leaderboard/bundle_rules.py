@@ -7,90 +7,138 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Annotated, Any
+
+from msgspec import Struct
 
 from robospa.action_space import KINDS
 from robospa.harness.trial import policy_seed
 from robospa.leaderboard.bundle import BundleError
+from robospa.leaderboard.card import Card
 from robospa.leaderboard.reference import LEVELS, Reference
 from robospa.results.records.run_io import finished
 from robospa.results.records.trial_record import TrialRecord
+from robospa.schema import Number, one_of, read
 from robospa.tasks.events import Event, outcome
 from robospa.trial import TrialKey
 
 CONTROLS = ("rest_to_rest",)
 """Ways of executing an action that the benchmark's numbers are made with."""
-VERSIONS = ("robospa", "python", "numpy", "sapien")
 ONE = ("embodiment", "mode", "split")
 COUNT = frozenset(("subtask_done", "subtask_undone", "success", "failed"))
 """Events that decide success and progress."""
 
 
-def spec_of(settings: Mapping[str, Any], task: str) -> Mapping[str, Any]:
-    """The spec of the policy that did `task`; BundleError if the settings hold none."""
-    policies = settings.get("policies") or {}
-    policy = policies.get(task) if policies else settings.get("policy")
-    spec = policy.get("spec") if isinstance(policy, Mapping) else None
-    if (
-        not isinstance(spec, Mapping)
-        or not isinstance(spec.get("name"), str)
-        or spec.get("action") not in KINDS
-    ):
-        raise BundleError(f"the run's settings hold no policy spec for {task}")
-    return spec
+class Spec(Struct, frozen=True):
+    """What a policy said of itself, as far as it is held against the card."""
+
+    name: str
+    action: Annotated[str, one_of(KINDS)]
+    horizon: Any = None
+    privileged: Any = False
 
 
-def check_settings(run: Mapping[str, Any], reference: Reference) -> None:
-    """BundleError if the run `run` (as in run.json) is one that cannot enter."""
-    settings, about = run.get("settings"), run.get("about")
-    if not isinstance(settings, Mapping) or not isinstance(about, Mapping):
-        raise BundleError("the run has no settings or does not say where it ran")
-    if run.get("suite") != reference.suite:
+class Policy(Struct, frozen=True):
+    """A policy of the run."""
+
+    spec: Spec
+
+
+class World(Struct, frozen=True):
+    """Where the trials ran."""
+
+    factory: str
+    control: str = CONTROLS[0]
+
+
+class Settings(Struct, frozen=True):
+    """The settings of a run that decide whether it can enter."""
+
+    embodiment: tuple[str, ...]
+    mode: tuple[str, ...]
+    split: tuple[str, ...]
+    run_seed: int
+    privileged: bool
+    world: World
+    policy: Policy | None = None
+    policies: dict[str, Policy] | None = None
+    step_scale: Number = 1.0
+
+    def __post_init__(self) -> None:
+        for name in ONE:
+            if len(getattr(self, name)) != 1:
+                raise ValueError(f"it mixes {name}s or names none; a bundle has one")
+
+    def spec(self, task: str) -> Spec:
+        """The spec of the policy that did `task`; BundleError if the settings hold none."""
+        policy = self.policies.get(task) if self.policies else self.policy
+        if policy is None:
+            raise BundleError(f"the run's settings hold no policy spec for {task}")
+        return policy.spec
+
+
+class Versions(Struct, frozen=True):
+    """What the run was made with."""
+
+    robospa: str
+    python: str
+    numpy: str
+    sapien: str
+
+
+class About(Struct, frozen=True):
+    """What the run says of its software and machine."""
+
+    versions: Versions
+    code: str
+    git: dict[str, Any] = {}
+    machine: dict[str, Any] = {}
+    world: dict[str, Any] = {}
+
+
+class RunFile(Struct, frozen=True):
+    """`run.json`, as far as the rules need it."""
+
+    suite: str
+    settings: Settings
+    about: About
+    categories: dict[str, str]
+
+
+def check_settings(run: Mapping[str, object], reference: Reference) -> Settings:
+    """The settings of `run` (as in run.json); BundleError if it is one that cannot enter."""
+    found = read(RunFile, run, "the run", BundleError)
+    settings = found.settings
+    if found.suite != reference.suite:
         raise BundleError(
-            f"the run is of the suite {str(run.get('suite'))[:40]!a}; this robospa has "
+            f"the run is of the suite {found.suite[:40]!a}; this robospa has "
             f"{reference.suite!r}: verify it with the version that it was made with"
         )
-    if settings.get("privileged") is not False or _privileged(settings):
+    policies = [settings.policy, *(settings.policies or {}).values()]
+    if settings.privileged or any(p.spec.privileged for p in policies if p):
         raise BundleError("the run's policy is privileged: it saw the exact state, not images")
-    if settings.get("step_scale", 1.0) != 1.0:
+    if settings.step_scale != 1.0:
         raise BundleError("the run's step limits are not the official ones")
-    if not isinstance(settings.get("run_seed"), int):
-        raise BundleError("the run's settings have no run_seed")
-    world = settings.get("world")
-    if not isinstance(world, Mapping) or world.get("factory") != reference.world:
+    if settings.world.factory != reference.world:
         raise BundleError("the run was made in another world than the benchmark's simulator")
-    if world.get("control", CONTROLS[0]) not in CONTROLS:
+    if settings.world.control not in CONTROLS:
         raise BundleError(
             "the run executes actions at a fixed rate; the benchmark moves from rest to rest"
         )
-    for name in ONE:
-        if not (isinstance(settings.get(name), list) and len(settings[name]) == 1):
-            raise BundleError(f"the run mixes {name}s or names none; a bundle has one")
-    versions = about.get("versions")
-    if not isinstance(versions, Mapping) or not all(
-        isinstance(versions.get(name), str) for name in VERSIONS
-    ):
-        raise BundleError(f"the run does not say its versions of {', '.join(VERSIONS)}")
-    if not all(isinstance(about.get(name, {}), Mapping) for name in ("git", "machine", "world")):
-        raise BundleError("the run's description of code and machine is malformed")
-    if not isinstance(about.get("code"), str):
-        raise BundleError("the run does not say which code it was made with")
+    return settings
 
 
-def _privileged(settings: Mapping[str, Any]) -> bool:
-    found = [settings.get("policy"), *dict(settings.get("policies") or {}).values()]
-    specs = [p.get("spec") for p in found if isinstance(p, Mapping)]
-    return any(isinstance(s, Mapping) and s.get("privileged") for s in specs)
-
-
-def check_card_fits(card: Mapping[str, Any], settings: Mapping[str, Any], task: str) -> None:
+def check_card_fits(card: Card, settings: Settings, task: str) -> None:
     """BundleError if card and policy spec disagree about the actions of `task`."""
-    spec, said = spec_of(settings, task), card["actions"]
-    for name, found in (("space", spec["action"]), ("chunk", spec.get("horizon"))):
-        if said[name] != found:
+    spec = settings.spec(task)
+    for name, stated, used in (
+        ("space", card.actions.space, spec.action),
+        ("chunk", card.actions.chunk, spec.horizon),
+    ):
+        if stated != used:
             raise BundleError(
-                f"the model card says {name} = {said[name]!r}, but the policy that did {task} "
-                f"said {found!a}"
+                f"the model card says {name} = {stated!r}, but the policy that did {task} has "
+                f"{str(used)[:40]!a}"
             )
 
 
@@ -133,7 +181,7 @@ def check_seeds(keys: Sequence[TrialKey], reference: Reference, practice: bool) 
                         )
 
 
-def check_categories(run: Mapping[str, Any], tasks: Sequence[str], reference: Reference) -> None:
+def check_categories(run: Mapping[str, object], tasks: Sequence[str], reference: Reference) -> None:
     """BundleError unless the run says the category of each of its tasks, and says it right."""
     if run.get("categories") != {t: reference.facts(t, LEVELS[0]).category for t in tasks}:
         raise BundleError("the run's categories are not those of its tasks")
@@ -158,12 +206,12 @@ def check_record(record: TrialRecord, reference: Reference, run_seed: int) -> No
     if not 0 <= record.steps <= facts.steps:
         raise BundleError(f"{key.slug} has {record.steps} actions; the limit is {facts.steps}")
     counted = [Event(0.0, e["kind"], "", e["index"]) for e in record.events if e["kind"] in COUNT]
-    told = outcome(counted, record.total)
+    reached = outcome(counted, record.total)
     claimed = (record.success, record.done, record.best)
-    if claimed != (told.success, told.done, told.best):
+    if claimed != (reached.success, reached.done, reached.best):
         raise BundleError(
             f"{key.slug} claims success {record.success}, {record.done} done, {record.best} at "
-            f"best; its events say {told.success}, {told.done}, {told.best}"
+            f"best; its events say {reached.success}, {reached.done}, {reached.best}"
         )
     if record.success != (record.end == "success"):
         raise BundleError(f"{key.slug} ends in {record.end} and claims success {record.success}")

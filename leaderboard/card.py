@@ -8,72 +8,75 @@ markup, scripts and invisible characters are refused, since names end up on a pa
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Collection
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import Annotated
+
+from msgspec import Meta, Struct
 
 from robospa.leaderboard.bundle import MEGA, BundleError
-from robospa.leaderboard.strict_json import is_hash, look
+from robospa.leaderboard.strict_json import check_text
+from robospa.schema import Sha256, one_of, pattern, read
 
 LINK = re.compile(r"https://[A-Za-z0-9.-]+(:[0-9]+)?(/[A-Za-z0-9._~/%+=@:,-]*)?")
-LEVELS = 5
 ALL = "all"
 """The checkpoint of a model that does every task."""
-Check = Callable[[Any], bool]
+
+Link = Annotated[
+    str, pattern(rf"(?=.{{1,300}}\Z){LINK.pattern}", "a https address of at most 300 characters")
+]
+Demonstrations = Annotated[int, Meta(ge=0, le=10**7)]
 
 
-def _text(most: int) -> Check:
-    return lambda v: isinstance(v, str) and len(v.strip()) > 0 and len(v) <= most and _plain(v)
+def _plain(most: int) -> Meta:
+    """The rule that a text is of 1 to `most` characters, not all of them spaces."""
+    return pattern(
+        rf"(?=.*\S)[^<>\"`\\{{}}\n\r\t]{{1,{most}}}",
+        f"text of 1 to {most} plain characters (no line breaks, quotes, braces or < >)",
+    )
 
 
-def _plain(value: str) -> bool:
-    return value.isprintable() and not set(value) & set('<>"`\\{}')
+class Training(Struct, frozen=True, forbid_unknown_fields=True):
+    """What the model was trained on; demonstrations are per base task, one number a level."""
+
+    tasks: Annotated[str, one_of(("single", "multi"))]
+    scenes: Annotated[str, one_of(("clean", "randomised", "both"))]
+    demonstrations: tuple[
+        Demonstrations, Demonstrations, Demonstrations, Demonstrations, Demonstrations
+    ]
 
 
-def _whole(low: int, high: int) -> Check:
-    return lambda v: type(v) is int and low <= v <= high
+class Actions(Struct, frozen=True, forbid_unknown_fields=True):
+    """The space of the model's actions, how many make a chunk, and their rate [Hz] in the data."""
+
+    space: Annotated[str, one_of(("joint", "ee", "delta_ee"))]
+    chunk: Annotated[int, Meta(ge=1, le=10_000)]
+    rate: Annotated[int, Meta(gt=0, le=10_000)] | Annotated[float, Meta(gt=0, le=10_000)]
 
 
-def _one_of(*words: str) -> Check:
-    return lambda v: isinstance(v, str) and v in words
+class Checkpoint(Struct, frozen=True, forbid_unknown_fields=True):
+    """Where weights are, and their hash."""
+
+    reference: Link
+    sha256: Sha256
 
 
-def _number(v: Any) -> bool:
-    return type(v) in (int, float) and 0 < v <= 10_000
+class Card(Struct, frozen=True, forbid_unknown_fields=True):
+    """A model card. `checkpoints` are by base task, or under ALL."""
 
+    name: Annotated[str, _plain(80)]
+    team: Annotated[str, _plain(200)]
+    licence: Annotated[str, _plain(80)]
+    parameters: Annotated[int, Meta(ge=0, le=10**14)]
+    link: Link
+    training: Training
+    actions: Actions
+    checkpoints: dict[str, Checkpoint]
 
-def _link(v: Any) -> bool:
-    return isinstance(v, str) and len(v) <= 300 and LINK.fullmatch(v) is not None
-
-
-def _demonstrations(v: Any) -> bool:
-    return isinstance(v, list) and len(v) == LEVELS and all(_whole(0, 10**7)(n) for n in v)
-
-
-FIELDS: Mapping[str, Mapping[str, tuple[Check, str]]] = {
-    "": {
-        "name": (_text(80), "text of at most 80 plain characters"),
-        "team": (_text(200), "text of at most 200 plain characters"),
-        "licence": (_text(80), "text of at most 80 plain characters, best an SPDX name"),
-        "parameters": (_whole(0, 10**14), "a whole number of parameters"),
-        "link": (_link, "a https address"),
-    },
-    "training": {
-        "tasks": (_one_of("single", "multi"), '"single" or "multi"'),
-        "scenes": (_one_of("clean", "randomised", "both"), '"clean", "randomised" or "both"'),
-        "demonstrations": (_demonstrations, "five whole numbers, one a level, per base task"),
-    },
-    "actions": {
-        "space": (_one_of("joint", "ee", "delta_ee"), '"joint", "ee" or "delta_ee"'),
-        "chunk": (_whole(1, 10_000), "the number of actions of a chunk"),
-        "rate": (_number, "the rate [Hz] of the demonstrations' actions"),
-    },
-}
-CHECKPOINT = {
-    "reference": (_link, "a https address"),
-    "sha256": (is_hash, "64 hexadecimal digits"),
-}
+    def __post_init__(self) -> None:
+        if not (self.name + self.team + self.licence).isprintable():
+            raise ValueError("name, team and licence may hold printable characters only")
 
 
 def template() -> str:
@@ -81,7 +84,7 @@ def template() -> str:
     return files("robospa.leaderboard").joinpath("model.toml").read_text(encoding="utf-8")
 
 
-def read_card(path: Path) -> dict[str, Any]:
+def read_card(path: Path) -> Card:
     """The card in the TOML file `path`, not yet held against a run; BundleError if it is none."""
     import tomllib
 
@@ -96,64 +99,31 @@ def read_card(path: Path) -> dict[str, Any]:
         data = tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise BundleError(f"the model card {path} cannot be read: {error.strerror}") from None
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise BundleError(f"the model card {path} is not TOML: {error}") from None
-    return data
+    return to_card(data)
 
 
-def check_card(
-    card: Mapping[str, Any], tasks: Collection[str], what: str = "the model card"
-) -> None:
-    """BundleError for the first field of `card` that is missing, unknown or not what it has to be.
-
-    `tasks` are the base tasks of the run: a model trained for one task at a time has a checkpoint
-    for each of them.
-    """
-    look(dict(card), what)
-    groups = [name for name in FIELDS if name]
-    _only(card, {*FIELDS[""], *groups, "checkpoints"}, what)
-    for group, fields in FIELDS.items():
-        part = card.get(group) if group else card
-        if not isinstance(part, Mapping):
-            raise BundleError(f"{what} has no table [{group}]")
-        if group:
-            _only(part, fields, f"{what}, [{group}]")
-        _check(part, fields, f"{what}, [{group}]" if group else what)
-    _check_points(card, tasks, what)
+def to_card(data: object, what: str = "the model card") -> Card:
+    """`data`, decoded JSON or TOML, as a card; BundleError naming the first field that is missing,
+    unknown or not what it has to be."""
+    check_text(data, what)
+    return read(Card, data, what, BundleError)
 
 
-def _check_points(card: Mapping[str, Any], tasks: Collection[str], what: str) -> None:
-    points = card.get("checkpoints")
-    if not isinstance(points, Mapping) or not points:
-        raise BundleError(f"{what} has no table [checkpoints]")
-    for name, point in points.items():
-        where = f"{what}, [checkpoints.{name}]"
-        if not isinstance(point, Mapping):
-            raise BundleError(f"{where} is no table of reference and sha256")
-        _only(point, CHECKPOINT, where)
-        _check(point, CHECKPOINT, where)
-    wanted = set(tasks) if card["training"]["tasks"] == "single" else {ALL}
-    if set(points) == {ALL} and len(tasks) == 1:
+def check_checkpoints(card: Card, tasks: Collection[str], what: str = "the model card") -> None:
+    """BundleError unless `card` has a checkpoint for each of `tasks`, the base tasks of the run, if
+    it is of a model trained for one task at a time, and else one for all."""
+    points = set(card.checkpoints)
+    if points == {ALL} and len(tasks) == 1:
         return
-    if missing := sorted(wanted - set(points)):
+    needed = set(tasks) if card.training.tasks == "single" else {ALL}
+    if missing := sorted(needed - points):
         raise BundleError(
             f"{what} has no checkpoint for {', '.join(missing[:3])}: [checkpoints] has a table for "
             'every base task if training.tasks is "single", and the table "all" if it is "multi"'
         )
-    if strange := sorted(set(points) - wanted):
+    if extra := sorted(points - needed):
         raise BundleError(
-            f"{what} has a checkpoint for {strange[0]}, which the run has no trials of"
+            f"{what} has a checkpoint for {extra[0][:80]}, which the run has no trials of"
         )
-
-
-def _check(part: Mapping[str, Any], fields: Mapping[str, tuple[Check, str]], where: str) -> None:
-    for name, (right, words) in fields.items():
-        if name not in part:
-            raise BundleError(f"{where} does not say {name}: {words}")
-        if not right(part[name]):
-            raise BundleError(f"{where}: {name} is not {words}")
-
-
-def _only(part: Mapping[str, Any], known: Collection[str], where: str) -> None:
-    if strange := sorted(str(name) for name in set(part) - set(known)):
-        raise BundleError(f"{where} has a field that no card has: {strange[0][:40]!a}")

@@ -8,10 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated
+
+from msgspec import UNSET, Struct, UnsetType
 
 from robospa.categories import CATEGORIES, DIMENSIONS, SPATIAL
 from robospa.leaderboard.bundle import BundleError
+from robospa.leaderboard.evidence import Evidence
 from robospa.leaderboard.scores import compare_scores
 from robospa.leaderboard.submission import Submission, slug_of
 from robospa.results.paper import rounding
@@ -22,6 +25,7 @@ from robospa.results.scoring.score_json import to_json
 from robospa.results.scoring.scores import VariantScore, combine
 from robospa.results.scoring.setting import Setting
 from robospa.results.statistics.intervals import Estimate
+from robospa.schema import Count, pattern, read
 
 BADGES = {
     "published": "published, not verified",
@@ -101,48 +105,44 @@ def published_entries() -> list[Entry]:
 
 def entry_of(submission: Submission) -> Entry:
     """The entry of a submission; BundleError if its scores do not hold together."""
-    card, settings = submission.card, submission.run["settings"]
+    card, evidence = submission.card, submission.evidence
     column = _column(submission)
-    training, actions = card["training"], card["actions"]
-    demonstrations = ", ".join(map(str, training["demonstrations"]))
+    training, actions = card.training, card.actions
+    demonstrations = ", ".join(map(str, training.demonstrations))
     about = (
-        ("team", card["team"]),
-        ("licence of the weights", card["licence"]),
-        ("parameters", short_count(card["parameters"])),
-        ("training", "one checkpoint a base task" if training["tasks"] == "single"
+        ("team", card.team),
+        ("licence of the weights", card.licence),
+        ("parameters", short_count(card.parameters)),
+        ("training", "one checkpoint a base task" if training.tasks == "single"
          else "one checkpoint for all tasks"),
-        ("training scenes", training["scenes"]),
+        ("training scenes", training.scenes),
         ("demonstrations", f"{demonstrations} (levels 1 to 5, per base task)"),
-        ("actions", f"{actions['space']}, chunks of {actions['chunk']}, {actions['rate']:g} Hz"),
+        ("actions", f"{actions.space}, chunks of {actions.chunk}, {actions.rate:g} Hz"),
         ("embodiment", column.embodiment),
-        ("scene mode", _first(settings["mode"])),
-        ("instructions", _first(settings["split"])),
-        ("suite", str(submission.run.get("suite", ""))),
-        ("bundle", str(submission.manifest["bundle"])),
+        ("scene mode", submission.settings.mode[0]),
+        ("instructions", submission.settings.split[0]),
+        ("suite", submission.suite),
+        ("bundle", submission.bundle),
     )  # fmt: skip
     return Entry(
         slug=submission.folder.name,
-        name=card["name"],
-        team=card["team"],
-        parameters=short_count(card["parameters"]),
-        link=card["link"],
-        badges=badges_of(submission.evidence),
-        embodiment=_first(settings["embodiment"]),
-        mode=_first(settings["mode"]),
-        split=_first(settings["split"]),
-        suite=str(submission.run.get("suite", "")),
-        training=training["tasks"],
-        scenes=training["scenes"],
+        name=card.name,
+        team=card.team,
+        parameters=short_count(card.parameters),
+        link=card.link,
+        badges=evidence.badges,
+        embodiment=column.embodiment,
+        mode=submission.settings.mode[0],
+        split=submission.settings.split[0],
+        suite=submission.suite,
+        training=training.tasks,
+        scenes=training.scenes,
         column=column,
         about=about,
-        evidence=tuple(evidence_lines(submission.evidence)),
+        evidence=tuple(evidence_lines(evidence)),
         failures=submission.failures,
         submission=submission,
     )
-
-
-def _first(value: Any) -> str:
-    return str(value[0] if isinstance(value, list) and value else value)
 
 
 def short_count(count: int) -> str:
@@ -153,93 +153,99 @@ def short_count(count: int) -> str:
     return str(count)
 
 
+Interval = tuple[float, float, float]
+"""A value with the bounds of its interval."""
+
+
+class VariantRow(Struct, frozen=True):
+    """A variant in `scores.json`; a metric that does not apply is absent, one without trials is
+    None."""
+
+    trials: Count
+    missing: Count
+    successes: Count
+    sr: Interval | UnsetType | None = UNSET
+    onta: Interval | UnsetType | None = UNSET
+    ps: Interval | UnsetType | None = UNSET
+
+    @property
+    def values(self) -> dict[str, Estimate | None]:
+        """The metrics that apply."""
+        found = {"sr": self.sr, "onta": self.onta, "ps": self.ps}
+        return {
+            name: None if value is None else Estimate(*value)
+            for name, value in found.items()
+            if value is not UNSET
+        }
+
+
+class ScoresFile(Struct, frozen=True):
+    """The part of `scores.json` that everything else in it is computed from."""
+
+    variants: dict[str, dict[Annotated[str, pattern("L[1-5]", "L1 to L5")], VariantRow]]
+
+
 def _column(submission: Submission) -> Column:
     """The submission's scores as a column, computed from its variants."""
-    run, where = submission.run, f"the submission {submission.folder.name}"
-    settings, categories = run["settings"], run["categories"]
-    counts = load().tasks
+    where = f"the submission {submission.folder.name}: scores.json"
+    given = read(ScoresFile, submission.scores, where, BundleError)
+    settings, counts = submission.settings, load().tasks
     cells: dict[tuple[str, int], VariantScore] = {}
+    for task, levels in given.variants.items():
+        category = submission.categories.get(task)
+        if category is None:
+            raise BundleError(
+                f"{where} has scores of {task[:80]!a}, of which the run has no trials"
+            )
+        for name, row in levels.items():
+            level = int(name.removeprefix("L"))
+            known = counts.get(task)
+            n = known.counts[level - 1] if known and category in SPATIAL else 0
+            listed = row.trials + row.missing
+            cells[task, level] = VariantScore(
+                task, level, category, listed, row.trials, row.successes, row.values, n
+            )
     try:
-        for task, levels in submission.scores["variants"].items():
-            for name, part in levels.items():
-                level, category = int(name.removeprefix("L")), str(categories[task])
-                values = {
-                    metric: None if part[metric] is None else _estimate(part[metric])
-                    for metric in ("sr", "onta", "ps")
-                    if metric in part
-                }
-                known = counts.get(task)
-                n = known.counts[level - 1] if known and category in SPATIAL else 0
-                listed = int(part["trials"]) + int(part["missing"])
-                done = int(part["successes"])
-                cells[task, level] = VariantScore(
-                    task, level, category, listed, int(part["trials"]), done, values, n
-                )
         scores = combine(cells)
-        setting = Setting(
-            (_first(settings["embodiment"]),),
-            (_first(settings["mode"]),),
-            (_first(settings["split"]),),
-            (str(run.get("suite", "")),),
-        )
-        column = Column(ModelResults(str(submission.card["name"]), scores, setting))
+        parts = (settings.embodiment[:1], settings.mode[:1], settings.split[:1])
+        setting = Setting(*parts, (submission.suite,))
+        column = Column(ModelResults(submission.card.name, scores, setting))
         assert column.values, "computed here, where an error is the bundle's"
     except (KeyError, TypeError, ValueError, AttributeError, AssertionError, IndexError) as error:
-        raise BundleError(f"{where}: scores.json is not a report's: {error!r}") from None
+        raise BundleError(f"{where} is not a report's: {error!r}") from None
     if found := compare_scores(to_json(scores), submission.scores):
-        raise BundleError(f"{where}: scores.json does not hold together: {found}")
+        raise BundleError(f"{where} does not hold together: {found}")
     return column
 
 
-def _estimate(triple: Any) -> Estimate:
-    value, low, high = map(float, triple)
-    return Estimate(value, low, high)
-
-
-def badges_of(evidence: Mapping[str, Any]) -> tuple[str, ...]:
-    """The badges that the evidence carries."""
-    made = ["valid"]
-    again = evidence.get("replayed")
-    if again:
-        made.append("replayed" if again["identical"] == again["sampled"] else "outcomes")
-    if evidence.get("reproduced"):
-        made.append("reproduced")
-    return tuple(made)
-
-
-def evidence_lines(evidence: Mapping[str, Any]) -> list[tuple[str, str]]:
+def evidence_lines(evidence: Evidence) -> list[tuple[str, str]]:
     """What the badges rest on, as badge and sentence."""
-    valid, again = evidence["valid"], evidence.get("replayed")
-    fresh = evidence.get("reproduced")
-    made = [
+    valid, again, fresh = evidence.valid, evidence.replayed, evidence.reproduced
+    lines = [
         (
             "valid",
-            f"{valid['trials']} trials of {valid['variants']} variants: structure, hashes, chain, "
+            f"{valid.trials} trials of {valid.variants} variants: structure, hashes, chain, "
             "seeds, records, actions and scores hold.",
         )
     ]
-    made += [("lint", str(text)) for text in valid.get("warnings", [])]
+    lines += [("lint", text) for text in valid.warnings]
     if again:
-        chance = again.get("catches_2_percent")
-        said = (
-            f"{again['sampled']} of {again['trials']} trials were played again: "
-            f"{again['identical']} identical to the bit, {again['agrees']} with the same outcome "
+        text = (
+            f"{again.sampled} of {again.trials} trials were played again: "
+            f"{again.identical} identical to the bit, {again.agrees} with the same outcome "
             "and another final state, none with another outcome."
         )
-        if isinstance(chance, (int, float)):
-            said += f" 2 % of forged outcomes would have shown with {100 * chance:.1f} %."
-        made.append((BADGES[badges_of({"replayed": again})[1]], said))
-        made.append(("challenge", str(again.get("challenge", ""))))
+        if again.catches_2_percent is not None:
+            chance = 100 * again.catches_2_percent
+            text += f" 2 % of forged outcomes would have shown with {chance:.1f} %."
+        lines += [(BADGES[evidence.badges[1]], text), ("challenge", again.challenge)]
     if fresh:
-        made.append(
-            (
-                "reproduced",
-                f"Hidden seeds agree with the claim: p = {fresh['overall']['p']:.2g} overall, "
-                f"tested at {fresh['alpha']:g}.",
-            )
+        text = (
+            f"Hidden seeds agree with the claim: p = {fresh.overall.p:.2g} overall, "
+            f"tested at {fresh.alpha:g}."
         )
-        made.append(("commitment", str(fresh.get("commitment", ""))))
-    return made
+        lines += [("reproduced", text), ("commitment", fresh.commitment)]
+    return lines
 
 
 def page_values(entry: Entry) -> dict[str, dict[str, list[list[float] | int]]]:

@@ -16,7 +16,6 @@ import secrets
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from robospa.harness.running.atomic_file import replace_file
 from robospa.harness.seeds import Sweep
@@ -42,7 +41,7 @@ class Block:
     salt: str
     suite: str = SUITE
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, object]:
         """Plain JSON values."""
         lists = {f"{task}/{level}": list(found) for (task, level), found in self.seeds.items()}
         return {"format": FORMAT, "suite": self.suite, "salt": self.salt, "seeds": lists}
@@ -114,7 +113,7 @@ def read_block(path: Path, commitment: str) -> Block:
     return Block(_seeds(lists, path.name), salt)
 
 
-def _seeds(lists: Any, what: str) -> dict[tuple[str, int], tuple[int, ...]]:
+def _seeds(lists: object, what: str) -> dict[tuple[str, int], tuple[int, ...]]:
     if not isinstance(lists, dict) or not lists:
         raise BundleError(f"{what} has no seeds")
     seeds: dict[tuple[str, int], tuple[int, ...]] = {}

@@ -2,7 +2,7 @@
 
 Refused: privileged policies, trials missing or lost, runs made with different versions, code or
 settings, a world or step limits that are not the benchmark's, and whatever our lint calls an error.
-What is packed is then verified like a stranger's bundle, so nothing leaves that would not pass.
+What is packed is then verified like anybody's bundle, so nothing leaves that would not pass.
 
 The announced trials are filmed by playing their recorded actions again; a film that the run has
 already is taken as it is. Addresses and command lines stay at home.
@@ -19,21 +19,24 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
+from msgspec import structs, to_builtins
+
 from robospa.harness.factory import load_function
 from robospa.harness.quantize import STEPS_PER_UNIT, is_quantized
 from robospa.harness.running.action_files import action_path, read_actions
 from robospa.harness.running.manifest import changed_settings, group_keys, seed_hash
+from robospa.harness.world import World
 from robospa.leaderboard import bundle as layout
 from robospa.leaderboard.action_traces import Trace, encode
-from robospa.leaderboard.bundle import BundleError
+from robospa.leaderboard.bundle import BundleError, Chain, FileEntry, Manifest
 from robospa.leaderboard.bundle_rules import (
+    Settings,
     check_card_fits,
     check_record,
     check_seeds,
     check_settings,
-    spec_of,
 )
-from robospa.leaderboard.card import check_card
+from robospa.leaderboard.card import Card, check_checkpoints
 from robospa.leaderboard.record_rows import Row, trace_hash, write_rows
 from robospa.leaderboard.reference import Reference
 from robospa.leaderboard.sampling import announced
@@ -64,7 +67,7 @@ class Packed:
 
 def pack(
     folders: Sequence[Path],
-    card: Mapping[str, Any],
+    card: Card,
     out: Path,
     reference: Reference,
     *,
@@ -83,12 +86,12 @@ def pack(
         raise BundleError("videos can be left out of a bundle for practice only")
     runs = [read_run(folder) for folder in folders]
     run = merged(runs)
-    check(run, card, reference, practice)
+    settings = check(run, card, reference, practice)
     homes = {key: one.folder for one in runs for key in one.keys}
     part = out.with_name(f".{out.name}.{os.getpid()}.part")
     try:
         chosen = announced(inputs_of(run), run.keys) if videos else []
-        films = _films(run, chosen, reference, homes, note)
+        films = _films(run, settings, chosen, reference, homes, note)
         note("writing the bundle")
 
         def trace(key: TrialKey) -> Trace:
@@ -164,9 +167,9 @@ def _check_alike(first: Run, run: Run) -> None:
         )
 
 
-def check(run: Run, card: Mapping[str, Any], reference: Reference, practice: bool) -> None:
-    """BundleError if `run` cannot enter a leaderboard under `card`."""
-    check_settings(run.manifest, reference)
+def check(run: Run, card: Card, reference: Reference, practice: bool) -> Settings:
+    """The settings of `run`; BundleError if `run` cannot enter a leaderboard under `card`."""
+    settings = check_settings(run.manifest, reference)
     if run.missing:
         raise BundleError(
             f"the run is incomplete: {len(run.missing)} of {len(run.keys)} trials have no result, "
@@ -177,11 +180,12 @@ def check(run: Run, card: Mapping[str, Any], reference: Reference, practice: boo
             raise BundleError(f"lint: {finding.where}: {finding.text} [{finding.rule}]")
     check_seeds(run.keys, reference, practice)
     tasks = list(dict.fromkeys(key.task for key in run.keys))
-    check_card(card, tasks)
+    check_checkpoints(card, tasks)
     for task in tasks:
-        check_card_fits(card, run.manifest["settings"], task)
+        check_card_fits(card, settings, task)
     for key in run.keys:
-        check_record(run.records[key], reference, run.manifest["settings"]["run_seed"])
+        check_record(run.records[key], reference, settings.run_seed)
+    return settings
 
 
 def inputs_of(run: Run) -> str:
@@ -189,10 +193,30 @@ def inputs_of(run: Run) -> str:
     return layout.inputs_hash(run.manifest, seed_lists(run.keys))
 
 
+class _Writer:
+    """An archive that is being written, and what its manifest lists so far."""
+
+    def __init__(self, archive: zipfile.ZipFile) -> None:
+        self._archive = archive
+        self.files: dict[str, FileEntry] = {}
+
+    def add(self, name: str, data: bytes) -> None:
+        """Write a file and list it."""
+        self.files[name] = FileEntry(len(data), layout.sha256(data))
+        self.put(name, data)
+
+    def put(self, name: str, data: bytes) -> None:
+        """Write a file that the manifest does not list."""
+        entry = zipfile.ZipInfo(name, DATE)
+        entry.compress_type = zipfile.ZIP_STORED if name.endswith(".mp4") else zipfile.ZIP_DEFLATED
+        entry.external_attr = 0o100644 << 16
+        self._archive.writestr(entry, data)
+
+
 def write_bundle(
     path: Path,
     run: Run,
-    card: Mapping[str, Any],
+    card: Card,
     suite: str,
     trace: Callable[[TrialKey], Trace],
     films: Mapping[str, bytes],
@@ -201,56 +225,55 @@ def write_bundle(
     """Write the bundle of `run` to `path` without looking at it; `trace` finds a trial's actions,
     `films` has the videos by name."""
     lists, inputs = seed_lists(run.keys), inputs_of(run)
-    files: dict[str, dict[str, Any]] = {}
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=6) as archive:
-
-        def add(name: str, data: bytes) -> None:
-            files[name] = {"size": len(data), "sha256": layout.sha256(data)}
-            _add(archive, name, data)
-
+        writer = _Writer(archive)
         for name, film in films.items():
-            add(name, film)
-        rows = []
-        for variant, group in groupby(run.keys, key=lambda key: key.variant):
-            own = list(group)
-            traces = [trace(key) for key in own]
-            add(layout.actions_name(*variant), encode(traces))
-            for key, actions in zip(own, traces, strict=True):
-                shown = f"videos/{key.slug}.mp4"
-                record = replace(run.records[key], video=shown if shown in films else "")
-                rows.append(Row(record, trace_hash(actions)))
-        lines = list(write_rows(rows, inputs))
-        add(layout.RECORDS, b"".join(line + b"\n" for line in lines))
-        add(layout.RUN, layout.canonical(run.manifest))
-        add(layout.SEEDS, layout.canonical(lists))
-        add(layout.CARD, layout.canonical(card))
-        add(layout.SCORES, layout.canonical(scores_of(run)))
-        add(layout.OUTCOMES, layout.canonical(outcomes_of(run)))
+            writer.add(name, film)
+        lines = list(write_rows(_add_actions(writer, run, trace, films), inputs))
+        writer.add(layout.RECORDS, b"".join(line + b"\n" for line in lines))
+        for name, content in (
+            (layout.RUN, run.manifest),
+            (layout.SEEDS, lists),
+            (layout.CARD, card),
+            (layout.SCORES, scores_of(run)),
+            (layout.OUTCOMES, outcomes_of(run)),
+        ):
+            writer.add(name, layout.canonical(content))
         for ending, table in tables_of(run).items():
-            add(layout.TABLES[ending], table)
-        manifest: dict[str, Any] = {
-            "format": layout.FORMAT,
-            "suite": suite,
-            "robospa": own_version(),
-            "practice": practice,
-            "inputs": inputs,
-            "seeds": layout.sha256(layout.canonical(lists)),
-            "chain": {"rows": len(lines), "last": layout.sha256(lines[-1])},
-            "files": files,
-        }
-        manifest["bundle"] = layout.bundle_hash(manifest)
-        _add(archive, layout.MANIFEST, layout.canonical(manifest))
+            writer.add(layout.TABLES[ending], table)
+        manifest = Manifest(
+            format=layout.FORMAT,
+            suite=suite,
+            robospa=own_version(),
+            practice=practice,
+            inputs=inputs,
+            seeds=layout.sha256(layout.canonical(lists)),
+            chain=Chain(len(lines), layout.sha256(lines[-1])),
+            files=writer.files,
+        )
+        name = layout.bundle_hash(to_builtins(manifest))
+        writer.put(layout.MANIFEST, layout.canonical(structs.replace(manifest, bundle=name)))
 
 
-def _add(archive: zipfile.ZipFile, name: str, data: bytes) -> None:
-    entry = zipfile.ZipInfo(name, DATE)
-    entry.compress_type = zipfile.ZIP_STORED if name.endswith(".mp4") else zipfile.ZIP_DEFLATED
-    entry.external_attr = 0o100644 << 16
-    archive.writestr(entry, data)
+def _add_actions(
+    writer: _Writer, run: Run, trace: Callable[[TrialKey], Trace], films: Mapping[str, bytes]
+) -> list[Row]:
+    """Write the actions of every variant; the rows of their trials."""
+    rows = []
+    for variant, group in groupby(run.keys, key=lambda key: key.variant):
+        keys = list(group)
+        traces = [trace(key) for key in keys]
+        writer.add(layout.actions_name(*variant), encode(traces))
+        for key, actions in zip(keys, traces, strict=True):
+            film = f"videos/{key.slug}.mp4"
+            record = replace(run.records[key], video=film if film in films else "")
+            rows.append(Row(record, trace_hash(actions)))
+    return rows
 
 
 def _films(
     run: Run,
+    settings: Settings,
     chosen: Sequence[TrialKey],
     reference: Reference,
     homes: Mapping[TrialKey, Path],
@@ -258,7 +281,7 @@ def _films(
 ) -> dict[str, bytes]:
     """The videos of the `chosen` trials by name in the bundle."""
     films: dict[str, bytes] = {}
-    world: Any = None
+    world: World | None = None
     try:
         for number, key in enumerate(chosen, 1):
             name = f"videos/{key.slug}.mp4"
@@ -270,26 +293,29 @@ def _films(
             if world is None:
                 arguments = {"render": True} if reference.world.startswith("robospa.") else {}
                 world = load_function(reference.world)(**arguments)
-            films[name] = _film(world, run, key, reference, homes[key])
+            action = settings.spec(key.task).action
+            films[name] = _film(world, run.records[key], action, reference, homes[key])
     finally:
         if world is not None:
             world.close()
     return films
 
 
-def _film(world: Any, run: Run, key: TrialKey, reference: Reference, home: Path) -> bytes:
-    """A video of `key`, played from its recorded actions; BundleError if it ends differently."""
+def _film(
+    world: World, record: TrialRecord, action: str, reference: Reference, home: Path
+) -> bytes:
+    """A video of a trial, played from its recorded actions; BundleError if it ends differently."""
     from robospa.harness.convention_check.rerun import rerun
     from robospa.harness.pictures.video import TrialRecorder
 
-    record = run.records[key]
+    key = record.key
     actions, _ = read_actions(action_path(home, key))
     recorder = TrialRecorder(video=True)
     again = rerun(
         world,
         key,
         actions,
-        str(spec_of(run.manifest["settings"], key.task)["action"]),
+        action,
         recorder=recorder,
         parts=load_function(reference.parts),
     )

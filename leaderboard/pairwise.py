@@ -69,9 +69,9 @@ def write_pairs(pairs: Sequence[Pair], out: Path, note: Callable[[str], None]) -
 def _results(entry: Entry) -> ModelResults:
     kept = entry.submission
     assert kept is not None
-    return results_of(entry.name, kept.outcomes, manifest_keys(kept.run), kept.run["categories"])
+    return results_of(entry.name, kept.outcomes, manifest_keys(kept.run), kept.categories)
 
 
 def _state(entry: Entry) -> str:
     assert entry.submission is not None
-    return layout.sha256(str(entry.submission.manifest["bundle"]).encode())
+    return layout.sha256(str(entry.submission.bundle).encode())

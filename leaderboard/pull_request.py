@@ -8,7 +8,6 @@ bundle that is not what was announced.
 
 from __future__ import annotations
 
-import json
 import subprocess
 import sys
 import tempfile
@@ -21,7 +20,7 @@ from urllib.parse import urlsplit
 from robospa.leaderboard import bundle as layout
 from robospa.leaderboard.archive import Archive
 from robospa.leaderboard.bundle import BundleError
-from robospa.leaderboard.card import read_card
+from robospa.leaderboard.card import read_card, to_card
 from robospa.leaderboard.strict_json import parse_map
 from robospa.leaderboard.submission import ASKED, BUNDLE, EVIDENCE, SLUG, read_announced
 
@@ -60,7 +59,7 @@ def check(
     challenge: str | None = None,
     words: Sequence[str] = (),
     get: Fetch | None = None,
-) -> dict[str, Any]:
+) -> dict[str, object]:
     """Verify the bundle of the submission in `folder` and return the evidence, also written.
 
     With `challenge` a sample is replayed, too. `words` go to `robospa submit verify`, whose output
@@ -79,9 +78,10 @@ def check(
         if done.returncode:
             raise BundleError(f"{folder.name}: the bundle was not verified, as said above")
         with Archive(path) as archive:
-            packed = parse_map(archive.read(layout.CARD), layout.CARD)
-    found: dict[str, Any] = json.loads(evidence.read_text())
-    if found["valid"]["bundle"] != announced.bundle:
+            packed = to_card(parse_map(archive.read(layout.CARD), layout.CARD))
+    found = parse_map(evidence.read_bytes(), str(evidence))
+    valid = found.get("valid")
+    if not isinstance(valid, dict) or valid.get("bundle") != announced.bundle:
         raise BundleError(f"{folder / BUNDLE} has the hash of another bundle")
     if packed != card:
         raise BundleError(f"{folder / ASKED} is not the bundle's model card")

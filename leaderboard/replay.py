@@ -19,7 +19,6 @@ from robospa.harness.factory import load_function
 from robospa.harness.running.manifest import about_machine, changed_settings
 from robospa.leaderboard.action_traces import Trace
 from robospa.leaderboard.bundle import BundleError
-from robospa.leaderboard.bundle_rules import spec_of
 from robospa.leaderboard.reference import Reference
 from robospa.leaderboard.sampling import catch_probability, drawn
 from robospa.leaderboard.verify import Valid, read_traces
@@ -123,12 +122,10 @@ def replay(
     `on_trial` hears of each as it ends. Raises BundleError if the challenge is too short or the
     simulator does not run here.
     """
-    keys = drawn(challenge, str(valid.manifest["bundle"]), valid.keys, count)
+    keys = drawn(challenge, valid.manifest.bundle, valid.keys, count)
     traces = read_traces(valid, keys)
-    settings = valid.run.manifest["settings"]
     jobs = [
-        (valid.run.records[key], traces[key], str(spec_of(settings, key.task)["action"]))
-        for key in keys
+        (valid.run.records[key], traces[key], valid.settings.spec(key.task).action) for key in keys
     ]
     found: dict[TrialKey, Replayed] = {}
     start = (reference.world, reference.parts)

@@ -16,7 +16,6 @@ from robospa.harness.running.manifest import changed_settings
 from robospa.harness.running.policy_probe import probe_policies
 from robospa.leaderboard.agreement import Agreement, Counts, agreement, holm, power
 from robospa.leaderboard.bundle import BundleError
-from robospa.leaderboard.bundle_rules import spec_of
 from robospa.leaderboard.hidden_seeds import Block
 from robospa.leaderboard.reference import Reference
 from robospa.leaderboard.verify import Valid
@@ -99,7 +98,8 @@ def check_policy(valid: Valid, request: Request) -> None:
     """BundleError unless the server says of itself what it said when the bundle was made."""
     settings = valid.run.manifest["settings"]
     for task, policy in probe_policies(request.config, request.keys, request.wait).items():
-        before, now = dict(spec_of(settings, task)), policy.spec.to_json()
+        recorded = (settings.get("policies") or {}).get(task) or settings["policy"]
+        before, now = dict(recorded["spec"]), policy.spec.to_json()
         if changes := changed_settings(before, now):
             raise BundleError(
                 f"the server for {task} is not the one of the bundle: {'; '.join(changes[:3])}"

@@ -163,7 +163,7 @@ def write_model(entry: Entry, folder: Path) -> None:
         card=card(entry.name, entry.column.scores),
         about=entry.about,
         evidence=entry.evidence,
-        address=entry.submission.evidence.get("address", "") if entry.submission else "",
+        address=entry.submission.evidence.address if entry.submission else "",
         link=entry.link,
         tables=for_page(_tables(entry)),
         scores_shown=1,

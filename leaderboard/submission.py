@@ -17,19 +17,24 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated
+
+from msgspec import Struct, to_builtins
 
 from robospa.harness.running.atomic_file import replace_file
 from robospa.leaderboard import bundle as layout
 from robospa.leaderboard.archive import Archive
-from robospa.leaderboard.bundle import MEGA, BundleError
-from robospa.leaderboard.card import LINK, check_card, read_card
-from robospa.leaderboard.strict_json import is_hash, parse_map
+from robospa.leaderboard.bundle import MEGA, BundleError, Manifest, is_sha256
+from robospa.leaderboard.bundle_rules import RunFile, Settings
+from robospa.leaderboard.card import LINK, Card, check_checkpoints, read_card, to_card
+from robospa.leaderboard.evidence import BADGES, Evidence, read_evidence
+from robospa.leaderboard.strict_json import parse_map
 from robospa.leaderboard.verify import Valid
 from robospa.results.failures.labels import NAMES, distribution, failures_of
 from robospa.results.records.run_io import Run
 from robospa.results.report.run_card import END_NAMES
 from robospa.results.report.trials import trial_rows
+from robospa.schema import Count, one_of, pattern, read
 
 ASKED, BUNDLE = "model.toml", "bundle.txt"
 EVIDENCE = "evidence.json"
@@ -43,24 +48,27 @@ KEPT = {
 }
 """File in the folder -> file in the bundle."""
 COUNT = re.compile(r"[1-9][0-9]{0,11}")
-LEVELS = ("valid", "replayed", "reproduced")
+Number = int | float
 SLUG = re.compile(r"[a-z0-9][a-z0-9-]{0,63}")
-VIDEO = re.compile(r"videos/[A-Za-z0-9_-]{1,200}\.mp4")
 
 
 @dataclass(frozen=True)
 class Submission:
-    """A folder read back. `evidence` has the badges' by name and, maybe, the bundle's `address`."""
+    """A folder read back. `run`, `scores` and `outcomes` are the bundle's files as they are;
+    `settings` and `categories` are those of the run, `bundle` is the bundle's hash."""
 
     folder: Path
-    manifest: Mapping[str, Any]
-    card: Mapping[str, Any]
-    run: Mapping[str, Any]
-    scores: Mapping[str, Any]
-    outcomes: Mapping[str, Any]
-    evidence: Mapping[str, Any]
+    bundle: str
+    card: Card
+    run: Mapping[str, object]
+    suite: str
+    settings: Settings
+    categories: Mapping[str, str]
+    scores: Mapping[str, object]
+    outcomes: Mapping[str, object]
+    evidence: Evidence
     failures: Mapping[str, Mapping[str, int]]
-    films: Sequence[Mapping[str, Any]]
+    films: Sequence[Mapping[str, object]]
 
 
 @dataclass(frozen=True)
@@ -72,6 +80,37 @@ class Announced:
     bundle: str
 
 
+class Film(Struct, frozen=True, forbid_unknown_fields=True):
+    """A filmed trial: what the page's script works with, and nothing else."""
+
+    task: str
+    level: Number | None
+    seed: Number | None
+    end: Annotated[str, one_of(END_NAMES.values())]
+    video: Annotated[str, pattern(r"videos/[A-Za-z0-9_-]{1,200}\.mp4", "the name of a video")]
+    instruction: str = ""
+    message: str = ""
+    digest: str = ""
+    failure: str = ""
+    why: str = ""
+    run: Number | None = None
+    good: Number | None = None
+    done: Number | None = None
+    total: Number | None = None
+    steps: Number | None = None
+    seconds: Number | None = None
+    attempts: Number | None = None
+    at: Number | None = None
+    events: list[tuple[Number, str, str]] = []
+
+
+class TrialsFile(Struct, frozen=True):
+    """`trials.json`: how often each failure type was seen, by task, and the filmed trials."""
+
+    failures: dict[str, dict[Annotated[str, one_of(NAMES)], Count]]
+    films: list[Film]
+
+
 def slug_of(name: str) -> str:
     """A folder's name for a model's name."""
     return re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")[:64].strip("-") or "model"
@@ -79,7 +118,7 @@ def slug_of(name: str) -> str:
 
 def add(
     valid: Valid,
-    found: Sequence[Mapping[str, Any]],
+    found: Sequence[Mapping[str, object]],
     home: Path,
     name: str = "",
     address: str = "",
@@ -90,22 +129,22 @@ def add(
     are the contents of evidence files; BundleError if they are of another bundle, show that
     outcomes did not come again, or if the folder is of a submission already.
     """
-    if valid.manifest["practice"]:
+    if valid.manifest.practice:
         raise BundleError("a bundle for practice enters no leaderboard")
-    evidence: dict[str, Any] = {"valid": dict(valid.evidence)}
+    evidence: dict[str, object] = {"valid": to_builtins(valid.evidence)}
     for part in found:
         own = part.get("valid")
-        if isinstance(own, Mapping) and own.get("bundle") != valid.manifest["bundle"]:
+        if isinstance(own, Mapping) and own.get("bundle") != valid.manifest.bundle:
             raise BundleError("the evidence is of another bundle")
-        evidence.update({name: part[name] for name in LEVELS[1:] if name in part})
-    name = name or slug_of(str(valid.card["name"]))
+        evidence.update({name: part[name] for name in BADGES[1:] if name in part})
+    name = name or slug_of(valid.card.name)
     if not SLUG.fullmatch(name):
         raise BundleError("a submission's name is of small letters, digits and hyphens")
     folder = home / name
     address = _asked(folder, valid) or address
     if address:
         evidence["address"] = address
-    _check_evidence(evidence, valid.manifest, "the evidence")
+    read_evidence(evidence, valid.manifest.bundle, "the submission")
     filmed = {key: r for key, r in valid.run.records.items() if r.video}
     with Archive(valid.path) as archive:
         for name, source in KEPT.items():
@@ -130,7 +169,7 @@ def _asked(folder: Path, valid: Valid) -> str:
     if BUNDLE not in there:
         return ""
     announced = read_announced(folder)
-    if (announced.size, announced.bundle) != (valid.path.stat().st_size, valid.manifest["bundle"]):
+    if (announced.size, announced.bundle) != (valid.path.stat().st_size, valid.manifest.bundle):
         raise BundleError(f"{folder / BUNDLE} has the size or the hash of another bundle")
     return announced.address
 
@@ -141,7 +180,7 @@ def read_announced(folder: Path) -> Announced:
     lines = _bytes(path, str(folder)).decode(errors="replace").split()
     if len(lines) != 3 or not LINK.fullmatch(lines[0]) or not COUNT.fullmatch(lines[1]):
         raise BundleError(f"{path} is not three lines: https address, bytes, hash")
-    if not is_hash(lines[2]):
+    if not is_sha256(lines[2]):
         raise BundleError(f"{path} has no bundle hash of 64 hexadecimal digits")
     if int(lines[1]) > layout.Limits().packed:
         raise BundleError(f"{path} announces more than {layout.Limits().packed} bytes")
@@ -168,31 +207,33 @@ def read_submission(folder: Path) -> Submission:
         raise BundleError(f"{where} has a name of other than small letters, digits and hyphens")
     data = {name: _bytes(folder / name, where) for name in (*KEPT, EVIDENCE, TRIALS)}
     parts = {name: parse_map(raw, f"{where}, {name}") for name, raw in data.items()}
-    manifest = parts[layout.MANIFEST]
-    if manifest.get("bundle") != layout.bundle_hash(manifest):
+    manifest = read(Manifest, parts[layout.MANIFEST], f"{where}: the manifest", BundleError)
+    if manifest.bundle != layout.bundle_hash(parts[layout.MANIFEST]):
         raise BundleError(f"{where}: the manifest was changed, its hash is not the bundle's")
-    if manifest.get("practice") is not False:
+    if manifest.practice:
         raise BundleError(f"{where} was packed for practice and enters no leaderboard")
     for name, source in KEPT.items():
-        listed = manifest.get("files", {}).get(source, {})
-        if name != layout.MANIFEST and layout.sha256(data[name]) != listed.get("sha256"):
+        listed = manifest.files.get(source)
+        if name != layout.MANIFEST and (not listed or layout.sha256(data[name]) != listed.sha256):
             raise BundleError(f"{where}: {name} is not the bundle's")
-    _check_evidence(parts[EVIDENCE], manifest, where)
-    categories = parts[layout.RUN].get("categories")
-    if not isinstance(categories, dict):
-        raise BundleError(f"{where}: run.json does not say the tasks' categories")
-    check_card(parts[layout.CARD], list(categories), f"{where}, {layout.CARD}")
-    failures, films = _trials(parts[TRIALS], folder, where)
+    evidence = read_evidence(parts[EVIDENCE], manifest.bundle, where)
+    run = read(RunFile, parts[layout.RUN], f"{where}: the run", BundleError)
+    card = to_card(parts[layout.CARD], f"{where}, {layout.CARD}")
+    check_checkpoints(card, list(run.categories), f"{where}, {layout.CARD}")
+    failures, films = _read_trials(parts[TRIALS], folder, where)
     return Submission(
-        folder,
-        manifest,
-        parts[layout.CARD],
-        parts[layout.RUN],
-        parts["scores.json"],
-        parts["outcomes.json"],
-        parts[EVIDENCE],
-        failures,
-        films,
+        folder=folder,
+        bundle=manifest.bundle,
+        card=card,
+        run=parts[layout.RUN],
+        suite=run.suite,
+        settings=run.settings,
+        categories=run.categories,
+        scores=parts["scores.json"],
+        outcomes=parts["outcomes.json"],
+        evidence=evidence,
+        failures=failures,
+        films=films,
     )
 
 
@@ -205,77 +246,15 @@ def _bytes(path: Path, where: str) -> bytes:
         raise BundleError(f"{where}: {path.name} cannot be read: {error.strerror}") from None
 
 
-def _check_evidence(evidence: Mapping[str, Any], manifest: Mapping[str, Any], where: str) -> None:
-    """BundleError unless the evidence is of this bundle and contradicts nothing in it."""
-    valid, again, fresh = (evidence.get(name) for name in LEVELS)
-    if not isinstance(valid, Mapping) or valid.get("bundle") != manifest["bundle"]:
-        raise BundleError(f"{where} has no evidence that this very bundle is valid")
-    address = evidence.get("address", "")
-    if address and not (isinstance(address, str) and LINK.fullmatch(address)):
-        raise BundleError(f"{where}: the bundle's address is no https address")
-    counts = ("trials", "variants")
-    if again is not None:
-        if not _numbers(again, ("sampled", "identical", "agrees", "different", *counts[:1])):
-            raise BundleError(f"{where}: the evidence of the replay is malformed")
-        if again["different"] or not again["sampled"]:
-            raise BundleError(f"{where}: the replay found other outcomes than the bundle has")
-    if fresh is not None:
-        tests: Any = fresh.get("categories") if isinstance(fresh, Mapping) else None
-        whole: Any = fresh.get("overall") if isinstance(fresh, Mapping) else None
-        named = isinstance(tests, Mapping) and all(_numbers(t, ("p_holm",)) for t in tests.values())
-        if not named or not _numbers(whole, ("p",)) or not _numbers(fresh, ("alpha",)):
-            raise BundleError(f"{where}: the evidence of the reproduction is malformed")
-        least = min([whole["p"], *(t["p_holm"] for t in tests.values())])
-        if least < fresh["alpha"]:
-            raise BundleError(f"{where}: hidden seeds contradict what the bundle claims")
-    if not _numbers(valid, counts):
-        raise BundleError(f"{where}: the evidence of validity is malformed")
-
-
-def _numbers(part: Any, names: Sequence[str]) -> bool:
-    return isinstance(part, Mapping) and all(type(part.get(n)) in (int, float) for n in names)
-
-
-def _trials(
-    data: Mapping[str, Any], folder: Path, where: str
-) -> tuple[dict[str, dict[str, int]], list[dict[str, Any]]]:
-    """Failure counts and filmed trials, of the shapes that the pages rely on."""
-    failures, films = data.get("failures"), data.get("films")
-    if not isinstance(failures, dict) or not isinstance(films, list):
-        raise BundleError(f"{where}: {TRIALS} has no failures and films")
-    for counts in failures.values():
-        kinds = isinstance(counts, dict) and set(counts) <= set(NAMES)
-        if not kinds or not all(type(n) is int and n >= 0 for n in counts.values()):
-            raise BundleError(f"{where}: {TRIALS} has failure types that there are not")
-    for row in films:
-        if not isinstance(row, dict) or not _film_is_right(row):
-            raise BundleError(f"{where}: {TRIALS} has a filmed trial that is none")
-        path = folder / row["video"]
+def _read_trials(
+    data: Mapping[str, object], folder: Path, where: str
+) -> tuple[Mapping[str, Mapping[str, int]], list[dict[str, object]]]:
+    """Failure counts and rows of filmed trials; BundleError unless the videos are there."""
+    trials = read(TrialsFile, data, f"{where}, {TRIALS}", BundleError)
+    for film in trials.films:
+        path = folder / film.video
         if path.is_symlink() or not path.is_file() or path.stat().st_size > 16 * MEGA:
-            raise BundleError(f"{where}: {row['video']} is missing or no plain file")
-    return failures, [{**row, "run": 0} for row in films]
-
-
-TEXTS = ("task", "end", "instruction", "message", "digest", "video", "failure", "why")
-NUMBERS = ("run", "level", "seed", "good", "done", "total", "steps", "seconds", "attempts", "at")
-
-
-def _film_is_right(row: Mapping[str, Any]) -> bool:
-    """Whether a filmed trial's row has what the page's script works with, and nothing else."""
-    if set(row) - {*TEXTS, *NUMBERS, "events"} or not {"task", "level", "seed", "end"} <= set(row):
-        return False
-    if not all(isinstance(row[n], str) for n in TEXTS if n in row):
-        return False
-    if not all(type(row[n]) in (int, float) for n in NUMBERS if row.get(n) is not None):
-        return False
-    if row["end"] not in END_NAMES.values() or not VIDEO.fullmatch(row.get("video", "")):
-        return False
-    events = row.get("events", [])
-    return isinstance(events, list) and all(
-        isinstance(e, list)
-        and len(e) == 3
-        and type(e[0]) in (int, float)
-        and isinstance(e[1], str)
-        and isinstance(e[2], str)
-        for e in events
-    )
+            raise BundleError(f"{where}: {film.video} is missing or no plain file")
+    rows = data["films"]
+    assert isinstance(rows, list)
+    return trials.failures, [{**row, "run": 0} for row in rows]

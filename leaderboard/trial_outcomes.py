@@ -8,9 +8,10 @@ are held against each other scene by scene, by the code of `robospa compare`.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Annotated
+
+from msgspec import Meta, Struct
 
 from robospa.categories import METRICS
 from robospa.leaderboard.bundle import BundleError
@@ -21,30 +22,38 @@ from robospa.results.records.trial_record import TrialRecord
 from robospa.results.scoring.model_results import ModelResults, results_of_records
 from robospa.results.scoring.scores import Variant
 from robospa.results.scoring.setting import IncomparableError
+from robospa.schema import pattern, read
 from robospa.trial import TrialKey
 
 DIGITS = "0123456789abcdefghijklmnopqrstuvwxyz"
-FIELDS = {"candidates", "total", "success", "done"}
-PLACE = re.compile(r"([A-Za-z0-9_]{1,64})/([1-5])")
 Rows = dict[str, dict[str, list[float | None]]]
 
 
-def outcomes_of(run: Run) -> dict[str, dict[str, Any]]:
-    """The outcomes of a complete run."""
-    found: dict[str, dict[str, Any]] = {}
+class Outcomes(Struct, forbid_unknown_fields=True):
+    """The outcomes of a variant."""
+
+    candidates: int
+    total: Annotated[int, Meta(gt=0, lt=len(DIGITS))]
+    success: Annotated[str, pattern("[01]*", "text of 0 and 1")] = ""
+    done: Annotated[str, pattern("[0-9a-z]*", "text of digits and small letters")] = ""
+
+
+def outcomes_of(run: Run) -> dict[str, Outcomes]:
+    """The outcomes of a complete run, by "TASK/LEVEL"."""
+    found: dict[str, Outcomes] = {}
     for key in sorted(run.keys):
         record = run.records[key]
-        own = found.setdefault(
-            f"{key.task}/{key.level}",
-            {"candidates": record.candidates, "total": record.total, "success": "", "done": ""},
-        )
-        own["success"] += "1" if record.success else "0"
-        own["done"] += DIGITS[record.done]
+        own = found.setdefault(f"{key.task}/{key.level}", Outcomes(record.candidates, record.total))
+        own.success += "1" if record.success else "0"
+        own.done += DIGITS[record.done]
     return found
 
 
 def results_of(
-    name: str, outcomes: Mapping[str, Any], keys: Sequence[TrialKey], categories: Mapping[str, str]
+    name: str,
+    outcomes: Mapping[str, object],
+    keys: Sequence[TrialKey],
+    categories: Mapping[str, str],
 ) -> ModelResults:
     """The results of a model, from the `outcomes` of the trials `keys`; BundleError if they do
     not fit each other."""
@@ -60,24 +69,20 @@ def results_of(
     return results_of_records(name, sorted(keys), records, RunInfo(categories=categories))
 
 
-def _checked(part: Any, count: int, where: str) -> Mapping[str, Any]:
+def _checked(data: object, count: int, where: str) -> Outcomes:
     """The outcomes of a variant, if they are of `count` trials."""
-    if not isinstance(part, dict) or set(part) != FIELDS:
-        raise BundleError(f"{where}: the outcomes have other fields than {sorted(FIELDS)}")
-    good, done, total = part["success"], part["done"], part["total"]
-    numbers = type(total) is int and type(part["candidates"]) is int and 0 < total < len(DIGITS)
-    texts = isinstance(good, str) and isinstance(done, str)
-    if not (numbers and texts and len(good) == len(done) == count):
+    part = read(Outcomes, data, f"{where}: the outcomes", BundleError)
+    if not len(part.success) == len(part.done) == count:
         raise BundleError(f"{where}: the outcomes are not of {count} trials")
-    if set(good) - set("01") or set(done) - set(DIGITS[: total + 1]):
-        raise BundleError(f"{where}: the outcomes hold what no trial can have")
+    if set(part.done) - set(DIGITS[: part.total + 1]):
+        raise BundleError(f"{where}: the outcomes say that more is done than a trial can have")
     return part
 
 
-def _record(key: TrialKey, category: str, part: Mapping[str, Any], place: int) -> TrialRecord:
+def _record(key: TrialKey, category: str, part: Outcomes, place: int) -> TrialRecord:
     """As much of a trial's record as a comparison looks at. One suite, one seed: one scene."""
-    done, good = DIGITS.index(part["done"][place]), part["success"][place] == "1"
-    counts = (done, done, part["total"], part["candidates"], 0, 0, 0)
+    done, good = DIGITS.index(part.done[place]), part.success[place] == "1"
+    counts = (done, done, part.total, part.candidates, 0, 0, 0)
     end = "success" if good else "step_limit"
     return TrialRecord(key, category, "", "", end, good, *counts, "", "", 0.0)
 

@@ -14,14 +14,16 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+
+from msgspec import to_builtins
 
 from robospa.harness.running.manifest import seed_hash
 from robospa.leaderboard import bundle as layout
 from robospa.leaderboard.action_traces import Trace, decode
 from robospa.leaderboard.archive import Archive
-from robospa.leaderboard.bundle import BundleError, Limits
+from robospa.leaderboard.bundle import BundleError, Chain, FileEntry, Limits, Manifest
 from robospa.leaderboard.bundle_rules import (
+    Settings,
     check_card_fits,
     check_categories,
     check_record,
@@ -29,7 +31,8 @@ from robospa.leaderboard.bundle_rules import (
     check_settings,
     check_trace,
 )
-from robospa.leaderboard.card import check_card
+from robospa.leaderboard.card import Card, check_checkpoints, to_card
+from robospa.leaderboard.evidence import Validity
 from robospa.leaderboard.record_rows import read_rows, trace_hash
 from robospa.leaderboard.reference import Reference
 from robospa.leaderboard.sampling import announced
@@ -37,12 +40,12 @@ from robospa.leaderboard.scores import compare_scores, scores_of, tables_of
 from robospa.leaderboard.strict_json import parse, parse_map
 from robospa.leaderboard.trial_outcomes import outcomes_of
 from robospa.results.records.lint import lint_run
-from robospa.results.records.manifest import RunError, manifest_keys
+from robospa.results.records.manifest import TrialGroup, trial_keys
 from robospa.results.records.run_io import Run
 from robospa.results.records.trial_record import TrialRecord
+from robospa.schema import read
 from robospa.trial import TrialKey
 
-FIELDS = {"format", "suite", "robospa", "practice", "inputs", "chain", "seeds", "files", "bundle"}
 LISTING = ("unequal-trials", "missing")
 """Lint rules about how many trials there are, which `check_seeds` decides."""
 MOVIE = b"ftyp"
@@ -52,14 +55,16 @@ THREADS = 4
 
 @dataclass(frozen=True)
 class Valid:
-    """A bundle that is valid: its parts, and the `evidence` for the badge as plain JSON values."""
+    """A bundle that is valid: its parts, the hashes of the trials' actions, and the `evidence` for
+    the badge."""
 
     path: Path
-    manifest: Mapping[str, Any]
-    card: Mapping[str, Any]
+    manifest: Manifest
+    card: Card
     run: Run
+    settings: Settings
     traces: Mapping[TrialKey, str]
-    evidence: Mapping[str, Any]
+    evidence: Validity
 
     @property
     def keys(self) -> tuple[TrialKey, ...]:
@@ -76,36 +81,36 @@ def verify(
     """
     with Archive(path, limits) as archive:
         manifest = _manifest(archive, reference, practice)
-        files = _Files(archive, manifest["files"])
+        files = _Files(archive, manifest.files)
         run = files.map(layout.RUN)
-        check_settings(run, reference)
-        keys = _keys(run, archive.limits)
-        check_seeds(keys, reference, manifest["practice"])
+        settings = check_settings(run, reference)
+        keys = _keys(run, settings, archive.limits)
+        check_seeds(keys, reference, manifest.practice)
         _check_lists(files.map(layout.SEEDS), manifest, keys, run)
-        card = files.map(layout.CARD)
+        card = to_card(files.map(layout.CARD))
         tasks = list(dict.fromkeys(key.task for key in keys))
-        check_card(card, tasks)
+        check_checkpoints(card, tasks)
         check_categories(run, tasks, reference)
         for task in tasks:
-            check_card_fits(card, run["settings"], task)
+            check_card_fits(card, settings, task)
         with _no_collection():
-            records, traces = _records(archive, manifest, run, keys, reference)
+            records, traces = _records(archive, manifest, settings.run_seed, keys, reference)
         _check_actions(files, records, traces)
         found = Run(path, run, keys, records)
         warnings = _lints(found)
         compared = _check_scores(files, found, manifest)
         _check_videos(files, manifest, records)
         files.all_used()
-    evidence = {
-        "bundle": manifest["bundle"],
-        "trials": len(keys),
-        "variants": len({key.variant for key in keys}),
-        "practice": manifest["practice"],
-        "made_with": manifest["robospa"],
-        "tables_compared": compared,
-        "warnings": warnings,
-    }
-    return Valid(path, manifest, card, found, traces, evidence)
+    evidence = Validity(
+        bundle=manifest.bundle,
+        trials=len(keys),
+        variants=len({key.variant for key in keys}),
+        practice=manifest.practice,
+        made_with=manifest.robospa,
+        tables_compared=compared,
+        warnings=tuple(warnings),
+    )
+    return Valid(path, manifest, card, found, settings, traces, evidence)
 
 
 @contextmanager
@@ -123,19 +128,19 @@ def _no_collection() -> Iterator[None]:
 class _Files:
     """The files of a bundle, each read once and held against the manifest's hash."""
 
-    def __init__(self, archive: Archive, listed: Mapping[str, Any]) -> None:
+    def __init__(self, archive: Archive, listed: Mapping[str, FileEntry]) -> None:
         self._archive = archive
         self._listed = listed
         self._unused = set(listed) - {layout.RECORDS}
 
     def read(self, name: str) -> bytes:
         data = self._archive.read(name)
-        if layout.sha256(data) != self._listed[name]["sha256"]:
+        if layout.sha256(data) != self._listed[name].sha256:
             raise BundleError(f"{name} was changed: its hash is not the manifest's")
         self._unused.discard(name)
         return data
 
-    def map(self, name: str) -> dict[str, Any]:
+    def map(self, name: str) -> dict[str, object]:
         return parse_map(self.read(name), name)
 
     def all_used(self) -> None:
@@ -144,52 +149,41 @@ class _Files:
             raise BundleError(f"{min(self._unused)} belongs to none of the bundle's trials")
 
 
-def _manifest(archive: Archive, reference: Reference, practice: bool) -> dict[str, Any]:
+def _manifest(archive: Archive, reference: Reference, practice: bool) -> Manifest:
     """The manifest, held against the archive."""
-    manifest = parse_map(archive.read(layout.MANIFEST), layout.MANIFEST)
-    version = manifest.get("format")
+    data = parse_map(archive.read(layout.MANIFEST), layout.MANIFEST)
+    version = data.get("format")
     if type(version) is not int or version < 1:
         raise BundleError("the manifest does not say which format the bundle has")
     if version > layout.FORMAT:
         raise BundleError(
             f"the bundle has format {version}, this robospa reads up to {layout.FORMAT}: update it"
         )
-    if set(manifest) != FIELDS:
-        odd = sorted(set(manifest) ^ FIELDS)[0]
-        raise BundleError(f"the manifest lacks the field {odd[:40]!a} or has it in addition")
-    if manifest["suite"] != reference.suite:
+    manifest = read(Manifest, data, "the manifest", BundleError)
+    if manifest.suite != reference.suite:
         raise BundleError(
-            f"the bundle is of the suite {str(manifest['suite'])[:40]!a}; this robospa has "
+            f"the bundle is of the suite {manifest.suite[:40]!a}; this robospa has "
             f"{reference.suite!r}: use the version that it was made with"
         )
-    if manifest["bundle"] != layout.bundle_hash(manifest):
+    if manifest.bundle != layout.bundle_hash(data):
         raise BundleError("the manifest was changed: its hash is not the bundle's")
-    if type(manifest["practice"]) is not bool or not isinstance(manifest["robospa"], str):
-        raise BundleError("the manifest's fields practice and robospa are not what they have to be")
-    if manifest["practice"] and not practice:
+    if manifest.practice and not practice:
         raise BundleError(
             "the bundle was packed for practice: pack the whole run, or verify with --practice"
         )
-    _check_files(archive, manifest["files"])
-    chain = manifest["chain"]
-    if not isinstance(chain, dict) or set(chain) != {"rows", "last"}:
-        raise BundleError("the manifest does not say how the chain of rows ends")
+    _check_files(archive, manifest.files)
     return manifest
 
 
-def _check_files(archive: Archive, listed: Any) -> None:
+def _check_files(archive: Archive, listed: Mapping[str, FileEntry]) -> None:
     """BundleError unless `listed` are exactly the archive's files with their sizes."""
-    if not isinstance(listed, dict) or not all(
-        isinstance(f, dict) and set(f) == {"size", "sha256"} for f in listed.values()
-    ):
-        raise BundleError("the manifest has no list of files with size and sha256")
     there = set(archive.sizes) - {layout.MANIFEST}
     if lost := sorted(set(listed) - there):
         raise BundleError(f"the bundle lacks {lost[0][:80]!a}, which its manifest lists")
     if strange := sorted(there - set(listed)):
         raise BundleError(f"{strange[0]} is in the bundle but not in its manifest")
-    for name, about in listed.items():
-        if about["size"] != archive.sizes[name]:
+    for name, entry in listed.items():
+        if entry.size != archive.sizes[name]:
             raise BundleError(f"{name} was changed: its size is not the manifest's")
     needed = (layout.CARD, layout.RUN, layout.SEEDS, layout.RECORDS, layout.SCORES, layout.OUTCOMES)
     for name in (*needed, *layout.TABLES.values()):
@@ -197,43 +191,32 @@ def _check_files(archive: Archive, listed: Any) -> None:
             raise BundleError(f"the bundle has no {name}")
 
 
-def _keys(run: Mapping[str, Any], limits: Limits) -> tuple[TrialKey, ...]:
+def _keys(run: Mapping[str, object], settings: Settings, limits: Limits) -> tuple[TrialKey, ...]:
     """The listed trials, by task, level and seed."""
-    rows = run.get("trials")
-    if not isinstance(rows, list):
-        raise BundleError("the run has no list of trials")
-    for row in rows:
-        if not isinstance(row, dict) or not isinstance(row.get("seeds"), list):
-            raise BundleError("the run's list of trials is malformed")
-        if type(row.get("level")) is not int or not all(type(s) is int for s in row["seeds"]):
-            raise BundleError("the run's list of trials holds levels or seeds that are no numbers")
-    if sum(len(row["seeds"]) for row in rows) > limits.rows:
+    groups = read(list[TrialGroup], run.get("trials"), "the run's list of trials", BundleError)
+    if sum(len(group.seeds) for group in groups) > limits.rows:
         raise BundleError(f"the run lists more than {limits.rows} trials")
-    try:
-        keys = manifest_keys(run)
-    except RunError as error:
-        raise BundleError(str(error)) from None
-    settings = run["settings"]
+    keys = trial_keys(groups)
     for name in ("embodiment", "mode", "split"):
-        if strange := [k for k in keys if getattr(k, name) != settings[name][0]]:
+        if strange := [k for k in keys if getattr(k, name) != getattr(settings, name)[0]]:
             raise BundleError(f"{strange[0].slug[:120]!a} is not of the run's {name}")
     return tuple(sorted(keys))
 
 
 def _check_lists(
-    lists: Mapping[str, Any],
-    manifest: Mapping[str, Any],
+    lists: Mapping[str, object],
+    manifest: Manifest,
     keys: Sequence[TrialKey],
-    run: Mapping[str, Any],
+    run: Mapping[str, object],
 ) -> None:
     """BundleError unless the seed lists are those of the trials and hash to what is claimed."""
     if run.get("seed_hash") != seed_hash(keys):
         raise BundleError("the run's hash of its list of trials is another")
     if lists != seed_lists(keys):
         raise BundleError("seeds.json does not hold the seeds of the run's trials")
-    if manifest["seeds"] != layout.sha256(layout.canonical(lists)):
+    if manifest.seeds != layout.sha256(layout.canonical(lists)):
         raise BundleError("the hash of the seed lists is not the manifest's")
-    if manifest["inputs"] != layout.inputs_hash(run, lists):
+    if manifest.inputs != layout.inputs_hash(run, lists):
         raise BundleError("the hash of the run's inputs is not the manifest's")
 
 
@@ -247,17 +230,17 @@ def seed_lists(keys: Sequence[TrialKey]) -> dict[str, list[int]]:
 
 def _records(
     archive: Archive,
-    manifest: Mapping[str, Any],
-    run: Mapping[str, Any],
+    manifest: Manifest,
+    run_seed: int,
     keys: Sequence[TrialKey],
     reference: Reference,
 ) -> tuple[dict[TrialKey, TrialRecord], dict[TrialKey, str]]:
     """Every record and the hash of its actions, from the chain of rows."""
     records: dict[TrialKey, TrialRecord] = {}
     traces: dict[TrialKey, str] = {}
-    digest, last, seed = hashlib.sha256(), manifest["inputs"], run["settings"]["run_seed"]
+    digest, last = hashlib.sha256(), manifest.inputs
     lines = archive.rows(layout.RECORDS, digest)
-    for row, so_far in read_rows(lines, manifest["inputs"], layout.RECORDS):
+    for row, so_far in read_rows(lines, manifest.inputs, layout.RECORDS):
         key, last = row.record.key, so_far
         place = len(records)
         if key in records:
@@ -268,13 +251,13 @@ def _records(
                 f"{keys[place].slug if place < len(keys) else 'the end'}: rows are the listed "
                 "trials by task, level and seed"
             )
-        check_record(row.record, reference, seed)
+        check_record(row.record, reference, run_seed)
         records[key], traces[key] = row.record, row.trace
     if len(records) < len(keys):
         raise BundleError(f"the rows end before {keys[len(records)].slug}: trials are missing")
-    if manifest["chain"] != {"rows": len(records), "last": last}:
+    if manifest.chain != Chain(len(records), last):
         raise BundleError("the chain of rows does not end as the manifest says")
-    if digest.hexdigest() != manifest["files"][layout.RECORDS]["sha256"]:
+    if digest.hexdigest() != manifest.files[layout.RECORDS].sha256:
         raise BundleError(f"{layout.RECORDS} was changed: its hash is not the manifest's")
     return records, traces
 
@@ -334,18 +317,18 @@ def read_traces(valid: Valid, wanted: Sequence[TrialKey]) -> dict[TrialKey, Trac
 
 def _lints(run: Run) -> list[str]:
     """Warnings of our lint; BundleError for its first error."""
-    said = []
+    warnings = []
     for finding in lint_run(run):
         where = finding.where.removeprefix(run.folder.name).lstrip(", ")
         text = f"{where}: {finding.text} [{finding.rule}]".removeprefix(": ")
         if finding.severity == "error":
             raise BundleError(f"lint: {text}")
         if finding.rule not in LISTING:
-            said.append(f"warning: {text}")
-    return said
+            warnings.append(f"warning: {text}")
+    return warnings
 
 
-def _check_scores(files: _Files, run: Run, manifest: Mapping[str, Any]) -> bool:
+def _check_scores(files: _Files, run: Run, manifest: Manifest) -> bool:
     """Whether the tables' text was compared too; BundleError if a number is not what follows.
 
     Another version may write its tables otherwise, but not have other numbers in them.
@@ -354,10 +337,10 @@ def _check_scores(files: _Files, run: Run, manifest: Mapping[str, Any]) -> bool:
     where = compare_scores(scores_of(run), given)
     if where:
         raise BundleError(f"{layout.SCORES} is not what the records give: {where}")
-    if parse(files.read(layout.OUTCOMES), layout.OUTCOMES) != outcomes_of(run):
+    if files.map(layout.OUTCOMES) != to_builtins(outcomes_of(run)):
         raise BundleError(f"{layout.OUTCOMES} is not what the records give")
     texts = {ending: files.read(name) for ending, name in layout.TABLES.items()}
-    if manifest["robospa"] != own_version():
+    if manifest.robospa != own_version():
         return False
     for ending, text in tables_of(run).items():
         if text != texts[ending]:
@@ -373,14 +356,13 @@ def own_version() -> str:
 
 
 def _check_videos(
-    files: _Files, manifest: Mapping[str, Any], records: Mapping[TrialKey, TrialRecord]
+    files: _Files, manifest: Manifest, records: Mapping[TrialKey, TrialRecord]
 ) -> None:
     """BundleError unless the announced trials, and only they, have a video."""
-    listed = manifest["files"]
-    chosen = {f"videos/{key.slug}.mp4": key for key in announced(manifest["inputs"], records)}
+    chosen = {f"videos/{key.slug}.mp4": key for key in announced(manifest.inputs, records)}
     for name, key in chosen.items():
-        if name not in listed:
-            if manifest["practice"]:
+        if name not in manifest.files:
+            if manifest.practice:
                 continue
             raise BundleError(f"the announced video {name} is missing")
         if files.read(name)[4:8] != MOVIE:

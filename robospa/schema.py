@@ -12,6 +12,9 @@ A schema is a dataclass or a `msgspec.Struct` whose annotations say what is allo
 
 `msgspec.convert` does the work. Types are strict (true is no number, and neither is "3"), fields
 without a default are required, unknown fields are ignored; `Any` and numpy arrays pass as they are.
+`parse_json` makes such values of JSON with Python's own decoder, which alone can be made to see
+that a field is there twice.
+
 A refusal is raised as the caller's own error, whose one sentence names the field, what was expected
 and what came:
 
@@ -26,6 +29,7 @@ check them after `read`, or in `__post_init__`, whose ValueError comes out in th
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Callable, Iterable
 from typing import Annotated, Any, TypeVar
@@ -61,10 +65,25 @@ Identifier = Annotated[
 ]
 """Text that is safe as part of a file's name; may be empty."""
 
+Name = Annotated[
+    str,
+    pattern(
+        r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,99}",
+        "a plain name of at most 100 letters, digits and _ - ., which begins with none of - .",
+    ),
+]
+"""Text that becomes part of a path: a task, robot, mode or split."""
+MAX_INTEGER = 2**53
+"""Largest integer of a field: larger ones are not exact as a double."""
+Integer = Annotated[int, Meta(ge=-MAX_INTEGER, le=MAX_INTEGER)]
+Count = Annotated[int, Meta(ge=0, le=MAX_INTEGER)]
+Number = Integer | Annotated[float, Meta(ge=-MAX_INTEGER, le=MAX_INTEGER)]
+"""A finite number; a whole one stays an int."""
+Sha256 = Annotated[str, pattern(r"[0-9a-f]{64}", "64 hexadecimal digits in lower case")]
+
 _TYPES = {
     "int": "a whole number",
     "float": "a number",
-    "int | float": "a number",
     "str": "text",
     "bool": "true or false",
     "object": "a map",
@@ -88,6 +107,39 @@ def read(
         raise error(_sentence(value, what, str(failure))) from None
 
 
+def parse_json(text: str) -> Any:
+    """The JSON value in `text`; NaN and infinities are numbers, as `json.loads` reads them.
+
+    Raises ValueError if there is none, a field is there twice, it is nested without end, or holds
+    text that cannot be written down.
+    """
+    try:
+        value = _DECODER.decode(text)
+    except RecursionError:
+        raise ValueError("it is nested without end") from None
+    except ValueError as error:
+        raise ValueError(" ".join(str(error).split())[:200]) from None
+    if "\\u" in text:
+        try:
+            json.dumps(value, ensure_ascii=False).encode()
+        except UnicodeEncodeError:
+            raise ValueError("it holds half of a character (a lone surrogate)") from None
+    return value
+
+
+def _without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """A JSON object; one that gives a field twice is refused: which value would be true?"""
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        names = [name for name, _ in pairs]
+        twice = next(name for place, name in enumerate(names) if name in names[:place])
+        raise ValueError(f"the field {twice[:80]!r} is there twice")
+    return found
+
+
+_DECODER = json.JSONDecoder(object_pairs_hook=_without_repeats)
+
+
 def describe(value: object) -> str:
     """A short name for a value that came in place of another."""
     if value is None or isinstance(value, (bool, int, float, str)):
@@ -99,11 +151,15 @@ def _sentence(value: object, what: str, failure: str) -> str:
     """What msgspec refused, such as "Expected `int` >= 1 - at `$.cameras[0].width`", in words."""
     text, _, path = failure.partition(" - at `")
     if path.startswith("key`"):
-        text, path = "Expected `a map with text keys`", path.partition("`$")[2]
+        rule = _WORDS.get(text.partition(" matching regex ")[2])
+        keys = f"a map whose keys are each {rule}" if rule else "a map with text keys"
+        text, path = f"Expected `{keys}`", path.partition("`$")[2]
     path = path.removeprefix("$").rstrip("`")
     name = path.removeprefix(".").replace("[...]", "")
     if missing := re.fullmatch(r"Object missing required field `(.+)`", text):
         return f"{what}{name and f': {name!r}'} lacks the field {missing[1]!r}"
+    if unknown := re.fullmatch(r"Object contains unknown field `(.+)`", text, re.DOTALL):
+        return f"{what}{name and f': {name!r}'} has the unknown field {unknown[1][:80]!r}"
     refused = re.fullmatch(r"Expected `([^`]+)`(?:, got `[^`]+`)?(.*)", text)
     if not refused:  # the words of a `__post_init__`
         return f"{what}: {text}"
@@ -116,6 +172,7 @@ def _expected(kinds: str, bound: str) -> str:
     """The types and the bound that msgspec names, in words."""
     if bound.startswith(" matching regex "):
         return _WORDS.get(bound.removeprefix(" matching regex "), f"text{bound}")
+    kinds = kinds.replace("int | float", "float")
     words = [_TYPES.get(kind, kind) for kind in kinds.split(" | ")]
     return (_TYPES.get(kinds) or " or ".join(words)) + bound
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from robospa.schema import Count, Name
+
 REFERENCE = "aloha-agilex"
 """The suite's own robot: scenes are drawn for its workcell, and a trial has it by default."""
 
@@ -12,17 +14,17 @@ REFERENCE = "aloha-agilex"
 class TrialKey:
     """Identifies a trial: the same key and the same actions give the same record, to the bit."""
 
-    task: str
+    task: Name
     """Name of the task, such as `Pick_Blocks_Size`."""
-    level: int
+    level: Count
     """1 to 5."""
-    seed: int
+    seed: Count
     """Decides the scene and the instruction."""
-    embodiment: str = REFERENCE
+    embodiment: Name = REFERENCE
     """Name of the robot."""
-    mode: str = "clean"
+    mode: Name = "clean"
     """Name of the scene mode."""
-    split: str = "heldout"
+    split: Name = "heldout"
     """Instruction split, `train` or `heldout`."""
 
     @property

@@ -6,7 +6,7 @@ below it and imports nothing of it.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -57,13 +57,13 @@ def pack(
         run, card, out, reference, practice=practice, videos=videos, note=print
     )
     evidence = packed.valid.evidence
-    print(f"{out}: {packed.size / 1e6:.1f} MB, {evidence['trials']} trials")
+    print(f"{out}: {packed.size / 1e6:.1f} MB, {evidence.trials} trials")
     total = sum(packed.parts.values())
     shares = [f"{n} {100 * s / total:.0f} %" for n, s in packed.parts.items() if s > total / 100]
     print("of which " + ", ".join(shares))
-    for warning in evidence["warnings"]:
+    for warning in evidence.warnings:
         print(warning)
-    print(f"bundle {evidence['bundle']}")
+    print(f"bundle {evidence.bundle}")
 
 
 @submit.command()
@@ -90,17 +90,19 @@ def verify(
     """Check a bundle; with --challenge also replay a sample. Offline; nothing is unpacked."""
     import time
 
+    from msgspec import to_builtins
+
     reference = _load("reference:shipped")(world, parts)
     started = time.perf_counter()
     valid = _load("verify:verify")(bundle, reference, practice)
-    found: dict[str, Any] = {"valid": dict(valid.evidence)}
+    found: dict[str, object] = {"valid": to_builtins(valid.evidence)}
     seconds = time.perf_counter() - started
     print(
-        f"valid: {valid.evidence['trials']} trials of {valid.evidence['variants']} variants; "
+        f"valid: {valid.evidence.trials} trials of {valid.evidence.variants} variants; "
         "structure, hashes, chain, seeds, records, actions, scores and tables hold "
         f"({seconds:.1f} s)"
     )
-    for warning in valid.evidence["warnings"]:
+    for warning in valid.evidence.warnings:
         print(warning)
     holds = True
     if challenge is not None:
@@ -109,7 +111,7 @@ def verify(
         holds = replayed.holds
         exact = "replayed" if replayed.exact else "replayed, outcomes only"
         print(f"{exact if holds else 'NOT REPLAYED'}: " + " ".join(replayed.sentences()))
-    print(f"bundle {valid.manifest['bundle']}")
+    print(f"bundle {valid.manifest.bundle}")
     if evidence is not None:
         _write(evidence, found)
     if not holds:
@@ -205,7 +207,7 @@ def _replay(valid: Any, challenge: str, fraction: float, workers: int, reference
         return _load("replay:replay")(valid, challenge, count, reference, workers or cores(), show)
 
 
-def _write(path: Path, found: dict[str, Any]) -> None:
+def _write(path: Path, found: Mapping[str, object]) -> None:
     import json
 
     from robospa.harness.running.atomic_file import replace_file

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from robospa.harness.factory import open_policy
 from robospa.protocol.policy import HasHello, PolicySpec, SupportsClose
 from robospa.results.records.manifest import RunError
-from robospa.results.records.schema import parse
+from robospa.schema import parse_json
 from robospa.trial import TrialKey
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ def read_map(file: Path, tasks: Sequence[str], known: Collection[str]) -> dict[s
     Raises RunError if the file is no such map, names a task that does not exist, or lacks one.
     """
     try:
-        found = parse(file.read_text())
+        found = parse_json(file.read_text())
     except (OSError, ValueError) as error:
         raise RunError(f"--policy-map {file} cannot be read: {error}") from error
     if not isinstance(found, dict) or not all(map(_is_targets, found.values())):

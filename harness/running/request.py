@@ -128,10 +128,10 @@ def connect_arguments(
 def client_options(url: str, file: Path | None) -> dict[str, Any]:
     """The options of the JSON `file`, checked with those of the URL; raises SettingsError."""
     from robospa.clients import check_options
-    from robospa.results.records.schema import parse
+    from robospa.schema import parse_json
 
     try:
-        given = parse(file.read_text()) if file is not None else {}
+        given = parse_json(file.read_text()) if file is not None else {}
         if not isinstance(given, dict):
             raise ValueError("it is no JSON map")
         check_options(url, given)

@@ -2,18 +2,72 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from robospa.results.records.schema import check_key, check_manifest, parse
+from msgspec import Struct
+
+from robospa.schema import Count, Name, Number, parse_json, read
 from robospa.trial import TrialKey
 
 MANIFEST = "run.json"
 FORMAT = 1
 """Version of a run's folder. A newer one is refused."""
 MAX_MANIFEST_BYTES = 2**26
+
+
+Map = dict[str, Any]
+
+
+class TrialGroup(Struct, frozen=True):
+    """The seeds of a variant."""
+
+    task: Name
+    level: Count
+    embodiment: Name
+    mode: Name
+    split: Name
+    seeds: list[Count]
+
+
+class _Spec(Struct, frozen=True):
+    name: str = ""
+
+
+class _Policy(Struct, frozen=True):
+    spec: _Spec = _Spec()
+
+
+class _Settings(Struct, frozen=True):
+    policy: _Policy = _Policy()
+    policies: Map = {}
+    world: Map = {}
+    step_scale: Number = 1.0
+    privileged: bool = False
+
+
+class _About(Struct, frozen=True):
+    policy: Map = {}
+    policies: Map = {}
+    versions: Map = {}
+    machine: Map = {}
+    world: Map = {}
+    git: Map = {}
+    arguments: Map = {}
+    code: str = ""
+    warnings: list[Any] = []
+
+
+class _Manifest(Struct, frozen=True):
+    """What is relied on in a manifest; whatever else it holds, and what it lacks, is free."""
+
+    settings: _Settings = _Settings()
+    about: _About = _About()
+    categories: dict[str, str] = {}
+    suite: str = ""
+    seed_hash: str = ""
 
 
 class RunError(Exception):
@@ -75,7 +129,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     if not path.exists():
         raise RunError(f"{folder} is not a run: it has no {MANIFEST}")
     try:
-        data = parse(read_bytes(path, MAX_MANIFEST_BYTES).decode())
+        data = parse_json(read_bytes(path, MAX_MANIFEST_BYTES).decode())
     except ValueError as error:
         raise RunError(f"cannot read {path}: {error}") from error
     if not isinstance(data, dict) or not isinstance(data.get("trials"), list):
@@ -86,10 +140,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
             f"{path} has format {str(version)[:20]}, and this robospa reads up to {FORMAT}: "
             "use the version that wrote it or a newer one"
         )
-    try:
-        check_manifest(data)
-    except ValueError as error:
-        raise RunError(f"{path} is no run manifest: {error}") from error
+    read(_Manifest, data, f"the run manifest {path}", RunError)
     return data
 
 
@@ -105,18 +156,14 @@ def read_bytes(path: Path, most: int) -> bytes:
 
 def manifest_keys(manifest: Mapping[str, Any]) -> tuple[TrialKey, ...]:
     """The trials that a manifest lists; raises RunError if one of them is malformed."""
-    keys: list[TrialKey] = []
-    try:
-        for row in manifest["trials"]:
-            names = (row["task"], row["level"], row["embodiment"], row["mode"], row["split"])
-            task, level, embodiment, mode, split = names
-            if not isinstance(row["seeds"], list):
-                raise ValueError("its seeds are no list")
-            for seed in row["seeds"]:
-                keys.append(TrialKey(task, level, seed, embodiment, mode, split))
-                check_key(keys[-1])
-    except (KeyError, TypeError, ValueError) as error:
-        raise RunError(
-            f"the manifest's list of trials is malformed: {repr(error)[:200]}"
-        ) from error
-    return tuple(keys)
+    what = "the manifest's list of trials"
+    return trial_keys(read(list[TrialGroup], manifest.get("trials"), what, RunError))
+
+
+def trial_keys(groups: Iterable[TrialGroup]) -> tuple[TrialKey, ...]:
+    """The trials of `groups`, in their order."""
+    return tuple(
+        TrialKey(group.task, group.level, seed, group.embodiment, group.mode, group.split)
+        for group in groups
+        for seed in group.seeds
+    )

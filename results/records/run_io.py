@@ -3,7 +3,7 @@
 A line that was torn off at the end of a file (the writer was killed) is dropped: that trial has
 to be run again. Anything else that is not a record is refused, naming file and line. Two records of
 one trial must agree on everything that a repeatable world decides; if not, that is a
-`RepeatabilityError`. A run may come from anywhere: `records.schema` says what its files may hold.
+`RepeatabilityError`. A run may come from anywhere: `TrialRecord` says what a line may hold.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from robospa.results.records.manifest import (
     read_manifest,
     run_info,
 )
-from robospa.results.records.schema import check_record, parse
 from robospa.results.records.trial_record import TrialRecord
+from robospa.schema import parse_json, read
 from robospa.trial import TrialKey
 
 TRIALS = "trials"
@@ -46,6 +46,7 @@ DECIDED = (
 )
 """Fields that have to be equal in every record of one trial."""
 FIELDS = frozenset(f.name for f in fields(TrialRecord))
+KEY_FIELDS = frozenset(f.name for f in fields(TrialKey))
 MAX_FILE_BYTES = 2**30
 """More than this is read of no file of records."""
 
@@ -94,23 +95,17 @@ def to_line(record: TrialRecord) -> str:
 
 def from_line(line: str) -> TrialRecord:
     """The record that `to_line` wrote; raises ValueError saying what is wrong with it."""
-    return from_data(parse(line))
+    return from_data(parse_json(line))
 
 
-def from_data(data: Any) -> TrialRecord:
-    """The record in a decoded line, which is used up; raises ValueError if there is none."""
+def from_data(data: object) -> TrialRecord:
+    """The record in a decoded line; raises ValueError if there is none."""
     if not isinstance(data, dict) or not isinstance(data.get("key"), dict):
         raise ValueError("not a trial record")
-    unknown = sorted(set(data) - FIELDS)
-    if unknown:
-        raise ValueError(f"unknown fields {', '.join(unknown)[:200]}: written by a newer version?")
-    try:
-        key = TrialKey(**data.pop("key"))
-        record = TrialRecord(key=key, **{**data, "events": tuple(data.get("events", ()))})
-    except TypeError as error:
-        raise ValueError(f"not a trial record: {str(error)[:200]}") from error
-    check_record(record)
-    return record
+    if unknown := [*(data.keys() - FIELDS), *(data["key"].keys() - KEY_FIELDS)]:
+        names = ", ".join(sorted(unknown))[:200]
+        raise ValueError(f"unknown fields {names}: written by a newer version?")
+    return read(TrialRecord, data, "the trial record")
 
 
 def read_file(path: Path) -> list[TrialRecord]:

@@ -1,11 +1,12 @@
-"""The trial record: the unit of everything that is counted. Imports nothing of ours."""
+"""The trial record: the unit of everything that is counted. Its annotations are a line's schema."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Annotated, Any, TypedDict
 
+from robospa.schema import Count, Integer, Number, one_of
 from robospa.trial import TrialKey
 
 PROCESSOR = "processor"
@@ -20,6 +21,21 @@ END_REASONS = (
 )
 
 
+class _EventKind(TypedDict):
+    kind: str
+
+
+class EventRow(_EventKind, total=False):
+    """An event (`robospa.tasks.events`) as plain values: `time` in seconds since the trial's start,
+    `step` the number of actions begun by then."""
+
+    time: Number
+    object: str
+    index: Integer
+    note: str
+    step: Integer
+
+
 @dataclass(frozen=True)
 class TrialRecord:
     """One finished trial."""
@@ -32,42 +48,42 @@ class TrialRecord:
     """The sentence of the trial."""
     scene_digest: str
     """Hash of the scene at the start."""
-    end: str
+    end: Annotated[str, one_of(END_REASONS)]
     """`success`, `step_limit`, `goal_lost`, `policy_error` or `infrastructure`."""
     success: bool
     """Whether the goal was met."""
-    done: int
+    done: Count
     """Subtasks that hold at the end."""
-    best: int
+    best: Count
     """The most subtasks that ever held at once."""
-    total: int
+    total: Count
     """Subtasks of the variant."""
-    candidates: int
+    candidates: Count
     """The n of ONTA: objects that could be meant."""
-    steps: int
+    steps: Count
     """Policy actions executed."""
-    physics_steps: int
+    physics_steps: Count
     """Steps of the simulation, of 1/250 s."""
-    policy_calls: int
+    policy_calls: Count
     """Queries of the policy."""
     digest: str
     """Hash of the world's exact final state."""
     actions_digest: str
     """Hash of all executed actions."""
-    wall_time: float
+    wall_time: Number
     """Duration of the trial [s]."""
-    policy_seed: int = 0
+    policy_seed: Count = 0
     """Seed that the policy got."""
     message: str = ""
     """Why the trial ended, for errors."""
-    attempts: int = 1
+    attempts: Count = 1
     """How often the trial was started."""
-    events: tuple[Mapping[str, Any], ...] = ()
-    """What happened, in order: plain dicts, see `robospa.tasks.events`."""
-    latency: Mapping[str, float] = field(default_factory=dict)
+    events: tuple[EventRow, ...] = ()
+    """What happened, in order."""
+    latency: Mapping[str, Number] = field(default_factory=dict)
     """`p50`, `p95`, `p99` and `max` of the round trip [ms]; where the server reports them also
     the means of `queue` (before its model ran), `infer` (in it) and `batch` (observations)."""
-    timing: Mapping[str, float] = field(default_factory=dict)
+    timing: Mapping[str, Number] = field(default_factory=dict)
     """Seconds by purpose, and `processor`: processor time."""
     diagnostics: Mapping[str, Any] = field(default_factory=dict)
     """What the task measured besides success."""

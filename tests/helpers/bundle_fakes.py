@@ -19,6 +19,7 @@ from robospa.harness.trial import policy_seed, run_trial
 from robospa.harness.world import Poll, StepResult
 from robospa.leaderboard import bundle as layout
 from robospa.leaderboard.bundle import BundleError, Limits
+from robospa.leaderboard.card import to_card
 from robospa.leaderboard.reference import Reference, facts_of
 from robospa.leaderboard.verify import seed_lists, verify
 from robospa.trial import TrialKey
@@ -26,7 +27,7 @@ from robospa.trial import TrialKey
 PICK, PRESS = "Pick_Blocks_Size", "Press_Stapler_Repeat"
 SEEDS = tuple(range(100000, 100004))
 MEMBERS = {"GAC": (PICK,), "RPF": (PRESS,)}
-CARD: dict[str, Any] = {
+CARD_DATA: dict[str, Any] = {
     "name": "Fake 1",
     "team": "Nobody",
     "licence": "MIT",
@@ -36,6 +37,7 @@ CARD: dict[str, Any] = {
     "actions": {"space": "joint", "chunk": 4, "rate": 10.0},
     "checkpoints": {"all": {"reference": "https://example.org/w", "sha256": "0" * 64}},
 }
+CARD = to_card(CARD_DATA)
 FAKES = ["--world", "bundle_fakes:World", "--parts", "run_fakes:parts"]
 """Options of the command line that stand for the fake world."""
 CARD_TEXT = """

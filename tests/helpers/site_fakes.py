@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from bundle_fakes import CARD, REFERENCE, Weak, make_run
+from bundle_fakes import CARD_DATA, REFERENCE, Weak, make_run
 from run_fakes import FakePolicy
 
 from robospa.leaderboard.bundle import canonical
+from robospa.leaderboard.card import to_card
 from robospa.leaderboard.entries import Entry, published_entries
 from robospa.leaderboard.packing import pack
 from robospa.leaderboard.submission import add
@@ -44,7 +45,9 @@ REPRODUCED: dict[str, Any] = {
 def make_valid(folder: Path, policy: FakePolicy | None = None, **card: Any) -> Valid:
     """A valid bundle in `folder` of what `policy` did, its card changed by `card`."""
     run = make_run(folder / "run", policy=policy)
-    return pack([run], {**CARD, **card}, folder / "bundle.zip", REFERENCE, note=str).valid
+    return pack(
+        [run], to_card({**CARD_DATA, **card}), folder / "bundle.zip", REFERENCE, note=str
+    ).valid
 
 
 def make_submission(folder: Path, home: Path, *evidence: dict[str, Any], **card: Any) -> Path:

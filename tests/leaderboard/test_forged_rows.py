@@ -156,8 +156,8 @@ def test_a_success_that_the_scores_do_not_have(files: Files, tmp_path: Path) -> 
         ("steps", 10_000, "the limit is 20"),
         ("policy_seed", 1, "policy_seed is 1"),
         ("end", "infrastructure", "has no result"),
-        ("end", "vanished", "is none of"),
-        ("success", 1, "success is int"),
+        ("end", "vanished", "'end' must be one of success, "),
+        ("success", 1, "'success' must be true or false, not 1"),
         ("wall_time", 0.0, "faster than physics"),
     ],
 )

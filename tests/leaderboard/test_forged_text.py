@@ -58,7 +58,7 @@ def test_a_script_in_the_settings(files: Files, tmp_path: Path) -> None:
 
 def test_an_unknown_field_in_the_card(files: Files, tmp_path: Path) -> None:
     edit(files, "model.json", lambda card: card.update(onload="x"))
-    assert "a field that no card has" in refused(zip_up(tmp_path / "b.zip", seal(files)))
+    assert "has the unknown field 'onload'" in refused(zip_up(tmp_path / "b.zip", seal(files)))
 
 
 def test_a_future_format(files: Files, tmp_path: Path) -> None:

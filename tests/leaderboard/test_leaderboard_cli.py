@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 
 import pytest
+from msgspec import to_builtins
 from site_fakes import REPLAYED, make_valid
 
 from robospa.harness.cli.main import main
@@ -33,7 +34,7 @@ def test_evidence_of_another_bundle_adds_nothing(
     assert call(*words) == 1
     assert "of another bundle" in capsys.readouterr().err
     assert not (tmp_path / "home").exists()
-    path.write_text(json.dumps({"valid": dict(valid.evidence), "replayed": REPLAYED}))
+    path.write_text(json.dumps({"valid": to_builtins(valid.evidence), "replayed": REPLAYED}))
     assert call(*words) == 0
     assert (tmp_path / "home" / "fake-1" / "model.json").is_file()
     assert capsys.readouterr().out.startswith("Submission: ")

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
-from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
 import pytest
 from bundle_fakes import CARD, PICK, PRESS, REFERENCE, SEEDS, Weak, all_keys, make_run, unzip
+from msgspec.structs import replace
 
 from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.packing import pack
@@ -26,8 +26,8 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_a_packed_run_is_valid(whole: Path) -> None:
     valid = verify(whole / "b.zip", REFERENCE)
-    assert valid.evidence["trials"] == 20
-    assert valid.evidence["tables_compared"]
+    assert valid.evidence.trials == 20
+    assert valid.evidence.tables_compared
     assert valid.card == CARD
     assert sum(r.success for r in valid.run.records.values()) == 15
     assert {r.end for r in valid.run.records.values()} == {"success", "step_limit", "policy_error"}
@@ -53,14 +53,14 @@ def test_two_runs_of_one_model_make_one_bundle(tmp_path: Path) -> None:
     one = make_run(tmp_path / "one", all_keys((PICK,)))
     two = make_run(tmp_path / "two", all_keys((PRESS,)))
     packed = pack([two, one], CARD, tmp_path / "b.zip", REFERENCE)
-    assert packed.valid.evidence["variants"] == 10
+    assert packed.valid.evidence.variants == 10
     assert packed.size == (tmp_path / "b.zip").stat().st_size
 
 
 def test_practice_takes_a_few_trials_and_enters_no_leaderboard(tmp_path: Path) -> None:
     run = make_run(tmp_path / "run", [TrialKey(PICK, 1, s) for s in SEEDS[:2]])
     pack([run], CARD, tmp_path / "b.zip", REFERENCE, practice=True, videos=False)
-    assert verify(tmp_path / "b.zip", REFERENCE, practice=True).evidence["trials"] == 2
+    assert verify(tmp_path / "b.zip", REFERENCE, practice=True).evidence.trials == 2
     with pytest.raises(BundleError, match="packed for practice"):
         verify(tmp_path / "b.zip", REFERENCE)
 
@@ -153,8 +153,7 @@ def test_a_bundle_that_is_there_is_not_replaced(whole: Path) -> None:
 
 def test_card_and_policy_must_agree(tmp_path: Path) -> None:
     run = make_run(tmp_path / "run")
-    card = deepcopy(CARD)
-    card["actions"]["chunk"] = 50
+    card = replace(CARD, actions=replace(CARD.actions, chunk=50))
     with pytest.raises(BundleError, match="chunk = 50, but the policy that did Pick_Blocks_Size"):
         pack([run], card, tmp_path / "b.zip", REFERENCE)
 

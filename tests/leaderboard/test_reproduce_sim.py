@@ -9,12 +9,13 @@ from copy import deepcopy
 from pathlib import Path
 
 import pytest
-from bundle_fakes import CARD
+from bundle_fakes import CARD_DATA
 from shadow import HORIZON, Shadow
 
 from robospa.harness.running.evaluate import Request, evaluate
 from robospa.harness.running.request import make_request
 from robospa.harness.settings import EvaluationSettings, updated
+from robospa.leaderboard.card import to_card
 from robospa.leaderboard.hidden_seeds import draw_block, read_block, write_block
 from robospa.leaderboard.packing import pack
 from robospa.leaderboard.reference import shipped
@@ -42,12 +43,17 @@ def run(folder: Path, keys: list[TrialKey], clumsy: bool) -> Run:
 
 
 def test_a_claim_is_reproduced_and_an_inflated_one_is_caught(tmp_path: Path) -> None:
-    reference, card = shipped(), deepcopy(CARD)
+    reference, card = shipped(), deepcopy(CARD_DATA)
     card["actions"]["chunk"] = HORIZON
     claimed = [TrialKey(TASK, LEVEL, seed) for seed in accepted(TASK, LEVEL)[:TRIALS]]
     assert sum(r.success for r in run(tmp_path / "run", claimed, False).records.values()) == TRIALS
     valid = pack(
-        [tmp_path / "run"], card, tmp_path / "b.zip", reference, practice=True, videos=False
+        [tmp_path / "run"],
+        to_card(card),
+        tmp_path / "b.zip",
+        reference,
+        practice=True,
+        videos=False,
     ).valid
 
     drawn = draw_block([(TASK, LEVEL)], TRIALS)

@@ -151,12 +151,24 @@ def test_every_file_of_the_bundle_is_held_against_its_hash(folder: Path) -> None
     [
         ("evidence.json", lambda d: d["valid"].update(bundle="0" * 64), "this very bundle"),
         ("evidence.json", lambda d: d["replayed"].update(different=1), "other outcomes"),
-        ("evidence.json", lambda d: d["replayed"].update(sampled="all"), "malformed"),
+        (
+            "evidence.json",
+            lambda d: d["replayed"].update(sampled="all"),
+            "a whole number, not 'all'",
+        ),
         ("evidence.json", lambda d: d["reproduced"]["overall"].update(p=1e-9), "contradict"),
         ("evidence.json", lambda d: d.update(address="javascript:alert(1)"), "markup|address"),
-        ("trials.json", lambda d: d["films"][0].update(video="../../x.mp4"), "none"),
-        ("trials.json", lambda d: d["films"][0].update(seconds="1"), "none"),
-        ("trials.json", lambda d: d["failures"].update(x={"odd": 1}), "failure types"),
+        ("trials.json", lambda d: d["films"][0].update(video="../../x.mp4"), "the name of a video"),
+        (
+            "trials.json",
+            lambda d: d["films"][0].update(seconds="1"),
+            "a number or null, not '1'",
+        ),
+        (
+            "trials.json",
+            lambda d: d["failures"].update(x={"odd": 1}),
+            "'failures' must be a map",
+        ),
     ],
 )
 def test_folders_that_are_not_what_add_wrote_are_refused(
@@ -201,10 +213,10 @@ def test_what_was_handed_in_has_to_fit_the_bundle(tmp_path: Path) -> None:
         (folder / "bundle.txt").write_text(text.replace(" ", "\n"))
         with pytest.raises(BundleError, match=refusal):
             add(valid, [], home, "mine")
-    (folder / "bundle.txt").write_text(f"https://a.org/b.zip\n{size}\n{valid.manifest['bundle']}\n")
+    (folder / "bundle.txt").write_text(f"https://a.org/b.zip\n{size}\n{valid.manifest.bundle}\n")
     assert waiting(home) == ["mine"] and read_submissions(home) == []
     assert add(valid, [], home, "mine") == folder
-    assert read_submissions(home)[0].evidence["address"] == "https://a.org/b.zip"
+    assert read_submissions(home)[0].evidence.address == "https://a.org/b.zip"
     assert waiting(home) == []
 
 

@@ -56,9 +56,9 @@ def test_a_corrupt_middle_line_is_named(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ('"end":"success"|"end":"bored"', "none of success"),
+        ('"end":"success"|"end":"bored"', "must be one of success, "),
         ('"category":"GAC"|"categories":"GAC"', "unknown fields categories"),
-        ('"seed":100000|"sead":100000', "not a trial record"),
+        ('"seed":100000|"sead":100000', "unknown fields sead"),
     ],
 )
 def test_a_line_of_something_else_says_why(change: str, words: str) -> None:

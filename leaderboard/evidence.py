@@ -1,0 +1,94 @@
+"""What a submission's badges rest on: `evidence.json`, as `robospa submit` writes it."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from msgspec import Struct
+
+from robospa.leaderboard.bundle import BundleError
+from robospa.leaderboard.card import LINK
+from robospa.schema import Count, Number, pattern, read
+
+BADGES = ("valid", "replayed", "reproduced")
+
+
+class Validity(Struct, frozen=True):
+    """Level 1: the bundle's hash, how much it holds, and the warnings of our lint."""
+
+    bundle: str
+    trials: Count
+    variants: Count
+    practice: bool = False
+    made_with: str = ""
+    tables_compared: bool = True
+    warnings: tuple[str, ...] = ()
+
+
+class ReplayEvidence(Struct, frozen=True):
+    """Level 2: how many of the sampled trials came again identically, alike, or differently."""
+
+    sampled: Count
+    trials: Count
+    identical: Count
+    agrees: Count
+    different: Count
+    challenge: str = ""
+    catches_2_percent: Number | None = None
+
+
+class OverallTest(Struct, frozen=True):
+    """The test over all hidden trials."""
+
+    p: Number
+
+
+class CategoryTest(Struct, frozen=True):
+    """The test of a category; its p-value is corrected after Holm."""
+
+    p_holm: Number
+
+
+class Reproduction(Struct, frozen=True):
+    """Level 3: how hidden seeds agree with the claim, tested at the level `alpha`."""
+
+    alpha: Number
+    overall: OverallTest
+    categories: dict[str, CategoryTest]
+    commitment: str = ""
+
+
+class Evidence(Struct, frozen=True):
+    """All of it, and the bundle's address where it is known."""
+
+    valid: Validity
+    replayed: ReplayEvidence | None = None
+    reproduced: Reproduction | None = None
+    address: Annotated[str, pattern(rf"({LINK.pattern})?", "a https address")] = ""
+
+    @property
+    def badges(self) -> tuple[str, ...]:
+        """The badges that the evidence carries, weakest first."""
+        made = ["valid"]
+        if self.replayed:
+            exact = self.replayed.identical == self.replayed.sampled
+            made.append("replayed" if exact else "outcomes")
+        if self.reproduced:
+            made.append("reproduced")
+        return tuple(made)
+
+
+def read_evidence(data: object, bundle: str, where: str) -> Evidence:
+    """`data` as evidence; BundleError unless it is of the bundle with the hash `bundle` and
+    contradicts nothing in it."""
+    evidence = read(Evidence, data, f"{where}: the evidence", BundleError)
+    if evidence.valid.bundle != bundle:
+        raise BundleError(f"{where} has no evidence that this very bundle is valid")
+    again, fresh = evidence.replayed, evidence.reproduced
+    if again and (again.different or not again.sampled):
+        raise BundleError(f"{where}: the replay found other outcomes than the bundle has")
+    if fresh:
+        least = min([fresh.overall.p, *(test.p_holm for test in fresh.categories.values())])
+        if least < fresh.alpha:
+            raise BundleError(f"{where}: hidden seeds contradict what the bundle claims")
+    return evidence
