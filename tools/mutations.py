@@ -22,7 +22,7 @@ from pathlib import Path
 FOLDERS = ("robospa", "protocol", "clients", "tasks", "harness", "baselines", "results")
 FOLDERS += ("leaderboard",)
 
-QUICK = ("test_goal*.py", "test_pick_goal.py", "test_layouts.py", "test_events.py")
+QUICK = ("test_goal*.py", "test_pick_goal.py", "test_workcell.py", "test_events.py")
 """Tests that are run before all others of a folder: they catch most of what they can see."""
 
 
@@ -99,9 +99,23 @@ MUTATIONS = (
         "pass",
     ),
     _one(
-        "camera image is narrower", "tasks", "WIDTH, HEIGHT = 320, 240", "WIDTH, HEIGHT = 420, 240"
+        "camera image is narrower",
+        "tasks shared",
+        "WIDTH, HEIGHT = 320, 240",
+        "WIDTH, HEIGHT = 420, 240",
     ),
-    _one("reach is farther", "tasks", "MAX_REACH = 0.69", "MAX_REACH = 0.99"),
+    Mutation(
+        "reach is farther",
+        (
+            "MAX_REACH = 0.69",
+            "reach=0.69",
+        ),
+        (
+            "MAX_REACH = 0.99",
+            "reach=0.99",
+        ),
+        ("tests/tasks", "tests/shared"),
+    ),
     _one("objects overlap", "tasks", "if math.hypot(x - ox, y - oy) < distance:", "if False:"),
     _one(
         "opposite view is not mirrored",
@@ -109,11 +123,17 @@ MUTATIONS = (
         '"opposite": ("rightmost", "leftmost", "backmost", "frontmost")',
         '"opposite": ("leftmost", "rightmost", "backmost", "frontmost")',
     ),
-    _one(
+    Mutation(
         "far objects turn freely",
-        "tasks",
-        "if any(abs(cos * c[0] - sin * c[1]) >= ACROSS for c in closings):",
-        "if True:",
+        (
+            "if any(abs(cos * c[0] - sin * c[1]) >= ACROSS for c in closings):",
+            "if any(abs(cos * c[0] - sin * c[1]) >= across for c in closings):",
+        ),
+        (
+            "if True:",
+            "if True:",
+        ),
+        ("tests/tasks",),
     ),
     _one(
         "held-out sentences are the train ones",
@@ -153,11 +173,17 @@ MUTATIONS = (
         "return (math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2))",
         "return (math.cos(yaw / 2), 0.0, 0.0, -math.sin(yaw / 2))",
     ),
-    _one(
+    Mutation(
         "gripper is not clipped",
-        "harness",
-        "return Goals(joints, np.clip(table[:, self._width], 0.0, 1.0))",
-        "return Goals(joints, table[:, self._width])",
+        (
+            "return Goals(joints, np.clip(table[:, self._width], 0.0, 1.0))",
+            "gripper = np.clip(values[space.grippers], 0.0, 1.0)",
+        ),
+        (
+            "return Goals(joints, table[:, self._width])",
+            "gripper = values[space.grippers]",
+        ),
+        ("tests/harness",),
     ),
     _one(
         "bad quaternion passes",
@@ -196,17 +222,29 @@ MUTATIONS = (
         "if image.shape != shape or image.dtype != np.uint8:",
         "if image.dtype != np.uint8:",
     ),
-    _one(
+    Mutation(
         "negative histories only in name",
-        "protocol",
-        "-10_000 <= n < 0 for n in history",
-        "-10_000 <= n for n in history",
+        (
+            "-10_000 <= n < 0 for n in history",
+            "Meta(ge=-10_000, lt=0)",
+        ),
+        (
+            "-10_000 <= n for n in history",
+            "Meta(ge=-10_000)",
+        ),
+        ("tests/protocol",),
     ),
-    _one(
+    Mutation(
         "ONTA ignores chance",
-        "results",
-        "return _affine(rate, 1 / (1 - chance), -chance / (1 - chance))",
-        "return _affine(rate, 1.0, -chance)",
+        (
+            "return _affine(rate, 1 / (1 - chance), -chance / (1 - chance))",
+            "return 1 / (1 - chance), -chance / (1 - chance)",
+        ),
+        (
+            "return _affine(rate, 1.0, -chance)",
+            "return 1.0, -chance",
+        ),
+        ("tests/results",),
     ),
     _one(
         "MOVER adds widths",
@@ -220,11 +258,17 @@ MUTATIONS = (
         "down = math.hypot(first.value - first.low, second.high - second.value)",
         "down = math.hypot(first.high - first.value, second.value - second.low)",
     ),
-    _one(
+    Mutation(
         "lost trials count as failures",
-        "results",
-        "sr = wilson(successes, count) if count else None",
-        "sr = wilson(successes, max(listed, 1))",
+        (
+            "sr = wilson(successes, count) if count else None",
+            "= sr = wilson(successes, count)",
+        ),
+        (
+            "sr = wilson(successes, max(listed, 1))",
+            "= sr = wilson(successes, max(listed, 1))",
+        ),
+        ("tests/results",),
     ),
     _one(
         "X-VLA's grippers are not turned",

@@ -47,6 +47,8 @@ PARTLY_SEEN = (
     "Stamp_Seals_Press_Stapler",
 )
 """Tasks whose official regions end at the picture's edge: only middles have to be seen there."""
+TURNED = ("SDE", "CBG", "RRR", "CVR", "EPG", "Move_Playing_Cards_Away")
+"""Categories and tasks that draw how far objects are turned."""
 BEYOND_REACH = ("Remember_Orientation_Restore",)
 """Tasks that show things which no arm is meant to reach."""
 
@@ -261,6 +263,19 @@ def _reached(ws: Workspace, name: str, arms: tuple[int, ...]) -> bool:
     return False
 
 
+def awkward(scene: Scene) -> Iterator[str]:
+    """Objects far from the robot, of tasks that draw turns, which no gripper can close around."""
+    cell = ROBOT.workcell
+    drawn = catalog.task(scene.task).category in TURNED or scene.task in TURNED
+    for item in movable(scene) if drawn else ():
+        if item.pose.position[1] > cell.sideways_from:
+            turn = to_matrix(item.pose.rotation)
+            grasps = object_model(item.asset, item.params).grasps
+            sideways = [abs(float((turn @ np.array(g.closing))[0])) for g in grasps]
+            if max(sideways) < math.cos(cell.sideways_within) - 1e-9:
+                yield f"{item.name} ({item.asset}) is turned so that no grasp closes sideways"
+
+
 def misplaced(scene: Scene) -> Iterator[str]:
     """True if the facts of a single-target scene name another object, or none, or two."""
     if "target" in scene.facts and (found := targets_of(scene)) != [scene.facts["target"]]:
@@ -381,6 +396,7 @@ RULES: Mapping[str, Callable[[Scene], Iterator[str]]] = {
     "table": sunk,
     "names": named,
     "reach": unreachable,
+    "turn": awkward,
     "pick": unpickable,
     "answer": misplaced,
 }

@@ -13,9 +13,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 from drawn_scenes import FIRST_SEED, each_task, scenes
-from scene_checks import RULES, misplaced, overlaps, pixels, sunk, unpickable, unreachable, unseen
+from scene_checks import (
+    RULES,
+    awkward,
+    misplaced,
+    overlaps,
+    pixels,
+    sunk,
+    unpickable,
+    unreachable,
+    unseen,
+)
 
-from robospa.geometry import Pose
+from robospa.geometry import Pose, yaw_rotation
 from robospa.tasks import catalog
 from robospa.tasks.scene import Scene
 
@@ -93,6 +103,16 @@ def test_a_block_above_the_table_or_in_it_is_found(blocks: Scene) -> None:
     x, y, z = item.pose.position
     for dz in (0.001, -0.001):
         assert len(list(sunk(moved(blocks, item.name, (x, y, z + dz))))) == 1
+
+
+def test_a_far_soap_along_the_arm_is_found() -> None:
+    scene = catalog.build_scene("Pick_Soaps_Relational", 1, FIRST_SEED)
+    far = scene.objects[0]
+    x, _, z = far.pose.position
+    turns = (yaw_rotation(0.1 * k) for k in range(63))
+    turned = [replace(far, pose=Pose((x, 0.1, z), turn)) for turn in turns]
+    found = [len(list(awkward(replace(scene, objects=(item,))))) for item in turned]
+    assert set(found) == {0, 1}
 
 
 def test_another_rank_is_another_answer(blocks: Scene) -> None:
