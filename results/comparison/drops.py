@@ -1,4 +1,4 @@
-"""What one model loses from level to level."""
+"""Differences between the levels of one model."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from robospa.results.statistics.significance import p_of_interval
 
 
 def drops(results: ModelResults, metric: str = "sr") -> list[Difference]:
-    """What each category, dimension and the whole lose from level to level and from first to last.
+    """The loss of each category, dimension and the whole between levels, and from first to last.
 
     Only tasks that both levels have count. Scenes of different levels are unrelated.
     """

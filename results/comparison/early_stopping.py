@@ -1,4 +1,4 @@
-"""Which of two unfinished runs is ahead, by a test that may be looked at at any time."""
+"""Early stopping: a test of two unfinished runs that is valid at any time."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from robospa.results.statistics.sequential import Verdict, decide
 
 
 def stop_early(first: ModelResults, second: ModelResults) -> Verdict:
-    """Who wins by the paired e-value over all variants.
+    """The verdict of the paired e-value over all variants.
 
     Pairs are taken in an order fixed by the list of trials: one of each variant, then the next of
     each, so that no category decides alone before the others.

@@ -1,4 +1,4 @@
-"""What differences are averaged over, and how much each variant weighs."""
+"""Groups of variants that differences are averaged over, and the weights of variants."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a reader has to know before using a comparison, in sentences."""
+"""Sentences on the limits of a comparison."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def notes(
     listed: set[Variant],
     paired: bool,
 ) -> list[str]:
-    """What limits the comparison, in sentences."""
+    """The limits of the comparison."""
     found = []
     if paired:
         found.append("Paired: trials on the same seeds are held against each other.")
@@ -49,7 +49,7 @@ def _versions(model: ModelResults) -> dict[str, object]:
 
 
 def worst_and_best(first: ModelResults, second: ModelResults, metric: str) -> list[str]:
-    """What missing trials could make of the mean over all variants that both list."""
+    """Bounds of the mean difference over all variants that both list, if trials are missing."""
     category = {**second.categories, **first.categories}
     both = [
         v

@@ -23,7 +23,7 @@ MEMORY = "MIP"
 
 
 PRESSES = ("subtask_done", "wrong_order", "repeated")
-"""What a press can show as."""
+"""Events that a press can cause."""
 LATE = 1.0
 """A closing is reported up to this long [s] after what it did."""
 
@@ -266,7 +266,7 @@ class _Reader:
 
 
 def root_of(record: TrialRecord) -> Cause | None:
-    """Why a failed trial of a long-horizon task failed; None if nothing was tried."""
+    """The cause of failure of a long-horizon trial; None if nothing was tried."""
     reader = _Reader(
         record.category,
         record.total,

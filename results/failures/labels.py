@@ -1,4 +1,4 @@
-"""What kind of failure a failed trial is: decided from its events, by rules that can be read here.
+"""Failure types of trials, decided from their events by the rules below.
 
 The types are the paper's (its authors labelled videos by hand) and two of ours for trials that none
 of those describes: nothing was tried, and an answer that cannot be executed. The rules look for the
@@ -40,9 +40,9 @@ SIMULATED_PER_FILM = 2.0
 
 @dataclass(frozen=True)
 class Failure:
-    """Why a trial failed. `evidence` says what was seen, in one sentence.
+    """The type of a trial's failure. `evidence` describes in one sentence what was seen.
 
-    `time` [s, simulated] and `step` (actions begun by then, the failing one included) say when;
+    `time` [s, simulated] and `step` (actions started by then, the failing one included) say when;
     `video_seconds` is that moment in the trial's video. Each is None where it is not known.
     """
 
@@ -76,7 +76,7 @@ def distribution(
     by: str = "task",
     failures: Mapping[TrialKey, Failure] | None = None,
 ) -> dict[str, dict[str, int]]:
-    """How often each kind occurs, by "task", "category" or "variant"; kinds in their order.
+    """Occurrences of each kind, by "task", "category" or "variant"; kinds in their order.
 
     Groups without a failure are left out. `failures` are those of the records, where they are known
     already. ValueError for another grouping.

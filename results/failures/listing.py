@@ -14,7 +14,7 @@ FORMATS = ("markdown", "csv", "json")
 
 
 def counts_table(records: Iterable[TrialRecord], by: str, layout: str) -> str:
-    """How often each type occurs, as "markdown", "csv" or "json"; ValueError for another layout."""
+    """Occurrences of each type, as "markdown", "csv" or "json"; ValueError for another layout."""
     rows = distribution(records, by)
     if layout == "json":
         return json.dumps(rows, indent=1)

@@ -31,29 +31,33 @@ CAPTIONS = {
 }
 
 
-def draw(shown: Sequence[Series], folder: Path, formats: Sequence[str] = FORMATS) -> list[Drawing]:
-    """Write the figures of `shown` into `folder`; a figure without data is left out.
+def draw(
+    all_series: Sequence[Series], folder: Path, formats: Sequence[str] = FORMATS
+) -> list[Drawing]:
+    """Write the figures of `all_series` into `folder`; a figure without data is left out.
 
-    Published models get heat maps only where no run is shown.
+    Published models get heat maps only where no run is all_series.
     """
     made: list[Drawing] = []
-    runs = [s for s in shown if has_latency(s)]
-    mapped = [s for s in shown if not s.published] or shown
+    runs = [s for s in all_series if has_latency(s)]
+    mapped = [s for s in all_series if not s.published] or all_series
     with styled():
-        if any(s.scores.categories for s in shown):
-            save(draw_levels(shown), folder, "success", formats)
+        if any(s.scores.categories for s in all_series):
+            save(draw_levels(all_series), folder, "success", formats)
             made.append(Drawing("success", "Success against level", CAPTIONS["success"]))
-            save(draw_radar(shown), folder, "radar", formats)
+            save(draw_radar(all_series), folder, "radar", formats)
             made.append(Drawing("radar", "Categories", CAPTIONS["radar"]))
-        if any(percent_of(c, "ps") is not None for s in shown for c in s.scores.cells.values()):
-            save(draw_progress(shown), folder, "progress", formats)
+        if any(
+            percent_of(c, "ps") is not None for s in all_series for c in s.scores.cells.values()
+        ):
+            save(draw_progress(all_series), folder, "progress", formats)
             made.append(Drawing("progress", "Progress against success", CAPTIONS["progress"]))
         if runs:
             save(draw_latency(runs), folder, "latency", formats)
             made.append(Drawing("latency", "Latency", CAPTIONS["latency"]))
-        for number, series in enumerate(shown, 1):
+        for number, series in enumerate(all_series, 1):
             made += _own_figures(
-                series, number if len(shown) > 1 else 0, series in mapped, folder, formats
+                series, number if len(all_series) > 1 else 0, series in mapped, folder, formats
             )
     return made
 

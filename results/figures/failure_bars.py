@@ -1,4 +1,4 @@
-"""Why trials failed: for every task the share of each failure type among its failed trials."""
+"""Bars of failure types: for every task the share of each type among its failed trials."""
 
 from __future__ import annotations
 

@@ -26,14 +26,14 @@ def has_latency(series: Series) -> bool:
     return any(r.latency.get("p50", 0) > 0 for r in series.records)
 
 
-def draw_latency(shown: Sequence[Series]) -> Figure:
+def draw_latency(all_series: Sequence[Series]) -> Figure:
     """The figure: for every run the distribution over trials of their p50, p95 and p99."""
     from matplotlib.lines import Line2D
 
     figure = new_figure(2.1)
     axis = figure.subplots()
     handles = [Line2D([], [], color=INK, ls=dash, label=name) for name, dash in MEASURES]
-    for index, series in enumerate(shown):
+    for index, series in enumerate(all_series):
         colour = COLOURS[index % len(COLOURS)]
         handles.append(Line2D([], [], color=colour, lw=2.4, label=label_of(series.name)))
         for name, dash in MEASURES:

@@ -38,17 +38,17 @@ def chance_levels(scores: Scores) -> dict[tuple[str, int], float]:
     return {place: sum(v) / len(v) for place, v in found.items()}
 
 
-def draw_levels(shown: Sequence[Series]) -> Figure:
+def draw_levels(all_series: Sequence[Series]) -> Figure:
     """The figure; categories that no series has get no panel."""
-    present = {c for s in shown for (c, _) in s.scores.categories}
+    present = {c for s in all_series for (c, _) in s.scores.categories}
     columns = [[c for c in group if c in present] for group in (SPATIAL, PROCEDURAL)]
     columns = [group for group in columns if group] or [[]]
     lines = max(1, *(len(group) for group in columns))
     figure = new_figure(1.06 * lines + 0.45)
     axes = figure.subplots(lines, len(columns), squeeze=False, sharex=True, sharey=True)
-    levels = sorted({n for s in shown for n in s.scores.levels}) or [1]
+    levels = sorted({n for s in all_series for n in s.scores.levels}) or [1]
     guessed: dict[tuple[str, int], float] = {}
-    for series in shown:
+    for series in all_series:
         guessed |= chance_levels(series.scores)
     for column, group in enumerate(columns):
         for line in range(lines):
@@ -56,12 +56,12 @@ def draw_levels(shown: Sequence[Series]) -> Figure:
             if line >= len(group):
                 axis.set_axis_off()
                 continue
-            _panel(axis, shown, group[line], levels, guessed)
+            _panel(axis, all_series, group[line], levels, guessed)
             if line == len(group) - 1:
                 axis.tick_params(labelbottom=True)
             if column == 0:
                 axis.set_ylabel("SR [%]")
-    handles = series_handles(shown)
+    handles = series_handles(all_series)
     if guessed:
         from matplotlib.lines import Line2D
 
@@ -72,7 +72,7 @@ def draw_levels(shown: Sequence[Series]) -> Figure:
 
 def _panel(
     axis: Axes,
-    shown: Sequence[Series],
+    all_series: Sequence[Series],
     category: str,
     levels: Sequence[int],
     guessed: dict[tuple[str, int], float],
@@ -80,7 +80,7 @@ def _panel(
     chance = [(n, guessed[category, n]) for n in levels if (category, n) in guessed]
     if chance:
         axis.plot(*zip(*chance, strict=True), ls=(0, (1, 2)), color=INK, lw=0.8)
-    for index, series in enumerate(shown):
+    for index, series in enumerate(all_series):
         points = [
             (n, e)
             for n in levels
@@ -88,7 +88,7 @@ def _panel(
         ]
         if not points:
             continue
-        aside = (index - (len(shown) - 1) / 2) * min(0.09, 0.4 / len(shown))
+        aside = (index - (len(all_series) - 1) / 2) * min(0.09, 0.4 / len(all_series))
         down = [max(0.0, 100 * (e.value - e.low)) for _, e in points]
         up = [max(0.0, 100 * (e.high - e.value)) for _, e in points]
         axis.errorbar(

@@ -23,12 +23,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def draw_progress(shown: Sequence[Series]) -> Figure:
+def draw_progress(all_series: Sequence[Series]) -> Figure:
     """The figure: a point a variant; of a single series coloured by level."""
     figure = new_figure(2.9)
     axis = figure.subplots()
     axis.plot([0, 100], [0, 100], color=INK, lw=0.7, ls=(0, (1, 2)))
-    groups = _by_level(shown[0]) if len(shown) == 1 else _by_series(shown)
+    groups = _by_level(all_series[0]) if len(all_series) == 1 else _by_series(all_series)
     handles = [_scatter(axis, i, name, points) for i, (name, points) in enumerate(groups) if points]
     axis.set_xlim(-3, 103)
     axis.set_ylim(-3, 103)
@@ -36,7 +36,7 @@ def draw_progress(shown: Sequence[Series]) -> Figure:
     axis.set_ylabel("progress score [%]")
     axis.text(84, 78, "PS = SR", ha="left", va="top", fontsize=6)
     plain(axis, "both")
-    legend_below(figure, handles, 5 if len(shown) == 1 else 3)
+    legend_below(figure, handles, 5 if len(all_series) == 1 else 3)
     return figure
 
 
@@ -53,8 +53,8 @@ def _by_level(series: Series) -> list[tuple[str, list[tuple[float, float]]]]:
     return [(f"L{n}", _points(series, n)) for n in series.scores.levels]
 
 
-def _by_series(shown: Sequence[Series]) -> list[tuple[str, list[tuple[float, float]]]]:
-    return [(label_of(s.name), _points(s)) for s in shown]
+def _by_series(all_series: Sequence[Series]) -> list[tuple[str, list[tuple[float, float]]]]:
+    return [(label_of(s.name), _points(s)) for s in all_series]
 
 
 def _scatter(

@@ -26,29 +26,33 @@ if TYPE_CHECKING:
 LEVELS = (1, 5)
 
 
-def draw_radar(shown: Sequence[Series]) -> Figure:
+def draw_radar(all_series: Sequence[Series]) -> Figure:
     """The figure; a category without a result leaves a gap in its series' outline."""
     figure = new_figure(2.15)
     axes = figure.subplots(1, 2, subplot_kw={"projection": "polar"})
-    top = _top(shown)
+    top = _top(all_series)
     for axis, level in zip(axes, LEVELS, strict=True):
-        _radar(axis, shown, level, top)
-    legend_below(figure, series_handles(shown))
+        _radar(axis, all_series, level, top)
+    legend_below(figure, series_handles(all_series))
     return figure
 
 
-def _top(shown: Sequence[Series]) -> float:
+def _top(all_series: Sequence[Series]) -> float:
     """The outer ring [%]: the next 20 above the largest value, the same for both radars."""
-    values = [percent_of(s.scores.categories.get((c, n)), "sr") for s in shown for c in CATEGORIES
-              for n in LEVELS]  # fmt: skip
+    values = [
+        percent_of(s.scores.categories.get((c, n)), "sr")
+        for s in all_series
+        for c in CATEGORIES
+        for n in LEVELS
+    ]
     largest = max((v for v in values if v is not None), default=100.0)
     return float(min(100, max(20, 20 * math.ceil(largest / 20))))
 
 
-def _radar(axis: PolarAxes, shown: Sequence[Series], level: int, top: float) -> None:
+def _radar(axis: PolarAxes, all_series: Sequence[Series], level: int, top: float) -> None:
     angles = [2 * math.pi * i / len(CATEGORIES) for i in range(len(CATEGORIES))]
     some = False
-    for index, series in enumerate(shown):
+    for index, series in enumerate(all_series):
         values = [percent_of(series.scores.categories.get((c, level)), "sr") for c in CATEGORIES]
         known = [math.nan if v is None else v for v in values]
         some = some or any(v is not None for v in values)

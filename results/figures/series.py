@@ -1,4 +1,4 @@
-"""What figures are drawn from, and what all of them share: size, colours, files.
+"""The data of figures, and their common size, colours and files.
 
 Every figure is as wide as one column of a two-column paper and is read without colour too: series
 differ by marker and dash, stacked parts by hatching.
@@ -145,7 +145,7 @@ def legend_below(figure: Figure, handles: Sequence[Artist], columns: int = 3) ->
         )
 
 
-def series_handles(shown: Sequence[Series]) -> list[Line2D]:
+def series_handles(all_series: Sequence[Series]) -> list[Line2D]:
     """A legend entry for every series."""
     from matplotlib.lines import Line2D
 
@@ -159,5 +159,5 @@ def series_handles(shown: Sequence[Series]) -> list[Line2D]:
             ms=3.2,
             label=label_of(s.name),
         )
-        for i, s in enumerate(shown)
+        for i, s in enumerate(all_series)
     ]

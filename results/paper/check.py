@@ -1,4 +1,4 @@
-"""Every printed value of the paper held against what follows from its per-task tables.
+"""Check of every printed value of the paper against its per-task tables.
 
 `checks` walks all cells of all result tables; `errata` keeps those that do not follow, with the
 recomputed value and, where the numbers themselves give it away, the likely reason. Nothing here is
@@ -21,7 +21,7 @@ from robospa.results.statistics import onta
 from robospa.results.statistics.intervals import interval_of
 
 ENDS = 0.1
-"""How far a printed interval end may be from ours: rounding, and the noise of both bootstraps."""
+"""Allowed distance [percent] of a printed interval end from ours: rounding and bootstrap noise."""
 TITLES = {
     "sr": "per-task SR",
     "onta": "per-task ONTA",
@@ -54,10 +54,12 @@ class Check:
         return abs(self.printed - self.recomputed) <= self.tolerance + 1e-9
 
     def __str__(self) -> str:
-        shown, ours = (rounding.text(x, self.digits) for x in (self.printed, self.recomputed))
+        printed_value, ours = (
+            rounding.text(x, self.digits) for x in (self.printed, self.recomputed)
+        )
         why = f" ({self.reason})" if self.reason else ""
         where = f"{self.table}, {self.row}, {self.model}, {self.column}"
-        return f"{where}: printed {shown}, recomputed {ours}{why}"
+        return f"{where}: printed {printed_value}, recomputed {ours}{why}"
 
 
 def errata() -> list[Check]:
@@ -94,16 +96,18 @@ def _summary_table(
                 else:
                     value = columns[model].value(table.metric, row, int(name[1]))
                 assert value is not None, "published models are complete"
-                ours, shown = rounded(value), printed[place]
+                ours, printed_value = rounded(value), printed[place]
                 reason = ""
-                if ours != shown:
+                if ours != printed_value:
                     reason = _reason(data, table, columns[model], row, name)
                 title = TITLES[table.source]
-                yield Check(table.source, title, row, model, name, shown, ours, reason=reason)
+                yield Check(
+                    table.source, title, row, model, name, printed_value, ours, reason=reason
+                )
 
 
 def _reason(data: Published, table: PrintedTable, column: Column, row: str, name: str) -> str:
-    """Why a printed average differs, as far as the other printed numbers tell."""
+    """The likely reason why a printed average differs, from the other printed numbers."""
     model = column.published
     printed = dict(zip(table.columns, table.rows[row][model], strict=True))
     if name == "Drop":
@@ -152,31 +156,36 @@ def _per_task(data: Published) -> Iterator[Check]:
     for (model, metric), table in data.per_task.items():
         for task, row in table.rows.items():
             about = data.tasks[task]
-            for level, shown in zip(LEVELS, row, strict=True):
+            for level, printed_value in zip(LEVELS, row, strict=True):
                 success = data.value(model, "sr", task, level) or 0.0
                 count, reason, digits = about.counts[level - 1], "", 1
                 if metric == "sr":
-                    ours, digits = rounded(round(shown * data.trials / 100) / data.trials * 100), 0
+                    ours, digits = (
+                        rounded(round(printed_value * data.trials / 100) / data.trials * 100),
+                        0,
+                    )
                 elif metric == "onta":
                     ours = rounded(onta.of_percent(success, count))
-                    fits = [n for n in range(101) if rounded(onta.of_percent(n, count)) == shown]
-                    if ours != shown:
-                        guesses = ["is the SR itself"] if shown == success else []
+                    fits = [
+                        n for n in range(101) if rounded(onta.of_percent(n, count)) == printed_value
+                    ]
+                    if ours != printed_value:
+                        guesses = ["is the SR itself"] if printed_value == success else []
                         guesses += [f"is the ONTA of SR {fits[0]}"] if fits else []
                         reason = f"SR {success:.0f} of {count} objects"
-                        reason += f"; {shown} {' or '.join(guesses)}" if guesses else ""
+                        reason += f"; {printed_value} {' or '.join(guesses)}" if guesses else ""
                 elif count == 1:
                     ours = rounded(success)
-                    reason = "with one subtask PS is SR" if ours != shown else ""
+                    reason = "with one subtask PS is SR" if ours != printed_value else ""
                 else:
-                    ours = rounded(rounding.exact_progress(shown, count, data.trials))
+                    ours = rounded(rounding.exact_progress(printed_value, count, data.trials))
                 yield Check(
                     table.source,
                     TITLES[metric],
                     about.printed,
                     model,
                     f"L{level}",
-                    shown,
+                    printed_value,
                     ours,
                     derived=metric == "onta" or (metric == "ps" and count == 1),
                     digits=digits,
@@ -190,7 +199,7 @@ def _intervals(data: Published, columns: Mapping[str, Column]) -> Iterator[Check
         for row, (point, low, high) in by_row.items():
             value = columns[model].value("sr", row, table.level) or 0.0
             found = interval_of(*columns[model].samples(row, table.level), method="bootstrap")
-            for name, shown, ours, allowed in (
+            for name, printed_value, ours, allowed in (
                 ("value", point, value, 0.0),
                 ("low", low, 100 * found.low, ENDS),
                 ("high", high, 100 * found.high, ENDS),
@@ -201,7 +210,7 @@ def _intervals(data: Published, columns: Mapping[str, Column]) -> Iterator[Check
                     row,
                     model,
                     name,
-                    shown,
+                    printed_value,
                     rounded(ours, 1 if not allowed else 3),
                     tolerance=allowed,
                 )
@@ -213,16 +222,16 @@ def _embodiments(data: Published) -> Iterator[Check]:
         for short, row in by_task.items():
             task = table.tasks[short]
             dimension = "spatial" if data.tasks[task].category in DIMENSIONS["spatial"] else ""
-            for name, shown in zip(table.columns, row, strict=True):
+            for name, printed_value in zip(table.columns, row, strict=True):
                 same = robot == data.embodiment
-                ours = data.value(table.model, "sr", task, int(name[1])) if same else shown
+                ours = data.value(table.model, "sr", task, int(name[1])) if same else printed_value
                 yield Check(
                     table.source[dimension or "procedural"],
                     "embodiments",
                     short,
                     table.names[robot],
                     name,
-                    shown,
+                    printed_value,
                     rounded(ours or 0.0, 0),
                     derived=same,
                     digits=0,
@@ -233,9 +242,11 @@ def _basic(data: Published) -> Iterator[Check]:
     table = data.basic_grounding
     trials = table.tasks * table.trials
     for row, values in table.rows.items():
-        for name, shown in zip(table.columns, values, strict=True):
-            ours = rounded(100 * round(shown * trials / 100) / trials)
-            yield Check(table.source, "basic grounding", row, "", name, shown, ours, derived=False)
+        for name, printed_value in zip(table.columns, values, strict=True):
+            ours = rounded(100 * round(printed_value * trials / 100) / trials)
+            yield Check(
+                table.source, "basic grounding", row, "", name, printed_value, ours, derived=False
+            )
 
 
 def _counts(data: Published) -> Iterator[Check]:
@@ -250,5 +261,5 @@ def _counts(data: Published) -> Iterator[Check]:
         ("categories", len(assets.rows)),
         ("variants", sum(assets.rows.values())),
     ):
-        shown = assets.text[name]
-        yield Check(assets.source, "assets", "total", "", name, shown, ours, digits=0)
+        printed_value = assets.text[name]
+        yield Check(assets.source, "assets", "total", "", name, printed_value, ours, digits=0)

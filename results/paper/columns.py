@@ -82,7 +82,7 @@ class Column:
         return self.values[metric].get((row, level))
 
     def part(self, row: str, level: int) -> VariantScore | AverageScore | None:
-        """What the run knows of a row, which for averages is only what was run."""
+        """The score of a row; averages are over the variants that were run."""
         if row == rounding.OVERALL:
             return self.scores.overall.get(level)
         found = self.scores.cells.get((row, level)) or self.scores.categories.get((row, level))
@@ -99,7 +99,7 @@ class Column:
         return part.values.get(metric) if row == dimension else None
 
     def sample(self, metric: str, row: str, level: int) -> Sample | Estimate | None:
-        """What a test compares: counts of a variant's success rate, else value and interval."""
+        """The input of a test: counts of a variant's success rate, else value and interval."""
         part = self.part(row, level)
         if metric == "sr" and isinstance(part, VariantScore) and part.trials:
             return rate(part.successes, part.trials)
@@ -183,14 +183,19 @@ def table_values(
 
 
 def _untied(values: Mapping[str, dict[tuple[str, int], float | None]], model: str) -> Values:
-    """Where an average of progress falls exactly between two printable values, binary noise in the
-    means of c/T decided what was printed, so the printed one is taken."""
+    """`values` with ties decided as printed.
+
+    Where an average of progress falls exactly between two printable values, binary noise in the
+    means of c/T decided what was printed, so the printed one is taken.
+    """
     printed = load().ps
     for row, by_model in printed.rows.items():
-        for column, shown in zip(printed.columns, by_model[model], strict=True):
+        for column, printed_value in zip(printed.columns, by_model[model], strict=True):
             value = values["ps"][row, int(column[1])]
-            if value is not None and rounding.is_tie(value) and abs(value - shown) < 0.051:
-                values["ps"][row, int(column[1])] = value + (1e-6 if shown > value else -1e-6)
+            if value is not None and rounding.is_tie(value) and abs(value - printed_value) < 0.051:
+                values["ps"][row, int(column[1])] = value + (
+                    1e-6 if printed_value > value else -1e-6
+                )
     return values
 
 

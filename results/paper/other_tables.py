@@ -48,7 +48,7 @@ def interval_table(columns: Sequence[Column]) -> Table:
 
 
 def _open_notes(columns: Sequence[Column], level: int) -> list[str]:
-    """What columns lack at `level`."""
+    """Notes on missing tasks and trials of `columns` at `level`."""
     notes: list[str] = []
     for column in columns:
         notes += not_run_note(column, [level])
@@ -73,8 +73,8 @@ def _interval(column: Column, row: str, level: int, method: str) -> TableCell:
 
 
 def _with_ends(value: float, low: float, high: float, sign: str = "") -> TableCell:
-    shown = [rounding.text(100 * x) for x in (value, low, high)]
-    text = f"{shown[0]} [{shown[1]}, {shown[2]}]"
+    texts = [rounding.text(100 * x) for x in (value, low, high)]
+    text = f"{texts[0]} [{texts[1]}, {texts[2]}]"
     return TableCell(text, 100 * value, 100 * low, 100 * high, sign=sign)
 
 

@@ -70,8 +70,8 @@ def task_table(columns: Sequence[Column], name: str, metric: str, mark: str = "t
     """Every task at every level."""
     check_columns(columns)
     data = load()
-    shown = [t for t in data.tasks.values() if t.category in METRIC_CATEGORIES[metric]]
-    best = _best(columns, metric, [t.name for t in shown], LEVELS, mark)
+    tasks = [t for t in data.tasks.values() if t.category in METRIC_CATEGORIES[metric]]
+    best = _best(columns, metric, [t.name for t in tasks], LEVELS, mark)
     wrong = {
         key: check
         for column in columns
@@ -79,7 +79,7 @@ def task_table(columns: Sequence[Column], name: str, metric: str, mark: str = "t
         for key, check in _wrong(data.per_task[column.published, metric].source).items()
     }
     lines, last = [], ""
-    for task in shown:
+    for task in tasks:
         if task.category != last:
             last = task.category
             lines.append(TableRow(f"{last} {CATEGORY_NAMES[last]}", kind="section"))
@@ -96,7 +96,7 @@ def task_table(columns: Sequence[Column], name: str, metric: str, mark: str = "t
         lines.append(TableRow(task.printed, tuple(entries)))
     heads = tuple(f"L{level}" for level in LEVELS)
     title = f"{_long_name(metric)} in percent by task"
-    notes = _notes(columns, metric, [t.name for t in shown], LEVELS, mark, wrong)
+    notes = _notes(columns, metric, [t.name for t in tasks], LEVELS, mark, wrong)
     groups = tuple((c.title, len(heads)) for c in columns)
     return Table(name, title, "Task", heads * len(columns), tuple(lines), groups, notes)
 
@@ -148,13 +148,13 @@ def _best(
         }
     made: dict[tuple[str, int], set[str]] = {}
     for place in places:
-        shown = {
+        percents = {
             c.title: rounding.rounded(value)
             for c in columns
             if (value := c.value(metric, *place)) is not None
         }
-        top = max(shown.values(), default=0.0)
-        made[place] = {title for title, value in shown.items() if value == top}
+        top = max(percents.values(), default=0.0)
+        made[place] = {title for title, value in percents.items() if value == top}
     return made
 
 
@@ -190,11 +190,11 @@ def _notes(
     wrong: Mapping[tuple[str, str, str], Check],
 ) -> tuple[str, ...]:
     notes = [_MARK_NOTES[mark]] if len(columns) > 1 and mark != "none" else []
-    shown = {c.published for c in columns if c.published}
+    models = {c.published for c in columns if c.published}
     listed = [
         f"{c.row} {c.model} {c.column} {rounding.text(c.printed, c.digits)}"
         for c in wrong.values()
-        if c.model in shown
+        if c.model in models
     ]
     if listed and metric == "ps" and rows[0] in load().tasks:
         notes.append(f"{PRINTED_OTHERWISE} Does not follow from SR: {'; '.join(listed)}.")
@@ -218,7 +218,7 @@ def _notes(
 
 
 def not_run_note(column: Column, levels: Sequence[int]) -> list[str]:
-    """How many of the benchmark's tasks `column` lacks at `levels`, or nothing."""
+    """A note on the number of the benchmark's tasks that `column` lacks at `levels`, or nothing."""
     lacking = [f"{n} at L{level}" for level in levels if (n := column.not_run(level))]
     if not lacking:
         return []

@@ -1,4 +1,4 @@
-"""How the paper computes and prints: percent, means over categories, rounding, drops.
+"""Arithmetic and rounding of the paper: percent, means over categories, rounding, drops.
 
 Printed digits depend on the arithmetic, so it is fixed here and used for published models and for
 runs alike. Values are percent in double precision. A category is the mean of its tasks, a dimension
@@ -60,7 +60,7 @@ def exact_progress(printed: float, subtasks: int, trials: int = 100) -> float:
 
 
 def drop(first: float | None, last: float | None) -> float | None:
-    """How much is lost from `first` to `last`, both as printed."""
+    """The loss from `first` to `last`, both as printed."""
     if first is None or last is None:
         return None
     return rounded(rounded(first) - rounded(last))

@@ -1,4 +1,4 @@
-"""What looks wrong in a run or in a table of results, found without running anything again.
+"""Checks of a run or a table of results for values that cannot be right, without running anything.
 
 Numbers that cannot be (progress below success, a share of subtasks that no count gives), numbers
 that are too alike to be true (one row under two tasks, one sequence of actions for two seeds), and
@@ -27,7 +27,7 @@ T = TypeVar("T")
 INFORMATIVE = 3
 """Rows with fewer different numbers above zero may well agree by chance."""
 NAMED = 3
-"""How many examples a finding names before it only counts."""
+"""Largest number of examples that a finding names."""
 
 
 @dataclass(frozen=True)
@@ -166,7 +166,7 @@ def lint_run(run: Run, variants: Collection[tuple[str, int]] | None = None) -> l
 
 
 def lint_runs(runs: Sequence[Run]) -> list[Finding]:
-    """What keeps several runs from standing in one table."""
+    """Reasons why several runs cannot stand in one table."""
     found: list[Finding] = []
     for title, read in (
         ("code", lambda r: r.info.code),
@@ -209,7 +209,7 @@ def run_rows(
 def _lint_listing(
     run: Run, name: str, variants: Collection[tuple[str, int]] | None
 ) -> Iterator[Finding]:
-    """Which trials there are, against which there should be."""
+    """The trials that are present against those that are listed."""
     listed = Counter(run.keys)
     twice = [key.slug for key, count in listed.items() if count > 1]
     if twice:
@@ -240,14 +240,14 @@ def _lint_listing(
 
 
 def _lint_limits(run: Run, name: str) -> Iterator[Finding]:
-    """What a run allowed beyond the benchmark."""
+    """Departures of a run from the benchmark's rules."""
     if (scale := run.info.step_scale) != 1:
         text = f"step limits are {scale:g} times the official ones: not the benchmark's numbers"
         yield Finding("step-limits", "warning", name, text)
 
 
 def _lint_files(run: Run, name: str) -> Iterator[Finding]:
-    """How the records were written."""
+    """Torn and repeated records."""
     for file in run.torn:
         text = f"the last line of {file} was torn off: its trial has to be run again"
         yield Finding("torn-line", "warning", name, text)

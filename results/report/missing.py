@@ -1,4 +1,4 @@
-"""Which trials of a run are missing and why, in sentences."""
+"""Sentences on the missing trials of a run, with the reasons."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def missing_lines(scores: Scores) -> list[str]:
 
 
 def loss_lines(run: Run, most: int = 5) -> list[str]:
-    """Why trials are missing, one sentence a reason, the most frequent first."""
+    """The reasons for missing trials, one sentence a reason, the most frequent first."""
     reasons: dict[str, int] = {}
     for key in run.missing:
         record = run.records.get(key)

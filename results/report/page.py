@@ -110,7 +110,7 @@ def render(template: str, **context: object) -> str:
 
 
 def badges(runs: Sequence[Run], names: Sequence[str]) -> list[str]:
-    """What a reader has to know before any number."""
+    """Warnings above all numbers: privileged policies and missing trials."""
     made = []
     for run, name in zip(runs, names, strict=True):
         of = f"{name}: " if len(runs) > 1 else ""

@@ -1,4 +1,4 @@
-"""What a report of runs says: scores, tables, figures, failures and notes.
+"""The content of a report of runs: scores, tables, figures, failures and notes.
 
 Runs that cannot stand in one table (other embodiments, scenes, suites) still get their trials and
 cards, and one sentence that says why there is no table.
@@ -33,9 +33,12 @@ AVERAGES = (
 
 @dataclass(frozen=True)
 class Report:
-    """What a report says. `models` are the runs, then published models; `failures` has the type of
-    every failed trial of each run, and `findings` what `robospa lint` found. `columns` and `tables`
-    are empty where the runs cannot stand in one table."""
+    """The content of a report.
+
+    `models` are the runs, then published models; `failures` has the type of every failed trial of
+    each run, `findings` is the output of `robospa lint`. `columns` and `tables` are empty where the
+    runs cannot stand in one table.
+    """
 
     runs: Sequence[Run]
     models: Sequence[ModelResults]
@@ -119,14 +122,14 @@ def draw_figures(
 
 
 def findings(runs: Sequence[Run]) -> list[str]:
-    """What `robospa lint` finds in the runs."""
+    """Findings of `robospa lint` in the runs."""
     found = [f for run in runs for f in lint_run(run)]
     found += lint_runs(runs) if len(runs) > 1 else []
     return [str(f) for f in found]
 
 
 def method_notes(columns: Sequence[Column]) -> list[str]:
-    """How values and intervals were made, in sentences, as the estimates themselves say."""
+    """Sentences on the computation of values and intervals, from the estimates' own methods."""
     if not columns:
         return []
     made: dict[str, set[str]] = {}

@@ -17,7 +17,7 @@ END_NAMES = {
 }
 NOT_RUN = "not run"
 ACTIONS = {"action": "", "horizon": "chunks of at most ", "execute": "executed of each: "}
-"""What the spec says of actions, and the words before it."""
+"""Fields of the spec about actions, and the words before each."""
 
 
 def names_of(runs: Sequence[Run]) -> list[str]:
@@ -53,7 +53,7 @@ def about(run: Run) -> dict[str, object]:
 
 
 def ends(run: Run) -> dict[str, int]:
-    """How many trials ended in which way; trials that were never run count as "not run"."""
+    """Number of trials by end; trials that were never run count as "not run"."""
     counts: dict[str, int] = {}
     for key in run.keys:
         record = run.records.get(key)

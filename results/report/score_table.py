@@ -81,15 +81,17 @@ def _averages(
 
 
 def category_size(scores: Scores, row: ScoreRow) -> int:
-    """How many tasks a category's row sums up; 0 for other rows."""
+    """Number of tasks below a category's row; 0 for other rows."""
     return [*scores.category_of.values()].count(row.category) if row.kind == "category" else 0
 
 
 def score_table(run: Run, scores: Scores) -> Table:
     """The success rates of `run` by level, with the metrics of the mean over levels."""
-    shown = rows(scores)
-    if all(category_size(scores, row) < 2 for row in shown):
-        shown = [row for row in shown if row.kind != "category"]  # they would repeat their task
+    table_rows = rows(scores)
+    if all(category_size(scores, row) < 2 for row in table_rows):
+        table_rows = [
+            row for row in table_rows if row.kind != "category"
+        ]  # they would repeat their task
     privileged = " (privileged: sees the exact state)" if run.info.privileged else ""
     heads = (*map(level_name, scores.levels), "SR [95 %]", "ONTA", "PS", "trials")
     return Table(
@@ -97,7 +99,7 @@ def score_table(run: Run, scores: Scores) -> Table:
         f"{run.info.policy or 'policy'}{privileged}",
         "",
         heads,
-        tuple(_table_row(row) for row in shown),
+        tuple(_table_row(row) for row in table_rows),
     )
 
 
@@ -139,7 +141,7 @@ def print_scores(run: Run, scores: Scores) -> None:
 
 
 def _ends_line(run: Run) -> str:
-    """How the trials ended: what is no result, and what a policy could not do, is never hidden."""
+    """Number of trials by end, those without a result included."""
     counts = ", ".join(f"{count} {name}" for name, count in ends(run).items())
     note = f" ({MISSING} lacks trials)" if run.missing else ""
     return f"{len(run.keys)} trials: {counts}{note}"

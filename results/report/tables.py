@@ -1,4 +1,4 @@
-"""Which tables a report shows: the paper's, cut to what its runs cover.
+"""Tables of a report: the paper's, cut to the tasks and levels of its runs.
 
 Rows of tasks that no run of the report has are left out, so that a run of ten tasks is no page of
 dashes; the notes below a table say how much was not run. Averages over tasks that were not run stay
@@ -122,11 +122,13 @@ def for_page(tables: Sequence[ReportTable]) -> list[PageTable]:
 
     made = []
     for table in tables:
-        shown = table.table
-        long = [note for note in shown.notes if len(note) > LONG]
-        short = replace(shown, notes=tuple(note for note in shown.notes if note not in long))
+        paper_table = table.table
+        long = [note for note in paper_table.notes if len(note) > LONG]
+        short = replace(
+            paper_table, notes=tuple(note for note in paper_table.notes if note not in long)
+        )
         html = Markup(fragment(short))
-        made.append(PageTable(shown.title, html, table.folded, long))
+        made.append(PageTable(paper_table.title, html, table.folded, long))
     return made
 
 

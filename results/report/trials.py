@@ -81,7 +81,7 @@ def event_row(event: Happened) -> list[float | str]:
 
 @dataclass(frozen=True)
 class FailureCount:
-    """How often a type of failure occurs: `counts` has a number a run."""
+    """Occurrences of a type of failure: `counts` has one number a run."""
 
     kind: str
     name: str
@@ -89,7 +89,7 @@ class FailureCount:
 
 
 def failure_counts(failures: Sequence[Failures]) -> list[FailureCount]:
-    """How often each type occurs in each run, by frequency; types that never occur are left out."""
+    """Occurrences of each type in each run, by frequency; types that never occur are left out."""
     counts: dict[str, list[int]] = {}
     for number, found in enumerate(failures):
         for failure in found.values():

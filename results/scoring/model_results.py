@@ -1,4 +1,4 @@
-"""The results of one model: what tables, figures, reports and comparisons are made from."""
+"""The results of one model, the input of tables, figures, reports and comparisons."""
 
 from __future__ import annotations
 

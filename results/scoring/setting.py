@@ -1,4 +1,4 @@
-"""What was asked of a model, and the refusal to average or compare what was asked differently."""
+"""The setting of an evaluation, and the refusal to average or compare different settings."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ RAN_WITH = {
     "suite": "the suites {} and {}",
     "step_scale": "{:g} and {:g} times the official step limits",
 }
-"""How messages name two different values of each part."""
+"""Words of messages for two different values of each part."""
 
 
 class IncomparableError(ValueError):

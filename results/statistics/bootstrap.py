@@ -48,7 +48,7 @@ class Sample:
 
     @property
     def trials(self) -> int:
-        """How many outcomes there are."""
+        """Number of outcomes."""
         return sum(self.counts)
 
     @property
@@ -68,7 +68,7 @@ class Sample:
 
     @property
     def constant(self) -> bool:
-        """Whether all outcomes are equal: resampling them teaches nothing."""
+        """Whether all outcomes are equal: resampling them changes nothing."""
         return max(self.counts) == self.trials
 
 
@@ -191,7 +191,7 @@ def _values(sample: Sample, resamples: int, generator: np.random.Generator) -> N
 def resample_episodes(
     samples: Sequence[Sample], weights: Sequence[float], seed: int = 0, resamples: int = RESAMPLES
 ) -> NDArray[np.float64]:
-    """What `draw` gives, episode by episode: the slow way, to check the fast one against."""
+    """The values of `draw`, episode by episode: the slow way, to check the fast one against."""
     _check(samples, weights)
     generator = np.random.default_rng(seed)
     drawn = np.zeros(resamples)

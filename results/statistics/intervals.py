@@ -26,7 +26,7 @@ Z95 = 1.959963984540054
 """Two-sided 95 % quantile of the normal distribution."""
 LEVEL = 0.95
 METHODS = ("wilson", "exact", "jeffreys", "bootstrap")
-"""How the interval of a rate can be made (`--ci`); the first is the default."""
+"""Methods for the interval of a rate (`--ci`); the first is the default."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ def jeffreys(successes: int, trials: int) -> Estimate:
 
 
 def below(trials: int) -> float:
-    """What a rate of 0 in `trials` is below, one-sided at 95 %: "0/100, below 3.0 %"."""
+    """The upper limit of a rate of 0 in `trials`, one-sided at 95 %: "0/100, below 3.0 %"."""
     if trials < 1:
         raise ValueError("no trials bound no rate")
     return float(1 - (1 - LEVEL) ** (1 / trials))
@@ -250,7 +250,7 @@ def _percentile(value: float, draws: NDArray[np.float64], method: str) -> Estima
 
 
 def _root(function: Callable[[float], float], low: float, high: float) -> float:
-    """Where a falling `function` crosses 0 between `low` and `high`."""
+    """The root of a falling `function` between `low` and `high`."""
     for _ in range(60):
         middle = (low + high) / 2
         low, high = (middle, high) if function(middle) > 0 else (low, middle)

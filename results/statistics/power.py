@@ -1,4 +1,4 @@
-"""How many trials it takes to tell two success rates apart, before running them.
+"""Number of trials needed to tell two success rates apart, before running them.
 
 Normal approximations, good to a few percent from about 20 trials on: the arcsine formula for
 unrelated seeds, the variance of the discordant pairs for equal seeds. Two policies on equal seeds
@@ -67,7 +67,7 @@ def discordant(base: float, other: float, correlation: float) -> float:
 def plan(
     base: float, gap: float, correlations: Sequence[float] = (0.25, 0.5), power: float = POWER
 ) -> Plan:
-    """What it takes to tell `base` from `base + gap`; impossible correlations are left out."""
+    """Trials needed to tell `base` from `base + gap`; impossible correlations are left out."""
     other = base + gap
     paired = {}
     for correlation in correlations:

@@ -18,7 +18,7 @@ NOT_OFFICIAL = "stopped early: tells which is better, is no result to publish"
 
 @dataclass(frozen=True)
 class Verdict:
-    """Where a comparison stopped. `better` is 1, 2 or 0 (undecided), after `looked` pairs."""
+    """The end of a comparison. `better` is 1, 2 or 0 (undecided), after `looked` pairs."""
 
     better: int
     looked: int

@@ -27,11 +27,11 @@ def to_markdown(table: Table) -> str:
     ]
     for row in table.rows:
         label = escape_markdown(row.label)
-        shown = label if row.kind == "row" else f"*{label}*"
+        heading = label if row.kind == "row" else f"*{label}*"
         if row.kind == "section":
             lines.append(f"| **{label}** | " + " | ".join([""] * len(names)) + " |")
         else:
-            lines.append(f"| {shown} | " + " | ".join(map(_markdown_entry, row.cells)) + " |")
+            lines.append(f"| {heading} | " + " | ".join(map(_markdown_entry, row.cells)) + " |")
     for note in table.notes:
         lines += ["", escape_markdown(note)]
     return "\n".join(lines) + "\n"

@@ -11,23 +11,23 @@ def show(table: Table) -> None:
     from rich.console import Console
     from rich.text import Text
 
-    shown = rich_table.Table(title=table.title, title_justify="left", box=None, pad_edge=False)
-    shown.add_column(table.corner)
+    rendered = rich_table.Table(title=table.title, title_justify="left", box=None, pad_edge=False)
+    rendered.add_column(table.corner)
     last = ""
     for group, head in zip(table.group_of, table.heads, strict=True):
         name = f"{group if group != last else ''}\n{head}" if table.groups else head
-        shown.add_column(name, justify="left" if table.words else "right", no_wrap=True)
+        rendered.add_column(name, justify="left" if table.words else "right", no_wrap=True)
         last = group
     for row in table.rows:
         if row.kind == "section":
-            shown.add_section()
-            shown.add_row(Text(row.label, style="bold"))
+            rendered.add_section()
+            rendered.add_row(Text(row.label, style="bold"))
             continue
         cells = [Text(e.text + e.sign, style="bold" if e.best else "") for e in row.cells]
-        shown.add_row(Text(row.label, style="bold" * (row.kind == "average")), *cells)
+        rendered.add_row(Text(row.label, style="bold" * (row.kind == "average")), *cells)
     console = Console()
     if not console.is_terminal:
         console = Console(width=220)  # rows are only as long as they need
-    console.print(shown, highlight=False)
+    console.print(rendered, highlight=False)
     for note in table.notes:
         console.print(Text(note, style="dim"))

@@ -165,7 +165,7 @@ class Published:
 
 
 def title(model: str) -> str:
-    """How a model's name is written."""
+    """A model's name as it is written."""
     return TITLES.get(model, model)
 
 
