@@ -153,7 +153,7 @@ def make(path: Path, trials: int, noise: float) -> tuple[Reference, float, int]:
         "trials": group_keys(keys),
         "about": about_machine({}),
     }
-    begun = time.perf_counter()
+    start_time = time.perf_counter()
     records = {
         key: record(key, facts(key.task, key.level), steps[key], wins[key], trace_hash(traces(key)))
         for key in keys
@@ -162,7 +162,7 @@ def make(path: Path, trials: int, noise: float) -> tuple[Reference, float, int]:
     films = {f"videos/{key.slug}.mp4": b"\0\0\0\x18ftyp" + os.urandom(FILM)
              for key in announced(inputs_of(run), keys)}  # fmt: skip
     write_bundle(path, run, to_card(CARD), shipped().suite, traces, films)
-    spent = time.perf_counter() - begun
+    spent = time.perf_counter() - start_time
     whole = shipped()
     reference = Reference(lambda task, level: seeds, whole.facts, whole.members)
     return reference, spent, 56 * sum(steps.values())
@@ -182,10 +182,10 @@ def main(words: Sequence[str] | None = None) -> None:
         size = path.stat().st_size
         parts = ", ".join(f"{k} {v / 1e6:.1f}" for k, v in sizes_of(path).items() if v > 1e5)
         print(f"{size / 1e6:.1f} MB: {parts}; raw actions {raw / 1e6:.1f} MB")
-        begun, cpu = time.perf_counter(), time.process_time()
+        start_time, cpu = time.perf_counter(), time.process_time()
         valid = verify(path, reference)
         print(
-            f"level 1 of {len(valid.keys)} trials: {time.perf_counter() - begun:.1f} s "
+            f"level 1 of {len(valid.keys)} trials: {time.perf_counter() - start_time:.1f} s "
             f"({time.process_time() - cpu:.1f} s of processor time), load {os.getloadavg()[0]:.1f}"
         )
 

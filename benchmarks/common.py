@@ -162,8 +162,10 @@ def argument_parser(doc: str | None) -> argparse.ArgumentParser:
 
 def finish(result: Result, options: argparse.Namespace) -> None:
     """Print the result, and write it if that was asked for."""
-    said = "; ".join(words for words in (result.circumstances, options.circumstances) if words)
-    result = replace(result, circumstances=said)
+    circumstances = "; ".join(
+        words for words in (result.circumstances, options.circumstances) if words
+    )
+    result = replace(result, circumstances=circumstances)
     for row in result.rows:
         print(line(row))
     if options.json is not None:

@@ -42,7 +42,7 @@ def evaluate(
     folder = BUILD / f"expert-{policy}"
     again = folder.exists()
     command = [ROBOSPA, "eval", policy, "--tasks", ",".join(names)]
-    begun = time.monotonic()
+    start_time = time.monotonic()
     subprocess.run(
         [
             *command,
@@ -55,7 +55,7 @@ def evaluate(
         ],
         check=True,
     )
-    wall = time.monotonic() - begun
+    wall = time.monotonic() - start_time
     return list(read_run(folder).records.values()), wall, not again
 
 

@@ -41,27 +41,35 @@ def environment(name: str) -> Peer:
     """The peer's environment, made if it is missing."""
     folder = ROOT / name.replace(" ", "_").replace("'", "")
     python = folder / "bin" / "python"
-    wanted = REQUIREMENTS[name]
+    requirements = REQUIREMENTS[name]
     mark = folder / "installed.txt"
-    if not (mark.exists() and mark.read_text(encoding="utf-8") == " ".join(wanted)):
-        problem = _install(folder, python, wanted)
+    if not (mark.exists() and mark.read_text(encoding="utf-8") == " ".join(requirements)):
+        problem = _install(folder, python, requirements)
         if problem:
             shutil.rmtree(folder, ignore_errors=True)
             return Peer(name, None, problem=problem)
-        mark.write_text(" ".join(wanted), encoding="utf-8")
-    return Peer(name, python, _version(python, wanted[0]))
+        mark.write_text(" ".join(requirements), encoding="utf-8")
+    return Peer(name, python, _version(python, requirements[0]))
 
 
-def _install(folder: Path, python: Path, wanted: tuple[str, ...]) -> str:
+def _install(folder: Path, python: Path, requirements: tuple[str, ...]) -> str:
     """Make the environment; what went wrong, or ""."""
     for command in (
         [sys.executable, "-m", "venv", "--clear", str(folder)],
-        [str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *wanted],
+        [
+            str(python),
+            "-m",
+            "pip",
+            "install",
+            "--quiet",
+            "--disable-pip-version-check",
+            *requirements,
+        ],
     ):
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         if done.returncode:
             lines = [x for x in done.stderr.splitlines() if x.startswith("ERROR")]
-            return f"pip install {wanted[0]}: {(lines or [done.stderr.strip()])[-1]}"
+            return f"pip install {requirements[0]}: {(lines or [done.stderr.strip()])[-1]}"
     return ""
 
 

@@ -27,19 +27,19 @@ SHOWN = 12
 
 def measure(name: str, level: int, scenes: int) -> Json:
     """Milliseconds of CPU per scene of one variant."""
-    begun = time.process_time()
+    start_time = time.process_time()
     catalog.build_scene(name, level, FIRST_SEED - 1)
-    first = 1000 * (time.process_time() - begun)
+    first = 1000 * (time.process_time() - start_time)
     for seed in range(FIRST_SEED - WARM, FIRST_SEED - 1):
         catalog.build_scene(name, level, seed)
     spent, refused = [], 0
     for seed in range(FIRST_SEED, FIRST_SEED + scenes):
-        begun = time.process_time()
+        start_time = time.process_time()
         try:
             catalog.build_scene(name, level, seed)
         except RuntimeError:  # LayoutError is one
             refused += 1
-        spent.append(1000 * (time.process_time() - begun))
+        spent.append(1000 * (time.process_time() - start_time))
     p50, p99 = (float(v) for v in np.percentile(spent, [50, 99]))
     return {
         "task": name,

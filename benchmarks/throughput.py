@@ -123,10 +123,10 @@ def serving(base: float, item: float) -> Iterator[Served]:
 def serve(base: float, item: float) -> None:
     """The process of `serving`."""
     model = SimulatedModel(base, item)
-    begun, rounds = time.perf_counter(), 20
+    start_time, rounds = time.perf_counter(), 20
     for _ in range(rounds):
         model.infer_batch([{}] * BATCH, [0] * BATCH)
-    limit = BATCH * rounds / (time.perf_counter() - begun)
+    limit = BATCH * rounds / (time.perf_counter() - start_time)
     model.calls.clear()
     with ServerThread(model) as server:
         print(server.url, limit, flush=True)
@@ -154,13 +154,13 @@ class Window:
 
     seconds: float
     workers: int = 0
-    begun: float = 0.0
+    start_time: float = 0.0
 
     def look(self, status: Status) -> None:
         """Called by the driver."""
         if status.starting or status.workers != self.workers or not status.shares:
-            self.workers, self.begun = status.workers, status.now
-        elif status.now - self.begun > self.seconds:
+            self.workers, self.start_time = status.workers, status.now
+        elif status.now - self.start_time > self.seconds:
             raise Enough
 
 
@@ -179,7 +179,7 @@ def measure(busy: float, workers: int, seconds: float, base: float, item: float)
         with contextlib.suppress(Enough):
             runner.run()
         until = time.monotonic()
-        calls = [c for c in served.calls() if window.begun <= c[0] <= until - 0.5]
+        calls = [c for c in served.calls() if window.start_time <= c[0] <= until - 0.5]
     answers = sum(size for _, size in calls[1:])
     rate = answers / (calls[-1][0] - calls[0][0])
     return RunFigures(rate, answers / (len(calls) - 1), window.workers, served.limit)

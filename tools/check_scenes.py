@@ -35,7 +35,7 @@ def look(name: str, level: int, scenes: int) -> dict[str, Any]:
     """The findings in `scenes` scenes of one variant."""
     from scene_checks import RULES, drawn
 
-    begun = time.process_time()
+    start_time = time.process_time()
     broken: Counter[str] = Counter()
     examples: list[str] = []
     values: dict[str, Counter[str]] = {}
@@ -61,7 +61,7 @@ def look(name: str, level: int, scenes: int) -> dict[str, Any]:
         "broken": dict(broken),
         "examples": examples,
         "drawn": {key: dict(sorted(counts.items())) for key, counts in values.items()},
-        "seconds": round(time.process_time() - begun, 1),
+        "seconds": round(time.process_time() - start_time, 1),
     }
 
 

@@ -110,7 +110,7 @@ def _later(shift: int, stride: int = 1) -> Undo:
         rows = rows[rows < len(case.track)]
         if len(rows) < 2:
             return None
-        return replace(case, given=case.given[: len(rows)], wanted=case.track[rows])
+        return replace(case, given=case.given[: len(rows)], recorded=case.track[rows])
 
     return undo
 
@@ -127,14 +127,16 @@ def _interleaved(case: AnswerSample) -> AnswerSample | None:
 def _slower(case: AnswerSample) -> AnswerSample | None:
     """Two actions for every recorded frame."""
     given = case.given[1::2]
-    return replace(case, given=given, wanted=case.wanted[: len(given)]) if len(given) > 1 else None
+    return (
+        replace(case, given=given, recorded=case.recorded[: len(given)]) if len(given) > 1 else None
+    )
 
 
 def _measured(case: AnswerSample) -> AnswerSample | None:
     if case.measured is None:
         return None
     rows = case.t + 1 + np.arange(len(case.given))
-    return replace(case, wanted=case.measured[rows])
+    return replace(case, recorded=case.measured[rows])
 
 
 def _moved(case: AnswerSample, along: float) -> Array:
@@ -322,35 +324,35 @@ def fitted(cases: Sequence[AnswerSample]) -> list[ActionFault]:
         return []
     found = []
     given = np.concatenate([c.given for c in cases]).reshape(-1, 2, size + 1)[:, :, :-1]
-    wanted = np.concatenate([c.wanted for c in cases]).reshape(-1, 2, size + 1)[:, :, :-1]
+    recorded = np.concatenate([c.recorded for c in cases]).reshape(-1, 2, size + 1)[:, :, :-1]
     now = np.concatenate([np.tile(c.now, (len(c.given), 1)) for c in cases])
     now = now.reshape(-1, 2, size + 1)[:, :, :-1]
-    cost = np.abs(given[..., None, :] - wanted[..., :, None]).mean(axis=(0, 1))
+    cost = np.abs(given[..., None, :] - recorded[..., :, None]).mean(axis=(0, 1))
     cost += 0.002 * (1 - np.eye(size))
     rows = list(range(size))
     best = min(permutations(rows), key=lambda p: float(cost[rows, p].sum()))
     if list(best) != rows:
-        told = " ".join(str(i + 1) for i in best)
+        listed = " ".join(str(i + 1) for i in best)
         order = [*best, size]
         found.append(
             ActionFault(
                 "joint order",
-                f"the joints of an arm are in another order (ours are its {told})",
+                f"the joints of an arm are in another order (ours are its {listed})",
                 ORDER,
                 _columns(lambda a, b: [a[i] for i in order] + [b[i] for i in order], "joint"),
             )
         )
     for about, name in ((0 * now, "joint signs"), (now, "signs of motion")):
         mirrored = 2 * about - given
-        better = np.abs(mirrored - wanted).mean(axis=(0, 1)) + 0.01
-        flips = np.flatnonzero(better < np.abs(given - wanted).mean(axis=(0, 1)))
+        better = np.abs(mirrored - recorded).mean(axis=(0, 1)) + 0.01
+        flips = np.flatnonzero(better < np.abs(given - recorded).mean(axis=(0, 1)))
         if len(flips):
             found.append(_signs(name, tuple(int(i) for i in flips), size))
     return found
 
 
 def _signs(name: str, flips: tuple[int, ...], size: int) -> ActionFault:
-    told = " and ".join(str(i + 1) for i in flips)
+    listed = " and ".join(str(i + 1) for i in flips)
     pi = " (as if openpi's adapt_to_pi were on)" if flips == PI_SIGNS else ""
     columns = [i + arm * (size + 1) for arm in (0, 1) for i in flips]
 
@@ -361,22 +363,22 @@ def _signs(name: str, flips: tuple[int, ...], size: int) -> ActionFault:
         return given
 
     kind = "the motion of" if name == "signs of motion" else ""
-    phrase = " ".join(f"{kind} joint {told} of each arm has the wrong sign{pi}".split())
+    phrase = " ".join(f"{kind} joint {listed} of each arm has the wrong sign{pi}".split())
     return ActionFault(name, phrase, "signs", _given(changed, "joint"))
 
 
 def _offset(cases: Sequence[AnswerSample]) -> ActionFault:
-    gap = np.concatenate([c.given - c.wanted for c in cases])
+    gap = np.concatenate([c.given - c.recorded for c in cases])
     middle = np.median(gap, axis=0)
     shift = np.zeros_like(middle)
     for arm in cases[0].space.arms:
         shift[arm.position] = middle[arm.position]
-    told, right = (
+    listed, right = (
         ", ".join(f"{v:+.2f}" for v in shift[arm.position]) for arm in cases[0].space.arms
     )
     return ActionFault(
         "another origin",
-        f"its positions are off by ({told}) m left and ({right}) m right: another origin",
+        f"its positions are off by ({listed}) m left and ({right}) m right: another origin",
         "frame",
         _given(lambda case: case.given - shift, "ee"),
     )

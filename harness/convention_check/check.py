@@ -156,9 +156,9 @@ def _case(
     joint = spec.action == "joint"
     space = episode.space if joint else ActionSpace("ee", episode.space.joints)
     track = episode.commanded if joint else episode.ee.reshape(len(episode), space.width)
-    wanted = track[t + 1 : t + 1 + len(chunk)]
-    given = chunk[: len(wanted)]
-    if given.shape != wanted.shape:
+    recorded = track[t + 1 : t + 1 + len(chunk)]
+    given = chunk[: len(recorded)]
+    if given.shape != recorded.shape:
         raise EpisodeError(
             f"the policy answers {chunk.shape[1]} numbers an action, and {episode.name} has "
             f"{track.shape[1]} of that kind"
@@ -166,7 +166,7 @@ def _case(
     if spec.action == "delta_ee":
         given = absolute(given, track[t], space)
     measured = episode.measured if joint else None
-    return AnswerSample(space, given, wanted, track[t], track, t, measured)
+    return AnswerSample(space, given, recorded, track[t], track, t, measured)
 
 
 def _shown(spec: PolicySpec, view: ObservationFault) -> bool:
@@ -279,7 +279,7 @@ def _guess(
 
 def _held(case: AnswerSample) -> AnswerSample:
     """The same with a policy that does not move."""
-    return replace(case, given=np.tile(case.now, (len(case.wanted), 1)))
+    return replace(case, given=np.tile(case.now, (len(case.recorded), 1)))
 
 
 def _simplest(guesses: Sequence[Guess]) -> Guess | None:

@@ -89,15 +89,15 @@ def _case(policy: Policy, seen: Observation) -> AnswerSample | None:
     if kind == "delta_ee":
         now = np.tile([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0], 2)
     first = chunk[:1].copy()
-    wanted = now[None].copy()
-    return AnswerSample(space, first, wanted, now)
+    recorded = now[None].copy()
+    return AnswerSample(space, first, recorded, now)
 
 
 def odd(cases: Sequence[AnswerSample], action: str = "joint") -> tuple[list[str], str]:
-    """The same for first actions `given` (1, D) at the postures `wanted` (1, D)."""
+    """The same for first actions `given` (1, D) at the postures `recorded` (1, D)."""
     space = cases[0].space
     given = np.concatenate([case.given for case in cases])
-    wanted = np.concatenate([case.wanted for case in cases])
+    recorded = np.concatenate([case.recorded for case in cases])
     grips = given[:, space.grippers]
     found = []
     if grips.min() < -SLACK or grips.max() > 1 + SLACK:
@@ -105,12 +105,12 @@ def odd(cases: Sequence[AnswerSample], action: str = "joint") -> tuple[list[str]
             f"gripper numbers run from {grips.min():.3g} to {grips.max():.3g}; here 0 is closed "
             "and 1 open, and what lies outside is cut off"
         )
-    elif grips.min() >= 0 and grips.max() <= 0.12 and wanted[:, space.grippers].min() > 0.4:
+    elif grips.min() >= 0 and grips.max() <= 0.12 and recorded[:, space.grippers].min() > 0.4:
         found.append(
             f"gripper numbers stay below {grips.max():.3g} though the grippers are shown open: are "
             "they openings in metres? Here 1 is open"
         )
-    jump = _jump(given - wanted, space)
+    jump = _jump(given - recorded, space)
     unit = "rad" if space.kind == "joint" else "m"
     far = jump > JUMP[space.kind]
     if space.kind == "ee":
@@ -123,7 +123,7 @@ def odd(cases: Sequence[AnswerSample], action: str = "joint") -> tuple[list[str]
             )
     if action != "delta_ee":
         findings = judge(cases, {}, gain=GAIN)
-        grip = np.abs(given - wanted)[:, space.grippers].mean()
+        grip = np.abs(given - recorded)[:, space.grippers].mean()
         if findings.best is not None and (far or grip > TURNED or findings.base.score > 3):
             found.append(
                 f"the first action is far from the state; it looks as if {findings.best.phrase}"

@@ -19,7 +19,7 @@ WORST = 20.0
 
 @dataclass(frozen=True)
 class AnswerSample:
-    """One answer: `given` (K, D) beside what came next in the record, `wanted` (K, D).
+    """One answer: `given` (K, D) beside what came next in the record, `recorded` (K, D).
 
     `now` (D,) is the command at that frame, `track` (T, D) the whole record of which `now` is row
     `t`; `measured` the same as the robot measured it, if known. All in `space`, of the kind joint
@@ -28,7 +28,7 @@ class AnswerSample:
 
     space: ActionSpace
     given: Array
-    wanted: Array
+    recorded: Array
     now: Array
     track: Array | None = None
     t: int = 0
@@ -44,7 +44,7 @@ def groups(space: ActionSpace) -> list[str]:
 def errors(case: AnswerSample) -> Array:
     """Mean error of each of `groups`: [rad] over joints, [m], [rad] of turning, gripper 0..1."""
     found = []
-    a, b = case.given, case.wanted
+    a, b = case.given, case.recorded
     for arm in case.space.arms:
         if case.space.kind == "joint":
             found.append(np.abs(a[:, arm.body] - b[:, arm.body]).mean())

@@ -135,15 +135,15 @@ def _count(value: object) -> int:
 
 def _is_drawn(scenes: Sequence[Scene], key: str) -> bool:
     """True if the scenes of one level differ in this fact, which names no object and no place."""
-    said = set()
+    seen_values = set()
     for scene in scenes:
         value = scene.facts[key]
         names = {item.name for item in scene.objects}
         for item in value if isinstance(value, list) else [value]:
             if isinstance(item, float | list | dict) or item in names:
                 return False
-        said.add(str(value))
-    return len(said) > 1
+        seen_values.add(str(value))
+    return len(seen_values) > 1
 
 
 def _things(scenes: Mapping[int, Sequence[Scene]]) -> str:
@@ -251,13 +251,13 @@ def main(arguments: Sequence[str]) -> None:
     print(f"{PAGE}: {len(tasks())} tasks")
     if "--text" in arguments:
         return
-    wanted = [
+    requested = [
         task
         for task in tasks().values()
         if "--all" in arguments or not (PICTURES / picture_name(task)).exists()
     ]
     try:
-        print(f"{PICTURES}: {draw(wanted, PICTURES)} pictures")
+        print(f"{PICTURES}: {draw(requested, PICTURES)} pictures")
     except (RenderUnavailable, SceneUnstable) as error:
         sys.exit(f"no pictures: {error}")
 

@@ -138,15 +138,15 @@ def inverse(
     arm's `seeds`, aimed at the target, are tried in their order until one arrives. A target that
     is out of reach or beyond the joint limits has success False and the best joints found.
     """
-    wanted = np.stack([to_transform(t) for t in targets])
+    goal_frames = np.stack([to_transform(t) for t in targets])
     count = len(targets)
     if chain.links is not None:
-        local = np.linalg.inv(chain.base) @ wanted
+        local = np.linalg.inv(chain.base) @ goal_frames
         return arx.solve(chain.links, local, chain.lower, chain.upper)
     if near is not None:
         start = np.broadcast_to(np.asarray(near, dtype=float), (count, len(chain.axes)))
-        return _descend(chain, wanted, start)
-    local = np.linalg.inv(chain.base) @ wanted
+        return _descend(chain, goal_frames, start)
+    local = np.linalg.inv(chain.base) @ goal_frames
     aim = np.arctan2(local[:, 1, 3], local[:, 0, 3])
     joints = np.zeros((count, len(chain.axes)))
     arrived = np.zeros(count, dtype=bool)
@@ -156,7 +156,7 @@ def inverse(
             break
         start = np.repeat(seed[None], len(open_rows), axis=0)
         start[:, 0] += aim[open_rows]
-        found, ok = _descend(chain, wanted[open_rows], start)
+        found, ok = _descend(chain, goal_frames[open_rows], start)
         joints[open_rows] = found
         arrived[open_rows] = ok
     return joints, arrived

@@ -27,7 +27,7 @@ HELD_RADIUS = 0.06
 
 
 @dataclass(frozen=True)
-class Wanted:
+class OrientationTarget:
     """Object `name` is to lie with this `rotation`, its origin lower than `below` [m]."""
 
     name: str
@@ -36,20 +36,20 @@ class Wanted:
 
 
 class Restore:
-    """All of `wanted` at once; subtask i is object i. Success needs both grippers open.
+    """All of `targets` at once; subtask i is object i. Success needs both grippers open.
 
     `references` must not be moved: lifting one is an event, not a failure.
     """
 
     needs_contacts = False
 
-    def __init__(self, wanted: Sequence[Wanted], references: Sequence[str]) -> None:
-        self.total = len(wanted)
-        self._wanted = tuple(wanted)
+    def __init__(self, targets: Sequence[OrientationTarget], references: Sequence[str]) -> None:
+        self.total = len(targets)
+        self._targets = tuple(targets)
         self._references = tuple(references)
         self._flags = SubtaskFlags(self.total)
         self._places: dict[str, tuple[float, float]] = {}
-        names = [*(w.name for w in wanted), *references]
+        names = [*(w.name for w in targets), *references]
         self._lift_tracker = LiftTracker(names, radius=0.08)
         self._wrong_lifts = 0
         self._out_of_order = 0
@@ -58,12 +58,12 @@ class Restore:
     def roles(self) -> dict[str, ObjectRole]:
         """The objects to turn, and those that show how."""
         shown = {name: ObjectRole() for name in self._references}
-        return shown | {w.name: ObjectRole((i,)) for i, w in enumerate(self._wanted)}
+        return shown | {w.name: ObjectRole((i,)) for i, w in enumerate(self._targets)}
 
     def start(self, snapshot: Snapshot) -> tuple[Event, ...]:
         """Remember the places; an object never lies as wanted at the start."""
         self._lift_tracker.start(snapshot)
-        self._places = {w.name: snapshot.poses[w.name].position[:2] for w in self._wanted}
+        self._places = {w.name: snapshot.poses[w.name].position[:2] for w in self._targets}
         return ()
 
     def update(self, snapshot: Snapshot) -> tuple[Event, ...]:
@@ -74,27 +74,27 @@ class Restore:
             if event.kind == "grasped" and event.object in self._references:
                 self._wrong_lifts += 1
                 events += (Event(time, "wrong_object", event.object),)
-        for i, wanted in enumerate(self._wanted):
-            now = self._right(snapshot, wanted)
+        for i, target in enumerate(self._targets):
+            now = self._right(snapshot, target)
             if now and not self._flags.held[i]:
-                if closed_near(snapshot, snapshot.poses[wanted.name].position, HELD_RADIUS):
+                if closed_near(snapshot, snapshot.poses[target.name].position, HELD_RADIUS):
                     now = False
                 elif i not in self._flags.order and not all(self._flags.held[:i]):
                     self._out_of_order += 1
-                    events += (Event(time, "wrong_order", wanted.name, i),)
-            events += self._flags.set(i, now, time, wanted.name)
+                    events += (Event(time, "wrong_order", target.name, i),)
+            events += self._flags.set(i, now, time, target.name)
         if self._flags.all and grippers_open(snapshot):
             events += (Event(time, "success"),)
         return events
 
-    def _right(self, snapshot: Snapshot, wanted: Wanted) -> bool:
-        pose = snapshot.poses[wanted.name]
+    def _right(self, snapshot: Snapshot, target: OrientationTarget) -> bool:
+        pose = snapshot.poses[target.name]
         x, y, z = pose.position
-        px, py = self._places[wanted.name]
+        px, py = self._places[target.name]
         return (
-            z < wanted.below
+            z < target.below
             and math.hypot(x - px, y - py) < NEAR
-            and angle_between(pose.rotation, wanted.rotation) < TURN
+            and angle_between(pose.rotation, target.rotation) < TURN
         )
 
     def diagnostics(self) -> dict[str, float]:

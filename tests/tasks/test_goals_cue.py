@@ -13,7 +13,7 @@ from robospa.tasks.events import Event, outcome
 from robospa.tasks.goals.cue import MOVED_EARLY, AfterCue
 from robospa.tasks.goals.parts import Region
 from robospa.tasks.goals.placing import gather
-from robospa.tasks.goals.restore import Restore, Wanted
+from robospa.tasks.goals.restore import OrientationTarget, Restore
 from robospa.tasks.snapshot import Snapshot
 
 STRIP = Region((-0.26, 0.26), (-1.0, -0.11))
@@ -99,7 +99,7 @@ def turned(*yaws: float, shift: float = 0.0, lift: float = 0.0, gripper: float =
 def restore(*after: Snapshot) -> list[Event]:
     """Two blocks at yaw 0, wanted at 90 and 180 degrees."""
     quarter, half = yaw_rotation(math.pi / 2), yaw_rotation(math.pi)
-    goal = Restore([Wanted("a", quarter, 0.77), Wanted("b", half, 0.77)], [])
+    goal = Restore([OrientationTarget("a", quarter, 0.77), OrientationTarget("b", half, 0.77)], [])
     return run(goal, timed([turned(0, 0), *after]))
 
 

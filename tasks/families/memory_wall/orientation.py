@@ -18,7 +18,7 @@ from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.memory_wall.wall import HOLD_STILL, WALL, row, wall
 from robospa.tasks.families.tabletop import Item, named, side, standing
 from robospa.tasks.goals.cue import AfterCue
-from robospa.tasks.goals.restore import Restore, Wanted
+from robospa.tasks.goals.restore import OrientationTarget, Restore
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.instructions.words import NUMBERS
@@ -81,7 +81,8 @@ def goal(scene: Scene) -> AfterCue:
     """The near blocks turned like the far ones, after the wall has come."""
     pairs = zip(Facts.of(scene).near, Facts.of(scene).turns, strict=True)
     wanted = [
-        Wanted(name, yaw_rotation(TURNS[turn]), scene.table_top + LOW) for name, turn in pairs
+        OrientationTarget(name, yaw_rotation(TURNS[turn]), scene.table_top + LOW)
+        for name, turn in pairs
     ]
     return AfterCue(Restore(wanted, Facts.of(scene).far), [Facts.of(scene).wall])
 

@@ -172,16 +172,16 @@ def test_a_right_policy_fits_however_noisy(spec: Any, noise: float) -> None:
 
 def test_differences_of_pose_are_added_up_before_they_are_compared() -> None:
     now = MADE.ee[10].reshape(-1)
-    wanted = MADE.ee[11:31].reshape(-1, 16)
+    recorded = MADE.ee[11:31].reshape(-1, 16)
     deltas = []
-    for before, after in zip(np.vstack([now, wanted[:-1]]), wanted, strict=True):
+    for before, after in zip(np.vstack([now, recorded[:-1]]), recorded, strict=True):
         row: list[float] = []
         for a, b in zip(before.reshape(2, 8), after.reshape(2, 8), strict=True):
             one, two = (Pose(tuple(p[:3]), tuple(p[3:7])) for p in (a, b))
             step = one.inverse() * two
             row += [*step.position, *step.rotation, b[7]]
         deltas.append(row)
-    assert np.allclose(absolute(np.array(deltas), now, ActionSpace("ee")), wanted, atol=1e-9)
+    assert np.allclose(absolute(np.array(deltas), now, ActionSpace("ee")), recorded, atol=1e-9)
 
 
 def test_a_policy_that_learned_nothing_is_accused_of_nothing() -> None:
