@@ -9,12 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
-from robospa.results.records.trial_record import TrialRecord
-
-Happened = Mapping[str, Any]
-"""An event of a record."""
+from robospa.results.records.trial_record import EventRow, TrialRecord
 
 ORDERED = ("OCE", "MIP")
 """Categories whose steps have to be done in the order of their subtasks."""
@@ -33,7 +29,7 @@ class Cause:
     """A kind of failure, the event that shows it, and the sentence that says so."""
 
     kind: str
-    event: Happened
+    event: EventRow
     evidence: str
 
 
@@ -59,7 +55,7 @@ def roles_of(record: TrialRecord) -> dict[str, tuple[int, ...]]:
     return found
 
 
-def _worked(events: Sequence[Happened]) -> set[int]:
+def _worked(events: Sequence[EventRow]) -> set[int]:
     """Closings that led to a lift of their object before the next closing on it."""
     found: set[int] = set()
     for i, event in enumerate(events):
@@ -96,7 +92,7 @@ class _Reader:
     progress: float = -1.0
     mistakes: list[_Mistake] = field(default_factory=list)
 
-    def read(self, event: Happened) -> None:
+    def read(self, event: EventRow) -> None:
         kind = str(event["kind"])
         if event["object"] in self.pressed and kind in PRESSES and self.miss is not None:
             self.mistakes.remove(self.miss)  # it only made the gripper ready to press
@@ -108,7 +104,7 @@ class _Reader:
     def _add(
         self,
         kind: str,
-        event: Happened,
+        event: EventRow,
         evidence: str,
         needs: tuple[int, ...] = (),
         plain: bool = True,
@@ -117,7 +113,7 @@ class _Reader:
 
     # -- progress ------------------------------------------------------------------------------
 
-    def _subtask_done(self, event: Happened) -> None:
+    def _subtask_done(self, event: EventRow) -> None:
         index = event["index"]
         self.done.add(index)
         self.tried.add(index)
@@ -127,7 +123,7 @@ class _Reader:
             self.ever.add(index)
             self.progress = event["time"]
 
-    def _subtask_undone(self, event: Happened) -> None:
+    def _subtask_undone(self, event: EventRow) -> None:
         index = event["index"]
         self.done.discard(index)
         self.undone[index] = event["time"]
@@ -135,10 +131,10 @@ class _Reader:
 
     # -- attempts ------------------------------------------------------------------------------
 
-    def _grasped(self, event: Happened) -> None:
+    def _grasped(self, event: EventRow) -> None:
         self._taken(event, "lifted")
 
-    def _closed(self, event: Happened) -> None:
+    def _closed(self, event: EventRow) -> None:
         self.miss = None
         name, touching = event["object"], event.get("note") == "touching"
         if touching:
@@ -155,7 +151,7 @@ class _Reader:
         due = next((i for i in range(self.total) if i not in self.done), -1)
         return mine or (due,)
 
-    def _taken(self, event: Happened, did: str) -> None:
+    def _taken(self, event: EventRow, did: str) -> None:
         """A gripper has an object between its fingers: was it its turn?"""
         name = event["object"]
         subtasks = self.roles.get(name, ())
@@ -199,13 +195,13 @@ class _Reader:
         at, kind = event["time"], event["kind"]
         return bool(kind == "subtask_undone" and event["index"] == index and time - at < LATE)
 
-    def _dropped(self, event: Happened) -> None:
+    def _dropped(self, event: EventRow) -> None:
         name = event["object"]
         needs = self.roles.get(name, ())
         kind = "manipulation" if needs else "target_grounding"
         self._add(kind, event, f"dropped {name}", needs)
 
-    def _approached(self, event: Happened) -> None:
+    def _approached(self, event: EventRow) -> None:
         needs = self.roles.get(event["object"], ())
         if needs and any(i not in self.done for i in needs):
             evidence = f"reached {event['object']}, and nothing came of it"
@@ -213,7 +209,7 @@ class _Reader:
 
     # -- what goals say ------------------------------------------------------------------------
 
-    def _wrong_order(self, event: Happened) -> None:
+    def _wrong_order(self, event: EventRow) -> None:
         name = event["object"]
         kind = "memory" if self.category == MEMORY else "temporal_ordering"
         evidence = f"{name} was done before it was its turn"
@@ -225,11 +221,11 @@ class _Reader:
         needs = tuple(range(event["index"] + 1))
         self._add(kind, event, evidence, needs, plain=self.category in ORDERED)
 
-    def _repeated(self, event: Happened) -> None:
+    def _repeated(self, event: EventRow) -> None:
         evidence = f"{event['object']} was done once more than asked"
         self._add("redundant_repetition", event, evidence)
 
-    def _failed(self, event: Happened) -> None:
+    def _failed(self, event: EventRow) -> None:
         note = event.get("note", "")
         if not event["object"]:
             self._add("temporal_ordering", event, note or "acted too soon", (-1,))

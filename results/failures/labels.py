@@ -13,8 +13,8 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 from robospa.categories import SPATIAL
-from robospa.results.failures.attribution import Cause, Happened, roles_of, root_of
-from robospa.results.records.trial_record import TrialRecord
+from robospa.results.failures.attribution import Cause, roles_of, root_of
+from robospa.results.records.trial_record import EventRow, TrialRecord
 from robospa.trial import TrialKey
 
 NAMES = {
@@ -126,10 +126,10 @@ def _idle(record: TrialRecord) -> str:
 def _spatial(record: TrialRecord) -> Cause | None:
     """The selection is the first object that a gripper touched in closing, or lifted."""
     roles = roles_of(record)
-    beside: Happened | None = None
-    lost: Happened | None = None
-    reached: Happened | None = None
-    chosen: Happened | None = None
+    beside: EventRow | None = None
+    lost: EventRow | None = None
+    reached: EventRow | None = None
+    chosen: EventRow | None = None
     for event in record.events:
         kind, note = event["kind"], event.get("note", "")
         if kind == "grasped" or (kind == "closed" and note == "touching"):

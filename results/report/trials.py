@@ -8,10 +8,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from robospa.results.failures.attribution import Happened
 from robospa.results.failures.labels import NAMES, Failure
 from robospa.results.records.run_io import Run
-from robospa.results.records.trial_record import TrialRecord
+from robospa.results.records.trial_record import EventRow, TrialRecord
 from robospa.results.report.run_card import END_NAMES, NOT_RUN
 from robospa.trial import TrialKey
 
@@ -70,10 +69,10 @@ def _row(
     return {name: value for name, value in row.items() if value not in ("", None, [])}
 
 
-def event_row(event: Happened) -> list[float | str]:
+def event_row(event: EventRow) -> list[float | str]:
     """Simulated time [s], kind, and the rest in words."""
     kind = str(event.get("kind", "")).replace("_", " ")
-    words = [str(event[name]) for name in ("object", "note") if event.get(name)]
+    words = [text for text in (event.get("object"), event.get("note")) if text]
     if int(event.get("index", -1)) >= 0:
         words.insert(0, f"#{int(event['index']) + 1}")
     return [round(float(event.get("time", 0.0)), 2), kind, " ".join(words)]
