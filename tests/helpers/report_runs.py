@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from fake_records import trial_record
 
 from robospa.results.records.run_io import Run, read_run, to_line
 from robospa.results.records.trial_record import TrialRecord
@@ -18,22 +19,16 @@ CATEGORY_OF = {"Pick_Blocks_Size": "GAC", "Press_Stapler_Repeat": "RPF"}
 
 
 def record(task: str, level: int, seed: int, success: bool, **changes: object) -> TrialRecord:
-    made = TrialRecord(
-        key=TrialKey(task, level, seed),
+    made = trial_record(
+        TrialKey(task, level, seed),
+        success,
         category="GAC" if task.startswith("Pick") else "RPF",
         instruction="take it",
-        scene_digest="s",
-        end="success" if success else "step_limit",
-        success=success,
-        done=int(success),
-        best=int(success),
         total=1 if task.startswith("Pick") else 2,
         candidates=4,
         steps=10,
         physics_steps=500,
         policy_calls=2,
-        digest="d",
-        actions_digest="a",
         wall_time=2.0,
         latency={"p50": 5.0, "p95": 6.0, "p99": 7.0, "max": 8.0},
         timing={"physics": 1.0, "waiting": 0.5},

@@ -8,6 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from fake_records import trial_record
+
 from robospa.results.records.run_io import Run, read_run, to_line
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
@@ -21,13 +23,11 @@ def record(
     """A believable result."""
     success = done == total
     name = f"{task}{level}{seed}"
-    made = TrialRecord(
-        key=TrialKey(task, level, seed),
+    made = trial_record(
+        TrialKey(task, level, seed),
+        success,
         category=CATEGORIES.get(task, "GAC"),
-        instruction="do it",
         scene_digest=f"scene {name}",
-        end="success" if success else "step_limit",
-        success=success,
         done=done,
         best=done,
         total=total,

@@ -7,6 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 import pytest
+from fake_records import trial_record
 
 from robospa.harness.cli.main import main
 from robospa.results.records.run_io import to_line
@@ -18,10 +19,17 @@ LIFT = {"time": 3.0, "kind": "grasped", "object": "b", "index": -1, "note": "", 
 
 def record(seed: int, end: str) -> TrialRecord:
     key = TrialKey("Pick_Blocks_Size", 2, seed)
-    return TrialRecord(
-        key, "GAC", "", "", end, end == "success", 0, 0, 1, 3, 9, 900, 1, "", "", 1.0,
-        events=(LIFT,), diagnostics={"roles": {"a": [0], "b": []}}, video="videos/x.mp4",
-    )  # fmt: skip
+    return trial_record(
+        key,
+        end == "success",
+        end=end,
+        candidates=3,
+        steps=9,
+        physics_steps=900,
+        events=(LIFT,),
+        diagnostics={"roles": {"a": [0], "b": []}},
+        video="videos/x.mp4",
+    )
 
 
 @pytest.fixture

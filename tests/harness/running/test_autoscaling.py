@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import pytest
+from fake_records import trial_record
 
 from robospa.harness.running.autoscaling import Autoscaler, most_workers
-from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
 KEY = TrialKey("Pick_Fake", 1, 1)
@@ -13,10 +13,7 @@ KEY = TrialKey("Pick_Fake", 1, 1)
 
 def run_round(scaler: Autoscaler, waiting: float, trials: int | None = None) -> None:
     """A round of trials of 1 s each in which a process did nothing for `waiting`."""
-    record = TrialRecord(
-        KEY, "GAC", "go", "", "success", True, 1, 1, 1, 2, 1, 50, 1, "", "", 1.0,
-        timing={"processor": 1.0 - waiting},
-    )  # fmt: skip
+    record = trial_record(KEY, True, timing={"processor": 1.0 - waiting})
     for _ in range(trials or scaler.target):
         scaler.add(record)
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import io
 
+from fake_records import trial_record
+
 from robospa.harness.running.progress import ROWS, Progress, Tally, clock, details, summary
 from robospa.harness.running.server_stats import ServerStats
 from robospa.harness.running.status import Status
@@ -15,9 +17,7 @@ LONG, SHORT = TrialKey("Long", 5, 1), TrialKey("Short", 1, 1)
 
 def record(key: TrialKey, end: str = "success") -> TrialRecord:
     won = end == "success"
-    return TrialRecord(
-        key, "GAC", "go", "", end, won, int(won), int(won), 1, 2, 1, 50, 1, "", "", 0.1
-    )
+    return trial_record(key, won, end=end)
 
 
 def test_lost_trials_are_no_failures() -> None:

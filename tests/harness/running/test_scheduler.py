@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 import pytest
+from fake_records import trial_record
 from run_fakes import fake_task_of
 
 from robospa.harness.running.queue import TrialQueue
@@ -25,10 +26,12 @@ def keys(tasks: Sequence[str] = TASKS, trials: int = 20) -> list[TrialKey]:
 
 
 def record(key: TrialKey, latency: float, told: Mapping[str, float] | None = None) -> TrialRecord:
-    return TrialRecord(
-        key, "GAC", "go", "", "success", True, 1, 1, 1, 2, 1, 50, 1, "", "", 0.1,
+    return trial_record(
+        key,
+        True,
+        wall_time=0.1,
         latency={"p50": latency, "p95": latency, "p99": latency, "max": latency, **(told or {})},
-    )  # fmt: skip
+    )
 
 
 @dataclass

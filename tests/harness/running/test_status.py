@@ -5,20 +5,17 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from fake_records import trial_record
 
 from robospa.harness.running.server_stats import ServerStats
 from robospa.harness.running.status import Status, TimeBreakdown, server_text, shares_text
-from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
 KEY = TrialKey("Pick_Fake", 1, 1)
 
 
 def record(wall: float = 10.0, latency: dict[str, float] | None = None, **timing: float) -> Any:
-    return TrialRecord(
-        KEY, "GAC", "go", "", "success", True, 1, 1, 1, 2, 1, 50, 1, "", "", wall,
-        timing=timing, latency=latency or {},
-    )  # fmt: skip
+    return trial_record(KEY, True, wall_time=wall, timing=timing, latency=latency or {})
 
 
 def server(running: int = 4, p50: float = 120.0, **means: float) -> ServerStats:

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import pytest
+from fake_records import trial_record
 
 from robospa.results.failures.labels import KINDS, NAMES, distribution, label
 from robospa.results.failures.listing import counts_table, trials_table
@@ -40,13 +41,21 @@ def failed(
     seed: int = 1,
 ) -> TrialRecord:
     """A failed trial of a category with these events."""
-    return TrialRecord(
-        TrialKey(f"Task_{category}", 3, seed), category, "", "", end, False, done, done, 3, 3,
-        100, 5000, 10, "", "", 1.0,
+    return trial_record(
+        TrialKey(f"Task_{category}", 3, seed),
+        category=category,
+        end=end,
+        done=done,
+        best=done,
+        total=3,
+        candidates=3,
+        steps=100,
+        physics_steps=5000,
+        policy_calls=10,
         events=events(rows),
         diagnostics={} if roles is None else {"roles": roles},
         video=video,
-    )  # fmt: skip
+    )
 
 
 def kind(record: TrialRecord) -> str:

@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from fake_records import trial_record
 
 from robospa.results.failures.labels import KINDS, distribution
 from robospa.results.figures.draw import draw
@@ -24,23 +25,14 @@ def published(model: str) -> Series:
 
 
 def trial(task: str, category: str, level: int, seed: int, success: bool) -> TrialRecord:
-    return TrialRecord(
-        key=TrialKey(task, level, seed),
+    return trial_record(
+        TrialKey(task, level, seed),
+        success,
         category=category,
-        instruction="",
-        scene_digest="",
-        end="success" if success else "step_limit",
-        success=success,
         done=level if success else level - 1,
         best=level,
         total=level,
         candidates=3,
-        steps=9,
-        physics_steps=9,
-        policy_calls=1,
-        digest="",
-        actions_digest="",
-        wall_time=1.0,
         latency={"p50": 4.0 + seed, "p95": 6.0, "p99": 9.0, "max": 9.0},
     )
 

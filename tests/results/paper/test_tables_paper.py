@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from fake_records import trial_record
 
 from robospa.results.paper.columns import published_column, run_column
 from robospa.results.paper.published import LEVELS, load
@@ -22,23 +23,14 @@ DATA = load()
 
 
 def record(key: TrialKey, success: bool, done: int, total: int, candidates: int) -> TrialRecord:
-    return TrialRecord(
-        key=key,
+    return trial_record(
+        key,
+        success,
         category=DATA.tasks[key.task].category if key.task in DATA.tasks else "",
-        instruction="",
-        scene_digest="",
-        end="success" if success else "step_limit",
-        success=success,
         done=done,
         best=done,
         total=total,
         candidates=candidates,
-        steps=1,
-        physics_steps=1,
-        policy_calls=1,
-        digest="",
-        actions_digest="",
-        wall_time=1.0,
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
+from fake_records import trial_record
 
 from robospa.results.paper.columns import published_column
 from robospa.results.records.trial_record import TrialRecord
@@ -12,24 +13,7 @@ from robospa.results.scoring.scores import Scores, score
 from robospa.results.statistics.intervals import METHODS
 from robospa.trial import TrialKey
 
-BASE = TrialRecord(
-    key=TrialKey("A", 1, 0),
-    category="GAC",
-    instruction="",
-    scene_digest="",
-    end="step_limit",
-    success=False,
-    done=0,
-    best=0,
-    total=1,
-    candidates=2,
-    steps=1,
-    physics_steps=1,
-    policy_calls=1,
-    digest="",
-    actions_digest="",
-    wall_time=1.0,
-)
+BASE = trial_record(TrialKey("A", 1, 0))
 
 
 def trial(task: str, category: str, seed: int, done: int, total: int = 1) -> TrialRecord:
