@@ -200,7 +200,7 @@ def check_record(record: TrialRecord, reference: Reference, run_seed: int) -> No
         ("policy_seed", record.policy_seed, policy_seed(key, run_seed)),
     ):
         if found != right:
-            raise BundleError(f"{key.slug}: {name} is {found!a}, not {right!r}")
+            raise BundleError(f"{key.slug}: {name} is {ascii(found)[:40]}, not {right!r}")
     if min(record.attempts - 1, record.policy_calls, record.physics_steps, record.wall_time) < 0:
         raise BundleError(f"{key.slug} counts attempts, calls, steps or seconds below zero")
     if not 0 <= record.steps <= facts.steps:
