@@ -8,7 +8,7 @@ from functools import cache
 import pytest
 from drawn_scenes import assert_near_uniform, index_of
 
-from robospa.tasks.catalog import build_scene
+from robospa.tasks.catalog import build_scene, tasks
 from robospa.tasks.objects import object_model
 from robospa.tasks.sampling.region import Area
 from robospa.tasks.scene import Scene
@@ -43,6 +43,20 @@ def scenes(name: str, level: int) -> tuple[Scene, ...]:
 def test_target_is_any_name(name: str, level: int) -> None:
     found = scenes(name, level)
     assert_near_uniform((index_of(s) for s in found), len(found[0].objects))
+
+
+OTHERS = [
+    t.name
+    for t in tasks().values()
+    if t.category in ("GAC", "SDE", "CBG") and t.name not in (BLOCKS, DISTANCE)
+]
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_no_place_in_the_list_is_that_of_the_target(name: str) -> None:
+    for level in LEVELS:
+        found = [build_scene(name, level, seed) for seed in range(700_000, 700_060)]
+        assert_near_uniform((index_of(s) for s in found), len(found[0].objects))
 
 
 @each_variant
