@@ -23,7 +23,7 @@ TIME_LIMIT = 120.0
 
 
 @dataclass(frozen=True)
-class Finding:
+class SystemCheck:
     """One finding: `fix` is the one thing to do, empty if `ok`."""
 
     name: str
@@ -32,7 +32,7 @@ class Finding:
     fix: str = ""
 
 
-def run_checks() -> Iterator[Finding]:
+def run_checks() -> Iterator[SystemCheck]:
     """All checks, in the order in which they build on each other, as they are done.
 
     After a failed "simulator" check the ones that need it are left out.
@@ -47,20 +47,20 @@ def run_checks() -> Iterator[Finding]:
         yield _run("first picture", "check_picture", DRIVER)
 
 
-def _run(name: str, function: str, fix: str) -> Finding:
+def _run(name: str, function: str, fix: str) -> SystemCheck:
     """One check function of this module, in a child process."""
     code = f"from robospa.harness import doctor; doctor.report(doctor.{function})"
     command = [sys.executable, "-W", "ignore", "-c", code]
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=TIME_LIMIT)
     except subprocess.TimeoutExpired:
-        return Finding(name, False, f"no answer within {TIME_LIMIT:g} s", fix)
+        return SystemCheck(name, False, f"no answer within {TIME_LIMIT:g} s", fix)
     lines = done.stdout.splitlines()
     if lines and lines[-1].startswith("{"):
         found = json.loads(lines[-1])
-        return Finding(name, found["ok"], found["detail"], "" if found["ok"] else fix)
+        return SystemCheck(name, found["ok"], found["detail"], "" if found["ok"] else fix)
     why = (done.stderr.strip().splitlines() or [f"it ended with code {done.returncode}"])[-1]
-    return Finding(name, False, f"the check itself broke: {why}", fix)
+    return SystemCheck(name, False, f"the check itself broke: {why}", fix)
 
 
 def report(check: Callable[[], str]) -> None:

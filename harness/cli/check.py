@@ -198,7 +198,7 @@ def show(console: Console, findings: Findings, name: str, options: Mapping[str, 
         share = f"{guess.helped:.0%}" if guess.names else ""
         style = "bold" if guess is findings.best else ""
         table.add_row(
-            escape(label), *findings.told(guess), f"{guess.score:.2f}", share, style=style
+            escape(label), *findings.describe(guess), f"{guess.score:.2f}", share, style=style
         )
     console.print(table)
     for text in findings.untried:

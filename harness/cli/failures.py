@@ -16,7 +16,7 @@ def failures(
     ] = False,
     layout: Annotated[str, typer.Option("--format", help="markdown, csv or json")] = "markdown",
 ) -> None:
-    """Print the types of failure in a run; docs/failures.md says how they are told."""
+    """Print the types of failure in a run; docs/failures.md says how they are decided."""
     from robospa.results.failures.labels import OURS, label
     from robospa.results.failures.listing import counts_table, trials_table
     from robospa.results.records.run_io import read_run

@@ -100,7 +100,7 @@ class Findings:
     frames: tuple[int, ...]
     untried: tuple[str, ...] = ()
 
-    def told(self, guess: Guess) -> list[str]:
+    def describe(self, guess: Guess) -> list[str]:
         """The errors of `guess` with their units."""
         names = [name.split()[1] for name in self.groups]
         return [f"{e:.3f} {UNITS[n]}".strip() for e, n in zip(guess.errors, names, strict=True)]

@@ -119,7 +119,7 @@ def test_the_doctor_checks_the_policy_too(
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    found = [doctor.Finding("simulator", machine, "seen", "" if machine else "install it")]
+    found = [doctor.SystemCheck("simulator", machine, "seen", "" if machine else "install it")]
     monkeypatch.setattr(doctor, "run_checks", lambda: iter(found))
     monkeypatch.setattr("robospa.harness.conformance_rollout.rollouts", rows(True, True))
     make = NanPolicy if bad else FakePolicy
