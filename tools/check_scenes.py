@@ -33,7 +33,8 @@ SHOWN = 5
 
 def look(name: str, level: int, scenes: int) -> dict[str, Any]:
     """The findings in `scenes` scenes of one variant."""
-    from scene_checks import RULES, drawn
+    from scene_answers import drawn
+    from scene_checks import RULES
 
     start_time = time.process_time()
     broken: Counter[str] = Counter()
