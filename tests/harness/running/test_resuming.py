@@ -34,10 +34,10 @@ def edit(folder: Path, **changes: Any) -> None:
         ({"about": {"code": "a", "versions": {"numpy": "1"}}}, "versions.numpy: '1' -> '2'"),
         ({"about": {}}, "code"),
         ({"settings": {"run_seed": 7}}, "run_seed: 7 -> 0"),
-        ({"settings": [1]}, "settings is no map"),
+        ({"settings": [1]}, "'settings' must be a map, not a list"),
         ({"trials": []}, f"trials: {len(KEYS)} new and 0 gone"),
         ({"trials": 3}, "it has no list of trials"),
-        ({"trials": [{"task": "A"}]}, "list of trials is malformed: KeyError"),
+        ({"trials": [{"task": "A"}]}, "'[0]' lacks the field 'level'"),
     ],
 )
 def test_another_run_is_not_gone_on_with(
@@ -61,16 +61,22 @@ def test_a_manifest_that_is_none_is_named(tmp_path: Path, text: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "value"),
-    [("task", "../../x"), ("task", 3), ("level", "1"), ("seeds", "123"), ("seeds", [1e308])],
+    ("name", "value", "sentence"),
+    [
+        ("task", "../../x", r"'\[0\]\.task' must be a plain name .* not '\.\./\.\./x'"),
+        ("task", 3, r"'\[0\]\.task' must be text, not 3"),
+        ("level", "1", r"'\[0\]\.level' must be a whole number, not '1'"),
+        ("seeds", "123", r"'\[0\]\.seeds' must be a list, not '123'"),
+        ("seeds", [1e308], r"'\[0\]\.seeds\[0\]' must be a whole number, not 1e\+308"),
+    ],
 )
 def test_names_that_would_be_paths_and_numbers_that_are_none_are_refused(
-    tmp_path: Path, name: str, value: Any
+    tmp_path: Path, name: str, value: Any, sentence: str
 ) -> None:
     write_manifest(tmp_path, MANIFEST)
     rows = json.loads((tmp_path / "run.json").read_text())["trials"]
     rows[0][name] = value
-    with pytest.raises(RunError, match="list of trials is malformed"):
+    with pytest.raises(RunError, match=f"manifest's list of trials: {sentence}"):
         manifest_keys({"trials": rows})
 
 
