@@ -77,14 +77,3 @@ def turning_vector(matrix: Array) -> Array:
         ],
         axis=-1,
     )
-
-
-def axis_transforms(axis: Array, angles: Array) -> Array:
-    """(N, 4, 4) rotations by `angles` (N,) [rad] about one unit axis (Rodrigues)."""
-    x, y, z = axis
-    k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    out = np.zeros((len(angles), 4, 4))
-    s, c = np.sin(angles)[:, None, None], (1 - np.cos(angles))[:, None, None]
-    out[:, :3, :3] = np.eye(3) + s * k + c * (k @ k)
-    out[:, 3, 3] = 1
-    return out

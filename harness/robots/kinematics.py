@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from robospa.geometry import Array, Pose, from_transform, to_transform
 from robospa.harness.robots import arx
 from robospa.harness.robots.embodiment import Arm
-from robospa.rotations import axis_transforms, turning_vector
+from robospa.rotations import turning_vector
 
 POSITION_TOLERANCE = 2e-5  # [m]
 ROTATION_TOLERANCE = 5e-5  # [rad]
@@ -35,6 +35,7 @@ EXACT = 1e-6  # [m] and [rad], of what Newton steps have to leave
 START_SLACK = 0.4
 """A start so far [rad] beyond the working limits leads to no solution within them."""
 LIMIT_SLACK = 1e-9  # [rad]
+EYE = np.eye(3)
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,8 @@ class Chain:
     base: Array  # (4, 4)
     origins: Array  # (J, 4, 4)
     axes: Array  # (J, 3)
+    cross: Array  # (J, 3, 3) cross product with each axis, as a matrix
+    cross_twice: Array  # (J, 3, 3) its square
     tool: Array  # (4, 4)
     lower: Array  # (J,) joint limits
     upper: Array  # (J,)
@@ -58,11 +61,16 @@ def chain_of(arm: Arm) -> Chain:
     """The arm's joints as arrays, ending in its end-effector frame. Made once for equal arms."""
     origins = np.stack([to_transform(j.origin) for j in arm.joints])
     tool = to_transform(arm.tool)
+    cross = np.array(
+        [[[0, -z, y], [z, 0, -x], [-y, x, 0]] for x, y, z in (j.axis for j in arm.joints)]
+    )
     working = arm.working or [(joint.lower, joint.upper) for joint in arm.joints]
     return Chain(
         base=to_transform(arm.base),
         origins=origins,
         axes=np.array([j.axis for j in arm.joints], dtype=float),
+        cross=cross,
+        cross_twice=cross @ cross,
         tool=tool,
         links=arx.links_of(origins, tool) if arm.geometry == "arx" else None,
         working_lower=np.array([low for low, _ in working]),
@@ -73,12 +81,25 @@ def chain_of(arm: Arm) -> Chain:
     )
 
 
+def _joint_turns(chain: Chain, joints: Array) -> Array:
+    """(J, N, 4, 4) rotations of each joint by joints (N, J) [rad] about its axis (Rodrigues)."""
+    angles = joints.T[:, :, None, None]
+    turns = np.zeros((*joints.T.shape, 4, 4))
+    turns[..., :3, :3] = (
+        EYE
+        + np.sin(angles) * chain.cross[:, None]
+        + (1 - np.cos(angles)) * chain.cross_twice[:, None]
+    )
+    turns[..., 3, 3] = 1
+    return turns
+
+
 def link_frames(chain: Chain, joints: Array) -> list[Array]:
     """Transforms (N, 4, 4) of the links that joints (N, J) move, in the world, base first."""
     frame = np.broadcast_to(chain.base, (len(joints), 4, 4))
     frames = []
-    for i in range(joints.shape[1]):
-        frame = frame @ chain.origins[i] @ axis_transforms(chain.axes[i], joints[:, i])
+    for origin, turn in zip(chain.origins, _joint_turns(chain, joints), strict=True):
+        frame = frame @ origin @ turn
         frames.append(frame)
     return frames
 
@@ -86,18 +107,18 @@ def link_frames(chain: Chain, joints: Array) -> list[Array]:
 def forward(chain: Chain, joints: Array) -> tuple[Array, Array]:
     """End-effector transforms (N, 4, 4) and geometric Jacobians (N, 6, J) of joints (N, J)."""
     count, width = joints.shape
-    frame = np.broadcast_to(chain.base, (count, 4, 4))
-    points, axes = [], []
-    for i in range(width):
-        frame = frame @ chain.origins[i]
-        points.append(frame[:, :3, 3])
-        axes.append(frame[:, :3, :3] @ chain.axes[i])
-        frame = frame @ axis_transforms(chain.axes[i], joints[:, i])
-    frame = frame @ chain.tool
-    axis = np.stack(axes, axis=2)  # (N, 3, J)
-    arm = frame[:, :3, 3:4] - np.stack(points, axis=2)
-    linear = np.cross(axis, arm, axis=1)
-    return frame, np.concatenate([linear, axis], axis=1)
+    before = np.empty((width, count, 4, 4))  # frames of the joints, not turned yet
+    before[0] = chain.base @ chain.origins[0]
+    turns = _joint_turns(chain, joints)
+    for i, origin in enumerate(chain.origins[1:]):
+        np.matmul(before[i] @ turns[i], origin, out=before[i + 1])
+    frame = before[-1] @ turns[-1] @ chain.tool
+    axes = before[..., :3, :3] @ chain.axes[:, None, :, None]
+    x, y, z = axes[..., 0].transpose(2, 1, 0)  # (N, J) each
+    p, q, r = (frame[:, :3, 3] - before[..., :3, 3]).transpose(2, 1, 0)
+    rows = [y * r - z * q, z * p - x * r, x * q - y * p, x, y, z]
+    # `out`, since the last bits of products depend on how their factors lie in memory.
+    return frame, np.stack(rows, axis=1, out=np.empty((count, 6, width)))
 
 
 def end_effector(chain: Chain, joints: Sequence[float]) -> Pose:
@@ -109,8 +130,8 @@ def _errors(frame: Array, target: Array) -> Array:
     """(N, 6) position and rotation-vector errors from frames to targets."""
     turn = target[:, :3, :3] @ frame[:, :3, :3].transpose(0, 2, 1)
     vector = turning_vector(turn)
-    sine = np.linalg.norm(vector, axis=1) / 2
-    cosine = (np.trace(turn, axis1=1, axis2=2) - 1) / 2
+    sine = np.sqrt((vector * vector).sum(axis=1)) / 2
+    cosine = (turn[:, 0, 0] + turn[:, 1, 1] + turn[:, 2, 2] - 1) / 2
     angle = np.arctan2(sine, cosine)
     scale = np.where(sine > 1e-6, angle / np.maximum(2 * sine, 1e-12), 0.5)
     return np.concatenate([target[:, :3, 3] - frame[:, :3, 3], vector * scale[:, None]], axis=1)
@@ -146,8 +167,8 @@ def _descend(chain: Chain, targets: Array, joints: Array) -> tuple[Array, NDArra
             break
         transposed = jacobian.transpose(0, 2, 1)
         step = np.linalg.solve(transposed @ jacobian + damping, transposed @ error[:, :, None])
-        change = np.clip(step[:, :, 0], -STEP_LIMIT, STEP_LIMIT)
-        joints[active] = np.clip(joints[active] + change, lower, upper)
+        change = step[:, :, 0].clip(-STEP_LIMIT, STEP_LIMIT)
+        joints[active] = (joints[active] + change).clip(lower, upper)
     return joints, arrived
 
 
@@ -194,15 +215,15 @@ def inverse(
         return _descend(chain, goal_frames, start)
     local = np.linalg.inv(chain.base) @ goal_frames
     aim = np.arctan2(local[:, 1, 3], local[:, 0, 3])
-    joints = np.zeros((count, len(chain.axes)))
-    arrived = np.zeros(count, dtype=bool)
-    for seed in chain.seeds:
-        open_rows = np.flatnonzero(~arrived)
-        if not len(open_rows):
-            break
-        start = np.repeat(seed[None], len(open_rows), axis=0)
-        start[:, 0] += aim[open_rows]
-        found, ok = _descend(chain, goal_frames[open_rows], start)
-        joints[open_rows] = found
-        arrived[open_rows] = ok
+    postures = chain.seeds[:, None] + np.pad(aim[:, None], ((0, 0), (0, len(chain.axes) - 1)))
+    joints, arrived = _descend(chain, goal_frames, postures[0])
+    open_rows = np.flatnonzero(~arrived)
+    if len(open_rows) and len(postures) > 1:  # all other postures at once: a row costs little
+        others = postures[1:, open_rows]
+        goals = np.tile(goal_frames[open_rows], (len(others), 1, 1))
+        found, ok = _descend(chain, goals, others.reshape(-1, len(chain.axes)))
+        found, ok = found.reshape(others.shape), ok.reshape(others.shape[:2])
+        best = np.where(ok.any(axis=0), ok.argmax(axis=0), len(others) - 1)
+        joints[open_rows] = found[best, np.arange(len(open_rows))]
+        arrived[open_rows] = ok.any(axis=0)
     return joints, arrived

@@ -27,7 +27,7 @@ GOAL = 0.95
 class Row:
     """What came of the seeds of a variant that were tried in a row from `start` up.
 
-    `seconds` is the mean of a solved trial on one core; `inputs` names what it was made with;
+    `seconds` is the mean processor time of a solved trial; `inputs` names what it was made with;
     `reasons` are those of refusals, most frequent first, with # for every number.
     """
 

@@ -51,12 +51,3 @@ def test_the_angle_of_a_tiny_turn_is_exact() -> None:
     np.testing.assert_allclose(
         rotations.angle_between(np.array([[1.0, 0, 0, 0]]), turned), 1e-8, rtol=1e-9
     )
-
-
-def test_rotations_about_an_axis_are_scipys() -> None:
-    axis = np.array([2.0, -1, 2]) / 3
-    angles = np.linspace(-3, 3, 7)
-    found = rotations.axis_transforms(axis, angles)
-    wanted = Rotation.from_rotvec(axis * angles[:, None]).as_matrix()
-    np.testing.assert_allclose(found[:, :3, :3], wanted, atol=1e-14)
-    assert (found[:, 3] == [0, 0, 0, 1]).all() and (found[:, :3, 3] == 0).all()

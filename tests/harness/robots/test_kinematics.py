@@ -51,6 +51,21 @@ def test_out_of_reach_is_said_not_raised() -> None:
     assert ok.tolist() == [False, True]
 
 
+@pytest.mark.parametrize("robot", ["aloha-agilex", "piper", "franka-panda"])
+def test_answers_do_not_depend_on_the_targets_beside_them(robot: str) -> None:
+    """Some of these targets are found from the first posture, some from later ones, some never."""
+    chain = chain_of(embodiment(robot).arms[0])
+    rng = np.random.default_rng(5)
+    limits = chain.working_lower.clip(-3, 3), chain.working_upper.clip(-3, 3)
+    frames, _ = forward(chain, rng.uniform(*limits, (40, len(chain.axes))))
+    poses = [from_transform(frame) for frame in frames]
+    joints, ok = inverse(chain, poses)
+    alone = [inverse(chain, [pose]) for pose in poses]
+    assert 0 < ok.sum() < len(poses)
+    assert [bool(one[1][0]) for one in alone] == ok.tolist()
+    assert all(np.array_equal(one[0][0], row) for one, row in zip(alone, joints, strict=True))
+
+
 def test_jacobian_is_the_derivative() -> None:
     chain = chain_of(ARMS[1])
     joints = random_joints(ARMS[1], 1)
