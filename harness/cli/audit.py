@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from robospa.harness.cli.ranges import between
+from robospa.harness.cli.settings_flags import Token
 
 if TYPE_CHECKING:
     from robospa.results.records.run_io import Run
@@ -42,9 +43,7 @@ def audit(
     sentences: Annotated[
         int, typer.Option(callback=COUNT, help="with --policy: trials to ask it for")
     ] = 10,
-    token: Annotated[
-        str | None, typer.Option(envvar="ROBOSPA_TOKEN", help="bearer token of the server")
-    ] = None,
+    token: Token = None,
     as_json: Annotated[bool, typer.Option("--json", help="print JSON")] = False,
 ) -> None:
     """Look for signs that a run is not what it says: a sentence for each, with its number.

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from robospa.harness.cli.ranges import DAYS, TRIALS, between
+from robospa.harness.cli.settings_flags import Token
 from robospa.harness.clock.latency import latency_json
 from robospa.terminal import plain_console
 
@@ -47,9 +48,7 @@ SHOWN = 6
 
 def check(
     url: Annotated[str, typer.Argument(help="Policy server, such as ws://localhost:8000.")],
-    token: Annotated[
-        str | None, typer.Option(envvar="ROBOSPA_TOKEN", help="Bearer token of the server.")
-    ] = None,
+    token: Token = None,
     wait: Annotated[
         float, typer.Option(callback=DAYS, help="Seconds to wait until it listens.")
     ] = 0.0,

@@ -14,6 +14,7 @@ import typer
 
 from robospa.harness.cli.json_output import AsJson, aside, print_json
 from robospa.harness.cli.ranges import PROCESSES, SHARE, TRIALS
+from robospa.harness.cli.settings_flags import Token
 
 LEADERBOARD = "robospa.leaderboard"
 submit = typer.Typer(
@@ -203,9 +204,7 @@ def reproduce(
         int, typer.Option(callback=PROCESSES, help="worker processes; 0 for one per core")
     ] = 0,
     alpha: Annotated[float, typer.Option(callback=SHARE, help="level of the test")] = 0.01,
-    token: Annotated[
-        str | None, typer.Option(envvar="ROBOSPA_TOKEN", help="bearer token of the server")
-    ] = None,
+    token: Token = None,
     practice: Annotated[
         bool, typer.Option("--practice", help="accept bundles for practice")
     ] = False,
