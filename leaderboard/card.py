@@ -1,5 +1,6 @@
 """The model card: who made what was evaluated, from which data, and where its weights are.
 
+Weights are at a https address, or remade by a script of this repository ("recipe:scripts/x.sh").
 Written as TOML (`robospa submit template`), which Python reads without a further dependency; kept
 in the bundle as JSON. Every field is required, of one type, of bounded length, and plain text:
 markup, scripts and invisible characters are refused, since names end up on a page.
@@ -22,11 +23,17 @@ from robospa.leaderboard.strict_json import check_text
 from robospa.schema import Sha256, one_of, pattern, read
 
 LINK = re.compile(r"https://[A-Za-z0-9.-]+(:[0-9]+)?(/[A-Za-z0-9._~/%+=@:,-]*)?")
+RECIPE = re.compile(r"recipe:(scripts/[a-z0-9_]{1,60}\.sh)")
+"""The script of this repository that remakes weights."""
 ALL = "all"
 """The checkpoint of a model that does every task."""
 
-Link = Annotated[
-    str, pattern(rf"(?=.{{1,300}}\Z){LINK.pattern}", "a https address of at most 300 characters")
+Source = Annotated[
+    str,
+    pattern(
+        rf"(?=.{{1,300}}\Z)(?:{LINK.pattern}|{RECIPE.pattern})",
+        "a https address of at most 300 characters, or recipe:scripts/NAME.sh of this repository",
+    ),
 ]
 Demonstrations = Annotated[int, Meta(ge=0, le=10**7)]
 
@@ -58,9 +65,9 @@ class Actions(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Checkpoint(Struct, frozen=True, forbid_unknown_fields=True):
-    """Where weights are, and their hash."""
+    """Where weights are, or the recipe that remakes them, and their hash."""
 
-    reference: Link
+    reference: Source
     sha256: Sha256
 
 
@@ -71,7 +78,7 @@ class Card(Struct, frozen=True, forbid_unknown_fields=True):
     team: Annotated[str, _plain(200)]
     licence: Annotated[str, _plain(80)]
     parameters: Annotated[int, Meta(ge=0, le=10**14)]
-    link: Link
+    link: Source
     training: Training
     actions: Actions
     checkpoints: dict[str, Checkpoint]
@@ -79,6 +86,12 @@ class Card(Struct, frozen=True, forbid_unknown_fields=True):
     def __post_init__(self) -> None:
         if not (self.name + self.team + self.licence).isprintable():
             raise ValueError("name, team and licence may hold printable characters only")
+
+
+def recipe_of(source: str) -> str | None:
+    """The path of the script that a `source` names, None for a https address."""
+    found = RECIPE.fullmatch(source)
+    return found[1] if found else None
 
 
 def template() -> str:

@@ -15,6 +15,7 @@ from msgspec import UNSET, Struct, UnsetType
 from robospa.categories import CATEGORIES, DIMENSIONS, SPATIAL
 from robospa.leaderboard.agreement import LEAST_POWER, LIE
 from robospa.leaderboard.bundle import BundleError
+from robospa.leaderboard.card import Card, recipe_of
 from robospa.leaderboard.evidence import Evidence
 from robospa.leaderboard.sampling import what_it_catches
 from robospa.leaderboard.scores import compare_scores
@@ -146,6 +147,7 @@ def entry_of(submission: Submission) -> Entry:
         ("team", card.team),
         ("licence of the weights", card.licence),
         ("parameters", short_count(card.parameters)),
+        *_recipes(card),
         ("training", "one checkpoint a base task" if training.tasks == "single"
          else "one checkpoint for all tasks"),
         ("training scenes", training.scenes),
@@ -162,7 +164,7 @@ def entry_of(submission: Submission) -> Entry:
         name=card.name,
         team=card.team,
         parameters=short_count(card.parameters),
-        link=card.link,
+        link="" if recipe_of(card.link) else card.link,
         badges=evidence.badges,
         embodiment=column.embodiment,
         mode=submission.settings.mode[0],
@@ -176,6 +178,15 @@ def entry_of(submission: Submission) -> Entry:
         failures=submission.failures,
         submission=submission,
     )
+
+
+def _recipes(card: Card) -> list[tuple[str, str]]:
+    """How weights are remade that a recipe of the repository remakes, and their hash."""
+    return [
+        (f"weights, {task}", f"remade by bash {script}; sha256 {point.sha256}")
+        for task, point in card.checkpoints.items()
+        if (script := recipe_of(point.reference))
+    ]
 
 
 def short_count(count: int) -> str:

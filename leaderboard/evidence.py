@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from typing import Annotated
 
 from msgspec import Struct
 
 from robospa.leaderboard.agreement import LEAST_POWER, LIE
 from robospa.leaderboard.bundle import BundleError
+from robospa.leaderboard.bundle_in_repository import FILE
 from robospa.leaderboard.card import LINK
 from robospa.leaderboard.sampling import check_challenge, least_sample
 from robospa.schema import Count, Number, pattern, read
@@ -74,12 +76,14 @@ class Reproduction(Struct, frozen=True):
 
 
 class Evidence(Struct, frozen=True):
-    """All of it, and the bundle's address where it is known."""
+    """All of it, and the bundle's address where it is known; FILE if it lies in the folder."""
 
     valid: Validity
     replayed: ReplayEvidence | None = None
     reproduced: Reproduction | None = None
-    address: Annotated[str, pattern(rf"({LINK.pattern})?", "a https address")] = ""
+    address: Annotated[
+        str, pattern(rf"({LINK.pattern}|{re.escape(FILE)})?", f"a https address or {FILE}")
+    ] = ""
 
     @property
     def badges(self) -> tuple[str, ...]:
@@ -105,6 +109,11 @@ def read_evidence(data: object, bundle: str, where: str) -> Evidence:
             raise BundleError(f"{where}: the {name} is of another bundle")
     if again:
         _check_replay(again, evidence.valid.trials, where)
+    if evidence.address == FILE and (not again or again.sampled < again.trials):
+        raise BundleError(
+            f"{where}: not all trials were replayed, as those of a bundle in the repository are: "
+            "robospa submit verify --challenge VALUE --fraction 1"
+        )
     if fresh:
         _check_power(fresh, where)
         least = min([fresh.overall.p, *(test.p_holm for test in fresh.categories.values())])

@@ -1,13 +1,16 @@
 """What continuous integration asks of a pull request that submits: one folder, two files, a bundle.
 
-The pull request is read as data: nothing that it brings is run. The bundle is downloaded to a
-temporary file, as far as its announced size, verified by `robospa submit verify`, and held against
-the two files. Refused, each in one sentence: changes anywhere else, changes that are no additions,
-other files than the two, a name that is taken, a bundle that is not what was announced.
+The pull request is read as data: nothing that it brings is run. The bundle is downloaded, or copied
+from the folder, to a temporary file, as far as its announced size, verified by `robospa submit
+verify`, and held against the two files. Refused, each in one sentence: changes anywhere else,
+changes that are no additions, other files, a name that is taken, a bundle that is not what was
+announced, and one in the folder that is large or of weights that no recipe of this repository
+remakes.
 """
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -19,12 +22,21 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from robospa.leaderboard import bundle as layout
+from robospa.leaderboard import bundle_in_repository as in_repository
 from robospa.leaderboard.archive import Archive
 from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.card import read_card, to_card
 from robospa.leaderboard.reserved import check_folder
 from robospa.leaderboard.strict_json import parse_map
-from robospa.leaderboard.submission import ASKED, BUNDLE, EVIDENCE, SLUG, read_announced
+from robospa.leaderboard.submission import (
+    ASKED,
+    BUNDLE,
+    EVIDENCE,
+    HANDED_IN,
+    SLUG,
+    Announced,
+    read_announced,
+)
 
 HOME = PurePosixPath("leaderboard/submissions")
 README = str(HOME / "README.md")
@@ -68,7 +80,7 @@ def submitted(changes: Sequence[Change]) -> list[str]:
     """Names of the submissions that the `changes` hand in; [] if none.
 
     BundleError if they touch a submission and anything else, change or delete a file, bring other
-    files than the two, or take a name that is not free.
+    files than these, or take a name that is not free.
     """
     own = [c for c in changes if HOME in PurePosixPath(c.path).parents and c.path != README]
     if own and (strange := [c for c in changes if c not in own]):
@@ -88,12 +100,12 @@ def submitted(changes: Sequence[Change]) -> list[str]:
 
 
 def _name_of(path: str) -> str:
-    """The submission that one of its two files belongs to; BundleError if it is neither."""
+    """The submission that one of its files belongs to; BundleError if it is none of them."""
     place = PurePosixPath(path).relative_to(HOME).parts
-    if len(place) != 2 or not SLUG.fullmatch(place[0]) or place[1] not in (ASKED, BUNDLE):
+    if len(place) != 2 or not SLUG.fullmatch(place[0]) or place[1] not in HANDED_IN:
         raise BundleError(
-            f"{path[:120]!a} is not {HOME}/NAME/{ASKED} or {BUNDLE}, NAME being of small "
-            "letters, digits and hyphens"
+            f"{path[:120]!a} is not {HOME}/NAME/{ASKED}, {BUNDLE} or {in_repository.FILE}, NAME "
+            "being of small letters, digits and hyphens"
         )
     return place[0]
 
@@ -104,20 +116,31 @@ def check(
     challenge: str | None = None,
     words: Sequence[str] = (),
     get: Fetch | None = None,
+    clone: Path = Path(),
 ) -> dict[str, object]:
     """Verify the bundle of the submission in `folder` and return the evidence, also written.
 
-    With `challenge` a sample is replayed, too. `words` go to `robospa submit verify`, whose output
-    is passed on. Raises BundleError.
+    With `challenge` a sample is replayed, too: all trials of a bundle that lies in the folder.
+    `words` go to `robospa submit verify`, whose output is passed on. `clone` is where this
+    repository is, whose recipes a card may name. Raises BundleError.
     """
     there = {path.name for path in folder.iterdir()} if folder.is_dir() else set()
-    if there != {ASKED, BUNDLE} or any((folder / name).is_symlink() for name in there):
-        raise BundleError(f"{folder} does not hold the files {ASKED} and {BUNDLE}, and only them")
+    if not {ASKED, BUNDLE} <= there or any((folder / name).is_symlink() for name in there):
+        raise BundleError(f"{folder} does not hold {ASKED} and {BUNDLE} as plain files")
     announced, card = read_announced(folder), read_card(folder / ASKED)
+    if there != announced.files:
+        listed = ", ".join(sorted(announced.files))
+        raise BundleError(f"{folder} does not hold the files {listed}, and only them")
+    in_repository.check_recipes(card, clone)
     with tempfile.TemporaryDirectory() as place:
         path = Path(place) / "bundle.zip"
-        (get or fetch)(announced.address, path, announced.size)
         more = ["--challenge", challenge] if challenge else []
+        if announced.address == in_repository.FILE:
+            in_repository.check_weights(card, folder.name)
+            _take(folder, announced, path)
+            more += ["--fraction", "1"] if challenge else []
+        else:
+            (get or fetch)(announced.address, path, announced.size)
         command = [sys.executable, "-m", "robospa.harness.cli.main", "submit", "verify", str(path)]
         done = subprocess.run([*command, "--evidence", str(evidence), *more, *words])
         if done.returncode:
@@ -131,6 +154,13 @@ def check(
     if packed != card:
         raise BundleError(f"{folder / ASKED} is not the bundle's model card")
     return found
+
+
+def _take(folder: Path, announced: Announced, path: Path) -> None:
+    """Copy the bundle in `folder` to `path`; BundleError unless it has the announced size."""
+    if (size := in_repository.size_of(folder)) != announced.size:
+        raise BundleError(f"{folder / in_repository.FILE} has {size} bytes, not {announced.size}")
+    shutil.copyfile(folder / in_repository.FILE, path)
 
 
 class _SecureOnly(urllib.request.HTTPRedirectHandler):

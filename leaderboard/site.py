@@ -22,6 +22,7 @@ from typing import Any
 
 from robospa.categories import CATEGORIES, CATEGORY_NAMES, DIMENSIONS
 from robospa.harness.running.atomic_file import replace_file
+from robospa.leaderboard import bundle_in_repository as in_repository
 from robospa.leaderboard.beside_paper import BADGE, run_entries, shown_groups, told_suites
 from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.entries import BADGES, MEANINGS, Entry, all_entries, page_values
@@ -189,8 +190,12 @@ def write_model(entry: Entry, folder: Path, practice: bool = False) -> None:
     """The page of one model, with its figures and films, into `folder`."""
     (folder / FIGURES).mkdir(parents=True, exist_ok=True)
     films = list(entry.submission.films) if entry.submission else []
+    address = entry.submission.evidence.address if entry.submission else ""
     if entry.submission:
-        _copy_films(entry.submission.folder, films, folder)
+        names = [str(film["video"]) for film in films] + [in_repository.FILE] * (
+            address == in_repository.FILE
+        )
+        _copy(entry.submission.folder, names, folder)
     drawings = _figures(entry, folder / FIGURES)
     failures = failure_rows(entry.failures)
     sections = ["summary", "evidence", "tables", "figures"]
@@ -205,7 +210,7 @@ def write_model(entry: Entry, folder: Path, practice: bool = False) -> None:
         card=card(entry.name, entry.column.scores),
         about=entry.about,
         evidence=entry.evidence,
-        address=entry.submission.evidence.address if entry.submission else "",
+        address=address,
         link=entry.link,
         tables=for_page(_tables(entry)),
         scores_shown=1,
@@ -271,12 +276,12 @@ def _figures(entry: Entry, folder: Path) -> list[Drawing]:
     return made
 
 
-def _copy_films(source: Path, films: Sequence[Mapping[str, Any]], folder: Path) -> None:
-    for row in films:
-        target = folder / row["video"]
+def _copy(source: Path, names: Sequence[str], folder: Path) -> None:
+    for name in names:
+        target = folder / name
         target.parent.mkdir(parents=True, exist_ok=True)
         target.unlink(missing_ok=True)
         try:
-            os.link(source / row["video"], target)
+            os.link(source / name, target)
         except OSError:
-            shutil.copyfile(source / row["video"], target)
+            shutil.copyfile(source / name, target)

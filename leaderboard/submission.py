@@ -1,6 +1,7 @@
 """What the leaderboard keeps of a bundle: one small folder a submission, without actions and rows.
 
     model.toml, bundle.txt    as handed in: the card; a bundle's address, size and hash
+    bundle.zip    the bundle itself, if it lies in the repository (`bundle_in_repository`)
     manifest.json, model.json, run.json, scores.json, outcomes.json    as in the bundle
     evidence.json    what `robospa submit verify` and `reproduce` wrote, and where the bundle is
     trials.json      failure types by task, and the filmed trials
@@ -23,6 +24,7 @@ from msgspec import Struct, to_builtins
 
 from robospa.harness.running.atomic_file import replace_file
 from robospa.leaderboard import bundle as layout
+from robospa.leaderboard import bundle_in_repository as in_repository
 from robospa.leaderboard.archive import Archive
 from robospa.leaderboard.bundle import MEGA, BundleError, Manifest, is_sha256
 from robospa.leaderboard.bundle_rules import RunFile, Settings
@@ -38,6 +40,7 @@ from robospa.results.report.trials import trial_rows
 from robospa.schema import Count, one_of, pattern, read
 
 ASKED, BUNDLE = "model.toml", "bundle.txt"
+HANDED_IN = (ASKED, BUNDLE, in_repository.FILE)
 EVIDENCE = "evidence.json"
 TRIALS = "trials.json"
 KEPT = {
@@ -74,11 +77,17 @@ class Submission:
 
 @dataclass(frozen=True)
 class Announced:
-    """What was handed in: where the bundle is, how many bytes it has, and its hash."""
+    """What was handed in: where the bundle is (`in_repository.FILE` beside it), how many bytes it
+    has, and its hash."""
 
     address: str
     size: int
     bundle: str
+
+    @property
+    def files(self) -> set[str]:
+        """What the folder holds until it is verified."""
+        return {ASKED, BUNDLE} | ({in_repository.FILE} & {self.address})
 
 
 class Film(Struct, frozen=True, forbid_unknown_fields=True):
@@ -166,14 +175,18 @@ def add(
 def _asked(folder: Path, valid: Valid) -> str:
     """The bundle's address, if the submitter's files are there; BundleError if they do not fit."""
     there = {path.name for path in folder.iterdir()} if folder.is_dir() else set()
-    if there - {ASKED, BUNDLE} or (folder.exists() and not folder.is_dir()):
+    if there - {*HANDED_IN} or (folder.exists() and not folder.is_dir()):
         raise BundleError(f"{folder} is already there; remove it or choose another name")
     if ASKED in there and read_card(folder / ASKED) != valid.card:
         raise BundleError(f"{folder / ASKED} is not the bundle's model card")
     if BUNDLE not in there:
         return ""
     announced = read_announced(folder)
-    if (announced.size, announced.bundle) != (valid.path.stat().st_size, valid.manifest.bundle):
+    if in_repository.FILE in announced.files:
+        in_repository.check_weights(valid.card, str(folder))
+        in_repository.check_contents(folder, valid.manifest, str(folder))
+    sizes = {valid.path.stat().st_size, *(f.stat().st_size for f in folder.glob("*.zip"))}
+    if ({announced.size}, announced.bundle) != (sizes, valid.manifest.bundle):
         raise BundleError(f"{folder / BUNDLE} has the size or the hash of another bundle")
     return announced.address
 
@@ -182,12 +195,17 @@ def read_announced(folder: Path) -> Announced:
     """What `bundle.txt` in `folder` says; BundleError if it is none."""
     path = folder / BUNDLE
     lines = _bytes(path, str(folder)).decode(errors="replace").split()
-    if len(lines) != 3 or not LINK.fullmatch(lines[0]) or not COUNT.fullmatch(lines[1]):
-        raise BundleError(f"{path} is not three lines: https address, bytes, hash")
+    inside = lines[:1] == [in_repository.FILE]
+    where = inside or (lines and LINK.fullmatch(lines[0]))
+    if len(lines) != 3 or not where or not COUNT.fullmatch(lines[1]):
+        raise BundleError(
+            f"{path} is not three lines: https address (or {in_repository.FILE}), bytes, hash"
+        )
     if not is_sha256(lines[2]):
         raise BundleError(f"{path} has no bundle hash of 64 hexadecimal digits")
-    if int(lines[1]) > layout.Limits().packed:
-        raise BundleError(f"{path} announces more than {layout.Limits().packed} bytes")
+    most = in_repository.MOST if inside else layout.Limits().packed
+    if int(lines[1]) > most:
+        raise BundleError(f"{path} announces more than {most} bytes")
     return Announced(lines[0], int(lines[1]), lines[2])
 
 
@@ -195,7 +213,7 @@ def left_out(home: Path) -> dict[str, str]:
     """Folders below `home` that the site does not show, with the reason."""
     found = {}
     for folder in _folders(home):
-        if {p.name for p in folder.iterdir()} == {ASKED, BUNDLE}:
+        if {p.name for p in folder.iterdir()} in ({ASKED, BUNDLE}, {*HANDED_IN}):
             found[folder.name] = "it is not verified yet (robospa leaderboard add)"
             continue
         try:
@@ -236,6 +254,9 @@ def read_submission(folder: Path, practice: bool = False) -> Submission:
     run = read(RunFile, parts[layout.RUN], f"{where}: the run", BundleError)
     card = to_card(parts[layout.CARD], f"{where}, {layout.CARD}")
     check_checkpoints(card, list(run.categories), f"{where}, {layout.CARD}")
+    if evidence.address == in_repository.FILE:
+        in_repository.check_weights(card, where)
+        in_repository.check_contents(folder, manifest, where)
     failures, films = _read_trials(parts[TRIALS], folder, where)
     return Submission(
         folder=folder,

@@ -57,6 +57,7 @@ def hand_in(root: Path, bundle: Path, card: str = CARD, **changes: Any) -> Path:
 
 def test_two_files_are_a_submission() -> None:
     assert submitted(TWO) == ["mine"]
+    assert submitted([*TWO, Change("A", MINE + "bundle.zip")]) == ["mine"]
     other = [Change("M", "README.md"), Change("M", "leaderboard/submissions/README.md")]
     assert submitted(other) == []
 
@@ -71,6 +72,9 @@ def test_two_files_are_a_submission() -> None:
         ("leaderboard/submissions/../../x/bundle.txt", "is not leaderboard/submissions/NAME"),
         ("leaderboard/submissions/Mine/bundle.txt", "small letters"),
         ("leaderboard/submissions/bundle.txt", "is not leaderboard/submissions/NAME"),
+        ("leaderboard/submissions/bundle.zip", "is not leaderboard/submissions/NAME"),
+        (MINE + "other.zip", "is not leaderboard/submissions/NAME"),
+        (MINE + "bundle.zip/x", "is not leaderboard/submissions/NAME"),
         ("leaderboard/submissions/pi0-5/bundle.txt", "is that of the paper's"),
     ],
 )
@@ -83,9 +87,10 @@ def test_other_changes_are_refused(path: str, words: str) -> None:
     ("status", "words"), [("D", "deletes"), ("M", "changes"), ("T", "changes the type of")]
 )
 def test_changes_that_are_no_additions_are_refused(status: str, words: str) -> None:
-    theirs = Change(status, "leaderboard/submissions/theirs/bundle.txt")
-    with pytest.raises(BundleError, match=f"only adds files; this one {words}"):
-        submitted([*TWO, theirs])
+    for name in ("bundle.txt", "bundle.zip"):
+        theirs = Change(status, f"leaderboard/submissions/theirs/{name}")
+        with pytest.raises(BundleError, match=f"only adds files; this one {words}"):
+            submitted([*TWO, theirs])
 
 
 def git(folder: Path, *words: str) -> bytes:
@@ -235,7 +240,7 @@ def test_further_files_and_links_are_refused(bundle: Path, tmp_path: Path) -> No
     (folder / "setup.py").unlink()
     (folder / "bundle.txt").unlink()
     (folder / "bundle.txt").symlink_to("/etc/passwd")
-    with pytest.raises(BundleError, match="and only them"):
+    with pytest.raises(BundleError, match="as plain files"):
         check(folder, tmp_path / "e.json")
 
 
