@@ -61,7 +61,7 @@ pip_install() { "$venv/bin/python" -m pip install -q --disable-pip-version-check
 make_environment() {
     local now python torch
     cd "$(dirname "${BASH_SOURCE[0]}")/.."
-    now=$(cat "${locks[@]}" | sha256sum | cut -d' ' -f1)
+    now="$(cat "${locks[@]}" | sha256sum | cut -d' ' -f1) with robospa"
     [ "$(cat "$venv/.robospa-models" 2>/dev/null || true)" != "$now" ] || exit 0
     python=$(find_python)
     say "making $venv with $python"
@@ -75,9 +75,8 @@ make_environment() {
     say "installing the other packages of ${locks[*]}"
     pip_install --no-deps -r <(cat "${locks[@]}" | grep -vE '^(torch|torchvision)==') ||
         fail "pip could not install ${locks[*]}: see its message above."
-    if [ "$name" = maniskill ]; then # its tests run in it, and find our entry points
-        pip_install --no-deps --no-build-isolation -e . || fail "pip could not install robospa itself."
-    fi
+    # Its entry points: learners, policies and robots are found by them.
+    pip_install --no-deps --no-build-isolation -e . || fail "pip could not install robospa itself."
     "$venv/bin/python" -c "import $imports" || fail "one of $imports cannot be imported: see above."
     printf '%s' "$now" >"$venv/.robospa-models"
 }
