@@ -21,6 +21,7 @@ from urllib.parse import parse_qsl
 import msgspec
 
 from robospa.registry import did_you_mean
+from robospa.schema import convert
 
 T = TypeVar("T")
 
@@ -141,7 +142,7 @@ def _read(name: str, value: Any, hint: Any) -> Any:
         elif allowed == (tuple[str, ...],):
             value = (value,)
     try:
-        return msgspec.convert(value, hint, strict=False, dec_hook=_decode)
+        return convert(value, hint, strict=False, dec_hook=_decode)
     except msgspec.ValidationError:
         text = str(value)[:80]
         raise ValueError(f"option {name}={text!r} is not a {_type_name(hint)}") from None

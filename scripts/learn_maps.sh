@@ -64,5 +64,13 @@ $bin/robospa report "$out/run"
 
 say "4 of 4: the bundle"
 hash=$(cd "$out/policy" && sha256sum chooser.pt network.pt | sha256sum | cut -d' ' -f1)
-sed "s/SHA256/$hash/" baselines/learned/maps/model.toml >"$out/model.toml"
+parameters=$("$python" - "$out/policy" <<'PYTHON'
+import pathlib, sys, torch
+
+files = [pathlib.Path(sys.argv[1], name) for name in ("network.pt", "chooser.pt")]
+weights = [torch.load(file, map_location="cpu", weights_only=True) for file in files]
+print(sum(tensor.numel() for one in weights for tensor in one.values()))
+PYTHON
+)
+sed "s/SHA256/$hash/; s/PARAMETERS/$parameters/" baselines/learned/maps/model.toml >"$out/model.toml"
 $bin/robospa submit pack "$out/run" --model "$out/model.toml" -o "$out/bundle.zip" --force

@@ -13,9 +13,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-import msgspec
-
 from robospa.geometry import Pose, Vec3
+from robospa.schema import convert
 from robospa.tasks.shapes import Params
 from robospa.tasks.surroundings import Surroundings
 from robospa.workcell import TABLE_TOP
@@ -114,7 +113,7 @@ class Scene:
                 "objects": _objects(data["objects"]),
                 "table_shift": (shift[0], shift[1]),
                 "clutter": _objects(data.get("clutter", ())),
-                "surroundings": msgspec.convert(data.get("surroundings", {}), Surroundings),
+                "surroundings": convert(data.get("surroundings", {}), Surroundings),
             }
         )
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import threading
+import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any
@@ -124,3 +126,38 @@ def test_a_value_that_is_no_such_thing(value: Any, sentence: str) -> None:
 def test_values_are_described_shortly() -> None:
     assert describe("x" * 500) == repr("x" * 500)[:60]
     assert describe(b"x") == "a bytes"
+
+
+_WITHIN: list[int] = [0]
+
+
+def _slow() -> type[int]:
+    """What the annotation below is; fails where a second thread works it out meanwhile."""
+    _WITHIN[0] += 1
+    time.sleep(0.02)
+    alone = _WITHIN[0] == 1
+    _WITHIN[0] -= 1
+    return int if alone else str  # type: ignore[return-value]
+
+
+@dataclass(frozen=True)
+class Late:
+    """Its annotations cost time, at the first reading."""
+
+    value: _slow()  # type: ignore[valid-type]
+
+
+def test_threads_read_a_new_type_one_at_a_time() -> None:
+    """msgspec 0.22 ends the process if two of them meet a dataclass for the first time at once."""
+    begin, read_by = threading.Barrier(4), []
+
+    def first_reading() -> None:
+        begin.wait()
+        read_by.append(read(Late, {"value": 1}, "late").value)
+
+    threads = [threading.Thread(target=first_reading) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert read_by == [1, 1, 1, 1]

@@ -114,7 +114,7 @@ function draw(focus) {
   const line = (m) => {
     const row = make("tr", {}, make("td", { className: "num rank" }, String(main.get(m)?.rank ?? (m.rankable || ["published", "run"].includes(m.badge) ? "–" : "claim"))));
     const link = make("a", { href: `models/${m.id}/index.html` }, m.name);
-    row.append(make("th", { className: "name", scope: "row" }, link, make("small", {}, m.team)));
+    row.append(make("th", { className: "name", scope: "row" }, link, make("small", {}, m.team), ...categoriesRun(m)));
     columns.forEach((c, n) => {
       const v = value(m, c);
       const place = places[n].get(m);
@@ -138,6 +138,12 @@ function draw(focus) {
   document.getElementById("shown").textContent = models.length
     ? `${models.length} of ${data.models.length} models, ranked by ${by.title ? by.label + " (" + by.title + ")" : by.label}` +
       (shown.length > 1 ? ", each group for itself" : "") : "no model matches";
+}
+// Success in the categories of a model that did not run all of them, and so has no average.
+function categoriesRun(m) {
+  const at = (row) => value(m, { metric: "sr", row, level: 0 });
+  const run = at("overall") ? [] : categories.filter(at);
+  return run.length ? [make("small", {}, run.map((c) => `${c} ${percent(at(c)[0])} %`).join(", "))] : [];
 }
 function change() {
   columns = columnsOf();
@@ -178,12 +184,15 @@ function radar(sides, metric, level) {
   parts.push(shape("text", { x: 174, y: 140 - 110 + 12 }, top + " %"));
   sides.forEach((m, side) => {
     const points = axes.map((c, n) => [n, value(m, { metric, row: c, level })]).filter(([, v]) => v).map(([n, v]) => at(n, v[0]));
-    if (points.length > 2) parts.push(shape("polygon", { class: ["one", "two"][side], points: points.map((p) => p.map((x) => x.toFixed(1)).join(",")).join(" ") }));
+    const style = ["one", "two"][side];
+    if (points.length > 2) parts.push(shape("polygon", { class: style, points: points.map((p) => p.map((x) => x.toFixed(1)).join(",")).join(" ") }));
+    else parts.push(...points.map(([cx, cy]) => shape("circle", { class: style + " dot", cx, cy, r: 3.5 })));
   });
   return chart("Categories, " + (level ? "L" + level : "all levels"), 340, 280, parts);
 }
 function curve(sides, metric) {
-  const row = metric === "sr" ? "overall" : metric === "onta" ? "spatial" : "procedural";
+  const rows = [metric === "sr" ? "overall" : metric === "onta" ? "spatial" : "procedural", ...categories];
+  const row = rows.find((r) => sides.every((m) => value(m, { metric, row: r, level: 0 }))) || rows[0];
   const found = sides.map((m) => LEVELS.map((level) => value(m, { metric, row, level })));
   const top = topOf(found.flat().map((v) => (v ? v[2] : 0)));
   const x = (n) => 40 + 65 * n;
@@ -282,8 +291,10 @@ const first = (m) => value(m, { metric: "sr", row: "overall", level: 0 })?.[0] ?
 const place = (m) => GROUPS.findIndex((g) => g.key === m.group);
 const by = [...data.models].sort((a, b) => place(a) - place(b) || first(b) - first(a));
 const named = by.map((m) => [m.id, m.name]);
-fill(pair.elements.one, named, named[0][0]);
-fill(pair.elements.two, named, (named[1] || named[0])[0]);
+const shownFirst = by.find((m) => by.some((o) => o !== m && alike(m, o))) || by[0];
+const shownSecond = by.find((m) => m !== shownFirst && alike(m, shownFirst)) || by.find((m) => m !== shownFirst) || shownFirst;
+fill(pair.elements.one, named, shownFirst.id);
+fill(pair.elements.two, named, shownSecond.id);
 view.addEventListener("input", change);
 filters.addEventListener("input", () => draw());
 filters.addEventListener("reset", () => setTimeout(draw));
