@@ -22,6 +22,8 @@ from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
 CHUNK = 1000
+ENDED = "the recorded actions end here"
+"""What a record says whose goal was not met by then."""
 
 
 class Recorded:
@@ -47,7 +49,7 @@ class Recorded:
         """The recorded actions from this step on; PolicyAnswerError after the last."""
         chunk = self._actions[int(observation["step"]) :][:CHUNK]
         if not len(chunk):
-            raise PolicyAnswerError("the recorded actions end here")
+            raise PolicyAnswerError(ENDED)
         return chunk
 
 

@@ -14,6 +14,7 @@ from importlib import metadata
 
 import numpy as np
 
+from robospa.harness.convention_check.rerun import ENDED
 from robospa.harness.datasets.encoding import encode, require
 from robospa.harness.datasets.episode import DatasetEpisode
 from robospa.harness.datasets.episode_file import episode_bytes
@@ -61,12 +62,17 @@ class EpisodeMaker:
             raise NotGood(f"no occasion for {kind}: {error}") from error
         made = shown.demonstration
         if made.success is kind.startswith(MISTAKE_PREFIX):
-            raise NotGood(f"the expert does not {_wanted(kind)}: {'; '.join(made.failures)}")
+            why = "; ".join(made.failures) or "each of its motions went as planned"
+            raise NotGood(f"the expert does not {_wanted(kind)}: {why}")
         episode = episode_of(job.key, setup, shown, recorder)
         with timed(times, "replay"):
             record = replay(self._replayed, job.key, episode.commanded, episode.prefix_action, kind)
         if record.success is not made.success:
-            raise NotGood(f"its replay does not {_wanted(kind)}: {record.end} {record.message}")
+            all_sent = ENDED in record.message
+            why = (
+                "all recorded commands were sent" if all_sent else f"{record.end} {record.message}"
+            )
+            raise NotGood(f"its replay does not {_wanted(kind)}: {why}")
         with timed(times, "pictures"):
             pictures = encode(drawn(recorder.frames, job.cameras), job.cameras, job.images)
         data = episode_bytes(replace(verified(episode, record), pictures=pictures))
@@ -82,6 +88,13 @@ class EpisodeMaker:
             frames=len(episode),
             times=times,
         )
+
+
+def replay_end(record: TrialRecord) -> str:
+    """How a replay ended that does not end as its demonstration did, in words."""
+    if ENDED in record.message:
+        return "all recorded commands were sent"
+    return f"{record.end} {record.message}".strip()
 
 
 def _wanted(kind: str) -> str:
