@@ -34,18 +34,22 @@ def main(folder: Path, out: Path, every: int) -> None:
     first = np.searchsorted(episode_of, np.arange(found.num_episodes))
     filmed = HEAD in found.meta.features
     wanted = np.flatnonzero(episode_of % every == 0) if filmed else first[:0]
-    items = {int(i): found[int(i)] for i in sorted({*wanted, *first})}
-    for i, item in items.items():
+    tasks, pictures, read_one_by_one = {}, [], sorted({*wanted.tolist(), *first.tolist()})
+    for i in read_one_by_one:
+        item = found[i]
         for name, column in arrays.items():
             assert np.array_equal(np.asarray(item[name]).reshape(-1), column[i].reshape(-1)), name
+        tasks[i] = item["task"]
+        if filmed and episode_of[i] % every == 0:
+            seen = 255 * item[HEAD].permute(1, 2, 0)
+            pictures.append(seen.round().to(torch.uint8).numpy())
     if filmed:
-        seen = torch.stack([items[int(i)][HEAD].permute(1, 2, 0) for i in wanted])
-        arrays["pictures"] = (255 * seen).round().to(torch.uint8).numpy()
+        arrays["pictures"] = np.stack(pictures)
     about = {
         "episodes": found.num_episodes,
         "frames": found.num_frames,
-        "tasks": [items[int(i)]["task"] for i in first],
-        "items": len(items),
+        "tasks": [tasks[int(i)] for i in first],
+        "items": len(read_one_by_one),
     }
     np.savez(out, about=json.dumps(about), pictured=wanted, **arrays)
 
