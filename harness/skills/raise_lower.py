@@ -32,6 +32,8 @@ PIECE = 0.034
 """Two arms lift in pieces no longer than this [m]: both arrive before either goes on."""
 AT_HANDLE = 0.015
 """A grasp this near to a frame [m] is a grasp of it."""
+LESS = 0.8, 0.6
+"""Shares of the lift and of STANDOFF that do where an arm reaches no farther."""
 SHARE = 0.6
 """Share of the lift that the object must follow, or the grasp has failed."""
 
@@ -116,16 +118,24 @@ def _grip(ws: Workspace, holds: Sequence[ArmLift], openings: Sequence[float]) ->
 
 
 def _plan_lift(ws: Workspace, call: RaiseLower, arm: int, framed: bool, skip: int) -> ArmLift:
-    """The arm's best way to take and lift the object, the `skip` best left out."""
+    """The best way to take and lift the object, the `skip` best left out.
+
+    What one arm lifts is rather taken by the other, or lifted less high, than taken by a leaning
+    gripper: that turns it, so that it comes down beside its place.
+    """
     pieces = max(2, math.ceil(call.rise / PIECE)) if framed else 2
-    for leans in (LEVEL, LEANS):
-        for reach in reachable_grasps(ws, call.object, (arm,), leans):
+    whole, less = (call.rise, STANDOFF), (LESS[0] * call.rise, LESS[1] * STANDOFF)
+    ways = [(arm, LEVEL, whole), (arm, LEANS, whole)]
+    if not framed:
+        ways[1:1] = [(1 - arm, LEVEL, whole), (arm, LEVEL, less), (1 - arm, LEVEL, less)]
+    for taker, leans, (height, standoff) in ways:
+        for reach in reachable_grasps(ws, call.object, (taker,), leans):
             if framed and not _at_frame(ws, call.object, ARMS[arm], reach):
                 continue
-            out = moved_back(reach.pose, reach.approach, STANDOFF)
-            back = ws.solve_path(arm, reach.joints, line_poses(reach.pose, out, 2))
-            top = moved_up(reach.pose, call.rise)
-            up = ws.solve_path(arm, reach.joints, line_poses(reach.pose, top, pieces))
+            out = moved_back(reach.pose, reach.approach, standoff)
+            back = ws.solve_path(taker, reach.joints, line_poses(reach.pose, out, 2))
+            top = moved_up(reach.pose, height)
+            up = ws.solve_path(taker, reach.joints, line_poses(reach.pose, top, pieces))
             if back is not None and up is not None:
                 if skip == 0:
                     return ArmLift(reach, back[::-1], up)

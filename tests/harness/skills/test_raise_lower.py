@@ -9,7 +9,7 @@ import pytest
 
 from robospa.geometry import Pose
 from robospa.gripper import grasp_points
-from robospa.harness.robots import embodiment
+from robospa.harness.robots import Embodiment, embodiment
 from robospa.harness.robots.kinematics import chain_of, end_effector
 from robospa.harness.skills.raise_lower import raise_lower
 from robospa.harness.skills.workspace import SkillFailed, Workspace
@@ -23,23 +23,32 @@ RISE = 0.1
 
 
 class Table:
-    """A pot or fan that follows the closed grippers, if it `follows`."""
+    """A pot or fan at `x`, `y` [m] that follows the closed grippers, if it `follows`."""
 
-    def __init__(self, asset: str, follows: bool = True) -> None:
-        item = SceneObject("thing", asset, Pose((0.0, -0.05, TABLE_TOP)))
-        scene = Scene("none", 1, 0, ROBOT.name, "clean", (item,), {})
+    def __init__(
+        self,
+        asset: str,
+        follows: bool = True,
+        robot: Embodiment = ROBOT,
+        x: float = 0.0,
+        y: float = -0.05,
+    ) -> None:
+        self.robot, self.place = robot, (x, y)
+        item = SceneObject("thing", asset, Pose((x, y, TABLE_TOP)))
+        scene = Scene("none", 1, 0, robot.name, "clean", (item,), {})
         self.rise = 0.0
         self.tops: list[float] = []
         self.rows: list[np.ndarray] = []
         self._follows = follows
         self._from: float | None = None
-        home = np.concatenate([np.append(a.home, 1.0) for a in ROBOT.arms])
-        self.workspace = Workspace(scene, ROBOT, self._snapshot(home))
+        home = np.concatenate([np.append(a.home, 1.0) for a in robot.arms])
+        self.workspace = Workspace(scene, robot, self._snapshot(home))
 
     def _snapshot(self, row: np.ndarray) -> Snapshot:
         left, right = row[:7], row[7:]
         ends = [
-            end_effector(chain_of(a), r[:6]) for a, r in zip(ROBOT.arms, (left, right), strict=True)
+            end_effector(chain_of(a), r[:6])
+            for a, r in zip(self.robot.arms, (left, right), strict=True)
         ]
         closed = [end.position[2] for end, r in zip(ends, (left, right), strict=True) if r[6] < 0.2]
         if not closed or not self._follows:
@@ -47,9 +56,9 @@ class Table:
         else:
             self._from = min(closed) if self._from is None else self._from
             self.rise = max(0.0, min(closed) - self._from)
-        poses = {"thing": Pose((0.0, -0.05, TABLE_TOP + self.rise))}
+        poses = {"thing": Pose((*self.place, TABLE_TOP + self.rise))}
         joints = (tuple(left[:6]), tuple(right[:6]))
-        points = grasp_points(ROBOT.grippers, (ends[0], ends[1]))
+        points = grasp_points(self.robot.grippers, (ends[0], ends[1]))
         return Snapshot(
             0.0, poses, (left[6], right[6]), (ends[0], ends[1]), joints, grasp_points=points
         )
@@ -90,6 +99,20 @@ def test_both_grippers_close_in_one_action_and_both_arms_rise_in_one() -> None:
             for row in held]  # fmt: skip
     lean = np.array(ends)[:, 0] - np.array(ends)[:, 1]
     assert np.ptp(lean) < 0.003
+
+
+@pytest.mark.parametrize(("x", "y", "taken_by", "height"), [
+    (-0.055, -0.108, 1, 0.08),  # the left arm gets there leaning only
+    (0.04, -0.052, 0, 0.064),  # the right one neither, and the left one less high
+])  # fmt: skip
+def test_the_other_arm_or_a_lower_lift_before_a_leaning_gripper(
+    x: float, y: float, taken_by: int, height: float
+) -> None:
+    table = Table("fan", robot=embodiment("piper"), x=x, y=y)
+    table.run(RaiseLower("thing", 0.08, 2, ("left" if x < 0 else "right",)))
+    closed = np.array([[row[6] < 0.2, row[13] < 0.2] for row in table.rows])
+    assert closed[:, taken_by].any() and not closed[:, 1 - taken_by].any()
+    assert table.tops.count(pytest.approx(height, abs=0.002)) == 2
 
 
 def test_a_thing_that_stays_is_given_up_after_a_few_attempts() -> None:
