@@ -56,7 +56,8 @@ def hang(ws: Workspace, call: Hang) -> Steps:
             refused.append(grip_offset(ws, arm, call.object))
             yield from place(ws, Place(call.object, (x, y, z)))
             continue
-        if _narrow(ws, call, arm).free([ws.joints[arm], way[0]]):
+        narrow, straight = _narrow(ws, call, arm), [ws.joints[arm], way[0]]
+        if narrow.free(straight) and narrow.above_table(straight):
             ws.add(arm, way[0])
         else:
             travel(ws, arm, way[0])

@@ -50,6 +50,13 @@ class Narrow:
         depths = wide.depths(np.stack([np.concatenate(both) for both in parts]))
         return not bool((depths > MARGIN / 2).any())
 
+    def above_table(self, way: list[Array]) -> bool:
+        """Whether what is held stays above the table on the lines between joints [rad] `way`."""
+        line = np.concatenate([_line(a, b) for a, b in pairwise(way)])
+        frames, _ = forward(self.ws.chains[self.arm], line)
+        lowest = min((from_transform(f) * self.offset).position[2] for f in frames)
+        return lowest > self.ws.scene.table_top + MARGIN
+
 
 def _line(start: Array, goal: Array) -> Array:
     """Joints (N, J) on the line from `start` to `goal`, with both."""

@@ -13,7 +13,7 @@ from robospa.harness.robots import embodiment
 from robospa.harness.robots.kinematics import chain_of, end_effector
 from robospa.harness.skills import hang, pour
 from robospa.harness.skills.approach import approach_joints, translated
-from robospa.harness.skills.narrow import Narrow
+from robospa.harness.skills.narrow import MARGIN, Narrow
 from robospa.harness.skills.workspace import Workspace
 from robospa.tasks.catalog import build_scene
 from robospa.tasks.plan import Pour
@@ -82,6 +82,18 @@ def test_a_way_past_a_rack_is_free_only_where_the_hand_does_not_meet_it(
     here = Workspace(scene, ROBOT, snapshot)
     narrow = Narrow(here, 1, rack, Pose())
     assert narrow.free([here.joints[1], here.joints[1]]) is free
+
+
+@pytest.mark.parametrize(("below", "above"), [(0.05, True), (0.25, False)])
+def test_a_way_is_above_the_table_only_where_what_is_held_stays_so(
+    below: float, above: bool
+) -> None:
+    scene, ws = workspace("Hang_Mug_Stack_Blocks", 1)
+    end = ws.snapshot.end_effector[1]
+    x, y, z = end.position
+    assert (z - below > ws.scene.table_top + MARGIN) is above
+    narrow = Narrow(ws, 1, scene.facts["rack"], end.inverse() * Pose((x, y, z - below)))
+    assert narrow.above_table([ws.joints[1], ws.joints[1]]) is above
 
 
 def test_a_bin_is_emptied_upside_down_with_its_mouth_over_the_container() -> None:
