@@ -48,10 +48,10 @@ test-maniskill: ## ManiSkill: its environments, its replays of our trajectories;
 	@bash scripts/models.sh maniskill
 	.venv-maniskill/bin/python -m pytest tests/maniskill -m maniskill
 
-docs: ## The documentation's pages with the API reference, in build/docs
+docs: ## The documentation's pages with the API reference, in build/docs; a warning is an error
 	[ -x .venv-docs/bin/pip ] || python3 -m venv .venv-docs
 	.venv-docs/bin/pip install -q --disable-pip-version-check "zensical>=0.0.70" "mkdocstrings-python>=2"
-	.venv-docs/bin/zensical build
+	.venv-docs/bin/zensical build --strict
 
 format: ## Let ruff format and sort
 	$(BIN)/ruff check --fix .

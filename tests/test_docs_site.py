@@ -60,6 +60,19 @@ def test_links_to_a_section_find_its_heading(page: Path) -> None:
     assert [(t.name, anchor) for t, anchor in targets if anchor not in anchors(t)] == []
 
 
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_headings_have_one_address_on_the_site_and_in_the_repository(page: Path) -> None:
+    """The site joins the hyphens that a character left out, such as `&`, leaves side by side."""
+    assert [anchor for anchor in anchors(page) if "--" in anchor] == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_links_of_the_site_stay_within_it(page: Path) -> None:
+    targets = re.findall(r"\]\((?!https?:|#|mailto:)([^)#\s]+)", page.read_text())
+    inside = ROOT / "docs"
+    assert [t for t in targets if not (page.parent / t).resolve().is_relative_to(inside)] == []
+
+
 @pytest.mark.parametrize("page", TEXTS, ids=lambda page: str(page.relative_to(ROOT)))
 def test_relative_links_lead_somewhere(page: Path) -> None:
     targets = re.findall(r"\]\((?!https?:|#|mailto:)([^)#\s]+)", page.read_text())
