@@ -17,7 +17,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from robospa.clients.detect import explain_error
-from robospa.clients.dialect import TLS_PORT, ConnectionParams, Endpoint, dialects
+from robospa.clients.dialect import TLS_PORT, ConnectionParams, Dialect, Endpoint, dialects
 from robospa.protocol.client import RemotePolicy, WireClient, expecting
 from robospa.protocol.codec import DEFAULT_LIMITS, Limits
 from robospa.protocol.errors import (
@@ -50,9 +50,7 @@ def find_endpoint(url: str, options: Mapping[str, object] | None = None) -> Endp
     by_scheme = {scheme: dialect for dialect in dialects() for scheme in dialect.schemes}
     dialect = by_scheme.get(parts.scheme)
     if dialect is None:
-        known = ", ".join(f"{scheme}:// ({d.server})" for scheme, d in by_scheme.items())
-        known = known or "none (is robospa installed?)"
-        raise ValueError(f"{shown!r} is no address of a policy server; known are {known}")
+        raise ValueError(f"{shown!r} is no address of a policy server; {_addresses(by_scheme)}")
     if not parts.hostname:
         raise ValueError(
             f"{shown!r} names no host: write for example {parts.scheme}://localhost:{dialect.port}"
@@ -64,6 +62,14 @@ def find_endpoint(url: str, options: Mapping[str, object] | None = None) -> Endp
     except ValueError as error:
         raise ValueError(f"{shown!r} cannot be read: {without_secrets(str(error))}") from error
     return Endpoint(url, dialect, parts.scheme, parts.hostname, port, parts.path, given)
+
+
+def _addresses(by_scheme: Mapping[str, Dialect]) -> str:
+    """What addresses begin with, in words."""
+    if not by_scheme:
+        return "no dialect is known (is robospa installed?)"
+    known = ", ".join(f"{scheme}://" for scheme in by_scheme)
+    return f"they begin with {known} (ws:// for one of robospa serve)"
 
 
 def check_options(url: str, options: Mapping[str, object] | None = None) -> None:
@@ -125,8 +131,8 @@ def connect(
             if params.redirects:
                 session.hello["redirected_to"] = params.redirects[-1]
             return session
-        except Unauthorized:
-            raise
+        except Unauthorized as error:
+            raise Unauthorized(f"{error}; {TOKEN}") from error.__cause__
         except (HandshakeError, TransportError, ServerError) as error:
             # Once it has spoken this dialect, trouble is trouble and no sign of another one.
             if known or isinstance(error.__cause__, ConnectionRefusedError):

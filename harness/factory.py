@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
@@ -20,6 +21,8 @@ def policy_names() -> tuple[str, ...]:
 
 def policy_factory(name: str) -> Callable[..., Policy]:
     """The function that makes a policy, by entry-point name or `module:function`."""
+    if re.fullmatch(r"[\w.-]+:\d+(/.*)?", name):
+        raise UnknownName(f"{name!r} is no module:function; of a server write ws://{name}")
     if ":" in name:
         if os.getcwd() not in sys.path:
             sys.path.append(os.getcwd())  # so that a policy's own folder is enough to serve it

@@ -252,7 +252,7 @@ class Recording:
         _check(not unknown, f"video_cameras {unknown} are none of {', '.join(CAMERAS)}")
         name, _, project = self.log.partition(":")
         known = name in TRACKERS and not (name == "none" and project)
-        _check(known, f"log {self.log!r} is none of {', '.join(TRACKERS)}, wandb:PROJECT")
+        _check(known, f"log {self.log!r} is not one of {', '.join(TRACKERS)}, wandb:PROJECT")
 
 
 @dataclass(frozen=True)
@@ -374,4 +374,4 @@ def check_values(group: object) -> None:
         value = getattr(group, item.name)
         words = value.split(",") if choices and item.name in LISTS else [value]
         if choices and (wrong := [word for word in words if word not in choices]):
-            raise SettingsError(f"{item.name} {wrong[0]!r} is none of {', '.join(choices)}")
+            raise SettingsError(f"{item.name} {wrong[0]!r} is not one of {', '.join(choices)}")

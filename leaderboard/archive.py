@@ -94,6 +94,8 @@ class Archive:
 
 def _check_frame(path: Path, limits: Limits) -> None:
     """The file as a whole, before its list of entries is read."""
+    if path.is_dir():
+        raise BundleError(f"{path} is a folder: a bundle is a .zip of `robospa submit pack`")
     try:
         size = path.stat().st_size
         with path.open("rb") as file:

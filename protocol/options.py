@@ -53,7 +53,7 @@ def read_options(cls: type[T], given: Mapping[str, Any]) -> T:
         values[name] = _read(name, value, hints[name])
         choices = known[name].metadata.get("choices", ())
         if choices and values[name] not in choices:
-            raise ValueError(f"option {name}={value!r} is none of {', '.join(choices)}")
+            raise ValueError(f"option {name}={value!r} is not one of {', '.join(choices)}")
     made = cls(**values)
     check_ranges(made)
     return made

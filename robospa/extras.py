@@ -36,21 +36,24 @@ class MissingPackage(ModuleNotFoundError):
     """A package of an extra is not installed; the message says what installs it."""
 
 
-def need(module: str) -> ModuleType:
-    """The `module` of an extra, imported; raises MissingPackage if its package is not installed."""
+def need(module: str, extra: str = "") -> ModuleType:
+    """The `module` of an extra, imported; raises MissingPackage if its package is not installed.
+
+    `extra` is named then in place of the one in EXTRAS: a larger one that brings more.
+    """
     try:
         return import_module(module)
     except ModuleNotFoundError as error:
         top = module.partition(".")[0]
         if error.name is None or error.name.partition(".")[0] != top:
             raise
-        raise MissingPackage(f"{top} is not installed; {remedy(top)}", name=top) from error
+        raise MissingPackage(f"{top} is not installed; {remedy(top, extra)}", name=top) from error
 
 
-def remedy(module: str) -> str:
+def remedy(module: str, extra: str = "") -> str:
     """What installs `module`, as the end of a sentence."""
-    wanted = EXTRAS.get(module)
-    if wanted is None:
+    wanted = extra or EXTRAS.get(module)
+    if not wanted:
         return f"install it with: pip install {module}"
     return f"install it with: pip install '{source()}[{wanted}]'"
 

@@ -6,7 +6,8 @@ simulator.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -79,14 +80,29 @@ def serve(
     given = {**_from_file(options), **option_pairs(option or [])}
     if checkpoint is not None:
         given["path"] = str(checkpoint)
-    run_server(
-        host=host,
-        port=port,
-        token=token,
-        ssl=_tls(certificate, key),
-        on_ready=lambda url: print(f"serving {policy} at {url} (Ctrl-C stops)", flush=True),
-        **_hosted(policy, make, given, connections),
-    )
+    with _named_port(host, port):
+        run_server(
+            host=host,
+            port=port,
+            token=token,
+            ssl=_tls(certificate, key),
+            on_ready=lambda url: print(f"serving {policy} at {url} (Ctrl-C stops)", flush=True),
+            **_hosted(policy, make, given, connections),
+        )
+
+
+@contextmanager
+def _named_port(host: str, port: int) -> Iterator[None]:
+    """Raises BadOptions, with what to do, in place of the system's error for a port in use."""
+    import errno
+
+    try:
+        yield
+    except OSError as error:
+        if error.errno != errno.EADDRINUSE:
+            raise
+        text = f"port {port} of {host} is in use: choose another --port (0 takes a free one)"
+        raise BadOptions(text) from error
 
 
 def _tls(certificate: Path | None, key: Path | None) -> SSLContext | None:

@@ -18,7 +18,7 @@ from robospa.harness.datasets.collection_progress import CollectionProgress
 from robospa.harness.datasets.disk_use import check_room, expected_bytes, frames_of
 from robospa.harness.datasets.jobs import Job, MadeEpisode
 from robospa.harness.datasets.manifest import MANIFEST, DatasetManifest, Failure, read_made
-from robospa.harness.datasets.pack import FORMATS, images_of, pack
+from robospa.harness.datasets.pack import FORMATS, check_packages, images_of, pack
 from robospa.harness.datasets.settings import AUTO, KEYFRAMES, Collection, lists_of, trial_of
 from robospa.harness.datasets.store import EPISODES, EpisodeStore, Facts
 from robospa.harness.running.atomic_file import PARTIAL
@@ -110,10 +110,12 @@ def collect(
 ) -> Result | None:
     """Make the data set; None if it was finished before.
 
-    Raises SettingsError for what cannot be collected, RunError if another process is at it,
-    StorageError if the folder cannot be written, and what `open_pool` and workers raise.
+    Raises SettingsError for what cannot be collected, MissingPackage before anything is made,
+    RunError if another process is at it, StorageError if the folder cannot be written, and what
+    `open_pool` and workers raise.
     """
     keys, _ = lists_of(order.settings), order.images
+    check_packages(order.layout)
     with run_lock(order.out) as lock:
         store = EpisodeStore(order.out / EPISODES)
         folders = dataset_folders(order.out, keys)

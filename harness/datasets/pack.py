@@ -12,6 +12,7 @@ from itertools import chain
 from pathlib import Path
 from typing import Protocol
 
+from robospa.extras import need
 from robospa.harness.datasets.card import CardFacts, write_card
 from robospa.harness.datasets.episode import DatasetEpisode
 from robospa.harness.datasets.episode_file import read_episode_file
@@ -67,6 +68,14 @@ FORMATS: Mapping[str, MakeWriter] = {
     "robotwin-hdf5": RoboTwin,
     "maniskill": _maniskill,
 }
+
+
+def check_packages(layout: str) -> None:
+    """Raises MissingPackage if one that writes a format of `FORMATS`, or its card, is not
+    installed."""
+    table = "pyarrow" if layout.startswith("lerobot") else "h5py"
+    for module in (table, "PIL", "matplotlib"):
+        need(module, "demos")
 
 
 def images_of(layout: str) -> tuple[str, ...]:

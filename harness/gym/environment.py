@@ -83,7 +83,7 @@ class TaskEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         if level not in found.levels:
             raise SettingsError(f"{found.name} has levels {sorted(found.levels)}, not {level}")
         if render_mode not in (None, "rgb_array", "human"):
-            raise SettingsError(f"render_mode {render_mode!r} is none of rgb_array and human")
+            raise SettingsError(f"render_mode {render_mode!r} is not one of rgb_array and human")
         if wrong := [name for name in (*cameras, render_camera) if name not in CAMERAS]:
             raise SettingsError(f"there is no camera {wrong[0]!r}; known are {', '.join(CAMERAS)}")
         self.spec_of_policy = spec or PolicySpec(

@@ -299,7 +299,7 @@ def _check_backend(num_envs: int, sim_backend: str) -> None:
 
 def _one_of(what: str, given: str | None, known: Sequence[str]) -> str:
     if given is not None and given not in known:
-        raise SettingsError(f"{what} {given!r} is none of {', '.join(known)}")
+        raise SettingsError(f"{what} {given!r} is not one of {', '.join(known)}")
     return given or known[0]
 
 

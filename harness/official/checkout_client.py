@@ -97,7 +97,8 @@ class CheckoutProcess:
             text = printable(str(header.get("text", "")), SENTENCE)
             if header["error"] in ("unstable", "unsolved"):
                 raise BadScene(text)
-            raise CheckoutFailed(f"the checkout cannot {do}: {text}")
+            what = "be used" if do == "hello" else do
+            raise CheckoutFailed(f"the checkout cannot {what}: {text}")
         return header, found
 
     def _read(self, count: int, deadline: float, do: str) -> bytes:

@@ -87,7 +87,7 @@ def check_address(address: str) -> None:
     host, _, port = address.removeprefix("ray://").rpartition(":")
     if not host or not port.isdigit():
         raise NoCluster(
-            f"--address {address!r} is none of auto, local, HOST:PORT and ray://HOST:PORT"
+            f"--address {address!r} is not one of auto, local, HOST:PORT and ray://HOST:PORT"
         )
     if reason := unreachable(address):
         raise NoCluster(

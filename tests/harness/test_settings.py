@@ -62,7 +62,7 @@ def test_every_setting_is_a_flag_with_its_default() -> None:
 def test_several_splits_are_a_list_whose_entries_are_checked() -> None:
     for splits in ("heldout,train", ["heldout", "train"]):
         assert updated(DEFAULTS, {"split": splits}).selection.split == "heldout,train"
-    with pytest.raises(SettingsError, match="split 'test' is none of heldout, train"):
+    with pytest.raises(SettingsError, match="split 'test' is not one of heldout, train"):
         updated(DEFAULTS, {"split": "heldout,test"})
 
 
@@ -148,7 +148,7 @@ def test_json_has_the_same_form(tmp_path: Path) -> None:
         ("[compute]\nworkers = 'many'", "workers='many' is not a whole number"),
         ("[compute]\nworkers = -1", "workers is -1, and must be at least 0"),
         ("[compute]\naddress = 'auto'", "address goes with executor ray"),
-        ("[recording]\nvideo = 'some'", "none of none, failures, first, all"),
+        ("[recording]\nvideo = 'some'", "not one of none, failures, first, all"),
         (
             "[recording]\nvideo_cameras = 'head,top'",
             r"video_cameras \['top'\] are none of head, left_",
@@ -184,7 +184,9 @@ def test_impossible_values_are_refused(wrong: dict[str, Any]) -> None:
 
 
 def test_choices_hold_for_settings_made_in_python_too() -> None:
-    with pytest.raises(SettingsError, match="video 'some' is none of none, failures, first, all"):
+    with pytest.raises(
+        SettingsError, match="video 'some' is not one of none, failures, first, all"
+    ):
         Recording(video="some")
 
 

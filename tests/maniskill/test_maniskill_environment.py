@@ -104,8 +104,8 @@ def test_the_step_limit_truncates_and_a_bad_action_fails() -> None:
     [
         ({"num_envs": 4}, "one trial on the CPU"),
         ({"sim_backend": "physx_cuda"}, "one trial on the CPU"),
-        ({"obs_mode": "pointcloud"}, "is none of state, state_dict, none, rgb"),
-        ({"control_mode": "pd_ee_pose"}, "is none of pd_joint_pos, ee, delta_ee"),
+        ({"obs_mode": "pointcloud"}, "is not one of state, state_dict, none, rgb"),
+        ({"control_mode": "pd_ee_pose"}, "is not one of pd_joint_pos, ee, delta_ee"),
         ({"sensor_configs": {"shader_pack": "rt"}}, "width and height can be set"),
     ],
 )

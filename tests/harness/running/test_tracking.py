@@ -90,7 +90,7 @@ def test_a_tracker_that_fails_costs_no_trial(
 def test_what_cannot_be_is_refused_before_anything_is_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with pytest.raises(SettingsError, match="log 'tensorboard' is none of none, wandb"):
+    with pytest.raises(SettingsError, match="log 'tensorboard' is not one of none, wandb"):
         robospa.evaluate("hold", out=tmp_path / "run", log="tensorboard", **FAKES)
     monkeypatch.setitem(sys.modules, "wandb", None)
     with pytest.raises(MissingPackage, match=r"wandb is not installed.*\[wandb\]'"):

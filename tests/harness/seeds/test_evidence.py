@@ -158,7 +158,7 @@ def test_trials_of_several_robots_modes_and_splits() -> None:
     assert len(keys) == len(set(keys)) == 16
     assert {key.variant for key in keys} == {("Pick_Blocks_Size", 1)}
     assert {row["origin"] for row in seed_sources(chosen, keys)} == {"given"}
-    with pytest.raises(SettingsError, match="split 'test' is none of heldout, train"):
+    with pytest.raises(SettingsError, match="split 'test' is not one of heldout, train"):
         Selection(split="heldout,test")
 
 
