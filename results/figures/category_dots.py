@@ -22,13 +22,15 @@ if TYPE_CHECKING:
 
 LINE = 0.05
 """Height that a series takes of a category's line [inch]."""
+LEAST = 1.1
+"""Height of a figure whose few lines leave no room for its axes and legend [inch]."""
 
 
 def draw_dots(all_series: Sequence[Series], levels: Sequence[int]) -> Figure:
     """The figure, with a panel for each of `levels`; categories that no series has get no line."""
     present = {c for s in all_series for (c, level) in s.scores.categories if level in levels}
     shown = [c for c in CATEGORIES if c in present] or list(CATEGORIES)
-    figure = new_figure(len(shown) * (LINE * len(all_series) + 0.04) + 0.6)
+    figure = new_figure(max(LEAST, len(shown) * (LINE * len(all_series) + 0.04) + 0.6))
     axes = figure.subplots(1, len(levels), sharey=True, squeeze=False)[0]
     for axis, level in zip(axes, levels, strict=True):
         for index, series in enumerate(all_series):

@@ -24,7 +24,7 @@ from robospa.results.figures.series import (
 CAPTIONS = {
     "success": "Success rate by level for every category, with 95 % intervals; "
     "the dotted line is guessing among the candidates.",
-    "radar": "Success rate of every category at levels 1 and 5; a gap has no result.",
+    "radar": "Success rate of every category at the first and the last level; a gap has no result.",
     "progress": "Progress score against success rate, a point a procedural variant: the higher "
     "above the line, the further failed trials came.",
     "latency": "Share of trials whose median, 95th and 99th percentile latency lies below a value.",

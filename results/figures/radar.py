@@ -1,7 +1,7 @@
-"""The success rate of every category at the first and at the last level, side by side.
+"""The success rate of every category at the first and at the last level with results, side by side.
 
-Up to three series are radars, as in the paper; more outlines cover each other, so they are dots
-with their intervals, a line a category.
+Up to three series are radars, as in the paper; more outlines cover each other, and fewer than three
+categories have none, so these are dots with their intervals, a line a category.
 """
 
 from __future__ import annotations
@@ -28,30 +28,34 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.projections.polar import PolarAxes
 
-LEVELS = (1, 5)
 MOST_OUTLINES = 3
+FEWEST_SPOKES = 3
 
 
 def draw_radar(all_series: Sequence[Series]) -> Figure:
     """The figure; a category without a result leaves a gap in its series' outline."""
-    if len(all_series) > MOST_OUTLINES:
-        return draw_dots(all_series, LEVELS)
+    present = {place for series in all_series for place in series.scores.categories}
+    there = sorted({level for _, level in present})
+    levels = sorted({there[0], there[-1]}) if there else [1]
+    if len(all_series) > MOST_OUTLINES or len({c for c, _ in present}) < FEWEST_SPOKES:
+        return draw_dots(all_series, levels)
     figure = new_figure(2.2)
-    axes = figure.subplots(1, 2, subplot_kw={"projection": "polar"})
-    top = _top(all_series)
-    for axis, level in zip(axes, LEVELS, strict=True):
+    kind = {"projection": "polar"}
+    axes = figure.subplots(1, len(levels), subplot_kw=kind, squeeze=False)[0]
+    top = _top(all_series, levels)
+    for axis, level in zip(axes, levels, strict=True):
         _radar(axis, all_series, level, top)
     legend_below(figure, series_handles(all_series))
     return figure
 
 
-def _top(all_series: Sequence[Series]) -> float:
-    """The outer ring [%]: the next 20 above the largest value, the same for both radars."""
+def _top(all_series: Sequence[Series], levels: Sequence[int]) -> float:
+    """The outer ring [%]: the next 20 above the largest value, the same for all radars."""
     values = [
         percent_of(s.scores.categories.get((c, n)), "sr")
         for s in all_series
         for c in CATEGORIES
-        for n in LEVELS
+        for n in levels
     ]
     largest = max((v for v in values if v is not None), default=100.0)
     return float(min(100, max(20, 20 * math.ceil(largest / 20))))
@@ -59,11 +63,9 @@ def _top(all_series: Sequence[Series]) -> float:
 
 def _radar(axis: PolarAxes, all_series: Sequence[Series], level: int, top: float) -> None:
     angles = [2 * math.pi * i / len(CATEGORIES) for i in range(len(CATEGORIES))]
-    some = False
     for index, series in enumerate(all_series):
         values = [percent_of(series.scores.categories.get((c, level)), "sr") for c in CATEGORIES]
         known = [math.nan if v is None else v for v in values]
-        some = some or any(v is not None for v in values)
         colour = COLOURS[index % len(COLOURS)]
         axis.plot(
             [*angles, 0.0],
@@ -86,6 +88,5 @@ def _radar(axis: PolarAxes, all_series: Sequence[Series], level: int, top: float
     axis.set_yticks(rings, [*(f"{r:g}" for r in rings[:-1]), ""], fontsize=5)
     axis.set_rlabel_position(18)
     axis.spines["polar"].set_color(GRID)
-    name = f"L{level}" if some else f"L{level}: no results"
-    axis.set_title(name, loc="left", x=-0.12, y=1.06, weight="bold")
+    axis.set_title(f"L{level}", loc="left", x=-0.12, y=1.06, weight="bold")
     axis.set_xlabel(f"SR, outer ring {top:g} %", fontsize=6)

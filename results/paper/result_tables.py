@@ -227,10 +227,8 @@ def _notes(
         if column.published:
             continue
         if column.trials != trials:
-            notes.append(
-                f"{column.title}: up to {column.trials} trials a variant, "
-                f"the published models {trials}."
-            )
+            theirs = f", the published models {trials}" if models else ""
+            notes.append(f"{column.title}: up to {column.trials} trials a variant{theirs}.")
         notes += not_run_note(column, levels)
         places = [(row, level) for row in rows for level in levels]
         lost = [text for place in places if (text := _lost(column, metric, *place))]
@@ -251,8 +249,8 @@ def not_run_note(column: Column, levels: Sequence[int]) -> list[str]:
             "what has finished."
         ]
     return [
-        f"{column.title}: of {total} tasks {', '.join(lacking)} were not run; "
-        "averages that would include them are left out."
+        f"{column.title}: of {total} tasks {', '.join(lacking)} were not run; averages over them "
+        "are left out."
     ]
 
 

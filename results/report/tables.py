@@ -120,12 +120,16 @@ class PageTable:
 
 
 def for_page(tables: Sequence[ReportTable]) -> list[PageTable]:
-    """The tables for a page."""
+    """The tables for a page; a note stands below the first of the open tables that has it."""
     from markupsafe import Markup
 
-    made = []
+    made: list[PageTable] = []
+    said: set[str] = set()
     for table in tables:
-        paper_table = table.table
+        new = tuple(note for note in table.table.notes if table.folded or note not in said)
+        paper_table = replace(table.table, notes=new)
+        if not table.folded:
+            said.update(new)
         long = [note for note in paper_table.notes if len(note) > LONG]
         short = replace(
             paper_table, notes=tuple(note for note in paper_table.notes if note not in long)
