@@ -210,6 +210,19 @@ def _about_server(server: ProbedPolicy) -> dict[str, Any]:
     return found
 
 
+def ready_config(
+    config: WorkerConfig, keys: Sequence[TrialKey], policies: Mapping[str, ProbedPolicy]
+) -> WorkerConfig:
+    """`config` with what its workers have to know of the `policies` that answered, by task."""
+    servers = [p for policy in policies.values() for p in (policy, *policy.replicas)]
+    return replace(
+        config,
+        samples=frozenset({key.task: key for key in reversed(list(keys))}.values()),
+        expects={p.target: p.spec for p in servers if is_url(p.target)},
+        identities={p.target: p.identity for p in servers if is_url(p.target)},
+    )
+
+
 def evaluate(request: Request) -> None:
     """Run every listed trial of `request` that has no result yet.
 
@@ -224,13 +237,7 @@ def evaluate(request: Request) -> None:
     check_clock(request.config.clock, [policy.spec for policy in policies.values()])
     manifest = make_manifest(request, policies)
     first = {key.task: key for key in reversed(list(request.keys))}
-    servers = [p for policy in policies.values() for p in (policy, *policy.replicas)]
-    config = replace(
-        request.config,
-        samples=frozenset(first.values()),
-        expects={p.target: p.spec for p in servers if is_url(p.target)},
-        identities={p.target: p.identity for p in servers if is_url(p.target)},
-    )
+    config = ready_config(request.config, request.keys, policies)
     with (
         ray_executor(request.ray, config, _renders(policies)) as executor,
         run_lock(folder) as lock,

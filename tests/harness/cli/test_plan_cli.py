@@ -31,3 +31,19 @@ def test_it_is_about_the_selected_trials(capsys: pytest.CaptureFixture[str]) -> 
     )
     assert found["trials"] == 80 and found["least"] == 4
     assert list(found["half_widths"]) == ["80"] and found["enough"] == {}
+
+
+def test_a_server_that_is_not_there_is_one_sentence(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as end:
+        main(["plan", "ws://127.0.0.1:9", "--tasks", "GAC"])
+    assert end.value.code == 1
+    said = capsys.readouterr().err.strip().splitlines()
+    assert said[-1].startswith("robospa: ") and "127.0.0.1:9" in said[-1]
+
+
+@pytest.mark.sim
+def test_a_sample_says_what_all_trials_will_cost(capsys: pytest.CaptureFixture[str]) -> None:
+    chosen = ("--tasks", "Pick_Blocks_Size", "--levels", "1", "--trials", "20", "--workers", "1")
+    found = json.loads(output(capsys, "oracle", *chosen, "--seconds", "2", "--json"))["cost"]
+    assert found["trials"] == 20 and 1 <= found["sampled"] <= 20
+    assert found["calls"] >= 20 and found["seconds"] > 0 and found["server_hours"] == 0
