@@ -35,7 +35,7 @@ FEWEST_SPOKES = 3
 def draw_radar(all_series: Sequence[Series]) -> Figure:
     """The figure; a category without a result leaves a gap in its series' outline."""
     present = {place for series in all_series for place in series.scores.categories}
-    there = sorted({level for _, level in present})
+    there = sorted({level for _, level in present if level})  # 0 is all of them together
     levels = sorted({there[0], there[-1]}) if there else [1]
     if len(all_series) > MOST_OUTLINES or len({c for c, _ in present}) < FEWEST_SPOKES:
         return draw_dots(all_series, levels)

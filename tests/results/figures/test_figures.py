@@ -129,6 +129,19 @@ def test_a_series_keeps_its_trials_order_free(drawn: Path, tmp_path: Path) -> No
         assert (drawn / name).read_bytes() == (tmp_path / name).read_bytes()
 
 
+def test_few_categories_are_dots_at_the_first_and_last_level_that_were_run() -> None:
+    figure = draw_radar([small_run()])
+    assert [axis.name for axis in figure.axes] == ["rectilinear", "rectilinear"]
+    assert [axis.get_title(loc="left") for axis in figure.axes] == ["L1", "L5"]
+
+
+def test_a_run_of_one_level_has_one_panel() -> None:
+    records = [trial("Pick_Blocks_Size", "GAC", 3, seed, True) for seed in range(2)]
+    by_key = {r.key: r for r in records}
+    (axis,) = draw_radar([Series("one", score(by_key, by_key), tuple(records))]).axes
+    assert axis.get_title(loc="left") == "L3"
+
+
 def test_many_models_are_dots_with_intervals_not_outlines(tmp_path: Path) -> None:
     models = [published(name) for name in ("RDT", "GO-1", "pi0.5", "X-VLA")]
     assert [axis.name for axis in draw_radar(models[:3]).axes] == ["polar", "polar"]

@@ -1,0 +1,96 @@
+"""`--json`: every command that reports has it, and standard output is then one JSON value."""
+
+from __future__ import annotations
+
+import importlib
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import typer
+from checkouts import write_checkout
+from command_line import robospa
+from run_by_hand import outcomes, write
+
+from robospa.harness.cli.main import COMMANDS, NAMES
+
+SILENT = {
+    "demo": "shows how the others look",
+    "serve": "runs until it is stopped",
+    "view": "opens a browser",
+    "push": "prints an address",
+    "record": "prints the file",
+    "learn train": "prints the folder",
+    "learn curve": "prints the figure",
+    "submit template": "prints a TOML file",
+    "assets add": "prints what assets --json lists",
+}
+"""Commands that report nothing to a program, and why."""
+ELSEWHERE = {
+    "doctor": "test_help_cli",
+    "check": "test_help_cli",
+    "eval": "test_eval_cli",
+    "latency": "test_latency_cli",
+    "seeds": "test_seeds_cli",
+    "collect": "test_collect_cli",
+    "assets": "test_assets_cli",
+    "checkout": "test_checkout_cli",
+    "submit pack": "test_submit_cli",
+    "submit verify": "test_submit_cli",
+    "submit block": "test_submit_cli",
+    "submit reproduce": "test_submit_cli",
+    "leaderboard add": "test_leaderboard_cli",
+    "audit": "test_audit_cli",
+}
+"""Commands that need more than a run on disk, and the file of the test that parses their JSON."""
+HERE = {
+    "plan": "plan --tasks GAC --levels 5 --trials 20",
+    "report": "report {run}",
+    "failures": "failures {run}",
+    "compare": "compare {run} {other}",
+    "lint": "lint {run}",
+    "paper": "paper --out {tmp}/paper --table basic",
+    "tasks": "tasks Pick_Blocks_Size",
+    "instructions": "instructions {tmp}/checkout --tasks Pick_Blocks_Size --levels 2",
+    "leaderboard build": "leaderboard build --submissions {tmp}/none --out {tmp}/site",
+}
+
+
+def commands() -> Iterator[tuple[str, Any]]:
+    """Every command with its name, such as `submit verify`."""
+    for name in COMMANDS:
+        module = importlib.import_module(f"robospa.harness.cli.{name}")
+        found = getattr(module, NAMES.get(name, name))
+        app = found if isinstance(found, typer.Typer) else typer.Typer()
+        if app is not found:
+            app.command(name)(found)
+        command: Any = typer.main.get_command(app)
+        parts = getattr(command, "commands", {})
+        if not parts or command.invoke_without_command:
+            yield name, command
+        yield from ((f"{name} {part}", one) for part, one in parts.items())
+
+
+def test_every_command_that_reports_has_json() -> None:
+    having = {name for name, one in commands() if any("--json" in p.opts for p in one.params)}
+    assert having == {name for name, _ in commands()} - set(SILENT)
+    assert having == set(HERE) | set(ELSEWHERE)
+
+
+def test_the_other_tests_exist() -> None:
+    tests = Path(__file__).parents[2]
+    for name, file in ELSEWHERE.items():
+        (found,) = tests.rglob(f"{file}.py")
+        assert "--json" in found.read_text(), (name, file)
+
+
+@pytest.mark.parametrize("line", HERE.values(), ids=HERE)
+def test_standard_output_is_one_json_value(line: str, tmp_path: Path) -> None:
+    for name, found in (("one", [1, 1, 0]), ("two", [1, 0, 0])):
+        write(tmp_path / name, outcomes("Pick_Blocks_Size", 1, found))
+    write_checkout(tmp_path / "checkout")
+    words = line.format(run=tmp_path / "one", other=tmp_path / "two", tmp=tmp_path).split()
+    done = robospa(*words, "--json")
+    assert json.loads(done.out) and "Traceback" not in done.err
