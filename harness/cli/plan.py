@@ -1,4 +1,4 @@
-"""`robospa plan`: what how many of the selected trials tell, and what they cost, before a run."""
+"""`robospa plan`: how many of the selected trials are enough, and what they cost, before a run."""
 
 from __future__ import annotations
 
