@@ -51,7 +51,7 @@ class Column:
         """The head of the column."""
         shuffled = " (shuffled sentences)" * self.shuffled
         clock = " (real time)" * bool(self.results.info.clock)
-        budget = f" (budget: {self.budget.text})" if self.budget else ""
+        budget = f" ({self.budget.text})" if self.budget else ""
         return self.results.name + " (privileged)" * self.privileged + shuffled + clock + budget
 
     @property

@@ -105,7 +105,7 @@ def score_table(run: Run, scores: Scores) -> Table:
     knows += " (ablation: sentences of other scenes)" * run.info.shuffled_instructions
     knows += f" ({run.info.clock})" * bool(run.info.clock)
     if run.info.budget is not None:
-        knows += f" (budget: {run.info.budget.text})"
+        knows += f" ({run.info.budget.text})"
     heads = (*map(level_name, scores.levels), "SR [95 %]", "ONTA", "PS", "trials")
     return Table(
         "scores",
