@@ -136,7 +136,7 @@ def moments(record: TrialRecord, names: Mapping[str, str], end: float) -> list[M
 def _in_words(event: EventRow) -> str:
     about, note = event.get("object", ""), event.get("note", "")
     if event["kind"] == "closed":  # its note says how: touching or beside
-        return f"closed a gripper, {note} {about}".rstrip(" ,")
+        return f"closed, {note} {about}".rstrip(" ,")
     number = event.get("index", -1)
     head = event["kind"].replace("_", " ")
     if event["kind"].startswith("subtask"):

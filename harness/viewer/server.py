@@ -28,7 +28,7 @@ RATE = 20
 EXPORT_RATE = 10
 """Frames a simulated second of a page for itself: as many as a playback has."""
 SPEEDS = ("0.25", "0.5", "1", "2", "4")
-EYE, AT = (0.25, -0.85, 1.5), (0.0, -0.05, 0.74)
+EYE, AT = (0.3, -1.0, 1.65), (0.0, -0.05, 0.74)
 """Where the view begins and what it looks at [m, world]: from above the robot to the table."""
 WANTED = (40, 190, 90)
 """sRGB of the box around an object that is still to be moved or pressed."""

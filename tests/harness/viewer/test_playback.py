@@ -48,7 +48,7 @@ def test_an_object_is_wanted_until_all_its_subtasks_are_done() -> None:
 
 def test_events_are_words_with_the_objects_names_and_approaches_are_left_out() -> None:
     assert [moment.text for moment in played().moments] == [
-        "closed a gripper, touching the red block",
+        "closed, touching the red block",
         "subtask 1 done: the red block",
         "subtask 2 done: the blue block",
         "subtask 1 undone: the red block",
