@@ -14,6 +14,8 @@ from collections.abc import Collection
 from importlib import metadata
 from typing import Any
 
+from robospa.extras import EXTRAS, remedy
+
 POLICIES = "robospa.policies"
 """Functions that make a policy, called with the options of `robospa serve --arg`."""
 LEARNERS = "robospa.learners"
@@ -42,6 +44,9 @@ def load(path: str) -> Any:
     try:
         return getattr(importlib.import_module(module), name)
     except (ImportError, AttributeError, ValueError) as error:
+        package = str(getattr(error, "name", "")).partition(".")[0]
+        if path.startswith("robospa.") and package in EXTRAS:
+            raise UnknownName(f"{package} is not installed; {remedy(package)}") from error
         raise UnknownName(f"cannot load {path!r}: {error}") from error
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from robospa import extras
+from robospa import extras, registry
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -53,3 +53,14 @@ def test_a_package_that_is_there_but_lacks_one_of_its_own_is_not_called_missing(
     with pytest.raises(ModuleNotFoundError, match="nothing_of_that_name") as found:
         extras.need("halfway")
     assert not isinstance(found.value, extras.MissingPackage)
+
+
+def test_a_part_of_ours_that_lacks_an_extra_names_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    def missing(module: str) -> None:
+        raise ModuleNotFoundError("No module named 'sapien'", name="sapien")
+
+    monkeypatch.setattr(registry.importlib, "import_module", missing)
+    with pytest.raises(registry.UnknownName, match=r"sapien is not installed; .*\[sim\]'"):
+        registry.load("robospa.harness.sim.sapien_world:SapienWorld")
+    with pytest.raises(registry.UnknownName, match="cannot load 'mine:Policy': No module named"):
+        registry.load("mine:Policy")
