@@ -126,7 +126,7 @@ def test_spaces_are_those_of_the_spec() -> None:
         ({"cameras": ["top"]}, "there is no camera 'top'"),
         ({"spec": PolicySpec("x", history=(-1,))}, "gives no history"),
         ({"spec": PolicySpec("x", privileged=True)}, "gives no privileged state"),
-        ({"render_mode": "ansi"}, "none of rgb_array and human"),
+        ({"render_mode": "ansi"}, "not one of rgb_array and human"),
     ],
 )
 def test_what_cannot_be_is_refused(given: dict[str, Any], reason: str) -> None:

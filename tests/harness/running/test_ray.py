@@ -66,7 +66,7 @@ def traces(folder: Path) -> dict[str, bytes]:
 @pytest.mark.parametrize(
     ("address", "text"),
     [
-        ("nonsense", "none of auto, local, HOST:PORT"),
+        ("nonsense", "not one of auto, local, HOST:PORT"),
         ("127.0.0.1:1", "no Ray cluster answers at 127.0.0.1:1"),
         ("ray://127.0.0.1:1", "no Ray cluster answers at ray://127.0.0.1:1"),
     ],
