@@ -112,8 +112,9 @@ def test_two_servers_share_a_run_and_each_keeps_its_task(tmp_path: Path) -> None
     assert len(found.records) == 24 and not found.missing
     assert len(first.tasks) + len(second.tasks) == 24
     assert first.tasks and second.tasks
-    # Three tasks on two servers: one change of task is needed, each may help out once at the end.
-    assert first.switches + second.switches <= 3
+    # Three tasks on two servers: one change of task is needed, each may help out now and then at
+    # the end, more often where a worker comes late. Without tasks of their own it would be 15.
+    assert first.switches + second.switches <= 6
     about = found.manifest["about"]["policy"]
     assert about["target"] == first.url
     assert [server["target"] for server in about["equals"]] == [second.url]
