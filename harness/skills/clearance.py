@@ -50,6 +50,13 @@ class Boxes:
             worst = np.maximum(worst, inside.min(axis=2).max(axis=1, initial=0.0))
         return worst
 
+    def points(self) -> Array:
+        """Points (27 N, 3) [m, world]: corners and middles of edges, faces and boxes."""
+        steps = np.array(list(product((-1.0, 0.0, 1.0), repeat=3)))
+        inside = steps[None] * self.half[:, None]
+        points: Array = self.centre[:, None] + np.einsum("nij,nkj->nki", self.turn, inside)
+        return points.reshape(-1, 3)
+
 
 def _boxes(parts: Sequence[tuple[Pose, Array]]) -> Boxes:
     """Boxes at these poses with these half sizes."""

@@ -5,7 +5,16 @@ from __future__ import annotations
 import math
 from itertools import product
 
-from robospa.geometry import Pose, Vec3, axis_rotation, multiply, rotate, yaw_rotation
+from robospa.geometry import (
+    Pose,
+    Vec3,
+    axis_rotation,
+    from_transform,
+    multiply,
+    rotate,
+    yaw_rotation,
+)
+from robospa.harness.robots.kinematics import forward
 from robospa.harness.skills.approach import approach_joints, release, translated
 from robospa.harness.skills.dock import ATTEMPTS
 from robospa.harness.skills.grasping import GraspCandidate, reachable_grasps
@@ -25,6 +34,12 @@ SWINGS = (0.0, 0.25, -0.25, 0.5, -0.5, 0.75, -0.75)
 """Turns of the object about the peg [rad]."""
 WOBBLES = (0.0, 0.1, -0.1, 0.2, -0.2, 0.3, -0.3)
 """Turns about the vertical [rad] at which the handle still fits over the peg."""
+FAR_SWINGS = tuple(sign * 0.15 * n for n in range(10) for sign in ((1, -1) if n else (1,)))
+FAR_WOBBLES = tuple(sign * 0.1 * n for n in range(5) for sign in ((1, -1) if n else (1,)))
+"""Turns at which an object may still be hung when nothing else is left to try [rad]; it swings down
+as it is let go."""
+DETOURS = (0.0, 0.06, 0.12)
+"""How much farther out along the peg, and higher, the object passes by on that way [m]."""
 SIDES = (0.0, math.pi)
 """The handle fits from both sides."""
 ON_PEG, DROP = 0.018, 0.03
@@ -41,7 +56,8 @@ def hang(ws: Workspace, call: Hang) -> Steps:
     paths = [_path(peg, out) for out in OUTS]
     planned, allowed = _targets(peg, handle, (0.0,)), _targets(peg, handle, WOBBLES)
     refused: list[Pose] = []
-    for _ in range(ATTEMPTS):
+    for attempt in range(ATTEMPTS):
+        choices: tuple[list[Pose], ...] = (planned, allowed)
         x, y, z = ws.pose(call.object).position
         grasps = reachable_grasps(ws, call.object, arms_for(call.arm))
         filters = (
@@ -51,7 +67,11 @@ def hang(ws: Workspace, call: Hang) -> Steps:
         feasible = next((f for f in filters if any(f(grasp) for grasp in grasps)), None)
         yield from pick(ws, Pick(call.object, LIFT, call.arm), feasible)
         arm = ws.held.index(call.object)
-        way = _held_way(ws, call, arm, (planned, allowed), paths)
+        way = _held_way(ws, call, arm, choices, paths)
+        if way is None and attempt == ATTEMPTS - 1:
+            far = _far_target(ws, call, arm, peg, _far_targets(peg, handle))
+            if far is not None:
+                choices, way = (far[0],), far[1]
         if way is None:
             refused.append(grip_offset(ws, arm, call.object))
             yield from place(ws, Place(call.object, (x, y, z)))
@@ -62,7 +82,7 @@ def hang(ws: Workspace, call: Hang) -> Steps:
         else:
             travel(ws, arm, way[0])
         yield from ws.flush(exactly=True)
-        for joints in _held_way(ws, call, arm, (planned, allowed), paths) or way:
+        for joints in _held_way(ws, call, arm, choices, paths) or way:
             ws.add(arm, joints)
         yield from ws.flush(exactly=True)  # it comes to rest in its place before it is let go
         release(ws, arm)
@@ -97,6 +117,30 @@ def _held_way(
         if way is not None:
             return way
     return None
+
+
+def _far_target(
+    ws: Workspace, call: Hang, arm: int, peg: Pose, targets: list[Pose]
+) -> tuple[list[Pose], list[Array]] | None:
+    """The first of `targets` that arm and object come to past the peg's object, and the way."""
+    narrow, here, paths = _narrow(ws, call, arm), ws.joints[arm], [_path(peg, o) for o in OUTS]
+    for target in targets:
+        way = _way(narrow, [target], paths, here, True)
+        if way is None:
+            continue
+        frames, _ = forward(ws.chains[arm], way[0][None])
+        before = from_transform(frames[0])
+        for out, up in product(DETOURS, DETOURS):
+            x, y, z = rotate(peg.rotation, (0.0, -out, 0.0))
+            stop = ws.solve(arm, translated(before, (x, y, z + up)), way[0])
+            if stop is not None and _open(narrow, [here, stop, way[0]]):
+                return [target], [stop, *way]
+    return None
+
+
+def _open(narrow: Narrow, way: list[Array]) -> bool:
+    """Whether arm and object keep clear of peg and table on the lines between joints [rad]."""
+    return narrow.free(way) and narrow.above_table(way) and narrow.carried_past(way)
 
 
 def _hangs(handle: Pose, peg: Pose) -> bool:
@@ -146,11 +190,17 @@ def _grasp_filter(
 
 def _targets(peg: Pose, handle: Pose, wobbles: tuple[float, ...]) -> list[Pose]:
     """Poses of the object with the middle of its handle under the peg's place."""
+    return [p for w in wobbles for s in SWINGS for p in _hung(peg, handle, s, w)]
+
+
+def _far_targets(peg: Pose, handle: Pose) -> list[Pose]:
+    """The same for turns that go farther, the least about the peg first."""
+    return [p for s in FAR_SWINGS for w in FAR_WOBBLES for p in _hung(peg, handle, s, w)]
+
+
+def _hung(peg: Pose, handle: Pose, swing: float, wobble: float) -> list[Pose]:
+    """Poses of the object from both sides, turned by `swing` and `wobble` [rad]."""
+    turn = multiply(yaw_rotation(wobble), axis_rotation((0.0, 1.0, 0.0), swing))
+    turned = translated(peg * Pose((0.0, 0.0, 0.0), turn), (0.0, 0.0, -SAG))
     back = handle.inverse()
-    found = []
-    for wobble in wobbles:
-        for swing in SWINGS:
-            turn = multiply(yaw_rotation(wobble), axis_rotation((0.0, 1.0, 0.0), swing))
-            turned = translated(peg * Pose((0.0, 0.0, 0.0), turn), (0.0, 0.0, -SAG))
-            found += [turned * Pose((0.0, 0.0, 0.0), yaw_rotation(side)) * back for side in SIDES]
-    return found
+    return [turned * Pose((0.0, 0.0, 0.0), yaw_rotation(side)) * back for side in SIDES]

@@ -57,6 +57,22 @@ class Narrow:
         lowest = min((from_transform(f) * self.offset).position[2] for f in frames)
         return lowest > self.ws.scene.table_top + MARGIN
 
+    def carried_past(self, way: list[Array]) -> bool:
+        """Whether what is held keeps clear of the object on the lines between joints [rad] `way`.
+
+        It counts as points in the boxes that it is made of.
+        """
+        held = self.ws.held[self.arm]
+        if held is None:
+            return True
+        line = np.concatenate([_line(a, b) for a, b in pairwise(way)])
+        frames, _ = forward(self.ws.chains[self.arm], line)
+        model = self.ws.models[held]
+        parts = [own_boxes(model, from_transform(f) * self.offset).points() for f in frames]
+        around = own_boxes(self.ws.models[self.beside], self.ws.pose(self.beside))
+        wide = replace(around, half=around.half + MARGIN / 2)
+        return not bool((wide.depths(np.stack(parts)) > 0).any())
+
 
 def _line(start: Array, goal: Array) -> Array:
     """Joints (N, J) on the line from `start` to `goal`, with both."""

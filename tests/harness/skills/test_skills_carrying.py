@@ -96,6 +96,30 @@ def test_a_way_is_above_the_table_only_where_what_is_held_stays_so(
     assert narrow.above_table([ws.joints[1], ws.joints[1]]) is above
 
 
+@pytest.mark.parametrize(("aside", "past"), [(0.0, False), (0.4, True)])
+def test_a_mug_is_carried_past_a_rack_only_where_they_do_not_meet(aside: float, past: bool) -> None:
+    scene, ws = workspace("Hang_Mug_Stack_Blocks", 1)
+    mug, rack = scene.facts["mug"], scene.facts["rack"]
+    here, stands = ws.snapshot.end_effector[1], ws.pose(rack)
+    x, y, _ = stands.position
+    ws.held[1] = mug
+    held_at = Pose((x + aside, y, ws.scene.table_top), ws.pose(mug).rotation)
+    narrow = Narrow(ws, 1, rack, here.inverse() * held_at)
+    assert narrow.carried_past([ws.joints[1], ws.joints[1]]) is past
+
+
+def test_targets_of_the_last_attempt_keep_the_handle_at_the_peg_and_turn_it_farther() -> None:
+    scene, ws = workspace("Hang_Mug_Stack_Blocks", 1)
+    peg = ws.pose(scene.facts["rack"]) * ws.models[scene.facts["rack"]].frames["hang"]
+    handle = ws.models[scene.facts["mug"]].frames["handle"]
+    targets = hang._far_targets(peg, handle)
+    under = translated(peg, (0.0, 0.0, -hang.SAG)).position
+    assert all((t * handle).position == pytest.approx(under, abs=1e-9) for t in targets)
+    upright = [rotate(t.rotation, UPWARDS)[2] for t in targets]
+    usual = [rotate(t.rotation, UPWARDS)[2] for t in hang._targets(peg, handle, hang.WOBBLES)]
+    assert targets[:2] == hang._targets(peg, handle, (0.0,))[:2] and min(upright) < min(usual)
+
+
 def test_a_bin_is_emptied_upside_down_with_its_mouth_over_the_container() -> None:
     scene, ws = workspace("Place_Phone_Press_Stapler", 5)
     call = Pour(scene.facts["table_trash_bin"], into=scene.facts["dustbin"])
