@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from robospa.geometry import to_matrix
 from robospa.harness.robots.embodiment import Arm
-from robospa.harness.robots.kinematics import link_frames
+from robospa.harness.robots.kinematics import forward, link_frames
 from robospa.harness.skills.clearance import standing
 from robospa.harness.skills.workspace import Workspace
 from robospa.tasks.shapes import Box
@@ -28,6 +28,8 @@ SPARE = 0.01
 """What is left [m] between an arm and the table."""
 TOUCH = 0.005
 """An arm deeper [m] than this in something is in its way."""
+EDGE = 0.06
+"""What of a hand is farther [m] than this from the fingers' axis is beside what they touch."""
 SPACING = 0.05
 """Points on a link's box are at most so far apart [m]."""
 
@@ -51,12 +53,28 @@ def _points(arm: Arm) -> tuple[tuple[int, Array], ...]:
 
 def arm_points(ws: Workspace, arm: int, joints: Array) -> Array:
     """Points (N, K, 3) [m, world] on forearm, wrist and hand at joints (N, J)."""
+    parts = _link_points(ws, arm, joints)
+    return np.concatenate(parts, axis=1) if parts else np.empty((len(joints), 0, 3))
+
+
+def edge_depth(ws: Workspace, arm: int, joints: Array) -> Array:
+    """How deep (N,) [m] the edges of a wide hand are in things: what of the last link, the hand
+    without its fingers, is farther than EDGE from their axis."""
+    parts = _link_points(ws, arm, joints)
+    if not parts or not len(joints):
+        return np.zeros(len(joints))
+    frames, _ = forward(ws.chains[arm], joints[:1])
+    beside = (parts[-1][0] - frames[0, :3, 3]) @ frames[0, :3, 1:3]
+    return standing(ws).depths(parts[-1][:, np.hypot(*beside.T) > EDGE])
+
+
+def _link_points(ws: Workspace, arm: int, joints: Array) -> list[Array]:
+    """Points (N, K, 3) [m, world] on every link that collides, from the base outwards."""
     frames = link_frames(ws.chains[arm], joints)
-    parts = [
+    return [
         points @ frames[i][:, :3, :3].transpose(0, 2, 1) + frames[i][:, None, :3, 3]
         for i, points in _points(ws.robot.arms[arm])
     ]
-    return np.concatenate(parts, axis=1) if parts else np.empty((len(joints), 0, 3))
 
 
 def arm_depth(ws: Workspace, arm: int, joints: Array, *without: str) -> Array:

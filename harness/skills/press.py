@@ -10,7 +10,7 @@ import numpy as np
 
 from robospa.geometry import Pose, Vec3, axis_rotation, look_rotation, rotate
 from robospa.harness.robots.kinematics import inverse
-from robospa.harness.skills.arm_clearance import TOUCH, arm_depth
+from robospa.harness.skills.arm_clearance import TOUCH, arm_depth, edge_depth
 from robospa.harness.skills.both_arms import go
 from robospa.harness.skills.pick import arms_for
 from robospa.harness.skills.workspace import (
@@ -87,21 +87,23 @@ def _hovering(
     """Joints at a pose and `hover` [m] above it; None if there is no such pair in reach.
 
     `choices` are lists of poses, the best list first; of each the nearest few are looked at, those
-    that stay clear of a wall before all others.
+    that stay clear of a wall before all others, then those at which the edges of a wide hand stay
+    clear of what stands beside.
     """
     hand, near, front = ws.hand(arm), ws.joints[arm], wall_front(ws)
     poses = [(k, pose) for k, some in enumerate(choices) for pose in some]
     joints, ok = inverse(ws.chains[arm], [pose for _, pose in poses])
     reached = np.flatnonzero(ok)
     blocked = arm_depth(ws, arm, joints[reached]) > TOUCH
-    ranked: list[tuple[bool, int, float, int]] = []
-    for i, stuck in zip(reached.tolist(), blocked.tolist(), strict=True):
+    beside = edge_depth(ws, arm, joints[reached]) > 0.0
+    ranked: list[tuple[bool, bool, int, float, int]] = []
+    for i, stuck, grazes in zip(reached.tolist(), blocked.tolist(), beside.tolist(), strict=True):
         k, pose = poses[i]
         far = float(np.abs(joints[i] - near).max())
         hits = stuck or max_gripper_y(pose, hand) > front
-        ranked.append((hits, k, far, i))
+        ranked.append((hits, grazes, k, far, i))
     looked: Counter[tuple[bool, int]] = Counter()
-    for hits, k, _, i in sorted(ranked):
+    for hits, _, k, _, i in sorted(ranked):
         looked[hits, k] += 1
         if looked[hits, k] <= BEST:
             above = ws.solve(arm, moved_up(poses[i][1], hover), joints[i])

@@ -9,10 +9,12 @@ from robot_at_home import at_home
 from robospa.geometry import Pose, look_rotation
 from robospa.harness.robots import embodiments
 from robospa.harness.robots.kinematics import inverse, link_frames
-from robospa.harness.skills.arm_clearance import TOUCH, arm_depth
+from robospa.harness.skills.arm_clearance import TOUCH, arm_depth, edge_depth
 from robospa.harness.skills.motion import blocked
 from robospa.harness.skills.pick import pick
-from robospa.tasks.plan import Pick
+from robospa.harness.skills.press import press
+from robospa.tasks.catalog import build_scene
+from robospa.tasks.plan import Pick, Press
 from robospa.tasks.scene import SceneObject
 from robospa.workcell import TABLE_TOP
 
@@ -56,6 +58,29 @@ def test_a_way_is_blocked_by_what_the_forearm_would_sweep_over() -> None:
     middle = link_frames(ws.chains[1], (home + turned)[None] / 2)[5][0, :3, 3]
     behind = at_home("franka-panda", block(*middle.tolist(), 0.03))
     assert blocked(behind, 1, home, turned)
+
+
+@pytest.mark.parametrize(("name", "wide"), [("franka-panda", True), ("aloha-agilex", False)])
+def test_only_a_wide_hand_has_edges(name: str, wide: bool) -> None:
+    home = np.array([at_home(name).robot.arms[1].home])
+    everywhere = at_home(name, block(0.0, 0.0, TABLE_TOP, 3.0))
+    assert arm_depth(everywhere, 1, home)[0] > 0.0
+    assert (edge_depth(everywhere, 1, home)[0] > 0.0) == wide
+
+
+def test_a_press_keeps_the_edges_of_a_wide_hand_off_what_stands_beside() -> None:
+    # straight down above the cards the hand would stop on the clock
+    scene = build_scene("Click_Objects_Order", 4, 900_001)
+    ws = at_home("franka-panda", *scene.objects)
+    down = look_rotation((0.0, 0.0, -1.0), (1.0, 0.0, 0.0))
+    cards = next(o.name for o in scene.objects if o.asset == "playing_cards")
+    rows = next(press(ws, Press(cards, arm="left")))
+    side = ws.robot.action_space("joint").arms[0]
+    assert edge_depth(ws, 0, rows[:, side.body]).max() == 0.0
+    frame = ws.pose(cards) * ws.models[cards].frames["press"]
+    x, y, z = frame.position
+    straight, _ = inverse(ws.chains[0], [Pose((x, y, z + ws.hand(0).tip), down)])
+    assert edge_depth(ws, 0, straight)[0] > 0.0
 
 
 def test_a_short_touch_on_a_long_way_is_seen() -> None:
