@@ -34,7 +34,8 @@ def list_assets(
 ) -> None:
     """Name a folder of official assets; list what it holds and which tasks run with it.
 
-    Lengths, counts and sizes of all files are checked, meshes themselves are not read.
+    Lengths, counts and sizes of all files are checked; of meshes only what collides of bins,
+    baskets, bowls and cups is read, to see whether they are hollow.
     """
     if context.invoked_subcommand is None:
         from robospa.harness.packs.archive import open_archive
@@ -92,4 +93,6 @@ def _print(found: Index) -> None:
         console.print(fault)
     if len(found.faults) > MOST_FAULTS:
         console.print(f"and {len(found.faults) - MOST_FAULTS} models more; --json lists them")
+    if found.filled:
+        console.print(found.filled_text())
     console.print(found.summary())

@@ -108,13 +108,20 @@ def _body(
     archive: Archive, drawn: Sequence[MeshUse], solid: Sequence[MeshUse], whole: bool = False
 ) -> Body:
     skin = skin_of(archive, drawn)
+    return Body(skin, cache.load(skin, "box")["box"], solid_pieces(archive, solid, whole))
+
+
+def solid_pieces(
+    archive: Archive, solid: Sequence[MeshUse], whole: bool = False
+) -> tuple[Piece, ...]:
+    """What collides of the meshes: their convex pieces, or one hull around each if `whole`."""
     files = tuple(use.file for use in solid)
     how = f"{'hulls' if whole else 'pieces'} {_transforms(solid)}"
     entry = cache.kept(files, how, lambda: _packed(archive, solid, whole))
     arrays = cache.load(entry)
     corners = np.split(arrays["corners"], np.cumsum(arrays["corner_counts"])[:-1])
     triangles = np.split(arrays["triangles"], np.cumsum(arrays["triangle_counts"])[:-1])
-    return Body(skin, cache.load(skin, "box")["box"], tuple(zip(corners, triangles, strict=True)))
+    return tuple(zip(corners, triangles, strict=True))
 
 
 def skin_of(archive: Archive, drawn: Sequence[MeshUse], full: bool = False) -> Path:

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 from robospa.harness.packs.archive import Archive, ArchiveError, ModelFiles
 from robospa.harness.packs.glb import check_glb
-from robospa.harness.packs.model_data import read_model_data
+from robospa.harness.packs.hollows import is_filled
+from robospa.harness.packs.model_data import ModelData, read_model_data
 from robospa.harness.packs.objaverse import files_text, things
 from robospa.harness.robots import embodiments
 from robospa.tasks.official.models import (
@@ -32,6 +33,8 @@ class Index:
     faults: Mapping[str, str]
     missing: Mapping[str, tuple[str, ...]]
     """For each task that cannot run the folders of the models that it needs."""
+    filled: Mapping[str, tuple[str, ...]]
+    """For each task the models whose hollow is filled by what collides of them."""
     robots: tuple[str, ...]
     textures: Mapping[str, int]
     """Number of background pictures of each split."""
@@ -49,19 +52,34 @@ class Index:
         lacking = [f"{task} needs {' and '.join(of)}" for task, of in self.missing.items()]
         return "; ".join([text, *lacking])
 
+    def filled_text(self) -> str:
+        """Which tasks have hollow things of which some models are filled, in a sentence; empty if
+        none has."""
+        tasks = [
+            f"{task} ({', '.join(dict.fromkeys(name.partition('/')[0] for name in models))})"
+            for task, models in self.filled.items()
+        ]
+        text = f"hollows are filled by their hull, as in SAPIEN, in {len(tasks)} tasks: "
+        return text + "; ".join(tasks) if tasks else ""
+
 
 def index(archive: Archive) -> Index:
     """Look at every model's files: that they are there, and that lengths, counts and sizes fit.
 
-    Meshes themselves are not read, so this takes well under a second.
+    Of meshes only what collides of hollow things is read, and kept in the cache.
     """
     faults: dict[str, str] = {}
     unusable: dict[str, str] = {}
+    closed: dict[str, list[str]] = {}
     names = set()
     for asset in official_assets():
         for model in official_models(asset):
-            if model.name not in names and (fault := _fault(archive, model)):
-                faults[model.name] = fault
+            if model.name not in names:
+                fault, filled = _looked_at(archive, model)
+                if fault:
+                    faults[model.name] = fault
+                elif filled:
+                    closed.setdefault(asset, []).append(model.name)
             names.add(model.name)
             if model.name in faults:
                 unusable[asset] = model.folder
@@ -75,6 +93,11 @@ def index(archive: Archive) -> Index:
         models=len(names),
         faults=faults,
         missing=missing,
+        filled={
+            task: found
+            for task, assets in needs().items()
+            if (found := tuple(name for asset in assets for name in closed.get(asset, ())))
+        },
         robots=tuple(name for name in embodiments() if archive.embodiment(name) is not None),
         textures={split: _pictures(archive, split) for split in ("seen", "unseen")},
         clutter=sum(map(len, things(archive).values())),
@@ -87,16 +110,22 @@ def _pictures(archive: Archive, split: str) -> int:
     return 0 if folder is None else sum(1 for _ in folder.glob(TEXTURE_ENDING))
 
 
-def _fault(archive: Archive, model: OfficialModel) -> str:
-    """What is wrong with a model, in a sentence; empty if nothing is."""
+def _looked_at(archive: Archive, model: OfficialModel) -> tuple[str, bool]:
+    """What is wrong with a model, in a sentence (empty if nothing is), and whether its hollow is
+    filled."""
     try:
         files = archive.files(model)
         data = read_model_data(files.data)
         for file in {files.visual, files.collision} - {None}:
             if file is not None and file.suffix == ".glb":
                 check_glb(file)
+        return _misfit(model, data), is_filled(archive, model, files)
     except (ArchiveError, OSError) as error:
-        return str(error)
+        return str(error), False
+
+
+def _misfit(model: OfficialModel, data: ModelData) -> str:
+    """What of the model's data is not as listed, in a sentence; empty if all is."""
     for name, point in model.points.items():
         if data.point(point) is None:
             return f"{model.name} has no {point} point, where its {name} is"

@@ -7,6 +7,7 @@ vertices.
 
 from __future__ import annotations
 
+import importlib.util
 import io
 import math
 import re
@@ -192,6 +193,11 @@ class _Inside:
     def keys(self) -> list[str]:
         """Nothing is listed: what a mesh does not name is not read."""
         return []
+
+
+def reads_meshes() -> bool:
+    """Whether the library that reads meshes is installed."""
+    return importlib.util.find_spec("trimesh") is not None
 
 
 def _library() -> Any:

@@ -23,7 +23,8 @@ POINTS = frozenset({"press", "touched", "support", "left", "right", "tip", "hand
 class OfficialModel:
     """A model of the archive, and how its frame becomes ours (see models.toml).
 
-    A `jointed` one is a URDF file in a sub-folder called `model`, one with a `hinge` has a door.
+    A `jointed` one is a URDF file in a sub-folder called `model`, one with a `hinge` has a door; a
+    `hollow` one is open at its top.
     `points` gives for some of our frames the archive's point where they lie, such as "contact 2".
     """
 
@@ -33,6 +34,7 @@ class OfficialModel:
     lies: bool = False
     faces: str = ""
     hinge: bool = False
+    hollow: bool = False
     jointed: bool = False
     points: Mapping[str, str] = field(default_factory=dict)
 
@@ -71,6 +73,7 @@ def official_model(asset: str, look: int) -> OfficialModel | None:
         row.get("lies", False),
         row.get("faces", ""),
         row.get("hinge", False),
+        row.get("hollow", False),
         isinstance(models[look], str),
         {frame: point for frame, point in row.items() if frame in POINTS},
     )
