@@ -21,6 +21,10 @@ Array = NDArray[np.float64]
 
 ABOVE = 0.07
 """Height above the final pose from which the object comes straight down [m]."""
+FAR = 2.5
+"""Where a joint would turn by more [rad], a placement in a posture nearer by is looked for."""
+TURNS = (0.0, math.pi / 2, -math.pi / 2, math.pi, -math.pi)
+"""Turns [rad] of the last joint from which it is looked for."""
 YAWS = tuple(2 * math.pi * i / 16 for i in range(16))
 MOUTH = ((0.0, 0.0), (0.06, -0.08), (0.06, 0.0), (0.1, -0.12), (0.0, -0.12), (0.12, 0.0))
 """Where over a container the object may be let go, relative to its centre [m]."""
@@ -62,6 +66,29 @@ def reachable_placements(
     """All reachable ways to bring an object held with `offset` to one of `targets`, best first."""
     poses = [target * offset.inverse() for target in targets]
     joints, ok = inverse(ws.chains[arm], poses)
+    found = _best(ws, arm, poses, joints, ok, above, near)
+    if not found or float(np.abs(found[0].joints - near).max()) < FAR:
+        return found
+    for turn in TURNS:
+        start = np.append(near[:-1], near[-1] + turn)
+        joints, ok = inverse(ws.chains[arm], poses, start)
+        ok &= np.abs(joints - near).max(axis=1) < FAR
+        nearer = _best(ws, arm, poses, joints, ok, above, near)
+        if nearer:
+            return nearer
+    return found
+
+
+def _best(
+    ws: Workspace,
+    arm: int,
+    poses: list[Pose],
+    joints: Array,
+    ok: NDArray[np.bool_],
+    above: float,
+    near: Array,
+) -> list[Placement]:
+    """Placements at those of `joints` (N, J) [rad] that are `ok`, nearest to `near` first."""
     reached = np.flatnonzero(ok)
     held = ws.held[arm]
     blocked = arm_depth(ws, arm, joints[reached], *([held] if held else [])) > TOUCH

@@ -1,15 +1,19 @@
-"""An object that turned in the hand is put down again, not let fall."""
+"""An object that turned in the hand is put down again, not let fall; one in hand is not swung."""
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
+from robot_at_home import at_home
 
-from robospa.geometry import Pose
+from robospa.geometry import Pose, multiply, yaw_rotation
 from robospa.gripper import grasp_points
 from robospa.harness.robots import embodiment
-from robospa.harness.robots.kinematics import chain_of, end_effector
+from robospa.harness.robots.kinematics import chain_of, end_effector, inverse
 from robospa.harness.skills.approach import put_down
+from robospa.harness.skills.place import FAR, reachable_placements
 from robospa.harness.skills.workspace import Workspace
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.snapshot import Snapshot
@@ -39,3 +43,18 @@ def test_what_is_held_is_lowered_to_where_it_lay_before_the_gripper_opens() -> N
     before = end_effector(chain, rows[opened - 1, :6])
     assert before.position[2] == pytest.approx(HELD.position[2] - LIFTED, abs=1e-4)
     assert (rows[:opened, 6] == 0.0).all() and ws.held[0] is None
+
+
+def test_a_thing_is_turned_by_the_wrist_and_not_by_swinging_the_whole_arm_over() -> None:
+    # the first posture that reaches the target turns the base by 2.9 rad; what is held flies off
+    ws = at_home("ur5-wsg")
+    near = np.array([-0.8, -2.1, -1.4, -1.2, 1.6, 0.7])
+    here = end_effector(ws.chains[1], near)
+    x, y, z = here.position
+    turned = Pose((x, y, z - LIFTED), multiply(yaw_rotation(-math.pi / 2), here.rotation))
+    first, _ = inverse(ws.chains[1], [turned])
+    assert np.abs(first[0] - near).max() > FAR
+    best = reachable_placements(ws, 1, Pose(), [turned], 0.05, near)[0]
+    assert np.abs(best.joints - near).max() < FAR
+    there = end_effector(ws.chains[1], best.joints)
+    assert there.position == pytest.approx(turned.position, abs=2e-3)
