@@ -10,7 +10,7 @@ Other packages add packs by an entry point (`robospa.registry.PACKS`).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
@@ -25,6 +25,10 @@ if TYPE_CHECKING:
     from robospa.tasks.shapes import ObjectModel, Params
 
 
+class PackError(ValueError):
+    """A model that cannot be made, however often one tries; one sentence for the files' owner."""
+
+
 class Pack(Protocol):
     """Gives models for assets. Equal arguments give equal models, in every process that sees the
     same files."""
@@ -37,7 +41,7 @@ class Pack(Protocol):
     def model(self, asset: str, params: Params) -> ObjectModel:
         """The model of `asset`, its frame as that of the built-in one: z up, standing on z = 0.
 
-        ValueError, in one sentence for the files' owner, if it cannot be made.
+        PackError if it cannot be made.
         """
 
     def digest(self) -> str:
@@ -73,6 +77,14 @@ class PackWithClutter(Pack, Protocol):
     def clutter(self, scene: Scene) -> Sequence[Kind]:
         """Kinds of things, the library's and its own, that may lie about in `scene`; none if the
         library's are all. Nothing that the scene's sentences may mean."""
+
+
+@runtime_checkable
+class PackWithFaults(Pack, Protocol):
+    """A pack that can say, before anything is made, what of its files cannot be used."""
+
+    def faults(self, tasks: Collection[str]) -> Mapping[str, str]:
+        """For each of `tasks` that cannot run with the files a sentence that says why."""
 
 
 @cache

@@ -54,6 +54,10 @@ VIEWS = {
 ABOUT = ("task", "level", "seed", "embodiment", "mode", "split", "stride")
 MOST_FRAMES = 20_000
 MOST_JOINTS = 32
+MOST_BYTES = 2**31
+"""Of the pictures of one camera; official episodes have some 10 MB."""
+MOST_TEXT = 2**22
+"""Bytes of a file of sentences."""
 QUALITY = 95
 """Of a written JPEG: OpenCV's default, which the official recordings have."""
 
@@ -187,10 +191,10 @@ def _read(file: h5py.File, path: Path, instruction: str | None) -> Episode:
         measured = _numbers(file, "joint_action/measured", name)
         if measured.shape != commanded.shape:
             raise EpisodeError(f"{name}: joint_action/measured does not fit joint_action/vector")
-    frames = {view: _frames(file[at], at, name, length) for view, at in VIEWS.items() if at in file}
+    frames = {view: _frames(file, at, name, length) for view, at in VIEWS.items() if at in file}
     about = {key: _plain(file.attrs[key]) for key in ABOUT if key in file.attrs}
-    if not about and len(path.resolve().parents) > 2:  # <task>/<configuration>/data/episode0.hdf5
-        about = {"task": path.resolve().parents[2].name}
+    if not about and len(path.absolute().parents) > 2:  # <task>/<configuration>/data/episode0.hdf5
+        about = {"task": path.absolute().parents[2].name}
     text = instruction or str(_plain(file.attrs.get("instruction", "")))
     text = text or _official_instruction(path)
     return Episode(name, commanded, np.stack(arms, axis=1), frames, space, text, measured, about)
@@ -212,6 +216,7 @@ def _numbers(file: h5py.File, at: str, name: str) -> Array:
     if at not in file or not hasattr(file[at], "dtype"):
         raise EpisodeError(f"{name} has no {at}: it is not in the layout of RoboTwin 2.0")
     found = file[at]
+    _own(found, file, at, name)
     if found.size > 64 * MOST_FRAMES:
         raise EpisodeError(f"{name}: {at} has {found.size} numbers, which is too many")
     values = np.asarray(found[()], dtype=float)
@@ -220,9 +225,19 @@ def _numbers(file: h5py.File, at: str, name: str) -> Array:
     return values if values.ndim > 1 else values.reshape(-1, 1)
 
 
-def _frames(found: h5py.Dataset, at: str, name: str, length: int) -> list[Frame]:
+def _own(found: h5py.Dataset, file: h5py.File, at: str, name: str) -> None:
+    """Raises EpisodeError for data that lie in another file: HDF5 can link to any of this user."""
+    if found.file.filename != file.filename or found.external or found.is_virtual:
+        raise EpisodeError(f"{name}: {at} lies in another file, which is not read")
+
+
+def _frames(file: h5py.File, at: str, name: str, length: int) -> list[Frame]:
+    found = file[at]
     if not hasattr(found, "dtype"):
         raise EpisodeError(f"{name}: {at} is a group, not frames")
+    _own(found, file, at, name)
+    if found.nbytes > MOST_BYTES:
+        raise EpisodeError(f"{name}: {at} has {found.nbytes} bytes, more than {MOST_BYTES}")
     if found.shape[:1] != (length,):
         raise EpisodeError(f"{name}: {at} has {found.shape[0]} frames, not {length}")
     if found.ndim == 4 and found.dtype == np.uint8 and found.shape[3] == 3:
@@ -242,10 +257,20 @@ def _plain(value: object) -> str | int:
 
 def _official_instruction(path: Path) -> str:
     """The first training instruction that official data keep beside an episode, or nothing."""
-    at = path.resolve().parent.parent / "instructions" / f"{path.stem}.json"
-    with suppress(OSError, ValueError, LookupError, TypeError, AttributeError):
-        return str(json.loads(at.read_text())["seen"][0])
+    at = path.absolute().parent.parent / "instructions" / f"{path.stem}.json"
+    with suppress(OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
+        return str(json.loads(text_beside(at))["seen"][0])
     return ""
+
+
+def text_beside(path: Path, most: int = MOST_TEXT) -> str:
+    """What the file at `path` says, nothing if it is none. Raises OSError, and ValueError for one
+    that is no UTF-8 or has more than `most` bytes."""
+    if not path.is_file():
+        return ""
+    if path.stat().st_size > most:
+        raise ValueError(f"{path.name} has more than {most} bytes")
+    return path.read_text(encoding="utf-8")
 
 
 def write_episode(

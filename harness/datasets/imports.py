@@ -24,7 +24,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.harness.convention_check.episodes import Episode, EpisodeError, read_episode
+from robospa.harness.convention_check.episodes import (
+    Episode,
+    EpisodeError,
+    read_episode,
+    text_beside,
+)
 from robospa.harness.datasets.encoding import encode
 from robospa.harness.datasets.episode import DatasetEpisode, Pictures
 from robospa.harness.datasets.features import UNSTATED, Layout, LayoutError, layout_of
@@ -48,7 +53,6 @@ LAYOUTS = ("lerobot-v3", "lerobot-v2.1", "robotwin-hdf5")
 """Formats that can do without what is absent."""
 OFFICIAL = "official"
 """The kind of their episodes."""
-MOST_TEXT = 1 << 22
 
 
 @dataclass(frozen=True)
@@ -124,7 +128,7 @@ def _sources(
 
 def source(recording: Recording, home: Path) -> str:
     """Where a recording is below `home`."""
-    return recording.path.resolve().relative_to(home.resolve()).as_posix()
+    return recording.path.absolute().relative_to(home.absolute()).as_posix()
 
 
 def to_episode(recording: Recording, home: Path, codec: str) -> DatasetEpisode:
@@ -137,7 +141,7 @@ def to_episode(recording: Recording, home: Path, codec: str) -> DatasetEpisode:
         raise EpisodeError("it is a recording of robospa, no official one")
     if not found.frames:
         raise EpisodeError("it has no pictures")
-    configuration = recording.path.resolve().parents[1].name
+    configuration = recording.path.absolute().parents[1].name
     task, level = recording.variant
     key = TrialKey(task, level, recording.seed or 0, UNSTATED, configuration, SEEN)
     commanded = found.commanded.astype(np.float32)
@@ -172,9 +176,7 @@ def _sentences(recording: Recording) -> tuple[str, ...]:
     are."""
     path = recording.path.parent.parent / "instructions" / f"{recording.path.stem}.json"
     try:
-        if path.stat().st_size > MOST_TEXT:
-            raise EpisodeError(f"instructions/{path.name} has more than {MOST_TEXT} bytes")
-        listed = json.loads(path.read_text(encoding="utf-8"))["seen"]
+        listed = json.loads(text_beside(path))["seen"]
         texts = tuple(dict.fromkeys(text for text in listed if isinstance(text, str) and text))
     except (OSError, ValueError, LookupError, TypeError, RecursionError):
         texts = ()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -102,10 +102,13 @@ def is_official(world: str | None) -> bool:
     return world is not None and world.partition("?")[0] == NAME
 
 
-def parse_official(world: str) -> tuple[OfficialOptions, OfficialLayout]:
+def parse_official(
+    world: str, named: bool = False, tasks: Collection[str] = ()
+) -> tuple[OfficialOptions, OfficialLayout]:
     """The options that `world` names, and the layout they make on this machine.
 
-    Raises SettingsError if official objects are asked for and not there.
+    Raises SettingsError if official objects are asked for, by an option or by an archive that is
+    `named`, and not there; or if the archive lacks something of `tasks`.
     """
     try:
         options = read_options(OfficialOptions, url_options(world.partition("?")[2]))
@@ -117,14 +120,22 @@ def parse_official(world: str) -> tuple[OfficialOptions, OfficialLayout]:
     try:
         opened: Any = load(PACK)(NAME)
         _use_textures(opened)
-        return options, OfficialLayout(True, options.switches, str(opened.digest()))
+        layout = OfficialLayout(True, options.switches, str(opened.digest()))
     except (UnknownName, ValueError, OSError) as error:
-        if options.assets == NAME:
+        if named or options.assets == NAME:
             raise SettingsError(
                 f"--world {world}: there are no official objects: {error}"
             ) from error
         trouble = f"objects are built in, because there are no official ones: {error}"
         return options, OfficialLayout(False, options.switches, trouble=trouble)
+    faults = opened.faults(tasks) if tasks and isinstance(opened, packs.PackWithFaults) else {}
+    for task, fault in faults.items():
+        raise SettingsError(
+            f"{len(faults)} of {len(tasks)} tasks cannot run with this archive, {task} because "
+            f"{fault}; leave it out with --tasks; `robospa "
+            "assets` lists all"
+        )
+    return options, layout
 
 
 def _use_textures(pack: Any) -> None:

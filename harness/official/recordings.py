@@ -10,13 +10,14 @@ official files are not read.
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from robospa.harness.convention_check.episodes import Episode, EpisodeError
+from robospa.harness.convention_check.episodes import Episode, EpisodeError, text_beside
 from robospa.schema import parse_json
 from robospa.tasks.catalog import LEVELS
 from robospa.tasks.catalog import task as find_task
@@ -24,6 +25,7 @@ from robospa.trial import REFERENCE, TrialKey
 
 SCENES, SEEDS = "scene_info.json", "seed.txt"
 MOST_BYTES = 2**26
+MOST_DIGITS = 12
 _FILE = re.compile(r"episode_?(\d+)\.hdf5")
 _VARIANT = re.compile(r"(.+)_([1-5])")
 
@@ -43,6 +45,8 @@ class Recording:
 def find_recordings(folder: Path) -> list[Recording]:
     """All demonstrations below `folder`, by folder and number; raises EpisodeError if there are
     none, or if what lies beside them cannot be read."""
+    if not folder.is_dir():
+        raise EpisodeError(f"there is no folder {folder}; name the one that holds the recordings")
     files = [
         (path, found) for path in folder.rglob("*.hdf5") if (found := _FILE.fullmatch(path.name))
     ]
@@ -61,7 +65,7 @@ def find_recordings(folder: Path) -> list[Recording]:
 
 def recording_of(path: Path) -> Recording:
     """The recording in the file at `path`."""
-    path = path.resolve()
+    path = _plain(path)
     found = _FILE.fullmatch(path.name)
     if found is None:
         return Recording(path, 0)
@@ -72,7 +76,7 @@ def recording_of(path: Path) -> Recording:
 
 def variant_of(path: Path) -> tuple[str, int] | None:
     """The task and level in the names of the folders of `path`, such as `Pick_Blocks_Size_5`."""
-    for parent in path.resolve().parents[:4]:
+    for parent in _plain(path).parents[:4]:
         if found := _VARIANT.fullmatch(parent.name):
             try:
                 return find_task(found[1]).name, int(found[2])
@@ -100,9 +104,9 @@ def _with(number: int, scenes: Mapping[str, Any], seeds: list[int]) -> Recording
 def _beside(folder: Path) -> tuple[Mapping[str, Any], list[int]]:
     """What `folder` says of its episodes: scenes and seeds."""
     try:
-        scenes = _text(folder / SCENES)
+        scenes = text_beside(folder / SCENES, MOST_BYTES)
         known = parse_json(scenes) if scenes else {}
-        seeds = [int(word) for word in _text(folder / SEEDS).split()]
+        seeds = [_seed(word) for word in text_beside(folder / SEEDS, MOST_BYTES).split()]
     except (OSError, ValueError) as error:
         raise EpisodeError(
             f"{SCENES} or {SEEDS} in {folder} cannot be read: {str(error)[:200]}"
@@ -110,9 +114,13 @@ def _beside(folder: Path) -> tuple[Mapping[str, Any], list[int]]:
     return (known if isinstance(known, dict) else {}), seeds
 
 
-def _text(path: Path) -> str:
-    if not path.is_file():
-        return ""
-    if path.stat().st_size > MOST_BYTES:
-        raise ValueError(f"{path.name} has more than {MOST_BYTES} bytes")
-    return path.read_text(encoding="utf-8")
+def _seed(word: str) -> int:
+    if not (word.isascii() and word.isdecimal() and len(word) <= MOST_DIGITS):
+        raise ValueError(f"{word[:20]!r} is no seed")
+    return int(word)
+
+
+def _plain(path: Path) -> Path:
+    """`path` as it is written, without "..": links are not followed, because the folders that it
+    names say what it is."""
+    return Path(os.path.abspath(path))

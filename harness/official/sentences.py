@@ -17,6 +17,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+import stat
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -171,8 +172,10 @@ def read_checkout(folder: Path, variants: Iterable[tuple[str, int]]) -> Official
 
 def _read(path: Path, described: bool = False) -> Texts:
     try:
-        if path.stat().st_size > MOST_BYTES:
-            raise CheckoutError(f"{path} has more than {MOST_BYTES} bytes: it is no official file")
+        if not stat.S_ISREG((state := path.stat()).st_mode):
+            raise ValueError("it is no file")
+        if state.st_size > MOST_BYTES:
+            raise ValueError(f"it has more than {MOST_BYTES} bytes, and no official file has")
         data = parse_json(path.read_text(encoding="utf-8"))
     except FileNotFoundError as error:
         raise CheckoutError(

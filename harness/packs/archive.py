@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from robospa.tasks.official.models import OfficialModel
+from robospa.tasks.packs import PackError
 from robospa.user_cache import user_cache
 
 VARIABLE = "ROBOSPA_ASSETS"
@@ -20,7 +21,7 @@ PARTS = ("objects", "embodiments", "background_texture")
 ADVICE = "unpack objects.zip, embodiments.zip or background_texture.zip of the official data there"
 
 
-class ArchiveError(ValueError):
+class ArchiveError(PackError):
     """Something of the archive cannot be used; the message is one sentence for its owner."""
 
 
@@ -53,7 +54,13 @@ class Archive:
         raise ArchiveError(f"{str(path)!r} leads out of the assets' folder and is not read")
 
     def files(self, model: OfficialModel) -> ModelFiles:
-        """The model's files. ArchiveError, naming the first that is missing."""
+        """The model's files. ArchiveError, naming the first that is missing or closed to us."""
+        try:
+            return self._files(model)
+        except OSError as error:
+            raise ArchiveError(f"{str(error.filename)!r}: {error.strerror}") from None
+
+    def _files(self, model: OfficialModel) -> ModelFiles:
         folder = self.root / "objects" / model.folder
         if model.jointed:
             return ModelFiles(
@@ -116,10 +123,14 @@ def open_archive(path: Path | str | None = None) -> Archive:
             f"{VARIABLE}"
         )
     folder = Path(named).expanduser()
-    for root in (folder, folder / "assets"):
-        if any((root / part).is_dir() for part in PARTS):
-            return Archive(root.absolute())
-    state = f"holds none of {', '.join(PARTS)}" if folder.is_dir() else "does not exist"
+    try:
+        for root in (folder, folder / "assets"):
+            if any((root / part).is_dir() for part in PARTS):
+                return Archive(root.absolute())
+        state = f"holds none of {', '.join(PARTS)}" if folder.is_dir() else "does not exist"
+        state = "is a file, not a folder" if folder.is_file() else state
+    except (OSError, ValueError) as error:  # no right to look into it, or a name that none can have
+        raise ArchiveError(f"the folder of official assets {str(folder)!r}: {error}") from None
     raise ArchiveError(f"the folder of official assets {str(folder)!r} {state}; {ADVICE}")
 
 

@@ -24,7 +24,7 @@ from robospa.harness.packs.mesh_files import (
     read_shapes,
 )
 from robospa.harness.packs.pieces import connected_parts, convex_pieces
-from robospa.harness.packs.urdf import Joint, MeshUse, Robot, read_urdf
+from robospa.harness.packs.urdf import Joint, MeshUse, Robot, check_files, read_urdf
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -115,7 +115,7 @@ def solid_pieces(
     archive: Archive, solid: Sequence[MeshUse], whole: bool = False
 ) -> tuple[Piece, ...]:
     """What collides of the meshes: their convex pieces, or one hull around each if `whole`."""
-    files = tuple(use.file for use in solid)
+    files = _files(solid)
     how = f"{'hulls' if whole else 'pieces'} {_transforms(solid)}"
     entry = cache.kept(files, how, lambda: _packed(archive, solid, whole))
     arrays = cache.load(entry)
@@ -126,9 +126,15 @@ def solid_pieces(
 
 def skin_of(archive: Archive, drawn: Sequence[MeshUse], full: bool = False) -> Path:
     """The meshes as one to draw; with every triangle and a large picture if `full`."""
-    files = tuple(use.file for use in drawn)
+    files = _files(drawn)
     how = f"{'full' if full else 'thin'} skin {_transforms(drawn)}"
     return cache.kept(files, how, lambda: _skin(archive, drawn, full))
+
+
+def _files(uses: Sequence[MeshUse]) -> tuple[Path, ...]:
+    files = tuple(use.file for use in uses)
+    check_files(files)
+    return files
 
 
 def _transforms(uses: Sequence[MeshUse]) -> str:

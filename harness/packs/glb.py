@@ -39,7 +39,10 @@ def check_glb(path: Path) -> tuple[tuple[int, int], ...]:
     except ArchiveError as error:
         raise ArchiveError(f"{str(path)!r} {error}") from None
     except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
-        raise ArchiveError(f"{str(path)!r} is no valid GLB file: {error!r}") from error
+        raise ArchiveError(
+            f"{str(path)!r} is no valid GLB file: its header lacks something, or has it in another "
+            "form; unpack the archive again"
+        ) from error
 
 
 def _chunks(path: Path) -> tuple[Mapping[str, Any], int, int]:

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.harness.packs.archive import Archive, ModelFiles
+from robospa.harness.packs.archive import Archive
 from robospa.harness.packs.assembly import Piece, solid_pieces
 from robospa.harness.packs.mesh_files import reads_meshes
 from robospa.harness.packs.urdf import MeshUse
@@ -29,15 +29,18 @@ Y = 1
 """The archive's axis that points up (not of models that lie)."""
 
 
-def is_filled(archive: Archive, model: OfficialModel, files: ModelFiles) -> bool:
+def is_filled(archive: Archive, model: OfficialModel) -> bool:
     """Whether `model` should be hollow and its collision pieces, which are read or taken from the
     cache, close its mouth; False where meshes cannot be read, because trimesh is not installed.
 
     ArchiveError, in one sentence, for a file that cannot be used.
     """
-    if not model.hollow or files.collision is None or not reads_meshes():
+    if not model.hollow or not reads_meshes():
         return False
-    return depth(solid_pieces(archive, [MeshUse(files.collision, np.eye(4))])) <= SHALLOW
+    collision = archive.files(model).collision
+    if collision is None:
+        return False
+    return depth(solid_pieces(archive, [MeshUse(collision, np.eye(4))])) <= SHALLOW
 
 
 def depth(pieces: Sequence[Piece]) -> float:

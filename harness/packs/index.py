@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from robospa.harness.packs.archive import Archive, ArchiveError, ModelFiles
 from robospa.harness.packs.glb import check_glb
 from robospa.harness.packs.hollows import is_filled
-from robospa.harness.packs.model_data import ModelData, read_model_data
+from robospa.harness.packs.model_data import LARGEST_FILE, ModelData, read_model_data
 from robospa.harness.packs.objaverse import files_text, things
+from robospa.harness.packs.urdf import check_uses, read_urdf
 from robospa.harness.robots import embodiments
 from robospa.tasks.official.models import (
     OfficialModel,
@@ -68,21 +69,21 @@ def index(archive: Archive) -> Index:
 
     Of meshes only what collides of hollow things is read, and kept in the cache.
     """
-    faults: dict[str, str] = {}
-    unusable: dict[str, str] = {}
+    models = {asset: _models(asset) for asset in official_assets()}
+    faults = {m.name: text for some in models.values() for m in some if (text := fault(archive, m))}
     closed: dict[str, list[str]] = {}
-    names = set()
-    for asset in official_assets():
-        for model in official_models(asset):
-            if model.name not in names:
-                fault, filled = _looked_at(archive, model)
-                if fault:
-                    faults[model.name] = fault
-                elif filled:
+    for asset, some in models.items():
+        for model in some:
+            try:
+                if model.name not in faults and is_filled(archive, model):
                     closed.setdefault(asset, []).append(model.name)
-            names.add(model.name)
-            if model.name in faults:
-                unusable[asset] = model.folder
+            except (ArchiveError, OSError) as error:
+                faults[model.name] = str(error)
+    unusable = {
+        asset: some[0].folder
+        for asset, some in models.items()
+        if any(model.name in faults for model in some)
+    }
     missing = {
         task: tuple(sorted({unusable[asset] for asset in assets if asset in unusable}))
         for task, assets in needs().items()
@@ -90,7 +91,7 @@ def index(archive: Archive) -> Index:
     }
     return Index(
         root=str(archive.root),
-        models=len(names),
+        models=sum(map(len, models.values())),
         faults=faults,
         missing=missing,
         filled={
@@ -110,18 +111,34 @@ def _pictures(archive: Archive, split: str) -> int:
     return 0 if folder is None else sum(1 for _ in folder.glob(TEXTURE_ENDING))
 
 
-def _looked_at(archive: Archive, model: OfficialModel) -> tuple[str, bool]:
-    """What is wrong with a model, in a sentence (empty if nothing is), and whether its hollow is
-    filled."""
+def _models(asset: str) -> list[OfficialModel]:
+    """Each of the asset's models once."""
+    return list({model.name: model for model in official_models(asset)}.values())
+
+
+def task_faults(archive: Archive, tasks: Iterable[str]) -> dict[str, str]:
+    """For each of `tasks` that cannot run a sentence that says which file is the first to blame."""
+    found = {}
+    for task in tasks:
+        models = (model for asset in needs().get(task, ()) for model in _models(asset))
+        if text := next(filter(None, (fault(archive, model) for model in models)), ""):
+            found[task] = text
+    return found
+
+
+def fault(archive: Archive, model: OfficialModel) -> str:
+    """What is wrong with a model, in a sentence; empty if nothing is. No mesh is read."""
     try:
         files = archive.files(model)
         data = read_model_data(files.data)
         for file in {files.visual, files.collision} - {None}:
             if file is not None and file.suffix == ".glb":
                 check_glb(file)
-        return _misfit(model, data), is_filled(archive, model, files)
+        if files.urdf is not None:
+            check_uses(read_urdf(files.urdf, archive.inside))
     except (ArchiveError, OSError) as error:
-        return str(error), False
+        return str(error)
+    return _misfit(model, data)
 
 
 def _misfit(model: OfficialModel, data: ModelData) -> str:
@@ -147,11 +164,14 @@ def digest_of(archive: Archive) -> str:
         for model in official_models(asset):
             try:
                 files = archive.files(model)
-            except ArchiveError:
+                sizes = _sizes(files)
+                with files.data.open("rb") as file:
+                    said = file.read(LARGEST_FILE)
+            except (ArchiveError, OSError):
                 found.update(f"{model.name} missing\n".encode())
                 continue
-            found.update(f"{model.name} {_sizes(files)}\n".encode())
-            found.update(files.data.read_bytes())
+            found.update(f"{model.name} {sizes}\n".encode())
+            found.update(said)
     found.update(files_text(archive).encode())
     return found.hexdigest()[:16]
 

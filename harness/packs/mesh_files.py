@@ -124,7 +124,8 @@ def _parts(path: Path, inside: Callable[[Path], Path], by_node: bool = False) ->
     except ArchiveError:
         raise
     except Exception as error:  # whatever a reader of a broken file may stumble over
-        raise ArchiveError(f"{str(path)!r} cannot be read as a mesh: {error!r}") from error
+        text = " ".join(str(error).split())[:100] or type(error).__name__
+        raise ArchiveError(f"{str(path)!r} cannot be read as a mesh: {text}") from error
     if resolver.trouble:  # which trimesh only notes
         raise ArchiveError(f"{str(path)!r} names a file that is not read: {resolver.trouble}")
     if not parts:

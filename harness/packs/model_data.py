@@ -80,7 +80,7 @@ def read_model_data(path: Path) -> ModelData:
             raise
         raise ArchiveError(f"{str(path)!r} is no readable JSON file: {error}") from error
     if not isinstance(data, dict):
-        raise ArchiveError(f"{str(path)!r} must hold a JSON object, not a {type(data).__name__}")
+        raise ArchiveError(f"{str(path)!r} must hold a JSON object with a scale and points")
     scale = _three(data.get("scale", (1.0, 1.0, 1.0)), path, "scale")
     if not all(SCALES[0] <= s <= SCALES[1] for s in scale):
         raise ArchiveError(f"{str(path)!r} has the scale {list(scale)}, which no model can have")
@@ -99,7 +99,7 @@ def _mass(value: object, path: Path) -> float | None:
     """A body's mass [kg]; None where it is not given, or given link by link."""
     if value is None or isinstance(value, dict | list):
         return None
-    if not isinstance(value, int | float) or not 0 < value < 1e3:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < 1e3:
         raise ArchiveError(
             f"{str(path)!r} gives the mass {repr(value)[:80]}, which no object can have"
         )

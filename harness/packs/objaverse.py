@@ -113,5 +113,5 @@ def _listed(archive: Archive) -> Mapping[str, frozenset[str]] | None:
         raise
     except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
         raise ArchiveError(
-            f"{str(path)!r} is no list of things with their ids: {str(error)[:100]}"
+            f"{str(path)!r} is no JSON file whose list_of_items has the ids of each category"
         ) from error

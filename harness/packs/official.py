@@ -7,7 +7,7 @@ called) is taken from its built-in likeness and from the archive's points.
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from robospa.harness.packs.archive import Archive, ArchiveError, open_archive
 from robospa.harness.packs.assembly import Parts, Piece, parts_of
 from robospa.harness.packs.holding import grasps
-from robospa.harness.packs.index import digest_of
+from robospa.harness.packs.index import digest_of, task_faults
 from robospa.harness.packs.model_data import read_model_data
 from robospa.harness.packs.objaverse import ASSET as THING
 from robospa.harness.packs.objaverse import kinds, make_thing
@@ -53,6 +53,10 @@ class OfficialPack:
     def digest(self) -> str:
         """Hash of names and sizes of all files that models are made of, and of their points."""
         return digest_of(self.archive)
+
+    def faults(self, tasks: Collection[str]) -> dict[str, str]:
+        """For each of `tasks` that cannot run with the archive a sentence that says why."""
+        return task_faults(self.archive, tasks)
 
     def clutter(self, scene: Scene) -> tuple[Kind, ...]:
         """What may lie about in `scene`: our kinds, as the archive's models where it has those, and

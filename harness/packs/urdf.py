@@ -8,8 +8,9 @@ archive.
 from __future__ import annotations
 
 import math
+import os
 import xml.etree.ElementTree as ET
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -94,8 +95,27 @@ def read_urdf(path: Path, inside: Callable[[Path], Path]) -> Robot:
         return _robot(root, path, inside)
     except ArchiveError:
         raise
-    except (ET.ParseError, ValueError, KeyError, RecursionError, LookupError) as error:
-        raise ArchiveError(f"{str(path)!r} is no valid URDF file: {error!r}") from error
+    except (ET.ParseError, ValueError, RecursionError) as error:
+        raise ArchiveError(f"{str(path)!r} is no valid URDF file: {error}") from error
+    except LookupError as error:
+        raise ArchiveError(
+            f"{str(path)!r} is no valid URDF file: a link, joint or mesh lacks what it must have"
+        ) from error
+
+
+def check_uses(robot: Robot) -> None:
+    """ArchiveError, naming the first, if a mesh that `robot` names is not there."""
+    for uses in (*robot.visuals.values(), *robot.collisions.values()):
+        check_files(use.file for use in uses)
+
+
+def check_files(files: Iterable[Path]) -> None:
+    """ArchiveError, naming the first, if a mesh file is not there or may not be read."""
+    for file in files:
+        if not file.is_file():
+            raise ArchiveError(f"the mesh {str(file)!r} is missing; unpack the archive again")
+        if not os.access(file, os.R_OK):
+            raise ArchiveError(f"the mesh {str(file)!r} may not be read by this user")
 
 
 def _robot(root: ET.Element, path: Path, inside: Callable[[Path], Path]) -> Robot:
@@ -109,8 +129,10 @@ def _robot(root: ET.Element, path: Path, inside: Callable[[Path], Path]) -> Robo
             seen.add(link)
     links = root.findall("link")
     parts = sum(len(link) for link in links)
-    if parts > MOST_PARTS or len(joints) > MOST_PARTS:
-        raise ArchiveError(f"{str(path)!r} has {parts} parts, more than {MOST_PARTS}")
+    if max(parts, len(links)) > MOST_PARTS or len(joints) > MOST_PARTS:
+        raise ArchiveError(
+            f"{str(path)!r} has {max(parts, len(links))} parts, more than {MOST_PARTS}"
+        )
 
     def meshes(kind: str) -> dict[str, tuple[MeshUse, ...]]:
         return {

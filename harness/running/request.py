@@ -227,7 +227,7 @@ def _world(settings: EvaluationSettings) -> dict[str, Any]:
             "world_arguments": {"folder": str(folder), **plain_options(options)},
         }
     if is_official(simulation.world):
-        start, _ = parse_official(str(simulation.world))
+        start, _ = parse_official(str(simulation.world), simulation.assets is not None)
         arguments = {"render": None, **control, "settle": start.settle}
         if simulation.robot_assets != BUILTIN:
             arguments["robot_assets"] = simulation.robot_assets
@@ -264,7 +264,11 @@ def _parts(settings: EvaluationSettings, keys: Sequence[TrialKey]) -> dict[str, 
         arguments["sentences"] = read_checkout(folder, {key.variant for key in keys})
     if not official:
         return {"parts": OFFICIAL_PARTS, "parts_arguments": arguments}
-    _, arguments["layout"] = parse_official(str(settings.simulation.world))
+    _, arguments["layout"] = parse_official(
+        str(settings.simulation.world),
+        settings.simulation.assets is not None,
+        {key.task for key in keys},
+    )
     arguments["episodes"] = episodes_of(keys)
     return {"parts": OFFICIAL_WORLD_PARTS, "parts_arguments": arguments}
 

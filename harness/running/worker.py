@@ -292,11 +292,14 @@ def _attempt(worker: Worker, command: RunTrial) -> Message:
     from robospa.harness.running.server_stats import connection_fault, retry_cause
     from robospa.harness.world import SceneUnstable
     from robospa.registry import UnknownName
+    from robospa.tasks.packs import PackError
 
     key = command.key
     try:
         return TrialDone(worker.run(key, command.target, command.retries))
-    except SceneUnstable as error:
+    except (SceneUnstable, PackError) as error:
+        if isinstance(error, PackError):  # the world may hold a part of the scene
+            worker.recover()
         return TrialLost(key, RetryRow("harness_error", describe(error), 0), retry=False)
     except (UnknownName, StorageError) as error:
         return Fatal(describe(error))

@@ -19,6 +19,8 @@ from robospa.harness.textures.field import SIZE
 from robospa.tasks.surroundings import TEXTURES, Texture
 
 ENDINGS = (".png", ".jpg", ".jpeg", ".webp")
+LARGEST = 8192
+"""Pixels along a side of a file."""
 
 
 class TextureFolder:
@@ -49,10 +51,17 @@ class TextureFolder:
                 f"this scene mode needs; add {texture.split}/0.png, 1.png, ..."
             )
         file = files[texture.index % len(files)]
+        if not file.is_file():  # such as a pipe, which nobody may ever write to
+            raise ValueError(f"the texture {str(file)!r} cannot be read: it is no file")
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", Image.DecompressionBombWarning)
                 with Image.open(file) as opened:
+                    if max(opened.size) > LARGEST:
+                        raise ValueError(
+                            f"the texture {str(file)!r} has {opened.width}x{opened.height} pixels, "
+                            f"more than {LARGEST} along a side"
+                        )
                     picture = opened.convert("RGB").resize((SIZE, SIZE), Image.Resampling.BOX)
         except (OSError, UnidentifiedImageError, Image.DecompressionBombError) as error:
             raise ValueError(f"the texture {str(file)!r} cannot be read: {error}") from error

@@ -28,6 +28,7 @@ from robospa.observation import CameraSpec
 from robospa.protocol.errors import ConnectionLost
 from robospa.protocol.policy import PolicySpec, TrialInfo
 from robospa.tasks.events import Event, ObjectRole
+from robospa.tasks.packs import PackError
 from robospa.tasks.scene import Scene
 from robospa.tasks.snapshot import Contact, Snapshot
 from robospa.tasks.task import Level, Task
@@ -63,6 +64,8 @@ class FakeWorld:
     def load(self, scene: Scene, contacts: bool = False) -> None:
         if scene.seed == 666:
             raise SceneUnstable("the scene of seed 666 does not come to rest")
+        if scene.seed == 667:
+            raise PackError("the model of seed 667 has no mesh")
         self.total, self.steps, self.seed, self.views = 0.0, 0, scene.seed, 0
 
     def step(self, action: NDArray[np.float32], space: str, poll: Poll) -> StepResult:

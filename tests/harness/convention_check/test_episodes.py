@@ -122,6 +122,59 @@ def test_a_broken_file_is_one_sentence(official: Path, what: str) -> None:
     assert "\n" not in str(error.value)
 
 
+def _in_another_file(file: Any) -> None:
+    other = Path(file.filename).with_name("other.hdf5")
+    with h5py.File(other, "w") as made:
+        made["x"] = np.zeros((FRAMES, 14))
+    del file["joint_action/vector"]
+    file["joint_action/vector"] = h5py.ExternalLink(str(other), "x")
+
+
+def _raw_bytes_of(file: Any) -> None:
+    del file["observation/head_camera/rgb"]
+    file.create_dataset(
+        "observation/head_camera/rgb", (FRAMES,), "S10", external=[(__file__, 0, 10 * FRAMES)]
+    )
+
+
+def _unpacks_to(dtype: str, *shape: int) -> Callable[[Any], None]:
+    def change(file: Any) -> None:
+        del file["observation/head_camera/rgb"]
+        chunks = (1, *(min(n, 64) for n in shape))
+        file.create_dataset("observation/head_camera/rgb", (FRAMES, *shape), dtype, chunks=chunks)
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (_in_another_file, "joint_action/vector lies in another file, which is not read"),
+        (_raw_bytes_of, "head_camera/rgb lies in another file"),
+        (_unpacks_to("u1", 60_000, 60_000, 3), "more than 2147483648"),
+        (_unpacks_to("S2000000000"), "more than 2147483648"),
+    ],
+)
+def test_a_hostile_file_is_refused(
+    official: Path, change: Callable[[Any], None], told: str
+) -> None:
+    """One that shows other files of this user, or is small and would fill the memory."""
+    with h5py.File(official, "a") as file:
+        change(file)
+    assert official.stat().st_size < 2**22
+    with pytest.raises(EpisodeError, match=told):
+        read_episode(official)
+
+
+@pytest.mark.parametrize("text", ["[" * 200_000, '{"seen": 5}', None])
+def test_broken_sentences_are_none(official: Path, text: str | None) -> None:
+    """The last is a link to something without an end."""
+    (path,) = official.parents[1].glob("instructions/*.json")
+    path.unlink()
+    path.symlink_to("/dev/zero") if text is None else path.write_text(text)
+    assert read_episode(official).instruction == ""
+
+
 @pytest.mark.parametrize("content", [b"", b"not hdf5 at all", b"\x89HDF\r\n\x1a\n" + b"\0" * 80])
 def test_what_is_no_hdf5_is_one_sentence(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "a.hdf5").write_bytes(content)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import pickle
+from collections.abc import Collection
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -107,6 +108,28 @@ def test_without_an_archive_it_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
         with pytest.raises(SettingsError, match=r"--world official\?"):
             parse_official(f"official?{wrong}")
     assert is_official("official?x") and not is_official("officials") and not is_official(None)
+
+
+def test_an_archive_that_is_named_has_to_be_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nobody who names one wants our own objects instead."""
+    monkeypatch.setenv("ROBOSPA_ASSETS", "before")
+    with pytest.raises(SettingsError, match="holds none of objects, embodiments"):
+        request(tmp_path, assets=str(tmp_path), world="official")
+
+
+def test_an_archive_that_lacks_what_a_task_needs_is_refused_at_the_start(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def faults(tasks: Collection[str]) -> dict[str, str]:
+        return {task: "a file is missing" for task in tasks if task != TASK}
+
+    torn = SimpleNamespace(name="x", has=str, model=str, digest=lambda: "h", faults=faults)
+    monkeypatch.setattr(official_options, "load", lambda path: lambda name: torn)
+    assert parse_official("official", tasks=[TASK])[1].packed
+    with pytest.raises(SettingsError, match=r"1 of 2 tasks cannot run .*, Other because"):
+        parse_official("official", tasks=[TASK, "Other"])
 
 
 def request(folder: Path, **more: object) -> Any:

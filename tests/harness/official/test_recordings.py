@@ -14,6 +14,7 @@ import pytest
 from robospa.action_space import SEVEN_JOINT_ARMS, ActionSpace
 from robospa.geometry import rotate
 from robospa.harness.convention_check.episodes import Episode, EpisodeError
+from robospa.harness.datasets.imports import source
 from robospa.harness.official.rebuild import NotStored, rebuilt
 from robospa.harness.official.recordings import (
     Recording,
@@ -68,13 +69,29 @@ def test_recordings_are_found_with_their_seeds_and_scenes(tmp_path: Path) -> Non
     assert [r.number for r in chosen(found, 2)] == [0, 1]
 
 
+def test_a_linked_recording_is_what_its_own_folder_says(tmp_path: Path) -> None:
+    base = official(tmp_path)
+    (tmp_path / "disk").mkdir()
+    file = base / "data" / "episode1.hdf5"
+    file.rename(tmp_path / "disk" / "x")
+    file.symlink_to(tmp_path / "disk" / "x")
+    loop = base / "data" / "episode3.hdf5"
+    loop.symlink_to(loop.name)
+    linked, looped = (r for r in find_recordings(tmp_path) if r.number in (1, 3))
+    assert linked.variant == looped.variant == ("Pick_Mixed_Objects_Multi_View_B", 1)
+    assert source(linked, tmp_path).endswith("data/episode1.hdf5")
+
+
 def test_what_is_no_recording_is_one_sentence(tmp_path: Path) -> None:
     with pytest.raises(EpisodeError, match="there are no recordings below"):
         find_recordings(tmp_path)
     base = official(tmp_path)
-    (base / "seed.txt").write_text("0 one")
-    with pytest.raises(EpisodeError, match="cannot be read"):
-        find_recordings(tmp_path)
+    for seeds, named in (("0 one", "'one'"), ("0 " + "9" * 4000, "'9{20}'")):
+        (base / "seed.txt").write_text(seeds)
+        with pytest.raises(EpisodeError, match=f"cannot be read: {named} is no seed"):
+            find_recordings(tmp_path)
+    with pytest.raises(EpisodeError, match="there is no folder"):
+        find_recordings(base / "seed.txt")
     assert variant_of(Path("/x/Pick_Nothing_3/d/data/episode0.hdf5")) is None
 
 

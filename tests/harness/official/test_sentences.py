@@ -135,6 +135,15 @@ def test_a_broken_file_is_one_sentence(tmp_path: Path, text: str, sentence: str)
     assert str(path) in str(caught.value) and "\n" not in str(caught.value)
 
 
+def test_what_has_no_end_is_not_read(tmp_path: Path) -> None:
+    write_checkout(tmp_path)
+    path = tmp_path / "description" / "task_instruction" / "Rank_Blocks_Color_2.json"
+    path.unlink()
+    path.symlink_to("/dev/zero")
+    with pytest.raises(CheckoutError, match=r"Color_2\.json cannot be read: it is no file"):
+        read_checkout(tmp_path, [("Rank_Blocks_Color", 2)])
+
+
 def test_what_is_missing_is_named(tmp_path: Path) -> None:
     with pytest.raises(CheckoutError, match="is no checkout of RoboSPA"):
         read_checkout(tmp_path, [SIZE])

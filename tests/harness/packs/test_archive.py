@@ -19,6 +19,25 @@ def nothing_noted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("ROBOSPA_ASSETS", raising=False)
 
 
+def test_a_file_and_a_closed_folder_are_said_to_be_that(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "objects.zip").touch()
+    with pytest.raises(ArchiveError, match="is a file, not a folder; unpack"):
+        open_archive(tmp_path / "objects.zip")
+
+    def closed(path: Path) -> bool:
+        raise PermissionError(13, "Permission denied", str(path))
+
+    archive = archive_with(tmp_path, "model_data3.json")
+    monkeypatch.setattr(Path, "is_dir", closed)
+    with pytest.raises(ArchiveError, match="Permission denied"):
+        open_archive(tmp_path)
+    monkeypatch.setattr(Path, "is_file", closed)
+    with pytest.raises(ArchiveError, match=r"base3\.glb': Permission denied"):
+        archive.files(CAN)
+
+
 def archive_with(root: Path, *files: str) -> Archive:
     for file in files:
         path = root / "objects" / "071_can" / file

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import re
 import shutil
 import struct
 import zlib
@@ -16,9 +18,12 @@ from mesh_writers import Piece, glb, glb_bytes
 from pack_fixtures import READS_MESHES
 
 from robospa.harness.packs.archive import ArchiveError, open_archive
+from robospa.harness.packs.index import fault
 from robospa.harness.packs.model_data import read_model_data
 from robospa.harness.packs.official import OfficialPack
 from robospa.harness.textures.folder import TextureFolder
+from robospa.tasks.official.models import official_models
+from robospa.tasks.packs import PackWithFaults
 from robospa.tasks.surroundings import Texture
 
 pytestmark = READS_MESHES
@@ -115,6 +120,8 @@ def first(values: object, index: int, key: str, value: object) -> None:
         (header(lambda h: first(h["bufferViews"], 0, "byteStride", 2**40)), "promises 4 numbers"),
         (header(lambda h: first(h["nodes"], 0, "matrix", [NAN] * 16)), NOWHERE),
         (header(lambda h: first(h["nodes"], 0, "scale", [1e308] * 3)), NOWHERE),
+        (header(lambda h: h.update(nodes={"a": 1})), "its header lacks something"),
+        (header(lambda h: h.update(meshes=[{"primitives": 5}])), "its header lacks something"),
     ],
 )
 def test_a_harmed_model_is_refused_in_a_sentence(root: Path, harm: Change, sentence: str) -> None:
@@ -143,6 +150,53 @@ def test_a_harmed_thing_is_refused_in_a_sentence(root: Path, harm: Change, sente
     assert "\n" not in str(refused.value)
 
 
+def in_urdf(old: str, new: str) -> Change:
+    def harm(root: Path) -> None:
+        for path in root.glob("objects/044_microwave/*/mobility.urdf"):
+            path.write_text(path.read_text().replace(old, new))
+
+    return harm
+
+
+def without_meshes(root: Path) -> None:
+    for path in root.glob("objects/044_microwave/*/textured_objs/*.obj"):
+        path.unlink()
+
+
+@pytest.mark.parametrize(
+    ("harm", "sentence"),
+    [
+        (without_meshes, "the mesh '.*body_visual.obj' is missing"),
+        (in_urdf("textured_objs/", "package://x/"), "which is no path"),
+        (in_urdf("textured_objs/", "/etc/"), "'/etc/body_visual.obj' leads out"),
+        (in_urdf("textured_objs/", "../../../../etc/"), "leads out of the assets' folder"),
+        (in_urdf("<robot", "<!DOCTYPE r [<!ENTITY x SYSTEM 'f'>]><robot"), "defines XML entities"),
+        (in_urdf('<link name="base"/>', "<link/>"), "lacks what it must have"),
+        (in_urdf('<link name="base"/>', '<link name="base"/>' * 5000), "more than 4096"),
+    ],
+)
+def test_a_harmed_urdf_file_is_known_before_anything_is_made(
+    tmp_path: Path, harm: Change, sentence: str
+) -> None:
+    """By `robospa assets`, and by a run, which refuses the tasks that need it."""
+    root = make_archive(tmp_path, ["microwave"])
+    model = official_models("microwave")[0]
+    assert not fault(open_archive(root), model)
+    harm(root)
+    said = fault(open_archive(root), model)
+    assert re.search(sentence, said) and len(said) < 500 and "\n" not in said
+
+
+def test_a_pack_names_the_tasks_that_cannot_run(root: Path) -> None:
+    pack = OfficialPack(open_archive(root))
+    assert isinstance(pack, PackWithFaults)
+    assert not pack.faults(["Pick_Cans_Relational", "Pick_Blocks_Size"])
+    (root / CAN / "model_data0.json").unlink()
+    found = pack.faults(["Pick_Cans_Relational", "Pick_Blocks_Size", "Basic_Color_Blocks"])
+    assert {*found} == {"Pick_Cans_Relational"}
+    assert "model_data0.json' is missing" in found["Pick_Cans_Relational"]
+
+
 def test_a_thing_whose_picture_is_not_there_is_drawn_without(root: Path) -> None:
     (root / THING / "textured.png").unlink()
     assert OfficialPack(open_archive(root)).model("objaverse", {"thing": "marker/0"}).skin
@@ -155,6 +209,7 @@ def test_a_thing_whose_picture_is_not_there_is_drawn_without(root: Path) -> None
         ("scale", [10**400] * 3, "three numbers as scale"),
         ("extents", [1, 10**400, 1], "three numbers as extents"),
         ("mass", 10**400, "which no object can have"),
+        ("mass", True, "which no object can have"),
         ("contact_points_pose", [[[10**400] * 4] * 4], "no 4x4 frames"),
         ("contact_points_pose", [[[float("inf")] * 4] * 4], "no object can have"),
     ],
@@ -173,7 +228,9 @@ def test_numbers_that_json_allows_and_no_model_has(
     ("harm", "sentence"),
     [
         (lambda path: path.write_bytes(png(30_000, 30_000)), "cannot be read: Image size"),
+        (lambda path: path.write_bytes(png(10_000, 16)), "has 10000x16 pixels, more than 8192"),
         (lambda path: (path.unlink(), path.symlink_to(path.name)), "Too many levels"),
+        (lambda path: (path.unlink(), os.mkfifo(path)), "it is no file"),
     ],
 )
 def test_a_harmed_texture_is_refused_in_a_sentence(root: Path, harm: Change, sentence: str) -> None:

@@ -139,10 +139,10 @@ def test_scenes_of_our_own_suite_are_what_they_were_to_the_bit() -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("[]", "is no list of things with their ids"),
-        ('{"list_of_items": {"bottle": 3}}', "is no list of things"),
-        ("{", "is no list of things"),
-        ("[" * 100_000, "is no list of things"),
+        ("[]", "is no JSON file whose list_of_items"),
+        ('{"list_of_items": {"bottle": 3}}', "is no JSON file whose list_of_items"),
+        ("{", "is no JSON file whose list_of_items"),
+        ("[" * 100_000, "is no JSON file whose list_of_items"),
     ],
 )
 def test_a_broken_list_is_refused_in_a_sentence(tmp_path: Path, text: str, message: str) -> None:

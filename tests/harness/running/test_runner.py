@@ -97,6 +97,14 @@ def test_an_unstable_seed_is_not_tried_twice(tmp_path: Path) -> None:
     assert [(r.end, r.attempts) for r in records] == [("infrastructure", 1)]
 
 
+def test_a_model_that_cannot_be_made_is_not_tried_twice(tmp_path: Path) -> None:
+    broken, sound = TrialKey("Pick_Fake", 1, 667), TrialKey("Pick_Fake", 1, 1)
+    records, _ = go(tmp_path, "FakePolicy", [broken, sound])
+    found = {r.key.seed: (r.end, r.attempts, r.message) for r in records}
+    assert found[667] == ("infrastructure", 1, "the model of seed 667 has no mesh")
+    assert found[1][0] == "success"
+
+
 def test_dead_and_stuck_workers_are_replaced(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
