@@ -25,6 +25,10 @@ ASSETS = "ROBOSPA_ASSETS"
 """Environment variable that names the archive."""
 TEXTURES = "background_texture"
 """Its folder of textures, whose layout is that of ROBOSPA_TEXTURES."""
+OWN_SENTENCES = (
+    "sentences are our own and name looks of built-in objects, such as a blue stapler, which the "
+    "archive's models need not have; add --instructions CHECKOUT for the official ones"
+)
 WITH_PACK = "robospa.tasks.packs:with_pack"
 PACK = "robospa.tasks.packs:pack"
 
@@ -59,6 +63,12 @@ class OfficialLayout:
     def suite(self) -> str:
         """The suite of results."""
         return SUITE if self.packed else BUILTIN_SUITE
+
+    def warnings(self, official_sentences: bool) -> list[str]:
+        """What a run's owner should know of it."""
+        if self.packed and not official_sentences:
+            return [OWN_SENTENCES]
+        return [self.trouble] if self.trouble else []
 
     def to_json(self) -> dict[str, object]:
         """For a run's manifest."""

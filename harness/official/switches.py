@@ -45,6 +45,7 @@ STANDS = {"Observe_Blocks_Move_Memory": 0.85, "Observe_Objects_Click_Memory": 0.
 HIDING = (*STANDS, "Remember_Orientation_Restore")
 WALL_HALF, WALL_Z = 0.2, 0.95
 """Half height and middle [m] of the official wall: it ends 1 cm above the table."""
+SAME_HEIGHT = 1e-6
 PURE: Mapping[str, tuple[float, float, float]] = {
     "red": (1, 0, 0), "green": (0, 1, 0), "blue": (0, 0, 1), "yellow": (1, 1, 0),
     "cyan": (0, 1, 1), "magenta": (1, 0, 1), "orange": (1, 0.5, 0), "purple": (0.5, 0, 0.5),
@@ -158,13 +159,18 @@ def _wall(scene: Scene, episode: int) -> Scene:
     item = scene.object(scene.facts["wall"])
     x, y, _ = item.pose.position
     half = [*item.params["half"][:2], WALL_HALF]
-    raised = replace(_with(item, half=half), pose=Pose((x, y, WALL_Z), item.pose.rotation))
+    at = Pose((x, y, WALL_Z + scene.table_rise), item.pose.rotation)
+    raised = replace(_with(item, half=half), pose=at)
     return _changed(scene, {item.name: raised})
 
 
 def _stand(scene: Scene, episode: int) -> Scene:
     grey = [STANDS[scene.task]] * 3
-    stands = [item for item in scene.objects if item.fixed and item.pose.position[2] == STAND_Z]
+    stands = [
+        item
+        for item in scene.objects
+        if item.fixed and abs(item.pose.position[2] - scene.table_rise - STAND_Z) < SAME_HEIGHT
+    ]
     return _changed(scene, {item.name: _with(item, color=grey) for item in stands})
 
 

@@ -168,7 +168,7 @@ def make_manifest(request: Request, policies: Mapping[str, ProbedPolicy]) -> Man
     categories = {task: part.task.category for task, part in found.items()}
     if (layout := config.parts_arguments.get("layout")) is not None:
         settings["layout"] = layout.to_json()
-        about["warnings"] += [layout.trouble] if layout.trouble else []
+        about["warnings"] += layout.warnings(official is not None)
     steps = world.get("action_steps", config.world_arguments.get("action_steps"))
     suite = timed_suite(next(iter(found.values())).scene.suite, steps)
     if steps is not None:

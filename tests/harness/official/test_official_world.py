@@ -66,6 +66,9 @@ def test_objects_are_of_the_archive_where_there_is_one(monkeypatch: pytest.Monke
     options, layout = parse_official("official")
     assert (options, layout.suite, layout.digest) == (OfficialOptions(), SUITE, "hash of official")
     assert layout.to_json()["assets"] == "official"
+    assert layout.warnings(official_sentences=True) == []
+    (said,) = layout.warnings(official_sentences=False)
+    assert "add --instructions CHECKOUT" in said
     packed: Any = layout.pack(task_parts(KEY).scene)
     assert packed.name == "official"
     assert parse_official("official?assets=builtin")[1].suite == BUILTIN_SUITE
@@ -101,7 +104,8 @@ def test_without_an_archive_it_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(official_options, "load", missing)
     _, layout = parse_official("official?switches=pure-colors")
     assert layout.suite == BUILTIN_SUITE and layout.to_json()["switches"] == ["pure-colors"]
-    assert layout.trouble.startswith("objects are built in") and "no archive" in layout.trouble
+    (said,) = layout.warnings(official_sentences=False)
+    assert said.startswith("objects are built in") and "no archive" in said
     with pytest.raises(SettingsError, match="no official objects: there is no archive"):
         parse_official("official?assets=official")
     for wrong in ("switches=gap", "settle=long", "speed=2"):
