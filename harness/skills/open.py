@@ -7,7 +7,7 @@ of the table, and turns with the door by a share of its angle: a round handle le
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import product
 
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from robospa.geometry import Pose, axis_rotation, multiply, rotate
 from robospa.harness.robots.kinematics import inverse
+from robospa.harness.skills.arm_clearance import TOUCH, arm_depth
 from robospa.harness.skills.both_arms import go
 from robospa.harness.skills.motion import line_poses, rise
 from robospa.harness.skills.pick import arms_for
@@ -59,15 +60,14 @@ def pull_open(ws: Workspace, call: Open) -> Steps:
     if hinge is None or "handle" not in ws.models[call.object].frames:
         raise SkillFailed(f"{call.object} has no door with a handle")
     goal = call.to * hinge.upper
-    ways = _ways(ws, call, hinge)
-    for _ in range(ATTEMPTS):
-        way = next(ways, None)
+    for left in reversed(range(ATTEMPTS)):
+        ways = _ways(ws, call, hinge)
+        way = next(ways, None) if left else _clear(ws, ways)
         if way is None:
             break
         yield from _pull(ws, way)
         if ws.snapshot.hinges[call.object] > goal - 0.1 * hinge.upper:
             return
-        ways = _ways(ws, call, hinge)
     raise SkillFailed(f"no arm could open {call.object} to {goal:.2f} rad")
 
 
@@ -117,6 +117,16 @@ def _ways(ws: Workspace, call: Open, hinge: Hinge) -> Iterator[Pull]:
         joints = _in_one_go(ws, arm, [start, *poses])
         if joints is not None:
             yield Pull(arm, joints[0], joints[1], joints[2:], approach, poses[-1])
+
+
+def _clear(ws: Workspace, ways: Iterable[Pull]) -> Pull | None:
+    """The first way on which the arm itself is in nothing; without one, the first; None of none."""
+    first: Pull | None = None
+    for way in ways:
+        first = first or way
+        if arm_depth(ws, way.arm, np.stack([way.before, way.at, *way.arc])).max() <= TOUCH:
+            return way
+    return first
 
 
 def _in_one_go(ws: Workspace, arm: int, poses: list[Pose]) -> list[Array] | None:

@@ -12,7 +12,8 @@ from robot_at_home import at_home
 
 from robospa.geometry import Pose, rotate
 from robospa.harness.robots import embodiment, embodiments
-from robospa.harness.robots.kinematics import end_effector
+from robospa.harness.robots.kinematics import end_effector, link_frames
+from robospa.harness.skills.arm_clearance import TOUCH, arm_depth
 from robospa.harness.skills.clearance import (
     bounding_box,
     finger_points,
@@ -20,7 +21,7 @@ from robospa.harness.skills.clearance import (
     palm_points,
 )
 from robospa.harness.skills.grasping import TOO_THIN, reachable_grasps
-from robospa.harness.skills.open import pull_open
+from robospa.harness.skills.open import Pull, _clear, _ways, pull_open
 from robospa.harness.skills.press import DEPTH, press
 from robospa.tasks.objects import assets, look_count, object_model
 from robospa.tasks.objects.appliances import OVENS
@@ -140,3 +141,28 @@ def test_a_door_is_pulled_open_without_a_change_of_posture(name: str) -> None:
     joints, gripper = rows[:, side.body], rows[:, side.gripper]
     pulling = joints[gripper == 0.0]
     assert len(pulling) >= 4 and np.abs(np.diff(pulling, axis=0)).max() < 1.0
+
+
+def test_at_the_last_attempt_a_door_is_pulled_along_a_way_on_which_the_arm_is_in_nothing() -> None:
+    oven = SceneObject("oven", "microwave", Pose((-0.06, 0.17, TABLE_TOP)), {"look": 0}, fixed=True)
+    ws = at_home("franka-panda", oven)
+    ws.snapshot = replace(ws.snapshot, hinges={"oven": 0.7})
+    hinge = ws.models["oven"].hinge
+    assert hinge is not None
+    call = Open("oven", to=0.7, arm="left")
+    first = next(_ways(ws, call, hinge))
+    elbow = link_frames(ws.chains[0], first.arc[-1][None])[4][0, :3, 3]
+    look = {"half": [0.02] * 3, "color": [1.0, 0.0, 0.0]}
+    thing = SceneObject("thing", "block", Pose(tuple(elbow.tolist())), look, fixed=True)
+    beside = at_home("franka-panda", oven, thing)
+    beside.snapshot = replace(beside.snapshot, hinges={"oven": 0.7})
+
+    def depth(way: Pull) -> float:
+        return float(arm_depth(beside, way.arm, np.stack([way.before, way.at, *way.arc])).max())
+
+    taken = _clear(beside, _ways(beside, call, hinge))
+    assert taken is not None and depth(first) > TOUCH >= depth(taken)
+
+
+def test_of_no_way_none_is_taken() -> None:
+    assert _clear(at_home("franka-panda"), ()) is None
