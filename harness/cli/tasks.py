@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import fields
 from itertools import pairwise
 from pathlib import Path
@@ -39,6 +39,9 @@ def tasks(
         str, typer.Option(help="head, left_wrist, right_wrist, front, third")
     ] = "head",
     size: Annotated[str, typer.Option(help="WIDTHxHEIGHT of the picture [px]")] = "640x480",
+    world: Annotated[
+        str | None, typer.Option(help="official: with the objects and quirks of that world")
+    ] = None,
     out: Annotated[Path | None, typer.Option(help="PNG file (or JPEG with --gallery)")] = None,
     frame: Annotated[bool, typer.Option(help="render the scene's first frame")] = True,
     gallery: Annotated[bool, typer.Option("--gallery", help="one picture of all levels")] = False,
@@ -61,6 +64,8 @@ def tasks(
         raise typer.BadParameter(f"no camera {camera!r}; there are {', '.join(CAMERAS)}")
     if split is not None and split not in SPLITS:
         raise typer.BadParameter(f"{split!r} is no split; there are {', '.join(SPLITS)}")
+    if world is not None and (as_json or view):
+        raise typer.BadParameter("--world goes with pictures: leave out --json and --view")
     if as_json:
         from robospa.harness.cli.task_json import listing, scene_json
 
@@ -68,7 +73,7 @@ def tasks(
         found = listing() if name is None else scene_json(_scene(name, level, seed), splits)
         print(json.dumps(found, indent=1))
     elif gallery:
-        _gallery(console, name, seed, split or "heldout", out or GALLERY)
+        _gallery(console, name, seed, split or "heldout", world, out or GALLERY)
     elif name is None:
         if view:
             raise typer.BadParameter("--view needs a task; `robospa tasks` lists them")
@@ -77,11 +82,12 @@ def tasks(
         _view(_scene(name, level, seed), split or "heldout", port, minutes)
     else:
         scene = _scene(name, level, seed)
+        told, shown = (scene, scene) if world is None else _official(world)(scene)
         pixels = parse_size(size)
-        _describe(console, scene, SPLITS if split is None else (split,))
+        _describe(console, told, SPLITS if split is None else (split,))
         if frame:
             path = out or Path(f"{scene.task}-L{level}-{seed}.png")
-            _draw(console, scene, camera, pixels, path)
+            _draw(console, shown, camera, pixels, path)
 
 
 def parse_size(text: str) -> tuple[int, int]:
@@ -113,6 +119,32 @@ def _scene(name: str, level: int, seed: int) -> Scene:
         return build_scene(found.name, level, seed)
     except ValueError as error:
         raise typer.BadParameter(str(error)) from None
+
+
+def _official(world: str) -> Callable[[Scene], tuple[Scene, Scene]]:
+    """Makes a scene of ours one of the official world: as its sentence is made of it, and as it is
+    shown. BadParameter for another world, or one that is not there."""
+    from robospa.harness.official.official_options import is_official, parse_official
+    from robospa.harness.official.official_parts import official_scenes
+    from robospa.harness.settings import SettingsError
+    from robospa.tasks.seeds import accepted
+    from robospa.trial import TrialKey
+
+    if not is_official(world):
+        raise typer.BadParameter(f"no pictures are made of the world {world!r}, but of official")
+    try:
+        _, layout = parse_official(world)
+    except SettingsError as error:
+        raise typer.BadParameter(str(error)) from None
+    if layout.trouble:
+        typer.echo(f"warning: {layout.trouble}", err=True)
+
+    def scenes(scene: Scene) -> tuple[Scene, Scene]:
+        key = TrialKey(scene.task, scene.level, scene.seed)
+        seeds = accepted(scene.task, scene.level)
+        return official_scenes(key, layout, {key.variant: seeds} if key.seed in seeds else {})
+
+    return scenes
 
 
 # -- all tasks --------------------------------------------------------------------------------
@@ -249,7 +281,9 @@ def _view(scene: Scene, split: str, port: int, minutes: float) -> None:
 # -- the contact sheet ------------------------------------------------------------------------
 
 
-def _gallery(console: Console, name: str | None, seed: int, split: str, path: Path) -> None:
+def _gallery(
+    console: Console, name: str | None, seed: int, split: str, world: str | None, path: Path
+) -> None:
     from rich.progress import track
     from rich.text import Text
 
@@ -258,6 +292,7 @@ def _gallery(console: Console, name: str | None, seed: int, split: str, path: Pa
     from robospa.harness.settings import SettingsError
     from robospa.harness.sim.sapien_world import SapienWorld
     from robospa.harness.world import RenderUnavailable, SceneUnstable
+    from robospa.tasks.catalog import build_scene
     from robospa.tasks.catalog import tasks as all_tasks
     from robospa.tasks.sentences import instruction
 
@@ -265,10 +300,22 @@ def _gallery(console: Console, name: str | None, seed: int, split: str, path: Pa
         chosen = [_find(each) for each in (parse_tasks(name) if name else all_tasks())]
     except SettingsError as error:
         raise typer.BadParameter(str(error)) from None
-    world = SapienWorld()
+    changed = None if world is None else _official(world)
+    told: dict[str, Scene] = {}
+
+    def build(task: str, level: int, seed: int) -> Scene:
+        scene = build_scene(task, level, seed)
+        said, shown = (scene, scene) if changed is None else changed(scene)
+        told[shown.digest] = said
+        return shown
+
+    def sentence(scene: Scene) -> str:
+        return instruction(told[scene.digest], split)
+
+    simulator = SapienWorld()
     try:
         rows = [
-            gallery.task_row(world, task, seed, lambda scene: instruction(scene, split))
+            gallery.task_row(simulator, task, seed, sentence, build)
             for task in track(chosen, "drawing", console=console)
         ]
         count = sum(len(row.cells) for row in rows)
@@ -278,5 +325,5 @@ def _gallery(console: Console, name: str | None, seed: int, split: str, path: Pa
         console.print(Text.assemble(("no gallery:", "red"), f" {error}"))
         raise typer.Exit(1) from None
     finally:
-        world.close()
+        simulator.close()
     console.print(f"{count} variants in {path} ({size / 1000:.0f} kB)", soft_wrap=True)

@@ -31,6 +31,8 @@ TEXT, CAPTION_SIZE, LINES = "#20262e", 12, 4
 PAPER, QUIET = "#ffffff", "#68727f"
 LEAST, SHARE = 1_000_000, 75_000
 """Most bytes of a sheet: so many, or so many for each task; a README's picture stays below 1 MB."""
+Build = Callable[[str, int, int], Scene]
+"""Makes the scene of a task, level and seed."""
 TRIES = 20
 """Seeds that `settled_scene` tries."""
 
@@ -64,10 +66,12 @@ def first_frame(
     return world.render(CameraSpec(camera, *size))
 
 
-def settled_scene(world: World, name: str, level: int, seed: int) -> Scene:
+def settled_scene(
+    world: World, name: str, level: int, seed: int, build: Build = build_scene
+) -> Scene:
     """The first scene from `seed` up that comes to rest, loaded; SceneUnstable after 20 seeds."""
     for attempt in range(seed, seed + TRIES):
-        scene = build_scene(name, level, attempt)
+        scene = build(name, level, attempt)
         try:
             world.load(scene)
         except SceneUnstable:
@@ -76,11 +80,18 @@ def settled_scene(world: World, name: str, level: int, seed: int) -> Scene:
     raise SceneUnstable(f"{name} level {level}: none of the seeds {seed}..{attempt} comes to rest")
 
 
-def task_row(world: World, task: Task, seed: int, sentence: Callable[[Scene], str]) -> GalleryRow:
-    """The row of `task`: one settled scene a level, seen by the head camera."""
+def task_row(
+    world: World,
+    task: Task,
+    seed: int,
+    sentence: Callable[[Scene], str],
+    build: Build = build_scene,
+) -> GalleryRow:
+    """The row of `task`: one settled scene a level, which `build` makes of the task's name, level
+    and seed, seen by the head camera."""
     cells = []
     for level in sorted(task.levels):
-        scene = settled_scene(world, task.name, level, seed)
+        scene = settled_scene(world, task.name, level, seed, build)
         image = world.render(CameraSpec("head", 2 * CELL[0], 2 * CELL[1]))
         cells.append(Cell(level, sentence(scene), image))
     return GalleryRow(

@@ -9,11 +9,13 @@ import pytest
 import typer
 from typer.testing import CliRunner, Result
 
+from robospa.harness.cli import tasks as commands
 from robospa.harness.cli.tasks import describe_skill, parse_size, per_level, tasks
 from robospa.harness.pictures import gallery
 from robospa.tasks.catalog import build_scene
 from robospa.tasks.catalog import tasks as all_tasks
 from robospa.tasks.plan import Home, Pick, Place, Wait
+from robospa.tasks.scene import Scene
 
 NAME = "Pick_Blocks_Size"
 
@@ -187,3 +189,30 @@ def test_a_settled_scene_skips_seeds_that_do_not_rest() -> None:
     world = Restless()
     scene = gallery.settled_scene(world, NAME, 1, 7)  # type: ignore[arg-type]
     assert world.seen == [7, 8, 9] and scene.seed == 9
+
+
+def test_a_scene_of_the_official_world_is_described_and_drawn(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With its quirks: what is told keeps the colours' words, what is drawn has pure ones."""
+    drawn: list[Scene] = []
+    monkeypatch.setattr(commands, "_draw", lambda console, scene, *rest: drawn.append(scene))
+    world = "official?assets=builtin"
+    done = run("Rank_Blocks_Color", "--world", world, "--split", "train")
+    assert done.exit_code == 0 and "red" in done.output
+    (scene,) = drawn
+    assert scene.suite == "official-1-builtin"
+    assert [1.0, 0.0, 0.0] in [item.params["color"] for item in scene.objects]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--world", "checkout:x"), "no pictures are made of the world"),
+        (("--world", "official?speed=2"), "--world official?speed=2"),
+        (("--world", "official", "--json"), "leave out --json and --view"),
+    ],
+)
+def test_a_world_that_cannot_be_drawn_is_said(arguments: tuple[str, ...], said: str) -> None:
+    done = run(NAME, *arguments)
+    assert done.exit_code == 2 and said in done.output
