@@ -1,0 +1,130 @@
+"""What objects of the official archive cost beside built-in ones: loading, and physics steps.
+
+    python benchmarks/official.py [--assets DIR] [--json]
+
+Without `--assets` a made-up archive of the official names, sizes and frames is measured
+(tests/helpers/made_archive.py). Every variant is loaded once, each model anew from the cache on
+disk; then the expert's trials of some variants are run with both kinds of objects. CPU time.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from common import Metric, Result, argument_parser, finish
+
+from robospa.harness.factory import policy_factory
+from robospa.harness.official.official_options import ASSETS, OfficialLayout
+from robospa.harness.official.official_parts import official_world_parts
+from robospa.harness.official.official_world import OfficialWorld
+from robospa.harness.seeds.attempt import ORACLE
+from robospa.harness.trial import run_trial
+from robospa.harness.world import SceneUnstable
+from robospa.tasks import packs
+from robospa.tasks.catalog import LEVELS
+from robospa.tasks.official.models import needs
+from robospa.trial import TrialKey
+
+SEED = 100_000
+LOAD_BAR = 150.0
+STEP_BAR = 2.0
+TEXT = """\
+With `--world official` objects are those of an archive ([the official world](official-world.md)):
+here a made-up one of the official names, sizes and frames, whose meshes are smaller than the real
+ones. What is drawn and what collides is made of its files once and kept; loading reads that."""
+
+
+def made_up(folder: Path) -> Path:
+    """An archive of stand-ins."""
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "helpers"))
+    from made_archive import make_archive
+
+    found: Path = make_archive(folder)
+    return found
+
+
+def load_all(world: OfficialWorld, layout: OfficialLayout) -> tuple[list[float], int]:
+    """CPU seconds of each of the variants that settle, scene and goal included, and how many do
+    not."""
+    pack: Any = packs.pack("official")
+    spent, unstable = [], 0
+    for task in needs():
+        for level in LEVELS:
+            pack._made.cache_clear()
+            began = time.thread_time()
+            try:
+                world.load(official_world_parts(TrialKey(task, level, SEED), layout, {}).scene)
+                spent.append(time.thread_time() - began)
+            except SceneUnstable:
+                unstable += 1
+    return spent, unstable
+
+
+def trials(layout: OfficialLayout, keys: list[TrialKey]) -> tuple[float, int]:
+    """CPU seconds of a physics step in the expert's trials, planning included, and successes."""
+    world, policy = OfficialWorld(render=False), policy_factory(ORACLE)()
+    parts: Callable[..., Any] = partial(official_world_parts, layout=layout, episodes={})
+    steps = successes = 0
+    began = time.thread_time()
+    for key in keys:
+        record = run_trial(world, policy, key, policy_seed=0, parts=parts)
+        steps += record.physics_steps
+        successes += record.success
+    return (time.thread_time() - began) / steps, successes
+
+
+def measure(assets: Path | None, most: int) -> Result:
+    """All figures of one run."""
+    with tempfile.TemporaryDirectory() as folder:
+        os.environ.setdefault("ROBOSPA_CACHE", folder)
+        os.environ[ASSETS] = str(assets or made_up(Path(folder) / "assets"))
+        official, builtin = OfficialLayout(True, "all"), OfficialLayout(False, "all")
+        world = OfficialWorld()
+        load_all(world, official)  # fills the cache
+        spent, unstable = load_all(world, official)
+        ours, _ = load_all(world, builtin)
+        names = [name for name, used in needs().items() if used]
+        keys = [TrialKey(name, 5, SEED) for name in names[:: max(1, len(names) // most)]]
+        trials(official, keys[:1])
+        step, solved = trials(official, keys)
+        plain, _ = trials(builtin, keys)
+    times, others = (1e3 * np.array(values) for values in (spent, ours))
+    rows = (
+        Metric("loading a scene, the slowest", round(float(times.max()), 1), "ms", LOAD_BAR),
+        Metric("loading a scene, the median", round(float(np.median(times)), 1), "ms",
+            note=f"built-in objects: {np.median(others):.1f} ms, {others.max():.1f} at most"),
+        Metric("variants that do not settle", unstable, "", at_most=0, note=f"of {len(times)}"),
+        Metric("a physics step in the expert's trials, beside built-in objects",
+            round(step / plain, 2), "x", STEP_BAR,
+            note=f"{1e6 * step:.0f} and {1e6 * plain:.0f} us, planning included"),
+        Metric("trials that the expert solves", solved, "", note=f"of {len(keys)}"),
+    )  # fmt: skip
+    return Result(
+        "official",
+        "Objects of the official archive",
+        rows,
+        text=TEXT,
+        circumstances=f"{len(times)} variants loaded once with a renderer, models from the cache "
+        f"on disk; {len(keys)} trials at level 5; CPU time",
+    )
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argument_parser(__doc__)
+    parser.add_argument("--assets", type=Path, default=None)
+    parser.add_argument("--trials", type=int, default=20, help="about so many of the expert")
+    options = parser.parse_args()
+    finish(measure(options.assets, options.trials), options)
+
+
+if __name__ == "__main__":
+    main()
