@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -13,6 +15,8 @@ from robospa.harness.skills.workspace import Array, Steps, Workspace, moved_back
 
 RETREAT = 0.07
 """How far the open gripper backs out [m]."""
+DEEPER, ASIDE = 0.004, 0.045
+"""How far the open gripper goes below where it let go of what jams in it, and out sideways [m]."""
 BEST = 12
 """How many of the reachable end poses are tried along the whole path."""
 
@@ -74,6 +78,29 @@ def put_down(ws: Workspace, arm: int, height: float) -> Steps:
             ws.add(arm, joints)
     release(ws, arm)
     yield from ws.flush()
+
+
+def slide_out(ws: Workspace, arm: int, name: str, height: float) -> Steps:
+    """Lower `name`, which jams in the open gripper, to `height` [m] and move out beside it.
+
+    What widens upwards to the gripper's opening comes up with it.
+    """
+    frames, _ = forward(ws.chains[arm], ws.joints[arm][None])
+    here = from_transform(frames[0])
+    down = translated(here, (0.0, 0.0, height - ws.pose(name).position[2] - DEEPER))
+    x, y, _ = rotate(here.rotation, (0.0, 0.0, 1.0))
+    share = math.copysign(ASIDE / max(math.hypot(x, y), 1e-9), -y)
+    for step in (share, -share):  # towards the robot first
+        beside = translated(down, (x * step, y * step, 0.0))
+        up = translated(beside, (0.0, 0.0, RETREAT))
+        way = [p for a, b in pairwise((here, down, beside, up)) for p in line_poses(a, b, 2)]
+        joints = ws.solve_path(arm, ws.joints[arm], way)
+        if joints is not None:
+            for stop in joints:
+                ws.add(arm, stop)
+            break
+    rise(ws, arm)
+    yield from ws.flush(exactly=True)
 
 
 def bring_in(ws: Workspace, arm: int, path: Sequence[Array]) -> Steps:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from robospa.action_space import ARMS
 from robospa.harness.robots import embodiment
-from robospa.harness.skills.approach import put_down
+from robospa.harness.skills.approach import put_down, slide_out
 from robospa.harness.skills.both_arms import go_home
 from robospa.harness.skills.dock import dock
 from robospa.harness.skills.hang import hang
@@ -158,6 +158,13 @@ class Expert:
                 continue
             if self._arrived(then):
                 return
+        if isinstance(then, Place) and self._hangs(then):
+            yield from slide_out(ws, arm, then.object, place_position(ws, then)[2])
+
+    def _hangs(self, call: Place) -> bool:
+        """Whether the object came up again with the gripper that let it go."""
+        goal = place_position(self.workspace, call)
+        return self.workspace.pose(call.object).position[2] - goal[2] >= STUCK_ABOVE
 
     def _arrived(self, call: Place | Drop) -> bool:
         ws = self.workspace
@@ -165,7 +172,7 @@ class Expert:
         if isinstance(call, Place):
             goal = np.array(place_position(ws, call))
             off = np.abs(here[:2] - goal[:2]).max()
-            return bool(off < PLACED_WITHIN and here[2] - goal[2] < STUCK_ABOVE)
+            return bool(off < PLACED_WITHIN and not self._hangs(call))
         bin_pose, model = ws.pose(call.into), ws.models[call.into]
         inside = np.abs(here[:2] - np.array(bin_pose.position[:2])) < np.array(model.size[:2]) / 2
         return bool(inside.all() and here[2] < bin_pose.position[2] + model.size[2])

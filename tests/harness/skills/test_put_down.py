@@ -12,7 +12,7 @@ from robospa.geometry import Pose, multiply, yaw_rotation
 from robospa.gripper import grasp_points
 from robospa.harness.robots import embodiment
 from robospa.harness.robots.kinematics import chain_of, end_effector, inverse
-from robospa.harness.skills.approach import put_down
+from robospa.harness.skills.approach import ASIDE, DEEPER, put_down, slide_out
 from robospa.harness.skills.place import FAR, reachable_placements
 from robospa.harness.skills.workspace import Workspace
 from robospa.tasks.scene import Scene, SceneObject
@@ -25,24 +25,41 @@ HELD = Pose((-0.2, -0.15, 0.95), (0.5, -0.5, 0.5, 0.5))
 LIFTED = 0.08
 
 
-def test_what_is_held_is_lowered_to_where_it_lay_before_the_gripper_opens() -> None:
+def holding_a_cube(gripper: float) -> Workspace:
+    """The left arm at HELD with a cube between its fingers, LIFTED above the table."""
     half = {"half": [0.02, 0.02, 0.02], "color": [1.0, 0.0, 0.0]}
     cube = SceneObject("cube", "block", Pose((-0.2, -0.15, TABLE_TOP + 0.02 + LIFTED)), half)
     scene = Scene("none", 1, 0, ROBOT.name, "clean", (cube,), {})
-    chain = chain_of(ROBOT.arms[0])
     right = end_effector(chain_of(ROBOT.arms[1]), ROBOT.arms[1].home)
     points = grasp_points(ROBOT.grippers, (HELD, right))
-    start = Snapshot(0.0, {"cube": cube.pose}, (0.0, 1.0), (HELD, right),
+    start = Snapshot(0.0, {"cube": cube.pose}, (gripper, 1.0), (HELD, right),
         (ROBOT.arms[0].home, ROBOT.arms[1].home), grasp_points=points)  # fmt: skip
     ws = Workspace(scene, ROBOT, start)
     joints = ws.solve(0, HELD)
     assert joints is not None
-    ws.joints[0], ws.held[0] = joints, "cube"
+    ws.joints[0] = joints
+    return ws
+
+
+def test_what_is_held_is_lowered_to_where_it_lay_before_the_gripper_opens() -> None:
+    ws = holding_a_cube(0.0)
+    ws.held[0] = "cube"
     rows = next(put_down(ws, 0, TABLE_TOP + 0.02))
     opened = int(np.flatnonzero(rows[:, 6] == 1.0)[0])
-    before = end_effector(chain, rows[opened - 1, :6])
+    before = end_effector(ws.chains[0], rows[opened - 1, :6])
     assert before.position[2] == pytest.approx(HELD.position[2] - LIFTED, abs=1e-4)
     assert (rows[:opened, 6] == 0.0).all() and ws.held[0] is None
+
+
+def test_what_jams_in_the_open_gripper_is_lowered_and_left_sideways() -> None:
+    ws = holding_a_cube(1.0)
+    rows = next(slide_out(ws, 0, "cube", TABLE_TOP + 0.02))
+    _, down, _, beside, *_ = [end_effector(ws.chains[0], row[:6]).position for row in rows]
+    assert (rows[:, 6] == 1.0).all()
+    assert down[2] == pytest.approx(HELD.position[2] - LIFTED - DEEPER, abs=1e-3)
+    assert beside[2] == pytest.approx(down[2], abs=1e-3)
+    assert math.dist(beside[:2], down[:2]) == pytest.approx(ASIDE, abs=1e-3)
+    assert beside[1] < down[1], "it goes towards the robot"
 
 
 def test_a_thing_is_turned_by_the_wrist_and_not_by_swinging_the_whole_arm_over() -> None:
