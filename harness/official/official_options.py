@@ -148,6 +148,20 @@ def parse_official(
     return options, layout
 
 
+def check_robots(names: Collection[str]) -> None:
+    """Raises SettingsError if the archive lacks the meshes of one of these robots."""
+    from robospa.harness.packs.archive import open_archive
+    from robospa.harness.packs.robot_skins import check_robot
+    from robospa.harness.robots import embodiment
+
+    try:
+        archive = open_archive()
+        for name in sorted(names):
+            check_robot(archive, embodiment(name))
+    except (ValueError, OSError) as error:
+        raise SettingsError(f"robots cannot be drawn with the official meshes: {error}") from error
+
+
 def _use_textures(pack: Any) -> None:
     """Randomised scenes have the archive's textures, unless the user has named others."""
     folder = Path(getattr(getattr(pack, "archive", None), "root", "")) / TEXTURES

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from robospa.geometry import to_transform
 from robospa.harness.packs.archive import Archive, ArchiveError
 from robospa.harness.packs.assembly import skin_of
-from robospa.harness.packs.urdf import MeshUse, Robot, read_urdf
+from robospa.harness.packs.urdf import MeshUse, Robot, check_files, read_urdf
 from robospa.harness.robots.embodiment import Arm, Embodiment, Joint
 from robospa.tasks.shapes import Skin
 
@@ -44,14 +44,8 @@ def robot_skins(archive: Archive, robot: Embodiment, full: bool = False) -> Robo
 
     ArchiveError, in one sentence, if they are not there or cannot be read.
     """
-    folder = archive.embodiment(robot.name)
-    if folder is None:
-        raise ArchiveError(
-            f"there are no meshes of {robot.name} in {str(archive.root / 'embodiments')!r}; unpack "
-            "embodiments.zip of the official data there"
-        )
     left, right = robot.arms
-    urdf = _urdf_of(archive, folder, left)
+    urdf = _robot_urdf(archive, robot)
     own = {joint.name for joint in right.joints} - {joint.name for joint in left.joints}
     both = bool(own) and own <= {*_names(urdf)}
     arms = robot.arms if both else robot.arms[:1]
@@ -61,6 +55,21 @@ def robot_skins(archive: Archive, robot: Embodiment, full: bool = False) -> Robo
         _arm_skins(archive, urdf, right, moving, full, still=not both),
     )
     return RobotSkins(skins, stand=both)
+
+
+def check_robot(archive: Archive, robot: Embodiment) -> None:
+    """ArchiveError, in one sentence, if the meshes of `robot` are not all there; none is read."""
+    check_files(use.file for uses in _robot_urdf(archive, robot).visuals.values() for use in uses)
+
+
+def _robot_urdf(archive: Archive, robot: Embodiment) -> Robot:
+    folder = archive.embodiment(robot.name)
+    if folder is None:
+        raise ArchiveError(
+            f"there are no meshes of {robot.name} in {str(archive.root / 'embodiments')!r}; unpack "
+            "embodiments.zip of the official data there"
+        )
+    return _urdf_of(archive, folder, robot.arms[0])
 
 
 def _carriers(urdf: Robot, arm: Arm) -> dict[str, str]:

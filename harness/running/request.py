@@ -20,7 +20,12 @@ from robospa.harness.official.checkout_options import (
     parse_checkout,
 )
 from robospa.harness.official.official_options import FACTORY as OFFICIAL_FACTORY
-from robospa.harness.official.official_options import is_official, parse_official, use_archive
+from robospa.harness.official.official_options import (
+    check_robots,
+    is_official,
+    parse_official,
+    use_archive,
+)
 from robospa.harness.running.autoscaling import cores, most_workers
 from robospa.harness.running.evaluate import Request
 from robospa.harness.running.policy_probe import read_map
@@ -269,6 +274,8 @@ def _parts(settings: EvaluationSettings, keys: Sequence[TrialKey]) -> dict[str, 
         settings.simulation.assets is not None,
         {key.task for key in keys},
     )
+    if settings.simulation.robot_assets != BUILTIN:
+        check_robots({key.embodiment for key in keys})
     arguments["episodes"] = episodes_of(keys)
     return {"parts": OFFICIAL_WORLD_PARTS, "parts_arguments": arguments}
 

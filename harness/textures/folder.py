@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.harness.textures.field import SIZE
+from robospa.tasks.packs import PackError
 from robospa.tasks.surroundings import TEXTURES, Texture
 
 ENDINGS = (".png", ".jpg", ".jpeg", ".webp")
@@ -24,17 +25,17 @@ LARGEST = 8192
 
 
 class TextureFolder:
-    """The images under `path`. ValueError, in one sentence, if they are not as described above."""
+    """The images under `path`. PackError, in one sentence, if they are not as described above."""
 
     def __init__(self, path: Path) -> None:
         if not path.is_dir():
-            raise ValueError(
+            raise PackError(
                 f"there is no folder of textures {str(path)!r}; make it or unset ROBOSPA_TEXTURES"
             )
         self._path = path
         self._files = {split: _numbered(path / split) for split in TEXTURES}
         if not any(self._files.values()):
-            raise ValueError(
+            raise PackError(
                 f"the folder of textures {str(path)!r} has no image such as seen/0.png or "
                 "unseen/0.png"
             )
@@ -46,25 +47,25 @@ class TextureFolder:
 
         files = self._files[texture.split]
         if not files:
-            raise ValueError(
+            raise PackError(
                 f"the folder of textures {str(self._path)!r} has no {texture.split} images, which "
                 f"this scene mode needs; add {texture.split}/0.png, 1.png, ..."
             )
         file = files[texture.index % len(files)]
         if not file.is_file():  # such as a pipe, which nobody may ever write to
-            raise ValueError(f"the texture {str(file)!r} cannot be read: it is no file")
+            raise PackError(f"the texture {str(file)!r} cannot be read: it is no file")
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", Image.DecompressionBombWarning)
                 with Image.open(file) as opened:
                     if max(opened.size) > LARGEST:
-                        raise ValueError(
+                        raise PackError(
                             f"the texture {str(file)!r} has {opened.width}x{opened.height} pixels, "
                             f"more than {LARGEST} along a side"
                         )
                     picture = opened.convert("RGB").resize((SIZE, SIZE), Image.Resampling.BOX)
         except (OSError, UnidentifiedImageError, Image.DecompressionBombError) as error:
-            raise ValueError(f"the texture {str(file)!r} cannot be read: {error}") from error
+            raise PackError(f"the texture {str(file)!r} cannot be read: {error}") from error
         return np.asarray(picture, dtype=np.uint8)
 
     def about(self) -> dict[str, object]:
@@ -75,9 +76,7 @@ class TextureFolder:
                 try:
                     size = file.stat().st_size
                 except OSError as error:
-                    raise ValueError(
-                        f"the texture {str(file)!r} cannot be read: {error}"
-                    ) from error
+                    raise PackError(f"the texture {str(file)!r} cannot be read: {error}") from error
                 listed.update(f"{split}/{file.name} {size}\n".encode())
         counts = {split: len(files) for split, files in self._files.items()}
         return {"folder": self._path.name, **counts, "hash": listed.hexdigest()[:16]}
@@ -90,7 +89,7 @@ def _numbered(folder: Path) -> list[Path]:
     files = [file for file in folder.iterdir() if file.suffix.lower() in ENDINGS]
     for file in files:
         if not (file.stem.isascii() and file.stem.isdigit()):
-            raise ValueError(
+            raise PackError(
                 f"the texture {str(file)!r} must be called by a number, such as 0{file.suffix}"
             )
     return sorted(files, key=lambda file: (int(file.stem), file.name))

@@ -23,7 +23,7 @@ from robospa.harness.packs.model_data import read_model_data
 from robospa.harness.packs.official import OfficialPack
 from robospa.harness.textures.folder import TextureFolder
 from robospa.tasks.official.models import official_models
-from robospa.tasks.packs import PackWithFaults
+from robospa.tasks.packs import PackError, PackWithFaults
 from robospa.tasks.surroundings import Texture
 
 pytestmark = READS_MESHES
@@ -235,7 +235,7 @@ def test_numbers_that_json_allows_and_no_model_has(
 )
 def test_a_harmed_texture_is_refused_in_a_sentence(root: Path, harm: Change, sentence: str) -> None:
     harm(root / "background_texture" / "unseen" / "0.png")
-    with pytest.raises(ValueError, match=sentence):
+    with pytest.raises(PackError, match=sentence):
         textures = TextureFolder(root / "background_texture")
         textures.about()
         textures.image(Texture("unseen", 0))

@@ -9,11 +9,13 @@ import pytest
 from made_robots import MOVED, make_robot
 from pack_fixtures import READS_MESHES
 
+from robospa.harness.official.official_options import check_robots
 from robospa.harness.packs import cache
 from robospa.harness.packs.archive import ArchiveError, open_archive
 from robospa.harness.packs.robot_skins import RobotSkins, robot_skins
 from robospa.harness.robots import embodiment
 from robospa.harness.robots.embodiment import Arm
+from robospa.harness.settings import SettingsError
 from robospa.tasks.objects.build import points_of
 from robospa.tasks.shapes import Skin
 
@@ -77,3 +79,15 @@ def test_what_is_missing_is_named(tmp_path: Path) -> None:
     (tmp_path / "embodiments" / "piper" / "urdf" / "robot.urdf").unlink()
     with pytest.raises(ArchiveError, match=r"no URDF file in .* has the joints joint1, joint2"):
         robot_skins(archive, embodiment("piper"))
+
+
+def test_a_run_knows_before_its_first_trial_what_of_a_robot_is_missing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ROBOSPA_ASSETS", str(make_robot(tmp_path, "piper")))
+    check_robots(["piper"])
+    with pytest.raises(SettingsError, match="no meshes of aloha-agilex"):
+        check_robots(["piper", "aloha-agilex"])
+    (tmp_path / "embodiments" / "piper" / "urdf" / "meshes" / "root.glb").unlink()
+    with pytest.raises(SettingsError, match=r"the mesh '.*root.glb' is missing"):
+        check_robots(["piper"])
