@@ -57,13 +57,8 @@ def tasks(
     ] = 0.0,
 ) -> None:
     """List the tasks; describe and draw one scene; or draw tasks at all levels on one sheet."""
-    from robospa.observation import CAMERAS
-
     console = plain_console()
-    if camera not in CAMERAS:
-        raise typer.BadParameter(f"no camera {camera!r}; there are {', '.join(CAMERAS)}")
-    if split is not None and split not in SPLITS:
-        raise typer.BadParameter(f"{split!r} is no split; there are {', '.join(SPLITS)}")
+    _check(camera, split)
     if world is not None and (as_json or view):
         raise typer.BadParameter("--world goes with pictures: leave out --json and --view")
     if as_json:
@@ -88,6 +83,16 @@ def tasks(
         if frame:
             path = out or Path(f"{scene.task}-L{level}-{seed}.png")
             _draw(console, shown, camera, pixels, path)
+
+
+def _check(camera: str, split: str | None) -> None:
+    """BadParameter for a camera or a split that there is not."""
+    from robospa.observation import CAMERAS
+
+    if camera not in CAMERAS:
+        raise typer.BadParameter(f"no camera {camera!r}; there are {', '.join(CAMERAS)}")
+    if split is not None and split not in SPLITS:
+        raise typer.BadParameter(f"{split!r} is no split; there are {', '.join(SPLITS)}")
 
 
 def parse_size(text: str) -> tuple[int, int]:
