@@ -1,8 +1,9 @@
 """What the expert solves with every robot on seeds that no list holds.
 
-    robospa eval oracle --tasks all --levels all --embodiments ARX-X5,piper,franka-panda,ur5-wsg \\
+    robospa eval oracle --embodiments ARX-X5,piper,franka-panda,ur5-wsg \\
         --seeds 900000-900019 --trials 20 --out runs/experts
-    python tools/expert_table.py runs/experts ...   counts runs into benchmarks/results
+    python tools/expert_table.py runs/experts ...   counts runs into benchmarks/results, where they
+                                                    replace the variants that they hold
     python tools/expert_table.py                    writes the table into docs/adding-a-robot.md
 
 A test holds the page against the counts: the table, and that every variant below 95 % is named.
@@ -85,6 +86,12 @@ def read(path: Path) -> list[Variant]:
         ]
 
 
+def merged(old: Sequence[Variant], new: Sequence[Variant]) -> list[Variant]:
+    """All variants, `new` ones in place of the `old` of the same robot, task and level."""
+    found = {(v.robot, v.task, v.level): v for v in (*old, *new)}
+    return [found[key] for key in sorted(found)]
+
+
 def table(variants: Sequence[Variant]) -> list[str]:
     """Lines of Markdown: a row for each robot, a column for each category."""
     category = {name: task.category for name, task in load().tasks.items()}
@@ -97,7 +104,7 @@ def table(variants: Sequence[Variant]) -> list[str]:
                 solved[column] += v.solved
                 tried[column] += v.tried
         cells = [f"{solved[c]}/{tried[c]}" for c in columns]
-        share = 100 * solved["all"] / tried["all"]
+        share = 1000 * solved["all"] // tried["all"] / 10  # never rounded up to all of them
         whole = f"{solved['all']:,}/{tried['all']:,}: {share:.1f} %"
         lines.append(f"| {robot} | {' | '.join(cells)} | {whole} |")
     return lines
@@ -115,7 +122,7 @@ def below(variants: Sequence[Variant]) -> dict[tuple[str, str], dict[int, Varian
 def main(runs: Sequence[str]) -> None:
     """Count runs, or write the table of what was counted."""
     if runs:
-        write(COUNTS, counted([Path(run) for run in runs]))
+        write(COUNTS, merged(read(COUNTS), counted([Path(run) for run in runs])))
     lines = PAGE.read_text().splitlines()
     first = next(i for i, line in enumerate(lines) if line.startswith(HEAD))
     end = next(i for i in range(first, len(lines)) if not lines[i].startswith("|"))

@@ -37,7 +37,7 @@ from robospa.harness.skills.workspace import (
     max_gripper_y,
     wall_front,
 )
-from robospa.tasks.shapes import Grasp, ObjectModel
+from robospa.tasks.shapes import Box, Cylinder, Grasp, ObjectModel, Shape
 
 Array = NDArray[np.float64]
 
@@ -60,7 +60,7 @@ WRONG_SIDE = 0.6
 @dataclass(frozen=True)
 class GraspCandidate:
     """A grasp that the arm can take: end-effector pose, its joints, and the gripper value 0..1 to
-    come with."""
+    come with; `depth` is how deep [m] arm or hand would be in other things."""
 
     arm: int
     pose: Pose
@@ -69,6 +69,7 @@ class GraspCandidate:
     opening: float
     cost: float
     tilt: float
+    depth: float
 
 
 def upright(pose: Pose) -> bool:
@@ -89,13 +90,43 @@ def world_grasps(model: ObjectModel, pose: Pose, hand: Gripper) -> tuple[Grasp, 
             )
             for g in model.grasps
         )
-    centre = pose.apply((0.0, 0.0, model.bottom + model.size[2] / 2))
-    sizes = np.array(model.size)
+    middle = Pose((0.0, 0.0, model.bottom + model.size[2] / 2))
+    whole = _level_grasps(pose * middle, model.size, hand.opening - SPARE_OPENING)
+    widest = max((g.width for g in model.grasps), default=0.0)
+    limit = max(hand.opening - SPARE_OPENING, widest + 1e-6)
+    return whole or tuple(
+        grasp
+        for shape in model.shapes
+        if shape.collision and (size := _part_size(shape)) is not None
+        for grasp in _level_grasps(pose * shape.pose, size, limit)
+    )
+
+
+def _part_size(shape: Shape) -> Vec3 | None:
+    """Size [m] of a box or a cylinder along its axes; None for another form."""
+    form = shape.geometry
+    if isinstance(form, Box):
+        return (2 * form.half[0], 2 * form.half[1], 2 * form.half[2])
+    if isinstance(form, Cylinder):
+        return (2 * form.radius, 2 * form.radius, 2 * form.half_length)
+    return None
+
+
+def _level_grasps(pose: Pose, size: Vec3, limit: float) -> tuple[Grasp, ...]:
+    """Grasps from above across the level axes of a body of `size`, centred at `pose`, that are
+    shorter than `limit`; across a lying one's length if it has rolled to where no other is level.
+    """
     axes = to_matrix(pose.rotation)
-    flat = np.abs(axes[2]) < 0.5  # body axes that lie in the table's plane
-    choices = [i for i in range(3) if flat[i] and sizes[i] < hand.opening - SPARE_OPENING]
+    flat = np.abs(axes[2]) < 0.5
+    across = [(axes[:, i], size[i]) for i in range(3) if flat[i]]
+    if flat[2] and not flat[:2].any():
+        level = np.cross((0.0, 0.0, 1.0), axes[:, 2])
+        across.append((level / np.linalg.norm(level), max(size[:2])))
+    down = (0.0, 0.0, -1.0)
     return tuple(
-        Grasp(centre, (0.0, 0.0, -1.0), tuple(axes[:, i]), float(sizes[i]), 0.6) for i in choices
+        Grasp(pose.position, down, tuple(closing.tolist()), width, 0.6)
+        for closing, width in across
+        if width < limit
     )
 
 
@@ -174,12 +205,13 @@ def reachable_grasps(
             inside, opening = _fitting_opening(hand, pose, width, own)
             palm = palm_points(hand, pose)
             around = np.concatenate([finger_points(hand, pose, opening), palm])
-            depth = max(inside, whole.depth(palm), near.depth(around), blocked)
+            others = max(near.depth(around), blocked)
+            depth = max(inside, whole.depth(palm), others)
             turned = joints[i] - home  # of the last two joints: how far hand and wrist turn
             roll = abs(float(turned[-1])) + 0.5 * abs(float(turned[-2]))
             depth = max(depth, max_gripper_y(pose, hand) - front)
             thin = TOO_THIN if width <= hand.gap else 0.0
             cost = wrong + thin + 0.5 * tilt + 0.25 * roll + 60.0 * depth
             value = ws.robot.arms[arm].gripper_value(opening)
-            found.append(GraspCandidate(arm, pose, approach, joints[i], value, cost, tilt))
+            found.append(GraspCandidate(arm, pose, approach, joints[i], value, cost, tilt, others))
     return sorted(found, key=lambda r: r.cost)

@@ -22,6 +22,8 @@ SPARE = 0.025
 """Room between what is carried and what it is carried over [m]."""
 ABOVE_TABLE = 0.02
 """How far above the table [m] a direct way leads."""
+DETOURS = (0.06, 0.12, 0.18, 0.24)
+"""How far towards the robot [m] an arm goes around what it cannot get over."""
 BACK = (0.0, 0.06, 0.12)
 """How far behind a goal [m] an arm may come down to it."""
 SAMPLES, STRIDE = 10, 0.1
@@ -149,6 +151,20 @@ def route(ws: Workspace, arm: int, goal: Array) -> Route:
                 return Route((*via, above), True)
             spare = Route((*via, above), False) if spare.via == via else spare
     return spare
+
+
+def detour(ws: Workspace, arm: int, goal: Array) -> Array | None:
+    """Joints nearer to the robot, to which and from which to `goal` the way is free; or None."""
+    frames, _ = forward(ws.chains[arm], ws.joints[arm][None])
+    here = from_transform(frames[0])
+    x, y, z = here.position
+    for back, up in product(DETOURS, (0.0, 0.03, 0.06)):
+        via = ws.solve(arm, Pose((x, y - back, z + up), here.rotation), ws.joints[arm])
+        if via is None or blocked(ws, arm, ws.joints[arm], via):
+            continue
+        if not blocked(ws, arm, via, goal):
+            return via
+    return None
 
 
 def travel(ws: Workspace, arm: int, goal: Array, gripper: float | None = None) -> None:

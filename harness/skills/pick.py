@@ -70,14 +70,17 @@ def _choose(
     """The best grasp not yet tried, with the joints of the way in and of the lift.
 
     One to which the way is free, to its start and straight in from there, if there is any among
-    the best ROUTES that are feasible; else one to whose start it is free.
+    the best ROUTES that are feasible; else one to whose start it is free. A hand that only picks
+    may push a neighbour aside, and its level grasps hold best; one that goes on to place must leave
+    towers and rows as they are, so it leans before it touches anything.
     """
     arms = tuple(a for a in arms_for(call.arm) if ws.held[a] is None)
     spare: Choice | None = None
+    obstructed: list[tuple[bool, Choice]] = []
     for leans in (LEVEL, LEANS):
         options = reachable_grasps(ws, call.object, arms, leans)
         fresh = [o for o in options if not any(_same_grasp(o, t) for t in tried)]
-        obstructed: list[tuple[bool, Choice]] = []
+        looked_at = 0
         for option in (fresh or options)[: LOOKAHEAD + 1]:
             out = moved_back(option.pose, option.approach, STANDOFF)
             back = ws.solve_path(option.arm, option.joints, line_poses(option.pose, out, 2))
@@ -90,13 +93,17 @@ def _choose(
                 continue
             free = route(ws, option.arm, back[-1]).free
             touches = arm_depth(ws, option.arm, np.stack(back), call.object).max() > TOUCH
+            touches |= feasible is not None and option.depth > TOUCH
             if free and not touches:
                 return found
             obstructed.append((not free, found))
-            if len(obstructed) == ROUTES:
+            looked_at += 1
+            if looked_at == ROUTES:
                 break
-        if obstructed:
-            return min(obstructed, key=lambda way: way[0])[1]
+        if obstructed and feasible is None:
+            break
+    if obstructed:
+        return min(obstructed, key=lambda way: way[0])[1]
     if spare is not None:
         return spare
     raise SkillFailed(f"no arm can reach {call.object} at {ws.pose(call.object).position}")

@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 from robospa.geometry import Pose, axis_rotation, multiply, rotate, yaw_rotation
 from robospa.harness.robots.kinematics import inverse
 from robospa.harness.skills.arm_clearance import TOUCH, arm_depth
+from robospa.harness.skills.clearance import bounding_box, finger_points, own_boxes, standing
 from robospa.harness.skills.grasping import GraspCandidate
-from robospa.harness.skills.motion import line_poses, retreat_home, travel
+from robospa.harness.skills.motion import detour, line_poses, retreat_home, route, travel
 from robospa.harness.skills.workspace import SkillFailed, Steps, Workspace, moved_back, moved_up
 from robospa.tasks.plan import Drop, Place
+from robospa.tasks.shapes import Box
 
 Array = NDArray[np.float64]
 
@@ -25,6 +27,8 @@ FAR = 2.5
 """Where a joint would turn by more [rad], a placement in a posture nearer by is looked for."""
 TURNS = (0.0, math.pi / 2, -math.pi / 2, math.pi, -math.pi)
 """Turns [rad] of the last joint from which it is looked for."""
+OPENINGS = (1.0, 0.8, 0.6, 0.4)
+"""Shares of the full opening, widest first, with which a placed object may be let go of."""
 YAWS = tuple(2 * math.pi * i / 16 for i in range(16))
 MOUTH = ((0.0, 0.0), (0.06, -0.08), (0.06, 0.0), (0.1, -0.12), (0.0, -0.12), (0.12, 0.0))
 """Where over a container the object may be let go, relative to its centre [m]."""
@@ -141,6 +145,22 @@ def can_follow(ws: Workspace, call: Place | Drop, grasp: GraspCandidate) -> bool
     return bool(reachable_placements(ws, grasp.arm, offset, targets, above, grasp.joints))
 
 
+def release_opening(ws: Workspace, arm: int, pose: Pose, offset: Pose, call: Place) -> float:
+    """Gripper value 0..1 with which the object, held with `offset`, is let go of at end-effector
+    `pose`: all the way, or less where a finger would push a neighbour aside and then does not."""
+    hand, model = ws.hand(arm), ws.models[call.object]
+    boxes = all(isinstance(s.geometry, Box) for s in model.shapes if s.collision)
+    own = (own_boxes if boxes else bounding_box)(model, pose * offset)
+    without = [name for name in (call.object, call.on) if name is not None]
+    for share in OPENINGS:
+        fingers = finger_points(hand, pose, hand.opening * share)
+        if own.depth(fingers) > 0.0:
+            break
+        if standing(ws, *without).depth(fingers) <= TOUCH:
+            return 1.0 if share == 1.0 else ws.robot.arms[arm].gripper_value(hand.opening * share)
+    return 1.0
+
+
 def place(ws: Workspace, call: Place) -> Steps:
     """Carry, set down, let go, back off."""
     arm = arm_holding(ws, call.object)
@@ -151,16 +171,23 @@ def place(ws: Workspace, call: Place) -> Steps:
     if not found:
         raise SkillFailed(f"{call.object} cannot be brought to {place_position(ws, call)}")
     spot = found[0]
+    if not route(ws, arm, spot.above).free:
+        via = detour(ws, arm, spot.above)
+        if via is not None:
+            ws.add(arm, via)
     travel(ws, arm, spot.above)
     yield from ws.flush()
     ws.add(arm, spot.joints)
     ws.add(arm)
-    ws.add(arm, gripper=1.0)
+    opening = release_opening(ws, arm, spot.pose, offset, call)
+    ws.add(arm, gripper=opening)
     approach = rotate(spot.pose.rotation, (1, 0, 0))
     away = moved_back(spot.pose, approach, call.retreat)
     out = ws.solve_path(arm, spot.joints, line_poses(spot.pose, away, 2)) or [spot.above]
     for joints in out:
         ws.add(arm, joints)
+    if opening < 1.0:
+        ws.add(arm, gripper=1.0)
     ws.held[arm] = None
     yield from ws.flush()
 

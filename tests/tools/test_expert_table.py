@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 import pytest
-from expert_table import COUNTS, ENOUGH, PAGE, Variant, below, counted, read, table, write
+from expert_table import COUNTS, ENOUGH, PAGE, Variant, below, counted, merged, read, table, write
 from report_runs import make_run, record
 
 TEXT = PAGE.read_text("utf-8")
@@ -30,6 +30,12 @@ def test_what_was_counted_is_read_again(tmp_path: Path) -> None:
     ]
     write(tmp_path / "counts.csv", variants)
     assert read(tmp_path / "counts.csv") == variants
+
+
+def test_variants_that_were_run_again_replace_the_ones_counted_before() -> None:
+    old = [Variant("piper", "Pick_Blocks_Size", n, 18, 20, (900_001, 900_004)) for n in (1, 2)]
+    new = Variant("piper", "Pick_Blocks_Size", 2, 20, 20)
+    assert merged(old, [new]) == [old[0], new]
 
 
 def test_a_row_adds_up_the_variants_of_a_category() -> None:

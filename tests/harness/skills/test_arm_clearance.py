@@ -8,9 +8,9 @@ from robot_at_home import at_home
 
 from robospa.geometry import Pose, look_rotation
 from robospa.harness.robots import embodiments
-from robospa.harness.robots.kinematics import inverse, link_frames
+from robospa.harness.robots.kinematics import end_effector, inverse, link_frames
 from robospa.harness.skills.arm_clearance import TOUCH, arm_depth, edge_depth
-from robospa.harness.skills.motion import blocked
+from robospa.harness.skills.motion import blocked, detour
 from robospa.harness.skills.pick import pick
 from robospa.harness.skills.press import press
 from robospa.tasks.catalog import build_scene
@@ -101,3 +101,24 @@ def test_the_straight_way_to_a_grasp_stays_off_what_stands_in_front() -> None:
     side = ws.robot.action_space("joint").arms[1]
     way_in = rows[rows[:, side.gripper] > 0.0][:, side.body]
     assert arm_depth(ws, 1, way_in, "bottle").max() <= TOUCH
+
+
+def test_what_no_arm_gets_over_is_gone_around_on_the_robots_side() -> None:
+    down = look_rotation((0.0, 0.0, -1.0), (1.0, 0.0, 0.0))
+    ws = at_home("piper", block(-0.12, -0.02, TABLE_TOP + 0.06, 0.06))
+    start, goal = (ws.solve(0, Pose((x, y, 0.93), down)) for x, y in ((-0.27, -0.02), (0.0, -0.17)))
+    assert start is not None and goal is not None and blocked(ws, 0, start, goal)
+    ws.joints[0] = start
+    via = detour(ws, 0, goal)
+    assert via is not None
+    assert not blocked(ws, 0, start, via) and not blocked(ws, 0, via, goal)
+    assert end_effector(ws.chains[0], via).position[1] < -0.07
+
+
+def test_no_detour_leads_out_of_a_thing() -> None:
+    down = look_rotation((0.0, 0.0, -1.0), (1.0, 0.0, 0.0))
+    ws = at_home("piper", block(-0.27, -0.02, TABLE_TOP, 0.3))
+    start, goal = (ws.solve(0, Pose((x, y, 0.93), down)) for x, y in ((-0.27, -0.02), (0.0, -0.17)))
+    assert start is not None and goal is not None
+    ws.joints[0] = start
+    assert detour(ws, 0, goal) is None
