@@ -103,9 +103,16 @@ def slide_out(ws: Workspace, arm: int, name: str, height: float) -> Steps:
     yield from ws.flush(exactly=True)
 
 
-def bring_in(ws: Workspace, arm: int, path: Sequence[Array]) -> Steps:
-    """Travel to the first joints of `path`, follow the others, release the object there."""
-    travel(ws, arm, path[0])
+def bring_in(ws: Workspace, arm: int, path: Sequence[Array], stop: Array | None = None) -> Steps:
+    """Travel to the first joints of `path`, follow the others, release the object there.
+
+    By way of joints `stop`, if given, without a look at what is in the way.
+    """
+    if stop is None:
+        travel(ws, arm, path[0])
+    else:
+        ws.add(arm, stop)
+        ws.add(arm, path[0])
     yield from ws.flush()
     for joints in path[1:]:
         ws.add(arm, joints)

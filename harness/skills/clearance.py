@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from itertools import product
 
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from robospa.geometry import Pose, to_matrix
 from robospa.gripper import Gripper
 from robospa.harness.skills.workspace import Workspace, is_wall
+from robospa.tasks.objects.build import points_of
 from robospa.tasks.shapes import Box, ObjectModel
 
 Array = NDArray[np.float64]
@@ -79,6 +80,18 @@ def own_boxes(model: ObjectModel, pose: Pose) -> Boxes:
     return _boxes(
         [(pose * s.pose, np.array(s.geometry.half)) for s in parts if isinstance(s.geometry, Box)]
     )
+
+
+def part_boxes(model: ObjectModel, pose: Pose, grown: float = 0.0) -> Boxes:
+    """Boxes around each of the colliding shapes, along its axes, `grown` [m] to every side."""
+    parts = []
+    for shape in model.shapes:
+        if shape.collision:
+            points = points_of(replace(shape, pose=Pose()))
+            low, high = points.min(axis=0), points.max(axis=0)
+            x, y, z = ((low + high) / 2).tolist()
+            parts.append((pose * shape.pose * Pose((x, y, z)), (high - low) / 2 + grown))
+    return _boxes(parts)
 
 
 def neighbours(ws: Workspace, target: str) -> Boxes:

@@ -7,8 +7,10 @@ from numpy.typing import NDArray
 
 from robospa.geometry import rotate
 from robospa.harness.skills.approach import approach_joints, bring_in, translated
+from robospa.harness.skills.around import stop_beside
 from robospa.harness.skills.grasping import GraspCandidate
-from robospa.harness.skills.motion import retreat_home
+from robospa.harness.skills.motion import retreat_home, route
+from robospa.harness.skills.narrow import Narrow
 from robospa.harness.skills.pick import pick
 from robospa.harness.skills.place import grip_offset
 from robospa.harness.skills.workspace import SkillFailed, Steps, Workspace
@@ -46,7 +48,9 @@ def dock(ws: Workspace, call: Dock) -> Steps:
             retreat_home(ws, arm)
             yield from ws.flush()
             raise SkillFailed(f"{call.object} cannot be brought to {call.frame} of {call.on}")
-        yield from bring_in(ws, arm, way)
+        free = route(ws, arm, way[0]).free
+        stop = None if free else stop_beside(Narrow(ws, arm, call.on, offset), way[0])
+        yield from bring_in(ws, arm, way, stop)
         here = np.array(ws.pose(call.object).position)
         if float(np.abs(here - np.array(frame.position)).max()) < CLOSE:
             return

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from itertools import product
 
+import numpy as np
+
 from robospa.geometry import (
     Pose,
     Vec3,
@@ -16,7 +18,7 @@ from robospa.geometry import (
 )
 from robospa.harness.robots.kinematics import forward
 from robospa.harness.skills.approach import approach_joints, release, translated
-from robospa.harness.skills.dock import ATTEMPTS
+from robospa.harness.skills.around import stop_beside
 from robospa.harness.skills.grasping import GraspCandidate, reachable_grasps
 from robospa.harness.skills.motion import travel
 from robospa.harness.skills.narrow import Narrow
@@ -25,6 +27,7 @@ from robospa.harness.skills.place import grip_offset, place
 from robospa.harness.skills.workspace import Array, Steps, Workspace
 from robospa.tasks.plan import Hang, Pick, Place
 
+ATTEMPTS = 5
 LIFT = 0.14
 OUTS = (0.085, 0.06)
 """How far before the peg's place the object comes in, along the peg [m], the better way first."""
@@ -38,6 +41,8 @@ FAR_SWINGS = tuple(sign * 0.15 * n for n in range(10) for sign in ((1, -1) if n 
 FAR_WOBBLES = tuple(sign * 0.1 * n for n in range(5) for sign in ((1, -1) if n else (1,)))
 """Turns at which an object may still be hung when nothing else is left to try [rad]; it swings down
 as it is let go."""
+BEFORE_PEG = 2.5
+"""Before the peg no joint turns by more [rad]: a wrist that turned over there would hit it."""
 DETOURS = (0.0, 0.06, 0.12)
 """How much farther out along the peg, and higher, the object passes by on that way [m]."""
 SIDES = (0.0, math.pi)
@@ -50,13 +55,18 @@ ALIKE = (0.03, 0.3)
 
 
 def hang(ws: Workspace, call: Hang) -> Steps:
-    """Pick, bring in along the peg, lower, release; again if it does not hang."""
+    """Pick, bring in along the peg, lower, release; again if it does not hang.
+
+    Where no way is left, as after it has slipped in the hand, it is put back and taken otherwise.
+    """
     peg = ws.pose(call.on) * ws.models[call.on].frames[call.frame]
     handle = ws.models[call.object].frames[call.handle]
     paths = [_path(peg, out) for out in OUTS]
     planned, allowed = _targets(peg, handle, (0.0,)), _targets(peg, handle, WOBBLES)
     refused: list[Pose] = []
+    taken: list[GraspCandidate] = []
     for attempt in range(ATTEMPTS):
+        last = attempt == ATTEMPTS - 1
         choices: tuple[list[Pose], ...] = (planned, allowed)
         x, y, z = ws.pose(call.object).position
         grasps = reachable_grasps(ws, call.object, arms_for(call.arm))
@@ -65,30 +75,46 @@ def hang(ws: Workspace, call: Hang) -> Steps:
             for narrow, targets in product((True, False), (planned, allowed))
         )
         feasible = next((f for f in filters if any(f(grasp) for grasp in grasps)), None)
-        yield from pick(ws, Pick(call.object, LIFT, call.arm), feasible)
+        taken.append((yield from pick(ws, Pick(call.object, LIFT, call.arm), feasible, taken)))
         arm = ws.held.index(call.object)
+        gripped = grip_offset(ws, arm, call.object)
         way = _held_way(ws, call, arm, choices, paths)
-        if way is None and attempt == ATTEMPTS - 1:
+        if way is None and last:
             far = _far_target(ws, call, arm, peg, _far_targets(peg, handle))
             if far is not None:
                 choices, way = (far[0],), far[1]
+        if way is not None:
+            _go_before_peg(ws, call, arm, way[0])
+            yield from ws.flush(exactly=True)
+            in_now = _held_way(ws, call, arm, choices, paths, BEFORE_PEG)
+            way = in_now or (way if last else None)
         if way is None:
-            refused.append(grip_offset(ws, arm, call.object))
+            refused.append(gripped)
             yield from place(ws, Place(call.object, (x, y, z)))
             continue
-        narrow, straight = _narrow(ws, call, arm), [ws.joints[arm], way[0]]
-        if narrow.free(straight) and narrow.above_table(straight):
-            ws.add(arm, way[0])
-        else:
-            travel(ws, arm, way[0])
-        yield from ws.flush(exactly=True)
-        for joints in _held_way(ws, call, arm, choices, paths) or way:
+        for joints in way:
             ws.add(arm, joints)
         yield from ws.flush(exactly=True)  # it comes to rest in its place before it is let go
         release(ws, arm)
         yield from ws.flush()
         if _hangs(ws.pose(call.object) * handle, peg):
             return
+
+
+def _go_before_peg(ws: Workspace, call: Hang, arm: int, goal: Array) -> None:
+    """Go to joints `goal`: straight, else around the peg's object, else on the usual way."""
+    narrow, straight = _narrow(ws, call, arm), [ws.joints[arm], goal]
+    if narrow.open(straight):
+        ws.add(arm, goal)
+        return
+    stop = stop_beside(narrow, goal)
+    if stop is not None:
+        ws.add(arm, stop)
+        ws.add(arm, goal)
+    elif narrow.free(straight) and narrow.above_table(straight):
+        ws.add(arm, goal)
+    else:
+        travel(ws, arm, goal)
 
 
 def _alike(a: Pose, b: Pose) -> bool:
@@ -108,13 +134,15 @@ def _held_way(
     arm: int,
     choices: tuple[list[Pose], ...],
     paths: list[list[Vec3]],
+    farthest: float = math.inf,
 ) -> list[Array] | None:
     """Joints [rad] from before the peg to a target, for the object as it lies in the hand now; a
-    free way if there is one, of the first `choices` that have one."""
+    free way if there is one, of the first `choices` that have one to whose beginning no joint turns
+    by more than `farthest` [rad]."""
     narrow, near = _narrow(ws, call, arm), ws.joints[arm]
     for only_free, targets in product((True, False), choices):
         way = _way(narrow, targets, paths, near, only_free)
-        if way is not None:
+        if way is not None and float(np.abs(way[0] - near).max()) < farthest:
             return way
     return None
 
@@ -133,14 +161,9 @@ def _far_target(
         for out, up in product(DETOURS, DETOURS):
             x, y, z = rotate(peg.rotation, (0.0, -out, 0.0))
             stop = ws.solve(arm, translated(before, (x, y, z + up)), way[0])
-            if stop is not None and _open(narrow, [here, stop, way[0]]):
+            if stop is not None and narrow.open([here, stop, way[0]]):
                 return [target], [stop, *way]
     return None
-
-
-def _open(narrow: Narrow, way: list[Array]) -> bool:
-    """Whether arm and object keep clear of peg and table on the lines between joints [rad]."""
-    return narrow.free(way) and narrow.above_table(way) and narrow.carried_past(way)
 
 
 def _hangs(handle: Pose, peg: Pose) -> bool:

@@ -8,7 +8,7 @@ from collections.abc import Generator
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.geometry import Pose, yaw_rotation
+from robospa.geometry import Pose, axis_rotation, rotate, yaw_rotation
 from robospa.harness.skills.grasping import GraspCandidate, reachable_grasps
 from robospa.harness.skills.motion import travel
 from robospa.harness.skills.pick import GraspFilter, arms_for, pick
@@ -38,6 +38,12 @@ TRIES = 2
 """How often one grasp is tried on one object."""
 SPARE = 2
 """A grasp should leave at least so many ways to every object."""
+LEVEL, TIPPED = (0.0,), (0.2, -0.2, 0.4, -0.4, 0.6, -0.6)
+"""Turns of the tool about its x axis [rad] with which it hits; tipped where a level one is out of
+reach, as after it has turned in the hand."""
+FACE = 0.025
+"""How far the edge of a striking face is from its middle, along y [m]: what is tipped hits with it.
+"""
 ATTEMPTS = 3
 
 
@@ -72,7 +78,9 @@ def _back(ws: Workspace, arm: int, tool: str, home: Pose) -> Place:
 def _strike(ws: Workspace, arm: int, tool: str, name: str) -> Generator[Array, Snapshot, bool]:
     """Down on the object and up again; whether the head met its middle."""
     for k in range(TRIES):
-        found = _spots(ws, arm, grip_offset(ws, arm, tool), tool, name)
+        offset = grip_offset(ws, arm, tool)
+        level = _spots(ws, arm, offset, tool, name, LEVEL)
+        found = level or _spots(ws, arm, offset, tool, name, TIPPED)
         if len(found) <= k:
             return False
         travel(ws, arm, found[k].above)
@@ -83,7 +91,8 @@ def _strike(ws: Workspace, arm: int, tool: str, name: str) -> Generator[Array, S
         goal = np.array(ws.pose(name).apply(ws.models[name].frames["press"].position))
         ws.add(arm, found[k].above)
         yield from ws.flush()
-        if np.abs(head - goal)[:2].max() < MISSED[0] and head[2] - goal[2] < MISSED[1]:
+        edge = 0.0 if level else FACE * abs(rotate(ws.pose(tool).rotation, (0, 1, 0))[2])
+        if np.abs(head - goal)[:2].max() < MISSED[0] and head[2] - edge - goal[2] < MISSED[1]:
             return True
     return False
 
@@ -91,28 +100,41 @@ def _strike(ws: Workspace, arm: int, tool: str, name: str) -> Generator[Array, S
 def _fitting(ws: Workspace, call: Hit, names: list[str]) -> GraspFilter:
     """Accepts grasps with SPARE placements on every object, or as many as the best grasp has."""
 
-    def ways(grasp: GraspCandidate) -> int:
+    def ways(grasp: GraspCandidate, tips: tuple[float, ...]) -> int:
         offset = grasp.pose.inverse() * ws.pose(call.tool)
         found = SPARE
         for name in names:
             if found:
-                found = min(found, len(_spots(ws, grasp.arm, offset, call.tool, name)))
+                found = min(found, len(_spots(ws, grasp.arm, offset, call.tool, name, tips)))
         return found
 
-    best = 0
-    for option in reachable_grasps(ws, call.tool, arms_for(call.arm)):
-        best = max(best, ways(option))
-        if best == SPARE:
+    options = reachable_grasps(ws, call.tool, arms_for(call.arm))
+    for tips in (LEVEL, LEVEL + TIPPED):
+        best = 0
+        for option in options:
+            best = max(best, ways(option, tips))
+            if best == SPARE:
+                break
+        if best:
             break
-    return lambda grasp: ways(grasp) >= best
+    return lambda grasp: ways(grasp, tips) >= best
 
 
-def _targets(ws: Workspace, tool: str, name: str) -> list[Pose]:
-    """Poses of the upright tool whose head is on the object, from all sides."""
+def _targets(ws: Workspace, tool: str, name: str, tips: tuple[float, ...]) -> list[Pose]:
+    """Poses of the tool, tipped by `tips`, whose head is on the object, from all sides."""
     x, y, z = (ws.pose(name) * ws.models[name].frames["press"]).position
     head = ws.models[tool].frames["head"].inverse()
-    return [Pose((x, y, z - DEPTH), yaw_rotation(yaw)) * head for yaw in YAWS]
+    return [
+        Pose((x, y, z - DEPTH + FACE * abs(math.sin(tip))), yaw_rotation(yaw))
+        * Pose((0.0, 0.0, 0.0), axis_rotation((1.0, 0.0, 0.0), tip))
+        * head
+        for tip in tips
+        for yaw in YAWS
+    ]
 
 
-def _spots(ws: Workspace, arm: int, offset: Pose, tool: str, name: str) -> list[Placement]:
-    return reachable_placements(ws, arm, offset, _targets(ws, tool, name), ABOVE, ws.joints[arm])
+def _spots(
+    ws: Workspace, arm: int, offset: Pose, tool: str, name: str, tips: tuple[float, ...]
+) -> list[Placement]:
+    targets = _targets(ws, tool, name, tips)
+    return reachable_placements(ws, arm, offset, targets, ABOVE, ws.joints[arm])

@@ -29,6 +29,8 @@ BACK = (0.0, 0.06, 0.12)
 SAMPLES, STRIDE = 10, 0.1
 """In how many places a joint line is looked at, and how far [rad] a joint turns at most between two
 at which the arm itself is."""
+WIDE = 2.0
+"""Where a joint turns by more [rad], the hand, too, is looked at in as many places as the arm."""
 
 
 def tip_heights(ws: Workspace, arm: int, joints: Array) -> Array:
@@ -75,7 +77,9 @@ def blocked(ws: Workspace, arm: int, start: Array, goal: Array) -> bool:
 
     The ends themselves are not tested.
     """
-    line = _between(start, goal, SAMPLES)
+    turned = float(np.abs(goal - start).max())
+    closely = _between(start, goal, max(SAMPLES, math.ceil(turned / STRIDE)))
+    line = closely if turned > WIDE else _between(start, goal, SAMPLES)
     frames, _ = forward(ws.chains[arm], line)
     centres = frames[:, :3, 3] + frames[:, :3, 0] * ws.hand(arm).grip
     low = centres[:, 2] - depth_below_grasp(ws, arm)
@@ -89,8 +93,7 @@ def blocked(ws: Workspace, arm: int, start: Array, goal: Array) -> bool:
         if bool((near & (low < top + 0.01)).any()):
             return True
     held = () if name is None else (name,)
-    closely = max(SAMPLES, math.ceil(float(np.abs(goal - start).max()) / STRIDE))
-    return bool((arm_depth(ws, arm, _between(start, goal, closely), *held) > TOUCH).any())
+    return bool((arm_depth(ws, arm, closely, *held) > TOUCH).any())
 
 
 def _between(start: Array, goal: Array, count: int) -> Array:

@@ -6,7 +6,7 @@ The object counts as the boxes that it is made of.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -14,8 +14,14 @@ from numpy.typing import NDArray
 
 from robospa.geometry import Pose, from_transform
 from robospa.harness.robots.kinematics import forward
-from robospa.harness.skills.arm_clearance import arm_points
-from robospa.harness.skills.clearance import finger_points, own_boxes, palm_points
+from robospa.harness.skills.arm_clearance import TOUCH, arm_depth, arm_points
+from robospa.harness.skills.clearance import (
+    Boxes,
+    finger_points,
+    palm_points,
+    part_boxes,
+    standing,
+)
 from robospa.harness.skills.workspace import Workspace
 
 Array = NDArray[np.float64]
@@ -39,8 +45,7 @@ class Narrow:
         """Whether the arm keeps clear of the object on the lines between joints [rad] `way`."""
         line = np.concatenate([_line(a, b) for a, b in pairwise(way)])
         model, pose = self.ws.models[self.beside], self.ws.pose(self.beside)
-        boxes = own_boxes(model, pose)
-        wide = replace(boxes, half=boxes.half + MARGIN)
+        wide = part_boxes(model, pose, MARGIN)
         if (wide.depths(arm_points(self.ws, self.arm, line)) > 0).any():
             return False
         frames, _ = forward(self.ws.chains[self.arm], line)
@@ -60,18 +65,36 @@ class Narrow:
     def carried_past(self, way: list[Array]) -> bool:
         """Whether what is held keeps clear of the object on the lines between joints [rad] `way`.
 
-        It counts as points in the boxes that it is made of.
+        Both count as points in the boxes that they are made of.
         """
+        bodies = self._carried(way)
+        around = part_boxes(self.ws.models[self.beside], self.ws.pose(self.beside), MARGIN / 2)
+        corners = around.points()
+        return not any(around.depth(b.points()) > 0 or b.depth(corners) > 0 for b in bodies)
+
+    def past_others(self, way: list[Array]) -> bool:
+        """Whether arm and held object touch nothing but the object on these lines."""
+        held = self.ws.held[self.arm]
+        but = (self.beside,) if held is None else (self.beside, held)
+        line = np.concatenate([_line(a, b) for a, b in pairwise(way)])
+        if (arm_depth(self.ws, self.arm, line, *but) > TOUCH).any():
+            return False
+        others = standing(self.ws, *but)
+        return not any(others.depth(body.points()) > 0 for body in self._carried(way))
+
+    def open(self, way: list[Array]) -> bool:
+        """Whether arm and held object keep clear of object and table on these lines."""
+        return self.free(way) and self.above_table(way) and self.carried_past(way)
+
+    def _carried(self, way: list[Array]) -> list[Boxes]:
+        """The boxes of what is held, along the lines between joints [rad] `way`."""
         held = self.ws.held[self.arm]
         if held is None:
-            return True
+            return []
         line = np.concatenate([_line(a, b) for a, b in pairwise(way)])
         frames, _ = forward(self.ws.chains[self.arm], line)
         model = self.ws.models[held]
-        parts = [own_boxes(model, from_transform(f) * self.offset).points() for f in frames]
-        around = own_boxes(self.ws.models[self.beside], self.ws.pose(self.beside))
-        wide = replace(around, half=around.half + MARGIN / 2)
-        return not bool((wide.depths(np.stack(parts)) > 0).any())
+        return [part_boxes(model, from_transform(frame) * self.offset) for frame in frames]
 
 
 def _line(start: Array, goal: Array) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Generator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +14,9 @@ from robospa.harness.skills.arm_clearance import TOUCH, arm_depth
 from robospa.harness.skills.both_arms import go
 from robospa.harness.skills.grasping import LEANS, LEVEL, GraspCandidate, reachable_grasps
 from robospa.harness.skills.motion import line_poses, retreat_home, rise, route
-from robospa.harness.skills.workspace import SkillFailed, Steps, Workspace, moved_back
+from robospa.harness.skills.workspace import SkillFailed, Workspace, moved_back
 from robospa.tasks.plan import Pick
+from robospa.tasks.snapshot import Snapshot
 
 Array = NDArray[np.float64]
 GraspFilter = Callable[[GraspCandidate], bool]
@@ -38,9 +39,17 @@ def arms_for(call_arm: str | None) -> tuple[int, ...]:
     return (0, 1) if call_arm is None else (ARMS.index(call_arm),)
 
 
-def pick(ws: Workspace, call: Pick, feasible: GraspFilter | None = None) -> Steps:
-    """Grasp and lift, preferring grasps that `feasible` accepts; SkillFailed after ATTEMPTS."""
-    tried: list[GraspCandidate] = []
+def pick(
+    ws: Workspace,
+    call: Pick,
+    feasible: GraspFilter | None = None,
+    but: Sequence[GraspCandidate] = (),
+) -> Generator[Array, Snapshot, GraspCandidate]:
+    """Grasp and lift, preferring grasps that `feasible` accepts; SkillFailed after ATTEMPTS.
+
+    One like those of `but` is taken only if there is no other. Returns the grasp that held.
+    """
+    tried = list(but)
     for _ in range(ATTEMPTS):
         choice, way_in, way_up = _choose(ws, call, tried, feasible)
         tried.append(choice)
@@ -56,7 +65,7 @@ def pick(ws: Workspace, call: Pick, feasible: GraspFilter | None = None) -> Step
         yield from ws.flush()
         if ws.pose(call.object).position[2] - before > 0.4 * call.lift:
             ws.held[arm] = call.object
-            return
+            return choice
         ws.add(arm, gripper=1.0)
         rise(ws, arm)
         retreat_home(ws, arm)

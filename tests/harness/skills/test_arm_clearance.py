@@ -92,6 +92,16 @@ def test_a_short_touch_on_a_long_way_is_seen() -> None:
     assert blocked(ws, 1, start, np.array(ws.robot.arms[1].home))
 
 
+def test_a_hand_that_comes_down_from_a_wide_swing_is_seen_over_what_it_passes_last() -> None:
+    # half a turn about the column; the fingers sink to the bottle's height in the last twentieth
+    bottle = Pose((0.286, 0.152, TABLE_TOP))
+    ws = at_home("ur5-wsg", SceneObject("thing", "bottle", bottle))
+    goal = np.array([1.62, -1.01, 1.44, -0.07, 1.12, -0.16])
+    assert blocked(ws, 1, np.array(ws.robot.arms[1].home), goal)
+    aside = at_home("ur5-wsg", SceneObject("thing", "bottle", Pose((-0.3, 0.0, TABLE_TOP))))
+    assert not blocked(aside, 1, np.array(ws.robot.arms[1].home), goal)
+
+
 def test_the_straight_way_to_a_grasp_stays_off_what_stands_in_front() -> None:
     # the cup is beyond the fingers' neighbours, but a level hand passes it on its way to the bottle
     bottle = SceneObject("bottle", "bottle", Pose((0.14, 0.095, TABLE_TOP)), {"look": 0})

@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
+from robot_at_home import at_home
 
 from robospa.geometry import Pose, rotate
 from robospa.gripper import grasp_points
@@ -16,7 +18,7 @@ from robospa.harness.skills.approach import approach_joints, translated
 from robospa.harness.skills.narrow import MARGIN, Narrow
 from robospa.harness.skills.workspace import Workspace
 from robospa.tasks.catalog import build_scene
-from robospa.tasks.plan import Pour
+from robospa.tasks.plan import Hang, Pour
 from robospa.tasks.scene import Scene
 from robospa.tasks.snapshot import Snapshot
 
@@ -131,3 +133,26 @@ def test_a_bin_is_emptied_upside_down_with_its_mouth_over_the_container() -> Non
         assert abs(x - middle[0]) < container.size[0] / 2 - 0.1
         assert abs(y - middle[1]) < container.size[1] / 2 - 0.1
         assert z > middle[2] + container.size[2]
+
+
+def test_before_the_peg_the_wrist_does_not_turn_over() -> None:
+    # the mug has slipped by 6 mm on its way: the first target left needs the other posture
+    scene = build_scene("Hang_Mug_Stack_Blocks", 1, 900_000, "piper")
+    mug, rack = scene.facts["mug"], scene.facts["rack"]
+    ws = at_home("piper", *scene.objects)
+    ws.joints[1] = np.array([-0.03, 2.21, -1.53, 1.78, 1.07, -1.68])
+    hand = end_effector(ws.chains[1], ws.joints[1])
+    slipped = Pose((0.188, 0.029, -0.033), (0.84, 0.11, -0.5, -0.18))
+    ends, poses = (ws.snapshot.end_effector[0], hand), {**ws.snapshot.poses, mug: hand * slipped}
+    ws.snapshot, ws.held[1] = replace(ws.snapshot, end_effector=ends, poses=poses), mug
+    call = Hang(mug, rack)
+    peg = ws.pose(rack) * ws.models[rack].frames[call.frame]
+    handle = ws.models[mug].frames[call.handle]
+    paths = [hang._path(peg, out) for out in hang.OUTS]
+    choices = (hang._targets(peg, handle, (0.0,)), hang._targets(peg, handle, hang.WOBBLES))
+    turned = []
+    for farthest in (math.inf, hang.BEFORE_PEG):
+        way = hang._held_way(ws, call, 1, choices, paths, farthest)
+        assert way is not None
+        turned.append(float(np.abs(way[0] - ws.joints[1]).max()))
+    assert turned[0] > hang.BEFORE_PEG > turned[1]

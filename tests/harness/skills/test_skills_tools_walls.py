@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import pytest
+from robot_at_home import at_home
 
 from robospa.geometry import Pose, to_matrix
 from robospa.gripper import grasp_points
 from robospa.harness.robots import embodiment
 from robospa.harness.robots.kinematics import chain_of, end_effector
 from robospa.harness.skills.grasping import reachable_grasps
+from robospa.harness.skills.hit import DEPTH, FACE, LEVEL, TIPPED, _spots
 from robospa.harness.skills.motion import object_tops, travel_height
 from robospa.harness.skills.workspace import Workspace, wall_front
 from robospa.tasks.catalog import build_scene, task
@@ -53,6 +55,24 @@ def test_the_gripper_stays_in_front_of_the_wall() -> None:
     best = reachable_grasps(workspace(CUBE, WALL), "cube", (0,))[0]
     closing = to_matrix(best.pose.rotation)[:, 1]
     assert abs(closing[0]) > abs(closing[1])  # the wide side of the palm lies along the wall
+
+
+def test_a_block_beyond_the_reach_of_a_level_hammer_is_hit_with_its_edge() -> None:
+    scene = build_scene("Hit_Blocks_Hammer_Order", 4, 900_009, "piper")
+    facts = scene.facts
+    ws = at_home("piper", *scene.objects)
+    hammer, name = facts["hammer"], facts["order"][-1]
+    offsets = [g.pose.inverse() * ws.pose(hammer) for g in reachable_grasps(ws, hammer, (0,))]
+    offset = next(o for o in offsets if not _spots(ws, 0, o, hammer, name, LEVEL))
+    spots = _spots(ws, 0, offset, hammer, name, TIPPED)
+    goal = ws.pose(name) * ws.models[name].frames["press"]
+    head = ws.models[hammer].frames["head"]
+    assert spots
+    for spot in spots:
+        face = spot.pose * offset * head
+        assert face.position[:2] == pytest.approx(goal.position[:2], abs=1e-3)
+        edges = [face.apply((0.0, y, 0.0))[2] for y in (FACE, -FACE)]
+        assert min(edges) == pytest.approx(goal.position[2] - DEPTH, abs=1e-3)
 
 
 @pytest.mark.sim
