@@ -47,8 +47,9 @@ DETOURS = (0.0, 0.06, 0.12)
 """How much farther out along the peg, and higher, the object passes by on that way [m]."""
 SIDES = (0.0, math.pi)
 """The handle fits from both sides."""
-ON_PEG, DROP = 0.018, 0.03
-"""A handle this near to the peg's place in x and y, and this little below it, hangs there [m]."""
+ON_PEG, DROP = 0.0195, 0.03
+"""A handle this near to the peg's place in x and in y, and this little below it, hangs there [m]; a
+mug that has swung around the peg is nearly so far."""
 
 ALIKE = (0.03, 0.3)
 """A grip that differs by less, in [m] and in [rad], from one that led to nothing is not tried."""
@@ -169,7 +170,7 @@ def _far_target(
 def _hangs(handle: Pose, peg: Pose) -> bool:
     """Whether the middle of the handle is where it comes to rest on the peg."""
     (x, y, z), (px, py, pz) = handle.position, peg.position
-    return math.hypot(x - px, y - py) < ON_PEG and abs(z - pz) < DROP
+    return max(abs(x - px), abs(y - py)) < ON_PEG and abs(z - pz) < DROP
 
 
 def _path(peg: Pose, out: float) -> list[Vec3]:
