@@ -43,9 +43,8 @@ class Narrow:
 
     def free(self, way: list[Array]) -> bool:
         """Whether the arm keeps clear of the object on the lines between joints [rad] `way`."""
-        line = np.concatenate([_line(a, b) for a, b in pairwise(way)])
-        model, pose = self.ws.models[self.beside], self.ws.pose(self.beside)
-        wide = part_boxes(model, pose, MARGIN)
+        line = _along(way)
+        wide = part_boxes(self.ws.models[self.beside], self.ws.pose(self.beside), MARGIN)
         if (wide.depths(arm_points(self.ws, self.arm, line)) > 0).any():
             return False
         frames, _ = forward(self.ws.chains[self.arm], line)
@@ -57,8 +56,7 @@ class Narrow:
 
     def above_table(self, way: list[Array]) -> bool:
         """Whether what is held stays above the table on the lines between joints [rad] `way`."""
-        line = np.concatenate([_line(a, b) for a, b in pairwise(way)])
-        frames, _ = forward(self.ws.chains[self.arm], line)
+        frames, _ = forward(self.ws.chains[self.arm], _along(way))
         lowest = min((from_transform(f) * self.offset).position[2] for f in frames)
         return lowest > self.ws.scene.table_top + MARGIN
 
@@ -76,8 +74,7 @@ class Narrow:
         """Whether arm and held object touch nothing but the object on these lines."""
         held = self.ws.held[self.arm]
         but = (self.beside,) if held is None else (self.beside, held)
-        line = np.concatenate([_line(a, b) for a, b in pairwise(way)])
-        if (arm_depth(self.ws, self.arm, line, *but) > TOUCH).any():
+        if (arm_depth(self.ws, self.arm, _along(way), *but) > TOUCH).any():
             return False
         others = standing(self.ws, *but)
         return not any(others.depth(body.points()) > 0 for body in self._carried(way))
@@ -91,13 +88,15 @@ class Narrow:
         held = self.ws.held[self.arm]
         if held is None:
             return []
-        line = np.concatenate([_line(a, b) for a, b in pairwise(way)])
-        frames, _ = forward(self.ws.chains[self.arm], line)
+        frames, _ = forward(self.ws.chains[self.arm], _along(way))
         model = self.ws.models[held]
         return [part_boxes(model, from_transform(frame) * self.offset) for frame in frames]
 
 
-def _line(start: Array, goal: Array) -> Array:
-    """Joints (N, J) on the line from `start` to `goal`, with both."""
-    count = 2 + math.ceil(float(np.abs(goal - start).max()) / STRIDE)
-    return start + (goal - start) * np.linspace(0.0, 1.0, count)[:, None]
+def _along(way: list[Array]) -> Array:
+    """Joints (N, J) on the lines between those of `way`, with these."""
+    lines = []
+    for start, goal in pairwise(way):
+        count = 2 + math.ceil(float(np.abs(goal - start).max()) / STRIDE)
+        lines.append(start + (goal - start) * np.linspace(0.0, 1.0, count)[:, None])
+    return np.concatenate(lines)
