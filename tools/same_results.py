@@ -116,9 +116,10 @@ def write_wire(folder: Path) -> None:
     from robospa.observation import CameraSpec
     from robospa.protocol import messages
     from robospa.protocol.policy import PolicySpec, TrialInfo
+    from robospa.trial import TrialKey
 
     spec = PolicySpec("name", (CameraSpec("head", 64, 48),), history=(-1, -5), execute=3)
-    trial = TrialInfo("T", 3, 7, "aloha-agilex", "clean", "heldout", "do it", 11, {"a": 1})
+    trial = TrialInfo("T", "aloha-agilex", "do it", 11, "abc", TrialKey("T", 3, 7), {"a": 1})
     image = np.arange(64 * 48 * 3, dtype=np.uint8).reshape(48, 64, 3)
     observation = {
         "images": {"head": image},
