@@ -12,6 +12,7 @@ import typer
 from robospa.harness.cli.json_output import AsJson, print_json
 from robospa.harness.cli.settings_flags import MoreServers, Token, given_flags, with_flags
 from robospa.harness.settings import GROUPS, EvaluationSettings, Selection, updated
+from robospa.text import duration_text
 
 if TYPE_CHECKING:
     from robospa.harness.running.cost_probe import Cost
@@ -83,27 +84,19 @@ def _probed(settings: EvaluationSettings, seconds: float, token: str | None) -> 
 
 def cost_lines(cost: Cost) -> list[str]:
     """A cost in words."""
-    hours = [f"{_duration(3600 * cost.core_hours)} of one core here"]
+    hours = [f"{duration_text(3600 * cost.core_hours)} of one core here"]
     if cost.server_hours:
-        hours.append(f"{_duration(3600 * cost.server_hours)} of policy servers")
+        hours.append(f"{duration_text(3600 * cost.server_hours)} of policy servers")
     lines = [
-        f"All {cost.trials:,} trials will take {_duration(cost.seconds)} ({_duration(cost.least)} "
-        f"to {_duration(cost.most)}, by a sample of {cost.sampled}): {cost.calls:,} queries, "
-        + ", ".join(hours)
+        f"All {cost.trials:,} trials will take {duration_text(cost.seconds)} "
+        f"({duration_text(cost.least)} to {duration_text(cost.most)}, "
+        f"by a sample of {cost.sampled}): {cost.calls:,} queries, " + ", ".join(hours)
     ]
     if cost.bottleneck:
         lines.append(
             f"At the end of the sample there were {cost.workers} workers; {cost.bottleneck}"
         )
     return lines
-
-
-def _duration(seconds: float) -> str:
-    """`3 h 05 min`, `12 min` or `40 s`."""
-    if seconds < 90:
-        return f"{seconds:.0f} s"
-    minutes = round(seconds / 60)
-    return f"{minutes // 60} h {minutes % 60:02d} min" if minutes >= 60 else f"{minutes} min"
 
 
 def what_trials_tell(variants: Sequence[tuple[str, int]]) -> dict[str, Any]:

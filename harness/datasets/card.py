@@ -22,6 +22,7 @@ from robospa.harness.datasets.features import Layout, all_pictures
 from robospa.harness.datasets.films import FPS
 from robospa.harness.datasets.manifest import EPISODES, EVENTS, MANIFEST, SUMS, DatasetManifest
 from robospa.harness.demonstrations.labels import LABELS
+from robospa.text import markdown_table
 
 CARD, SHEET, LENGTHS = "README.md", "episodes.jpg", "lengths.png"
 PICTURED = 24
@@ -212,8 +213,5 @@ def files_part() -> str:
 
 def table(heads: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     """Rows in Markdown."""
-    lines = ["| " + " | ".join(heads) + " |", "|---" * len(heads) + "|"]
-    for row in rows:
-        cells = (f"{x:,}" if isinstance(x, int | np.integer) else str(x) for x in row)
-        lines.append("| " + " | ".join(cells) + " |")
-    return "\n".join(lines)
+    cells = ([f"{x:,}" if isinstance(x, int | np.integer) else str(x) for x in r] for r in rows)
+    return markdown_table(heads, cells)

@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, TextIO
 
 from robospa.harness.datasets.disk_use import size_text
 from robospa.harness.datasets.jobs import MadeEpisode
-from robospa.harness.running.progress import EVERY, clock
+from robospa.harness.running.progress import EVERY
 from robospa.terminal import plain_console
+from robospa.text import clock_text
 
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
@@ -93,7 +94,7 @@ class CollectionProgress:
         passed = max(time.monotonic() - self._began, 1e-9)
         parts = [f"{3600 * self.made / passed:.0f} an hour"]
         if self._worked and self.done < self.total:
-            parts.append(f"{clock((self._left - self._worked) * passed / self._worked)} left")
+            parts.append(f"{clock_text((self._left - self._worked) * passed / self._worked)} left")
         parts.append(size_text(self.bytes))
         if self.replaced:
             parts.append(f"{self.replaced} seeds replaced")

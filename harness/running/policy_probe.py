@@ -20,13 +20,12 @@ from robospa.protocol.identity import Identity, identity_of
 from robospa.protocol.policy import HasHello, PolicySpec, SupportsClose
 from robospa.results.records.manifest import RunError
 from robospa.schema import parse_json
+from robospa.text import some
 from robospa.trial import TrialKey
 
 if TYPE_CHECKING:
     from robospa.harness.running.worker import Targets, WorkerConfig
 
-NAMED = 3
-"""How many tasks an error names before it only counts."""
 SECOND_LOOK = 1.1
 """[s] between two greetings of one server: a clock in whole seconds differs by then."""
 
@@ -74,10 +73,11 @@ def read_map(file: Path, tasks: Sequence[str], known: Collection[str]) -> dict[s
             '{"Pick_Blocks_Size": "ws://host:8000", ...}, or a list of different URLs for a task'
         )
     if unknown := [task for task in found if task not in known]:
-        raise RunError(f"--policy-map {file} names tasks that do not exist: {_some(unknown)}")
+        names = some([name[:80] for name in unknown])
+        raise RunError(f"--policy-map {file} names tasks that do not exist: {names}")
     if missing := [task for task in tasks if task not in found]:
         raise RunError(
-            f"--policy-map {file} has no policy for {_some(missing)}; add them or choose fewer "
+            f"--policy-map {file} has no policy for {some(missing)}; add them or choose fewer "
             "--tasks"
         )
     return {t: v if isinstance(v := found[t], str) else tuple(v) for t in tasks}
@@ -88,11 +88,6 @@ def _is_targets(value: object) -> bool:
     if not isinstance(value, list):
         return bool(value) and isinstance(value, str)
     return all(v and isinstance(v, str) for v in value) and len(set(value)) == len(value) > 0
-
-
-def _some(names: Sequence[str]) -> str:
-    more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
-    return ", ".join(name[:80] for name in names[:NAMED]) + more
 
 
 def probe(target: str, given: Mapping[str, Any], wait: float = 0.0) -> ProbedPolicy:

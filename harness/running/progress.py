@@ -15,6 +15,7 @@ from robospa.harness.running.server_stats import ServerStats
 from robospa.harness.running.status import Status, server_text, shares_text
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.statistics.intervals import wilson
+from robospa.text import clock_text, percent_text
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -72,7 +73,7 @@ class Tally:
         if self.ran:
             parts.append(f"{60 * self.rate:.1f} trials/min")
         if self.left and seconds_left is not None:
-            parts.append(f"{clock(seconds_left)} left")
+            parts.append(f"{clock_text(seconds_left)} left")
         if self.lost:
             parts.append(f"{self.lost} lost")
         return ", ".join(parts)
@@ -81,15 +82,7 @@ class Tally:
 def rate_text(successes: int, trials: int) -> str:
     """`25.0 % [7.1, 59.1]`: a rate with its 95 % interval, as if all trials were of one kind."""
     found = wilson(successes, trials)
-    low, high = (f"{100 * end:.1f}" for end in (found.low, found.high))
-    return f"{100 * found.value:.1f} % [{low}, {high}]"
-
-
-def clock(seconds: float) -> str:
-    """`seconds` as 1:02:03 or 2:03."""
-    hours, rest = divmod(round(seconds), 3600)
-    minutes, secs = divmod(rest, 60)
-    return f"{hours}:{minutes:02d}:{secs:02d}" if hours else f"{minutes}:{secs:02d}"
+    return percent_text(found.value, found.low, found.high).replace(" [", " % [")
 
 
 class Progress:
@@ -168,7 +161,7 @@ class Progress:
             self._films_began = now
         left = owed * (now - self._films_began) / made if made else None
         text = f"films: {made} made, {owed} to make"
-        text += f", {clock(left)} left" if left is not None and owed else ""
+        text += f", {clock_text(left)} left" if left is not None and owed else ""
         if self._screen is not None and now - self._shown >= REFRESH:
             self._shown = now
             self._screen.update(self._picture(text))

@@ -11,6 +11,7 @@ from robospa.harness.seeds.inputs import inputs
 from robospa.harness.seeds.sweep import Search, sweep
 from robospa.tasks.seeds import ListKey
 from robospa.terminal import plain_console
+from robospa.text import duration_text
 
 
 def searches(
@@ -63,7 +64,7 @@ def sweep_with_bar(
             if item.accepted or search.measures:
                 bar.advance(row)
             left = bar.tasks[0].remaining or 0
-            bar.update(row, speed=f"{rate:.2f} trials/s, {_duration(left / rate)} left")
+            bar.update(row, speed=f"{rate:.2f} trials/s, {duration_text(left / rate)} left")
 
         for search in sweep(pool, wanted, note, stop):
             bar.advance(row, search.count - _got(search))  # of one that was given up
@@ -73,11 +74,3 @@ def sweep_with_bar(
 def _got(search: Search) -> int:
     """How much of what it looks for it has."""
     return len(search.row() if search.measures else search.accepted)
-
-
-def _duration(seconds: float) -> str:
-    """`2 h 5 min`, `40 s`."""
-    minutes = round(seconds / 60)
-    if minutes >= 60:
-        return f"{minutes // 60} h {minutes % 60} min"
-    return f"{minutes} min" if minutes > 1 else f"{round(seconds)} s"

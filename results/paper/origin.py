@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from robospa.results.paper.pieces import listed, pieces, pieces_of, told
+from robospa.results.paper.pieces import pieces, pieces_of, told
 from robospa.results.scoring.model_results import ModelResults, in_official_world
+from robospa.text import listed
 
 DIFFERENCES = listed(pieces("", {}).other)
 """How the paper's suite differs from ours."""

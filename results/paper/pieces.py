@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from robospa.results.scoring.model_results import ModelResults, suite_of
 from robospa.results.scoring.setting import OFFICIAL
+from robospa.text import listed
 
 CHECKOUT = "official-checkout"
 RULES = "tasks, rules, thresholds, step limits"
@@ -87,11 +88,6 @@ def told(results: ModelResults) -> str:
         f"{results.name} ({suite_of(results) or 'suite not stated'}) has of the official benchmark "
         f"{listed(found.official)}; it has {listed(found.other)}."
     )
-
-
-def listed(words: Sequence[str]) -> str:
-    """`a, b and c`."""
-    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 
 
 def _map(settings: Mapping[str, Any], name: str) -> Mapping[str, Any]:

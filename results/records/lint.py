@@ -27,6 +27,7 @@ from robospa.results.records.lint_faults import lint_faults
 from robospa.results.records.run_io import Run, finished, lost_actions
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.statistics.onta import of_percent
+from robospa.text import some
 
 FASTEST_STEP = 4e-6
 """Wall time of a physics step [s] that no machine known to us beats: 1000 times real time. Arms
@@ -34,8 +35,6 @@ that stand still among sleeping objects take 16 us on two cores of 2026."""
 T = TypeVar("T")
 INFORMATIVE = 3
 """Rows with fewer different numbers above zero may well agree by chance."""
-NAMED = 3
-"""Largest number of examples that a finding names."""
 
 
 @dataclass(frozen=True)
@@ -214,20 +213,20 @@ def _lint_listing(
     listed = Counter(run.keys)
     twice = [key.slug for key, count in listed.items() if count > 1]
     if twice:
-        text = f"{_some(twice)} listed twice: each would count double"
+        text = f"{some(twice)} listed twice: each would count double"
         yield Finding("listed-twice", "error", name, text)
     if unlisted := [key.slug for key in run.records if key not in listed]:
-        text = f"{_some(unlisted)} recorded but not in the run's list"
+        text = f"{some(unlisted)} recorded but not in the run's list"
         yield Finding("not-listed", "error", name, text)
     if variants is not None:
         unknown = [
             f"{t} L{n}" for t, n in {k.variant: 0 for k in run.keys} if (t, n) not in variants
         ]
         if unknown:
-            text = f"{_some(unknown)} not among the benchmark's variants"
+            text = f"{some(unknown)} not among the benchmark's variants"
             yield Finding("unknown-variant", "error", name, text)
     if missing := [key.slug for key in dict.fromkeys(run.missing)]:
-        text = f"{len(missing)} of {len(listed)} trials have no result: {_some(missing)}"
+        text = f"{len(missing)} of {len(listed)} trials have no result: {some(missing)}"
         yield Finding("missing", "warning", name, text)
     sizes = Counter(key.variant for key in listed)
     if run.info.budget is not None:
@@ -251,7 +250,7 @@ def _lint_limits(run: Run, name: str) -> Iterator[Finding]:
         text = f"in real time ({run.info.clock}): not the benchmark's numbers"
         yield Finding("real-time", "note", name, text)
     if unknown := [server for server, checkpoint in run.info.servers.items() if checkpoint == ""]:
-        text = f"nothing says which checkpoint was served at {_some(unknown)}"
+        text = f"nothing says which checkpoint was served at {some(unknown)}"
         yield Finding("unknown-checkpoint", "note", name, text)
 
 
@@ -273,9 +272,7 @@ def _lint_files(run: Run, name: str) -> Iterator[Finding]:
         text = f"the last line of {file} was torn off: its trial has to be run again"
         yield Finding("torn-line", "warning", name, text)
     if run.repeated:
-        text = (
-            f"{_some([k.slug for k in run.repeated])} recorded more than once (the records agree)"
-        )
+        text = f"{some([k.slug for k in run.repeated])} recorded more than once (the records agree)"
         yield Finding("recorded-twice", "warning", name, text)
 
 
@@ -308,13 +305,13 @@ def _lint_variant(where: str, records: Sequence[TrialRecord]) -> Iterator[Findin
     )
     for rule, words, wrong in tests:
         if seeds := [f"seed {r.key.seed}" for r in records if wrong(r)]:
-            yield Finding(rule, "error", where, f"{words}: {_some(seeds)}")
+            yield Finding(rule, "error", where, f"{words}: {some(seeds)}")
     scenes: dict[str, set[int]] = defaultdict(set)
     for record in records:
         scenes[record.scene_digest].add(record.key.seed)
     for digest, alike in scenes.items():
         if digest and len(alike) > 1:
-            text = f"one scene under {_some([f'seed {seed}' for seed in sorted(alike)])}"
+            text = f"one scene under {some([f'seed {seed}' for seed in sorted(alike)])}"
             yield Finding("same-scene", "error", where, text)
 
 
@@ -364,9 +361,3 @@ def _shared(
                 first, second = sorted(alike)[:2]
                 example = example or f"such as {task} L{level} seeds {first} and {second}"
     return _Shared(count, example) if count else None
-
-
-def _some(names: Sequence[str]) -> str:
-    """The first few names and how many more there are."""
-    more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
-    return ", ".join(names[:NAMED]) + more

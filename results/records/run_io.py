@@ -29,6 +29,7 @@ from robospa.results.records.manifest import (
 from robospa.results.records.run_state import in_progress
 from robospa.results.records.trial_record import TrialRecord
 from robospa.schema import parse_json, read
+from robospa.text import some
 from robospa.trial import TrialKey
 
 if TYPE_CHECKING:
@@ -41,8 +42,6 @@ TRIALS = "trials"
 """Folder inside a run that holds the record files."""
 ACTIONS = "actions"
 """Folder inside a run that holds the executed actions of every trial."""
-NAMED = 3
-"""Largest number of trials that a sentence names."""
 
 DECIDED = (
     "instruction",
@@ -318,10 +317,9 @@ def lost_actions(folder: Path, records: Mapping[TrialKey, TrialRecord]) -> list[
     lost = [key.slug for key in done if action_path(folder, key).name not in there]
     if not lost:
         return []
-    more = f" and {len(lost) - NAMED} more" if len(lost) > NAMED else ""
     return [
         f"{len(lost)} of {len(done)} finished trials have lost the file of their actions: "
-        f"{', '.join(lost[:NAMED])}{more}; copy them back from where the run was made"
+        f"{some(lost)}; copy them back from where the run was made"
     ]
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from robospa.tasks.instructions.grammar import listed
+from robospa.text import listed
 
 Chain = Callable[[Sequence[str]], str]
 """From the clauses of two or more steps to a sentence, or several."""

@@ -8,7 +8,7 @@ every sentence. Nothing here knows a task.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from difflib import SequenceMatcher
 from typing import NamedTuple
 
@@ -75,11 +75,6 @@ def fill(template: str, values: Mapping[str, str]) -> str:
 def sentence_case(text: str) -> str:
     """`text` with a capital at the start of every sentence (not after a colon)."""
     return re.sub(r"(^|[.?!] )([a-z])", lambda m: m.group(1) + m.group(2).upper(), text)
-
-
-def listed(items: Sequence[str], last: str = " and ") -> str:
-    """ "a", "a and b", "a, b and c"."""
-    return items[0] if len(items) == 1 else ", ".join(items[:-1]) + last + items[-1]
 
 
 def masked_words(template: str) -> tuple[str, ...]:

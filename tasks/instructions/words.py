@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from robospa.tasks.instructions.grammar import Phrasings, Slots, listed
+from robospa.tasks.instructions.grammar import Phrasings, Slots
 from robospa.tasks.instructions.text import COMMON
+from robospa.text import listed
 
 NUMBERS = ("zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
 _ORDINALS = (

@@ -22,7 +22,7 @@ from robospa.tasks.families.stack_blocks.towers import NEAR_BAND
 from robospa.tasks.families.tabletop import Item, named, side, standing
 from robospa.tasks.goals.row import row
 from robospa.tasks.goals.stack import Bring
-from robospa.tasks.instructions.grammar import Phrasings, Slots, listed
+from robospa.tasks.instructions.grammar import Phrasings, Slots
 from robospa.tasks.instructions.text import COMMON, TaskText
 from robospa.tasks.instructions.words import NUMBERS, by_count
 from robospa.tasks.plan import Pick, Place, Skill
@@ -30,6 +30,7 @@ from robospa.tasks.sampling.points import LAYOUTS, scatter_points
 from robospa.tasks.sampling.region import LayoutError, Point, apart, shuffled
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Level, SceneSample, Task, Tracker
+from robospa.text import listed
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "instructions.toml")

@@ -20,13 +20,14 @@ from robospa.tasks.families.stack_blocks.towers import (
     tower_plan,
 )
 from robospa.tasks.families.tabletop import Item, middle_in_view, named, standing
-from robospa.tasks.instructions.grammar import Slots, listed
+from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import COMMON, TaskText
 from robospa.tasks.instructions.words import NUMBERS, by_count, color_orders
 from robospa.tasks.sampling.points import scatter_points
 from robospa.tasks.sampling.region import Point, apart
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Level, SceneSample, Task
+from robospa.text import listed
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "color.toml")

@@ -17,7 +17,7 @@ from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.tabletop import Item, draw_look, in_view, named, side, standing
 from robospa.tasks.goals.stamping import StampCounter
 from robospa.tasks.goals.tools import UseInOrder
-from robospa.tasks.instructions.grammar import Phrasings, Slots, listed
+from robospa.tasks.instructions.grammar import Phrasings, Slots
 from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.instructions.words import NUMBERS, by_count, color_orders
 from robospa.tasks.objects.tools import PADS
@@ -27,6 +27,7 @@ from robospa.tasks.sampling.region import LayoutError, Point
 from robospa.tasks.scene import Scene
 from robospa.tasks.shapes import ObjectModel
 from robospa.tasks.task import Level, SceneSample, Task
+from robospa.text import listed
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "seal.toml")

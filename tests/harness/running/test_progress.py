@@ -9,7 +9,7 @@ import types
 import pytest
 from fake_records import trial_record
 
-from robospa.harness.running.progress import ROWS, Progress, Tally, clock, details, summary
+from robospa.harness.running.progress import ROWS, Progress, Tally, details, summary
 from robospa.harness.running.server_stats import ServerStats
 from robospa.harness.running.status import Status
 from robospa.results.records.trial_record import TrialRecord
@@ -63,10 +63,6 @@ def test_a_terminal_shows_the_films_that_are_still_to_be_made() -> None:
         progress.add(record(SHORT, "step_limit"))
         progress.show_films(0, 3)
     assert "films: 0 made, 3 to make" in stream.getvalue()
-
-
-def test_clock() -> None:
-    assert (clock(65), clock(3723)) == ("1:05", "1:02:03")
 
 
 class Terminal(io.StringIO):

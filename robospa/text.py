@@ -1,0 +1,59 @@
+"""Texts that are made in many places: intervals, durations, lists of names, Markdown tables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+NAMED = 3
+"""So many names of a list are given before the others are only counted."""
+
+
+def interval_text(value: float, low: float, high: float, style: str = "z.1f") -> str:
+    """`12.0 [5.6, 23.8]`: a value with the ends of its interval, each in the format `style`."""
+    return f"{value:{style}} [{low:{style}}, {high:{style}}]"
+
+
+def percent_text(value: float, low: float, high: float, style: str = "z.1f") -> str:
+    """`interval_text` of fractions, in percent."""
+    return interval_text(100 * value, 100 * low, 100 * high, style)
+
+
+def duration_text(seconds: float) -> str:
+    """`3 h 05 min`, `12 min` or `40 s`, for sentences."""
+    if seconds < 90:
+        return f"{seconds:.0f} s"
+    hours, minutes = divmod(round(seconds / 60), 60)
+    return f"{hours} h {minutes:02d} min" if hours else f"{minutes} min"
+
+
+def clock_text(seconds: float) -> str:
+    """`1:02:03` or `2:03`, for what is shown again and again."""
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"
+
+
+def listed(words: Sequence[str], last: str = " and ") -> str:
+    """`a, b and c`."""
+    return last.join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
+
+
+def some(names: Sequence[str], most: int = NAMED) -> str:
+    """`a, b, c and 2 more`."""
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + more
+
+
+def plain(text: str) -> str:
+    """`text` on one line."""
+    return " ".join(text.split())
+
+
+def markdown_table(
+    heads: Sequence[str], rows: Iterable[Sequence[str]], align: Sequence[str] = ()
+) -> str:
+    """A table in Markdown, without a newline at its end; cells are Markdown already. `align` has
+    the rule below each head, such as `---:`."""
+    lines = ["| " + " | ".join(row) + " |" for row in (heads, *rows)]
+    rule = "|" + "".join(f"{one}|" for one in align or ["---"] * len(heads))
+    return "\n".join([lines[0], rule, *lines[1:]])
