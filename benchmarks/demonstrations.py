@@ -63,10 +63,10 @@ class Trial:
 
 def run(key: tuple[str, int, int]) -> Trial:
     """Record and replay one trial."""
-    from robospa.harness.convention_check.rerun import rerun
     from robospa.harness.demonstrations.expert_run import demonstrate
     from robospa.harness.demonstrations.recorder import FrameRecorder
     from robospa.harness.demonstrations.strides import stride_of
+    from robospa.harness.replay import replay
     from robospa.harness.robots import embodiment
     from robospa.harness.sim.motion import DEMONSTRATION_LIMITS
     from robospa.harness.sim.sapien_world import SapienWorld
@@ -86,7 +86,7 @@ def run(key: tuple[str, int, int]) -> Trial:
     space = embodiment(trial.embodiment).action_space("joint")
     actions = recorder.episode(name, made.instruction, {}, space, ()).actions
     world = SapienWorld(render=False)
-    done = rerun(world, trial, actions, "joint")
+    done = replay(world, trial, actions, "joint")
     world.close()
     return Trial(name, level, seed, made.success, done.success, len(actions), done.steps,
         round(made.seconds, 2), made.failures, done.end)  # fmt: skip

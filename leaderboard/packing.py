@@ -319,7 +319,8 @@ def _films(
     note: Note,
 ) -> dict[str, bytes]:
     """The videos of the `chosen` trials by name in the bundle."""
-    from robospa.harness.pictures.replay_film import FilmError, film
+    from robospa.harness.pictures.video import film
+    from robospa.harness.replay import ReplayError
 
     films: dict[str, bytes] = {}
     parts = load_function(reference.parts)
@@ -337,7 +338,7 @@ def _films(
                 world = load_function(reference.world)(**arguments)
             try:
                 films[name] = film(world, run.records[key], homes[key], parts=parts)
-            except FilmError as error:
+            except ReplayError as error:
                 raise BundleError(
                     f"{error}, so it cannot be filmed here: pack where it ran"
                 ) from error

@@ -172,12 +172,12 @@ def _start(world: str, parts: str) -> None:
 
 def _again(claimed: TrialRecord, trace: Trace, space: str) -> Replayed:
     """Play one trial again and compare."""
-    from robospa.harness.convention_check.rerun import rerun
+    from robospa.harness.replay import replay
 
     world, parts = _WORLD
     try:
         actions, joints = split_trace(trace, claimed.key.embodiment, space)
-        again = rerun(
+        again = replay(
             world,
             claimed.key,
             actions,

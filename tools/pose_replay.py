@@ -104,7 +104,7 @@ def record(file: Path) -> None:
 
 def play(file: Path) -> Iterator[str]:
     """One line a recording: its name, the final state, physics steps, actions out of reach."""
-    from robospa.harness.convention_check.rerun import rerun
+    from robospa.harness.replay import replay
     from robospa.harness.sim.sapien_world import SapienWorld
     from robospa.trial import TrialKey
 
@@ -113,7 +113,7 @@ def play(file: Path) -> Iterator[str]:
         for name in data.files:
             task, level, seed, space, _ = name.split("/")
             key = TrialKey(task, int(level), int(seed))
-            found = rerun(world, key, data[name], space)
+            found = replay(world, key, data[name], space)
             beyond = found.diagnostics.get("unreachable_actions", 0)
             yield f"{name} {found.digest} {found.physics_steps} {beyond}"
 

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from robospa.harness.clock.measure import Load
     from robospa.harness.convention_check.check import Findings
     from robospa.harness.convention_check.episodes import Episode
-    from robospa.harness.official.replays import Replay
+    from robospa.harness.official.replays import RecordingReplay
     from robospa.protocol.client import RemotePolicy
     from robospa.protocol.conformance import CheckResult
     from robospa.protocol.transport import Timeouts
@@ -106,7 +106,7 @@ class ServerReport:
     checks: Sequence[CheckResult]
     notes: Sequence[str]
     replay: Findings | None = None
-    again: Replay | None = None
+    again: RecordingReplay | None = None
     """What came of the demonstration itself, played again in its scene."""
     loads: Sequence[Load] = ()
     """Its latency under load."""
@@ -320,15 +320,15 @@ def _replay(console: Console, target: Target, episode: Episode, points: int) -> 
     return findings
 
 
-def _again(console: Console, demo: Path, episode: Episode) -> Replay | None:
+def _again(console: Console, demo: Path, episode: Episode) -> RecordingReplay | None:
     """Play the demonstration again in its scene; None if there is no simulator."""
     from robospa.harness.official.recordings import recording_of
-    from robospa.harness.official.replays import play_again
+    from robospa.harness.official.replays import replay_recording
 
     try:
         from robospa.harness.sim.sapien_world import SapienWorld
 
-        found = play_again(recording_of(demo), SapienWorld(render=False), episode)
+        found = replay_recording(recording_of(demo), SapienWorld(render=False), episode)
     except ImportError:
         return None
     if found.success is None:

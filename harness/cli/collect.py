@@ -144,7 +144,7 @@ def _import(folder: Path, most: int, world: str | None, as_json: bool) -> None:
 
     from robospa.harness.official.checkout_options import is_checkout, parse_checkout
     from robospa.harness.official.recordings import find_recordings
-    from robospa.harness.official.replays import chosen, in_checkout, play_again, summary
+    from robospa.harness.official.replays import chosen, in_checkout, replay_recording, summary
     from robospa.protocol.options import plain_options
 
     recordings = chosen(find_recordings(folder), most)
@@ -153,11 +153,11 @@ def _import(folder: Path, most: int, world: str | None, as_json: bool) -> None:
 
         checkout, options = parse_checkout(world)
         theirs = CheckoutWorld(str(checkout), **plain_options(options))
-        play = partial(play_again, world=theirs, rebuild=in_checkout)
+        play = partial(replay_recording, world=theirs, rebuild=in_checkout)
     elif world is None:
         from robospa.harness.sim.sapien_world import SapienWorld
 
-        play = partial(play_again, world=SapienWorld(render=False))
+        play = partial(replay_recording, world=SapienWorld(render=False))
     else:
         raise SettingsError(f"--world {world} is no checkout: write checkout:DIR")
     replays = [play(recording) for recording in recordings]

@@ -14,7 +14,6 @@ from importlib import metadata
 
 import numpy as np
 
-from robospa.harness.convention_check.rerun import ENDED
 from robospa.harness.datasets.encoding import encode, require
 from robospa.harness.datasets.episode import DatasetEpisode
 from robospa.harness.datasets.episode_file import episode_bytes
@@ -31,6 +30,7 @@ from robospa.harness.demonstrations.kinds import (
 from robospa.harness.demonstrations.recorder import FrameRecorder, drawn
 from robospa.harness.demonstrations.strides import KEYFRAMES, stride_of
 from robospa.harness.demonstrations.world import DemonstrationWorld
+from robospa.harness.replay import ENDED
 from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.harness.trial import TrialParts, task_parts
 from robospa.results.failures.labels import label

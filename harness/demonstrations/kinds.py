@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.action_space import ActionSpace
-from robospa.harness.convention_check.rerun import Recorded
 from robospa.harness.demonstrations.expert_run import (
     Demonstration,
     DemonstrationRun,
@@ -32,6 +31,7 @@ from robospa.harness.demonstrations.recorder import FrameRecorder
 from robospa.harness.demonstrations.streams import stream
 from robospa.harness.demonstrations.strides import stride_of
 from robospa.harness.demonstrations.world import DemonstrationWorld
+from robospa.harness.replay import RecordedPolicy
 from robospa.harness.robots import embodiment
 from robospa.harness.sim.motion import RATE
 from robospa.harness.skills import Expert
@@ -226,5 +226,5 @@ def replay(
     if kind.startswith(MISTAKE_PREFIX):
         allowed = len(executed)
     return run_trial(
-        world, Recorded(executed, "joint"), key, policy_seed=0, step_scale=allowed / limit
+        world, RecordedPolicy(executed, "joint"), key, policy_seed=0, step_scale=allowed / limit
     )

@@ -14,11 +14,11 @@ from pathlib import Path
 import numpy as np
 
 from robospa.harness.convention_check.episodes import Episode, EpisodeError, read_episode
-from robospa.harness.convention_check.rerun import rerun
 from robospa.harness.official.checkout_parts import checkout_parts
 from robospa.harness.official.rebuild import NotStored, rebuilt
 from robospa.harness.official.recordings import Recording
 from robospa.harness.official.sentences import UNSEEN
+from robospa.harness.replay import replay
 from robospa.harness.trial import TrialParts
 from robospa.harness.world import ActionError, SceneUnstable, World
 from robospa.trial import TrialKey
@@ -28,7 +28,7 @@ Rebuild = Callable[[Recording, Episode], tuple[TrialKey, TrialParts]]
 
 
 @dataclass(frozen=True)
-class Replay:
+class RecordingReplay:
     """What came of a recording: `success` None where it could not be played, with the `reason`."""
 
     recording: Recording
@@ -39,25 +39,25 @@ class Replay:
     total: int = 0
 
 
-def play_again(
+def replay_recording(
     recording: Recording, world: World, episode: Episode | None = None, rebuild: Rebuild = rebuilt
-) -> Replay:
+) -> RecordingReplay:
     """Play one recording again in `world`; raises what `world` raises but for its scenes."""
     try:
         found = read_episode(recording.path) if episode is None else episode
         key, parts = rebuild(recording, found)
     except (EpisodeError, NotStored) as error:
-        return Replay(recording, 0, None, str(error))
+        return RecordingReplay(recording, 0, None, str(error))
     actions = np.concatenate([found.actions, found.actions[-1:]])
     limit = parts.task.levels[key.level].steps
     try:
-        record = rerun(
+        record = replay(
             world, key, actions, "joint", parts=lambda _: parts, step_scale=len(actions) / limit
         )
     except (SceneUnstable, ActionError) as error:
-        return Replay(recording, len(found), None, str(error))
+        return RecordingReplay(recording, len(found), None, str(error))
     reason = "" if record.success else record.message or record.end
-    return Replay(recording, len(found), record.success, reason, record.done, record.total)
+    return RecordingReplay(recording, len(found), record.success, reason, record.done, record.total)
 
 
 def in_checkout(recording: Recording, episode: Episode) -> tuple[TrialKey, TrialParts]:
@@ -80,7 +80,7 @@ def chosen(recordings: Iterable[Recording], most: int) -> list[Recording]:
     return found
 
 
-def summary(replays: Sequence[Replay]) -> list[str]:
+def summary(replays: Sequence[RecordingReplay]) -> list[str]:
     """The counts in words: a line for each variant, and why some could not be played."""
     lines = []
     for name, some in _by_variant(replays).items():
@@ -97,11 +97,11 @@ def summary(replays: Sequence[Replay]) -> list[str]:
     return lines
 
 
-def _by_variant(replays: Iterable[Replay]) -> dict[str, list[Replay]]:
-    found: dict[str, list[Replay]] = {}
-    for replay in replays:
-        variant = replay.recording.variant
-        folders = replay.recording.path.parts[-4:-2]
+def _by_variant(replays: Iterable[RecordingReplay]) -> dict[str, list[RecordingReplay]]:
+    found: dict[str, list[RecordingReplay]] = {}
+    for one in replays:
+        variant = one.recording.variant
+        folders = one.recording.path.parts[-4:-2]
         name = f"{variant[0]} level {variant[1]}" if variant else "/".join(folders)
-        found.setdefault(name, []).append(replay)
+        found.setdefault(name, []).append(one)
     return found

@@ -8,14 +8,19 @@ plays it.
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from robospa.harness.replay import replay_record
+from robospa.harness.trial import TrialParts, task_parts
 from robospa.harness.world import StepResult, Still, World
 from robospa.observation import CameraSpec
+from robospa.results.records.trial_record import TrialRecord
+from robospa.trial import TrialKey
 
 FPS = 10
 """Frames per second of a video."""
@@ -111,3 +116,20 @@ class FilmRecorder:
             self._image = np.hstack(still.draw(self._cameras))
         for _ in range(frames):
             self._video.add(self._image)
+
+
+def film(
+    world: World,
+    record: TrialRecord,
+    folder: Path,
+    *,
+    parts: Callable[[TrialKey], TrialParts] = task_parts,
+    step_scale: float = 1.0,
+    cameras: Sequence[str] = (CAMERA,),
+) -> bytes:
+    """An MP4 of the finished trial of `record`, replayed from the run in `folder`, `cameras` side
+    by side. Raises what `replay_record` raises: a replay that ends otherwise is not filmed.
+    """
+    recorder = FilmRecorder([CameraSpec(name) for name in cameras])
+    replay_record(world, record, folder, recorder, parts=parts, step_scale=step_scale)
+    return recorder.finish()

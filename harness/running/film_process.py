@@ -66,7 +66,7 @@ class FilmMaker:
 
     def make(self, record: TrialRecord) -> FilmDone:
         """Film the trial of `record`; whatever goes wrong is in the answer."""
-        from robospa.harness.pictures.replay_film import FilmError
+        from robospa.harness.replay import ReplayError
         from robospa.harness.running.atomic_file import StorageError
         from robospa.harness.running.worker import describe
         from robospa.harness.world import RenderUnavailable
@@ -75,7 +75,7 @@ class FilmMaker:
             self._film(record)
         except (StorageError, RenderUnavailable) as error:
             return FilmDone(record.key, describe(error), stop=True)
-        except FilmError as error:
+        except ReplayError as error:
             return FilmDone(record.key, str(error))
         except Exception as error:
             with contextlib.suppress(OSError):  # the log's disk may be full
@@ -86,7 +86,7 @@ class FilmMaker:
 
     def _film(self, record: TrialRecord) -> None:
         from robospa.harness.factory import load_function
-        from robospa.harness.pictures.replay_film import film
+        from robospa.harness.pictures.video import film
         from robospa.harness.running.atomic_file import StorageError, replace_file, storage_errors
         from robospa.results.records.films import film_name
 

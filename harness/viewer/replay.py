@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.geometry import Pose
-from robospa.harness.pictures.replay_film import play_again
+from robospa.harness.replay import replay_record
 from robospa.harness.trial import TrialParts, run_trial, task_parts
 from robospa.harness.viewer.playback import Playback, playback_of
 from robospa.harness.world import StepResult, World
@@ -74,10 +74,10 @@ def recorded_playback(
 ) -> Playback:
     """The trial of `record`, whose actions are in the run in `folder`, played again.
 
-    Raises FilmError if it does not come again, RunError if its actions cannot be read.
+    Raises ReplayError if it does not come again, RunError if its actions cannot be read.
     """
     recorder = PoseRecorder()
-    play_again(world, record, folder, recorder, parts=parts, step_scale=step_scale)
+    replay_record(world, record, folder, recorder, parts=parts, step_scale=step_scale)
     return _playback(record, parts(record.key), recorder)
 
 

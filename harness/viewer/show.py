@@ -37,7 +37,7 @@ def trial_named(run: Run, name: str) -> TrialRecord:
 
 
 def of_run(folder: Path, name: str) -> tuple[Playback, list[DrawnBody]]:
-    """The trial called `name` of the run in `folder`, played again; raises RunError, FilmError."""
+    """The trial called `name` of the run in `folder`, replayed; raises RunError, ReplayError."""
     from robospa.harness.factory import load_function
     from robospa.harness.robots import embodiment
     from robospa.harness.running.film_stage import replay_config

@@ -15,8 +15,7 @@ from robospa.harness.clock.clock import Clock
 from robospa.harness.clock.latency import parse_latency
 from robospa.harness.clock.motion_log import ENTRY
 from robospa.harness.clock.switching import parse_switching
-from robospa.harness.convention_check.rerun import rerun
-from robospa.harness.pictures.replay_film import play_again
+from robospa.harness.replay import replay, replay_record
 from robospa.harness.running.action_files import ActionRecorder, write_actions
 from robospa.harness.trial import run_trial
 from robospa.results.records.run_io import action_path
@@ -137,7 +136,7 @@ def test_the_recorded_actions_give_the_trial_again_without_a_clock() -> None:
         recorder=recorder,
         clock=real("120ms"),
     )
-    again = rerun(TargetWorld(), KEY, recorder.actions, "joint", policy_seed=7, parts=parts)
+    again = replay(TargetWorld(), KEY, recorder.actions, "joint", policy_seed=7, parts=parts)
     assert (again.digest, again.actions_digest) == (record.digest, record.actions_digest)
 
 
@@ -157,7 +156,7 @@ def test_a_trial_longer_than_its_step_limit_is_played_again_whole(tmp_path: Path
     action_path(tmp_path, key).parent.mkdir()
     write_actions(tmp_path, key, recorder.actions, "joint")
     again = ActionRecorder()
-    play_again(TargetWorld(), record, tmp_path, again, parts=parts)
+    replay_record(TargetWorld(), record, tmp_path, again, parts=parts)
     assert np.array_equal(again.actions, recorder.actions)
 
 

@@ -11,7 +11,7 @@ from robospa.harness.clock.clock import Clock
 from robospa.harness.clock.latency import parse_latency
 from robospa.harness.clock.motion_log import ENTRY
 from robospa.harness.clock.switching import parse_switching
-from robospa.harness.convention_check.rerun import rerun
+from robospa.harness.replay import replay
 from robospa.harness.running.action_files import ActionRecorder
 from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.harness.trial import run_trial
@@ -51,7 +51,7 @@ def test_a_trial_comes_again_to_the_bit_in_another_order_and_from_its_actions() 
     assert differences(first[0], again) == []
     assert first[0].diagnostics[ENTRY] == again.diagnostics[ENTRY]
     assert again.diagnostics[ENTRY]["blind"] > 0 and again.diagnostics[ENTRY]["held"] > 0
-    replayed = rerun(worlds[0], KEYS[0], recorder.actions, "joint", policy_seed=5)
+    replayed = replay(worlds[0], KEYS[0], recorder.actions, "joint", policy_seed=5)
     assert replayed.digest == again.digest
     for world in worlds:
         world.close()

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from fake_records import trial_record
 
-from robospa.harness.convention_check.rerun import ENDED
 from robospa.harness.datasets.episode_maker import replay_end
+from robospa.harness.replay import ENDED
 from robospa.trial import TrialKey
 
 KEY = TrialKey("Pick_Blocks_Size", 1, 1)

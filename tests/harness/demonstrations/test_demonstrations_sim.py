@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from robospa.harness.convention_check.rerun import rerun
 from robospa.harness.demonstrations.expert_run import demonstrate
 from robospa.harness.demonstrations.recorder import FrameRecorder
 from robospa.harness.demonstrations.strides import stride_of
+from robospa.harness.replay import replay
 from robospa.harness.robots import embodiment
 from robospa.harness.sim.motion import DEMONSTRATION_LIMITS
 from robospa.harness.sim.sapien_world import SapienWorld
@@ -37,7 +37,7 @@ def test_a_replayed_demonstration_succeeds_within_the_step_limit(key: TrialKey) 
     space = embodiment(key.embodiment).action_space("joint")
     actions = recorder.episode("x", made.instruction, {}, space, ()).actions
     limit = task(key.task).levels[key.level].steps
-    done = rerun(SapienWorld(render=False), key, actions, "joint")
+    done = replay(SapienWorld(render=False), key, actions, "joint")
     assert done.success and done.end == "success"
     assert done.steps < len(actions) <= SHARE * limit  # it goes on where the replay has succeeded
     assert np.array_equal(actions[-1], actions[-2])  # and comes to rest

@@ -23,7 +23,7 @@ from robospa.harness.official.recordings import (
     recording_of,
     variant_of,
 )
-from robospa.harness.official.replays import Replay, chosen, in_checkout, summary
+from robospa.harness.official.replays import RecordingReplay, chosen, in_checkout, summary
 
 LAYOUT: Mapping[str, Any] = {
     "target_index": 1,
@@ -163,7 +163,11 @@ def test_a_checkout_makes_any_scene_from_seed_and_number() -> None:
 
 def test_the_summary_counts_and_gives_reasons() -> None:
     one = Recording(Path("/a/T_1/c/data/episode0.hdf5"), 0, ("Press_Stapler_Repeat", 1))
-    rows = [Replay(one, 9, True), Replay(one, 9, False, "step_limit"), Replay(one, 0, None, "why")]
+    rows = [
+        RecordingReplay(one, 9, True),
+        RecordingReplay(one, 9, False, "step_limit"),
+        RecordingReplay(one, 0, None, "why"),
+    ]
     assert summary(rows) == [
         "Press_Stapler_Repeat level 1: 3 recordings, 1 of 2 meet their goal again (50 %)",
         "  1 not played: why",

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from robospa.baselines.random import create
-from robospa.harness.pictures.replay_film import film
-from robospa.harness.pictures.video import FilmRecorder, VideoBuffer
+from robospa.harness.pictures.video import FilmRecorder, VideoBuffer, film
 from robospa.harness.running.action_files import ActionRecorder, write_actions
 from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.harness.trial import run_trial

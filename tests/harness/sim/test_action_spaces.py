@@ -8,8 +8,8 @@ from disguised_oracle import Disguised
 from unequal_arms import READY, unequal_arms
 
 from robospa.harness import action_decoder
-from robospa.harness.convention_check.rerun import rerun
 from robospa.harness.quantize import is_quantized
+from robospa.harness.replay import replay
 from robospa.harness.running.action_files import ActionRecorder
 from robospa.harness.sim import sapien_world
 from robospa.harness.trial import run_trial
@@ -53,7 +53,7 @@ def test_recorded_joints_are_replayed_to_the_bit_whatever_the_kinematics(
     assert record.success and recorder.joints is not None
     assert is_quantized(recorder.joints) and len(recorder.joints) == record.steps
     monkeypatch.setattr(action_decoder, "reaching", None)  # as if another version had none
-    again = rerun(world, key, recorder.actions, space, joints=recorder.joints)
+    again = replay(world, key, recorder.actions, space, joints=recorder.joints)
     assert again.actions_digest == record.actions_digest
     assert (again.digest, again.physics_steps) == (record.digest, record.physics_steps)
     assert again.end == "success"

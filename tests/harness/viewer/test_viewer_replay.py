@@ -10,7 +10,7 @@ from film_fakes import KEYS, recorded
 from run_fakes import FakeWorld, parts
 
 from robospa.geometry import Pose
-from robospa.harness.pictures.replay_film import FilmError
+from robospa.harness.replay import ReplayError
 from robospa.harness.viewer.replay import PoseRecorder, recorded_playback
 
 
@@ -41,7 +41,7 @@ def test_ten_frames_a_second_are_kept() -> None:
 
 def test_a_trial_that_does_not_come_again_is_refused(tmp_path: Path) -> None:
     record = replace(recorded(tmp_path / "run", KEYS[0]), digest="another")
-    with pytest.raises(FilmError, match="another state"):
+    with pytest.raises(ReplayError, match="another state"):
         recorded_playback(Posed(), record, tmp_path / "run", parts=parts)
 
 

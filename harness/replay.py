@@ -1,23 +1,25 @@
-"""Run a trial again from its recorded actions, without the model.
+"""Execute recorded actions again, without the model that chose them.
 
-The world decides everything else, so a repeatable world gives the same record. Refuses nothing by
-itself: what differs is for the caller to judge.
+The world decides everything else, so a repeatable world gives the same record.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from robospa.harness.running.action_files import read_actions, read_joints
 from robospa.harness.trial import Recorder, TrialParts, run_trial, task_parts
 from robospa.harness.world import JOINTS_OF_EE, ActionError, Poll, StepResult, World
 from robospa.observation import Observation
 from robospa.protocol.errors import PolicyAnswerError
 from robospa.protocol.policy import PolicySpec, TrialInfo
+from robospa.results.records.run_io import action_path
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
@@ -26,9 +28,13 @@ ENDED = "the recorded actions end here"
 """What a record says whose goal was not met by then."""
 
 
-class Recorded:
-    """A policy that sends recorded `actions`, float32 (T, D), of the action `space`; then it has
-    nothing more to say, which counts as an answer that cannot be executed."""
+class ReplayError(Exception):
+    """A trial does not come again; the message says which one and why."""
+
+
+class RecordedPolicy:
+    """Sends recorded `actions`, float32 (T, D), of the action `space`; then it has nothing more to
+    say, which counts as an answer that cannot be executed."""
 
     def __init__(self, actions: NDArray[np.float32], space: str) -> None:
         self._actions = actions
@@ -72,7 +78,7 @@ class _Following:
         return replace(self._world.step(recorded, kind, poll), joints=recorded)
 
 
-def rerun(
+def replay(
     world: World,
     key: TrialKey,
     actions: NDArray[np.float32],
@@ -88,15 +94,54 @@ def rerun(
 
     `joints` are joint actions to execute in their place, as an earlier run did.
     """
-    policy = Recorded(actions, space)
-    if joints is not None:
-        world = cast(World, _Following(world, joints))
     return run_trial(
-        world,
-        policy,
+        world if joints is None else cast(World, _Following(world, joints)),
+        RecordedPolicy(actions, space),
         key,
         policy_seed=policy_seed,
         recorder=recorder,
         parts=parts,
         step_scale=step_scale,
     )
+
+
+def replay_record(
+    world: World,
+    record: TrialRecord,
+    folder: Path,
+    recorder: Recorder,
+    *,
+    parts: Callable[[TrialKey], TrialParts] = task_parts,
+    step_scale: float = 1.0,
+) -> None:
+    """Replay the trial of `record`, whose actions are in the run in `folder`, for `recorder`.
+
+    Raises ReplayError if it ends in another state, RunError if its actions cannot be read, and what
+    `world` raises.
+    """
+    key = record.key
+    setup = parts(key)
+    if setup.scene.digest != record.scene_digest:
+        raise ReplayError(
+            f"{key.slug} was run in another scene than this version of robospa makes of its key"
+        )
+    path = action_path(folder, key)
+    actions, space = read_actions(path)
+    # A trial with a time limit of its own may have more actions than its step limit has.
+    limit = setup.task.levels[key.level].steps
+    again = replay(
+        world,
+        key,
+        actions,
+        space,
+        joints=read_joints(path),
+        policy_seed=record.policy_seed,
+        recorder=recorder,
+        parts=parts,
+        step_scale=max(step_scale, len(actions) / limit),
+    )
+    if again.digest != record.digest:
+        raise ReplayError(
+            f"{key.slug} played again ends in another state: the run is not repeatable on this "
+            "machine"
+        )
