@@ -30,7 +30,7 @@ from robospa.harness.trial import run_trial
 from robospa.harness.world import SceneUnstable
 from robospa.tasks import packs
 from robospa.tasks.catalog import LEVELS
-from robospa.tasks.official.models import needs
+from robospa.tasks.official import needs
 from robospa.trial import TrialKey
 
 SEED = 100_000

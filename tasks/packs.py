@@ -20,7 +20,7 @@ from robospa.registry import PACKS, find
 if TYPE_CHECKING:
     import numpy as np
 
-    from robospa.tasks.modes.clutter import Kind
+    from robospa.tasks.modes.clutter import ClutterKind
     from robospa.tasks.scene import Scene, SceneObject
     from robospa.tasks.shapes import ObjectModel, Params
 
@@ -74,7 +74,7 @@ class Builtin:
 class PackWithClutter(Pack, Protocol):
     """A pack that has things of its own to lie about in randomised scenes."""
 
-    def clutter(self, scene: Scene) -> Sequence[Kind]:
+    def clutter(self, scene: Scene) -> Sequence[ClutterKind]:
         """Kinds of things, the library's and its own, that may lie about in `scene`; none if the
         library's are all. Nothing that the scene's sentences may mean."""
 

@@ -9,20 +9,22 @@ Sentences of the splits `train` and `heldout` are orders; held-out ones have oth
 and word orders. Those of `indirect` ask, wish, state a goal or a condition. The phrasings that fill
 them are split too: those of training are in no other split. A scene has the same sentences in
 every mode; with clutter, some of them end in a clause that names the kinds of the objects
-(`robospa.tasks.instructions.among`).
+(`robospa.tasks.sentences`).
 """
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+import re
+from collections import Counter
+from collections.abc import Iterable, Mapping
 from itertools import product
 
 import numpy as np
 
 from robospa.tasks import catalog
-from robospa.tasks.instructions.among import told_apart
 from robospa.tasks.instructions.grammar import SENTENCES, SPLITS, Templates, fill, slot_names
+from robospa.tasks.objects import object_model
 from robospa.tasks.scene import Scene
 
 
@@ -91,3 +93,39 @@ def _generator(scene: Scene, split: str, purpose: str, salt: str) -> np.random.G
     text = "/".join([scene.suite, *([salt] if salt else []), *place])
     entropy = int.from_bytes(hashlib.sha256(text.encode()).digest()[:16], "big")
     return np.random.Generator(np.random.PCG64(entropy))
+
+
+ANY_KIND = re.compile(r"\b(objects?|items?|things?|pieces?)\b", re.IGNORECASE)
+"""Words that fit clutter too."""
+PLURALS = {
+    "bread": "loaves of bread",
+    "soap": "bars of soap",
+    "box of french fries": "boxes of french fries",
+    "pack of playing cards": "packs of playing cards",
+    "computer mouse": "computer mice",
+}
+
+
+def kinds_clause(scene: Scene) -> str:
+    """The sentence that names the kinds of the objects, such as "Only the mugs count."."""
+    nouns = Counter(object_model(item.asset, item.params).noun for item in scene.objects)
+    named = [f"the {noun if count == 1 else plural(noun)}" for noun, count in sorted(nouns.items())]
+    last = named.pop()
+    return f"Only {', '.join(named)} and {last} count." if named else f"Only {last} count."
+
+
+def plural(noun: str) -> str:
+    """The noun for several: "tea boxes"."""
+    return PLURALS.get(noun, f"{noun}es" if noun.endswith("x") else f"{noun}s")
+
+
+def told_apart(sentences: Iterable[str], scene: Scene) -> list[str]:
+    """The sentences, with the clause after those that may be read as speaking of other things."""
+    clause = kinds_clause(scene)
+    heads = {object_model(o.asset, o.params).noun.split()[-1] for o in scene.objects}
+    return [
+        f"{sentence} {clause}"
+        if ANY_KIND.search(sentence) or not any(head in sentence.lower() for head in heads)
+        else sentence
+        for sentence in sentences
+    ]

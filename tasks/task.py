@@ -1,21 +1,58 @@
-"""The definition of a task: figures per level and pure functions of its scene."""
+"""The definition of a task: figures per level, facts, and pure functions of its scene."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import Protocol
+from dataclasses import dataclass, fields
+from typing import Any, Protocol, Self
 
 import numpy as np
 
 from robospa.categories import BASIC, SPATIAL
 from robospa.tasks.events import Event, ObjectRole
-from robospa.tasks.facts import SceneFacts
 from robospa.tasks.instructions.grammar import Phrasings, Templates
 from robospa.tasks.plan import Skill
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.snapshot import Snapshot
 from robospa.workcell import Workcell
+
+
+class HasFacts(Protocol):
+    """A scene, as far as facts are concerned."""
+
+    @property
+    def facts(self) -> Mapping[str, Any]: ...
+
+
+@dataclass(frozen=True)
+class SceneFacts:
+    """What a task drew besides the objects: a frozen dataclass that `draw` writes and `of` reads.
+
+    Fields are strings, numbers, and tuples of them. In the scene they are plain JSON values. A
+    field at its default is left out, so that what only some levels have needs a default that says
+    "there is none" ("" or 0).
+    """
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain JSON values by field, without those at their default."""
+        values = {f.name: (getattr(self, f.name), f.default) for f in fields(self)}
+        return {
+            name: _plain(value) for name, (value, default) in values.items() if value != default
+        }
+
+    @classmethod
+    def of(cls, scene: HasFacts) -> Self:
+        """The facts of a scene; what the class has no field for is left out."""
+        known = {f.name: scene.facts[f.name] for f in fields(cls) if f.name in scene.facts}
+        return cls(**{name: _frozen(value) for name, value in known.items()})
+
+
+def _plain(value: Any) -> Any:
+    return [_plain(item) for item in value] if isinstance(value, list | tuple) else value
+
+
+def _frozen(value: Any) -> Any:
+    return tuple(_frozen(item) for item in value) if isinstance(value, list | tuple) else value
 
 
 class Tracker(Protocol):

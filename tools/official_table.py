@@ -27,7 +27,7 @@ from robospa.tasks.goals.repeat import PressCounter
 from robospa.tasks.goals.restore import Restore
 from robospa.tasks.goals.row import Pair
 from robospa.tasks.goals.stack import Bring, Stack
-from robospa.tasks.official.models import needs, official_assets, official_models
+from robospa.tasks.official import needs, official_assets, official_models
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.shapes import ObjectModel
 

@@ -76,7 +76,7 @@ def _print(found: Index) -> None:
     from rich.table import Table
 
     from robospa.harness.robots import embodiments
-    from robospa.tasks.official.models import needs
+    from robospa.tasks.official import needs
 
     table = Table("official assets", "found", "of", box=None, pad_edge=False)
     table.columns[1].justify = table.columns[2].justify = "right"

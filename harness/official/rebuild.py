@@ -22,7 +22,7 @@ from robospa.schema import Count, Number
 from robospa.schema import read as read_as
 from robospa.tasks.catalog import task as find_task
 from robospa.tasks.objects import object_model
-from robospa.tasks.official.models import official_assets, official_models
+from robospa.tasks.official import official_assets, official_models
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.shapes import ObjectModel
 from robospa.trial import REFERENCE, TrialKey

@@ -27,7 +27,7 @@ import numpy as np
 
 from robospa.harness.official.slots import NoOfficialSentence, Value, arms, official_values
 from robospa.schema import parse_json
-from robospa.tasks.official.models import official_assets, official_model, official_models
+from robospa.tasks.official import official_assets, official_model, official_models
 from robospa.tasks.scene import Scene, SceneObject
 
 SEEN, UNSEEN = "official_seen", "official_unseen"

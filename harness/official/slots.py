@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 
 from robospa.tasks.colors import nearest
-from robospa.tasks.instructions.words import ordinal
+from robospa.tasks.instructions.text import ordinal
 from robospa.tasks.scene import Scene, SceneObject
 
 Value = str | SceneObject

@@ -18,7 +18,7 @@ from robospa.geometry import Pose
 from robospa.tasks.colors import NAMED
 from robospa.tasks.families.cross_view.scenes import EXTREMES, SEEN_AS, VIEWS, leaders
 from robospa.tasks.families.memory_wall.wall import STAND_Z
-from robospa.tasks.official.models import official_models
+from robospa.tasks.official import official_models
 from robospa.tasks.scene import Scene, SceneObject
 
 IDS: Mapping[str, tuple[int, ...]] = {

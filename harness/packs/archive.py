@@ -10,7 +10,7 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
-from robospa.tasks.official.models import OfficialModel
+from robospa.tasks.official import OfficialModel
 from robospa.tasks.packs import PackError
 from robospa.user_cache import user_cache
 

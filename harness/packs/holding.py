@@ -15,7 +15,7 @@ from robospa.geometry import Vec3
 from robospa.harness.packs.model_data import ModelData
 from robospa.harness.packs.placing import Likeness, Placing
 from robospa.tasks.objects.build import MAX_WIDTH
-from robospa.tasks.official.models import OfficialModel
+from robospa.tasks.official import OfficialModel
 from robospa.tasks.shapes import Grasp, ObjectModel
 
 Floats = NDArray[np.float64]

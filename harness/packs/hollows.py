@@ -16,7 +16,7 @@ from robospa.harness.packs.archive import Archive
 from robospa.harness.packs.assembly import Piece, solid_pieces
 from robospa.harness.packs.mesh_files import reads_meshes
 from robospa.harness.packs.urdf import MeshUse
-from robospa.tasks.official.models import OfficialModel
+from robospa.tasks.official import OfficialModel
 
 Floats = NDArray[np.float64]
 

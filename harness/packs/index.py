@@ -13,7 +13,7 @@ from robospa.harness.packs.model_data import LARGEST_FILE, ModelData, read_model
 from robospa.harness.packs.objaverse import files_text, things
 from robospa.harness.packs.urdf import check_uses, read_urdf
 from robospa.harness.robots import embodiments
-from robospa.tasks.official.models import (
+from robospa.tasks.official import (
     OfficialModel,
     needs,
     official_assets,

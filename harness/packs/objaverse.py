@@ -16,9 +16,8 @@ from robospa.harness.packs.archive import Archive, ArchiveError
 from robospa.harness.packs.assembly import hull_of
 from robospa.harness.packs.solids import solids, vector
 from robospa.harness.packs.urdf import read_urdf
-from robospa.tasks.modes.clutter import Kind
-from robospa.tasks.modes.look_alikes import colors_asked, taken_kinds
-from robospa.tasks.official.models import clutter_alike
+from robospa.tasks.modes.clutter import ClutterKind, colors_asked, taken_kinds
+from robospa.tasks.official import clutter_alike
 from robospa.tasks.scene import Scene
 from robospa.tasks.shapes import ObjectModel, Skin
 
@@ -45,14 +44,16 @@ def things(archive: Archive) -> Mapping[str, tuple[str, ...]]:
     return {category: tuple(numbers) for category, numbers in found.items()}
 
 
-def kinds(archive: Archive, pack: str, scene: Scene) -> tuple[Kind, ...]:
+def kinds(archive: Archive, pack: str, scene: Scene) -> tuple[ClutterKind, ...]:
     """The categories that may lie about in `scene`: nothing that it could mean by its words. Of
     their colours nothing is known, so there are none where it names things by colour."""
     if colors_asked(scene):
         return ()
     taken, alike = taken_kinds(scene), clutter_alike()
     return tuple(
-        Kind(ASSET, tuple({"thing": f"{category}/{n}", "pack": pack} for n in numbers), fixed=True)
+        ClutterKind(
+            ASSET, tuple({"thing": f"{category}/{n}", "pack": pack} for n in numbers), fixed=True
+        )
         for category, numbers in things(archive).items()
         if category in alike and not taken & alike[category]
     )

@@ -23,9 +23,9 @@ from robospa.harness.packs.objaverse import kinds, make_thing
 from robospa.harness.packs.placing import Likeness, Placing, frames, place
 from robospa.harness.packs.solids import solids, vector
 from robospa.tasks.colors import NAMED
-from robospa.tasks.modes.clutter import Kind, own_kinds
+from robospa.tasks.modes.clutter import ClutterKind, own_kinds
 from robospa.tasks.objects import object_model
-from robospa.tasks.official.models import OfficialModel, official_model
+from robospa.tasks.official import OfficialModel, official_model
 from robospa.tasks.scene import Scene
 from robospa.tasks.shapes import Color, Hinge, ObjectModel, Params, Skin
 
@@ -58,18 +58,18 @@ class OfficialPack:
         """For each of `tasks` that cannot run with the archive a sentence that says why."""
         return task_faults(self.archive, tasks)
 
-    def clutter(self, scene: Scene) -> tuple[Kind, ...]:
+    def clutter(self, scene: Scene) -> tuple[ClutterKind, ...]:
         """What may lie about in `scene`: our kinds, as the archive's models where it has those, and
         its things of Objaverse; none if it has no such things."""
         theirs = kinds(self.archive, self.name, scene)
         return (*map(self._packed, own_kinds(scene)), *theirs) if theirs else ()
 
-    def _packed(self, kind: Kind) -> Kind:
+    def _packed(self, kind: ClutterKind) -> ClutterKind:
         looks = [
             {**params, "pack": self.name} if self._there(kind.asset, params) else params
             for params in kind.looks
         ]
-        return Kind(kind.asset, looks)
+        return ClutterKind(kind.asset, looks)
 
     def _there(self, asset: str, params: Params) -> bool:
         """Whether the archive has the model's files."""

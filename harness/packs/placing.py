@@ -17,7 +17,7 @@ from robospa.geometry import Pose, Vec3, from_matrix
 from robospa.harness.packs.archive import ArchiveError
 from robospa.harness.packs.model_data import ModelData
 from robospa.tasks.objects.build import points_of
-from robospa.tasks.official.models import OfficialModel, official_size
+from robospa.tasks.official import OfficialModel, official_size
 from robospa.tasks.shapes import ObjectModel
 
 Floats = NDArray[np.float64]

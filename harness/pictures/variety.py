@@ -19,7 +19,7 @@ from robospa.harness.pictures.gallery import CELL, TRIES, save_jpeg
 from robospa.harness.world import SceneUnstable, World
 from robospa.observation import CameraSpec
 from robospa.tasks.catalog import build_scene, tasks
-from robospa.tasks.sampling.region import LayoutError
+from robospa.tasks.sampling.places import LayoutError
 from robospa.tasks.scene import Scene
 from robospa.trial import REFERENCE
 

@@ -11,7 +11,7 @@ from multiprocessing import get_context
 
 from robospa.harness.world import SceneUnstable, World
 from robospa.protocol.policy import Policy
-from robospa.tasks.sampling.region import LayoutError
+from robospa.tasks.sampling.places import LayoutError
 from robospa.tasks.seeds import ListKey
 from robospa.trial import TrialKey
 

@@ -16,8 +16,8 @@ from robospa.geometry import Pose, look_rotation
 from robospa.harness import textures
 from robospa.harness.sim import room
 from robospa.harness.sim.abreast import add_copies
+from robospa.tasks.scene import Lights, Surroundings, Texture
 from robospa.tasks.shapes import Shape
-from robospa.tasks.surroundings import Lights, Surroundings, Texture
 from robospa.workcell import WORKCELL
 
 if TYPE_CHECKING:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from robospa.harness.textures.catalog import chosen
 from robospa.harness.textures.field import SIZE, Draw, Picture
 from robospa.harness.textures.folder import TextureFolder
-from robospa.tasks.surroundings import SEEN, Texture
+from robospa.tasks.scene import SEEN, Texture
 
 VARIABLE = "ROBOSPA_TEXTURES"
 """Environment variable that names a folder of the user's own textures."""

@@ -13,7 +13,7 @@ from functools import cache
 
 from robospa.harness.textures import cloth, plain, prints, stone, tiles, wood
 from robospa.harness.textures.field import Draw, Picture
-from robospa.tasks.surroundings import UNSEEN
+from robospa.tasks.scene import UNSEEN
 
 Colors = tuple[str, ...]
 Maker = Callable[[Draw, Colors, int], Picture]

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from robospa.harness.textures.field import SIZE
 from robospa.tasks.packs import PackError
-from robospa.tasks.surroundings import TEXTURES, Texture
+from robospa.tasks.scene import TEXTURES, Texture
 
 ENDINGS = (".png", ".jpg", ".jpeg", ".webp")
 LARGEST = 8192

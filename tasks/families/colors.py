@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from robospa.tasks.colors import NAMED, stands_out
-from robospa.tasks.sampling.region import LayoutError
+from robospa.tasks.sampling.places import LayoutError
 from robospa.tasks.shapes import Color
 
 COLORS: dict[str, Color] = {

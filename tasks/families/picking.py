@@ -8,13 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from robospa.tasks.colors import NAMED
-from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.tabletop import draw_look
 from robospa.tasks.goals.pick import Lift, PickTracker
 from robospa.tasks.objects import object_model
 from robospa.tasks.plan import Pick, Skill
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Tracker
+from robospa.tasks.task import SceneFacts, Tracker
 
 
 @dataclass(frozen=True)

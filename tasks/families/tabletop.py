@@ -9,7 +9,7 @@ import numpy as np
 
 from robospa.geometry import Pose, yaw_rotation
 from robospa.tasks import objects
-from robospa.tasks.sampling.region import Point
+from robospa.tasks.sampling.places import Point
 from robospa.tasks.scene import SceneObject
 from robospa.tasks.shapes import ObjectModel, Params
 from robospa.workcell import TABLE_TOP, Workcell

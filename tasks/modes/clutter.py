@@ -4,23 +4,36 @@ The official rules: kind and look are drawn evenly, then up to 100 places; a thi
 keeps its distance from all others and from what the task needs (`keep_out`), lies on the table,
 and, higher than 5 cm, in its far half. It ends with the number asked for, or after 50 things for
 which no place was found. One scene in fifty has none at all.
+
+A sentence that is true of a scene stays true of it with clutter: nothing that may be taken for one
+of the task's things, or has a colour that the task names, lies about. The official rule of places
+is a rectangle around each of the task's things and some of its places; here they follow from scene
+and plan, and two rules are ours: a gripper has room around what it takes or presses, and clutter
+hides no object of the task from the head camera.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
+import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cache
 
 import numpy as np
 
-from robospa.geometry import Array, Pose, yaw_rotation
-from robospa.tasks.modes.keep_out import TALL, keep_out
-from robospa.tasks.modes.look_alikes import candidates, color_words, colors_asked
-from robospa.tasks.objects import look_count, object_model
-from robospa.tasks.sampling.region import Mask
+from robospa.geometry import Array, Pose, to_matrix, yaw_rotation
+from robospa.tasks import catalog
+from robospa.tasks.colors import LOOK_ALIKES as COLORS_ALIKE
+from robospa.tasks.colors import NAMED
+from robospa.tasks.objects import assets, look_count, object_model
+from robospa.tasks.objects.build import PALETTE, points_of
+from robospa.tasks.plan import Place
+from robospa.tasks.sampling.places import Mask
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.shapes import ObjectModel, Params
+from robospa.workcell import WORKCELL
 
 NONE_AT_ALL = 0.02
 MOST_FAILURES, PLACES = 50, 100
@@ -33,7 +46,7 @@ BETWEEN = 0.01
 
 
 @dataclass(frozen=True)
-class Kind:
+class ClutterKind:
     """A kind of thing: the parameters of each of its looks, and whether nothing can move it."""
 
     asset: str
@@ -41,16 +54,16 @@ class Kind:
     fixed: bool = False
 
 
-def own_kinds(scene: Scene) -> tuple[Kind, ...]:
+def own_kinds(scene: Scene) -> tuple[ClutterKind, ...]:
     """The kinds of the built-in library that may lie about in `scene`."""
     return tuple(
-        Kind(asset, [{"look": look} for look in range(look_count(asset))])
+        ClutterKind(asset, [{"look": look} for look in range(look_count(asset))])
         for asset in candidates(scene)
     )
 
 
 def clutter(
-    scene: Scene, rng: np.random.Generator, most: int, kinds: Sequence[Kind] | None = None
+    scene: Scene, rng: np.random.Generator, most: int, kinds: Sequence[ClutterKind] | None = None
 ) -> tuple[SceneObject, ...]:
     """At most `most` things of `kinds` (default: those of the library) on the table of `scene`."""
     if rng.random() < NONE_AT_ALL:
@@ -96,3 +109,189 @@ def _apart(
     cx, cy, radius = np.array(circles).T
     apart = np.hypot(x[:, None] - cx, y[:, None] - cy) >= radius + model.radius + BETWEEN
     return np.asarray(apart.all(axis=1))
+
+
+FURNITURE = frozenset(
+    {
+        "block", "cover", "display_stand", "dustbin", "electronic_scale", "garbage", "microwave",
+        "mug_rack", "pad", "phone_stand", "t_block", "tray", "wooden_block",
+    }
+)  # fmt: skip
+"""Assets that are never clutter: parts of a task's furniture, and plain blocks and markers."""
+
+LOOK_ALIKES: tuple[frozenset[str], ...] = tuple(
+    frozenset(words.split())
+    for words in (
+        "bottle pill_bottle perfume glue sauce_can",
+        "can sauce_can cup mug",
+        "cup mug cover table_trash_bin",
+        "bowl plate bread_basket kitchen_pot",
+        "plate tray coaster pad display_stand electronic_scale",
+        "dustbin table_trash_bin bread_basket",
+        "block wooden_block t_block rubikscube tea_box coffee_box tissue_box playing_cards soap",
+        "tea_box coffee_box tissue_box playing_cards french_fries",
+        "phone remote_control electronic_scale",
+        "phone_stand payment_sign mug_rack display_stand",
+        "bell alarm_clock",
+        "bread hamburger bread_basket",
+        "garbage apple",
+    )
+)
+"""Kinds that may be taken for each other, or that one word covers (a box of tea is a box)."""
+
+COLOR_WORDS = frozenset(PALETTE) | frozenset(NAMED)
+ALSO_ALIKE = (("gold", "yellow"), ("cream", "beige", "white"), ("grey", "gray", "silver"))
+"""Words of the object library's colours beside those that `robospa.tasks.colors` tells apart."""
+
+
+def candidates(scene: Scene) -> tuple[str, ...]:
+    """Assets that clutter of `scene` may be, sorted."""
+    taken = FURNITURE | taken_kinds(scene)
+    return tuple(a for a in assets() if a not in taken)
+
+
+def taken_kinds(scene: Scene) -> frozenset[str]:
+    """Assets that the scene is about, and what may be taken for them."""
+    present = frozenset(item.asset for item in scene.objects)
+    return present.union(*(group for group in LOOK_ALIKES if group & present))
+
+
+def colors_asked(scene: Scene) -> frozenset[str]:
+    """Words for the objects' colours and for what looks alike, where a task names things by colour.
+
+    None for other tasks.
+    """
+    if not any("color" in fact for fact in scene.facts):
+        return frozenset()
+    phrases = [" ".join(object_model(o.asset, o.params).phrases) for o in scene.objects]
+    words = frozenset().union(*map(color_words, phrases))
+    alike = (group for group in (*COLORS_ALIKE, *ALSO_ALIKE) if words & set(group))
+    return words.union(*alike)
+
+
+@cache
+def color_words(text: str) -> frozenset[str]:
+    """Words for colours in `text`."""
+    return frozenset(w for w in COLOR_WORDS if re.search(rf"\b{w}\b", text))
+
+
+TALL = 0.05
+"""Higher things [m] keep farther away, and off the near half of the table (official)."""
+GAP = 0.005
+"""Added to the radius of a piece of clutter against a task's rectangles (official) [m]."""
+ROOM, ROOM_TALL = 0.015, 0.055
+"""Further room around a task's things for fingers, and for the hand beside tall clutter [m]."""
+IN_FRONT = 0.08
+"""How far [m] the room beside tall clutter reaches towards the robot, whose hands come from there.
+"""
+
+_SIGNS = np.array(list(itertools.product((-1.0, 1.0), (-1.0, 1.0), (0.0, 1.0))))
+
+
+@dataclass(frozen=True)
+class KeepOut:
+    """Oriented rectangles on the table, and how far each task object reaches in the head's picture.
+
+    `centres` (N, 2) [m], `axes` (N, 2, 2) with the rectangles' x and y axes as rows, `halves`
+    (N, 2) [m]. `boxes` (M, 4) are left, right, top and bottom [px] of objects whose nearest point
+    is at `nearest` (M,) [m].
+    """
+
+    centres: Array
+    axes: Array
+    halves: Array
+    boxes: Array
+    nearest: Array
+
+    def free(self, x: Array, y: Array, model: ObjectModel, table_top: float) -> Mask:
+        """At which places (K,) [m] a piece of clutter keeps its distance and hides nothing."""
+        tall = model.size[2] > TALL
+        reach = model.radius + GAP + (ROOM_TALL if tall else ROOM)
+        away = np.stack([x, y], axis=1)[:, None] - self.centres
+        free = self._outside(away, reach)
+        if tall:
+            away[..., 1] += IN_FRONT
+            free &= self._outside(away, reach)
+        left, right, top, bottom = WORKCELL.head.box(
+            x, y, model.radius, table_top, table_top + model.size[2]
+        )
+        one, two, three, four = self.boxes.T
+        apart = (left[:, None] > two) | (right[:, None] < one)
+        apart |= (top[:, None] > four) | (bottom[:, None] < three)
+        apart |= y[:, None] - model.radius > self.nearest
+        return np.asarray(free & apart.all(axis=1))
+
+    def _outside(self, away: Array, reach: float) -> Mask:
+        local = np.abs(np.einsum("nij,knj->kni", self.axes, away)) - self.halves
+        beyond = np.maximum(local, 0.0)
+        return np.asarray(((beyond**2).sum(axis=2) >= reach**2).all(axis=1))
+
+
+@dataclass
+class _Rectangles:
+    """Rectangles as they are found."""
+
+    centres: list[tuple[float, float]] = field(default_factory=list)
+    axes: list[Array] = field(default_factory=list)
+    halves: list[tuple[float, float]] = field(default_factory=list)
+
+    def add(self, x: float, y: float, axes: Array, half: tuple[float, float]) -> None:
+        self.centres.append((x, y))
+        self.axes.append(axes)
+        self.halves.append(half)
+
+    def add_circle(self, x: float, y: float, radius: float) -> None:
+        """The square around a circle."""
+        self.add(x, y, np.eye(2), (radius, radius))
+
+
+def keep_out(scene: Scene) -> KeepOut:
+    """Where no clutter of `scene` may lie; nothing of it depends on which object is asked for,
+    beyond the places to which the plan carries things."""
+    found = _Rectangles()
+    boxes, nearest = [], []
+    for item in scene.objects:
+        model = object_model(item.asset, item.params)
+        turn = to_matrix(item.pose.rotation)
+        half = footprint(model)
+        x, y, _ = item.pose.position
+        found.add(x, y, turn[:2, :2].T, half)
+        _add_swing(found, item.pose, model)
+        corners = _corners(item, model, half)
+        column, row = WORKCELL.head.pixel(*corners.T)
+        boxes.append((column.min(), column.max(), row.min(), row.max()))
+        nearest.append(corners[:, 1].min())
+    for skill in catalog.task(scene.task).plan(scene):
+        if isinstance(skill, Place):
+            x, y, _ = skill.position
+            if skill.on is not None:
+                x, y, _ = scene.object(skill.on).pose.position
+            moved = scene.object(skill.object)
+            found.add_circle(x, y, object_model(moved.asset, moved.params).radius)
+    return KeepOut(
+        np.array(found.centres), np.array(found.axes), np.array(found.halves),
+        np.array(boxes), np.array(nearest),
+    )  # fmt: skip
+
+
+def footprint(model: ObjectModel) -> tuple[float, float]:
+    """Half sizes [m] of an upright box around the origin that holds the model."""
+    x, y, _ = model.size
+    if model.radius > math.hypot(x, y) / 2 + 1e-3:  # the origin is not in the middle
+        return model.radius, model.radius
+    return x / 2, y / 2
+
+
+def _add_swing(found: _Rectangles, pose: Pose, model: ObjectModel) -> None:
+    """The circle that a door or lid may sweep."""
+    if model.hinge is not None:
+        points = np.concatenate([points_of(shape) for shape in model.hinge.shapes])
+        x, y, _ = pose.apply(model.hinge.point)
+        reach = np.hypot(*(points - model.hinge.point)[:, :2].T).max()
+        found.add_circle(x, y, float(reach))
+
+
+def _corners(item: SceneObject, model: ObjectModel, half: tuple[float, float]) -> Array:
+    """(8, 3) corners [m] of an object's box in the world."""
+    local = _SIGNS * (*half, model.size[2]) + (0.0, 0.0, model.bottom)
+    return np.asarray(local @ to_matrix(item.pose.rotation).T + item.pose.position)

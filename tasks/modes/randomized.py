@@ -25,9 +25,8 @@ import numpy as np
 from robospa.registry import did_you_mean
 from robospa.tasks.modes import Part, with_table_raised
 from robospa.tasks.modes.clutter import clutter
-from robospa.tasks.scene import Scene
+from robospa.tasks.scene import SEEN, TEXTURES, UNSEEN, Lights, Scene, Texture
 from robospa.tasks.shapes import Color
-from robospa.tasks.surroundings import SEEN, TEXTURES, UNSEEN, Lights, Texture
 
 FLICKERING = 0.02
 """Probability that the lights of a scene change from picture to picture (official)."""

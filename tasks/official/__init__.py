@@ -1,1 +1,129 @@
-"""Facts about the official benchmark's assets that tasks, packs and instructions share."""
+"""Which model of the official archive each look of our assets stands for.
+
+Assets that are not listed here (blocks, pads, covers, T-shaped blocks, the garbage ball) are boxes
+and balls officially too, or are not published: they are always built in.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from robospa.geometry import Vec3
+
+POINTS = frozenset({"press", "touched", "support", "left", "right", "tip", "handle"})
+"""Our frames that may lie at a point of the archive."""
+
+
+@dataclass(frozen=True)
+class OfficialModel:
+    """A model of the archive, and how its frame becomes ours (see models.toml).
+
+    A `jointed` one is a URDF file in a sub-folder called `model`, one with a `hinge` has a door; a
+    `hollow` one is open at its top.
+    `points` gives for some of our frames the archive's point where they lie, such as "contact 2".
+    """
+
+    folder: str
+    model: str
+    turns: int = 0
+    lies: bool = False
+    faces: str = ""
+    hinge: bool = False
+    hollow: bool = False
+    jointed: bool = False
+    points: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def name(self) -> str:
+        """As the official scene files and object descriptions write it: "071_can/base3"."""
+        return f"{self.folder}/base{self.model}"
+
+
+@dataclass(frozen=True)
+class OfficialSize:
+    """`size` [m] across, up and deep, the widths upper bounds (boxes of turned models); `centre`
+    [m] of that box from the model's origin; how many points of each kind the archive gives."""
+
+    size: Vec3
+    centre: Vec3
+    contacts: int
+    functional: int
+
+
+def official_model(asset: str, look: int) -> OfficialModel | None:
+    """The archive's model of that look; None if `asset` is none of the archive's.
+
+    ValueError if the asset has no such look.
+    """
+    row = _table().get(asset)
+    if row is None:
+        return None
+    models = row["models"]
+    if not 0 <= look < len(models):
+        raise ValueError(f"asset {asset!r} has official models of looks 0 to {len(models) - 1}")
+    return OfficialModel(
+        row["folder"],
+        str(models[look]),
+        row.get("turns", (0,) * len(models))[look],
+        row.get("lies", False),
+        row.get("faces", ""),
+        row.get("hinge", False),
+        row.get("hollow", False),
+        isinstance(models[look], str),
+        {frame: point for frame, point in row.items() if frame in POINTS},
+    )
+
+
+def official_assets() -> tuple[str, ...]:
+    """Our assets that have models in the archive, sorted."""
+    return tuple(sorted(_table()))
+
+
+def official_models(asset: str) -> tuple[OfficialModel, ...]:
+    """The archive's model of each look of `asset`; none for one that is always built in."""
+    looks = len(_table()[asset]["models"]) if asset in _table() else 0
+    found = (official_model(asset, look) for look in range(looks))
+    return tuple(model for model in found if model is not None)
+
+
+@cache
+def _table() -> Mapping[str, Mapping[str, Any]]:
+    return tomllib.loads((Path(__file__).parent / "models.toml").read_text("utf-8"))
+
+
+@cache
+def needs() -> Mapping[str, tuple[str, ...]]:
+    """For each of the benchmark's tasks, the assets of `official_assets` that its scenes hold."""
+    rows = tomllib.loads((Path(__file__).parent / "needs.toml").read_text("utf-8"))
+    return {task: tuple(assets) for task, assets in rows.items()}
+
+
+@cache
+def _sizes() -> Mapping[str, Mapping[str, Mapping[str, Any]]]:
+    return tomllib.loads((Path(__file__).parent / "sizes.toml").read_text("utf-8"))
+
+
+def official_size(model: OfficialModel) -> OfficialSize | None:
+    """How large the archive says that `model` is; None for jointed ones: it does not say."""
+    row = _sizes().get(model.folder, {}).get(model.model)
+    if row is None:
+        return None
+    return OfficialSize(
+        _vector(row["size"]), _vector(row["centre"]), row["contacts"], row["functional"]
+    )
+
+
+@cache
+def clutter_alike() -> Mapping[str, frozenset[str]]:
+    """For each category of things that only lie about, our assets that it may be taken for."""
+    rows = tomllib.loads((Path(__file__).parent / "clutter.toml").read_text("utf-8"))
+    return {category: frozenset(assets) for category, assets in rows.items()}
+
+
+def _vector(row: Sequence[float]) -> Vec3:
+    return (row[0], row[1], row[2])

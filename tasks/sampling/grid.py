@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from robospa.geometry import Array
-from robospa.tasks.sampling.region import LayoutError, Range
+from robospa.tasks.sampling.places import LayoutError, Range
 from robospa.workcell import Workcell
 
 Cell = tuple[int, int]

@@ -14,7 +14,7 @@ from collections.abc import Callable
 import numpy as np
 
 from robospa.geometry import Array
-from robospa.tasks.sampling.region import LayoutError, Mask
+from robospa.tasks.sampling.places import LayoutError, Mask
 
 Fits = Callable[[Array, Array, int], Mask]
 """Whether place i of each chain's layout (chains, count, 2) may move to `moved_to` (chains, 2)."""

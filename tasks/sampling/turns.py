@@ -16,7 +16,7 @@ import numpy as np
 from robospa.geometry import Array
 from robospa.tasks.objects import object_model
 from robospa.tasks.objects.build import points_of
-from robospa.tasks.sampling.region import LayoutError, Mask
+from robospa.tasks.sampling.places import LayoutError, Mask
 from robospa.tasks.shapes import Params
 from robospa.workcell import Workcell
 

@@ -22,7 +22,7 @@ from robospa.harness.packs.placing import Y_UP
 from robospa.tasks.objects import meshes as m
 from robospa.tasks.objects import object_model
 from robospa.tasks.objects.build import points_of
-from robospa.tasks.official.models import (
+from robospa.tasks.official import (
     OfficialModel,
     OfficialSize,
     official_assets,

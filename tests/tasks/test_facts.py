@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import pytest
 
 from robospa.tasks import catalog
-from robospa.tasks.facts import SceneFacts
 from robospa.tasks.scene import Scene
+from robospa.tasks.task import SceneFacts
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,7 @@ from robospa.tasks.goals.pick import Lift, PickTracker
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.plan import Pick, Skill
-from robospa.tasks.sampling.region import Area, Mask, Points
-from robospa.tasks.sampling.scatter import scatter
+from robospa.tasks.sampling.places import Area, Mask, Points, scatter
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.task import Level, SceneSample, Task, Tracker
 from robospa.workcell import TABLE_TOP, Workcell

@@ -15,7 +15,6 @@ import numpy as np
 
 from robospa.tasks import objects
 from robospa.tasks.colors import NAMED
-from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.tabletop import Item, draw_look, named, radius, standing
 from robospa.tasks.goals.checklist import Checklist
 from robospa.tasks.goals.parts import Part, Rests, level_with
@@ -23,10 +22,9 @@ from robospa.tasks.goals.repeat import ActionCounter, PressCounter
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.plan import Home, Pick, Place, Press, Skill
-from robospa.tasks.sampling.points import free_point, retry
-from robospa.tasks.sampling.region import Point
+from robospa.tasks.sampling.places import Point, free_point, retry
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Level, SceneSample, Task
+from robospa.tasks.task import Level, SceneFacts, SceneSample, Task
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "can_basket.toml")

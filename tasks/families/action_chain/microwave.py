@@ -16,7 +16,6 @@ import numpy as np
 
 from robospa.geometry import Pose
 from robospa.tasks import objects
-from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.tabletop import (
     Item,
     draw_look,
@@ -33,11 +32,10 @@ from robospa.tasks.goals.repeat import ActionCounter, PressCounter
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.plan import Open, Pick, Place, Press, Skill
-from robospa.tasks.sampling.points import retry
-from robospa.tasks.sampling.region import Point
+from robospa.tasks.sampling.places import Point, retry
 from robospa.tasks.scene import Scene
 from robospa.tasks.shapes import Hinge, Params
-from robospa.tasks.task import Level, SceneSample, Task
+from robospa.tasks.task import Level, SceneFacts, SceneSample, Task
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "microwave.toml")

@@ -15,7 +15,6 @@ from itertools import pairwise
 import numpy as np
 
 from robospa.geometry import Pose
-from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.action_chain.stations import frame_of
 from robospa.tasks.families.colors import first_colors
 from robospa.tasks.families.dustbin.floor_bin import reachable
@@ -26,10 +25,9 @@ from robospa.tasks.goals.repeat import ActionCounter
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.plan import Hang, Pick, Place, Skill
-from robospa.tasks.sampling.points import free_point, retry
-from robospa.tasks.sampling.region import Point
+from robospa.tasks.sampling.places import Point, free_point, retry
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Level, SceneSample, Task
+from robospa.tasks.task import Level, SceneFacts, SceneSample, Task
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "mug_tower.toml")

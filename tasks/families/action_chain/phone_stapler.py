@@ -15,7 +15,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from robospa.geometry import Pose
-from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.action_chain.stations import button, frame_of
 from robospa.tasks.families.dustbin.floor_bin import BIN, TABLE_SHIFT, container
 from robospa.tasks.families.tabletop import Item, named, standing
@@ -24,14 +23,13 @@ from robospa.tasks.goals.parts import Inside, Near, Part, Rests
 from robospa.tasks.goals.repeat import ActionCounter
 from robospa.tasks.goals.subtask_flags import inside_box
 from robospa.tasks.instructions.grammar import Slots
-from robospa.tasks.instructions.text import TaskText
-from robospa.tasks.instructions.words import times
+from robospa.tasks.instructions.text import TaskText, times
 from robospa.tasks.objects import look_count
 from robospa.tasks.plan import Dock, Home, Pour, Press, Skill
-from robospa.tasks.sampling.points import retry
+from robospa.tasks.sampling.places import retry
 from robospa.tasks.sampling.turns import Turnable, free_beside
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Level, SceneSample, Task
+from robospa.tasks.task import Level, SceneFacts, SceneSample, Task
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "phone_stapler.toml")

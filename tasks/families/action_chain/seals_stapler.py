@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.action_chain.stations import button, frame_of
 from robospa.tasks.families.tabletop import Item, draw_look, named, radius, side, standing
 from robospa.tasks.goals.checklist import Checklist
@@ -20,12 +19,11 @@ from robospa.tasks.goals.parts import Part
 from robospa.tasks.goals.repeat import ActionCounter
 from robospa.tasks.goals.stamping import StampCounter
 from robospa.tasks.instructions.grammar import Slots
-from robospa.tasks.instructions.text import TaskText
-from robospa.tasks.instructions.words import times
+from robospa.tasks.instructions.text import TaskText, times
 from robospa.tasks.plan import Press, Skill, Stamp
-from robospa.tasks.sampling.points import free_point, retry
+from robospa.tasks.sampling.places import free_point, retry
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Level, SceneSample, Task
+from robospa.tasks.task import Level, SceneFacts, SceneSample, Task
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "seals_stapler.toml")

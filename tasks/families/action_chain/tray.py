@@ -15,7 +15,6 @@ import numpy as np
 
 from robospa.geometry import Pose
 from robospa.tasks import objects
-from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.action_chain.stations import button, frame_of, there_and_back
 from robospa.tasks.families.tabletop import Item, draw_look, in_view, named, radius, standing
 from robospa.tasks.goals.checklist import Checklist
@@ -24,10 +23,9 @@ from robospa.tasks.goals.repeat import ActionCounter
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.plan import Place, Skill
-from robospa.tasks.sampling.points import free_point, retry
-from robospa.tasks.sampling.region import Point
+from robospa.tasks.sampling.places import Point, free_point, retry
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Level, SceneSample, Task
+from robospa.tasks.task import Level, SceneFacts, SceneSample, Task
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "tray.toml")

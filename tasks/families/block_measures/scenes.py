@@ -18,10 +18,8 @@ from robospa.tasks.families.colors import drawn_color
 from robospa.tasks.families.picking import PickFacts, lifted, pick_target
 from robospa.tasks.goals.pick import Lift
 from robospa.tasks.instructions.grammar import Slots
-from robospa.tasks.instructions.text import TaskText
-from robospa.tasks.instructions.words import ordinal
-from robospa.tasks.sampling.region import Area, Mask, Points, spread
-from robospa.tasks.sampling.scatter import scatter
+from robospa.tasks.instructions.text import TaskText, ordinal
+from robospa.tasks.sampling.places import Area, Mask, Points, scatter, spread
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.task import Level, SceneSample, Task
 from robospa.workcell import TABLE_TOP, FixedCamera, Workcell

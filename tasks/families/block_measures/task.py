@@ -17,7 +17,7 @@ from robospa.tasks.families.block_measures.scenes import (
     front,
     rank_task,
 )
-from robospa.tasks.sampling.region import Points
+from robospa.tasks.sampling.places import Points
 from robospa.workcell import TABLE_TOP, FixedCamera
 
 HALF_EDGES = (

@@ -18,10 +18,9 @@ from robospa.tasks.families.picking import PickFacts, lifted, pick_name, pick_ta
 from robospa.tasks.families.tabletop import draw_look, standing
 from robospa.tasks.goals.pick import Lift
 from robospa.tasks.instructions.grammar import Slots
-from robospa.tasks.instructions.text import TaskText
-from robospa.tasks.instructions.words import ordinal
+from robospa.tasks.instructions.text import TaskText, ordinal
 from robospa.tasks.sampling.grid import GridLayout
-from robospa.tasks.sampling.points import retry
+from robospa.tasks.sampling.places import retry
 from robospa.tasks.sampling.turns import Turnable, between
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.shapes import Params

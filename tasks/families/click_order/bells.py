@@ -12,18 +12,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.click_order import objects
 from robospa.tasks.families.click_order.clicking import click, click_counter, clickable_look
 from robospa.tasks.families.tabletop import Item, in_view, named, side, standing
 from robospa.tasks.goals.clicks import ClickInOrder
 from robospa.tasks.instructions.grammar import Slots, Templates
-from robospa.tasks.instructions.text import TaskText
-from robospa.tasks.instructions.words import NUMBERS, acting_arm, one_after_another
+from robospa.tasks.instructions.text import NUMBERS, TaskText, acting_arm, one_after_another
 from robospa.tasks.plan import Skill
-from robospa.tasks.sampling.region import LayoutError, Point, apart
+from robospa.tasks.sampling.places import LayoutError, Point, apart
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Level, SceneSample, Task
+from robospa.tasks.task import Level, SceneFacts, SceneSample, Task
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "bells.toml")

@@ -14,9 +14,7 @@ from robospa.tasks import objects
 from robospa.tasks.families.tabletop import side
 from robospa.tasks.goals.repeat import PRESS_BOX, PressCounter
 from robospa.tasks.plan import Press
-from robospa.tasks.sampling.points import retry
-from robospa.tasks.sampling.region import Area, LayoutError, Point
-from robospa.tasks.sampling.scatter import candidates, scatter
+from robospa.tasks.sampling.places import Area, LayoutError, Point, candidates, retry, scatter
 from robospa.tasks.sampling.turns import Turnable, free_turns, outline
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.shapes import Params

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.click_order.clicking import (
     click,
     click_counter,
@@ -20,12 +19,11 @@ from robospa.tasks.families.click_order.clicking import (
 from robospa.tasks.families.tabletop import Item, named, side, standing
 from robospa.tasks.goals.clicks import ClickInOrder
 from robospa.tasks.instructions.grammar import Slots
-from robospa.tasks.instructions.text import TaskText
-from robospa.tasks.instructions.words import acting_arm, one_after_another
+from robospa.tasks.instructions.text import TaskText, acting_arm, one_after_another
 from robospa.tasks.plan import Skill
-from robospa.tasks.sampling.region import Area
+from robospa.tasks.sampling.places import Area
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Level, SceneSample, Task
+from robospa.tasks.task import Level, SceneFacts, SceneSample, Task
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "objects.toml")

@@ -20,12 +20,10 @@ from robospa.tasks.families.picking import PickFacts, lifted, pick_target
 from robospa.tasks.families.tabletop import draw_look, standing
 from robospa.tasks.goals.pick import Lift
 from robospa.tasks.instructions.grammar import Phrasings, Slots
-from robospa.tasks.instructions.text import TaskText
-from robospa.tasks.instructions.words import ordinal
+from robospa.tasks.instructions.text import TaskText, ordinal
 from robospa.tasks.objects import object_model
 from robospa.tasks.sampling.markov import Fits, keeps_apart, pool, walk
-from robospa.tasks.sampling.points import retry
-from robospa.tasks.sampling.region import LayoutError, Mask
+from robospa.tasks.sampling.places import LayoutError, Mask, retry
 from robospa.tasks.sampling.turns import Turnable, free_turns
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.shapes import Params

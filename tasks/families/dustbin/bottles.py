@@ -14,7 +14,6 @@ from functools import partial
 import numpy as np
 
 from robospa.tasks import objects
-from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.dustbin.floor_bin import (
     BIN,
     EXCHANGE,
@@ -26,13 +25,11 @@ from robospa.tasks.families.dustbin.floor_bin import (
 from robospa.tasks.families.tabletop import Item, middle_in_view, named, standing
 from robospa.tasks.goals.placing import collect
 from robospa.tasks.instructions.grammar import Slots
-from robospa.tasks.instructions.text import TaskText
-from robospa.tasks.instructions.words import NUMBERS, by_count
+from robospa.tasks.instructions.text import NUMBERS, TaskText, by_count
 from robospa.tasks.plan import Skill
-from robospa.tasks.sampling.points import scatter_points
-from robospa.tasks.sampling.region import Point
+from robospa.tasks.sampling.places import Point, scatter_points
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Level, SceneSample, Task, Tracker
+from robospa.tasks.task import Level, SceneFacts, SceneSample, Task, Tracker
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "bottles.toml")

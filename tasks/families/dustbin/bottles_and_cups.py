@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from robospa.geometry import Pose
-from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.action_chain.stations import frame_of
 from robospa.tasks.families.dustbin import bottles as only_bottles
 from robospa.tasks.families.dustbin.bottles import HALF_HEIGHT
@@ -38,13 +37,11 @@ from robospa.tasks.goals.checklist import Checklist
 from robospa.tasks.goals.parts import Inside, Part, Rests, on_spot
 from robospa.tasks.goals.repeat import ActionCounter
 from robospa.tasks.instructions.grammar import Slots, Templates
-from robospa.tasks.instructions.text import TaskText
-from robospa.tasks.instructions.words import by_count
+from robospa.tasks.instructions.text import TaskText, by_count
 from robospa.tasks.plan import Pick, Place, Skill
-from robospa.tasks.sampling.points import free_point, retry
-from robospa.tasks.sampling.region import Point
+from robospa.tasks.sampling.places import Point, free_point, retry
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Level, SceneSample, Task
+from robospa.tasks.task import Level, SceneFacts, SceneSample, Task
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "bottles_and_cups.toml")

@@ -12,7 +12,7 @@ from robospa.geometry import Pose
 from robospa.tasks import objects
 from robospa.tasks.goals.parts import Container
 from robospa.tasks.plan import Drop, Pick, Place, Skill
-from robospa.tasks.sampling.region import Point, apart
+from robospa.tasks.sampling.places import Point, apart
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.workcell import Workcell
 

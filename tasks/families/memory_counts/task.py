@@ -12,16 +12,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.click_order.clicking import click_counter, press_point
 from robospa.tasks.families.tabletop import Item, draw_look, named, side, standing
 from robospa.tasks.goals.clicks import PressCounts
 from robospa.tasks.instructions.grammar import Phrasings, Slots
-from robospa.tasks.instructions.text import TaskText
-from robospa.tasks.instructions.words import NUMBERS, by_count, ordinal
+from robospa.tasks.instructions.text import NUMBERS, TaskText, by_count, ordinal
 from robospa.tasks.plan import Press, Skill
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Level, SceneSample, Task
+from robospa.tasks.task import Level, SceneFacts, SceneSample, Task
 from robospa.text import listed
 from robospa.workcell import Workcell
 

@@ -10,17 +10,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.colors import first_colors
 from robospa.tasks.families.tabletop import Item, named, side, standing
 from robospa.tasks.goals.memory import Cover, UncoverInOrder
 from robospa.tasks.instructions.grammar import Slots
-from robospa.tasks.instructions.text import TaskText
-from robospa.tasks.instructions.words import color_orders
+from robospa.tasks.instructions.text import TaskText, color_orders
 from robospa.tasks.plan import Home, Pick, Place, Skill, Wait
-from robospa.tasks.sampling.region import shuffled
+from robospa.tasks.sampling.places import shuffled
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Level, SceneSample, Task
+from robospa.tasks.task import Level, SceneFacts, SceneSample, Task
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "instructions.toml")

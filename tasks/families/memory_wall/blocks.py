@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from robospa.geometry import Pose
-from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.colors import COLORS
 from robospa.tasks.families.memory_wall.wall import HOLD_STILL, STAND_TOP, WALL, row, stand, wall
 from robospa.tasks.families.tabletop import Item, named, side, standing
@@ -21,13 +20,11 @@ from robospa.tasks.goals.cue import AfterCue
 from robospa.tasks.goals.parts import Region
 from robospa.tasks.goals.placing import gather
 from robospa.tasks.instructions.grammar import Slots
-from robospa.tasks.instructions.text import TaskText
-from robospa.tasks.instructions.words import NUMBERS, by_count
+from robospa.tasks.instructions.text import NUMBERS, TaskText, by_count
 from robospa.tasks.plan import Home, Pick, Place, Skill
-from robospa.tasks.sampling.region import Area, shuffled
-from robospa.tasks.sampling.scatter import candidates, scatter
+from robospa.tasks.sampling.places import Area, candidates, scatter, shuffled
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Level, SceneSample, Task
+from robospa.tasks.task import Level, SceneFacts, SceneSample, Task
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "blocks.toml")

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from robospa.geometry import Pose, yaw_rotation
-from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.click_order.clicking import (
     TURNS,
     click,
@@ -26,12 +25,11 @@ from robospa.tasks.families.tabletop import Item, named, standing
 from robospa.tasks.goals.clicks import ClickInOrder
 from robospa.tasks.goals.cue import AfterCue
 from robospa.tasks.instructions.grammar import Slots
-from robospa.tasks.instructions.text import TaskText
-from robospa.tasks.instructions.words import NUMBERS, by_count
+from robospa.tasks.instructions.text import NUMBERS, TaskText, by_count
 from robospa.tasks.plan import Skill
-from robospa.tasks.sampling.region import Area
+from robospa.tasks.sampling.places import Area
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Level, SceneSample, Task
+from robospa.tasks.task import Level, SceneFacts, SceneSample, Task
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "objects.toml")

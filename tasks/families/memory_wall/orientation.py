@@ -14,17 +14,15 @@ import numpy as np
 
 from robospa.geometry import yaw_rotation
 from robospa.tasks import objects
-from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.memory_wall.wall import HOLD_STILL, WALL, row, wall
 from robospa.tasks.families.tabletop import Item, named, side, standing
 from robospa.tasks.goals.cue import AfterCue
 from robospa.tasks.goals.restore import OrientationTarget, Restore
 from robospa.tasks.instructions.grammar import Slots
-from robospa.tasks.instructions.text import TaskText
-from robospa.tasks.instructions.words import NUMBERS
+from robospa.tasks.instructions.text import NUMBERS, TaskText
 from robospa.tasks.plan import Home, Pick, Place, Skill
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Level, SceneSample, Task
+from robospa.tasks.task import Level, SceneFacts, SceneSample, Task
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "orientation.toml")

@@ -12,19 +12,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.colors import first_colors
 from robospa.tasks.families.tabletop import Item, named, standing
 from robospa.tasks.goals.parts import Region
 from robospa.tasks.goals.placing import Destination, bring
 from robospa.tasks.instructions.grammar import Phrasings, Slots
-from robospa.tasks.instructions.text import TaskText
-from robospa.tasks.instructions.words import NUMBERS
+from robospa.tasks.instructions.text import NUMBERS, TaskText
 from robospa.tasks.plan import Pick, Place, Skill
-from robospa.tasks.sampling.points import LAYOUTS, TRIES_PER_POINT
-from robospa.tasks.sampling.region import LayoutError, shuffled
+from robospa.tasks.sampling.places import LAYOUTS, TRIES_PER_POINT, LayoutError, shuffled
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Level, SceneSample, Task, Tracker
+from robospa.tasks.task import Level, SceneFacts, SceneSample, Task, Tracker
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "blocks.toml")

@@ -12,19 +12,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from robospa.tasks import objects
-from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.tabletop import Item, draw_look, named, side, standing
 from robospa.tasks.goals.parts import Region
 from robospa.tasks.goals.placing import Destination, bring
 from robospa.tasks.instructions.grammar import Slots
-from robospa.tasks.instructions.text import TaskText
-from robospa.tasks.instructions.words import NUMBERS, by_count
+from robospa.tasks.instructions.text import NUMBERS, TaskText, by_count
 from robospa.tasks.plan import Pick, Place, Skill
-from robospa.tasks.sampling.points import scatter_points
-from robospa.tasks.sampling.region import shuffled
+from robospa.tasks.sampling.places import scatter_points, shuffled
 from robospa.tasks.sampling.turns import Turnable, free_turns
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Level, SceneSample, Task, Tracker
+from robospa.tasks.task import Level, SceneFacts, SceneSample, Task, Tracker
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "cards.toml")

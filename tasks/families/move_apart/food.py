@@ -12,16 +12,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.tabletop import Item, draw_look, named, side, standing
 from robospa.tasks.goals.parts import Region
 from robospa.tasks.goals.placing import Destination, bring
 from robospa.tasks.instructions.grammar import Phrasings, Slots
-from robospa.tasks.instructions.text import TaskText
-from robospa.tasks.instructions.words import NUMBERS
+from robospa.tasks.instructions.text import NUMBERS, TaskText
 from robospa.tasks.plan import Pick, Place, Skill
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Level, SceneSample, Task, Tracker
+from robospa.tasks.task import Level, SceneFacts, SceneSample, Task, Tracker
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "food.toml")

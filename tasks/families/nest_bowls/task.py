@@ -12,17 +12,14 @@ import numpy as np
 
 from robospa.geometry import Array, Vec3
 from robospa.tasks import objects
-from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.tabletop import Item, draw_look, named, side, standing
 from robospa.tasks.goals.nest import nest
 from robospa.tasks.instructions.grammar import Slots
-from robospa.tasks.instructions.text import TaskText
-from robospa.tasks.instructions.words import NUMBERS, by_count
+from robospa.tasks.instructions.text import NUMBERS, TaskText, by_count
 from robospa.tasks.plan import Pick, Place, Skill
-from robospa.tasks.sampling.region import Area, Mask, shuffled
-from robospa.tasks.sampling.scatter import candidates, scatter
+from robospa.tasks.sampling.places import Area, Mask, candidates, scatter, shuffled
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Level, SceneSample, Task, Tracker
+from robospa.tasks.task import Level, SceneFacts, SceneSample, Task, Tracker
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "instructions.toml")

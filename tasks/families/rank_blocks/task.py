@@ -16,20 +16,24 @@ import numpy as np
 
 from robospa.geometry import Vec3
 from robospa.tasks.colors import NAMED
-from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.colors import drawn_color, first_colors
 from robospa.tasks.families.stack_blocks.towers import NEAR_BAND
 from robospa.tasks.families.tabletop import Item, named, side, standing
 from robospa.tasks.goals.row import row
 from robospa.tasks.goals.stack import Bring
 from robospa.tasks.instructions.grammar import Phrasings, Slots
-from robospa.tasks.instructions.text import COMMON, TaskText
-from robospa.tasks.instructions.words import NUMBERS, by_count
+from robospa.tasks.instructions.text import COMMON, NUMBERS, TaskText, by_count
 from robospa.tasks.plan import Pick, Place, Skill
-from robospa.tasks.sampling.points import LAYOUTS, scatter_points
-from robospa.tasks.sampling.region import LayoutError, Point, apart, shuffled
+from robospa.tasks.sampling.places import (
+    LAYOUTS,
+    LayoutError,
+    Point,
+    apart,
+    scatter_points,
+    shuffled,
+)
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Level, SceneSample, Task, Tracker
+from robospa.tasks.task import Level, SceneFacts, SceneSample, Task, Tracker
 from robospa.text import listed
 from robospa.workcell import Workcell
 

@@ -28,7 +28,7 @@ from robospa.tasks.goals.pick import Lift
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText
 from robospa.tasks.sampling.grid import StraightLines
-from robospa.tasks.sampling.region import LayoutError
+from robospa.tasks.sampling.places import LayoutError
 from robospa.tasks.sampling.turns import Turnable, free_turns
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.shapes import Params

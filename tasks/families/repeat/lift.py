@@ -13,15 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from robospa.tasks import objects
-from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.tabletop import Item, named, side, standing
 from robospa.tasks.goals.lift_cycles import LiftCycles, back_home, held_up, put_down, raised
 from robospa.tasks.instructions.grammar import Slots
-from robospa.tasks.instructions.text import TaskText
-from robospa.tasks.instructions.words import NUMBERS, by_count
+from robospa.tasks.instructions.text import NUMBERS, TaskText, by_count
 from robospa.tasks.plan import RaiseLower, Skill
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Level, SceneSample, Task
+from robospa.tasks.task import Level, SceneFacts, SceneSample, Task
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "lift.toml")

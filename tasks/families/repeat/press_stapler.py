@@ -13,15 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from robospa.tasks import objects
-from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.tabletop import Item, draw_look, named, side, standing
 from robospa.tasks.goals.repeat import PressCounter, Repeat
 from robospa.tasks.instructions.grammar import Slots
-from robospa.tasks.instructions.text import TaskText
-from robospa.tasks.instructions.words import NUMBERS, by_count
+from robospa.tasks.instructions.text import NUMBERS, TaskText, by_count
 from robospa.tasks.plan import Press, Skill
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Level, SceneSample, Task
+from robospa.tasks.task import Level, SceneFacts, SceneSample, Task
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "press_stapler.toml")

@@ -21,10 +21,8 @@ from robospa.tasks.families.stack_blocks.towers import (
 )
 from robospa.tasks.families.tabletop import Item, middle_in_view, named, standing
 from robospa.tasks.instructions.grammar import Slots
-from robospa.tasks.instructions.text import COMMON, TaskText
-from robospa.tasks.instructions.words import NUMBERS, by_count, color_orders
-from robospa.tasks.sampling.points import scatter_points
-from robospa.tasks.sampling.region import Point, apart
+from robospa.tasks.instructions.text import COMMON, NUMBERS, TaskText, by_count, color_orders
+from robospa.tasks.sampling.places import Point, apart, scatter_points
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Level, SceneSample, Task
 from robospa.text import listed

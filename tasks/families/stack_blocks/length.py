@@ -23,8 +23,7 @@ from robospa.tasks.families.stack_blocks.towers import (
 )
 from robospa.tasks.families.tabletop import Item, named, standing
 from robospa.tasks.instructions.grammar import Slots
-from robospa.tasks.sampling.batch import Ground, scatter_blocks
-from robospa.tasks.sampling.region import Area, Points, spread
+from robospa.tasks.sampling.places import Area, Ground, Points, scatter_blocks, spread
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Level, SceneSample, Task
 from robospa.workcell import Workcell

@@ -11,15 +11,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.tabletop import side
 from robospa.tasks.goals.stack import HEIGHT_TOLERANCE, Bring, Stack
 from robospa.tasks.instructions.grammar import Slots
-from robospa.tasks.instructions.text import COMMON, TaskText
-from robospa.tasks.instructions.words import NUMBERS, by_count
+from robospa.tasks.instructions.text import COMMON, NUMBERS, TaskText, by_count
 from robospa.tasks.plan import Pick, Place, Skill
-from robospa.tasks.sampling.region import Point, apart
+from robospa.tasks.sampling.places import Point, apart
 from robospa.tasks.scene import Scene
+from robospa.tasks.task import SceneFacts
 
 TEXT = TaskText.beside(__file__, "towers.toml")
 

@@ -14,18 +14,15 @@ import numpy as np
 
 from robospa.geometry import Array
 from robospa.tasks import objects
-from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.stack_blocks.color import COLORS
 from robospa.tasks.families.tabletop import Item, draw_look, named, side, standing
 from robospa.tasks.goals.tools import HitCounter, UseInOrder
 from robospa.tasks.instructions.grammar import Slots
-from robospa.tasks.instructions.text import TaskText
-from robospa.tasks.instructions.words import color_orders
+from robospa.tasks.instructions.text import TaskText, color_orders
 from robospa.tasks.plan import Hit, Skill
-from robospa.tasks.sampling.region import Area, Mask, Point, shuffled
-from robospa.tasks.sampling.scatter import scatter
+from robospa.tasks.sampling.places import Area, Mask, Point, scatter, shuffled
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Level, SceneSample, Task
+from robospa.tasks.task import Level, SceneFacts, SceneSample, Task
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "hammer.toml")

@@ -13,20 +13,17 @@ import numpy as np
 
 from robospa.tasks import objects
 from robospa.tasks.colors import LOOK_ALIKES
-from robospa.tasks.facts import SceneFacts
 from robospa.tasks.families.tabletop import Item, draw_look, in_view, named, side, standing
 from robospa.tasks.goals.stamping import StampCounter
 from robospa.tasks.goals.tools import UseInOrder
 from robospa.tasks.instructions.grammar import Phrasings, Slots
-from robospa.tasks.instructions.text import TaskText
-from robospa.tasks.instructions.words import NUMBERS, by_count, color_orders
+from robospa.tasks.instructions.text import NUMBERS, TaskText, by_count, color_orders
 from robospa.tasks.objects.tools import PADS
 from robospa.tasks.plan import Pick, Place, Skill
-from robospa.tasks.sampling.points import free_point
-from robospa.tasks.sampling.region import LayoutError, Point
+from robospa.tasks.sampling.places import LayoutError, Point, free_point
 from robospa.tasks.scene import Scene
 from robospa.tasks.shapes import ObjectModel
-from robospa.tasks.task import Level, SceneSample, Task
+from robospa.tasks.task import Level, SceneFacts, SceneSample, Task
 from robospa.text import listed
 from robospa.workcell import Workcell
 

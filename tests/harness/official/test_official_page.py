@@ -12,7 +12,7 @@ from official_table import HEAD, PAGE, RULES, SEED, Rule, goal_and_frames, piece
 from robospa.harness.official.slots import SLOTS
 from robospa.harness.official.switches import SWITCHES
 from robospa.tasks.catalog import build_scene
-from robospa.tasks.official.models import needs
+from robospa.tasks.official import needs
 
 TEXT = PAGE.read_text("utf-8")
 FIDELITY = (Path(PAGE).parent / "fidelity.md").read_text("utf-8")

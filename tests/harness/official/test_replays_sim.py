@@ -13,7 +13,7 @@ from robospa.harness.datasets.features import layout_of
 from robospa.harness.datasets.jobs import Job
 from robospa.harness.datasets.robotwin import RoboTwin
 from robospa.tasks.catalog import build_scene
-from robospa.tasks.official.models import official_model
+from robospa.tasks.official import official_model
 from robospa.trial import TrialKey
 
 pytestmark = pytest.mark.sim

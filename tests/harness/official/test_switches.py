@@ -12,7 +12,7 @@ from robospa.geometry import Pose
 from robospa.harness.official.switches import IDS, SWITCHES, Switch, chosen, switched
 from robospa.tasks.catalog import build_scene, tasks
 from robospa.tasks.colors import NAMED
-from robospa.tasks.official.models import official_model
+from robospa.tasks.official import official_model
 from robospa.tasks.scene import Scene, SceneObject
 
 FIDELITY = Path(__file__).resolve().parents[3] / "docs" / "fidelity.md"

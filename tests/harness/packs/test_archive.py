@@ -8,7 +8,7 @@ import pytest
 from made_archive import THINGS, make_archive
 
 from robospa.harness.packs.archive import Archive, ArchiveError, note, open_archive
-from robospa.tasks.official.models import OfficialModel
+from robospa.tasks.official import OfficialModel
 
 CAN = OfficialModel("071_can", "3")
 

@@ -17,7 +17,7 @@ from robospa.harness.packs.mesh_files import read_shapes
 from robospa.harness.packs.pieces import convex_pieces
 from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.tasks.objects import object_model
-from robospa.tasks.official.models import official_model, official_size
+from robospa.tasks.official import official_model, official_size
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.workcell import TABLE_TOP
 

@@ -14,7 +14,7 @@ from robospa.harness.packs.archive import open_archive
 from robospa.harness.packs.index import index
 from robospa.harness.packs.mesh_files import read_shapes
 from robospa.harness.packs.pieces import convex_pieces
-from robospa.tasks.official.models import official_assets, official_models
+from robospa.tasks.official import official_assets, official_models
 
 pytestmark = READS_MESHES
 HOLLOW = ("bowl", "bread_basket", "cup", "dustbin", "mug", "table_trash_bin")

@@ -22,9 +22,9 @@ from robospa.harness.packs.index import fault
 from robospa.harness.packs.model_data import read_model_data
 from robospa.harness.packs.official import OfficialPack
 from robospa.harness.textures.folder import TextureFolder
-from robospa.tasks.official.models import official_models
+from robospa.tasks.official import official_models
 from robospa.tasks.packs import PackError, PackWithFaults
-from robospa.tasks.surroundings import Texture
+from robospa.tasks.scene import Texture
 
 pytestmark = READS_MESHES
 

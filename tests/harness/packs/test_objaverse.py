@@ -22,10 +22,9 @@ from robospa.harness.trial import task_parts
 from robospa.observation import CameraSpec
 from robospa.tasks import packs
 from robospa.tasks.catalog import build_scene
-from robospa.tasks.modes.keep_out import keep_out
-from robospa.tasks.modes.look_alikes import colors_asked, taken_kinds
+from robospa.tasks.modes.clutter import colors_asked, keep_out, taken_kinds
 from robospa.tasks.objects import assets, object_model
-from robospa.tasks.official.models import clutter_alike
+from robospa.tasks.official import clutter_alike
 from robospa.tasks.scene import Scene
 from robospa.trial import TrialKey
 

@@ -19,7 +19,7 @@ from robospa.harness.packs.official import OfficialPack
 from robospa.harness.settings import Simulation
 from robospa.tasks.objects import meshes as m
 from robospa.tasks.objects import object_model
-from robospa.tasks.official.models import official_model, official_size
+from robospa.tasks.official import official_model, official_size
 from robospa.tasks.shapes import Box, ObjectModel
 
 pytestmark = READS_MESHES

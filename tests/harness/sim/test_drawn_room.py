@@ -13,8 +13,7 @@ from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.harness.textures import MadeTextures
 from robospa.harness.world import RenderUnavailable
 from robospa.observation import CameraSpec
-from robospa.tasks.scene import Scene
-from robospa.tasks.surroundings import UNSEEN, Lights, Surroundings, Texture
+from robospa.tasks.scene import UNSEEN, Lights, Scene, Surroundings, Texture
 from robospa.workcell import WORKCELL
 
 pytestmark = pytest.mark.sim

@@ -14,7 +14,7 @@ from robospa.harness.textures import MadeTextures, source
 from robospa.harness.textures.catalog import KINDS, combinations
 from robospa.harness.textures.field import SIZE, Draw, Field, cell, noise, wave
 from robospa.harness.textures.folder import TextureFolder
-from robospa.tasks.surroundings import SEEN, UNSEEN, Texture
+from robospa.tasks.scene import SEEN, UNSEEN, Texture
 
 DIGESTS = {
     ("seen", 0): "3a2e2a4dd1ac",

@@ -10,7 +10,7 @@ from drawn_scenes import assert_near_uniform, index_of
 
 from robospa.tasks.catalog import build_scene, tasks
 from robospa.tasks.objects import object_model
-from robospa.tasks.sampling.region import Area
+from robospa.tasks.sampling.places import Area
 from robospa.tasks.scene import Scene
 from robospa.workcell import TABLE_TOP
 

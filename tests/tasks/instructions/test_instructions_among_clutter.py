@@ -5,8 +5,7 @@ from __future__ import annotations
 import pytest
 
 from robospa.tasks.catalog import build_scene, tasks
-from robospa.tasks.instructions.among import ANY_KIND, kinds_clause
-from robospa.tasks.sentences import SPLITS, sentences
+from robospa.tasks.sentences import ANY_KIND, SPLITS, kinds_clause, sentences
 
 SINGLE = [name for name, task in tasks().items() if task.dimension != "procedural"]
 

@@ -10,14 +10,15 @@ import numpy as np
 import pytest
 
 from robospa.tasks.catalog import build_scene, tasks
-from robospa.tasks.modes.clutter import EDGE
-from robospa.tasks.modes.keep_out import TALL, keep_out
-from robospa.tasks.modes.look_alikes import (
+from robospa.tasks.modes.clutter import (
+    EDGE,
     FURNITURE,
     LOOK_ALIKES,
+    TALL,
     candidates,
     color_words,
     colors_asked,
+    keep_out,
 )
 from robospa.tasks.objects import assets, look_count, object_model
 from robospa.tasks.plan import Place

@@ -10,8 +10,7 @@ from robospa.schema import read
 from robospa.tasks.catalog import build_scene
 from robospa.tasks.modes import canonical, for_training, tangible
 from robospa.tasks.modes.randomized import OFFICIAL, VARIATIONS
-from robospa.tasks.scene import Scene
-from robospa.tasks.surroundings import TEXTURES, Surroundings, Texture
+from robospa.tasks.scene import TEXTURES, Scene, Surroundings, Texture
 from robospa.trial import TrialKey
 
 PLACE = ("Stack_Blocks_Size_Order", 3)

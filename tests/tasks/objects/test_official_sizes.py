@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from robospa.tasks.objects import look_count, object_model
-from robospa.tasks.official.models import official_assets, official_models, official_size
+from robospa.tasks.official import official_assets, official_models, official_size
 
 HEIGHT = 0.05
 """Largest relative error of a height."""

@@ -6,7 +6,7 @@ import pytest
 
 from robospa.tasks import catalog
 from robospa.tasks.objects import assets, look_count, object_model
-from robospa.tasks.official.models import (
+from robospa.tasks.official import (
     POINTS,
     needs,
     official_assets,

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from robospa.tasks.sampling.markov import keeps_apart, pool, walk
-from robospa.tasks.sampling.region import Area, LayoutError, spread
-from robospa.tasks.sampling.scatter import scatter
+from robospa.tasks.sampling.places import Area, LayoutError, scatter, spread
 
 A = np.array
 

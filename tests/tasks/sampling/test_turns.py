@@ -9,7 +9,7 @@ import pytest
 from scene_checks import overlap
 
 from robospa.geometry import Pose, yaw_rotation
-from robospa.tasks.sampling.region import LayoutError
+from robospa.tasks.sampling.places import LayoutError
 from robospa.tasks.sampling.turns import Turnable, free_turns, outline
 from robospa.tasks.scene import SceneObject
 from robospa.workcell import WORKCELL
