@@ -30,7 +30,7 @@ LONG = (
     "test_server_faults",
     "test_reproduce_sim",
     "test_oracle_through_adapters",
-    "test_docs_robot",
+    "test_docs_extensions",
     "test_failure_policies",
     "test_run_sim",
     "test_submit_sim",
