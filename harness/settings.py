@@ -15,7 +15,6 @@ from typing import Annotated, TypeVar
 
 from msgspec import Meta
 
-from robospa.harness.budget.limit import ALL, OVERALL, parse_limit
 from robospa.harness.clock.settings import Timing
 from robospa.harness.world import ROBOT_ASSETS
 from robospa.observation import CAMERAS
@@ -92,37 +91,6 @@ class Selection:
         _check(
             self.instructions is None or "indirect" not in self.split.split(","),
             "split indirect has no official sentences: leave it or instructions out",
-        )
-
-
-@dataclass(frozen=True)
-class Plan:
-    """How many of the selected trials are run, and which."""
-
-    budget: str = option(
-        ALL,
-        "run only so many of the selected trials, such as 500, or as many as a time allows, such "
-        "as 2h: those that tell most, never ranked; --resume with a larger one goes on",
-    )
-    goal: str = option(
-        OVERALL,
-        "with a budget, the mean that is to be told best: overall, spatial, procedural, GAC,RPF",
-    )
-    against: str | None = option(
-        None,
-        "folder of a run with the same trials: stop as soon as it is decided which is better; with "
-        "a budget, spend it on what tells the difference best",
-    )
-
-    def __post_init__(self) -> None:
-        check_values(self)
-        try:
-            limit = parse_limit(self.budget)
-        except ValueError as error:
-            raise SettingsError(str(error)) from error
-        _check(
-            self.goal == OVERALL or not limit.is_none,
-            "goal goes with a budget: without one all selected trials are run",
         )
 
 
@@ -272,7 +240,6 @@ class EvaluationSettings:
     )
     out: Path | None = option(None, "folder of the run")
     selection: Selection = field(default_factory=Selection)
-    plan: Plan = field(default_factory=Plan)
     simulation: Simulation = field(default_factory=Simulation)
     timing: Timing = field(default_factory=Timing)
     connection: Connection = field(default_factory=Connection)
@@ -283,7 +250,6 @@ class EvaluationSettings:
 
 GROUPS: dict[str, type] = {
     "selection": Selection,
-    "plan": Plan,
     "simulation": Simulation,
     "timing": Timing,
     "connection": Connection,

@@ -103,18 +103,12 @@ class RunFile(Struct, frozen=True):
     settings: Settings
     about: About
     categories: dict[str, str]
-    budget: dict[str, Any] | None = None
 
 
 def check_settings(run: Mapping[str, object], reference: Reference) -> Settings:
     """The settings of `run` (as in run.json); BundleError if it is one that cannot enter."""
     found = read(RunFile, run, "the run", BundleError)
     settings = found.settings
-    if found.budget is not None:
-        raise BundleError(
-            "the run has a budget: it lists only some of the trials; go on with --resume and no "
-            "--budget"
-        )
     if settings.clock is not None:
         raise BundleError(
             "the run is in real time; the benchmark's clock stands still while a policy thinks"

@@ -69,13 +69,3 @@ def test_the_command_is_noted_without_where_to_write(
     words = ["/there/wire.py", "--json", "--requests", "5", "--circumstances", "it rains", "--fill"]
     monkeypatch.setattr(sys, "argv", words)
     assert common.command() == "python benchmarks/wire.py --requests 5 --fill"
-
-
-@pytest.mark.usefixtures("common")
-def test_intervals_of_a_budget_cover_the_published_rates(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A few runs; `benchmarks/budget.py` makes hundreds. Were a variant's own outcomes to decide on
-    its trials, or were two trials a variant taken for many, this would not hold."""
-    budget = script("budget", monkeypatch)
-    whole, single = budget.cover(budget.truth("GO-1"), 560, 5)
-    assert single.share >= 88 and len(single.held) == 50
-    assert abs(whole.bias) < 1.8 and 2.2 < whole.half < 3.2

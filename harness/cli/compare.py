@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import asdict
 from enum import StrEnum
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from robospa.harness.cli.json_output import AsJson, print_json
 from robospa.harness.cli.ranges import SHARE
 
 if TYPE_CHECKING:
@@ -18,6 +18,10 @@ if TYPE_CHECKING:
 
 GAPS = (0.02, 0.05, 0.1, 0.2)
 """Differences of rates in the table of sample sizes."""
+HALVES = (0.01, 0.025, 0.05)
+"""Half widths of the overall rate there."""
+TRIALS = (2, 10, 100)
+"""Trials of every variant there."""
 
 
 class Metric(StrEnum):
@@ -47,20 +51,19 @@ def compare(
     ci: Annotated[Method, typer.Option(help="intervals of single rates")] = Method.wilson,
     variants: Annotated[bool, typer.Option(help="list all variants, not only those apart")] = False,
     drops: Annotated[bool, typer.Option(help="what each side loses from level to level")] = False,
-    early: Annotated[
-        bool, typer.Option(help="who is ahead, valid at any time of unfinished runs")
+    power: Annotated[
+        bool, typer.Option(help="compare nothing: say how many trials tell rates apart")
     ] = False,
-    power: Annotated[bool, typer.Option(help="trials it takes to tell rates apart")] = False,
     base: Annotated[
         float, typer.Option(callback=SHARE, help="with --power: rate of the first")
     ] = 0.2,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="print all of it as JSON, not as tables")
-    ] = False,
+    tasks: Annotated[str, typer.Option(help="with --power: as in `robospa eval`")] = "all",
+    levels: Annotated[str, typer.Option(help="with --power: such as 1,3-5")] = "1-5",
+    as_json: AsJson = False,
 ) -> None:
     """Say what differs between two runs on the same seeds, or between a run and the paper."""
     if power:
-        _print_power(base)
+        _power(tasks, levels, base, as_json)
         return
     if not (first and second):
         raise ValueError("compare needs two sides: folders of runs, or names of published models")
@@ -68,22 +71,9 @@ def compare(
     from robospa.results.comparison.runs import both_sides
 
     one, two = both_sides(first, second)
-    if early:
-        from robospa.results.comparison.early_stopping import stop_early
-
-        verdict = stop_early(one, two)
-        if as_json:
-            print(json.dumps(asdict(verdict), indent=1))
-            return
-        who = {1: f"{one.name} is better", 2: f"{two.name} is better", 0: "undecided"}
-        print(
-            f"{who[verdict.better]} after {verdict.looked} of {verdict.pairs} pairs "
-            f"(e-value {verdict.evidence:.3g}); {verdict.note}"
-        )
-        return
     found = differences(one, two, metric.value, ci.value)
     if as_json:
-        print(json.dumps(asdict(found), indent=1))
+        print_json(found)
         return
     _print(found, variants)
     if drops:
@@ -138,15 +128,32 @@ def _print_drops(one: ModelResults, two: ModelResults, metric: str) -> None:
             )
 
 
-def _print_power(base: float) -> None:
-    from robospa.results.statistics.power import POWER, plan
+def _power(tasks: str, levels: str, base: float, as_json: bool) -> None:
+    """Print how well the overall rate is known by trials of every variant, if rates are like the
+    published models', and the trials that tell two rates apart."""
+    from robospa.harness.selection import parse_levels, parse_tasks
+    from robospa.results.paper.planning import half_width, published_variances, trials_for
+    from robospa.results.statistics.power import POWER, sample_size
 
+    variants = [(task, level) for task in parse_tasks(tasks) for level in parse_levels(levels)]
+    models = published_variances(variants)
+    widths = {n: {m: half_width(v, n) for m, v in models.items()} for n in TRIALS}
+    enough = {half: max(trials_for(v, half) for v in models.values()) for half in HALVES if models}
+    gaps = {gap: sample_size(base, gap) for gap in GAPS if base + gap < 1}
+    if as_json:
+        apart = [{"gap": gap, **asdict(needed)} for gap, needed in gaps.items()]
+        found = {"half_widths": widths, "enough": enough, "differences": apart}
+        print_json({"variants": len(variants), **found})
+        return
+    for n, by_model in widths.items():
+        if by_model:
+            known = ", ".join(f"{100 * half:.1f} ({model})" for model, half in by_model.items())
+            print(f"--trials {n} ({n * len(variants):,}) tells the overall rate to within {known}")
+    for half, n in enough.items():
+        print(f"For {100 * half:g} points either way --trials {n} is enough")
     print(f"Trials a side to tell rates apart with probability {POWER:.0%}, first rate {base:.0%}")
     print("Equal seeds: by the correlation (phi) of both policies' outcomes on one seed.")
-    for gap in GAPS:
-        if base + gap >= 1:
-            continue
-        needed = plan(base, gap)
+    for gap, needed in gaps.items():
         paired = ", ".join(f"{n} if phi is {phi:g}" for phi, n in needed.paired.items())
         print(
             f"  {100 * gap:.0f} points: {needed.unpaired} on unrelated seeds; "

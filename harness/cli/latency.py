@@ -20,11 +20,7 @@ NAME = "success-latency"
 """Of the files beside the runs."""
 
 
-OTHER_GROUPS = [kind for name, kind in GROUPS.items() if name != "plan"]
-"""A plan chooses trials by their results, and a curve needs the same ones at every latency."""
-
-
-@with_flags([EvaluationSettings, *OTHER_GROUPS], without=["policy", "clock"], hidden=["parts"])
+@with_flags([EvaluationSettings, *GROUPS.values()], without=["policy", "clock"], hidden=["parts"])
 def latency(
     context: typer.Context,
     policy: Annotated[

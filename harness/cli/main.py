@@ -18,7 +18,6 @@ SECTIONS = {
         "serve": "Serve a policy by name or module:function.",
         "check": "Test a policy server against the protocol.",
         "eval": "Evaluate a policy on a fixed list of trials.",
-        "plan": "Say how many trials are enough, and what they will cost.",
         "latency": "Evaluate a policy in real time: success against latency.",
     },
     "Read the results": {

@@ -82,8 +82,6 @@ def run_data(run: Run) -> dict[str, object]:
         return {"parts": {setting_name(part): run_data(part) for part in parts}}
     counts: dict[str, object] = {"trials": len(run.keys), "missing": len(run.missing)}
     counts["ends"] = ends(run)
-    if run.info.budget is not None:
-        counts["budget"] = {"trials": len(run.info.budget.order), "listed": run.info.budget.listed}
     problems = {"problems": problem_data(run.records.values())}
     return {**counts, **problems, **to_json(score_run(run))}
 

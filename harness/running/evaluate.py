@@ -13,7 +13,6 @@ from dataclasses import dataclass, field, replace
 from multiprocessing.connection import Connection
 from typing import Any
 
-from robospa.harness.budget.run import BudgetRun, open_budget
 from robospa.harness.clock.clock import timed_suite, timing_warning
 from robospa.harness.factory import is_url, load_function
 from robospa.harness.running.atomic_file import replace_file
@@ -37,10 +36,9 @@ from robospa.harness.running.runner import Runner, RunOptions
 from robospa.harness.running.status import Status
 from robospa.harness.running.tracking import Careful, open_tracker
 from robospa.harness.running.worker import SHUFFLED_PARTS, WorkerConfig, describe, load_parts
-from robospa.harness.settings import EvaluationSettings, Plan
+from robospa.harness.settings import EvaluationSettings
 from robospa.harness.settings_file import FILE, to_toml
 from robospa.harness.trial_identity import salt_hash
-from robospa.results.records.manifest import read_manifest
 from robospa.results.records.run_io import finished, lost_actions, read_records
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
@@ -70,8 +68,6 @@ class Request:
     wait: float = 0.0
     ray: RaySettings | None = None
     """Where the workers are, if not on this machine."""
-    plan: Plan = field(default_factory=Plan)
-    """Which of the trials are run."""
     in_process: bool = False
     """The policy's server is one of this process, which ends with the run."""
 
@@ -236,7 +232,6 @@ def evaluate(request: Request) -> None:
         check_blind(policies.values())
     check_clock(request.config.clock, [policy.spec for policy in policies.values()])
     manifest = make_manifest(request, policies)
-    first = {key.task: key for key in reversed(list(request.keys))}
     config = ready_config(request.config, request.keys, policies)
     with (
         ray_executor(request.ray, config, _renders(policies)) as executor,
@@ -245,15 +240,12 @@ def evaluate(request: Request) -> None:
         recover_folder(folder)
         known = read_records(folder)
         results = {key.task for key, record in known.items() if finished(record)}
-        old = read_manifest(folder) if request.resume else None
-        budget = open_budget(request.plan, manifest, folder, old)
-        now = manifest if budget is None else budget.manifest
-        open_run(folder, now, request.resume, results)
+        open_run(folder, manifest, request.resume, results)
         if request.settings is not None:
             replace_file(folder / FILE, to_toml(request.settings).encode())
-        missing = [key for key in now.keys if not finished(known.get(key))]
-        total = len(now.keys) if budget is None else budget.expected
-        with Progress(total, len(now.keys) - len(missing)) as progress:
+        missing = [key for key in manifest.keys if not finished(known.get(key))]
+        total = len(manifest.keys)
+        with Progress(total, total - len(missing)) as progress:
             lost = [
                 f"{text}; copy them back before this run is replayed"
                 for text in lost_actions(folder, known)
@@ -272,15 +264,9 @@ def evaluate(request: Request) -> None:
             runner = Runner(config, missing, request.options, on_note=progress.note)
             runner.known = known
             runner.executor = executor
-            if budget is not None:
-                budget.start(known, missing)
-                runner.more, runner.tasks = budget.more, tuple(first)
             films = films_of(config, known, request.options.workers if executor is None else 0)
 
             def add(record: TrialRecord) -> None:
-                if budget is not None:
-                    budget.add(record)
-                    progress.tally.total = budget.expected
                 progress.add(record)
                 tracker.add(record)
                 films.add([record] if record.video else [])
@@ -292,7 +278,7 @@ def evaluate(request: Request) -> None:
 
             runner.on_record, runner.on_status = add, show
             try:
-                _run(runner, budget)
+                runner.run()
                 tracker.finish(folder)
                 about_films = finish_films(films, progress, folder)
             finally:
@@ -302,18 +288,6 @@ def evaluate(request: Request) -> None:
         shares = runner.times.overall_shares()
         for text in [*summary(shares, runner.status(time.monotonic())), *about_films]:
             progress.note(text)
-
-
-def _run(runner: Runner, budget: BudgetRun | None) -> None:
-    """Run all trials; what a budget has spent is kept, after Ctrl-C too."""
-    try:
-        runner.run()
-    except KeyboardInterrupt:
-        if budget is not None:
-            budget.save()
-        raise
-    if budget is not None:
-        budget.save()
 
 
 __all__ = ["Request", "RunAborted", "WorldBroken", "evaluate", "probe_world"]

@@ -19,17 +19,13 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-import msgspec
-
 from robospa.harness.running.atomic_file import PARTIAL, replace_file
 from robospa.harness.running.code_hash import code_hash
 from robospa.protocol.identity import Identity, identity_of
 from robospa.results.records.manifest import (
     FORMAT,
     MANIFEST,
-    Budget,
     RunError,
-    budget_of,
     manifest_keys,
     read_manifest,
 )
@@ -41,18 +37,16 @@ from robospa.trial import TrialKey
 @dataclass(frozen=True)
 class Manifest:
     """A run's `settings`, its fixed `keys`, what is known `about` where it ran, and the category
-    of each of its tasks. With a `budget`, `keys` are what is taken up so far, in that order."""
+    of each of its tasks."""
 
     settings: Mapping[str, Any]
     keys: tuple[TrialKey, ...]
     about: Mapping[str, Any]
     categories: Mapping[str, str] = field(default_factory=dict)
     suite: str = SUITE
-    budget: Budget | None = None
 
     def to_json(self) -> dict[str, Any]:
         """Plain JSON values."""
-        budget = {} if self.budget is None else {"budget": msgspec.to_builtins(self.budget)}
         return {
             "format": FORMAT,
             "suite": self.suite,
@@ -60,7 +54,6 @@ class Manifest:
             "seed_hash": seed_hash(self.keys),
             "categories": dict(self.categories),
             "trials": group_keys(self.keys),
-            **budget,
             "about": json.loads(json.dumps(self.about, default=str)),
         }
 
@@ -73,15 +66,6 @@ def group_keys(keys: Iterable[TrialKey]) -> list[dict[str, Any]]:
         rows.setdefault(row, []).append(key.seed)
     names = ("task", "level", "embodiment", "mode", "split")
     return [{**dict(zip(names, row, strict=True)), "seeds": s} for row, s in rows.items()]
-
-
-def order_of(keys: Iterable[TrialKey]) -> list[int]:
-    """The row of `group_keys` that each of `keys` is in, one after another."""
-    rows: dict[tuple[Any, ...], int] = {}
-    return [
-        rows.setdefault((key.task, key.level, key.embodiment, key.mode, key.split), len(rows))
-        for key in keys
-    ]
 
 
 def seed_hash(keys: Iterable[TrialKey]) -> str:
@@ -157,17 +141,10 @@ def changed_settings(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str
 
 
 def _list_changes(old: Mapping[str, Any], new: Manifest) -> list[str]:
-    """What differs between the trials that were selected, whether all of them are listed or not."""
+    """What differs between the lists of trials."""
     before, after = set(manifest_keys(old)), set(new.keys)
-    budgets = (budget_of(old), new.budget)
-    first, second = (
-        seed_hash(keys) if budget is None else budget.listed_hash
-        for budget, keys in zip(budgets, (before, after), strict=True)
-    )
-    if first == second:
+    if before == after:
         return []
-    if any(budgets):
-        return ["trials: others were selected"]
     return [f"trials: {len(after - before)} new and {len(before - after)} gone"]
 
 
@@ -278,5 +255,5 @@ def open_run(
             "first one again to resume it or choose another --out"
         )
     mended = changed_policies(old.get("about", {}), new["about"])
-    if mended or settings != old.get("settings", {}) or budget_of(old) != manifest.budget:
+    if mended or settings != old.get("settings", {}):
         write_manifest(folder, manifest)

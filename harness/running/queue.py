@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import heapq
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -99,18 +99,11 @@ class TrialQueue:
         self.durations = DurationEstimates(lambda key: self.info(key).steps)
         self.unsettled = 0
         self._retries = retries or {}
-        self.add(keys)
-
-    def add(self, keys: Iterable[TrialKey]) -> bool:
-        """Further trials of the run; whether there are any."""
-        before = self.unsettled
         for key in sorted(keys):
             by_level = self._groups.setdefault(key.task, _Group()).fresh
-            by_level.setdefault(key.level, deque()).append(
-                Pending(key, retries=self._retries.get(key, ()))
-            )
+            pending = Pending(key, retries=self._retries.get(key, ()))
+            by_level.setdefault(key.level, deque()).append(pending)
             self.unsettled += 1
-        return self.unsettled > before
 
     def info(self, key: TrialKey) -> VariantInfo:
         """The variant of `key`; all fields empty if its task cannot be found."""
@@ -123,12 +116,6 @@ class TrialQueue:
                 found = VariantInfo()
             self._info[key.variant] = found
         return self._info[key.variant]
-
-    @property
-    def pending(self) -> int:
-        """How many trials wait for a worker, or for the end of a pause."""
-        groups = self._groups.values()
-        return sum(sum(map(len, g.fresh.values())) + len(g.retries) for g in groups)
 
     @property
     def tasks(self) -> tuple[str, ...]:

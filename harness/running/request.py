@@ -44,7 +44,6 @@ from robospa.harness.settings import (
     Compute,
     Connection,
     EvaluationSettings,
-    Plan,
     SettingsError,
     flat,
 )
@@ -126,7 +125,6 @@ def make_request(
         resume=resume,
         wait=settings.connection.wait,
         ray=_on_ray(compute),
-        plan=settings.plan if keys is None else Plan(),
     )
 
 

@@ -98,9 +98,8 @@ class RunOptions:
 class Runner:
     """Runs `keys` with workers of `executor`, by default processes here as `config` describes.
 
-    `more` gives trials to run besides, when so many wait for so many places of workers. `tasks` are
-    those of all, by default of `keys`. `on_record` gets every record, `on_note` one line for every
-    mishap, `on_status` the run's state now and then. `known` has the records of earlier drivers.
+    `on_record` gets every record, `on_note` one line for every mishap, `on_status` the run's state
+    now and then. `known` has the records of earlier drivers.
     """
 
     config: WorkerConfig
@@ -111,8 +110,6 @@ class Runner:
     executor: Executor | None = None
     on_status: Callable[[Status], None] = lambda status: None
     known: Mapping[TrialKey, TrialRecord] = field(default_factory=dict)
-    more: Callable[[int, int], Sequence[TrialKey]] = lambda waiting, workers: ()
-    tasks: Sequence[str] = ()
 
     def run(self) -> None:
         """Record every trial. Raises RunAborted; on KeyboardInterrupt workers are killed first."""
@@ -130,7 +127,6 @@ class Runner:
             one_trial=self.config.one_trial,
             pause=self.options.backoff,
             patience=self.options.patience,
-            tasks=self.tasks,
         )
         held = self._held = self.options.held
         self._workers = self.executor or LocalExecutor(self.config, most, held)
@@ -144,7 +140,7 @@ class Runner:
         self._checked = time.monotonic()
         self._reported = 0.0
         try:
-            while self._take_up() or self._queue.unsettled:
+            while self._queue.unsettled:
                 self._start_workers()
                 self._assign()
                 self._receive()
@@ -172,11 +168,6 @@ class Runner:
         for slot in [slot for slot in workers if slot.ready and self._held > 1]:
             if len(self._slots) < left and (more := slot.worker.another()) is not None:
                 self._slots.append(Slot(more, time.monotonic() + START_SECONDS, extra=True))
-
-    def _take_up(self) -> bool:
-        """Queue what `more` gives; whether that was anything."""
-        places = self._held * self._most_workers()
-        return self._queue.add(self.more(self._queue.pending, places))
 
     def _most_workers(self) -> int:
         """How many workers there may be now."""

@@ -40,8 +40,7 @@ class Job:
 
 class Scheduler:
     """Hands out the trials of `queue`. `targets` names the policies that can do a task, `one_trial`
-    has the address of those that may do one trial at a time. `tasks` are all that may be queued, by
-    default those that are."""
+    has the address of those that may do one trial at a time."""
 
     def __init__(
         self,
@@ -52,13 +51,12 @@ class Scheduler:
         one_trial: Mapping[str, str] | None = None,
         pause: float = 2.0,
         patience: float = 60.0,
-        tasks: Sequence[str] = (),
     ) -> None:
         self.queue = queue
         self._pause, self._patience = pause, patience
         self._one_trial = one_trial or {}
         tasks_of: dict[str, set[str]] = {}
-        for task in tasks or queue.tasks:
+        for task in queue.tasks:
             for target in targets(task):
                 tasks_of.setdefault(target, set()).add(task)
         self.servers = {

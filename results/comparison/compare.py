@@ -205,7 +205,6 @@ def _group_row(
     b, c = discordant(pairs)
     # One weight for every trial holds inside a category; above it only the interval is fair.
     pooled = kind in ("task", "category") and all(x.first.binary for x in pairs)
-    pooled = pooled and not any(x.gap is not None and x.gap.spread for x in pairs)
     p = mcnemar_mid_p(b, c) if pooled else p_of_interval(honest)
     return Difference(*row, p, b, c, over_tasks=other)
 

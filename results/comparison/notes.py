@@ -48,11 +48,6 @@ def notes(
                 f"Different {what}: {', '.join(ours)} and {', '.join(theirs)}, with the same "
                 "objects in the scenes of one seed."
             )
-    found += [
-        f"{side.name}: {side.info.budget.text}, an estimate with intervals of its plan."
-        for side in (first, second)
-        if side.info.budget is not None
-    ]
     if paired:
         found.append("Paired: trials on the same seeds are held against each other.")
         pairs = {v: len(common_seeds(first, second, v)) for v in common}

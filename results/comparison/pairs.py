@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.scoring.model_results import ModelResults, check_alike
 from robospa.results.scoring.scores import sample_of
 from robospa.results.scoring.setting import COMPARISON, IncomparableError
-from robospa.results.scoring.weights import Variant, strata_of
+from robospa.results.scoring.weights import Variant
 from robospa.results.statistics.bootstrap import Sample
-from robospa.results.statistics.stratified import with_spreads
 
 
 @dataclass(frozen=True)
@@ -49,18 +48,7 @@ def paired_variants(
     common = [variant for variant in one if variant in two]
     if not all(common_seeds(first, second, variant) for variant in common):
         return [VariantPair(v, one[v], two[v], None) for v in common], False
-    pairs = [_paired(first, second, variant, metric) for variant in common]
-    if pairs and (first.info.budget or second.info.budget):
-        pairs = _with_spreads(pairs, {**second.categories, **first.categories})
-    return pairs, True
-
-
-def _with_spreads(pairs: list[VariantPair], category: Mapping[str, str]) -> list[VariantPair]:
-    """`pairs` whose gaps know what all of them tell of the variance of each: a budget's plan chose
-    how many there are."""
-    gaps = [pair.gap for pair in pairs if pair.gap is not None]
-    found = with_spreads(gaps, strata_of([pair.variant for pair in pairs], category))
-    return [replace(pair, gap=gap) for pair, gap in zip(pairs, found, strict=True)]
+    return [_paired(first, second, variant, metric) for variant in common], True
 
 
 def _paired(

@@ -16,7 +16,6 @@ from robospa.categories import BASIC, DIMENSIONS, METRIC_CATEGORIES
 from robospa.results.paper import rounding
 from robospa.results.paper.published import LEVELS, load
 from robospa.results.paper.published_results import published_results
-from robospa.results.records.manifest import Budget
 from robospa.results.records.run_io import Run
 from robospa.results.scoring.model_results import (
     ModelResults,
@@ -51,8 +50,7 @@ class Column:
         """The head of the column."""
         shuffled = " (shuffled sentences)" * self.shuffled
         clock = " (real time)" * bool(self.results.info.clock)
-        budget = f" ({self.budget.text})" if self.budget else ""
-        return self.results.name + " (privileged)" * self.privileged + shuffled + clock + budget
+        return self.results.name + " (privileged)" * self.privileged + shuffled + clock
 
     @property
     def scores(self) -> Scores:
@@ -76,14 +74,9 @@ class Column:
         return self.results.info.shuffled_instructions
 
     @property
-    def budget(self) -> Budget | None:
-        """The plan by which it lists its trials, if it does not list all."""
-        return self.results.info.budget
-
-    @property
     def apart(self) -> bool:
-        """Whether it is never ranked: an ablation, a run in real time, or one with a budget."""
-        return self.shuffled or bool(self.results.info.clock) or self.budget is not None
+        """Whether it is never ranked: an ablation, or a run in real time."""
+        return self.shuffled or bool(self.results.info.clock)
 
     @property
     def embodiment(self) -> str:

@@ -229,9 +229,7 @@ def _lint_listing(
         text = f"{len(missing)} of {len(listed)} trials have no result: {some(missing)}"
         yield Finding("missing", "warning", name, text)
     sizes = Counter(key.variant for key in listed)
-    if run.info.budget is not None:
-        yield Finding("budget", "note", name, f"{run.info.budget.text}: an estimate, never ranked")
-    elif len(set(sizes.values())) > 1:
+    if len(set(sizes.values())) > 1:
         low, high = min(sizes.values()), max(sizes.values())
         text = f"variants have between {low} and {high} trials: their intervals differ in width"
         yield Finding("unequal-trials", "warning", name, text)

@@ -72,41 +72,6 @@ class _About(Struct, frozen=True):
     warnings: list[Any] = []
 
 
-class Budget(Struct, frozen=True):
-    """The plan of a run that lists only some of the trials that were selected.
-
-    `trials` or `seconds` is what it may spend, neither where only a decided comparison ends it.
-    `goal` is what varies as little as possible, as a difference to the run `against` if there is
-    one. Of that comparison `evidence` is the e-value, and `better` is 1 if this run was found to be
-    better, 2 if the other one, 0 if nothing is decided. `listed` trials were selected, with this
-    hash. `order` is how the plan came to list its trials: indices of rows of the manifest's list.
-    """
-
-    listed: Count
-    listed_hash: str
-    order: list[Count]
-    goal: str = "overall"
-    trials: Count | None = None
-    seconds: Number | None = None
-    spent: Number = 0.0
-    """[s] that running it has taken."""
-    against: str = ""
-    better: Count = 0
-    looked: Count = 0
-    """Pairs until it was decided, or so far."""
-    evidence: Number = 1.0
-
-    @property
-    def text(self) -> str:
-        """How many trials of how many, and why no more: `560 of 28,000 trials, a budget`."""
-        if self.trials is not None or self.seconds is not None:
-            why = "a budget" + f", compared with {self.against}" * bool(self.against)
-        else:
-            why = "stopped early" if self.better else "not finished"
-            why += f", compared with {self.against}"
-        return f"{len(self.order):,} of {self.listed:,} trials, {why}"
-
-
 class _Manifest(Struct, frozen=True):
     """What is relied on in a manifest; whatever else it holds, and what it lacks, is free."""
 
@@ -115,7 +80,6 @@ class _Manifest(Struct, frozen=True):
     categories: dict[str, str] = {}
     suite: str = ""
     seed_hash: str = ""
-    budget: Budget | None = None
 
 
 class RunError(Exception):
@@ -157,8 +121,6 @@ class RunInfo:
     world: Mapping[str, Any] = field(default_factory=dict)
     servers: Mapping[str, str] = field(default_factory=dict)
     """The checkpoint that each policy server named, by address; empty for one that named none."""
-    budget: Budget | None = None
-    """The plan of a run with a budget; None of one that lists all that was selected."""
 
 
 def run_info(manifest: Mapping[str, Any]) -> RunInfo:
@@ -187,7 +149,6 @@ def run_info(manifest: Mapping[str, Any]) -> RunInfo:
         machine=about.get("machine", {}),
         world=about.get("world", {}),
         servers=_servers(about),
-        budget=budget_of(manifest),
     )
 
 
@@ -198,12 +159,6 @@ def _clock(declared: Mapping[str, Any] | None) -> str:
     switching, seconds = declared.get("switching", "wait"), declared.get("seconds")
     limit = f" within {seconds:g} s" if seconds is not None else ""
     return f"real:{declared['latency']}{'' if switching == 'wait' else f' {switching}'}{limit}"
-
-
-def budget_of(manifest: Mapping[str, Any]) -> Budget | None:
-    """The plan of a run with a budget; RunError if it is malformed."""
-    found = manifest.get("budget")
-    return None if found is None else read(Budget, found, "the run's budget", RunError)
 
 
 def _servers(about: Mapping[str, Any]) -> dict[str, str]:

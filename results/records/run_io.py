@@ -282,8 +282,6 @@ def read_run(folder: str | Path) -> Run:
         records = merge(found, records)
         results += [record for record in found if finished(record)]
         torn += [path.name] * was_torn
-    if going_on and "budget" in manifest:  # its list has grown since
-        manifest = read_manifest(folder)
     counts = Counter(r.key for r in results if not withdraws(records[r.key], r))
     repeated = tuple(key for key, count in counts.items() if count > 1)
     keys = manifest_keys(manifest)

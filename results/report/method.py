@@ -14,10 +14,6 @@ SINGLE = {"wilson": "Wilson's", "exact": "Clopper and Pearson's exact", "jeffrey
 """Methods for the success rate of one variant, by the name of `intervals.METHODS`."""
 BOOTSTRAP = "95 % intervals are the paper's: a bootstrap over the trials within each variant."
 PROGRESS = "Intervals of progress are a bootstrap over trials."
-BUDGET = (
-    "A budget gives every variant trials by what the others' results suggest; averages of such a "
-    "run have Wilson's interval with the number of trials that would vary as much."
-)
 PRINTED = (
     "Of published progress only the mean is known: its interval is rather too wide than too narrow."
 )
@@ -32,10 +28,9 @@ def method_notes(columns: Sequence[Column]) -> list[str]:
         if (estimate := cell.values.get("ps")) is not None
     ]  # fmt: skip
     printed = any(column.published for column, _ in cells)
-    budget = [BUDGET] if any(column.budget for column in columns) else []
     ci = columns[0].scores.ci
     if ci == "bootstrap":
-        return [AVERAGES, BOOTSTRAP, *budget, *([PRINTED] if printed else [])]
+        return [AVERAGES, BOOTSTRAP, *([PRINTED] if printed else [])]
     rates = (
         f"95 % intervals are over trials on other seeds: {SINGLE[ci]} for the rate of one variant; "
         "for an average MOVER, which combines the intervals of the variants below it."
@@ -44,7 +39,6 @@ def method_notes(columns: Sequence[Column]) -> list[str]:
     return [
         AVERAGES,
         rates,
-        *budget,
         *([PROGRESS] if resampled else []),
         *([PRINTED] if printed else []),
     ]

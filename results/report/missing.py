@@ -5,7 +5,6 @@ from __future__ import annotations
 from robospa.results.records.reasons import grouped
 from robospa.results.records.run_io import Run
 from robospa.results.scoring.scores import Scores
-from robospa.results.statistics.sequential import NOT_OFFICIAL
 
 
 def missing_lines(scores: Scores) -> list[str]:
@@ -16,24 +15,6 @@ def missing_lines(scores: Scores) -> list[str]:
         for cell in scores.cells.values()
         if cell.missing
     ]
-
-
-def budget_lines(run: Run) -> list[str]:
-    """One sentence on a run that does not list all trials, and one on its comparison."""
-    budget = run.info.budget
-    if budget is None:
-        return []
-    found = [
-        f"{budget.text}: an estimate with intervals of its plan, never ranked; --resume without "
-        "--budget and --against goes on to all"
-    ]
-    if budget.against:
-        verdict = {0: "undecided", 1: "this run is better", 2: f"{budget.against} is better"}
-        found.append(
-            f"against {budget.against}: {verdict[budget.better]} after {budget.looked} pairs "
-            f"(e-value {budget.evidence:.3g}); {NOT_OFFICIAL}"
-        )
-    return found
 
 
 def loss_lines(run: Run, most: int = 5) -> list[str]:

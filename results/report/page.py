@@ -138,8 +138,6 @@ def badges(runs: Sequence[Run], names: Sequence[str]) -> list[str]:
             made.append(f"{of}an ablation, every trial had the sentence of another scene")
         if run.info.clock:
             made.append(f"{of}in real time ({run.info.clock}), a suite of its own")
-        if run.info.budget is not None:
-            made.append(f"{of}{run.info.budget.text}: an estimate, never ranked")
         if run.missing:
             made.append(f"{of}{len(run.missing)} of {len(run.keys)} trials are missing")
     return made

@@ -56,7 +56,6 @@ def about(run: Run) -> dict[str, object]:
         "seeded": bool(info.seeded),
         "spec": info.spec,
         "trials": len(run.keys),
-        "budget": None if info.budget is None else info.budget.text,
         "results": len(run.keys) - len(run.without_result),
         "missing": len(run.missing),
         "to_run": len(run.waiting),
@@ -127,7 +126,6 @@ def facts(run: Run) -> list[tuple[str, str]]:
         ("actions", _words(f"{words}{spec[n]}" for n, words in ACTIONS.items() if spec.get(n))),
         ("seeding", f"{seeded}; seed {settings.get('policy_seed', 0)}" if spec else ""),
         ("trials", _trials(run)),
-        ("budget", info.budget.text if info.budget is not None else ""),
         ("ends", _words(f"{count} {name}" for name, count in ends(run).items())),
         ("not executed as sent", "; ".join(problem_lines(run.records.values()))),
         ("setting", _words(_line(settings.get(n)) for n in ("embodiment", "mode", "split")

@@ -10,7 +10,7 @@ from robospa.results.records.action_problems import problem_lines
 from robospa.results.records.run_io import Run
 from robospa.results.records.settings_of_run import setting_name
 from robospa.results.report.faults import policy_error_lines, repeat_lines
-from robospa.results.report.missing import budget_lines, loss_lines, missing_lines
+from robospa.results.report.missing import loss_lines, missing_lines
 from robospa.results.report.run_card import ends
 from robospa.results.scoring.score_json import level_name
 from robospa.results.scoring.scores import AverageScore, Scores, VariantScore
@@ -104,8 +104,6 @@ def score_table(run: Run, scores: Scores) -> Table:
         knows = " (knows every trial's seed)"
     knows += " (ablation: sentences of other scenes)" * run.info.shuffled_instructions
     knows += f" ({run.info.clock})" * bool(run.info.clock)
-    if run.info.budget is not None:
-        knows += f" ({run.info.budget.text})"
     heads = (*map(level_name, scores.levels), "SR [95 %]", "ONTA", "PS", "trials")
     return Table(
         "scores",
@@ -152,7 +150,7 @@ def print_scores(run: Run, scores: Scores) -> None:
     show(score_table(run, scores))
     console = plain_console(wide=130)
     console.print(_ends_line(run), style="dim", soft_wrap=True)
-    lines = [*budget_lines(run), *missing_lines(scores), *loss_lines(run), *policy_error_lines(run)]
+    lines = [*missing_lines(scores), *loss_lines(run), *policy_error_lines(run)]
     for line in [*lines, *repeat_lines(run), *problem_lines(run.records.values())]:
         console.print(line, style="yellow", soft_wrap=True)
 

@@ -164,5 +164,5 @@ def results_of_records(
         if record is not None and finished(record):
             trials.setdefault(key.variant, {})[key.seed] = record
     setting = setting_of(keys, info.suite, info.step_scale, info.clock)
-    scores = score(keys, records, info.categories, ci, info.budget is not None)
+    scores = score(keys, records, info.categories, ci)
     return ModelResults(name, scores, setting, info, trials)

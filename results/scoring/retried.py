@@ -49,8 +49,7 @@ def with_repeated_failed(
 def worst_case(run: Run, ci: str = METHODS[0]) -> Scores:
     """The scores of `run` if every repeated trial had failed. What missing trials leave open is in
     `VariantScore.worst` and `AverageScore.worst`, as always."""
-    records, budget = with_repeated_failed(run.records), run.info.budget is not None
-    return score(run.keys, records, run.info.categories, ci, budget)
+    return score(run.keys, with_repeated_failed(run.records), run.info.categories, ci)
 
 
 MOST_REPEATED = 0.01

@@ -19,7 +19,7 @@ import numpy as np
 from robospa.categories import BASIC, CATEGORIES, DIMENSIONS, METRICS, PROCEDURAL, SPATIAL
 from robospa.results.records.run_io import Run, finished
 from robospa.results.records.trial_record import TrialRecord
-from robospa.results.scoring.weights import Variant, strata_of
+from robospa.results.scoring.weights import Variant
 from robospa.results.statistics.bootstrap import Sample, progress, rate
 from robospa.results.statistics.intervals import (
     METHODS,
@@ -27,11 +27,9 @@ from robospa.results.statistics.intervals import (
     chance_corrected,
     interval_of,
     mean,
-    planned,
     wilson,
 )
 from robospa.results.statistics.onta import of_bound
-from robospa.results.statistics.stratified import with_spreads
 from robospa.trial import TrialKey
 
 Weighted = tuple[tuple[Sample, float], ...]
@@ -265,7 +263,7 @@ def _join(parts: Sequence[VariantScore | AverageScore], ci: str = METHODS[0]) ->
             joined = mean(known) if len(known) == len(below) else None
             if joined is not None and samples[metric]:
                 found, weights = zip(*samples[metric], strict=True)
-                if ci == "bootstrap" or planned(found):
+                if ci == "bootstrap":
                     joined = replace(interval_of(found, weights, ci), value=joined.value)
             values[metric] = joined
     return AverageScore(
@@ -298,12 +296,10 @@ def score(
     records: Mapping[TrialKey, TrialRecord],
     category_of: Mapping[str, str] | None = None,
     ci: str = METHODS[0],
-    budget: bool = False,
 ) -> Scores:
     """All scores of the trials `keys` from their `records`, with intervals by the method `ci`.
 
-    `category_of` tells the category of tasks that may have no record yet. With a `budget` a plan
-    chose `keys`: averages have `intervals.stratified_mean`.
+    `category_of` tells the category of tasks that may have no record yet.
     """
     listed: dict[tuple[str, int], list[TrialKey]] = {}
     for key in keys:
@@ -314,7 +310,7 @@ def score(
     for (task, level), members in listed.items():
         found = [records[k] for k in members if k in records and finished(records[k])]
         cells[task, level] = score_cell(task, level, category.get(task, ""), len(members), found)
-    return combine(_with_spreads(cells) if budget else cells, ci)
+    return combine(cells, ci)
 
 
 def combine(cells: Mapping[Variant, VariantScore], ci: str = METHODS[0]) -> Scores:
@@ -322,21 +318,6 @@ def combine(cells: Mapping[Variant, VariantScore], ci: str = METHODS[0]) -> Scor
     return Scores({variant: with_intervals(cell, ci) for variant, cell in cells.items()}, ci)
 
 
-def _with_spreads(cells: Mapping[Variant, VariantScore]) -> dict[Variant, VariantScore]:
-    """`cells` whose samples know what all of them tell of the variance of each."""
-    made = dict(cells)
-    for metric in METRICS:
-        own = [variant for variant, cell in cells.items() if metric in cell.samples]
-        if own:
-            strata = strata_of(own, {task: cells[task, n].category for task, n in own})
-            found = with_spreads([cells[variant].samples[metric] for variant in own], strata)
-            for variant, sample in zip(own, found, strict=True):
-                samples = {**made[variant].samples, metric: sample}
-                made[variant] = replace(made[variant], samples=samples)
-    return made
-
-
 def score_run(run: Run, ci: str = METHODS[0]) -> Scores:
     """All scores of `run`, of what has been run so far, with intervals by the method `ci`."""
-    budget = run.info.budget is not None
-    return score(run.counted, run.records, run.info.categories, ci, budget)
+    return score(run.counted, run.records, run.info.categories, ci)

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from robospa.results.statistics.stratified import Strata
-
 Variant = tuple[str, int]
 """Task and level."""
 
@@ -19,9 +17,3 @@ def weights_of(variants: Sequence[Variant], category: Mapping[str, str]) -> list
     for task in tasks:
         sizes[category[task]] = sizes.get(category[task], 0) + 1
     return [1 / (len(sizes) * sizes[category[t]] * tasks[t]) for t, _ in variants]
-
-
-def strata_of(variants: Sequence[Variant], category: Mapping[str, str]) -> Strata:
-    """`variants` as strata of their mean."""
-    tasks, levels = [task for task, _ in variants], [level for _, level in variants]
-    return Strata(tasks, levels, [category[t] for t in tasks], weights_of(variants, category))

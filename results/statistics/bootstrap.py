@@ -30,29 +30,15 @@ GRID = 1 << 16
 
 
 @dataclass(frozen=True)
-class Spread:
-    """What a plan over many variants tells of one (`statistics.stratified`).
-
-    `variance` is that of one outcome, as a part of the largest. `gain`: how many times as many
-    trials would tell as little of the mean of all variants if they were not told apart.
-    """
-
-    variance: float
-    gain: float
-
-
-@dataclass(frozen=True)
 class Sample:
     """The outcomes of one variant's trials: `counts[c]` trials had outcome c = 0, 1, 2...
 
-    The value of a trial is `shift + scale * c`, that of the variant the mean over its trials. Only
-    variants whose numbers of trials a plan chose have a `spread`.
+    The value of a trial is `shift + scale * c`, that of the variant the mean over its trials.
     """
 
     counts: tuple[int, ...]
     scale: float = 1.0
     shift: float = 0.0
-    spread: Spread | None = None
 
     def __post_init__(self) -> None:
         if sum(self.counts) < 1 or min(self.counts) < 0 or len(self.counts) < 2:
@@ -69,14 +55,6 @@ class Sample:
     def total(self) -> int:
         """Sum of the outcomes; of 0/1 outcomes the successes."""
         return sum(c * count for c, count in enumerate(self.counts))
-
-    @property
-    def moments(self) -> tuple[float, float]:
-        """Means of the outcomes, as parts of the largest possible one, and of their squares."""
-        parts = [c / (len(self.counts) - 1) for c in range(len(self.counts))]
-        first = sum(part * n for part, n in zip(parts, self.counts, strict=True))
-        second = sum(part * part * n for part, n in zip(parts, self.counts, strict=True))
-        return first / self.trials, second / self.trials
 
     @property
     def value(self) -> float:

@@ -170,8 +170,6 @@ def paired_sample_difference(gaps: Sample) -> Estimate:
 
 def paired_mean(gaps: Sequence[Sample], weights: Sequence[float]) -> Estimate:
     """The weighted sum of the differences of pairs, as `paired_sample_difference` has them."""
-    if len(gaps) > 1 and planned(gaps):
-        return stratified_mean(gaps, weights)
     return mover([paired_sample_difference(gap) for gap in gaps], weights)
 
 
@@ -185,62 +183,17 @@ def interval_of(
 
     One sample is a variant; an average over tasks and categories is the flat list of its variants,
     each weighted by 1 / (categories x tasks in its category). `bootstrap` is the paper's; the
-    others are MOVER on the limits of the single rates, with progress always bootstrapped. Variants
-    whose trials a plan chose have `stratified_mean` instead.
+    others are MOVER on the limits of the single rates, with progress always bootstrapped.
     """
     if method not in METHODS:
         raise ValueError(f"no interval is called {method!r}; there are {', '.join(METHODS)}")
     shares = [1 / len(samples)] * len(samples) if weights is None else list(weights)
-    if len(samples) > 1 and planned(samples):
-        return stratified_mean(samples, shares)
     if method == "bootstrap":
         value = sum(w * s.value for s, w in zip(samples, shares, strict=True))
         name = "bootstrap" if len(samples) == 1 else "stratified bootstrap"
         return _percentile(value, draw(samples, shares, seed), name)
     cells = [_cell(s, method, seed + n) for n, s in enumerate(samples)]
     return mover(cells, shares)
-
-
-def planned(samples: Sequence[Sample]) -> bool:
-    """Whether a plan chose the numbers of trials of all `samples`."""
-    return all(s.spread is not None for s in samples)
-
-
-def stratified_mean(samples: Sequence[Sample], weights: Sequence[float]) -> Estimate:
-    """The weighted sum (weights not negative) of `samples` that have a spread: Wilson's interval
-    with the number of trials that would vary as much as these do.
-
-    Few trials of a variant say little of its limits, so MOVER on them would be twice as wide as
-    needed. A part of the whole never gains more from its variants than the whole does.
-    ValueError if a sample has no spread.
-    """
-    spreads = [s.spread for s in samples if s.spread is not None]
-    if len(spreads) < len(samples) or not samples:
-        raise ValueError("a sample that no plan was made for has no spread")
-    moments = [s.moments for s in samples]
-    reach = [w * s.scale * (len(s.counts) - 1) for s, w in zip(samples, weights, strict=True)]
-    width = sum(reach)
-    shares = [r / width for r in reach]
-    mean = sum(u * first for u, (first, _) in zip(shares, moments, strict=True))
-    whole = sum(u * second for u, (_, second) in zip(shares, moments, strict=True)) - mean**2
-    parts = [u * u / s.trials for u, s in zip(shares, samples, strict=True)]
-    variance = sum(part * spread.variance for part, spread in zip(parts, spreads, strict=True))
-    variance = max(variance, whole * sum(parts) / max(s.gain for s in spreads))
-    limits = _with_variance(mean, variance, 1 / sum(parts))
-    shift = sum(w * s.shift for s, w in zip(samples, weights, strict=True))
-    low, high = shift + width * limits.low, shift + width * limits.high
-    return Estimate(shift + width * mean, low, high, "stratified Wilson")
-
-
-def _with_variance(mean: float, variance: float, trials: float) -> Estimate:
-    """Wilson's interval of a `mean` that has this `variance`; of 0 and 1, as of so many `trials`.
-
-    `mean` may be a rounding error away from 0 or 1.
-    """
-    if min(mean, 1 - mean) < 1e-9 or variance <= 0:
-        return wilson(round(mean) * trials, trials)
-    count = mean * (1 - mean) / variance
-    return wilson(mean * count, count)
 
 
 def over_tasks(

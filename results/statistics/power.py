@@ -17,7 +17,7 @@ ALPHA = 0.05
 
 
 @dataclass(frozen=True)
-class Plan:
+class SampleSize:
     """Trials a side that tell `base` from `other`; `paired` by correlation of the outcomes."""
 
     base: float
@@ -64,9 +64,9 @@ def discordant(base: float, other: float, correlation: float) -> float:
     return base + other - 2 * together
 
 
-def plan(
+def sample_size(
     base: float, gap: float, correlations: Sequence[float] = (0.25, 0.5), power: float = POWER
-) -> Plan:
+) -> SampleSize:
     """Trials needed to tell `base` from `base + gap`; impossible correlations are left out."""
     other = base + gap
     paired = {}
@@ -75,7 +75,7 @@ def plan(
             paired[correlation] = trials_paired(base, other, correlation, power)
         except ValueError:
             continue
-    return Plan(base, other, trials_unpaired(base, other, power), paired)
+    return SampleSize(base, other, trials_unpaired(base, other, power), paired)
 
 
 def _z(power: float, alpha: float) -> float:

@@ -46,7 +46,6 @@ ELSEWHERE = {
 }
 """Commands that need more than a run on disk, and the file of the test that parses their JSON."""
 HERE = {
-    "plan": "plan --tasks GAC --levels 5 --trials 20",
     "report": "report {run}",
     "failures": "failures {run}",
     "compare": "compare {run} {other}",

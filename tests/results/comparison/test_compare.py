@@ -10,7 +10,6 @@ from run_by_hand import outcomes, record, write
 
 from robospa.results.comparison.compare import Comparison, Difference, compare
 from robospa.results.comparison.drops import drops
-from robospa.results.comparison.early_stopping import stop_early
 from robospa.results.paper.published_results import published_results
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.scoring.model_results import ModelResults, results_of_run
@@ -151,21 +150,6 @@ def test_drops_between_levels(tmp_path: Path) -> None:
     )
 
 
-def test_the_early_verdict_is_marked(tmp_path: Path) -> None:
-    one = side(tmp_path / "a", outcomes(SIZE, 1, [1] * 12))
-    two = side(tmp_path / "b", outcomes(SIZE, 1, [0] * 12))
-    found = stop_early(one, two)
-    assert (found.better, found.looked, found.pairs) == (1, 7, 12)
-    assert "no result to publish" in found.note
-
-
-def test_early_stopping_hears_every_variant_in_turn(tmp_path: Path) -> None:
-    one = outcomes(SIZE, 1, [1] * 30) + outcomes(MUGS, 1, [0] * 30)
-    two = outcomes(SIZE, 1, [0] * 30) + outcomes(MUGS, 1, [1] * 30)
-    found = stop_early(side(tmp_path / "a", one), side(tmp_path / "b", two))
-    assert (found.better, found.looked) == (0, 60)  # one variant each: nobody is better
-
-
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -218,8 +202,6 @@ def test_what_cannot_be_compared_is_one_sentence(tmp_path: Path) -> None:
     second = side(tmp_path / "b", outcomes(MUGS, 1, [1]))
     with pytest.raises(IncomparableError, match="no variant in common"):
         compare(first, second)
-    with pytest.raises(IncomparableError, match="share no seed"):
-        stop_early(first, second)
     empty = side(tmp_path / "c", [record(SIZE, 1, 0, 0, end="infrastructure")])
     with pytest.raises(IncomparableError, match="holds no result yet"):
         compare(first, empty)

@@ -1,4 +1,4 @@
-"""Sample sizes and early stopping: known numbers, and simulations that keep their promise."""
+"""Sample sizes: known numbers, and simulations that keep their promise."""
 
 from __future__ import annotations
 
@@ -7,12 +7,11 @@ import pytest
 
 from robospa.results.statistics.power import (
     discordant,
-    plan,
     power_paired,
+    sample_size,
     trials_paired,
     trials_unpaired,
 )
-from robospa.results.statistics.sequential import NOT_OFFICIAL, THRESHOLD, decide, evidence
 from robospa.results.statistics.significance import mcnemar_mid_p
 
 
@@ -41,42 +40,12 @@ def test_the_power_formula_agrees_with_simulated_tests() -> None:
     assert found == pytest.approx(0.58, abs=0.03)
 
 
-def test_a_plan_leaves_out_correlations_that_cannot_be() -> None:
-    assert set(plan(0.2, 0.05).paired) == {0.25, 0.5}
-    assert set(plan(0.02, 0.5, (0.0, 0.5)).paired) == {0.0}
+def test_a_sample_size_leaves_out_correlations_that_cannot_be() -> None:
+    assert set(sample_size(0.2, 0.05).paired) == {0.25, 0.5}
+    assert set(sample_size(0.02, 0.5, (0.0, 0.5)).paired) == {0.0}
 
 
 @pytest.mark.parametrize(("base", "other"), [(0.2, 0.2), (-0.1, 0.2), (0.5, 1.1)])
 def test_rates_that_are_none_are_refused(base: float, other: float) -> None:
     with pytest.raises(ValueError, match="not two different rates"):
         trials_unpaired(base, other)
-
-
-def test_evidence_by_hand() -> None:
-    assert evidence(0, 0) == pytest.approx(1.0)
-    assert evidence(1, 0) == pytest.approx(1.0)  # one win says nothing yet
-    assert evidence(2, 0) == pytest.approx(1.5)  # 4 * 3/8
-    assert evidence(7, 0) > THRESHOLD > evidence(6, 0)
-    with pytest.raises(ValueError, match="no counts"):
-        evidence(-1, 0)
-
-
-def test_a_verdict_says_where_it_stopped_and_that_it_is_no_result() -> None:
-    found = decide([(True, True), *[(False, True)] * 10])
-    assert (found.better, found.looked, found.pairs) == (2, 8, 11)
-    assert found.note == NOT_OFFICIAL
-    assert decide([(True, True)] * 50).better == 0
-
-
-def test_looking_after_every_pair_rarely_finds_what_is_not_there() -> None:
-    generator, looks, promised, peeked = np.random.default_rng(0), 100, 0, 0
-    for _ in range(400):
-        outcomes = generator.random((looks, 2)) < 0.4
-        promised += decide([(bool(a), bool(b)) for a, b in outcomes]).better != 0
-        first = np.cumsum(outcomes[:, 0] & ~outcomes[:, 1])
-        second = np.cumsum(outcomes[:, 1] & ~outcomes[:, 0])
-        peeked += any(
-            mcnemar_mid_p(int(b), int(c)) < 0.05 for b, c in zip(first[9:], second[9:], strict=True)
-        )
-    assert promised / 400 <= 0.05
-    assert peeked / 400 >= 0.12  # what the e-value is for
