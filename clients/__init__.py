@@ -18,18 +18,17 @@ from urllib.parse import urlsplit
 
 from robospa.clients.detect import explain_error
 from robospa.clients.dialect import TLS_PORT, ConnectionParams, Dialect, Endpoint, dialects
-from robospa.protocol.client import RemotePolicy, WireClient, expecting
+from robospa.protocol.client import Identity, RemotePolicy, WireClient, expecting
 from robospa.protocol.codec import DEFAULT_LIMITS, Limits
 from robospa.protocol.errors import (
     HandshakeError,
     ServerError,
     TransportError,
     Unauthorized,
+    without_secrets,
 )
-from robospa.protocol.identity import Identity
 from robospa.protocol.options import read_options, url_options
 from robospa.protocol.policy import PolicySpec
-from robospa.protocol.sanitize import without_secrets
 from robospa.protocol.transport import Timeouts
 
 __all__ = ["check_options", "connect", "find_endpoint"]

@@ -11,7 +11,7 @@ import hashlib
 import os
 from pathlib import Path
 
-from robospa.protocol.sanitize import printable
+from robospa.protocol.errors import printable
 
 SAMPLES, BLOCK = 16, 2**16
 """Blocks that are read of a file, spread evenly, and bytes of each."""

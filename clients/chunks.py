@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.action_space import ActionSpace
-from robospa.protocol.errors import PolicyAnswerError
+from robospa.protocol.errors import PolicyAnswerError, printable
 from robospa.protocol.policy import MAX_HORIZON
-from robospa.protocol.sanitize import printable
 
 NAMED = 160
 """Characters of foreign names in an error."""

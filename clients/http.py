@@ -26,8 +26,9 @@ from robospa.protocol.errors import (
     ProtocolViolation,
     ServerError,
     Unauthorized,
+    printable,
+    without_secrets,
 )
-from robospa.protocol.sanitize import printable, without_secrets
 from robospa.protocol.transport import MOVED
 
 MAX_ANSWER = 64 * 2**20

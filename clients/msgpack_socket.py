@@ -8,8 +8,7 @@ from __future__ import annotations
 from robospa.clients.dialect import ConnectionParams
 from robospa.clients.numpy_msgpack import Form, pack, unpack
 from robospa.protocol.client import violation
-from robospa.protocol.errors import DecodeError, TransportError
-from robospa.protocol.sanitize import printable
+from robospa.protocol.errors import DecodeError, TransportError, printable
 from robospa.protocol.transport import Transport
 
 

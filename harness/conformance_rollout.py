@@ -17,8 +17,7 @@ from robospa.harness.world import World
 from robospa.protocol.client import RemotePolicy
 from robospa.protocol.conformance import CheckResult
 from robospa.protocol.errors import WireError
-from robospa.protocol.policy import PolicySpec
-from robospa.protocol.synthetic import robot_of
+from robospa.protocol.policy import PolicySpec, robot_of
 from robospa.results.records.action_problems import problem_counts
 from robospa.results.records.trial_record import TrialRecord
 from robospa.tasks.seeds import accepted

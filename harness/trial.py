@@ -31,8 +31,7 @@ from robospa.harness.trial_times import Stopwatch, answer_times
 from robospa.harness.world import ActionError, StepResult, TellsInstruction, World
 from robospa.observation import Observation, View
 from robospa.protocol.errors import PolicyAnswerError, PolicyError
-from robospa.protocol.policy import Policy, PolicySpec, TrialInfo
-from robospa.protocol.validation import check_chunk
+from robospa.protocol.policy import Policy, PolicySpec, TrialInfo, check_chunk
 from robospa.results.records.action_problems import KINDS, ProblemKind
 from robospa.results.records.trial_record import PROCESSOR, EventRow, TrialRecord
 from robospa.tasks.catalog import build_scene

@@ -4,24 +4,28 @@
 dialects, each by a `WireClient` of its own. Requests are answered one by one; an answer with the
 wrong id ends the connection, because from then on every action could belong to another observation.
 There is no reconnect inside a trial: `reconnect()` is for the harness, between trials, and refuses
-a server that is another one meanwhile (`robospa.protocol.identity`). Errors: see
+a server that is another one meanwhile (`Identity`). Errors: see
 `robospa.protocol.errors`.
 """
 
 from __future__ import annotations
 
+import hashlib
+import json
 import math
+import re
 import ssl as ssl_module
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
+from dataclasses import dataclass
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar, cast
+from typing import TYPE_CHECKING, Protocol, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robospa.observation import Observation
-from robospa.protocol.codec import DEFAULT_LIMITS, Limits
+from robospa.protocol.codec import DEFAULT_LIMITS, Limits, encode_images
 from robospa.protocol.errors import (
     CallTimeout,
     ConnectionLost,
@@ -32,9 +36,8 @@ from robospa.protocol.errors import (
     ServerError,
     SpecMismatch,
     TransportError,
+    printable,
 )
-from robospa.protocol.identity import Identity, identity_of
-from robospa.protocol.images import encode_images
 from robospa.protocol.messages import (
     BAD_ANSWER,
     BUSY,
@@ -51,13 +54,121 @@ from robospa.protocol.messages import (
     pack,
     unpack,
 )
-from robospa.protocol.policy import PolicySpec, TrialInfo
-from robospa.protocol.sanitize import printable
+from robospa.protocol.policy import PolicySpec, TrialInfo, check_chunk, check_size, compare_specs
 from robospa.protocol.transport import Address, Timeouts, Transport
-from robospa.protocol.validation import check_chunk, check_size, compare_specs
 
 if TYPE_CHECKING:
     from typing_extensions import Self
+
+NOT_OF_THE_SERVER = ("warnings", "redirected_to")
+"""Entries of a greeting that our client adds."""
+DECLARED = ("dialect", "version", "server", "spec", "options")
+"""Entries with a fixed meaning; all others are a server's own, and may hold anything."""
+TRANSIENT = re.compile(
+    r"uptime|time|timestamp|now|clock|started|boot|pid|uuid|nonce|device|gpu|port|ip|address|node"
+    r"|host(name)?|(session|connection|client|request)s?"
+)
+"""Words in the name of an entry that may change while a server stays the same."""
+CHECKPOINT = re.compile(
+    r"checkpoints?|ckpt|weights|path|revision|commit|sha(256)?|hash|digest|fingerprint"
+)
+"""Words in the name of an entry that tells one checkpoint from another."""
+SHOWN = 100
+"""Characters of a value in a message."""
+
+
+@dataclass(frozen=True)
+class Identity:
+    """Which policy a server serves: all that its greeting says of it and that a second one repeats.
+
+    A URL names a machine and not a checkpoint. So a run keeps who answered at its start, and every
+    later connection is compared with that. Left out is what changes while a server stays the same:
+    names that say so (an uptime, a process, the machine), flags that are on or off, and whatever
+    differs between two greetings of one server (`repeated_in`).
+
+    `parts`: JSON values by dotted name, such as `spec.horizon`; `volatile`: names of those left out
+    because they were found to change.
+    """
+
+    parts: Mapping[str, object]
+    volatile: frozenset[str] = frozenset()
+
+    @property
+    def hash(self) -> str:
+        """16 hexadecimal digits that are equal for equal parts."""
+        text = json.dumps(dict(self.parts), sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+    @property
+    def checkpoint(self) -> str:
+        """What the server says of its checkpoint; empty if nothing names one."""
+        for name, value in (
+            ("spec.checkpoint", self.parts.get("spec.checkpoint")),
+            *self.own_parts(),
+        ):
+            if isinstance(value, (str, int)) and value != "" and _speaks_of(CHECKPOINT, name):
+                return str(value)[:SHOWN]
+        return ""
+
+    def own_parts(self) -> Iterator[tuple[str, object]]:
+        """The parts that are a server's own, by name."""
+        return (
+            (name, value)
+            for name, value in self.parts.items()
+            if name.partition(".")[0] not in DECLARED
+        )
+
+    def repeated_in(self, again: Identity) -> Identity:
+        """This identity without what differs in a second greeting of the same server."""
+        names = {*self.parts, *again.parts}
+        changed = {n for n in names if self.parts.get(n) != again.parts.get(n)}
+        kept = {name: value for name, value in self.parts.items() if name not in changed}
+        return Identity(kept, self.volatile | changed)
+
+    def changes(self, now: Identity) -> list[str]:
+        """One phrase per part that is another one in `now`; empty if it is the same policy."""
+        ignored = self.volatile | now.volatile
+        names = [n for n in {**self.parts, **now.parts} if n not in ignored]
+        pairs = [(n, self.parts.get(n), now.parts.get(n)) for n in names]
+        return [
+            f"{name.removeprefix('spec.')} was {_shown(old)} and is {_shown(new)}"
+            for name, old, new in pairs
+            if old != new
+        ]
+
+
+def identity_of(hello: Mapping[str, object], volatile: Collection[str] = ()) -> Identity:
+    """The identity in a greeting (JSON values), without the parts named in `volatile`."""
+    said = {name: value for name, value in hello.items() if name not in NOT_OF_THE_SERVER}
+    parts = {name: value for name, value in _flat(said) if name not in volatile}
+    kept = {
+        name: value
+        for name, value in parts.items()
+        if name.partition(".")[0] in DECLARED
+        or not (isinstance(value, bool) or _speaks_of(TRANSIENT, name))
+    }
+    return Identity(kept, frozenset(volatile))
+
+
+def _flat(value: Mapping[str, object], path: str = "") -> Iterator[tuple[str, object]]:
+    """All values that are no maps, by dotted name."""
+    for name, inner in value.items():
+        if isinstance(inner, Mapping):
+            yield from _flat(inner, f"{path}{name}.")
+        else:
+            yield f"{path}{name}", list(inner) if isinstance(inner, tuple) else inner
+
+
+def _speaks_of(words: re.Pattern[str], name: str) -> bool:
+    """Whether a dotted name has one of `words`; camelCase has words as well."""
+    found = re.findall(r"[A-Z]?[a-z0-9]+|[A-Z0-9]+", name)
+    return any(words.fullmatch(word.lower()) for word in found)
+
+
+def _shown(value: object) -> str:
+    text = "unset" if value is None else repr(value)
+    return text if len(text) <= SHOWN else f"{text[: SHOWN - 3]}..."
+
 
 M = TypeVar("M", bound=Message)
 T = TypeVar("T")
@@ -74,15 +185,15 @@ class WireClient(Protocol):
     """
 
     spec: PolicySpec
-    hello: dict[str, Any]
+    hello: dict[str, object]
 
     def reset(self, id: int, trial: TrialInfo) -> None: ...
 
     def infer(
         self, id: int, observation: Observation, timeout: float
-    ) -> tuple[Any, Mapping[str, float]]: ...
+    ) -> tuple[object, Mapping[str, float]]: ...
 
-    def end(self, id: int, outcome: Mapping[str, Any]) -> None: ...
+    def end(self, id: int, outcome: Mapping[str, object]) -> None: ...
 
     def close(self) -> None: ...
 
@@ -115,7 +226,7 @@ class RemotePolicy:
         self.spec: PolicySpec = self._session.spec
 
     @property
-    def hello(self) -> dict[str, Any]:
+    def hello(self) -> dict[str, object]:
         """Dialect, version, server name, spec and what else it says of itself as JSON values."""
         return self._session.hello
 
@@ -143,7 +254,9 @@ class RemotePolicy:
         reported = {name: ms for name, ms in timing.items() if math.isfinite(ms)}
         self.last_timing = {**reported, "round_trip_ms": (time.perf_counter() - start) * 1e3}
         self._warm = True
-        return check_chunk(answer, self.spec, self.hello.get("options", ()))
+        options = self.hello.get("options")
+        names = options if isinstance(options, Mapping) else ()
+        return check_chunk(answer, self.spec, names, exact=True)
 
     def _when_free(self, request: Callable[[], T], timeout: float) -> T:
         """The answer to `request`. While the server is busy it is repeated, with growing pauses,
@@ -164,7 +277,7 @@ class RemotePolicy:
             time.sleep(pause)
             pause = min(2 * pause, LONGEST_PAUSE)
 
-    def end(self, outcome: Mapping[str, Any] | None = None) -> None:
+    def end(self, outcome: Mapping[str, object] | None = None) -> None:
         """Tell the server how the trial ended (JSON values); optional."""
         self._session.end(self._id(), outcome or {})
 
@@ -215,7 +328,7 @@ class _RobospaClient:
         hello = self._receive(Hello, 0, timeouts.hello)
         self.spec = hello.spec
         check_size(hello.spec, limits, transport.url)
-        self.hello = {
+        self.hello: dict[str, object] = {
             "dialect": "robospa.v1",
             "version": hello.version,
             "server": hello.server,
@@ -227,13 +340,11 @@ class _RobospaClient:
 
     def infer(
         self, id: int, observation: Observation, timeout: float
-    ) -> tuple[Any, Mapping[str, float]]:
+    ) -> tuple[object, Mapping[str, float]]:
         actions = self._call(Infer(id, observation), Actions, timeout)
-        if actions.chunk.dtype != np.float32:
-            raise PolicyAnswerError(f"the policy answered {actions.chunk.dtype}, not float32")
         return actions.chunk, actions.timing
 
-    def end(self, id: int, outcome: Mapping[str, Any]) -> None:
+    def end(self, id: int, outcome: Mapping[str, object]) -> None:
         self._call(End(id, outcome), Ended, self._timeouts.end)
 
     def close(self) -> None:

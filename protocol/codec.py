@@ -18,9 +18,10 @@ with either.
 
 from __future__ import annotations
 
+import io
 import math
 import struct
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -175,7 +176,7 @@ _SHAPE_KEY, _DATA_KEY = _binary(_SHAPE), _binary(_DATA)
 # ---------------------------------------------------------------- decoding
 
 
-def decode(buffer: Buffer, limits: Limits = DEFAULT_LIMITS) -> Any:
+def decode(buffer: Buffer, limits: Limits = DEFAULT_LIMITS) -> object:
     """The value in `buffer`, which must hold exactly one. Raises DecodeError and nothing else."""
     if len(buffer) > limits.message:
         raise DecodeError(f"message of {len(buffer)} bytes is over the limit of {limits.message}")
@@ -235,7 +236,7 @@ class _Reader:
         number: int = _LENGTHS[width].unpack_from(self.bytes, self.take(width))[0]
         return number
 
-    def value(self, depth: int) -> Any:
+    def value(self, depth: int) -> object:
         self.items += 1
         if self.items > self.limits.items:
             raise self.fail(f"more than {self.limits.items} items")
@@ -254,7 +255,8 @@ class _Reader:
             return self.list(tag & 0x0F, depth)
         if tag in _FIXED:
             form = _FIXED[tag]
-            return form.unpack_from(self.bytes, self.take(form.size))[0]
+            number: object = form.unpack_from(self.bytes, self.take(form.size))[0]
+            return number
         if tag in _CONSTANTS:
             return _CONSTANTS[tag]
         if tag in _STR:
@@ -284,16 +286,16 @@ class _Reader:
         if self.items + count * least > self.limits.items:
             raise self.fail(f"more than {self.limits.items} items")
 
-    def list(self, count: int, depth: int) -> list[Any]:
+    def list(self, count: int, depth: int) -> list[object]:
         self.count(count, 1)
         return [self.value(depth + 1) for _ in range(count)]
 
-    def map(self, count: int, depth: int) -> Any:
+    def map(self, count: int, depth: int) -> object:
         self.count(count, 2)
         if count and self.bytes[self.pos] in _BIN:
             array = self.usual_array()
             return array if array is not None else self.numpy(count)
-        result: dict[str | int, Any] = {}
+        result: dict[str | int, object] = {}
         for _ in range(count):
             key = self.value(depth + 1)
             if type(key) is not str and type(key) is not int:
@@ -325,9 +327,9 @@ class _Reader:
         self.pos, self.items = start, items
         return None
 
-    def numpy(self, count: int) -> Any:
+    def numpy(self, count: int) -> object:
         """A map with binary keys: an array, or a scalar as openpi sends it."""
-        found: dict[bytes, Any] = {}
+        found: dict[bytes, object] = {}
         for _ in range(count):
             key = bytes(self.binary()[:16])
             if key not in _BINARY_KEYS or key in found:
@@ -369,3 +371,69 @@ class _Reader:
         array = array.reshape(shape)
         array.flags.writeable = False
         return array
+
+
+# ---------------------------------------------------------------- JPEG, as a declared image codec
+# An encoded image travels as binary data in place of the array; Pillow is imported on first use.
+
+Images = dict[str, object]
+QUALITY = 90
+
+
+def encode_jpeg(image: NDArray[np.uint8]) -> bytes:
+    """uint8 (H, W, 3) RGB to JPEG, quality 90, 4:2:0. Raises EncodeError."""
+    if image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] != 3 or not image.size:
+        raise EncodeError(f"{image.dtype} array of shape {image.shape} cannot become a JPEG")
+    stream = io.BytesIO()
+    _pillow().fromarray(np.ascontiguousarray(image)).save(stream, "JPEG", quality=QUALITY)
+    return stream.getvalue()
+
+
+def decode_jpeg(data: bytes, limits: Limits = DEFAULT_LIMITS) -> NDArray[np.uint8]:
+    """JPEG to uint8 (H, W, 3) RGB; the size is checked before a pixel is decoded."""
+    try:
+        with _pillow().open(io.BytesIO(data), formats=("JPEG",)) as picture:
+            if picture.width * picture.height * 3 > limits.array:
+                raise DecodeError(f"JPEG of {picture.width} x {picture.height} is over the limit")
+            return np.asarray(picture.convert("RGB"))
+    except DecodeError:
+        raise
+    except Exception as error:  # Pillow raises many kinds for broken files
+        raise DecodeError(f"an image is no JPEG: {error}") from error
+
+
+def encode_images(observation: Mapping[str, object]) -> Images:
+    """The observation with every image as JPEG; nothing else is touched."""
+    return _map_images(
+        observation, lambda image: encode_jpeg(image) if isinstance(image, np.ndarray) else image
+    )
+
+
+def decode_images(observation: Mapping[str, object], limits: Limits = DEFAULT_LIMITS) -> Images:
+    """The observation with every JPEG as an array."""
+    return _map_images(
+        observation, lambda image: decode_jpeg(image, limits) if isinstance(image, bytes) else image
+    )
+
+
+def _map_images(view: Mapping[str, object], change: Callable[[object], object]) -> Images:
+    changed = dict(view)
+    images, history = changed.get("images"), changed.get("history")
+    if isinstance(images, dict):
+        changed["images"] = {name: change(image) for name, image in images.items()}
+    if isinstance(history, dict):
+        changed["history"] = {
+            offset: _map_images(past, change) if isinstance(past, dict) else past
+            for offset, past in history.items()
+        }
+    return changed
+
+
+def _pillow() -> Any:
+    try:
+        from PIL import Image
+    except ImportError as error:
+        raise EncodeError(
+            "images as JPEG need Pillow, which is not installed: pip install pillow"
+        ) from error
+    return Image

@@ -13,11 +13,13 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from robospa.action_space import ActionSpace
+from robospa.environment_state import WIDTH
 from robospa.observation import Observation
 from robospa.protocol.client import RemotePolicy, connect
 from robospa.protocol.codec import DEFAULT_LIMITS, encode
@@ -34,10 +36,49 @@ from robospa.protocol.messages import (
     pack,
     unpack,
 )
-from robospa.protocol.policy import PolicySpec
-from robospa.protocol.synthetic import synthetic_observation, trial_for
+from robospa.protocol.policy import PolicySpec, TrialInfo, compare_specs, joints_of, robot_of
 from robospa.protocol.transport import Address, Timeouts, Transport
-from robospa.protocol.validation import compare_specs
+from robospa.trial import REFERENCE, TrialKey
+
+KEY = TrialKey("Pick_Blocks_Size", 1, 100_000)
+"""A real task: a server may load a checkpoint by its name."""
+TRIAL = TrialInfo(
+    KEY.task, REFERENCE, "Pick up the red block.", policy_seed=7, id="b1d0c4e2a7935f68"
+)
+POSE = np.array([0, 0, 1, 1, 0, 0, 0, 1], np.float32)
+"""An end effector 1 m up, not turned, open."""
+
+
+def trial_for(spec: PolicySpec) -> TrialInfo:
+    """The trial of the checks, of a robot that `spec` drives, with a key if it asks for one."""
+    robot = robot_of(spec)
+    trial = replace(TRIAL, embodiment=robot, joints=joints_of(spec))
+    return replace(trial, key=replace(KEY, embodiment=robot)) if spec.needs_trial_key else trial
+
+
+def synthetic_observation(spec: PolicySpec, step: int = 0, seed: int = 0) -> Observation:
+    """An observation of the form that `spec` asks for, filled with reproducible noise."""
+    rng = np.random.default_rng(seed)
+    width = ActionSpace("joint", joints_of(spec)).width
+
+    def view() -> Observation:
+        images = {
+            c.name: rng.integers(0, 256, (c.height, c.width, 3), np.uint8) for c in spec.cameras
+        }
+        seen: Observation = {"images": images, "ee": np.tile(POSE, (2, 1))}
+        if spec.state != "none":
+            seen["state"] = np.zeros(width, np.float32)
+        return seen
+
+    observation = view()
+    observation["instruction"], observation["step"] = TRIAL.instruction, step
+    if spec.history:
+        observation["history"] = {offset: view() for offset in spec.history}
+    if spec.privileged:
+        observation["privileged"] = {}
+    if spec.environment_state:
+        observation["environment_state"] = np.zeros(WIDTH, np.float32)
+    return observation
 
 
 @dataclass(frozen=True)
@@ -345,10 +386,10 @@ def _garbage(target: _Target) -> str:
     transport = target.raw()
     transport.send(b"\xc1 no message")
     try:
-        answer: Any = unpack(_bytes(transport, target.timeouts.end))
+        answer = unpack(_bytes(transport, target.timeouts.end))
         assert isinstance(answer, Error), f"garbage was answered with {answer.type}"
     except TransportError:
-        answer = None
+        pass
     finally:
         transport.close()
     with target.connect() as policy:

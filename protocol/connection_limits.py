@@ -1,20 +1,9 @@
 """Limits on the connections of one server: how many, how slow, how long silent.
 
 The network is not trusted. Everything that a client can make last or grow has a limit here, and a
-client that exceeds one loses its own connection and nothing else:
-
-    handshake not finished     dropped after `ServerOptions.handshake` seconds; of more than
-                               `handshakes` in progress the oldest is dropped
-    no free place              a connection that never sent a message gives its place to a newer
-                               one; if there is none, HTTP 503 after `patience`
-    message in many pieces     must be complete `message` seconds after its first byte
-    messages unfinished        together at most `unfinished` bytes: over that the largest is dropped
-    answers not read           nothing more is read from it, and after `message` seconds it ends
-    fragments, pings           at most `FRAMES` frames without a finished message
-    silent                     closed after `idle` seconds
-
-websockets has the first, and bounds the size of messages and the length of queues; the others it
-leaves to its user. Each case is logged in one line.
+client that exceeds one loses its own connection and nothing else (the table is in
+docs/protocol.md). websockets bounds the time of a handshake, the size of messages and the length of
+queues; the rest it leaves to its user. Each case is logged in one line.
 """
 
 from __future__ import annotations
@@ -24,10 +13,13 @@ import errno
 import logging
 import time
 from collections.abc import Callable
-from typing import Any
+from dataclasses import dataclass, field
 
 from websockets.asyncio.server import ServerConnection
 from websockets.frames import Frame
+from websockets.http11 import Request
+
+from robospa.protocol.codec import DEFAULT_LIMITS, Limits
 
 try:
     import resource
@@ -44,6 +36,31 @@ REPEAT = 10.0
 """[s] before the same warning is logged again."""
 OUT_OF_FILES = (errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM)
 _DATA = (0, 1, 2)  # continuation, text, binary
+
+
+@dataclass(frozen=True)
+class ServerOptions:
+    """Limits of one server.
+
+    `idle`: seconds of silence after which a connection is closed. `patience`: seconds that a new
+    connection waits for a free place. `message`: seconds within which a message has to be complete
+    and an answer read. `unfinished`: bytes that messages still on their way may have together: over
+    that the largest is dropped. `handshakes`: how many may be in progress at once, each for
+    `handshake` seconds. `queue`: requests that may wait. `threads`: how many threads call policies
+    (more than one only if they allow it).
+    """
+
+    max_connections: int = 256
+    unfinished: int = 2**29
+    queue: int = 256
+    threads: int = 1
+    idle: float = 3600.0
+    patience: float = 2.0
+    message: float = 60.0
+    handshakes: int = 128
+    handshake: float = 10.0
+    name: str = "robospa"
+    limits: Limits = field(default_factory=lambda: DEFAULT_LIMITS)
 
 
 class MonitoredConnection(ServerConnection):
@@ -68,7 +85,7 @@ class MonitoredConnection(ServerConnection):
     _in_message = False
     _closing: asyncio.Task[None] | None = None
 
-    def connection_made(self, transport: Any) -> None:
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
         super().connection_made(transport)
         self.limiter.opened(self)
 
@@ -99,7 +116,7 @@ class MonitoredConnection(ServerConnection):
             if self.on_message_began is not None:
                 self.on_message_began()
 
-    def process_event(self, event: Any) -> None:
+    def process_event(self, event: Frame | Request) -> None:  # type: ignore[override]
         if not isinstance(event, Frame) or self._allowed(event):
             super().process_event(event)
         elif not self.transport.is_closing():
@@ -129,11 +146,20 @@ class MonitoredConnection(ServerConnection):
         log.warning("dropping the client %s: %s", self.client, reason)
         self.transport.abort()
 
-    def close_idle(self, seconds: float) -> None:
-        """Close the connection with a reason, once."""
-        if self._closing is None:
-            log.warning("closing the connection of %s: silent for %g s", self.client, seconds)
-            self._closing = self.loop.create_task(self.close(1000, f"silent for {seconds:g} s"))
+    def check(self, now: float, options: ServerOptions) -> None:
+        """Drop the connection if it is too slow, close it if it is silent for too long."""
+        slow, idle = options.message, options.idle
+        if self.unread_since is not None:
+            if now - self.unread_since > slow:
+                self.drop(f"it has not read its answers for {slow:g} s")
+        elif self.message_began is not None:
+            if self.recv_messages.paused:  # it is we who do not read
+                self.message_began = now
+            elif now - self.message_began > slow:
+                self.drop(f"a message was not complete {slow:g} s after it began")
+        elif now - (self.waiting_since or now) > idle and self._closing is None:
+            log.warning("closing the connection of %s: silent for %g s", self.client, idle)
+            self._closing = self.loop.create_task(self.close(1000, f"silent for {idle:g} s"))
 
     @property
     def client(self) -> str:
@@ -145,22 +171,11 @@ class MonitoredConnection(ServerConnection):
 class ConnectionLimiter:
     """At most `capacity` sessions, and a task that checks all connections."""
 
-    def __init__(
-        self,
-        capacity: int,
-        *,
-        patience: float,
-        handshakes: int,
-        message: float,
-        idle: float,
-        unfinished: int,
-    ) -> None:
-        self.capacity = capacity
-        self._patience, self._max_handshakes = patience, handshakes
-        self._message, self._idle = message, idle
-        self._most_held, self._held = unfinished, 0
+    def __init__(self, capacity: int, options: ServerOptions) -> None:
+        self.capacity, self._options = capacity, options
+        self._held = 0
         self._sessions: dict[MonitoredConnection, float] = {}
-        self._waiting: list[object] = []
+        self._waiting: list[MonitoredConnection] = []
         self._open: dict[MonitoredConnection, None] = {}
         self._handshakes: dict[MonitoredConnection, None] = {}
         self._warned: dict[str, float] = {}
@@ -192,12 +207,20 @@ class ConnectionLimiter:
         if self._task is not None:
             self._task.cancel()
 
+    async def _check_all(self) -> None:
+        period = min(1.0, self._options.message / 4, self._options.idle / 4)
+        while True:
+            await asyncio.sleep(period)
+            now = asyncio.get_running_loop().time()
+            for connection in list(self._open):
+                connection.check(now, self._options)
+
     # ------------------------------------------------------------ the life of a connection
 
     def opened(self, connection: MonitoredConnection) -> None:
         """A socket was accepted; nothing has been read from it."""
         self._open[connection] = self._handshakes[connection] = None
-        most = self._max_handshakes
+        most = self._options.handshakes
         if len(self._handshakes) > most:
             self.warn(f"more than {most} handshakes at once: the oldest are dropped")
             oldest = next(iter(self._handshakes))
@@ -208,12 +231,12 @@ class ConnectionLimiter:
         """Wait up to `patience` seconds for a place: a client that reconnects may be faster than
         the news that its old connection is closed. The newest is served first: a flood of
         connections that came earlier can wait."""
-        clock, ticket = asyncio.get_running_loop().time, object()
-        deadline = clock() + self._patience
-        self._waiting.append(ticket)
+        clock = asyncio.get_running_loop().time
+        deadline = clock() + self._options.patience
+        self._waiting.append(connection)
         try:
             while True:
-                newest = self._waiting[-1] is ticket
+                newest = self._waiting[-1] is connection
                 if newest and (len(self._sessions) < self.capacity or self._evict(clock())):
                     self._sessions[connection] = clock()
                     return True
@@ -222,7 +245,7 @@ class ConnectionLimiter:
                     return False
                 await asyncio.sleep(0.01 if newest else 0.1)
         finally:
-            self._waiting.remove(ticket)
+            self._waiting.remove(connection)
 
     def _evict(self, now: float) -> bool:
         """Free the place of the oldest connection that never sent a message."""
@@ -248,11 +271,11 @@ class ConnectionLimiter:
         the one with most is dropped: messages that are really sent are unfinished for moments."""
         self._held += size - connection.held
         connection.held = size
-        if self._held > self._most_held:
+        if self._held > self._options.unfinished:
             largest = max(self._open, key=lambda each: each.held)
             largest.drop(
                 f"its unfinished message has {largest.held} bytes, and all together {self._held}, "
-                f"of which {self._most_held} are allowed"
+                f"of which {self._options.unfinished} are allowed"
             )
             self._held -= largest.held
             largest.held = 0
@@ -266,35 +289,15 @@ class ConnectionLimiter:
         if not connection.in_session:
             self._sessions.pop(connection, None)
 
-    # ------------------------------------------------------------ periodic checks
+    # ------------------------------------------------------------ the log
 
-    async def _check_all(self) -> None:
-        period = min(1.0, self._message / 4, self._idle / 4)
-        while True:
-            await asyncio.sleep(period)
-            now = asyncio.get_running_loop().time()
-            for connection in list(self._open):
-                self._check(connection, now)
-
-    def _check(self, connection: MonitoredConnection, now: float) -> None:
-        """Drop the connection if it is too slow, close it if it is silent for too long."""
-        if connection.unread_since is not None:
-            if now - connection.unread_since > self._message:
-                connection.drop(f"it has not read its answers for {self._message:g} s")
-        elif connection.message_began is not None:
-            if connection.recv_messages.paused:  # it is we who do not read
-                connection.message_began = now
-            elif now - connection.message_began > self._message:
-                connection.drop(f"a message was not complete {self._message:g} s after it began")
-        elif now - (connection.waiting_since or now) > self._idle:
-            connection.close_idle(self._idle)
-
-    def _accept_failed(self, loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+    def _accept_failed(self, loop: asyncio.AbstractEventLoop, context: dict[str, object]) -> None:
         """Log in one line that a connection cannot be accepted; asyncio tries again in a second."""
         if getattr(context.get("exception"), "errno", None) in OUT_OF_FILES:
+            most = resource.getrlimit(resource.RLIMIT_NOFILE)[0] if resource else "only so many"
             self.warn(
                 f"a client cannot be accepted: {context['exception']}; it waits. This process may "
-                f"have {_max_files()} files and sockets open (see ulimit -n), "
+                f"have {most} files and sockets open (see ulimit -n), "
                 f"{len(self._open)} of them are clients"
             )
         else:
@@ -306,7 +309,3 @@ class ConnectionLimiter:
         if now - self._warned.get(text[:20], -REPEAT) >= REPEAT:
             self._warned[text[:20]] = now
             log.warning("%s", text)
-
-
-def _max_files() -> str:
-    return str(resource.getrlimit(resource.RLIMIT_NOFILE)[0]) if resource else "only so many"

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from msgspec import Meta
@@ -81,7 +81,7 @@ class Infer:
 
     type: ClassVar[str] = "infer"
     id: RequestId
-    observation: Mapping[str, Any]
+    observation: Mapping[str, object]
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +112,7 @@ class End:
 
     type: ClassVar[str] = "end"
     id: RequestId
-    outcome: Mapping[str, Any] = field(default_factory=dict)
+    outcome: Mapping[str, object] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -146,7 +146,7 @@ TYPES: dict[str, type[Message]] = {
 
 def pack(message: Message, limits: Limits = DEFAULT_LIMITS) -> bytes:
     """The message as one buffer. Raises EncodeError."""
-    sent: dict[str, Any] = {"type": message.type}
+    sent: dict[str, object] = {"type": message.type}
     for one in fields(message):
         value = getattr(message, one.name)
         sent[one.name] = value.to_json() if isinstance(value, PolicySpec | TrialInfo) else value
@@ -158,12 +158,12 @@ def unpack(buffer: Buffer, limits: Limits = DEFAULT_LIMITS) -> Message:
     return read_message(decode(buffer, limits))
 
 
-def read_message(value: Any) -> Message:
+def read_message(value: object) -> Message:
     """The checked message in a decoded map (see `unpack`)."""
     kind = read(_Head, value, "message", DecodeError).type
     if kind not in TYPES:
         raise DecodeError(f"message type {kind[:40]!r} is not one of {', '.join(TYPES)}")
-    if kind == Hello.type:
+    if kind == Hello.type and isinstance(value, Mapping):
         _check_version(value)
         value = {"server": "", **value}  # may be left out
     message = read(TYPES[kind], value, f"{kind} message", DecodeError)
@@ -175,7 +175,7 @@ def read_message(value: Any) -> Message:
     return message
 
 
-def _check_version(hello: Any) -> None:
+def _check_version(hello: Mapping[str, object]) -> None:
     """Raises VersionMismatch before anything is read that another version may write otherwise."""
     version = hello.get("version")
     if not isinstance(version, str):

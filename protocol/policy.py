@@ -6,9 +6,10 @@ execute one after the other.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field, fields
-from typing import TYPE_CHECKING, Annotated, Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Annotated, Any, Protocol, TypeGuard, cast
 
 import numpy as np
 from msgspec import Meta
@@ -16,9 +17,11 @@ from numpy.typing import NDArray
 
 from robospa.action_space import KINDS, SEVEN_JOINT_ARMS, SIX_JOINT_ARMS, ActionSpace
 from robospa.observation import DEFAULT_CAMERAS, STATES, CameraSpec, Observation
-from robospa.protocol.errors import DecodeError
+from robospa.protocol.codec import Limits
+from robospa.protocol.errors import DecodeError, HandshakeError, PolicyAnswerError, printable
+from robospa.registry import ROBOTS, UnknownName, find
 from robospa.schema import Identifier, SettingName, describe, one_of, read
-from robospa.trial import TrialKey
+from robospa.trial import REFERENCE, TrialKey
 
 CODECS = ("raw", "jpeg")
 JOINT_DIMS = tuple(
@@ -84,13 +87,13 @@ class PolicySpec:
     """The weights behind it, in a text that changes with them, such as a file's hash or a revision;
     empty if it tells none. Another one never continues a run. Printable, at most 200 characters."""
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, object]:
         """Plain JSON values; `from_json` is the inverse."""
         data = asdict(self)
         return {k: list(v) if isinstance(v, tuple) else v for k, v in data.items()}
 
     @classmethod
-    def from_json(cls, value: Any) -> PolicySpec:
+    def from_json(cls, value: object) -> PolicySpec:
         """The spec in a decoded map; unknown fields are ignored. Raises DecodeError."""
         spec = read(cls, value, "spec", DecodeError)
         check_spec(spec)
@@ -108,6 +111,25 @@ class PolicySpec:
         if self.action_dim is not None:
             return (self.action_dim,)
         return POSE_DIMS if self.action == "ee" else JOINT_DIMS
+
+
+def robot_of(spec: PolicySpec) -> str:
+    """The default robot where `spec` drives it, else the first that it names."""
+    return (
+        REFERENCE if not spec.embodiments or REFERENCE in spec.embodiments else spec.embodiments[0]
+    )
+
+
+def joints_of(spec: PolicySpec) -> tuple[int, int]:
+    """Joints of the arms that `spec` drives: those of its robot, or, where that is not installed
+    here, of arms as wide as its actions, equal ones where that can be."""
+    with suppress(UnknownName):
+        left, right = find(ROBOTS, robot_of(spec), "robot").arms
+        return len(left.joints), len(right.joints)
+    width = spec.action_dim if spec.action == "joint" else None
+    if width is None or width < 4:
+        return SIX_JOINT_ARMS
+    return (width - 2) // 2, (width - 1) // 2
 
 
 def check_spec(spec: PolicySpec) -> None:
@@ -151,20 +173,20 @@ class TrialInfo:
     """A name of the trial for logs and files, which means nothing."""
     key: TrialKey | None = None
     """Which trial it is; only for a policy whose spec `needs_trial_key`."""
-    extra: Mapping[str, Any] = field(default_factory=dict)
+    extra: Mapping[str, object] = field(default_factory=dict)
     """More JSON values; may be empty."""
     joints: tuple[Joints, Joints] = SIX_JOINT_ARMS
     """Joints of the left and the right arm: `state` and joint actions have their columns
     (`robospa.action_space.ActionSpace("joint", joints)`)."""
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, object]:
         """Plain JSON values, `key` only if there is one; `from_json` is the inverse."""
-        data = {one.name: getattr(self, one.name) for one in fields(self) if one.name != "key"}
-        data["joints"] = list(self.joints)
+        names = [one.name for one in fields(self) if one.name != "key"]
+        data = {name: getattr(self, name) for name in names} | {"joints": list(self.joints)}
         return data if self.key is None else {**data, "key": asdict(self.key)}
 
     @classmethod
-    def from_json(cls, value: Any) -> TrialInfo:
+    def from_json(cls, value: object) -> TrialInfo:
         """The trial in a decoded map; unknown fields are ignored. Raises DecodeError."""
         return read(cls, value, "trial", DecodeError)
 
@@ -196,76 +218,167 @@ class Policy(Protocol):
         `spec.horizon` where that is declared."""
 
 
-class BatchPolicy(Policy, Protocol):
-    """A policy whose model runs several observations at once.
+class OptionalMembers(Policy, Protocol):
+    """What a policy may have beside its three calls, each on its own; `has` says which are there.
 
-    `sessions` names the connection that each observation belongs to, so that per-trial state can
-    be kept apart; an exception spoils the whole batch only if the policy lets it.
+    `sessions` names the connection that each observation belongs to, so that the state of trials
+    can be kept apart; an exception spoils the whole batch only if the policy lets it.
     """
 
     def infer_batch(
         self, observations: Sequence[Observation], sessions: Sequence[int]
-    ) -> Sequence[NDArray[np.float32]]: ...
+    ) -> Sequence[NDArray[np.float32]]:
+        """Several observations in one call of the model."""
 
+    def reset_session(self, session: int, trial: TrialInfo) -> None:
+        """A batch policy that keeps state by session: called instead of `reset`."""
 
-# Optional members of policies, checked with `isinstance`.
+    def end_session(self, session: int) -> None:
+        """A connection to a batch policy has ended."""
 
+    def end(self, outcome: Mapping[str, object]) -> None:
+        """How the trial ended: JSON values such as success and steps."""
 
-@runtime_checkable
-class SupportsBatches(Protocol):
-    """A `BatchPolicy`, whatever else it has."""
+    def close(self) -> None:
+        """Release what the policy holds."""
 
-    def infer_batch(
-        self, observations: Sequence[Observation], sessions: Sequence[int]
-    ) -> Sequence[NDArray[np.float32]]: ...
-
-
-@runtime_checkable
-class SupportsSessionReset(Protocol):
-    """A batch policy that keeps state by session: called instead of `reset`."""
-
-    def reset_session(self, session: int, trial: TrialInfo) -> None: ...
-
-
-@runtime_checkable
-class SupportsSessionEnd(Protocol):
-    """A batch policy that is notified when a connection has ended."""
-
-    def end_session(self, session: int) -> None: ...
-
-
-@runtime_checkable
-class SupportsEnd(Protocol):
-    """A policy that is notified how a trial ended: JSON values such as success and steps."""
-
-    def end(self, outcome: Mapping[str, Any]) -> None: ...
-
-
-@runtime_checkable
-class SupportsClose(Protocol):
-    """A policy that has something to release."""
-
-    def close(self) -> None: ...
-
-
-@runtime_checkable
-class SupportsReconnect(Protocol):
-    """A policy behind a server, to which a new connection can be opened."""
-
-    def reconnect(self) -> None: ...
-
-
-@runtime_checkable
-class HasHello(Protocol):
-    """A policy behind a server, with the server's greeting as JSON values."""
+    def reconnect(self) -> None:
+        """Open a new connection to the server behind this policy."""
 
     @property
-    def hello(self) -> Mapping[str, Any]: ...
-
-
-@runtime_checkable
-class HasTiming(Protocol):
-    """A policy whose server reports its times of the last answer [ms]."""
+    def hello(self) -> Mapping[str, object]:
+        """The greeting of the server behind this policy, as JSON values."""
 
     @property
-    def last_timing(self) -> Mapping[str, float]: ...
+    def last_timing(self) -> Mapping[str, float]:
+        """Times of the last answer that the server reported [ms]."""
+
+
+def has(policy: object, member: str) -> TypeGuard[OptionalMembers]:
+    """Whether `policy` has this one of the optional members."""
+    return hasattr(policy, member)
+
+
+SPACES = ("joint", "ee")
+"""Action spaces that the dialects of other projects have."""
+
+
+def check_chunk(
+    answer: object, spec: PolicySpec, options: Collection[str] = (), *, exact: bool = False
+) -> NDArray[np.float32]:
+    """`answer` as the float32 (T, D) chunk that `spec` promises, or PolicyAnswerError.
+
+    `options`: those that the dialect of its server has; the error names the one that mends it.
+    `exact`: refuse other floats than float32, which do not exist on the wire.
+    """
+    if not isinstance(answer, np.ndarray) or answer.dtype.kind != "f":
+        found = getattr(answer, "dtype", type(answer).__name__)
+        if isinstance(answer, Mapping):
+            found = f"a map of {printable(', '.join(map(str, answer)), 80) or 'nothing'}"
+        raise PolicyAnswerError(f"the policy answered {found}, not an array of float32")
+    if exact and answer.dtype != np.float32:
+        raise PolicyAnswerError(f"the policy answered {answer.dtype}, not float32")
+    most = MAX_HORIZON if spec.horizon is None else spec.horizon
+    if answer.ndim != 2 or not 1 <= len(answer) <= most:
+        horizon = most if spec.horizon is None else f"its horizon {most}"
+        raise PolicyAnswerError(
+            f"the policy answered an array of shape {answer.shape}, not (T, D) with T from 1 to "
+            f"{horizon}{_remedy(answer, spec, options)}"
+        )
+    if answer.shape[1] not in spec.action_dims:
+        raise PolicyAnswerError(
+            f"the policy answered {answer.shape[1]} numbers per action, but a {spec.action} "
+            f"action has {' or '.join(map(str, spec.action_dims))}"
+            f"{_remedy(answer, spec, options)}"
+        )
+    with np.errstate(over="ignore"):
+        chunk = np.ascontiguousarray(answer, dtype=np.float32)
+    finite = np.isfinite(chunk)
+    if not finite.all():
+        row, column = np.argwhere(~finite)[0]
+        raise PolicyAnswerError(
+            f"the policy answered {chunk[row, column]} in action {row}, dimension {column}"
+        )
+    return chunk
+
+
+def _remedy(answer: NDArray[np.generic], spec: PolicySpec, options: Collection[str]) -> str:
+    """What to add to the URL so that a chunk of this shape is taken; "" if nothing helps."""
+    if answer.ndim != 2 or len(answer) == 0:
+        return ""
+    length, width = answer.shape
+    if width in spec.action_dims:
+        if "horizon" not in options or length > MAX_HORIZON:
+            return ""
+        return (
+            f"; write ?horizon={length} to execute all of them, with execute={spec.horizon} to "
+            f"execute the first {spec.horizon}"
+        )
+    others = [kind for kind in SPACES if kind != spec.action and ActionSpace(kind).width == width]
+    if "space" in options and others:
+        return f"; write ?space={others[0]} if these are {others[0]} actions"
+    return f"; write ?action_dim={width} if it is right" if "action_dim" in options else ""
+
+
+def check_observation(observation: Mapping[str, object], spec: PolicySpec) -> Observation:
+    """`observation` (images decoded) itself, typed.
+
+    Raises DecodeError if it lacks what `spec` asks for.
+    """
+    _check_view("observation", observation, spec)
+    if not isinstance(observation.get("instruction"), str):
+        raise DecodeError("observation: 'instruction' must be text")
+    history = observation.get("history", {}) if spec.history else {}
+    for offset in spec.history:
+        if not isinstance(history, dict) or offset not in history:
+            raise DecodeError(f"observation lacks history {offset}, which the spec asks for")
+        _check_view(f"history {offset}", history[offset], spec)
+    if spec.privileged and not isinstance(observation.get("privileged"), dict):
+        raise DecodeError("observation lacks the privileged state that the spec asks for")
+    if spec.environment_state:
+        objects = observation.get("environment_state")
+        if not isinstance(objects, np.ndarray) or objects.ndim != 1 or objects.dtype != np.float32:
+            raise DecodeError("observation: 'environment_state' must be float32 of one axis")
+    if spec.committed_actions and "committed" in observation:
+        rows, delay = observation["committed"], observation.get("delay")
+        if not isinstance(rows, np.ndarray) or rows.ndim != 2 or rows.dtype != np.float32:
+            raise DecodeError("observation: 'committed' must be float32 of two axes")
+        if type(delay) is not int or delay < 0:
+            raise DecodeError("observation: 'delay' must be a whole number from 0 up")
+    return cast("Observation", observation)
+
+
+def _check_view(what: str, view: object, spec: PolicySpec) -> None:
+    images = view.get("images", {}) if isinstance(view, dict) else None
+    if not isinstance(view, dict) or not isinstance(images, dict):
+        raise DecodeError(f"{what}: 'images' must be a map from camera to array")
+    for camera in spec.cameras:
+        image, shape = images.get(camera.name), (camera.height, camera.width, 3)
+        if not isinstance(image, np.ndarray):
+            raise DecodeError(f"{what} lacks the image of camera {camera.name!r}")
+        if image.shape != shape or image.dtype != np.uint8:
+            raise DecodeError(
+                f"{what}: image {camera.name!r} is {image.dtype} {image.shape}, not uint8 {shape}"
+            )
+    if spec.state != "none":
+        state = view.get("state")
+        if not isinstance(state, np.ndarray) or state.ndim != 1 or state.dtype != np.float32:
+            raise DecodeError(f"{what}: 'state' must be a float32 array of one axis")
+
+
+def check_size(spec: PolicySpec, limits: Limits, url: str) -> None:
+    """Raises HandshakeError if the images that `spec` asks for fit into no message."""
+    sizes = [3 * camera.width * camera.height for camera in spec.cameras]
+    total = sum(sizes) * (1 + len(spec.history)) if spec.image_codec == "raw" else 0
+    if total > limits.message or max(sizes, default=0) > limits.array:
+        raise HandshakeError(
+            f"the server at {url} asks for {max(total, *sizes) / 1e6:.0f} MB of images in an "
+            f"observation, and a message may have {limits.message / 1e6:.0f} MB: ask for smaller "
+            "images"
+        )
+
+
+def compare_specs(expected: PolicySpec, found: PolicySpec) -> list[str]:
+    """One phrase per field that differs; empty if the specs are the same."""
+    old, new = expected.to_json(), found.to_json()
+    return [f"{name} was {old[name]} and is {new[name]}" for name in old if old[name] != new[name]]

@@ -4,10 +4,9 @@ Three ways to hand over a policy, by what it knows about sessions:
 
     policy_factory   a function that makes one policy object per connection: right for every
                      policy that remembers anything between calls. Weights belong in the closure.
-    BatchPolicy      one object for all connections, asked through `infer_batch(observations,
-                     sessions)`. It keeps per-trial state by session number, or none at all; if it
-                     has `reset_session(session, trial)` and `end_session(session)`, these are
-                     called instead of `reset(trial)`.
+    `infer_batch`    a policy with this member serves all connections. It keeps per-trial state by
+                     session number, or none at all; if it has `reset_session(session, trial)` and
+                     `end_session(session)`, these are called instead of `reset(trial)`.
     any other policy one object, hence one connection at a time; a second one is refused, because
                      two trials would share its state unnoticed.
 
@@ -17,28 +16,88 @@ then it need not be thread-safe.
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
 import itertools
+import logging
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Protocol, TypeVar
+from queue import SimpleQueue
+from typing import Protocol, TypeVar
 
 from robospa.observation import Observation
 from robospa.protocol.batching import Answer, Batcher
-from robospa.protocol.policy import (
-    Policy,
-    PolicySpec,
-    SupportsBatches,
-    SupportsClose,
-    SupportsEnd,
-    SupportsSessionEnd,
-    SupportsSessionReset,
-    TrialInfo,
-)
-from robospa.protocol.threads import PolicyThreads
+from robospa.protocol.policy import Policy, PolicySpec, TrialInfo, has
 
 T = TypeVar("T")
 PolicyFactory = Callable[[], Policy]
+log = logging.getLogger("robospa.server")
+
+
+class PolicyThreads:
+    """`count` threads that take calls from one queue, so that the event loop keeps answering.
+
+    Like an executor, but its threads are daemons, so that a model that hangs cannot keep the
+    process from ending, and a result goes straight to the event loop, which saves 20 us a request.
+    """
+
+    def __init__(self, count: int) -> None:
+        self._jobs: SimpleQueue[Callable[[], None] | None] = SimpleQueue()
+        self._count = count
+        for number in range(count):
+            name = f"robospa-policy-{number}"
+            threading.Thread(target=self._work, name=name, daemon=True).start()
+
+    async def run(self, call: Callable[..., T], *args: object) -> T:
+        """`call(*args)` in one of the threads; raises what it raises."""
+        loop = asyncio.get_running_loop()
+        future: asyncio.Future[T] = loop.create_future()
+
+        def deliver(set_outcome: Callable[[], None]) -> None:
+            if not future.done():
+                set_outcome()
+
+        def job() -> None:
+            try:
+                answer = call(*args)
+                outcome = lambda: future.set_result(answer)  # noqa: E731
+            except BaseException as error:
+                failure = _as_exception(error)
+                outcome = lambda: future.set_exception(failure)  # noqa: E731
+            with contextlib.suppress(RuntimeError):  # the loop is closed: nobody waits
+                loop.call_soon_threadsafe(deliver, outcome)
+
+        self._jobs.put(job)
+        return await future
+
+    def post(self, call: Callable[..., object], *args: object) -> None:
+        """The same without waiting, for a model that may hang; a failure is logged."""
+
+        def job() -> None:
+            try:
+                call(*args)
+            except BaseException as error:
+                log.error("a policy failed while it was closed", exc_info=error)
+
+        self._jobs.put(job)
+
+    def close(self) -> None:
+        """End the threads after the calls that are queued already."""
+        for _ in range(self._count):
+            self._jobs.put(None)
+
+    def _work(self) -> None:
+        while (job := self._jobs.get()) is not None:
+            job()
+            del job  # an idle thread must not keep the last observation alive
+
+
+def _as_exception(error: BaseException) -> Exception:
+    """An error that a future can carry: SystemExit must end neither thread nor server."""
+    if isinstance(error, Exception) and not isinstance(error, StopIteration):
+        return error
+    return RuntimeError(f"the policy raised {type(error).__name__}: {error}")
 
 
 class PolicySession(Protocol):
@@ -48,7 +107,7 @@ class PolicySession(Protocol):
 
     async def infer(self, observation: Observation) -> Answer: ...
 
-    async def end(self, outcome: Mapping[str, Any]) -> None: ...
+    async def end(self, outcome: Mapping[str, object]) -> None: ...
 
     def request_began(self) -> None:
         """The first bytes of a request have arrived."""
@@ -82,51 +141,41 @@ class PolicyHost:
         threads: int = 1,
         queue: int = 256,
     ) -> None:
-        if (policy is None) == (policy_factory is None):
-            raise ValueError("give either a policy or a policy_factory")
-        self._factory = policy_factory
         first = policy if policy_factory is None else policy_factory()
-        assert first is not None
+        if first is None or (policy is not None and policy_factory is not None):
+            raise ValueError("give either a policy or a policy_factory")
+        self._policy, self._factory = policy, policy_factory
+        self._spare = first if policy is None else None
         self.spec = spec_of(first)
-        self._policy, self._spare = policy, None if policy is not None else first
-        self._batched = isinstance(policy, SupportsBatches)
-        self.max_sessions = 1 if policy is not None and not self._batched else None
+        batched = has(policy, "infer_batch")
+        self.max_sessions = 1 if policy is not None and not batched else None
         self._threads = PolicyThreads(threads)
         self._lock = threading.Lock()
         self._numbers = itertools.count(1)
-        self._batcher = Batcher(self._infer_batch, self.spec.batch, queue)
+        self._batcher = Batcher(self._infer_batch, self.spec.batch, queue) if batched else None
 
     @property
     def waiting(self) -> int:
         """Requests that wait for a call of a batch policy."""
-        return self._batcher.waiting
-
-    async def run(self, call: Callable[..., T], *args: Any) -> T:
-        """`call(*args)` in a policy thread."""
-        return await self._threads.run(call, *args)
-
-    def post(self, call: Callable[..., object], *args: Any) -> None:
-        """The same without waiting: a hanging model must not hold up a closing connection."""
-        self._threads.post(call, *args)
+        return 0 if self._batcher is None else self._batcher.waiting
 
     async def open(self) -> PolicySession:
         """A session for a new connection."""
-        number = next(self._numbers)
+        if self._policy is not None and self._batcher is not None:
+            return _BatchedSession(self._threads, self._policy, self._batcher, next(self._numbers))
         if self._policy is not None:
-            if self._batched:
-                return _BatchedSession(self, self._policy, self._batcher, number)
-            return _ExclusiveSession(self, self._policy, self._lock, close=False)
+            return _ExclusiveSession(self._threads, self._policy, self._lock, close=False)
         policy, self._spare = self._spare, None
         if policy is None:
             assert self._factory is not None
-            policy = await self.run(self._factory)
-        return _ExclusiveSession(self, policy, threading.Lock(), close=True)
+            policy = await self._threads.run(self._factory)
+        return _ExclusiveSession(self._threads, policy, threading.Lock(), close=True)
 
     async def _infer_batch(
         self, observations: Sequence[Observation], sessions: Sequence[int]
     ) -> Sequence[object]:
-        assert isinstance(self._policy, SupportsBatches)
-        return await self.run(self._policy.infer_batch, observations, sessions)
+        assert has(self._policy, "infer_batch")
+        return await self._threads.run(self._policy.infer_batch, observations, sessions)
 
     def close(self) -> None:
         """Let go of the threads."""
@@ -137,19 +186,21 @@ class _ExclusiveSession:
     """A policy object that serves one connection. `lock` is held while it is called, because a
     client may leave, and the next one or `close` follow, while a call runs in another thread."""
 
-    def __init__(self, host: PolicyHost, policy: Policy, lock: threading.Lock, close: bool) -> None:
-        self._host, self._policy, self._lock, self._close = host, policy, lock, close
+    def __init__(
+        self, threads: PolicyThreads, policy: Policy, lock: threading.Lock, close: bool
+    ) -> None:
+        self._threads, self._policy, self._lock, self._close = threads, policy, lock, close
 
     def request_began(self) -> None:
         return None
 
     async def reset(self, trial: TrialInfo) -> None:
-        await self._host.run(self._call, self._policy.reset, trial)
+        await self._threads.run(self._call, self._policy.reset, trial)
 
     async def infer(self, observation: Observation) -> Answer:
-        return await self._host.run(self._call, self._timed, time.perf_counter(), observation)
+        return await self._threads.run(self._call, self._timed, time.perf_counter(), observation)
 
-    def _call(self, method: Callable[..., T], *args: Any) -> T:
+    def _call(self, method: Callable[..., T], *args: object) -> T:
         with self._lock:
             return method(*args)
 
@@ -160,38 +211,40 @@ class _ExclusiveSession:
         times = {"queue_ms": (start - asked) * 1e3, "infer_ms": (end - start) * 1e3, "batch": 1.0}
         return answer, times
 
-    async def end(self, outcome: Mapping[str, Any]) -> None:
-        if isinstance(self._policy, SupportsEnd):
-            await self._host.run(self._call, self._policy.end, outcome)
+    async def end(self, outcome: Mapping[str, object]) -> None:
+        if has(self._policy, "end"):
+            await self._threads.run(self._call, self._policy.end, outcome)
 
     def close(self) -> None:
-        if self._close and isinstance(self._policy, SupportsClose):
-            self._host.post(self._call, self._policy.close)
+        if self._close and has(self._policy, "close"):
+            self._threads.post(self._call, self._policy.close)
 
 
 class _BatchedSession:
     """One session of a policy that serves many at once."""
 
-    def __init__(self, host: PolicyHost, policy: Policy, batcher: Batcher, number: int) -> None:
-        self._host, self._policy, self._batcher, self._number = host, policy, batcher, number
+    def __init__(
+        self, threads: PolicyThreads, policy: Policy, batcher: Batcher, number: int
+    ) -> None:
+        self._threads, self._policy, self._batcher, self._number = threads, policy, batcher, number
 
     def request_began(self) -> None:
         self._batcher.request_began(self._number)
 
     async def reset(self, trial: TrialInfo) -> None:
         self._batcher.forget(self._number)
-        if isinstance(self._policy, SupportsSessionReset):
-            await self._host.run(self._policy.reset_session, self._number, trial)
+        if has(self._policy, "reset_session"):
+            await self._threads.run(self._policy.reset_session, self._number, trial)
         else:
-            await self._host.run(self._policy.reset, trial)
+            await self._threads.run(self._policy.reset, trial)
 
     async def infer(self, observation: Observation) -> Answer:
         return await self._batcher.infer(self._number, observation)
 
-    async def end(self, outcome: Mapping[str, Any]) -> None:
+    async def end(self, outcome: Mapping[str, object]) -> None:
         self._batcher.forget(self._number)
 
     def close(self) -> None:
         self._batcher.forget(self._number)
-        if isinstance(self._policy, SupportsSessionEnd):
-            self._host.post(self._policy.end_session, self._number)
+        if has(self._policy, "end_session"):
+            self._threads.post(self._policy.end_session, self._number)

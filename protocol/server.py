@@ -30,13 +30,26 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 from websockets.typing import Subprotocol
 
-from robospa.protocol.codec import DEFAULT_LIMITS, Limits
-from robospa.protocol.connection_limits import ConnectionLimiter, MonitoredConnection
-from robospa.protocol.handler import ConnectionHandler, refuse
-from robospa.protocol.messages import SUBPROTOCOL
-from robospa.protocol.policy import Policy
-from robospa.protocol.policy_host import PolicyFactory, PolicyHost
-from robospa.protocol.tuning import enlarge_buffers, keep_alive, keep_freed_memory
+from robospa.protocol import messages
+from robospa.protocol.batching import QueueFull
+from robospa.protocol.codec import Limits, decode, decode_images
+from robospa.protocol.connection_limits import (
+    ConnectionLimiter,
+    MonitoredConnection,
+    ServerOptions,
+)
+from robospa.protocol.errors import (
+    POLICY_FAILED,
+    DecodeError,
+    PolicyAnswerError,
+    error_sentence,
+    policy_traceback,
+)
+from robospa.protocol.messages import SUBPROTOCOL, Error, Message
+from robospa.protocol.openpi import serve_openpi
+from robospa.protocol.policy import Policy, PolicySpec, check_chunk, check_observation
+from robospa.protocol.policy_host import PolicyFactory, PolicyHost, PolicySession
+from robospa.protocol.transport import enlarge_buffers, keep_alive, keep_freed_memory
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -49,29 +62,109 @@ LAST_ANSWER = 0.1
 """[s] in which a handler whose connection is closed may return by itself."""
 
 
-@dataclass(frozen=True)
-class ServerOptions:
-    """Limits of one server.
+@dataclass
+class ConnectionHandler:
+    """Serves one connection in `robospa.v1` until it closes.
 
-    `idle`: seconds of silence after which a connection is closed. `patience`: seconds that a new
-    connection waits for a free place. `message`: seconds within which a message has to be complete
-    and an answer read. `unfinished`: bytes that messages still on their way may have together.
-    `handshakes`: how many may be in progress at once, each for `handshake` seconds. `queue`:
-    requests that may wait. `threads`: how many threads call policies (more than one only if they
-    allow it).
+    Requests are answered strictly one after the other and each gets exactly one answer, so a failed
+    reset can never shift the answers that follow. After an exception of the policy the trial is
+    over: `infer` is refused until the next reset.
     """
 
-    max_connections: int = 256
-    unfinished: int = 2**29
-    queue: int = 256
-    threads: int = 1
-    idle: float = 3600.0
-    patience: float = 2.0
-    message: float = 60.0
-    handshakes: int = 128
-    handshake: float = 10.0
-    name: str = "robospa"
-    limits: Limits = field(default_factory=lambda: DEFAULT_LIMITS)
+    socket: MonitoredConnection
+    policy: PolicySession
+    spec: PolicySpec
+    name: str
+    limits: Limits
+    _in_trial: bool = False
+    _last_id: int = 0
+
+    async def run(self) -> None:
+        """Speak `robospa.v1`. Raises ConnectionClosed."""
+        await self._send(messages.Hello(0, messages.VERSION, self.name, self.spec))
+        while True:
+            data = await self.socket.next_message()
+            if isinstance(data, str):
+                return await self._give_up(1003, "text frames do not exist in robospa.v1")
+            try:
+                value = decode(data, self.limits)
+            except DecodeError as error:
+                return await self._give_up(1007, str(error))
+            id = value.get("id") if isinstance(value, dict) else None
+            if type(id) is not int or not self._last_id < id <= messages.MAX_ID:
+                return await self._give_up(1008, f"request ids must increase from {self._last_id}")
+            self._last_id = id
+            answer = await self._answer(id, value)
+            del data, value  # let the memory of this observation be used for the next one
+            await self._send(answer)
+
+    async def _answer(self, id: int, value: object) -> Message:
+        try:
+            request = messages.read_message(value)
+            if isinstance(request, messages.Reset):
+                return await self._reset(request)
+            if isinstance(request, messages.Infer):
+                return await self._infer(request)
+            if isinstance(request, messages.End):
+                return await self._end(request)
+            raise DecodeError(f"a client may not send {request.type}")
+        except DecodeError as error:
+            return Error(id, messages.BAD_MESSAGE, str(error))
+        except QueueFull as error:
+            return Error(id, messages.BUSY, f"the server is busy: {error}", retriable=True)
+        except Exception as error:
+            self._in_trial = False
+            said = error_sentence(error)
+            log.error("the policy failed: %s\n%s", said, policy_traceback(error))
+            return Error(id, POLICY_FAILED, said, getattr(error, "retriable", True))
+
+    async def _reset(self, request: messages.Reset) -> Message:
+        self._in_trial = False
+        await self.policy.reset(request.trial)
+        self._in_trial = True
+        return messages.Ready(request.id)
+
+    async def _infer(self, request: messages.Infer) -> Message:
+        if not self._in_trial:
+            return self._no_trial(request)
+        received = request.observation
+        try:
+            if self.spec.image_codec == "jpeg":
+                received = await asyncio.to_thread(decode_images, received, self.limits)
+            observation = check_observation(received, self.spec)
+        except DecodeError as error:
+            return Error(request.id, messages.BAD_OBSERVATION, str(error))
+        answer, timing = await self.policy.infer(observation)
+        try:
+            return messages.Actions(request.id, check_chunk(answer, self.spec), timing)
+        except PolicyAnswerError as error:
+            return Error(request.id, messages.BAD_ANSWER, str(error))
+
+    async def _end(self, request: messages.End) -> Message:
+        if not self._in_trial:
+            return self._no_trial(request)
+        self._in_trial = False
+        await self.policy.end(request.outcome)
+        return messages.Ended(request.id)
+
+    def _no_trial(self, request: Message) -> Message:
+        why = f"{request.type} needs a successful reset first"
+        return Error(request.id, messages.NO_TRIAL, why, True)
+
+    async def _send(self, message: Message) -> None:
+        await self.socket.send(messages.pack(message, self.limits))
+
+    async def _give_up(self, close_code: int, reason: str) -> None:
+        log.warning("closing a connection: %s", reason)
+        await self._send(Error(0, messages.BAD_MESSAGE, reason))
+        await self.socket.close(close_code, reason[:100])
+
+
+async def refuse(socket: MonitoredConnection, ours: bool, error: Exception) -> None:
+    """Send the reason why there is no session, in either dialect, and close."""
+    reason = error_sentence(error)
+    await socket.send(messages.pack(Error(0, POLICY_FAILED, reason)) if ours else reason)
+    await socket.close(1011, "no policy for this connection")
 
 
 @dataclass(frozen=True)
@@ -109,14 +202,8 @@ class PolicyServer:
             self.policy, self.policy_factory, threads=options.threads, queue=options.queue
         )
         most = options.max_connections
-        self._limiter = ConnectionLimiter(
-            min(most, self._policies.max_sessions or most),
-            patience=options.patience,
-            handshakes=options.handshakes,
-            message=options.message,
-            idle=options.idle,
-            unfinished=options.unfinished,
-        )
+        places = min(most, self._policies.max_sessions or most)
+        self._limiter = ConnectionLimiter(places, options)
         self._server: Server | None = None
 
     @property
@@ -217,11 +304,9 @@ class PolicyServer:
             log.exception("no policy could be made for a new connection")
             return await refuse(connection, ours, error)
         connection.on_message_began = policy.request_began
-        handler = ConnectionHandler(
-            connection, policy, self._policies.spec, options.name, options.limits
-        )
+        given = connection, policy, self._policies.spec, options.name, options.limits
         try:
-            await (handler.run() if ours else handler.run_openpi())
+            await (ConnectionHandler(*given).run() if ours else serve_openpi(*given))
         finally:
             policy.close()
 

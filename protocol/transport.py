@@ -9,15 +9,17 @@ instead). A transport that failed once is closed and stays closed.
 from __future__ import annotations
 
 import contextlib
+import ipaddress
 import logging
 import re
 import socket
 import ssl as ssl_module
 import struct
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from http import HTTPStatus
-from typing import Any
+from typing import Any, TypeVar
 from urllib.parse import urljoin, urlsplit
 
 from websockets.exceptions import (
@@ -39,16 +41,12 @@ from robospa.protocol.errors import (
     HandshakeError,
     TransportError,
     Unauthorized,
+    printable,
+    without_secrets,
 )
 from robospa.protocol.messages import SUBPROTOCOL
-from robospa.protocol.sanitize import printable, without_secrets
-from robospa.protocol.tuning import (
-    enlarge_buffers,
-    is_loopback,
-    keep_freed_memory,
-    loopback_socket,
-)
 
+T = TypeVar("T")
 LIBRARY_LOG = logging.getLogger("robospa.client.websockets")
 """What websockets prints of odd servers, with tracebacks; here each ends in an error of ours."""
 LIBRARY_LOG.setLevel(logging.CRITICAL)
@@ -193,48 +191,81 @@ def why_closed(error: Exception, limit: int) -> str:
     return "it was closed without a reason; look at the server's log"
 
 
+class NotYet(Exception):
+    """Nobody serves there yet; `error` is raised if nobody comes."""
+
+    def __init__(self, error: Exception) -> None:
+        super().__init__(str(error))
+        self.error = error
+
+
+def connect_until(url: str, wait: float, connect: Callable[[], T]) -> T:
+    """What `connect` returns, called again for `wait` s while nobody listens or it raises NotYet.
+
+    Raises ConnectFailed for any OSError, and what else `connect` raises.
+    """
+    give_up = time.monotonic() + wait
+    while True:
+        try:
+            return connect()
+        except ConnectionRefusedError as error:
+            failure: Exception = ConnectFailed(
+                f"cannot connect to {url}: nothing listens there; start the policy server first"
+            )
+            cause: BaseException | None = error
+        except NotYet as error:
+            failure, cause = error.error, error.__cause__
+        except OSError as error:
+            raise ConnectFailed(f"cannot connect to {url}: {error}") from error
+        if time.monotonic() >= give_up:
+            raise failure from cause
+        time.sleep(0.05)
+
+
 def _open(
     address: Address, timeouts: Timeouts, limits: Limits, offer: str | None
 ) -> tuple[ClientConnection, str]:
     """The connection, and the address where it was made in the end."""
-    give_up = time.monotonic() + timeouts.wait
-    moves = 0
-    while True:
+    for _ in range(1 + REDIRECTS):
+        here = address
+
+        def attempt() -> ClientConnection:
+            return _attempt(here, timeouts, limits, offer)  # noqa: B023
+
         try:
-            return _open_once(address, timeouts, limits, offer), address.url
-        except ConnectionRefusedError as error:
-            if time.monotonic() >= give_up:
-                raise ConnectFailed(
-                    f"cannot connect to {address.url}: nothing listens there; "
-                    "start the policy server first"
-                ) from error
-            time.sleep(0.05)
-        except BadAddress:
-            raise
+            return connect_until(here.url, timeouts.wait, attempt), here.url
         except _Redirected as error:
-            moves += 1
-            if moves > REDIRECTS:
-                raise HandshakeError(f"{address.url} redirects for ever") from error
-            address = _moved(address, error.location)
-        except InvalidStatus as error:
-            unavailable = error.response.status_code == HTTPStatus.SERVICE_UNAVAILABLE
-            if not unavailable or time.monotonic() >= give_up:  # it may shut down to restart
-                raise _refused(address, error) from error
-            time.sleep(0.05)
-        except TimeoutError as error:
-            raise ConnectFailed(
-                f"{address.url} did not finish the handshake within {timeouts.connect:g} s; "
-                "look at the server's log"
-            ) from error
-        except (OSError, ValueError, EOFError, WebSocketException) as error:
-            if not _hung_up(error):
-                raise ConnectFailed(f"cannot connect to {address.url}: {error}") from error
-            if time.monotonic() >= give_up:
-                raise ConnectFailed(
-                    f"cannot connect to {address.url}: it hung up during the handshake ({error}); "
-                    "start the policy server behind it"
-                ) from error
-            time.sleep(0.05)
+            address = _moved(here, error.location)
+    raise HandshakeError(f"{here.url} redirects for ever")
+
+
+def _attempt(
+    address: Address, timeouts: Timeouts, limits: Limits, offer: str | None
+) -> ClientConnection:
+    """One handshake, whose failures are errors of ours."""
+    try:
+        return _open_once(address, timeouts, limits, offer)
+    except (ConnectionRefusedError, BadAddress):
+        raise
+    except InvalidStatus as error:
+        refused = _refused(address, error)
+        if error.response.status_code == HTTPStatus.SERVICE_UNAVAILABLE:  # it may restart
+            raise NotYet(refused) from error
+        raise refused from error
+    except TimeoutError as error:
+        raise ConnectFailed(
+            f"{address.url} did not finish the handshake within {timeouts.connect:g} s; "
+            "look at the server's log"
+        ) from error
+    except (OSError, ValueError, EOFError, WebSocketException) as error:
+        if not _hung_up(error):
+            raise ConnectFailed(f"cannot connect to {address.url}: {error}") from error
+        raise NotYet(
+            ConnectFailed(
+                f"cannot connect to {address.url}: it hung up during the handshake ({error}); "
+                "start the policy server behind it"
+            )
+        ) from error
 
 
 def _moved(address: Address, location: str) -> Address:
@@ -267,19 +298,20 @@ def _hung_up(error: Exception) -> bool:
 def _open_once(
     address: Address, timeouts: Timeouts, limits: Limits, offer: str | None
 ) -> ClientConnection:
-    options: dict[str, Any] = {}
     parts = urlsplit(address.url)
     if parts.scheme not in ("ws", "wss") or not parts.hostname or "@" in parts.netloc:
         raise BadAddress(
             f"{without_secrets(address.url)!r} is not of the form ws://host:port or wss://host:port"
         )
-    if is_loopback(parts.hostname or ""):
+    sock = None
+    if is_loopback(parts.hostname):
         # Own socket: no detour through a proxy that the environment names, and buffers that
         # are set before the connection exists (the kernel scales its window by them).
         port = parts.port or (443 if parts.scheme == "wss" else 80)
-        options["sock"] = loopback_socket(parts.hostname or "", port, timeouts.connect)
+        sock = loopback_socket(parts.hostname, port, timeouts.connect)
     manager = websocket_connect(
         address.url,
+        sock=sock,
         ssl=address.ssl,
         subprotocols=[Subprotocol(offer)] if offer else None,
         additional_headers=address.headers(),
@@ -290,7 +322,6 @@ def _open_once(
         ping_interval=None,
         logger=LIBRARY_LOG,
         create_connection=_Connection,
-        **options,
     )
     # As of websockets 17 the result must be entered; before, entering it changes nothing.
     connection: ClientConnection = manager.__enter__()
@@ -307,3 +338,61 @@ def _refused(address: Address, error: InvalidStatus) -> Exception:
     if status in (HTTPStatus.BAD_REQUEST, HTTPStatus.FORBIDDEN, HTTPStatus.UPGRADE_REQUIRED):
         return HandshakeError(f"{address.url} refused the connection: {body or status}")
     return ConnectFailed(f"{address.url} answered HTTP {status}: {body or 'no reason given'}")
+
+
+SOCKET_BUFFER = 4 * 2**20
+"""Bytes asked of the kernel each way (it may give less): a full observation fits."""
+_LARGEST_BLOCK = 31 * 2**20  # glibc learns from blocks up to 32 MiB
+
+
+def keep_freed_memory() -> None:
+    """Let this process keep up to about 64 MiB of freed memory for the next observation.
+
+    The C library hands large blocks back to the kernel as soon as they are free and has to fetch
+    them again, page by page, for the next message: 400 page faults and more than half of the
+    processor time of a request. glibc raises its thresholds (to twice this size) when a large block
+    has come and gone once; no page of the block is touched. Elsewhere the call does nothing.
+    """
+    bytearray(_LARGEST_BLOCK)
+
+
+def enlarge_buffers(sock: socket.socket) -> None:
+    """Ask for room for a whole observation; sockets accepted by a listener inherit it."""
+    for option in (socket.SO_SNDBUF, socket.SO_RCVBUF):
+        sock.setsockopt(socket.SOL_SOCKET, option, SOCKET_BUFFER)
+
+
+def keep_alive(sock: socket.socket) -> None:
+    """Let the kernel notice within two minutes that a silent peer's machine is gone."""
+    sock.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+    for name, value in (("TCP_KEEPIDLE", 60), ("TCP_KEEPINTVL", 15), ("TCP_KEEPCNT", 4)):
+        if hasattr(socket, name):
+            sock.setsockopt(socket.IPPROTO_TCP, getattr(socket, name), value)
+
+
+def is_loopback(host: str) -> bool:
+    """Whether `host` is this machine."""
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+def loopback_socket(host: str, port: int, timeout: float) -> socket.socket:
+    """A connected socket whose buffers were large before it connected: the kernel scales its
+    window by them. `timeout` [s]. Raises OSError."""
+    error: OSError = ConnectionRefusedError(f"{host} has no address")
+    for family, kind, proto, _, target in socket.getaddrinfo(host, port, type=socket.SOCK_STREAM):
+        sock = socket.socket(family, kind, proto)
+        try:
+            enlarge_buffers(sock)
+            sock.settimeout(timeout)
+            sock.connect(target)
+            sock.settimeout(None)
+            return sock
+        except OSError as failure:
+            sock.close()
+            error = failure
+    raise error

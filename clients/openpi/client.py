@@ -13,17 +13,15 @@ from robospa.action_space import ActionSpace
 from robospa.clients.chunks import HORIZON, as_chunk, refuse_unread
 from robospa.clients.dialect import ConnectionParams, Dialect
 from robospa.clients.numpy_msgpack import unpack
-from robospa.clients.openpi.conventions import to_openpi
 from robospa.clients.probe import Probe
 from robospa.clients.robot_option import RobotOption
 from robospa.clients.token_budget import check_budget
 from robospa.observation import CameraSpec, Observation
 from robospa.protocol.codec import Limits, encode
-from robospa.protocol.errors import DecodeError, ProtocolViolation, ServerError
-from robospa.protocol.openpi import CAMERA_NAMES
+from robospa.protocol.errors import DecodeError, ProtocolViolation, ServerError, json_values
+from robospa.protocol.openpi import CAMERA_NAMES, to_openpi
 from robospa.protocol.options import option, plain_options
 from robospa.protocol.policy import PolicySpec, TrialInfo
-from robospa.protocol.sanitize import json_values
 from robospa.protocol.transport import Timeouts, Transport
 
 WARNINGS = (

@@ -24,8 +24,8 @@ from robospa.protocol.errors import (
     EncodeError,
     ProtocolViolation,
     ServerError,
+    printable,
 )
-from robospa.protocol.sanitize import printable
 
 MAX_REASON = 240
 """Characters of a server's error text that are repeated."""

@@ -30,10 +30,9 @@ from robospa.clients.probe import Probe
 from robospa.clients.robot_option import RobotOption
 from robospa.clients.token_budget import BUDGET, check_budget
 from robospa.observation import CameraSpec, Observation
-from robospa.protocol.errors import HandshakeError, ServerError
+from robospa.protocol.errors import HandshakeError, ServerError, json_values, printable
 from robospa.protocol.options import option, plain_options
 from robospa.protocol.policy import PolicySpec, TrialInfo
-from robospa.protocol.sanitize import json_values, printable
 
 CAMERAS = {"head": "head_camera", "left_wrist": "left_camera", "right_wrist": "right_camera"}
 PROTOCOL = 1

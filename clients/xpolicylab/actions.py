@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 
 from robospa.action_space import ARMS
 from robospa.clients.chunks import NAMED, as_chunk, refuse_unread
-from robospa.protocol.errors import PolicyAnswerError
-from robospa.protocol.sanitize import printable
+from robospa.protocol.errors import PolicyAnswerError, printable
 from robospa.registry import did_you_mean
 
 BODIES = {"joint": "arm_joint_state", "ee": "ee_pose"}

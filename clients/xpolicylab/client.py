@@ -33,10 +33,9 @@ from robospa.clients.robot_option import RobotOption
 from robospa.clients.token_budget import BUDGET, check_budget
 from robospa.clients.xpolicylab.actions import read_actions
 from robospa.observation import Observation
-from robospa.protocol.errors import ServerError
+from robospa.protocol.errors import ServerError, printable
 from robospa.protocol.options import option, plain_options
 from robospa.protocol.policy import PolicySpec, TrialInfo
-from robospa.protocol.sanitize import printable
 from robospa.rotations import quaternion_to_matrix
 
 CAMERAS = {"head": "cam_head", "left_wrist": "cam_left_wrist", "right_wrist": "cam_right_wrist"}

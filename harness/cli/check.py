@@ -303,7 +303,8 @@ def _warnings(connect: Connect) -> list[str]:
 
     try:
         with connect() as policy:
-            return [str(text) for text in policy.hello.get("warnings", ())]
+            found = policy.hello.get("warnings")
+            return list(map(str, found)) if isinstance(found, list) else []
     except WireError:
         return []
 
@@ -314,8 +315,9 @@ def _replay(console: Console, target: Target, episode: Episode, points: int) -> 
 
     with target.connect() as policy:
         findings = replay(policy, episode, points)
-        chosen = policy.hello.get("options", {})  # a robospa.v1 server leaves nothing to choose
-    options = {m: name for m, name in target.deciding_options.items() if name in chosen}
+        chosen = policy.hello.get("options")  # a robospa.v1 server leaves nothing to choose
+    known = chosen if isinstance(chosen, Mapping) else {}
+    options = {m: name for m, name in target.deciding_options.items() if name in known}
     show(console, findings, episode.name, options)
     return findings
 

@@ -149,7 +149,7 @@ def sentence(error: BaseException) -> str:
     """`error` in one line; its class only where the text was not written for users."""
     words = error.args[0] if isinstance(error, KeyError) and error.args else error
     from robospa.extras import remedy
-    from robospa.protocol.sanitize import without_secrets
+    from robospa.protocol.errors import without_secrets
 
     text = "".join(c for c in " ".join(str(words).split()) if c.isprintable())
     text = without_secrets(text)

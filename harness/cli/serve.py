@@ -135,8 +135,8 @@ def _hosted(
     """What the server runs: a shared policy or a factory of one per connection, and its options."""
     from functools import partial
 
+    from robospa.protocol.connection_limits import ServerOptions
     from robospa.protocol.options import read_options
-    from robospa.protocol.server import ServerOptions
 
     kind = options_class(make)
     if kind is None:

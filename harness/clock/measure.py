@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from robospa.harness.clock.latency import Latency, of_samples
 from robospa.protocol.client import RemotePolicy
-from robospa.protocol.synthetic import synthetic_observation, trial_for
+from robospa.protocol.conformance import synthetic_observation, trial_for
 
 CLIENTS = (1, 4, 8)
 """How many at once; one is a robot with a server for itself."""

@@ -33,8 +33,8 @@ from robospa.action_space import ARMS, POSE, SEVEN_JOINT_ARMS, SIX_JOINT_ARMS, A
 from robospa.extras import remedy
 from robospa.harness.running.atomic_file import replace_file
 from robospa.observation import CameraSpec, Observation
+from robospa.protocol.codec import decode_jpeg
 from robospa.protocol.errors import DecodeError
-from robospa.protocol.images import decode_jpeg
 from robospa.protocol.policy import PolicySpec
 
 if TYPE_CHECKING:

@@ -20,8 +20,8 @@ from robospa.harness.convention_check.samples import AnswerSample
 from robospa.harness.robots import embodiment
 from robospa.harness.robots.kinematics import chain_of, end_effector
 from robospa.observation import Observation
-from robospa.protocol.policy import Policy, PolicySpec
-from robospa.protocol.synthetic import robot_of, synthetic_observation, trial_for
+from robospa.protocol.conformance import synthetic_observation, trial_for
+from robospa.protocol.policy import Policy, PolicySpec, robot_of
 
 POSTURES = 4
 JUMP = {"joint": 1.0, "ee": 0.3}

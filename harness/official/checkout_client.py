@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from robospa.harness.official import checkout_server
 from robospa.harness.official.checkout_server import packed, unpacked
-from robospa.protocol.sanitize import printable
+from robospa.protocol.errors import printable
 
 SENTENCE = 500
 SECONDS = {"hello": 300.0, "load": 900.0, "step": 300.0, "observe": 120.0}

@@ -25,18 +25,14 @@ from robospa.harness.factory import is_url
 from robospa.harness.running.messages import Activity, Heartbeat
 from robospa.harness.running.turn import Turn
 from robospa.observation import Observation
-from robospa.protocol.errors import PolicyAnswerError, PolicyError, WireError
-from robospa.protocol.policy import (
-    HasHello,
-    HasTiming,
-    Policy,
-    PolicySpec,
-    SupportsClose,
-    SupportsEnd,
-    SupportsReconnect,
-    TrialInfo,
+from robospa.protocol.errors import (
+    PolicyAnswerError,
+    PolicyError,
+    WireError,
+    error_sentence,
+    policy_traceback,
 )
-from robospa.protocol.user_errors import error_sentence, policy_traceback
+from robospa.protocol.policy import Policy, PolicySpec, TrialInfo, has
 
 HEARTBEAT_SECONDS = 1.0
 
@@ -139,12 +135,12 @@ class MonitoredPolicy:
     @property
     def hello(self) -> Mapping[str, Any]:
         """The server's greeting; empty for a policy without a server."""
-        return self._policy.hello if isinstance(self._policy, HasHello) else {}
+        return self._policy.hello if has(self._policy, "hello") else {}
 
     @property
     def last_timing(self) -> Mapping[str, float]:
         """The server's times of the last answer [ms]; empty if it reports none."""
-        return self._policy.last_timing if isinstance(self._policy, HasTiming) else {}
+        return self._policy.last_timing if has(self._policy, "last_timing") else {}
 
     def begin(self) -> None:
         """Another trial follows."""
@@ -190,19 +186,19 @@ class MonitoredPolicy:
 
     def end(self, outcome: Mapping[str, Any]) -> None:
         """Tell the policy how its trial went, if it wants to know."""
-        if isinstance(self._policy, SupportsEnd):
+        if has(self._policy, "end"):
             with self._heartbeat.policy(self.target):
                 self._policy.end(outcome)
 
     def reconnect(self) -> None:
         """Open a new connection to the policy's server, if it has one."""
-        if isinstance(self._policy, SupportsReconnect):
+        if has(self._policy, "reconnect"):
             with self._heartbeat.policy(self.target):
                 self._policy.reconnect()
 
     def close(self) -> None:
         """Free what the policy holds."""
-        if isinstance(self._policy, SupportsClose):
+        if has(self._policy, "close"):
             with self._heartbeat.policy(self.target):
                 self._policy.close()
 

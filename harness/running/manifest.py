@@ -21,7 +21,7 @@ from typing import Any
 
 from robospa.harness.running.atomic_file import PARTIAL, replace_file
 from robospa.harness.running.code_hash import code_hash
-from robospa.protocol.identity import Identity, identity_of
+from robospa.protocol.client import Identity, identity_of
 from robospa.results.records.manifest import (
     FORMAT,
     MANIFEST,

@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any
 from robospa.harness.clock.clock import Clock
 from robospa.harness.factory import is_url, open_policy
 from robospa.harness.robots import embodiment
-from robospa.protocol.identity import Identity, identity_of
-from robospa.protocol.policy import HasHello, PolicySpec, SupportsClose
+from robospa.protocol.client import Identity, identity_of
+from robospa.protocol.policy import PolicySpec, has
 from robospa.results.records.manifest import RunError
 from robospa.schema import parse_json
 from robospa.text import some
@@ -99,8 +99,8 @@ def probe(target: str, given: Mapping[str, Any], wait: float = 0.0) -> ProbedPol
     if "timeouts" in options:
         options["timeouts"] = replace(options["timeouts"], wait=wait)
     policy = open_policy(target, options)
-    hello = dict(policy.hello) if isinstance(policy, HasHello) else {"dialect": "in process"}
-    if isinstance(policy, SupportsClose):
+    hello = dict(policy.hello) if has(policy, "hello") else {"dialect": "in process"}
+    if has(policy, "close"):
         policy.close()
     return ProbedPolicy(target, policy.spec, hello)
 

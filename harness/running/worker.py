@@ -43,9 +43,9 @@ from robospa.harness.running.messages import (
 from robospa.harness.running.policy_probe import over_budget
 from robospa.harness.running.record_store import RecordWriter
 from robospa.harness.running.turn import Turn
-from robospa.protocol.identity import Identity
+from robospa.protocol.client import Identity
+from robospa.protocol.errors import printable
 from robospa.protocol.policy import PolicySpec
-from robospa.protocol.sanitize import printable
 from robospa.results.records.films import film_name
 from robospa.results.records.trial_record import RetryRow, TrialRecord
 from robospa.trial import TrialKey

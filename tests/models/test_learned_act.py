@@ -16,8 +16,8 @@ from tiny_datasets import MANIFEST, written
 
 from robospa.clients import connect
 from robospa.harness.datasets.pack import pack
+from robospa.protocol.conformance import synthetic_observation
 from robospa.protocol.policy import TrialInfo
-from robospa.protocol.synthetic import synthetic_observation
 from robospa.protocol.transport import Timeouts
 from robospa.trial import TrialKey
 

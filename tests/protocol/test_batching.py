@@ -9,8 +9,7 @@ from typing import Any
 import pytest
 from virtual_time import run
 
-from robospa.protocol.batch_window import KEPT, SLACK, AdaptiveBatchWindow, CallCost
-from robospa.protocol.batching import Batcher, QueueFull
+from robospa.protocol.batching import KEPT, SLACK, AdaptiveBatchWindow, Batcher, CallCost, QueueFull
 
 
 @pytest.fixture

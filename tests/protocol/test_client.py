@@ -361,14 +361,14 @@ def test_images_travel_as_jpeg_if_the_spec_says_so(start: Any) -> None:
 
 
 def test_a_broken_jpeg_is_refused() -> None:
-    from robospa.protocol.images import decode_jpeg
+    from robospa.protocol.codec import decode_jpeg
 
     with pytest.raises(DecodeError, match="no JPEG"):
         decode_jpeg(b"\xff\xd8 nothing")
 
 
 def test_a_jpeg_bomb_is_refused_by_its_header() -> None:
-    from robospa.protocol.images import decode_jpeg, encode_jpeg
+    from robospa.protocol.codec import decode_jpeg, encode_jpeg
 
     data = encode_jpeg(np.zeros((40, 40, 3), np.uint8))
     with pytest.raises(DecodeError, match="over the limit"):

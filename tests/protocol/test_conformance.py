@@ -11,11 +11,9 @@ import pytest
 from wire_helpers import QUICK, SPEC, Recall, Scripted, answer
 
 from robospa.observation import CameraSpec
-from robospa.protocol.conformance import CHECKS, check
+from robospa.protocol.conformance import CHECKS, check, synthetic_observation
 from robospa.protocol.messages import Actions, Hello, Ready, pack
-from robospa.protocol.policy import PolicySpec
-from robospa.protocol.synthetic import synthetic_observation
-from robospa.protocol.validation import check_observation
+from robospa.protocol.policy import PolicySpec, check_observation
 
 
 def verdicts(url: str, **options: Any) -> dict[str, bool | None]:

@@ -21,10 +21,10 @@ from wire_helpers import QUICK, TRIAL, Recall, ask, observation, raw, until
 
 from robospa.protocol.client import connect
 from robospa.protocol.codec import encode
-from robospa.protocol.connection_limits import FRAMES
+from robospa.protocol.connection_limits import FRAMES, ServerOptions
 from robospa.protocol.errors import ConnectionLost, TransportError
 from robospa.protocol.messages import Error, Infer, Ready, Reset, pack
-from robospa.protocol.server import ServerOptions, ServerThread
+from robospa.protocol.server import ServerThread
 
 KEY = base64.b64encode(b"0123456789abcdef").decode()
 HANDSHAKE = (

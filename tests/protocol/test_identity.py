@@ -7,9 +7,8 @@ from typing import Any
 import pytest
 from run_fakes import SPEC
 
-from robospa.protocol.client import RemotePolicy
+from robospa.protocol.client import Identity, RemotePolicy, identity_of
 from robospa.protocol.errors import SpecMismatch
-from robospa.protocol.identity import Identity, identity_of
 from robospa.protocol.transport import Timeouts
 
 HELLO: dict[str, Any] = {

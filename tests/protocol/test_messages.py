@@ -29,8 +29,13 @@ from robospa.protocol.messages import (
     pack,
     unpack,
 )
-from robospa.protocol.policy import PolicySpec, TrialInfo
-from robospa.protocol.validation import check_chunk, check_observation, compare_specs
+from robospa.protocol.policy import (
+    PolicySpec,
+    TrialInfo,
+    check_chunk,
+    check_observation,
+    compare_specs,
+)
 from robospa.trial import TrialKey
 
 IDS = st.integers(0, MAX_ID)

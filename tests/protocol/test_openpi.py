@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 from wire_helpers import Recall, observation
 
+from robospa.observation import CameraSpec
 from robospa.protocol.errors import DecodeError
 from robospa.protocol.openpi import from_openpi
+from robospa.protocol.policy import PolicySpec
 
 
 def openpi_client(url: str) -> Any:
@@ -83,6 +85,9 @@ def test_openpis_api_key_is_a_token(start: Any) -> None:
     client._ws.close()
 
 
+SEES = PolicySpec("sees", cameras=(CameraSpec("head", 8, 6),), state="none")
+
+
 @pytest.mark.parametrize(
     "image",
     [
@@ -92,7 +97,7 @@ def test_openpis_api_key_is_a_token(start: Any) -> None:
     ],
 )
 def test_images_of_either_layout_and_range(image: Any) -> None:
-    found = from_openpi({"images": {"cam_high": image}}, 0)["images"]["head"]
+    found = from_openpi({"images": {"cam_high": image}}, 0, SEES)["images"]["head"]
     assert found.shape == (6, 8, 3)
     assert found.dtype == np.uint8
     assert (found == 51).all()
@@ -100,8 +105,8 @@ def test_images_of_either_layout_and_range(image: Any) -> None:
 
 @pytest.mark.parametrize(
     "value",
-    [None, {"images": []}, {"images": {"cam_high": 1}}, {"state": [1.0]}, {"prompt": 3}],
+    [None, {"images": []}, {"images": {"cam_high": 1}}, {"state": [1.0]}, {"prompt": 3}, {}],
 )
 def test_what_is_no_openpi_observation(value: Any) -> None:
     with pytest.raises(DecodeError):
-        from_openpi(value, 0)
+        from_openpi(value, 0, SEES)

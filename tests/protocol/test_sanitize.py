@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from robospa.protocol.sanitize import json_values
+from robospa.protocol.errors import json_values
 
 
 def test_arrays_and_numbers_that_json_lacks_can_be_kept() -> None:

@@ -9,7 +9,7 @@ import pytest
 from robospa.clients import connect, find_endpoint
 from robospa.harness.cli.main import main, sentence
 from robospa.protocol.client import connect as connect_ours
-from robospa.protocol.sanitize import without_secrets
+from robospa.protocol.errors import without_secrets
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,7 @@ from wire_helpers import QUICK, SPEC, TRIAL, Recall, ask, observation, raw, webs
 
 from robospa.protocol.client import connect
 from robospa.protocol.codec import Limits, encode
+from robospa.protocol.connection_limits import ServerOptions
 from robospa.protocol.errors import (
     ConnectionLost,
     PolicyAnswerError,
@@ -20,7 +21,6 @@ from robospa.protocol.errors import (
     TransportError,
 )
 from robospa.protocol.messages import End, Error, Infer, Message, Ready, Reset, pack, unpack
-from robospa.protocol.server import ServerOptions
 
 
 def test_a_failed_reset_shifts_no_answer(start: Any) -> None:

@@ -12,6 +12,7 @@ import pytest
 from wire_helpers import QUICK, TRIAL, Recall, Together, observation, raw, until, websocket
 
 from robospa.protocol.client import connect
+from robospa.protocol.connection_limits import ServerOptions
 from robospa.protocol.errors import (
     CallTimeout,
     ConnectFailed,
@@ -19,7 +20,7 @@ from robospa.protocol.errors import (
     ServerError,
 )
 from robospa.protocol.messages import Infer, Reset, pack
-from robospa.protocol.server import ServerOptions, ServerThread
+from robospa.protocol.server import ServerThread
 
 
 def test_every_connection_has_a_policy_of_its_own(start: Any) -> None:
@@ -240,7 +241,7 @@ def test_a_session_that_fails_is_in_the_log(
     async def broken(session: Any) -> None:
         raise ZeroDivisionError("a mistake of ours")
 
-    monkeypatch.setattr("robospa.protocol.handler.ConnectionHandler.run", broken)
+    monkeypatch.setattr("robospa.protocol.server.ConnectionHandler.run", broken)
     server = start(policy_factory=Recall)
     with pytest.raises(ConnectionLost):
         connect(server.url, timeouts=QUICK)

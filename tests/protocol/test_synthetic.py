@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from robospa.protocol.conformance import synthetic_observation, trial_for
 from robospa.protocol.policy import PolicySpec
-from robospa.protocol.synthetic import synthetic_observation, trial_for
 
 
 @pytest.mark.parametrize(

@@ -11,9 +11,8 @@ import pytest
 from wire_helpers import QUICK, TRIAL, Recall, observation
 
 from robospa.protocol.client import connect
-from robospa.protocol.errors import ServerError
+from robospa.protocol.errors import ServerError, error_sentence, policy_traceback
 from robospa.protocol.policy_host import PolicyHost
-from robospa.protocol.user_errors import error_sentence, policy_traceback
 
 HERE = Path(__file__).name
 

@@ -13,9 +13,8 @@ from robospa.baselines.learned.act.policy import PLANS, ActPolicy, until_rest
 from robospa.baselines.learned.act.poses import WIDTH, from_poses, to_poses
 from robospa.baselines.learned.act.settings import About, ActOptions
 from robospa.environment_state import WIDTH as ENVIRONMENT_WIDTH
-from robospa.protocol.policy import TrialInfo
-from robospa.protocol.synthetic import synthetic_observation
-from robospa.protocol.validation import check_chunk, check_observation
+from robospa.protocol.conformance import synthetic_observation
+from robospa.protocol.policy import TrialInfo, check_chunk, check_observation
 
 CHUNK = 6
 TURN = (0.70710678, 0.0, 0.0, 0.70710678)

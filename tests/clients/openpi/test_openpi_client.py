@@ -13,7 +13,6 @@ from standins import OpenPi
 
 from robospa.clients import connect
 from robospa.clients.openpi.client import OpenPiClientOptions
-from robospa.clients.openpi.conventions import to_openpi
 from robospa.protocol.errors import (
     ConnectionLost,
     EncodeError,
@@ -21,6 +20,7 @@ from robospa.protocol.errors import (
     ProtocolViolation,
     ServerError,
 )
+from robospa.protocol.openpi import to_openpi
 
 
 def reply(actions: Any) -> bytes:

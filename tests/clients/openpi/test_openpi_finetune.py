@@ -13,8 +13,7 @@ from model_fakes import install
 
 from robospa.action_space import ActionSpace
 from robospa.clients.openpi import finetune, serve
-from robospa.clients.openpi.conventions import to_openpi
-from robospa.protocol.openpi import CAMERA_NAMES
+from robospa.protocol.openpi import CAMERA_NAMES, to_openpi
 
 
 def kept(kind: str) -> Any:

@@ -22,8 +22,9 @@ from robospa.harness.running.turn import Turn
 from robospa.harness.running.worker import WorkerConfig
 from robospa.harness.trial import run_trial
 from robospa.harness.trial_times import Stopwatch
+from robospa.protocol.connection_limits import ServerOptions
 from robospa.protocol.policy import TrialInfo
-from robospa.protocol.server import ServerOptions, ServerThread
+from robospa.protocol.server import ServerThread
 from robospa.protocol.transport import Timeouts
 from robospa.results.records.run_io import differences, read_records
 from robospa.results.records.trial_record import TrialRecord
