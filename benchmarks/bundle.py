@@ -33,12 +33,11 @@ from robospa.harness.sim.motion import RATE
 from robospa.harness.trial import task_parts
 from robospa.harness.trial_identity import policy_seed
 from robospa.leaderboard.card import to_card
-from robospa.leaderboard.durations import durations
+from robospa.leaderboard.evidence import announced
 from robospa.leaderboard.packing import sizes_of, write_bundle
-from robospa.leaderboard.record_rows import trace_hash
-from robospa.leaderboard.reference import PARTS, WORLD, Reference, shipped
-from robospa.leaderboard.sampling import announced
-from robospa.leaderboard.scene_check import first_wrong
+from robospa.leaderboard.rules import PARTS, WORLD, Reference, first_wrong, shipped
+from robospa.leaderboard.traces import durations
+from robospa.leaderboard.trial_rows import trace_hash
 from robospa.leaderboard.verify import verify
 from robospa.results.records.run_io import Run
 from robospa.results.records.trial_record import TrialRecord

@@ -37,7 +37,7 @@ Parts = Callable[[TrialKey], TrialParts]
 
 
 @dataclass(frozen=True)
-class Finding:
+class AuditFinding:
     """What one check found."""
 
     check: str
@@ -45,7 +45,7 @@ class Finding:
     suspicious: bool
 
 
-def hidden_gap(public: Run, hidden: Run) -> Finding:
+def hidden_gap(public: Run, hidden: Run) -> AuditFinding:
     """Whether trials on public seeds succeed more often than those on hidden scenes."""
     counts = []
     for variant in dict.fromkeys(key.variant for key in hidden.keys):
@@ -56,7 +56,9 @@ def hidden_gap(public: Run, hidden: Run) -> Finding:
         if shown and unseen:
             counts.append(Counts(sum(shown), len(shown), sum(unseen), len(unseen)))
     if not counts:
-        return Finding("hidden rate", "no variant was run on public and on hidden scenes.", False)
+        return AuditFinding(
+            "hidden rate", "no variant was run on public and on hidden scenes.", False
+        )
     found = agreement(counts)
     trials = sum(c.fresh_trials for c in counts)
     claimed = sum(c.fresh_trials * c.claimed / c.claimed_trials for c in counts) / trials
@@ -64,7 +66,7 @@ def hidden_gap(public: Run, hidden: Run) -> Finding:
         f"{100 * claimed:.1f} % succeed on public seeds and {100 * found.fresh / trials:.1f} % of "
         f"{trials} trials on hidden scenes (exact one-sided p = {found.lower:.2g})."
     )
-    return Finding("hidden rate", text, found.lower < ALPHA)
+    return AuditFinding("hidden rate", text, found.lower < ALPHA)
 
 
 def path_distance(one: Trace, two: Trace) -> float:
@@ -87,17 +89,19 @@ def _resampled(trace: Trace) -> NDArray[np.float64]:
 
 def expert_likeness(
     traces: Mapping[TrialKey, Trace], expert: Callable[[TrialKey], Trace]
-) -> Finding:
+) -> AuditFinding:
     """Whether joint actions that successful trials executed are the expert's in the same scene."""
     found = [path_distance(trace, expert(key)) for key, trace in traces.items()]
     if not found:
-        return Finding("expert", "no successful trial has the joint actions it executed.", False)
+        return AuditFinding(
+            "expert", "no successful trial has the joint actions it executed.", False
+        )
     near = sum(distance < NEAR for distance in found)
     text = (
         f"{near} of {len(found)} successful trials stay within {NEAR:g} rad of the expert's own "
         f"path (median distance {np.median(found):.3g} rad)."
     )
-    return Finding("expert", text, 2 * near > len(found))
+    return AuditFinding("expert", text, 2 * near > len(found))
 
 
 def other_sentence(key: TrialKey, parts: Parts = task_parts) -> str | None:
@@ -116,7 +120,7 @@ def sentence_reaction(
     keys: Sequence[TrialKey],
     parts: Parts = task_parts,
     other: Callable[[TrialKey], str | None] = other_sentence,
-) -> Finding:
+) -> AuditFinding:
     """Whether the policy that `play` has does something else in the same scene when it is given
     another sentence."""
     own, exchanged = [], []
@@ -126,17 +130,21 @@ def sentence_reaction(
         own.append(play(key, parts(key)))
         exchanged.append(play(key, replace(parts(key), instruction=text)))
     if not own:
-        return Finding("sentences", "no trial has a scene in which other sentences ask.", False)
+        return AuditFinding(
+            "sentences", "no trial has a scene in which other sentences ask.", False
+        )
     same = sum(a.actions_digest == b.actions_digest for a, b in zip(own, exchanged, strict=True))
     before, after = (sum(r.success for r in records) for records in (own, exchanged))
     text = (
         f"{before} of {len(own)} trials succeed with their own sentence and {after} with one that "
         f"asks for something else; {same} have the same actions with both."
     )
-    return Finding("sentences", text, same == len(own) or (after > 0 and after >= STILL * before))
+    return AuditFinding(
+        "sentences", text, same == len(own) or (after > 0 and after >= STILL * before)
+    )
 
 
-def faults(run: Run) -> list[Finding]:
+def faults(run: Run) -> list[AuditFinding]:
     """Repeated trials and policy errors, over all levels and at each."""
     made = []
     for rate in fault_rates(run.records.values()):
@@ -146,5 +154,5 @@ def faults(run: Run) -> list[Finding]:
             f"({rate.attempts} attempts that did not count), {rate.policy_errors} ended in a "
             "policy error."
         )
-        made.append(Finding("errors", text, rate.too_many))
+        made.append(AuditFinding("errors", text, rate.too_many))
     return made

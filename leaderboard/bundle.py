@@ -29,6 +29,8 @@ from msgspec import Struct
 
 from robospa.schema import Sha256
 
+IN_REPOSITORY = "bundle.zip"
+"""Name of a bundle in its submission's folder, and its address in `bundle.txt`."""
 FORMAT = 1
 """Version of this layout. A newer one is refused, an older one is read as long as it is known."""
 MANIFEST = "manifest.json"
@@ -59,7 +61,7 @@ what the whole benchmark needs. JSON takes up to 24 times its bytes in memory.""
 
 
 @dataclass(frozen=True)
-class Limits:
+class BundleLimits:
     """What a bundle as a whole may have: bytes of the zip file, entries, bytes when unpacked, rows
     and bytes of one row."""
 
@@ -77,14 +79,14 @@ class FileEntry(Struct, frozen=True, forbid_unknown_fields=True):
     sha256: Sha256
 
 
-class Chain(Struct, frozen=True, forbid_unknown_fields=True):
+class RowChain(Struct, frozen=True, forbid_unknown_fields=True):
     """How many rows there are, and the hash of the last one."""
 
     rows: int
     last: Sha256
 
 
-class Manifest(Struct, frozen=True, forbid_unknown_fields=True):
+class BundleManifest(Struct, frozen=True, forbid_unknown_fields=True):
     """`manifest.json`. `robospa` is the version that packed it, `inputs` the hash of what was fixed
     before the first trial, `seeds` that of the seed lists, `bundle` that of all the rest."""
 
@@ -94,7 +96,7 @@ class Manifest(Struct, frozen=True, forbid_unknown_fields=True):
     practice: bool
     inputs: Sha256
     seeds: Sha256
-    chain: Chain
+    chain: RowChain
     files: dict[str, FileEntry]
     bundle: str = ""
 

@@ -4,12 +4,19 @@ Weights are at a https address, or remade by a script of this repository ("recip
 Written as TOML (`robospa submit template`), which Python reads without a further dependency; kept
 in the bundle as JSON. Every field is required, of one type, of bounded length, and plain text:
 markup, scripts and invisible characters are refused, since names end up on a page.
+
+Names of the paper's models and team are taken, however they are spelt. They are compared by their
+skeleton: without case, accents, spaces and punctuation, with characters that look alike as one. So
+"Pi-0.5", "π0.5" and a name with a Cyrillic letter in it are all the model of the paper. A name that
+says more, such as "pi0.5 (our lab)", is free.
 """
 
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Collection
+from functools import cache
 from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, get_args, get_origin
@@ -18,9 +25,71 @@ from msgspec import Meta, Struct
 from msgspec.structs import fields
 
 from robospa.leaderboard.bundle import MEGA, BundleError
-from robospa.leaderboard.reserved import check_names
-from robospa.leaderboard.strict_json import check_text
+from robospa.leaderboard.untrusted import check_text
+from robospa.results.paper.published import TITLES, load
 from robospa.schema import Sha256, one_of, pattern, read
+
+LOOK_ALIKE = str.maketrans(
+    {
+        **{"π": "pi", "ρ": "p", "ο": "o", "α": "a", "ν": "v", "χ": "x", "ι": "i", "κ": "k"},
+        **{"а": "a", "в": "b", "е": "e", "к": "k", "м": "m", "н": "h", "о": "o", "р": "p"},
+        **{"с": "c", "т": "t", "у": "y", "х": "x", "і": "i", "ј": "j", "ѕ": "s", "г": "r"},
+        **{"ԁ": "d", "ԍ": "g", "ѵ": "v", "ӏ": "l", "п": "n", "ɡ": "g", "ɑ": "a", "ı": "i"},
+        **{"0": "o", "1": "l", "i": "l", "5": "s"},
+    }
+)
+"""Greek and Cyrillic letters, and digits, as the Latin letters that they are taken for."""
+
+
+def skeleton(text: str) -> str:
+    """`text` as a hurried reader sees it: letters alone, look-alikes as one."""
+    plain = unicodedata.normalize("NFKD", text).casefold()
+    return "".join(c for c in plain.translate(LOOK_ALIKE).translate(LOOK_ALIKE) if c.isalnum())
+
+
+OWNER = skeleton("RoboSPA")
+"""Nobody's team or model has the benchmark in its name: it would pass for the authors'."""
+CLAIMS = frozenset(map(skeleton, ("paper", "official", "published", "original", "authors", "the")))
+"""Words that make a model's name no other name."""
+
+
+@cache
+def published_names() -> dict[str, str]:
+    """The paper's models by the skeletons of their names."""
+    titles = {model: TITLES.get(model, model) for model in load().models}
+    return {skeleton(name): title for model, title in titles.items() for name in (model, title)}
+
+
+def check_folder(name: str) -> None:
+    """BundleError if a submission's folder is called like a model of the paper."""
+    if taken := published_names().get(skeleton(name)):
+        raise BundleError(
+            f"the folder's name {name[:80]!a} is that of the paper's {taken}: add what is yours, "
+            f"such as {name[:40]}-our-lab"
+        )
+
+
+def check_names(name: str, team: str) -> None:
+    """BundleError if a model card's `name` or `team` would pass for the paper's."""
+    if taken := published_names().get("".join(_said(name))):
+        raise BundleError(
+            f"the model card's name {name[:80]!a} is that of the paper's {taken}: add what is "
+            f"yours, such as {name[:40]!a} and your team's name"
+        )
+    for what, text in (("name", name), ("team", team)):
+        said = _said(text)
+        if OWNER in said or "".join(said) == OWNER:
+            raise BundleError(
+                f"the model card's {what} {text[:80]!a} has the benchmark's name in it, as if it "
+                "came from the paper: choose another"
+            )
+
+
+def _said(text: str) -> list[str]:
+    """The skeletons of the words of `text`, without those that say nothing."""
+    words = (skeleton(word) for word in re.split(r"[\W_]+", text))
+    return [word for word in words if word and word not in CLAIMS]
+
 
 LINK = re.compile(r"https://[A-Za-z0-9.-]+(:[0-9]+)?(/[A-Za-z0-9._~/%+=@:,-]*)?")
 RECIPE = re.compile(r"recipe:(scripts/[a-z0-9_]{1,60}\.sh)")
@@ -46,7 +115,7 @@ def _plain(most: int) -> Meta:
     )
 
 
-class Training(Struct, frozen=True, forbid_unknown_fields=True):
+class CardTraining(Struct, frozen=True, forbid_unknown_fields=True):
     """What the model was trained on; demonstrations are per base task, one number a level."""
 
     tasks: Annotated[str, one_of(("single", "multi"))]
@@ -56,7 +125,7 @@ class Training(Struct, frozen=True, forbid_unknown_fields=True):
     ]
 
 
-class Actions(Struct, frozen=True, forbid_unknown_fields=True):
+class CardActions(Struct, frozen=True, forbid_unknown_fields=True):
     """The space of the model's actions, how many make a chunk, and their rate [Hz] in the data."""
 
     space: Annotated[str, one_of(("joint", "ee", "delta_ee"))]
@@ -79,8 +148,8 @@ class Card(Struct, frozen=True, forbid_unknown_fields=True):
     licence: Annotated[str, _plain(80)]
     parameters: Annotated[int, Meta(ge=0, le=10**14)]
     link: Source
-    training: Training
-    actions: Actions
+    training: CardTraining
+    actions: CardActions
     checkpoints: dict[str, Checkpoint]
 
     def __post_init__(self) -> None:

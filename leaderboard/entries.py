@@ -1,13 +1,14 @@
 """Who stands on the leaderboard: submissions with their badges, and the four published models.
 
 An entry's values come from the counts of its single variants; all averages are computed here, and
-a submission whose own averages differ from them is refused.
+a submission whose own averages differ from them is refused. Two entries are ranked against each
+other only if both are `rankable` and share a `Group`. What an entry does not state equals nothing.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import astuple, dataclass
 from typing import Annotated
 
 from msgspec import UNSET, Struct, UnsetType
@@ -16,12 +17,12 @@ from robospa.categories import CATEGORIES, DIMENSIONS, SPATIAL
 from robospa.leaderboard.agreement import LEAST_POWER, LIE
 from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.card import Card, recipe_of
-from robospa.leaderboard.evidence import Evidence
-from robospa.leaderboard.sampling import what_it_catches
-from robospa.leaderboard.scores import compare_scores
+from robospa.leaderboard.evidence import BadgeEvidence, what_it_catches
 from robospa.leaderboard.submission import Submission, slug_of
+from robospa.leaderboard.verify import compare_scores
 from robospa.results.paper import rounding
 from robospa.results.paper.columns import Column, published_column
+from robospa.results.paper.origin import DIFFERENCES
 from robospa.results.paper.published import LEVELS, load
 from robospa.results.scoring.model_results import ModelResults
 from robospa.results.scoring.score_json import to_json
@@ -30,8 +31,66 @@ from robospa.results.scoring.setting import Setting
 from robospa.results.statistics.intervals import Estimate
 from robospa.schema import Count, pattern, read
 
+
+@dataclass(frozen=True, order=True)
+class Group:
+    """What has to be equal for two values to be of one benchmark; no part is empty."""
+
+    suite: str
+    embodiment: str
+    mode: str
+    split: str
+
+    def __str__(self) -> str:
+        return ", ".join(astuple(self))
+
+    @property
+    def of_paper(self) -> bool:
+        """Whether these are the numbers that the paper prints."""
+        return self.suite == load().suite
+
+    @property
+    def of_draft(self) -> bool:
+        """Whether its suite still changes: two entries of one draft may be of different scenes."""
+        return self.suite.endswith("-draft")
+
+    @property
+    def title(self) -> str:
+        """The group in words."""
+        if self.of_paper:
+            return f"Numbers printed in the paper: {self.embodiment}, {self.mode} scenes"
+        return f"{self.suite}: {self.embodiment}, {self.mode} scenes, {self.split} instructions"
+
+    @property
+    def note(self) -> str:
+        """Why nobody in it is ranked; empty where somebody can be."""
+        if self.of_draft:
+            return "A draft of a suite, whose scenes still change: no ranks."
+        return f"Another suite, with {DIFFERENCES}: no ranks." if self.of_paper else ""
+
+
+def group(entry: Entry) -> Group | None:
+    """The group of `entry`; None if it does not state all parts, so that it is in nobody's."""
+    found = Group(entry.suite, entry.embodiment, entry.mode, entry.split)
+    return found if all(astuple(found)) else None
+
+
+def rankable(entry: Entry) -> bool:
+    """Whether `entry` gets a rank in its group: it has trials, of a frozen suite of this benchmark,
+    that were reproduced on hidden scenes. Anything else is a claim."""
+    found = group(entry)
+    if found is None or found.of_draft or entry.column.published:
+        return False
+    return "reproduced" in entry.badges
+
+
+def groups_of(entries: Iterable[Entry]) -> list[Group]:
+    """The groups of `entries` in the order in which they are shown: the paper's last."""
+    found = {one for entry in entries if (one := group(entry))}
+    return sorted(found, key=lambda one: (one.of_paper, one))
+
+
 BADGES = {
-    "run": "a run, not submitted",
     "published": "published, not verified",
     "valid": "valid",
     "outcomes": "outcomes replayed",
@@ -40,11 +99,6 @@ BADGES = {
 }
 """From the weakest to the strongest."""
 MEANINGS = {
-    "run": (
-        "A run of an official world on the machine that made these pages. Nobody can play it again "
-        "without the same files, so it is no submission; it is ranked beside the paper's models "
-        "alone."
-    ),
     "published": "Numbers printed in the paper, which nobody can check without the models.",
     "valid": (
         "Structure, hashes, seeds, scenes, records, actions and scores of the bundle fit each "
@@ -262,7 +316,7 @@ def _column(submission: Submission) -> Column:
     return column
 
 
-def evidence_lines(evidence: Evidence) -> list[tuple[str, str]]:
+def evidence_lines(evidence: BadgeEvidence) -> list[tuple[str, str]]:
     """What the badges rest on, as badge and sentence."""
     valid, again, fresh = evidence.valid, evidence.replayed, evidence.reproduced
     lines = [

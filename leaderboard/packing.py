@@ -26,29 +26,33 @@ from robospa.harness.running.action_files import read_actions, read_joints
 from robospa.harness.running.manifest import changed_settings, group_keys, seed_hash
 from robospa.harness.world import World
 from robospa.leaderboard import bundle as layout
-from robospa.leaderboard.action_traces import Trace, encode
-from robospa.leaderboard.bundle import BundleError, Chain, FileEntry, Manifest
-from robospa.leaderboard.bundle_rules import (
+from robospa.leaderboard.bundle import BundleError, BundleManifest, FileEntry, RowChain
+from robospa.leaderboard.card import Card, check_checkpoints
+from robospa.leaderboard.evidence import announced
+from robospa.leaderboard.rules import (
+    Done,
+    Reference,
     Settings,
     check_card_fits,
     check_seeds,
     check_settings,
 )
-from robospa.leaderboard.card import Card, check_checkpoints
-from robospa.leaderboard.executed_joints import with_joints
-from robospa.leaderboard.one_robot import parts_of, path_of, robots_of
-from robospa.leaderboard.record_rows import Row, trace_hash, write_rows
-from robospa.leaderboard.record_rules import check_record
-from robospa.leaderboard.reference import Reference
-from robospa.leaderboard.sampling import announced
-from robospa.leaderboard.scene_check import Done
-from robospa.leaderboard.scores import scores_of, tables_of
-from robospa.leaderboard.trial_outcomes import outcomes_of
-from robospa.leaderboard.verify import LISTING, Valid, own_version, seed_lists, verify
+from robospa.leaderboard.traces import Trace, encode, with_joints
+from robospa.leaderboard.trial_rows import TrialRow, check_record, trace_hash, write_rows
+from robospa.leaderboard.verify import (
+    LISTING,
+    Valid,
+    outcomes_of,
+    own_version,
+    scores_of,
+    seed_lists,
+    tables_of,
+    verify,
+)
 from robospa.results.records.lint import lint_run
 from robospa.results.records.run_io import Run, action_path, read_run
 from robospa.results.records.trial_record import TrialRecord
-from robospa.trial import TrialKey
+from robospa.trial import TrialKey, path_part
 
 ABOUT = ("versions", "git", "code", "machine", "world", "warnings")
 """What of the machine and its software goes into the bundle."""
@@ -281,14 +285,14 @@ def write_bundle(
             writer.add(name, layout.canonical(content))
         for ending, table in tables_of(run).items():
             writer.add(layout.TABLES[ending], table)
-        manifest = Manifest(
+        manifest = BundleManifest(
             format=layout.FORMAT,
             suite=suite,
             robospa=own_version(),
             practice=practice,
             inputs=inputs,
             seeds=layout.sha256(layout.canonical(lists)),
-            chain=Chain(len(lines), layout.sha256(lines[-1])),
+            chain=RowChain(len(lines), layout.sha256(lines[-1])),
             files=writer.files,
         )
         name = layout.bundle_hash(to_builtins(manifest))
@@ -297,7 +301,7 @@ def write_bundle(
 
 def _add_actions(
     writer: _Writer, run: Run, trace: Callable[[TrialKey], Trace], films: Mapping[str, bytes]
-) -> list[Row]:
+) -> list[TrialRow]:
     """Write the actions of every variant; the rows of their trials."""
     rows = []
     for variant, group in groupby(run.keys, key=lambda key: key.variant):
@@ -307,7 +311,7 @@ def _add_actions(
         for key, actions in zip(keys, traces, strict=True):
             film = f"videos/{key.slug}.mp4"
             record = replace(run.records[key], video=film if film in films else "")
-            rows.append(Row(record, trace_hash(actions)))
+            rows.append(TrialRow(record, trace_hash(actions)))
     return rows
 
 
@@ -356,3 +360,31 @@ def sizes_of(path: Path) -> dict[str, int]:
             kind = entry.filename.partition("/")[0]
             found[kind] = found.get(kind, 0) + entry.compress_size
     return dict(sorted(found.items(), key=lambda pair: -pair[1]))
+
+
+def robots_of(runs: Sequence[Run]) -> tuple[str, ...]:
+    """The robots of all trials that `runs` list."""
+    return tuple(dict.fromkeys(key.embodiment for run in runs for key in run.keys))
+
+
+def parts_of(runs: Sequence[Run], robot: str) -> list[Run]:
+    """What `runs` have of `robot`, as if they had been asked for nothing else."""
+    found = [_part(run, robot) for run in runs]
+    return [run for run in found if run.keys]
+
+
+def _part(run: Run, robot: str) -> Run:
+    settings = {**(run.manifest.get("settings") or {}), "embodiment": [robot]}
+    keys = tuple(key for key in run.keys if key.embodiment == robot)
+    tasks = {key.task for key in keys}
+    named = {n: c for n, c in run.manifest.get("categories", {}).items() if n in tasks}
+    if settings.get("policies"):
+        settings["policies"] = {n: p for n, p in settings["policies"].items() if n in tasks}
+    records = {key: record for key, record in run.records.items() if key.embodiment == robot}
+    manifest = {**run.manifest, "settings": settings, "categories": named}
+    return replace(run, manifest=manifest, keys=keys, records=records)
+
+
+def path_of(out: Path, robot: str) -> Path:
+    """Where the bundle of `robot` goes if `out` was asked for."""
+    return out.with_name(f"{out.stem}-{path_part(robot)}{out.suffix}")

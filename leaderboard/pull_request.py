@@ -22,12 +22,8 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from robospa.leaderboard import bundle as layout
-from robospa.leaderboard import bundle_in_repository as in_repository
-from robospa.leaderboard.archive import Archive
-from robospa.leaderboard.bundle import BundleError
-from robospa.leaderboard.card import read_card, to_card
-from robospa.leaderboard.reserved import check_folder
-from robospa.leaderboard.strict_json import parse_map
+from robospa.leaderboard.bundle import IN_REPOSITORY, BundleError
+from robospa.leaderboard.card import check_folder, read_card, to_card
 from robospa.leaderboard.submission import (
     ASKED,
     BUNDLE,
@@ -35,8 +31,12 @@ from robospa.leaderboard.submission import (
     HANDED_IN,
     SLUG,
     Announced,
+    check_recipes,
+    check_weights,
     read_announced,
+    size_of,
 )
+from robospa.leaderboard.untrusted import BundleArchive, parse_map
 
 HOME = PurePosixPath("leaderboard/submissions")
 README = str(HOME / "README.md")
@@ -104,7 +104,7 @@ def _name_of(path: str) -> str:
     place = PurePosixPath(path).relative_to(HOME).parts
     if len(place) != 2 or not SLUG.fullmatch(place[0]) or place[1] not in HANDED_IN:
         raise BundleError(
-            f"{path[:120]!a} is not {HOME}/NAME/{ASKED}, {BUNDLE} or {in_repository.FILE}, NAME "
+            f"{path[:120]!a} is not {HOME}/NAME/{ASKED}, {BUNDLE} or {IN_REPOSITORY}, NAME "
             "being of small letters, digits and hyphens"
         )
     return place[0]
@@ -131,12 +131,12 @@ def check(
     if there != announced.files:
         listed = ", ".join(sorted(announced.files))
         raise BundleError(f"{folder} does not hold the files {listed}, and only them")
-    in_repository.check_recipes(card, clone)
+    check_recipes(card, clone)
     with tempfile.TemporaryDirectory() as place:
         path = Path(place) / "bundle.zip"
         more = ["--challenge", challenge] if challenge else []
-        if announced.address == in_repository.FILE:
-            in_repository.check_weights(card, folder.name)
+        if announced.address == IN_REPOSITORY:
+            check_weights(card, folder.name)
             _take(folder, announced, path)
             more += ["--fraction", "1"] if challenge else []
         else:
@@ -145,7 +145,7 @@ def check(
         done = subprocess.run([*command, "--evidence", str(evidence), *more, *words])
         if done.returncode:
             raise BundleError(f"{folder.name}: the bundle was not verified, as said above")
-        with Archive(path) as archive:
+        with BundleArchive(path) as archive:
             packed = to_card(parse_map(archive.read(layout.CARD), layout.CARD))
     found = parse_map(evidence.read_bytes(), str(evidence))
     valid = found.get("valid")
@@ -158,9 +158,9 @@ def check(
 
 def _take(folder: Path, announced: Announced, path: Path) -> None:
     """Copy the bundle in `folder` to `path`; BundleError unless it has the announced size."""
-    if (size := in_repository.size_of(folder)) != announced.size:
-        raise BundleError(f"{folder / in_repository.FILE} has {size} bytes, not {announced.size}")
-    shutil.copyfile(folder / in_repository.FILE, path)
+    if (size := size_of(folder)) != announced.size:
+        raise BundleError(f"{folder / IN_REPOSITORY} has {size} bytes, not {announced.size}")
+    shutil.copyfile(folder / IN_REPOSITORY, path)
 
 
 class _SecureOnly(urllib.request.HTTPRedirectHandler):

@@ -17,11 +17,10 @@ from typing import Any
 
 from robospa.harness.factory import load_function
 from robospa.harness.running.manifest import about_machine, changed_settings
-from robospa.leaderboard.action_traces import Trace
 from robospa.leaderboard.bundle import BundleError
-from robospa.leaderboard.executed_joints import split_trace
-from robospa.leaderboard.reference import Reference
-from robospa.leaderboard.sampling import catches, drawn, least_sample, what_it_catches
+from robospa.leaderboard.evidence import catches, drawn, least_sample, what_it_catches
+from robospa.leaderboard.rules import Reference
+from robospa.leaderboard.traces import Trace, split_trace
 from robospa.leaderboard.verify import Valid, read_traces
 from robospa.results.records.run_io import differences
 from robospa.results.records.trial_record import TrialRecord

@@ -12,34 +12,39 @@ import hashlib
 import json
 import os
 import shutil
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
 from importlib.resources import files
 from pathlib import Path
 from statistics import NormalDist
-from typing import Any
 
 from robospa.categories import CATEGORIES, CATEGORY_NAMES, DIMENSIONS
 from robospa.harness.running.atomic_file import replace_file
-from robospa.leaderboard import bundle_in_repository as in_repository
-from robospa.leaderboard.beside_paper import BADGE, run_entries, shown_groups, told_suites
-from robospa.leaderboard.bundle import BundleError
-from robospa.leaderboard.entries import BADGES, MEANINGS, Entry, all_entries, page_values
-from robospa.leaderboard.pairwise import pairs_of, write_pairs
-from robospa.leaderboard.practice import practice_entries
-from robospa.leaderboard.ranking import Group, group, groups_of, rankable, ranked_with_paper
-from robospa.leaderboard.reference import Reference, shipped
+from robospa.leaderboard import bundle as layout
+from robospa.leaderboard.bundle import IN_REPOSITORY, BundleError
+from robospa.leaderboard.entries import (
+    BADGES,
+    MEANINGS,
+    Entry,
+    all_entries,
+    group,
+    groups_of,
+    page_values,
+    rankable,
+)
 from robospa.leaderboard.submission import left_out, read_submissions
+from robospa.leaderboard.verify import paired, results_of
 from robospa.results.failures.labels import KINDS, NAMES, SIMULATED_PER_FILM
 from robospa.results.figures.draw import draw
 from robospa.results.figures.failure_bars import draw_failures
 from robospa.results.figures.series import Drawing, Series, save, styled
 from robospa.results.paper.origin import DIFFERENCES, ORIGIN
 from robospa.results.paper.published import load
+from robospa.results.records.manifest import manifest_keys
 from robospa.results.report.method import method_notes
 from robospa.results.report.page import FIGURES, card, figure, own_version, render
 from robospa.results.report.tables import ReportTable, for_page, report_tables
+from robospa.results.scoring.model_results import ModelResults
 
 MARK = ".robospa-site"
 """A file that says a folder is ours to write over."""
@@ -50,76 +55,51 @@ COMPARISONS = 1000
 Note = Callable[[str], None]
 
 
-def build(
-    home: Path,
-    out: Path,
-    note: Note = lambda text: None,
-    practice: Sequence[Path] = (),
-    reference: Reference | None = None,
-    beside_paper: Sequence[Path] = (),
-) -> Path:
+def build(home: Path, out: Path, note: Note = lambda text: None) -> Path:
     """Write the site of the submissions below `home` into `out`; returns its index.html.
 
-    The bundles `practice` get pages too, which say what they are; the table has none of them. The
-    runs `beside_paper` are of official worlds: they are ranked with the paper's models alone.
     Raises BundleError for the first submission that is none, before anything is written.
     """
-    entries = [*all_entries(read_submissions(home)), *run_entries(beside_paper)]
+    entries = all_entries(read_submissions(home))
     for name, why in left_out(home).items():
         note(f"{name} is left out: {why}")
-    if not practice:
-        return write_site(entries, out, note)
-    with tempfile.TemporaryDirectory() as place:
-        tried = practice_entries(practice, reference or shipped(), Path(place))
-        return write_site(entries, out, note, tried)
+    return write_site(entries, out, note)
 
 
-def write_site(
-    entries: Sequence[Entry],
-    out: Path,
-    note: Note = lambda text: None,
-    practice: Sequence[Entry] = (),
-) -> Path:
-    """Write the pages of `entries` into `out`, and those of `practice` beside the table."""
+def write_site(entries: Sequence[Entry], out: Path, note: Note = lambda text: None) -> Path:
+    """Write the pages of `entries` into `out`."""
     if out.exists() and not (out.is_dir() and ((out / MARK).exists() or not any(out.iterdir()))):
         raise BundleError(f"{out} holds other things than a leaderboard; choose another --out")
     out.mkdir(parents=True, exist_ok=True)
     replace_file(out / MARK, b"")
-    slugs = {entry.slug for entry in (*entries, *practice)}
+    slugs = {entry.slug for entry in entries}
     for old in (out / "models").glob("*"):
         if old.is_dir() and old.name not in slugs:
             shutil.rmtree(old)
     for number, entry in enumerate(entries, 1):
         note(f"{entry.name} ({number} of {len(entries)})")
         write_model(entry, out / "models" / entry.slug)
-    for entry in practice:
-        note(f"{entry.name}, for practice")
-        write_model(entry, out / "models" / entry.slug, practice=True)
     write_pairs(pairs_of(entries), out, note)
-    replace_file(out / "index.html", index_page(entries, practice).encode())
+    replace_file(out / "index.html", index_page(entries).encode())
     return out / "index.html"
 
 
-def index_page(entries: Sequence[Entry], practice: Sequence[Entry] = ()) -> str:
-    """The leaderboard itself, with links to the pages of `practice`."""
-    beside, with_paper = told_suites(entries), ranked_with_paper(entries)
+def index_page(entries: Sequence[Entry]) -> str:
+    """The leaderboard itself."""
     return render(
         "site.html",
         title="RoboSPA leaderboard",
         entries=[{"slug": e.slug, "name": e.name, "badge": BADGES[e.badge]} for e in entries],
-        practice=[{"slug": e.slug, "name": e.name} for e in practice],
         origin=ORIGIN,
-        beside=bool(beside),
-        badge_meanings=[
-            (badge, name, MEANINGS[badge])
-            for badge, name in BADGES.items()
-            if badge != BADGE or beside
-        ],
+        badge_meanings=[(badge, name, MEANINGS[badge]) for badge, name in BADGES.items()],
         suites=suites(entries),
         data={
-            "models": [model_data(entry, with_paper) for entry in entries],
-            "groups": shown_groups(groups_of(entries), entries),
-            "apart": beside | {load().suite: f"The paper's suite has {DIFFERENCES}."},
+            "models": [model_data(entry) for entry in entries],
+            "groups": [
+                {"key": str(one), "title": one.title, "note": one.note}
+                for one in groups_of(entries)
+            ],
+            "apart": {load().suite: f"The paper's suite has {DIFFERENCES}."},
             "rows": row_data(),
             "badges": BADGES,
             "training": TRAINING,
@@ -144,7 +124,7 @@ def row_data() -> dict[str, dict[str, str]]:
     return made | {t.name: {"name": t.name, "kind": "task", "category": t.category} for t in tasks}
 
 
-def model_data(entry: Entry, with_paper: frozenset[Group] = frozenset()) -> dict[str, Any]:
+def model_data(entry: Entry) -> dict[str, object]:
     """An entry for the table's script; see `rankable`."""
     return {
         "id": entry.slug,
@@ -153,7 +133,7 @@ def model_data(entry: Entry, with_paper: frozenset[Group] = frozenset()) -> dict
         "badge": entry.badge,
         "badges": list(entry.badges),
         "group": str(group(entry) or ""),
-        "rankable": rankable(entry, with_paper),
+        "rankable": rankable(entry),
         "embodiment": entry.embodiment,
         "mode": entry.mode,
         "split": entry.split,
@@ -175,25 +155,24 @@ def count_of(text: str) -> float:
         return 0
 
 
-def suites(entries: Sequence[Entry]) -> list[dict[str, Any]]:
+def suites(entries: Sequence[Entry]) -> list[dict[str, object]]:
     """The history of the suite, newest first, with the number of models on each."""
     text = files("robospa.leaderboard").joinpath("suites.json").read_text(encoding="utf-8")
-    known: list[dict[str, Any]] = json.loads(text)
-    known += [{"name": s, "robospa": "–", "text": text} for s, text in told_suites(entries).items()]
+    known: list[dict[str, object]] = json.loads(text)
     made = [{**s, "models": sum(e.suite == s["name"] for e in entries)} for s in reversed(known)]
     published = sum("published" in e.badges for e in entries)
     origin = "The paper's own scenes and seeds, of which the scenes are not published as a suite."
     return [*made, {"name": "paper", "robospa": "–", "models": published, "text": origin}]
 
 
-def write_model(entry: Entry, folder: Path, practice: bool = False) -> None:
+def write_model(entry: Entry, folder: Path) -> None:
     """The page of one model, with its figures and films, into `folder`."""
     (folder / FIGURES).mkdir(parents=True, exist_ok=True)
     films = list(entry.submission.films) if entry.submission else []
     address = entry.submission.evidence.address if entry.submission else ""
     if entry.submission:
-        names = [str(film["video"]) for film in films] + [in_repository.FILE] * (
-            address == in_repository.FILE
+        names = [str(film["video"]) for film in films] + [IN_REPOSITORY] * (
+            address == IN_REPOSITORY
         )
         _copy(entry.submission.folder, names, folder)
     drawings = _figures(entry, folder / FIGURES)
@@ -204,8 +183,7 @@ def write_model(entry: Entry, folder: Path, practice: bool = False) -> None:
     page = render(
         "model.html",
         title=entry.name,
-        badges=[] if practice else [(badge, BADGES[badge]) for badge in entry.badges],
-        practice=practice,
+        badges=[(badge, BADGES[badge]) for badge in entry.badges],
         partial=_partial(entry),
         card=card(entry.name, entry.column.scores),
         about=entry.about,
@@ -244,7 +222,7 @@ def _tables(entry: Entry) -> list[ReportTable]:
     return [replace(table, folded=table.table.name.endswith("-tasks")) for table in shown]
 
 
-def failure_rows(failures: Mapping[str, Mapping[str, int]]) -> list[dict[str, Any]]:
+def failure_rows(failures: Mapping[str, Mapping[str, int]]) -> list[dict[str, object]]:
     """How often each type occurs over all tasks, most first."""
     counts = {kind: sum(found.get(kind, 0) for found in failures.values()) for kind in KINDS}
     total = sum(counts.values())
@@ -285,3 +263,57 @@ def _copy(source: Path, names: Sequence[str], folder: Path) -> None:
             os.link(source / name, target)
         except OSError:
             shutil.copyfile(source / name, target)
+
+
+FOLDER = "pairs"
+Pair = tuple[Entry, Entry]
+
+
+def pairs_of(entries: Sequence[Entry]) -> list[Pair]:
+    """All pairs of submissions that were measured alike and have a variant in common."""
+    known = sorted((e for e in entries if e.submission), key=lambda entry: entry.slug)
+    return [
+        (one, two)
+        for place, one in enumerate(known)
+        for two in known[place + 1 :]
+        if group(one) and group(one) == group(two) and _variants(one) & _variants(two)
+    ]
+
+
+def _variants(entry: Entry) -> set[str]:
+    return set(entry.submission.outcomes) if entry.submission else set()
+
+
+def write_pairs(pairs: Sequence[Pair], out: Path, note: Callable[[str], None]) -> None:
+    """Write the script of every pair below `out`, and remove those of others."""
+    wanted = {f"{one.slug}/{two.slug}.js" for one, two in pairs}
+    for old in (out / FOLDER).glob("*/*.js"):
+        if str(old.relative_to(out / FOLDER)) not in wanted:
+            old.unlink()
+    for old in (out / FOLDER).glob("*"):
+        if old.is_dir() and not any(old.iterdir()):
+            shutil.rmtree(old)
+    first: tuple[str, ModelResults] | None = None
+    for one, two in pairs:
+        path = out / FOLDER / one.slug / f"{two.slug}.js"
+        state = f"// {_state(one)} {_state(two)} {own_version()}\n"
+        if path.is_file() and path.read_text(encoding="utf-8").startswith(state):
+            continue
+        note(f"{one.name} and {two.name} on equal seeds")
+        if first is None or first[0] != one.slug:
+            first = one.slug, _results(one)
+        key = json.dumps(f"{one.slug}/{two.slug}")
+        rows = json.dumps(paired(first[1], _results(two)), separators=(",", ":"))
+        replace_file(path, f"{state}pairLoaded({key}, {rows});\n".encode())
+
+
+def _results(entry: Entry) -> ModelResults:
+    kept = entry.submission
+    assert kept is not None
+    keys = manifest_keys(kept.run)
+    return results_of(entry.name, kept.outcomes, keys, kept.categories, kept.suite)
+
+
+def _state(entry: Entry) -> str:
+    assert entry.submission is not None
+    return layout.sha256(str(entry.submission.bundle).encode())

@@ -1,7 +1,7 @@
 """What the leaderboard keeps of a bundle: one small folder a submission, without actions and rows.
 
     model.toml, bundle.txt    as handed in: the card; a bundle's address, size and hash
-    bundle.zip    the bundle itself, if it lies in the repository (`bundle_in_repository`)
+    bundle.zip    the bundle itself, if it lies in the repository
     manifest.json, model.json, run.json, scores.json, outcomes.json    as in the bundle
     evidence.json    what `robospa submit verify` and `reproduce` wrote, and where the bundle is
     trials.json      failure types by task, and the filmed trials
@@ -9,6 +9,11 @@
 
 The bundle's hash covers its files' hashes, so those files of a folder are held against it
 again, and all averages are computed anew. Refused: anything else, in one sentence.
+
+A bundle that lies in the repository lets a clone verify it. Only a small one does, and only of a
+model whose weights a recipe of this repository remakes; all others stay at an address of their own.
+All of its trials are replayed, since whoever hands it in may also make the commit that would choose
+a sample.
 """
 
 from __future__ import annotations
@@ -24,14 +29,26 @@ from msgspec import Struct, to_builtins
 
 from robospa.harness.running.atomic_file import replace_file
 from robospa.leaderboard import bundle as layout
-from robospa.leaderboard import bundle_in_repository as in_repository
-from robospa.leaderboard.archive import Archive
-from robospa.leaderboard.bundle import MEGA, BundleError, Manifest, is_sha256
-from robospa.leaderboard.bundle_rules import RunFile, Settings
-from robospa.leaderboard.card import LINK, Card, check_checkpoints, read_card, to_card
-from robospa.leaderboard.evidence import BADGES, Evidence, read_evidence
-from robospa.leaderboard.reserved import check_folder
-from robospa.leaderboard.strict_json import parse_map
+from robospa.leaderboard.bundle import (
+    IN_REPOSITORY,
+    MEGA,
+    BundleError,
+    BundleLimits,
+    BundleManifest,
+    is_sha256,
+)
+from robospa.leaderboard.card import (
+    LINK,
+    Card,
+    check_checkpoints,
+    check_folder,
+    read_card,
+    recipe_of,
+    to_card,
+)
+from robospa.leaderboard.evidence import BADGES, BadgeEvidence, read_evidence
+from robospa.leaderboard.rules import RunFile, Settings
+from robospa.leaderboard.untrusted import BundleArchive, parse_map
 from robospa.leaderboard.verify import Valid
 from robospa.results.failures.labels import NAMES, distribution, failures_of
 from robospa.results.records.run_io import Run
@@ -39,8 +56,54 @@ from robospa.results.report.run_card import END_NAMES
 from robospa.results.report.trials import trial_rows
 from robospa.schema import Count, one_of, pattern, read
 
+MOST = 8 * MEGA
+"""The most bytes of a bundle in the repository, which never becomes smaller again."""
+
+
+def size_of(folder: Path) -> int:
+    """Bytes of the bundle in `folder`; BundleError unless it is a plain file and small enough."""
+    path = folder / IN_REPOSITORY
+    if path.is_symlink() or not path.is_file():
+        raise BundleError(f"{path} is missing or no plain file")
+    size = path.stat().st_size
+    if size > MOST:
+        raise BundleError(
+            f"{path} has {size} bytes; a bundle in the repository has at most {MOST}, a larger one "
+            "is downloaded from a https address"
+        )
+    return size
+
+
+def check_weights(card: Card, where: str) -> None:
+    """BundleError unless all weights of `card` are remade by a recipe of this repository."""
+    if strange := [p.reference for p in card.checkpoints.values() if not recipe_of(p.reference)]:
+        raise BundleError(
+            f"{where}: a bundle lies in the repository only if a recipe there remakes the weights, "
+            f"which are at {strange[0][:80]}; give the bundle a https address"
+        )
+
+
+def check_recipes(card: Card, clone: Path) -> None:
+    """BundleError unless every recipe that `card` names is a script in `clone`."""
+    for source in (card.link, *(point.reference for point in card.checkpoints.values())):
+        script = recipe_of(source)
+        if script and not (clone / script).is_file():
+            raise BundleError(f"the model card names {script}, which this repository does not have")
+
+
+def check_contents(folder: Path, manifest: BundleManifest, where: str) -> None:
+    """BundleError unless the bundle in `folder` holds the files that `manifest` lists."""
+    size_of(folder)
+    with BundleArchive(folder / IN_REPOSITORY, BundleLimits(packed=MOST)) as archive:
+        if set(archive.sizes) != {*manifest.files, layout.MANIFEST}:
+            raise BundleError(f"{where}: {IN_REPOSITORY} has other files than the manifest lists")
+        for name, listed in manifest.files.items():
+            if layout.sha256(archive.read(name)) != listed.sha256:
+                raise BundleError(f"{where}: {name} in {IN_REPOSITORY} is not the manifest's")
+
+
 ASKED, BUNDLE = "model.toml", "bundle.txt"
-HANDED_IN = (ASKED, BUNDLE, in_repository.FILE)
+HANDED_IN = (ASKED, BUNDLE, IN_REPOSITORY)
 EVIDENCE = "evidence.json"
 TRIALS = "trials.json"
 KEPT = {
@@ -70,14 +133,14 @@ class Submission:
     categories: Mapping[str, str]
     scores: Mapping[str, object]
     outcomes: Mapping[str, object]
-    evidence: Evidence
+    evidence: BadgeEvidence
     failures: Mapping[str, Mapping[str, int]]
     films: Sequence[Mapping[str, object]]
 
 
 @dataclass(frozen=True)
 class Announced:
-    """What was handed in: where the bundle is (`in_repository.FILE` beside it), how many bytes it
+    """What was handed in: where the bundle is (`IN_REPOSITORY` beside it), how many bytes it
     has, and its hash."""
 
     address: str
@@ -87,10 +150,10 @@ class Announced:
     @property
     def files(self) -> set[str]:
         """What the folder holds until it is verified."""
-        return {ASKED, BUNDLE} | ({in_repository.FILE} & {self.address})
+        return {ASKED, BUNDLE} | ({IN_REPOSITORY} & {self.address})
 
 
-class Film(Struct, frozen=True, forbid_unknown_fields=True):
+class FilmedTrial(Struct, frozen=True, forbid_unknown_fields=True):
     """A filmed trial: what the page's script works with, and nothing else."""
 
     task: str
@@ -118,7 +181,7 @@ class TrialsFile(Struct, frozen=True):
     """`trials.json`: how often each failure type was seen, by task, and the filmed trials."""
 
     failures: dict[str, dict[Annotated[str, one_of(NAMES)], Count]]
-    films: list[Film]
+    films: list[FilmedTrial]
 
 
 def slug_of(name: str) -> str:
@@ -132,16 +195,14 @@ def add(
     home: Path,
     name: str = "",
     address: str = "",
-    practice: bool = False,
 ) -> Path:
     """Keep a valid bundle in the folder `name` below `home` and return the folder.
 
     The folder may be there with what the submitter handed in, which has to fit the bundle. `found`
     are the contents of evidence files; BundleError if they are of another bundle, show that
-    outcomes did not come again, or if the folder is of a submission already. `practice` also takes
-    a bundle for practice.
+    outcomes did not come again, or if the folder is of a submission already.
     """
-    if valid.manifest.practice and not practice:
+    if valid.manifest.practice:
         raise BundleError("a bundle for practice enters no leaderboard")
     evidence: dict[str, object] = {"valid": to_builtins(valid.evidence)}
     for part in found:
@@ -159,7 +220,7 @@ def add(
         evidence["address"] = address
     read_evidence(evidence, valid.manifest.bundle, "the submission")
     filmed = {key: r for key, r in valid.run.records.items() if r.video}
-    with Archive(valid.path) as archive:
+    with BundleArchive(valid.path) as archive:
         for name, source in KEPT.items():
             replace_file(folder / name, archive.read(source))
         for record in filmed.values():
@@ -182,9 +243,9 @@ def _asked(folder: Path, valid: Valid) -> str:
     if BUNDLE not in there:
         return ""
     announced = read_announced(folder)
-    if in_repository.FILE in announced.files:
-        in_repository.check_weights(valid.card, str(folder))
-        in_repository.check_contents(folder, valid.manifest, str(folder))
+    if IN_REPOSITORY in announced.files:
+        check_weights(valid.card, str(folder))
+        check_contents(folder, valid.manifest, str(folder))
     sizes = {valid.path.stat().st_size, *(f.stat().st_size for f in folder.glob("*.zip"))}
     if ({announced.size}, announced.bundle) != (sizes, valid.manifest.bundle):
         raise BundleError(f"{folder / BUNDLE} has the size or the hash of another bundle")
@@ -195,15 +256,15 @@ def read_announced(folder: Path) -> Announced:
     """What `bundle.txt` in `folder` says; BundleError if it is none."""
     path = folder / BUNDLE
     lines = _bytes(path, str(folder)).decode(errors="replace").split()
-    inside = lines[:1] == [in_repository.FILE]
+    inside = lines[:1] == [IN_REPOSITORY]
     where = inside or (lines and LINK.fullmatch(lines[0]))
     if len(lines) != 3 or not where or not COUNT.fullmatch(lines[1]):
         raise BundleError(
-            f"{path} is not three lines: https address (or {in_repository.FILE}), bytes, hash"
+            f"{path} is not three lines: https address (or {IN_REPOSITORY}), bytes, hash"
         )
     if not is_sha256(lines[2]):
         raise BundleError(f"{path} has no bundle hash of 64 hexadecimal digits")
-    most = in_repository.MOST if inside else layout.Limits().packed
+    most = MOST if inside else layout.BundleLimits().packed
     if int(lines[1]) > most:
         raise BundleError(f"{path} announces more than {most} bytes")
     return Announced(lines[0], int(lines[1]), lines[2])
@@ -233,18 +294,17 @@ def _folders(home: Path) -> list[Path]:
     return sorted(p for p in home.iterdir() if p.is_dir()) if home.is_dir() else []
 
 
-def read_submission(folder: Path, practice: bool = False) -> Submission:
-    """The submission in `folder`, its files held against the bundle's hash; one for practice only
-    if that is asked for."""
+def read_submission(folder: Path) -> Submission:
+    """The submission in `folder`, its files held against the bundle's hash."""
     where = f"the submission {folder.name[:80]!a}"
     if not SLUG.fullmatch(folder.name):
         raise BundleError(f"{where} has a name of other than small letters, digits and hyphens")
     data = {name: _bytes(folder / name, where) for name in (*KEPT, EVIDENCE, TRIALS)}
     parts = {name: parse_map(raw, f"{where}, {name}") for name, raw in data.items()}
-    manifest = read(Manifest, parts[layout.MANIFEST], f"{where}: the manifest", BundleError)
+    manifest = read(BundleManifest, parts[layout.MANIFEST], f"{where}: the manifest", BundleError)
     if manifest.bundle != layout.bundle_hash(parts[layout.MANIFEST]):
         raise BundleError(f"{where}: the manifest was changed, its hash is not the bundle's")
-    if manifest.practice and not practice:
+    if manifest.practice:
         raise BundleError(f"{where} was packed for practice and enters no leaderboard")
     for name, source in KEPT.items():
         listed = manifest.files.get(source)
@@ -254,9 +314,9 @@ def read_submission(folder: Path, practice: bool = False) -> Submission:
     run = read(RunFile, parts[layout.RUN], f"{where}: the run", BundleError)
     card = to_card(parts[layout.CARD], f"{where}, {layout.CARD}")
     check_checkpoints(card, list(run.categories), f"{where}, {layout.CARD}")
-    if evidence.address == in_repository.FILE:
-        in_repository.check_weights(card, where)
-        in_repository.check_contents(folder, manifest, where)
+    if evidence.address == IN_REPOSITORY:
+        check_weights(card, where)
+        check_contents(folder, manifest, where)
     failures, films = _read_trials(parts[TRIALS], folder, where)
     return Submission(
         folder=folder,

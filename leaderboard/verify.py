@@ -10,43 +10,56 @@ from __future__ import annotations
 
 import gc
 import hashlib
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
-from msgspec import to_builtins
+from msgspec import Meta, Struct, to_builtins
 
+from robospa.categories import METRICS
 from robospa.harness.running.autoscaling import cores
 from robospa.harness.running.manifest import seed_hash
 from robospa.leaderboard import bundle as layout
-from robospa.leaderboard.action_traces import Trace, decode, most_bytes
-from robospa.leaderboard.archive import Archive
-from robospa.leaderboard.bundle import BundleError, Chain, FileEntry, Limits, Manifest
-from robospa.leaderboard.bundle_rules import (
+from robospa.leaderboard.bundle import (
+    BundleError,
+    BundleLimits,
+    BundleManifest,
+    FileEntry,
+    RowChain,
+)
+from robospa.leaderboard.card import Card, check_checkpoints, to_card
+from robospa.leaderboard.evidence import Validity, announced
+from robospa.leaderboard.rules import (
+    Done,
+    Reference,
     Settings,
     check_card_fits,
     check_categories,
+    check_scenes,
     check_seeds,
     check_settings,
 )
-from robospa.leaderboard.card import Card, check_checkpoints, to_card
-from robospa.leaderboard.evidence import Validity
-from robospa.leaderboard.listed_files import ListedFiles
-from robospa.leaderboard.record_rows import read_rows, trace_hash
-from robospa.leaderboard.record_rules import check_record, check_trace
-from robospa.leaderboard.reference import Reference
-from robospa.leaderboard.sampling import announced
-from robospa.leaderboard.scene_check import Done, check_scenes
-from robospa.leaderboard.scores import compare_scores, scores_of, tables_of
-from robospa.leaderboard.strict_json import parse, parse_map
-from robospa.leaderboard.trial_outcomes import outcomes_of
+from robospa.leaderboard.traces import Trace, decode, most_bytes
+from robospa.leaderboard.trial_rows import check_record, check_trace, read_rows, trace_hash
+from robospa.leaderboard.untrusted import BundleArchive, parse
+from robospa.results.comparison.compare import Difference, compare, over_levels
+from robospa.results.paper.columns import run_column
+from robospa.results.paper.tables import FORMATS
 from robospa.results.records.lint import lint_run
-from robospa.results.records.manifest import TrialGroup, trial_keys
+from robospa.results.records.manifest import RunInfo, TrialGroup, trial_keys
 from robospa.results.records.run_io import Run
 from robospa.results.records.trial_record import TrialRecord
-from robospa.schema import read
+from robospa.results.report.tables import report_tables
+from robospa.results.scoring.model_results import ModelResults, results_of_records
+from robospa.results.scoring.score_json import ScoresData, to_json
+from robospa.results.scoring.scores import score_run
+from robospa.results.scoring.setting import IncomparableError
+from robospa.results.scoring.weights import Variant
+from robospa.schema import pattern, read
 from robospa.trial import TrialKey
 
 LISTING = ("unequal-trials", "missing")
@@ -62,7 +75,7 @@ class Valid:
     the badge."""
 
     path: Path
-    manifest: Manifest
+    manifest: BundleManifest
     card: Card
     run: Run
     settings: Settings
@@ -79,7 +92,7 @@ def verify(
     path: Path,
     reference: Reference,
     practice: bool = False,
-    limits: Limits | None = None,
+    limits: BundleLimits | None = None,
     workers: int = 0,
     done: Done = lambda count, trials: None,
 ) -> Valid:
@@ -88,15 +101,15 @@ def verify(
     `practice` also accepts bundles that were packed for practice and enter no leaderboard. Scenes
     are made again in `workers` processes (0: one a core); `done` hears how many of how many are.
     """
-    with Archive(path, limits) as archive:
+    with BundleArchive(path, limits) as archive:
         manifest = _manifest(archive, reference, practice)
-        files = ListedFiles(archive, manifest.files)
-        run = files.map(layout.RUN)
+        archive.listed = manifest.files
+        run = archive.read_map(layout.RUN)
         settings = check_settings(run, reference)
         keys = _keys(run, settings, archive.limits)
         check_seeds(keys, reference, manifest.practice)
-        _check_lists(files.map(layout.SEEDS), manifest, keys, run)
-        card = to_card(files.map(layout.CARD))
+        _check_lists(archive.read_map(layout.SEEDS), manifest, keys, run)
+        card = to_card(archive.read_map(layout.CARD))
         tasks = list(dict.fromkeys(key.task for key in keys))
         check_checkpoints(card, tasks)
         check_categories(run, tasks, reference)
@@ -104,12 +117,12 @@ def verify(
             check_card_fits(card, settings, task)
         with _no_collection():
             records, traces = _records(archive, manifest, settings, keys, reference)
-        _check_actions(files, records, traces, reference, settings)
+        _check_actions(archive, records, traces, reference, settings)
         found = Run(path, run, keys, records)
         warnings = _lints(found)
-        compared = _check_scores(files, found, manifest)
-        _check_videos(files, manifest, records)
-        files.all_used()
+        compared = _check_scores(archive, found, manifest)
+        _check_videos(archive, manifest, records)
+        archive.all_used()
     check_scenes(records, reference.parts, workers or cores(), done)
     evidence = Validity(
         bundle=manifest.bundle,
@@ -135,9 +148,9 @@ def _no_collection() -> Iterator[None]:
             gc.enable()
 
 
-def _manifest(archive: Archive, reference: Reference, practice: bool) -> Manifest:
+def _manifest(archive: BundleArchive, reference: Reference, practice: bool) -> BundleManifest:
     """The manifest, held against the archive."""
-    data = parse_map(archive.read(layout.MANIFEST), layout.MANIFEST)
+    data = archive.read_map(layout.MANIFEST)
     version = data.get("format")
     if type(version) is not int or version < 1:
         raise BundleError("the manifest does not say which format the bundle has")
@@ -145,7 +158,7 @@ def _manifest(archive: Archive, reference: Reference, practice: bool) -> Manifes
         raise BundleError(
             f"the bundle has format {version}, this robospa reads up to {layout.FORMAT}: update it"
         )
-    manifest = read(Manifest, data, "the manifest", BundleError)
+    manifest = read(BundleManifest, data, "the manifest", BundleError)
     if manifest.suite != reference.suite:
         raise BundleError(
             f"the bundle is of the suite {manifest.suite[:40]!a}; this robospa has "
@@ -161,7 +174,7 @@ def _manifest(archive: Archive, reference: Reference, practice: bool) -> Manifes
     return manifest
 
 
-def _check_files(archive: Archive, listed: Mapping[str, FileEntry]) -> None:
+def _check_files(archive: BundleArchive, listed: Mapping[str, FileEntry]) -> None:
     """BundleError unless `listed` are exactly the archive's files with their sizes."""
     there = set(archive.sizes) - {layout.MANIFEST}
     if lost := sorted(set(listed) - there):
@@ -177,7 +190,9 @@ def _check_files(archive: Archive, listed: Mapping[str, FileEntry]) -> None:
             raise BundleError(f"the bundle has no {name}")
 
 
-def _keys(run: Mapping[str, object], settings: Settings, limits: Limits) -> tuple[TrialKey, ...]:
+def _keys(
+    run: Mapping[str, object], settings: Settings, limits: BundleLimits
+) -> tuple[TrialKey, ...]:
     """The listed trials, by task, level and seed."""
     groups = read(list[TrialGroup], run.get("trials"), "the run's list of trials", BundleError)
     if sum(len(group.seeds) for group in groups) > limits.rows:
@@ -191,7 +206,7 @@ def _keys(run: Mapping[str, object], settings: Settings, limits: Limits) -> tupl
 
 def _check_lists(
     lists: Mapping[str, object],
-    manifest: Manifest,
+    manifest: BundleManifest,
     keys: Sequence[TrialKey],
     run: Mapping[str, object],
 ) -> None:
@@ -215,8 +230,8 @@ def seed_lists(keys: Sequence[TrialKey]) -> dict[str, list[int]]:
 
 
 def _records(
-    archive: Archive,
-    manifest: Manifest,
+    archive: BundleArchive,
+    manifest: BundleManifest,
     settings: Settings,
     keys: Sequence[TrialKey],
     reference: Reference,
@@ -241,7 +256,7 @@ def _records(
         records[key], traces[key] = row.record, row.trace
     if len(records) < len(keys):
         raise BundleError(f"the rows end before {keys[len(records)].slug}: trials are missing")
-    if manifest.chain != Chain(len(records), last):
+    if manifest.chain != RowChain(len(records), last):
         raise BundleError("the chain of rows does not end as the manifest says")
     if digest.hexdigest() != manifest.files[layout.RECORDS].sha256:
         raise BundleError(f"{layout.RECORDS} was changed: its hash is not the manifest's")
@@ -256,7 +271,7 @@ def _variants(records: Mapping[TrialKey, TrialRecord]) -> Iterator[list[TrialRec
 
 
 def _check_actions(
-    files: ListedFiles,
+    archive: BundleArchive,
     records: Mapping[TrialKey, TrialRecord],
     traces: Mapping[TrialKey, str],
     reference: Reference,
@@ -268,7 +283,7 @@ def _check_actions(
     """
 
     def check(found: Sequence[TrialRecord]) -> None:
-        _check_variant(files, found, traces, reference, settings)
+        _check_variant(archive, found, traces, reference, settings)
 
     pool = ThreadPoolExecutor(THREADS)
     try:
@@ -279,7 +294,7 @@ def _check_actions(
 
 
 def _check_variant(
-    files: ListedFiles,
+    archive: BundleArchive,
     found: Sequence[TrialRecord],
     traces: Mapping[TrialKey, str],
     reference: Reference,
@@ -287,11 +302,11 @@ def _check_variant(
 ) -> None:
     name = layout.actions_name(*found[0].key.variant)
     most = most_bytes([record.steps for record in found])
-    if files.size(name) > most:
+    if archive.sizes.get(name, 0) > most:
         raise BundleError(
-            f"{name} unpacks to {files.size(name)} bytes; its trials have {most} at most"
+            f"{name} unpacks to {archive.sizes.get(name, 0)} bytes; its trials have {most} at most"
         )
-    stored = decode(files.read(name), name)
+    stored = decode(archive.read(name), name)
     if len(stored) != len(found):
         raise BundleError(f"{name} holds {len(stored)} trials, not {len(found)}")
     for record, trace in zip(found, stored, strict=True):
@@ -307,7 +322,7 @@ def read_traces(valid: Valid, wanted: Sequence[TrialKey]) -> dict[TrialKey, Trac
     for records in _variants(valid.run.records):
         places.update({record.key: place for place, record in enumerate(records)})
     found: dict[TrialKey, Trace] = {}
-    with Archive(valid.path) as archive:
+    with BundleArchive(valid.path) as archive:
         for variant in dict.fromkeys(key.variant for key in wanted):
             name = layout.actions_name(*variant)
             stored = decode(archive.read(name), name)
@@ -331,18 +346,18 @@ def _lints(run: Run) -> list[str]:
     return warnings
 
 
-def _check_scores(files: ListedFiles, run: Run, manifest: Manifest) -> bool:
+def _check_scores(archive: BundleArchive, run: Run, manifest: BundleManifest) -> bool:
     """Whether the tables' text was compared too; BundleError if a number is not what follows.
 
     Another version may write its tables otherwise, but not have other numbers in them.
     """
-    given = parse(files.read(layout.SCORES), layout.SCORES)
+    given = parse(archive.read(layout.SCORES), layout.SCORES)
     where = compare_scores(scores_of(run), given)
     if where:
         raise BundleError(f"{layout.SCORES} is not what the records give: {where}")
-    if files.map(layout.OUTCOMES) != to_builtins(outcomes_of(run)):
+    if archive.read_map(layout.OUTCOMES) != to_builtins(outcomes_of(run)):
         raise BundleError(f"{layout.OUTCOMES} is not what the records give")
-    texts = {ending: files.read(name) for ending, name in layout.TABLES.items()}
+    texts = {ending: archive.read(name) for ending, name in layout.TABLES.items()}
     if manifest.robospa != own_version():
         return False
     for ending, text in tables_of(run).items():
@@ -359,7 +374,7 @@ def own_version() -> str:
 
 
 def _check_videos(
-    files: ListedFiles, manifest: Manifest, records: Mapping[TrialKey, TrialRecord]
+    archive: BundleArchive, manifest: BundleManifest, records: Mapping[TrialKey, TrialRecord]
 ) -> None:
     """BundleError unless the announced trials, and only they, have a video."""
     chosen = {f"videos/{key.slug}.mp4": key for key in announced(manifest.suite, records)}
@@ -368,10 +383,147 @@ def _check_videos(
             if manifest.practice:
                 continue
             raise BundleError(f"the announced video {name} is missing")
-        if files.read(name)[4:8] != MOVIE:
+        if archive.read(name)[4:8] != MOVIE:
             raise BundleError(f"{name} is not an MP4 video")
         if records[key].video != name:
             raise BundleError(f"{key.slug} does not name its video {name}")
     for key, record in records.items():
         if record.video and (record.video not in chosen or chosen[record.video] != key):
             raise BundleError(f"{key.slug} names a video that was not announced")
+
+
+CLOSE = 1e-9
+"""Two computations of one number may differ by this much: other numpy, other order of sums."""
+
+
+def scores_of(run: Run) -> ScoresData:
+    """All scores of `run`, as `report.json` has them."""
+    return to_json(score_run(run))
+
+
+def tables_of(run: Run) -> dict[str, bytes]:
+    """The report's tables of `run` as files, by ending."""
+    try:
+        tables = [shown.table for shown in report_tables([run_column(run, "model")])]
+    except IncomparableError:
+        tables = []  # of variants that no table has
+    return {ending: FORMATS[ending](tables).encode() for ending in ("csv", "md")}
+
+
+def compare_scores(right: object, given: object, where: str = "") -> str:
+    """Where `given` first differs from `right`, in words; "" if nowhere."""
+    if isinstance(right, Mapping):
+        if not isinstance(given, Mapping) or set(given) != set(right):
+            return f"{where or 'the scores'} have other entries"
+        pairs = [(name, right[name], given[name]) for name in right]
+    elif isinstance(right, (list, tuple)):
+        if not isinstance(given, list) or len(given) != len(right):
+            return f"{where} has another length"
+        pairs = [(str(n), a, b) for n, (a, b) in enumerate(zip(right, given, strict=True))]
+    else:
+        return "" if _equal(right, given) else f"{where} is {str(given)[:40]!a}, not {right!r}"
+    for name, one, other in pairs:
+        found = compare_scores(one, other, f"{where}, {name}" if where else str(name))
+        if found:
+            return found
+    return ""
+
+
+def _equal(right: object, given: object) -> bool:
+    numbers = (int, float)
+    if isinstance(right, numbers) and isinstance(given, numbers):
+        if isinstance(right, bool) or isinstance(given, bool):
+            return right is given
+        return math.isclose(right, given, rel_tol=CLOSE, abs_tol=CLOSE)
+    return type(right) is type(given) and bool(right == given)
+
+
+DIGITS = "0123456789abcdefghijklmnopqrstuvwxyz"
+Rows = dict[str, dict[str, list[float | None]]]
+
+
+class Outcomes(Struct, forbid_unknown_fields=True):
+    """The outcomes of a variant."""
+
+    candidates: int
+    total: Annotated[int, Meta(gt=0, lt=len(DIGITS))]
+    success: Annotated[str, pattern("[01]*", "text of 0 and 1")] = ""
+    done: Annotated[str, pattern("[0-9a-z]*", "text of digits and small letters")] = ""
+
+
+def outcomes_of(run: Run) -> dict[str, Outcomes]:
+    """The outcomes of a complete run, by "TASK/LEVEL"."""
+    found: dict[str, Outcomes] = {}
+    for key in sorted(run.keys):
+        record = run.records[key]
+        own = found.setdefault(f"{key.task}/{key.level}", Outcomes(record.candidates, record.total))
+        own.success += "1" if record.success else "0"
+        own.done += DIGITS[record.done]
+    return found
+
+
+def results_of(
+    name: str,
+    outcomes: Mapping[str, object],
+    keys: Sequence[TrialKey],
+    categories: Mapping[str, str],
+    suite: str,
+) -> ModelResults:
+    """The results of a model, from the `outcomes` of the trials `keys` of `suite`; BundleError if
+    they do not fit each other."""
+    seeds: dict[Variant, list[TrialKey]] = {}
+    for key in sorted(keys):
+        seeds.setdefault(key.variant, []).append(key)
+    if set(outcomes) != {f"{task}/{level}" for task, level in seeds}:
+        raise BundleError(f"{name[:80]!a}: the outcomes are of other variants than the run")
+    records: dict[TrialKey, TrialRecord] = {}
+    for (task, level), own in seeds.items():
+        part = _checked(outcomes[f"{task}/{level}"], len(own), f"{name[:80]!a}, {task} L{level}")
+        records |= {k: _record(k, categories[task], part, place) for place, k in enumerate(own)}
+    return results_of_records(
+        name, sorted(keys), records, RunInfo(categories=categories, suite=suite)
+    )
+
+
+def _checked(data: object, count: int, where: str) -> Outcomes:
+    """The outcomes of a variant, if they are of `count` trials."""
+    part = read(Outcomes, data, f"{where}: the outcomes", BundleError)
+    if not len(part.success) == len(part.done) == count:
+        raise BundleError(f"{where}: the outcomes are not of {count} trials")
+    if set(part.done) - set(DIGITS[: part.total + 1]):
+        raise BundleError(f"{where}: the outcomes say that more is done than a trial can have")
+    return part
+
+
+def _record(key: TrialKey, category: str, part: Outcomes, place: int) -> TrialRecord:
+    """As much of a trial's record as a comparison looks at. One suite, one seed: one scene."""
+    done, good = DIGITS.index(part.done[place]), part.success[place] == "1"
+    counts = (done, done, part.total, part.candidates, 0, 0, 0)
+    end = "success" if good else "step_limit"
+    return TrialRecord(key, category, "", "", end, good, *counts, "", "", 0.0)
+
+
+def paired(first: ModelResults, second: ModelResults) -> dict[str, Rows]:
+    """Differences in percent on equal seeds, by metric, row and level (0: over levels).
+
+    Each is [difference, low, high, pairs that only the first, only the second did better in, q].
+    A metric that they cannot be paired in is left out.
+    """
+    made: dict[str, Rows] = {}
+    for metric in METRICS:
+        try:
+            found = compare(first, second, metric)
+            rows = [*found.cells, *found.groups, *over_levels(first, second, metric)]
+        except IncomparableError:
+            continue
+        if found.paired:
+            made[metric] = {}
+            for row in rows:
+                made[metric].setdefault(row.label, {})[str(row.level)] = _shown(row)
+    return made
+
+
+def _shown(row: Difference) -> list[float | None]:
+    found = row.estimate
+    numbers = [round(100 * x, 2) for x in (found.value, found.low, found.high)]
+    return [*numbers, row.only_first, row.only_second, float(f"{row.q:.2g}")]

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 COUNT = between(0, 10_000)
 AUDIT = "robospa.leaderboard.audit"
-JOINTS = "robospa.leaderboard.executed_joints"
+JOINTS = "robospa.leaderboard.traces"
 EXPERT = "robospa.baselines.oracle:create"
 
 
@@ -91,7 +91,7 @@ def _read(path: Path, count: int) -> tuple[Run, dict[TrialKey, Any]]:
 
     bundle = None
     if path.is_file():
-        reference = _load("robospa.leaderboard.reference:shipped")()
+        reference = _load("robospa.leaderboard.rules:shipped")()
         bundle = _load("robospa.leaderboard.verify:verify")(path, reference, practice=True)
     run = bundle.run if bundle else read_run(path)
     good = [key for key in run.keys if key in run.records and run.records[key].success]

@@ -35,29 +35,13 @@ def _load(path: str) -> Callable[..., Any]:
 def build(
     submissions: Home = SUBMISSIONS,
     out: Annotated[Path, typer.Option("--out", "-o", help="folder of the site")] = Path("site"),
-    practice: Annotated[
-        list[Path] | None,
-        typer.Option(help="also preview a bundle, such as one for practice; it enters no table"),
-    ] = None,
-    beside_paper: Annotated[
-        list[Path] | None,
-        typer.Option(
-            help="also show a run of --world official or checkout:DIR, ranked with the paper's "
-            "models alone"
-        ),
-    ] = None,
     as_json: AsJson = False,
-    world: Hidden = None,
-    parts: Hidden = None,
 ) -> None:
     """Write the leaderboard as static pages."""
     note = aside if as_json else print
     if not submissions.is_dir():
         note(f"There is no folder {submissions}: the site has the published models only.")
-    reference = _load("reference:shipped")(world, parts)
-    index = _load("site:build")(
-        submissions, out, note, practice or [], reference, beside_paper or []
-    )
+    index = _load("site:build")(submissions, out, note)
     if as_json:
         print_json({"index": index})
     else:
@@ -80,12 +64,12 @@ def add(
     parts: Hidden = None,
 ) -> None:
     """Verify a bundle and keep what the leaderboard needs of it in the submission's folder."""
-    valid = _load("verify:verify")(bundle, _load("reference:shipped")(world, parts))
+    valid = _load("verify:verify")(bundle, _load("rules:shipped")(world, parts))
     found = []
     for path in evidence or []:
         if path.stat().st_size > MOST:
             raise ValueError(f"{path} is larger than evidence can be")
-        found.append(_load("strict_json:parse_map")(path.read_bytes(), str(path)))
+        found.append(_load("untrusted:parse_map")(path.read_bytes(), str(path)))
     folder = _load("submission:add")(valid, found, submissions, name, address)
     if as_json:
         print_json({"submission": folder, "evidence": valid.evidence})

@@ -62,7 +62,7 @@ def pack(
 
     Of runs of several robots a bundle each, NAME-ROBOT.zip.
     """
-    reference = _load("reference:shipped")(world, parts)
+    reference = _load("rules:shipped")(world, parts)
     card = _load("card:read_card")(model)
     how = _load("packing:Packing")(
         practice=practice,
@@ -125,9 +125,9 @@ def verify(
     from msgspec import to_builtins
 
     if challenge is not None:
-        _load("sampling:check_challenge")(challenge)
-        _load("sampling:check_fraction")(fraction)
-    reference = _load("reference:shipped")(world, parts)
+        _load("evidence:check_challenge")(challenge)
+        _load("evidence:check_fraction")(fraction)
+    reference = _load("rules:shipped")(world, parts)
     started = time.perf_counter()
     valid = _load("verify:verify")(
         bundle, reference, practice, workers=workers, done=scene_progress()
@@ -175,15 +175,15 @@ def block(
     """Draw hidden scenes that the expert solves, and print the commitment to publish beforehand."""
     from robospa.harness.running.autoscaling import cores
 
-    valid = _load("verify:verify")(bundle, _load("reference:shipped")(world, parts), practice)
+    valid = _load("verify:verify")(bundle, _load("rules:shipped")(world, parts), practice)
     count = _load("reproduce:plan")(valid, trials, alpha)
     variants = list(dict.fromkeys(key.variant for key in valid.keys))
     say = aside if as_json else print
     say(f"{count} hidden trials of each of {len(variants)} variants: {count * len(variants)}")
     robot, mode = valid.keys[0].embodiment, valid.keys[0].mode
-    draw = _load("hidden_seeds:draw_block")
+    draw = _load("reproduce:draw_block")
     drawn = draw(variants, count, workers or cores(), say, robot, mode)
-    _load("hidden_seeds:write_block")(drawn, out)
+    _load("reproduce:write_block")(drawn, out)
     say(f"Keep {out} secret until the trials are over. Publish now:")
     if as_json:
         known = {"block": out, "trials": count, "variants": len(variants)}
@@ -221,9 +221,9 @@ def reproduce(
     from robospa.harness.settings import EvaluationSettings, updated
     from robospa.results.records.run_io import read_run
 
-    reference = _load("reference:shipped")(world, parts)
+    reference = _load("rules:shipped")(world, parts)
     valid = _load("verify:verify")(bundle, reference, practice)
-    seeds = _load("hidden_seeds:read_block")(block, commitment)
+    seeds = _load("reproduce:read_block")(block, commitment)
     keys = _load("reproduce:hidden_keys")(valid, seeds, reference)
     _load("reproduce:plan")(valid, min(map(len, seeds.seeds.values())), alpha)
     run_seed = valid.run.manifest["settings"]["run_seed"]
@@ -279,7 +279,7 @@ def _replay(valid: Any, challenge: str, fraction: float, workers: int, reference
     from robospa.harness.running.autoscaling import cores
     from robospa.harness.running.progress import Progress
 
-    count = _load("sampling:sample_size")(fraction, len(valid.keys))
+    count = _load("evidence:sample_size")(fraction, len(valid.keys))
     with Progress(count) as progress:
 
         def show(trial: Any) -> None:

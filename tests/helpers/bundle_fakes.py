@@ -21,9 +21,9 @@ from robospa.harness.trial import run_trial
 from robospa.harness.trial_identity import policy_seed
 from robospa.harness.world import ActionError, Poll, StepResult
 from robospa.leaderboard import bundle as layout
-from robospa.leaderboard.bundle import BundleError, Limits
+from robospa.leaderboard.bundle import BundleError, BundleLimits
 from robospa.leaderboard.card import to_card
-from robospa.leaderboard.reference import Reference, facts_of
+from robospa.leaderboard.rules import Reference, facts_of
 from robospa.leaderboard.verify import seed_lists, verify
 from robospa.tasks.snapshot import Snapshot
 from robospa.trial import TrialKey
@@ -230,7 +230,7 @@ def relist(files: Files, keys: Sequence[TrialKey]) -> None:
 ACTIONS = layout.actions_name(PICK, 1)
 
 
-def refused(path: Path, limits: Limits | None = None) -> str:
+def refused(path: Path, limits: BundleLimits | None = None) -> str:
     """The one sentence with which the bundle at `path` is refused."""
     with pytest.raises(BundleError) as caught:
         verify(path, REFERENCE, limits=limits)

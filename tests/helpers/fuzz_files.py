@@ -38,10 +38,10 @@ from robospa.harness.running.request import client_options
 from robospa.harness.selection import parse_seeds
 from robospa.harness.settings import SettingsError
 from robospa.leaderboard import bundle as layout
-from robospa.leaderboard.action_traces import decode, encode
-from robospa.leaderboard.archive import Archive
 from robospa.leaderboard.bundle import BundleError, canonical
 from robospa.leaderboard.packing import pack
+from robospa.leaderboard.traces import decode, encode
+from robospa.leaderboard.untrusted import Archive
 from robospa.leaderboard.verify import verify
 from robospa.results.records.manifest import RunError, manifest_keys, read_manifest
 from robospa.results.records.run_io import finished, from_line, merge, read_file, read_run, to_line

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from robospa.harness.quantize import quantize
-from robospa.leaderboard.action_traces import decode, encode
 from robospa.leaderboard.bundle import BundleError
+from robospa.leaderboard.traces import decode, encode
 
 ANY = st.integers(0, 5).flatmap(
     lambda n: arrays(np.float32, (n, 3), elements=st.floats(width=32, allow_nan=False)).map(

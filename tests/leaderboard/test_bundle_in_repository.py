@@ -15,7 +15,7 @@ import pytest
 from bundle_fakes import CARD_DATA, CARD_TEXT, FAKES, REFERENCE, make_run
 from site_fakes import REPLAYED, of_bundle
 
-from robospa.leaderboard import bundle_in_repository as in_repository
+from robospa.leaderboard import submission as in_repository
 from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.card import to_card
 from robospa.leaderboard.packing import pack

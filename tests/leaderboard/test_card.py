@@ -11,8 +11,7 @@ import pytest
 from bundle_fakes import CARD_DATA
 
 from robospa.leaderboard.bundle import BundleError
-from robospa.leaderboard.card import check_checkpoints, read_card, template, to_card
-from robospa.leaderboard.reserved import check_folder
+from robospa.leaderboard.card import check_checkpoints, check_folder, read_card, template, to_card
 
 TASKS = ("Pick_Blocks_Size", "Press_Stapler_Repeat")
 

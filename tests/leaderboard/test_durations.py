@@ -8,7 +8,7 @@ import pytest
 from robospa.harness.robots import embodiment
 from robospa.harness.sim.motion import HOLD_STEPS, action_steps, rest_to_rest, step_count
 from robospa.leaderboard.bundle import BundleError
-from robospa.leaderboard.durations import durations
+from robospa.leaderboard.traces import durations
 from robospa.trial import REFERENCE
 
 

@@ -12,14 +12,19 @@ from fake_records import trial_record
 
 from robospa.harness.cli.audit import _read as read_for_audit
 from robospa.harness.running.action_files import write_actions
-from robospa.leaderboard.action_traces import Trace, decode, encode
 from robospa.leaderboard.audit import expert_likeness
 from robospa.leaderboard.bundle import BundleError
-from robospa.leaderboard.durations import durations
-from robospa.leaderboard.executed_joints import joint_path, split_trace, with_joints
-from robospa.leaderboard.record_rows import trace_hash
-from robospa.leaderboard.record_rules import check_trace
-from robospa.leaderboard.reference import Reference, shipped
+from robospa.leaderboard.rules import Reference, shipped
+from robospa.leaderboard.traces import (
+    Trace,
+    decode,
+    durations,
+    encode,
+    joint_path,
+    split_trace,
+    with_joints,
+)
+from robospa.leaderboard.trial_rows import check_trace, trace_hash
 from robospa.trial import REFERENCE, TrialKey
 
 POSES = np.tile(np.array([0.25, 0, 1, 0.5, 0.5, 0.5, 0.5, 1] * 2, np.float32), (3, 1))

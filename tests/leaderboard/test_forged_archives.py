@@ -29,8 +29,8 @@ from bundle_fakes import (
 )
 
 from robospa.leaderboard import bundle as layout
-from robospa.leaderboard.action_traces import HEAD, MAGIC, encode
-from robospa.leaderboard.bundle import BundleError, Limits
+from robospa.leaderboard.bundle import BundleError, BundleLimits
+from robospa.leaderboard.traces import HEAD, MAGIC, encode
 from robospa.leaderboard.verify import verify
 
 
@@ -81,17 +81,17 @@ def test_rows_that_take_many_times_their_size_in_memory(
 
 def test_many_small_bombs(files: Files, tmp_path: Path) -> None:
     path = zip_up(tmp_path / "b.zip", files)
-    assert "the bundle unpacks to" in refused(path, Limits(unpacked=10_000))
+    assert "the bundle unpacks to" in refused(path, BundleLimits(unpacked=10_000))
 
 
 def test_more_entries_than_a_bundle_can_have(files: Files, tmp_path: Path) -> None:
     path = zip_up(tmp_path / "b.zip", files)
-    assert "5 is the most" in refused(path, Limits(entries=5))
+    assert "5 is the most" in refused(path, BundleLimits(entries=5))
 
 
 def test_a_file_that_is_too_large(files: Files, tmp_path: Path) -> None:
     path = zip_up(tmp_path / "b.zip", files)
-    assert "more than the 100 allowed" in refused(path, Limits(packed=100))
+    assert "more than the 100 allowed" in refused(path, BundleLimits(packed=100))
 
 
 def test_an_endless_row(files: Files, tmp_path: Path) -> None:
@@ -103,16 +103,16 @@ def test_more_rows_than_allowed(files: Files, tmp_path: Path) -> None:
     put_rows(files, [*rows_of(files), rows_of(files)[-1]])
     path = zip_up(tmp_path / "b.zip", seal(files))
     assert "is there twice" in refused(path)
-    assert "lists more than 39 trials" in refused(path, Limits(rows=39))
+    assert "lists more than 39 trials" in refused(path, BundleLimits(rows=39))
 
 
 def test_more_rows_than_the_reader_takes(honest: Path) -> None:
     import hashlib
 
-    from robospa.leaderboard.archive import Archive
+    from robospa.leaderboard.untrusted import BundleArchive
 
     with (
-        Archive(honest, Limits(rows=3)) as archive,
+        BundleArchive(honest, BundleLimits(rows=3)) as archive,
         pytest.raises(BundleError, match="has more than 3 rows"),
     ):
         list(archive.rows(layout.RECORDS, hashlib.sha256()))

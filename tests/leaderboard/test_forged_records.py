@@ -24,10 +24,10 @@ from bundle_fakes import (
 
 from robospa.harness.sim.motion import RATE
 from robospa.leaderboard import bundle as layout
-from robospa.leaderboard.action_traces import Trace
 from robospa.leaderboard.bundle import BundleError
-from robospa.leaderboard.record_rules import check_record, check_trace
-from robospa.leaderboard.scene_check import check_scenes, first_wrong
+from robospa.leaderboard.rules import check_scenes, first_wrong
+from robospa.leaderboard.traces import Trace
+from robospa.leaderboard.trial_rows import check_record, check_trace
 from robospa.leaderboard.verify import Valid, read_traces, verify
 from robospa.results.records.trial_record import RetryRow, TrialRecord
 from robospa.trial import TrialKey
@@ -239,7 +239,7 @@ def test_all_scenes_are_made_again(valid: Valid) -> None:
 
 
 def test_other_processes_make_scenes_too(valid: Valid, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("robospa.leaderboard.scene_check.FEW", 0)
+    monkeypatch.setattr("robospa.leaderboard.rules.FEW", 0)
     records = dict(valid.run.records)
     check_scenes(records, REFERENCE.parts, workers=2)
     key = list(records)[-1]
@@ -250,7 +250,7 @@ def test_other_processes_make_scenes_too(valid: Valid, monkeypatch: pytest.Monke
 
 def test_a_real_scene_and_sentence_are_made_again() -> None:
     from robospa.harness.trial import task_parts
-    from robospa.leaderboard.reference import PARTS
+    from robospa.leaderboard.rules import PARTS
 
     key = TrialKey(PICK, 1, 100000)
     found = task_parts(key)

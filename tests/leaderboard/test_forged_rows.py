@@ -28,8 +28,8 @@ from bundle_fakes import (
 
 from robospa.harness.sim.motion import RATE
 from robospa.leaderboard import bundle as layout
-from robospa.leaderboard.action_traces import decode
-from robospa.leaderboard.record_rows import trace_hash
+from robospa.leaderboard.traces import decode
+from robospa.leaderboard.trial_rows import trace_hash
 from robospa.trial import TrialKey
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from robospa.leaderboard.bundle import BundleError
-from robospa.leaderboard.hidden_seeds import FIRST, Block, read_block, write_block
+from robospa.leaderboard.reproduce import FIRST, Block, read_block, write_block
 
 BLOCK = Block({("Pick_Blocks_Size", 1): (FIRST, FIRST + 7)}, "ab" * 32)
 

@@ -27,7 +27,7 @@ def test_evidence_of_another_bundle_adds_nothing(
 ) -> None:
     from bundle_fakes import REFERENCE
 
-    monkeypatch.setattr("robospa.leaderboard.reference.shipped", lambda world, parts: REFERENCE)
+    monkeypatch.setattr("robospa.leaderboard.rules.shipped", lambda world, parts: REFERENCE)
     valid = make_valid(tmp_path)
     path = tmp_path / "evidence.json"
     path.write_text(json.dumps({"valid": {"bundle": "0"}, "replayed": REPLAYED}))

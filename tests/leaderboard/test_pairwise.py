@@ -12,9 +12,9 @@ from site_fakes import Weaker, make_submission
 
 from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.entries import entry_of
-from robospa.leaderboard.pairwise import pairs_of, write_pairs
+from robospa.leaderboard.site import pairs_of, write_pairs
 from robospa.leaderboard.submission import read_submissions
-from robospa.leaderboard.trial_outcomes import outcomes_of, paired, results_of
+from robospa.leaderboard.verify import outcomes_of, paired, results_of
 from robospa.results.comparison.compare import compare
 from robospa.results.records.run_io import Run, read_run
 from robospa.results.scoring.model_results import ModelResults, results_of_run

@@ -22,7 +22,7 @@ from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.card import read_card
 from robospa.leaderboard.packing import Packing, pack
 from robospa.leaderboard.pull_request import DIFF, Change, check, fetch, read_changes, submitted
-from robospa.leaderboard.reference import shipped
+from robospa.leaderboard.rules import shipped
 from robospa.trial import TrialKey
 
 ROOT = Path(__file__).parents[2]

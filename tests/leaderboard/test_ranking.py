@@ -5,19 +5,13 @@ from __future__ import annotations
 import html
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
-from report_runs import KNOWN, make_run
 from site_fakes import many_entries
 
-from robospa.leaderboard.beside_paper import run_entries
-from robospa.leaderboard.bundle import BundleError
-from robospa.leaderboard.entries import Entry, published_entries
-from robospa.leaderboard.ranking import Group, group, rankable
+from robospa.leaderboard.entries import Entry, Group, group, published_entries, rankable
 from robospa.leaderboard.site import index_page, model_data
-from robospa.results.paper.origin import ORIGIN, RANKED
-from robospa.tasks.scene import SUITE
+from robospa.results.paper.origin import ORIGIN
 
 PAPER = "paper, aloha-agilex, clean, paper"
 
@@ -92,47 +86,3 @@ def test_nobody_is_ranked_in_a_suite_that_still_changes(entries: list[Entry]) ->
     found = group(draft)
     assert not rankable(draft)
     assert found is not None and "draft" in found.note
-
-
-def run_folder(folder: Path, suite: str, privileged: bool = False) -> Path:
-    """A run of two variants in an official world."""
-    made = make_run(folder, KNOWN)
-    manifest = json.loads((made.folder / "run.json").read_text())
-    manifest["suite"] = suite
-    manifest["trials"] = [row for row in manifest["trials"] if row["seeds"]]
-    manifest["settings"]["privileged"] = privileged
-    manifest["settings"]["layout"] = {"assets": "official", "digest": "abcdef", "switches": []}
-    (made.folder / "run.json").write_text(json.dumps(manifest))
-    return made.folder
-
-
-def test_runs_of_official_worlds_are_ranked_with_the_papers_models_alone(
-    entries: list[Entry], tmp_path: Path
-) -> None:
-    kinds = (("official-1", False), ("official-checkout", False), ("official-1", True))
-    folders = [run_folder(tmp_path / str(n), *kind) for n, kind in enumerate(kinds)]
-    page = index_page([*entries, *run_entries(folders)])
-    data = json.loads(page.split('id="data">')[1].split("</script>")[0])
-    ranked = {m["name"]: m["rankable"] for m in data["models"] if m["group"] == PAPER}
-    assert len(ranked) == 4 + len({m["id"] for m in data["models"] if m["badge"] == "run"}) - 1
-    assert [m["rankable"] for m in data["models"] if m["badge"] == "run"] == [True, True, False]
-    assert all(m["rankable"] for m in data["models"] if m["badge"] == "published")
-    assert {m["group"] for m in data["models"] if m["badge"] == "run"} == {PAPER}
-    paper = data["groups"][-1]
-    assert paper["key"] == PAPER and "objects (archive abcdef)" in paper["note"]
-    assert RANKED in paper["note"] and "official-checkout" in data["apart"]
-    assert "A run of an official world" in page
-    for old in data["groups"][:-1]:
-        assert "official" not in old["note"]
-    without = index_page(entries)
-    assert "A run of an official world" not in without and RANKED not in without
-
-
-def test_our_own_suite_and_unfinished_runs_do_not_stand_beside_the_paper(tmp_path: Path) -> None:
-    with pytest.raises(BundleError, match="never ranked beside the paper"):
-        run_entries([run_folder(tmp_path / "ours", SUITE)])
-    folder = run_folder(tmp_path / "official", "official-1")
-    line = (folder / "trials" / "0000.jsonl").read_text().splitlines(keepends=True)
-    (folder / "trials" / "0000.jsonl").write_text("".join(line[:-1]))
-    with pytest.raises(BundleError, match="1 trials without a result"):
-        run_entries([folder])

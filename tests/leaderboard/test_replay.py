@@ -13,12 +13,10 @@ from bundle_fakes import PRESS, REFERENCE, Files, put_rows, rows_of, seal, zip_u
 from robospa.harness.sim.motion import RATE
 from robospa.leaderboard import bundle as layout
 from robospa.leaderboard.bundle import BundleError
-from robospa.leaderboard.reference import Reference
+from robospa.leaderboard.evidence import sample_size
 from robospa.leaderboard.replay import Replay, replay
-from robospa.leaderboard.sampling import sample_size
-from robospa.leaderboard.scores import scores_of, tables_of
-from robospa.leaderboard.trial_outcomes import outcomes_of
-from robospa.leaderboard.verify import verify
+from robospa.leaderboard.rules import Reference
+from robospa.leaderboard.verify import outcomes_of, scores_of, tables_of, verify
 from robospa.results.records.manifest import manifest_keys
 from robospa.results.records.run_io import Run, from_data
 
@@ -121,8 +119,8 @@ def test_actions_of_another_task_forged_with_all_hashes_are_caught(
 ) -> None:
     from robospa.harness.quantize import quantize
     from robospa.harness.trial import actions_digest
-    from robospa.leaderboard.action_traces import decode, encode
-    from robospa.leaderboard.record_rows import trace_hash
+    from robospa.leaderboard.traces import decode, encode
+    from robospa.leaderboard.trial_rows import trace_hash
 
     name = layout.actions_name(PRESS, 1)
     traces = [quantize(0.5 * trace) for trace in decode(files[name], name)]

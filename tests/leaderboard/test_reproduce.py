@@ -15,8 +15,15 @@ from site_fakes import make_valid
 from robospa.harness.trial import run_trial
 from robospa.harness.trial_identity import salt_hash
 from robospa.leaderboard.bundle import BundleError
-from robospa.leaderboard.hidden_seeds import FIRST, Block, draw_block
-from robospa.leaderboard.reproduce import Reproduction, compare, hidden_keys, plan
+from robospa.leaderboard.reproduce import (
+    FIRST,
+    Block,
+    Reproduction,
+    compare,
+    draw_block,
+    hidden_keys,
+    plan,
+)
 from robospa.leaderboard.verify import Valid
 from robospa.results.records.run_io import Run
 from robospa.results.records.trial_record import RetryRow

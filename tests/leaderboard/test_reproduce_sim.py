@@ -29,10 +29,16 @@ from robospa.leaderboard.audit import (
     sentence_reaction,
 )
 from robospa.leaderboard.card import to_card
-from robospa.leaderboard.hidden_seeds import draw_block, read_block, write_block
 from robospa.leaderboard.packing import Packing, pack
-from robospa.leaderboard.reference import shipped
-from robospa.leaderboard.reproduce import check_policy, compare, hidden_keys
+from robospa.leaderboard.reproduce import (
+    check_policy,
+    compare,
+    draw_block,
+    hidden_keys,
+    read_block,
+    write_block,
+)
+from robospa.leaderboard.rules import shipped
 from robospa.leaderboard.verify import Valid
 from robospa.protocol.server import ServerThread
 from robospa.results.records.run_io import Run, action_path, read_run

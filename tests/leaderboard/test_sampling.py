@@ -10,7 +10,7 @@ from fractions import Fraction
 import pytest
 
 from robospa.leaderboard.bundle import BundleError
-from robospa.leaderboard.sampling import (
+from robospa.leaderboard.evidence import (
     announced,
     catch_probability,
     drawn,

@@ -265,32 +265,11 @@ def test_another_card_than_the_bundles_is_refused(tmp_path: Path) -> None:
         add(valid, [], tmp_path / "home", "../mine")
 
 
-def test_a_bundle_for_practice_is_shown_and_enters_no_table(tmp_path: Path) -> None:
-    run = make_run(tmp_path / "run", [TrialKey(PICK, level, s) for level in (1, 2) for s in SEEDS])
-    pack([run], CARD, tmp_path / "b.zip", REFERENCE, Packing(practice=True, videos=False))
-    home = tmp_path / "home"
-    index = build(home, tmp_path / "out", practice=[tmp_path / "b.zip"], reference=REFERENCE)
-    text = index.read_text()
-    assert [m["name"] for m in data_of(text)["models"]] == [e.name for e in published_entries()]
-    link = "models/practice-1-fake-1/index.html"
-    assert "Practice, not submissions" in text and text.count(link) == 1
-    page = (tmp_path / "out" / link).read_text()
-    assert "practice, not a submission" in page and "is not submitted, has no badge" in page
-    assert 'class="mark valid"' not in page
-    assert not home.exists()
-
-    assert "Practice" not in build(home, tmp_path / "out").read_text()
-    assert not (tmp_path / "out" / link).exists()
-
-
 def test_a_bundle_for_practice_is_no_submission(tmp_path: Path) -> None:
     run = make_run(tmp_path / "run", [TrialKey(PICK, 1, s) for s in SEEDS])
     packed = pack([run], CARD, tmp_path / "b.zip", REFERENCE, Packing(practice=True, videos=False))
     with pytest.raises(BundleError, match="enters no leaderboard"):
         add(packed.valid, [], tmp_path / "home")
-    add(packed.valid, [], tmp_path / "home", practice=True)
-    with pytest.raises(BundleError, match="was packed for practice and enters no leaderboard"):
-        build(tmp_path / "home", tmp_path / "out")
 
 
 def test_a_folder_called_like_a_published_model_is_refused_and_left_out(

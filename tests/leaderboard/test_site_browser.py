@@ -14,8 +14,7 @@ from devtools import Page, chromium
 from site_fakes import REPLAYED, Weaker, make_submission, many_entries
 
 from robospa.leaderboard.entries import BADGES, entry_of, published_entries
-from robospa.leaderboard.pairwise import pairs_of, write_pairs
-from robospa.leaderboard.site import index_page, write_model
+from robospa.leaderboard.site import index_page, pairs_of, write_model, write_pairs
 from robospa.leaderboard.submission import read_submission, read_submissions
 from robospa.results.comparison.compare import over_levels
 from robospa.results.records.run_io import read_run

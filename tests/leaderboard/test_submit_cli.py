@@ -17,7 +17,7 @@ from robospa.harness.cli.submit import scene_progress
 from robospa.harness.running.evaluate import evaluate
 from robospa.harness.running.request import make_request
 from robospa.harness.settings import EvaluationSettings, updated
-from robospa.leaderboard.hidden_seeds import FIRST, Block, write_block
+from robospa.leaderboard.reproduce import FIRST, Block, write_block
 from robospa.leaderboard.verify import verify
 from robospa.protocol.server import ServerThread
 from robospa.results.records.manifest import RunError

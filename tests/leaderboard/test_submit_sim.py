@@ -11,8 +11,8 @@ from bundle_fakes import CARD_DATA
 
 from robospa.leaderboard.card import to_card
 from robospa.leaderboard.packing import Packing, pack
-from robospa.leaderboard.reference import shipped
 from robospa.leaderboard.replay import replay
+from robospa.leaderboard.rules import shipped
 from robospa.leaderboard.verify import verify
 from robospa.trial import TrialKey
 

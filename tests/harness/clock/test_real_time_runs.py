@@ -23,8 +23,7 @@ from robospa.harness.running.request import make_request
 from robospa.harness.running.worker import Worker, WorkerConfig
 from robospa.harness.settings import EvaluationSettings, SettingsError, updated
 from robospa.leaderboard.bundle import BundleError
-from robospa.leaderboard.bundle_rules import check_settings
-from robospa.leaderboard.reference import REFERENCE
+from robospa.leaderboard.rules import REFERENCE, check_settings
 from robospa.protocol.policy import PolicySpec
 from robospa.results.comparison.by_axis import by_axis
 from robospa.results.comparison.compare import compare

@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 
 from robospa.harness.datasets.settings import Collection, lists_of, trial_of
-from robospa.leaderboard.hidden_seeds import FIRST as FIRST_HIDDEN
+from robospa.leaderboard.reproduce import FIRST as FIRST_HIDDEN
 from robospa.tasks.seeds import FIRST_TRAINING_SEED, LAST_TRAINING_SEED
 
 ROOT = Path(__file__).resolve().parents[3]

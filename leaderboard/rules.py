@@ -1,22 +1,122 @@
-"""What a bundle says about its run: settings that count, seeds that are listed.
+"""What a bundle's run may be: the settings that count, seeds that are listed, scenes and sentences.
 
-The same rules are applied when a run is packed and when a bundle is read.
+The same rules are applied when a run is packed and when a bundle is read. They are held against a
+`Reference`: `shipped()` is the benchmark as installed; a test or a benchmark of the verifier brings
+its own.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from functools import cache
+from itertools import groupby
+from multiprocessing import get_context
 from typing import Annotated, Any
 
+import numpy as np
 from msgspec import Meta, Struct
+from numpy.typing import NDArray
 
 from robospa.action_space import KINDS
+from robospa.harness.factory import load_function
 from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.card import Card
-from robospa.leaderboard.reference import LEVELS, Reference
+from robospa.leaderboard.traces import Trace
+from robospa.results.records.trial_record import TrialRecord
 from robospa.schema import Number, one_of, read
-from robospa.trial import TrialKey
+from robospa.tasks.instructions.grammar import SPLITS
+from robospa.tasks.scene import SUITE
+from robospa.trial import REFERENCE, TrialKey
+
+WORLD = "robospa.harness.sim.sapien_world:SapienWorld"
+PARTS = "robospa.harness.trial:task_parts"
+LEVELS = (1, 2, 3, 4, 5)
+Steps = NDArray[np.int64]
+Durations = Callable[[str, str, Trace], tuple[Steps, Steps]]
+"""(robot, action space, actions) -> the fewest and the most physics steps of each action."""
+
+
+@dataclass(frozen=True)
+class VariantFacts:
+    """What every record of a variant has to say, and the most actions a trial may take."""
+
+    category: str
+    candidates: int
+    subtasks: int
+    steps: int
+
+
+@dataclass(frozen=True)
+class Reference:
+    """`seeds` of a task, level, robot and scene mode, and `facts` of a task and level, raise
+    LookupError if there are none. `members` are the tasks of a category. `world` and `parts` are
+    `module:function` paths: the only world whose runs count, and what finds a trial's scene and
+    goal. `durations` finds the fewest and the most physics steps of a trial's actions; None if
+    nothing is known of the world."""
+
+    seeds: Callable[[str, int, str, str], Sequence[int]]
+    facts: Callable[[str, int], VariantFacts]
+    members: Callable[[str], Collection[str]]
+    world: str = WORLD
+    parts: str = PARTS
+    suite: str = SUITE
+    robots: Sequence[str] = (REFERENCE,)
+    modes: Sequence[str] = ("clean",)
+    splits: Sequence[str] = SPLITS
+    durations: Durations | None = None
+
+
+def shipped(world: str | None = None, parts: str | None = None) -> Reference:
+    """The installed benchmark; `world` and `parts` replace where trials run and what they ask."""
+    from robospa.harness.robots import embodiments
+    from robospa.leaderboard.traces import durations
+    from robospa.tasks.catalog import tasks
+    from robospa.tasks.modes import modes
+    from robospa.tasks.seeds import accepted
+
+    def members(category: str) -> list[str]:
+        return [t.name for t in tasks().values() if t.category == category]
+
+    found = facts_of(load_function(parts) if parts else _catalog_parts)
+    return Reference(
+        accepted,
+        found,
+        members,
+        world or WORLD,
+        parts or PARTS,
+        robots=embodiments(),
+        modes=modes(),
+        durations=None if world else durations,
+    )
+
+
+def facts_of(parts: Callable[[TrialKey], Any]) -> Callable[[str, int], VariantFacts]:
+    """A function (task, level) -> facts, from what `parts` finds."""
+
+    @cache
+    def facts(name: str, level: int) -> VariantFacts:
+        found = parts(TrialKey(name, level, 0)).task
+        about = found.levels[level]
+        return VariantFacts(found.category, about.candidates, about.subtasks, about.steps)
+
+    return facts
+
+
+@dataclass(frozen=True)
+class _TaskOnly:
+    task: Any
+
+
+def _catalog_parts(key: TrialKey) -> _TaskOnly:
+    from robospa.tasks.catalog import tasks
+
+    if key.task not in tasks():
+        raise LookupError(f"there is no task {key.task!r}")
+    return _TaskOnly(tasks()[key.task])
+
 
 CONTROLS = ("rest_to_rest",)
 """Ways of executing an action that the benchmark's numbers are made with."""
@@ -226,3 +326,58 @@ def check_categories(run: Mapping[str, object], tasks: Sequence[str], reference:
     """BundleError unless the run says the category of each of its tasks, and says it right."""
     if run.get("categories") != {t: reference.facts(t, LEVELS[0]).category for t in tasks}:
         raise BundleError("the run's categories are not those of its tasks")
+
+
+FEW = 500
+"""So many trials are made here: other processes would take longer to start."""
+Claim = tuple[TrialKey, str, str]
+"""A trial, the digest of its scene and its sentence, as a record has them."""
+Done = Callable[[int, int], None]
+"""Called with how many of how many trials were looked at."""
+
+
+def check_scenes(
+    records: Mapping[TrialKey, TrialRecord],
+    parts: str,
+    workers: int = 1,
+    done: Done = lambda count, trials: None,
+) -> None:
+    """BundleError for the first of `records` whose scene or sentence is not the one that `parts`
+    (`module:function`) makes of its key."""
+    claims = [(key, r.scene_digest, r.instruction) for key, r in records.items()]
+    variants = [list(group) for _, group in groupby(claims, lambda claim: claim[0].variant)]
+    if workers < 2 or len(claims) <= FEW:
+        _judge((first_wrong(parts, found) for found in variants), variants, done)
+        return
+    with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
+        try:
+            wrong = pool.map(first_wrong, [parts] * len(variants), variants)
+            _judge(wrong, variants, done)
+        finally:
+            pool.shutdown(cancel_futures=True)
+
+
+def _judge(wrong: Iterable[str], variants: Sequence[Sequence[Claim]], done: Done) -> None:
+    trials, count = sum(map(len, variants)), 0
+    for text, claims in zip(wrong, variants, strict=True):
+        if text:
+            raise BundleError(text)
+        count += len(claims)
+        done(count, trials)
+
+
+def first_wrong(parts: str, claims: Sequence[Claim]) -> str:
+    """What is wrong with the first of `claims` that is; "" if none is."""
+    find = load_function(parts)
+    for key, digest, sentence in claims:
+        try:
+            found = find(key)
+        except (LookupError, ValueError) as error:
+            return f"{key.slug} is no trial of this suite: {' '.join(str(error).split())[:120]}"
+        for what, claimed, right in (
+            ("scene", digest, found.scene.digest),
+            ("sentence", sentence, found.instruction),
+        ):
+            if claimed != right:
+                return f"{key.slug} has another {what} ({claimed[:60]!a}, not {right[:60]!a})"
+    return ""
