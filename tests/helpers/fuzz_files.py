@@ -41,7 +41,7 @@ from robospa.leaderboard import bundle as layout
 from robospa.leaderboard.bundle import BundleError, canonical
 from robospa.leaderboard.packing import pack
 from robospa.leaderboard.traces import decode, encode
-from robospa.leaderboard.untrusted import Archive
+from robospa.leaderboard.untrusted import BundleArchive
 from robospa.leaderboard.verify import verify
 from robospa.results.records.manifest import RunError, manifest_keys, read_manifest
 from robospa.results.records.run_io import finished, from_line, merge, read_file, read_run, to_line
@@ -227,7 +227,7 @@ class Readers:
         decode(self.input("traces", rng), "actions")
 
     def _archive(self, rng: random.Random) -> None:
-        with Archive(self._put("archive", rng, "a.zip")) as archive:
+        with BundleArchive(self._put("archive", rng, "a.zip")) as archive:
             for name in archive.sizes:
                 archive.read(name)
 
