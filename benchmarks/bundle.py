@@ -32,10 +32,11 @@ from robospa.harness.running.manifest import about_machine, group_keys, seed_has
 from robospa.harness.sim.motion import RATE
 from robospa.harness.trial import task_parts
 from robospa.harness.trial_identity import policy_seed
+from robospa.harness.worlds import SAPIEN_NAME, TASK_PARTS
 from robospa.leaderboard.card import to_card
 from robospa.leaderboard.evidence import announced
 from robospa.leaderboard.packing import sizes_of, write_bundle
-from robospa.leaderboard.rules import PARTS, WORLD, Reference, first_wrong, shipped
+from robospa.leaderboard.rules import Reference, first_wrong, shipped
 from robospa.leaderboard.traces import durations
 from robospa.leaderboard.trial_rows import trace_hash
 from robospa.leaderboard.verify import verify
@@ -158,7 +159,7 @@ def make(path: Path, trials: int, noise: float) -> tuple[Reference, float, int]:
         "privileged": False,
         "run_seed": 0,
         "step_scale": 1.0,
-        "world": {"factory": WORLD, "control": "rest_to_rest"},
+        "world": {"name": SAPIEN_NAME, "control": "rest_to_rest"},
     }
     manifest = {
         "format": 1,
@@ -226,7 +227,7 @@ def scene_seconds(seeds: int = 1) -> float:
         for level in task.levels
         for seed in accepted(task.name, level)[:seeds]
     ]
-    first_wrong(PARTS, [(keys[0], "", "")])  # imports
+    first_wrong(TASK_PARTS, [(keys[0], "", "")])  # imports
     started = time.process_time()
     for key in keys:
         found = task_parts(key)

@@ -105,10 +105,10 @@ class Simulation:
         False,
         "an ablation, never ranked: every trial gets the sentence of another scene of its variant",
     )
-    world: str | None = option(
-        None,
-        "where trials run: builtin (the default); official, with official objects and quirks; or "
-        "checkout:DIR, a RoboSPA checkout in its own environment (checkout:DIR?python=PATH)",
+    world: str = option(
+        "sapien",
+        "where trials run: sapien; official, with official objects and quirks; or checkout:DIR, a "
+        "RoboSPA checkout in its own environment (checkout:DIR?python=PATH)",
     )
     assets: Path | None = option(
         None, "for the official world: folder of the official archive; else ROBOSPA_ASSETS"
@@ -126,11 +126,6 @@ class Simulation:
         _check(
             self.parts is None or not self.shuffle_instructions,
             "shuffle_instructions goes with the suite's own trials: leave out parts",
-        )
-        _check(
-            self.robot_assets == ROBOT_ASSETS[0] or str(self.world).partition("?")[0] == "official",
-            f"robot_assets {self.robot_assets} goes with world official alone: no other result was "
-            "had with such pictures",
         )
 
 

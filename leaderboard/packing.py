@@ -25,6 +25,7 @@ from robospa.harness.quantize import STEPS_PER_UNIT, is_quantized
 from robospa.harness.running.action_files import read_actions, read_joints
 from robospa.harness.running.manifest import changed_settings, group_keys, seed_hash
 from robospa.harness.world import World
+from robospa.harness.worlds import open_world
 from robospa.leaderboard import bundle as layout
 from robospa.leaderboard.bundle import BundleError, BundleManifest, FileEntry, RowChain
 from robospa.leaderboard.card import Card, check_checkpoints
@@ -338,8 +339,7 @@ def _films(
                 continue
             note(f"filming {key.slug} ({number} of {len(chosen)})")
             if world is None:
-                arguments = {"render": True} if reference.world.startswith("robospa.") else {}
-                world = load_function(reference.world)(**arguments)
+                world = open_world(reference.world, render=True)
             try:
                 films[name] = film(world, run.records[key], homes[key], parts=parts)
             except ReplayError as error:

@@ -17,6 +17,7 @@ from typing import Any
 
 from robospa.harness.factory import load_function
 from robospa.harness.running.manifest import about_machine, changed_settings
+from robospa.harness.worlds import open_world
 from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.evidence import catches, drawn, least_sample, what_it_catches
 from robospa.leaderboard.rules import Reference
@@ -165,8 +166,7 @@ _WORLD: list[Any] = []
 
 def _start(world: str, parts: str) -> None:
     """What a process keeps: a world without renderer, and what finds scenes and goals."""
-    arguments = {"render": False} if world.startswith("robospa.") else {}
-    _WORLD[:] = [load_function(world)(**arguments), load_function(parts)]
+    _WORLD[:] = [open_world(world, render=False), load_function(parts)]
 
 
 def _again(claimed: TrialRecord, trace: Trace, space: str) -> Replayed:

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from robospa.action_space import KINDS
 from robospa.harness.factory import load_function
+from robospa.harness.worlds import SAPIEN_NAME, TASK_PARTS
 from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.card import Card
 from robospa.leaderboard.traces import Trace
@@ -31,8 +32,6 @@ from robospa.tasks.instructions.grammar import SPLITS
 from robospa.tasks.scene import SUITE
 from robospa.trial import REFERENCE, TrialKey
 
-WORLD = "robospa.harness.sim.sapien_world:SapienWorld"
-PARTS = "robospa.harness.trial:task_parts"
 LEVELS = (1, 2, 3, 4, 5)
 Steps = NDArray[np.int64]
 Durations = Callable[[str, str, Trace], tuple[Steps, Steps]]
@@ -60,8 +59,8 @@ class Reference:
     seeds: Callable[[str, int, str, str], Sequence[int]]
     facts: Callable[[str, int], VariantFacts]
     members: Callable[[str], Collection[str]]
-    world: str = WORLD
-    parts: str = PARTS
+    world: str = SAPIEN_NAME
+    parts: str = TASK_PARTS
     suite: str = SUITE
     robots: Sequence[str] = (REFERENCE,)
     modes: Sequence[str] = ("clean",)
@@ -85,8 +84,8 @@ def shipped(world: str | None = None, parts: str | None = None) -> Reference:
         accepted,
         found,
         members,
-        world or WORLD,
-        parts or PARTS,
+        world or SAPIEN_NAME,
+        parts or TASK_PARTS,
         robots=embodiments(),
         modes=modes(),
         durations=None if world else durations,
@@ -144,7 +143,7 @@ class Policy(Struct, frozen=True):
 class World(Struct, frozen=True):
     """Where the trials ran."""
 
-    factory: str
+    name: str
     control: str = CONTROLS[0]
 
 
@@ -253,7 +252,7 @@ def check_settings(run: Mapping[str, object], reference: Reference) -> Settings:
         )
     if settings.step_scale != 1.0:
         raise BundleError("the run's step limits are not the official ones")
-    if settings.world.factory != reference.world:
+    if settings.world.name != reference.world:
         raise BundleError("the run was made in another world than the benchmark's simulator")
     return settings
 

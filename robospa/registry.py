@@ -1,4 +1,5 @@
-"""Find things by name: policies, robots, dialects, tasks, objects and scene modes are entry points.
+"""Find things by name: policies, robots, worlds, dialects, tasks, objects and scene modes are entry
+points.
 
 A package adds one by a line in its pyproject.toml, ours and others' alike:
 
@@ -22,6 +23,8 @@ LEARNERS = "robospa.learners"
 """Objects of `robospa.baselines.learned.learner.Learner`: what `robospa learn` trains."""
 ROBOTS = "robospa.robots"
 """Objects of `robospa.harness.robots.embodiment.Embodiment`."""
+WORLDS = "robospa.worlds"
+"""Objects of `robospa.harness.worlds.WorldKind`."""
 DIALECTS = "robospa.dialects"
 """Objects of `robospa.clients.dialect.Dialect`: servers that speak something else than ours."""
 ASSETS = "robospa.assets"

@@ -142,13 +142,14 @@ def _import(folder: Path, most: int, world: str | None, as_json: bool) -> None:
     """Play the recordings below `folder` again and print how often they meet their goal."""
     from functools import partial
 
-    from robospa.harness.official.checkout_options import is_checkout, parse_checkout
+    from robospa.harness.official.checkout_options import CHECKOUT, parse_checkout
     from robospa.harness.official.recordings import find_recordings
     from robospa.harness.official.replays import chosen, in_checkout, replay_recording, summary
+    from robospa.harness.worlds import world_kind
     from robospa.protocol.options import plain_options
 
     recordings = chosen(find_recordings(folder), most)
-    if world is not None and is_checkout(world):
+    if world is not None and world_kind(world) is CHECKOUT:
         from robospa.harness.official.checkout_world import CheckoutWorld
 
         checkout, options = parse_checkout(world)

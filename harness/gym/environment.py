@@ -24,6 +24,7 @@ from robospa.harness.settings import SettingsError
 from robospa.harness.trial import TrialState, open_trial, record_of, step_limit
 from robospa.harness.trial_identity import policy_seed
 from robospa.harness.world import ActionError, StepResult, World
+from robospa.harness.worlds import SAPIEN_NAME, TASK_PARTS, open_world
 from robospa.observation import CAMERAS, DEFAULT_CAMERAS, CameraSpec
 from robospa.protocol.errors import PolicyError
 from robospa.protocol.policy import PolicySpec
@@ -33,8 +34,6 @@ from robospa.tasks.events import outcome
 from robospa.tasks.seeds import ListKey
 from robospa.trial import REFERENCE, TrialKey
 
-WORLD = "robospa.harness.sim.sapien_world:SapienWorld"
-PARTS = "robospa.harness.trial:task_parts"
 USUAL_CAMERAS = tuple(camera.name for camera in DEFAULT_CAMERAS)
 FRAME_SECONDS = 0.1
 """Simulated seconds between two pictures in a window."""
@@ -76,8 +75,8 @@ class TaskEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         render_mode: str | None = None,
         render_camera: str = "head",
         render_size: tuple[int, int] = (640, 480),
-        world: str = WORLD,
-        parts: str = PARTS,
+        world: str = SAPIEN_NAME,
+        parts: str = TASK_PARTS,
     ) -> None:
         found = find_task(task)
         if level not in found.levels:
@@ -101,8 +100,8 @@ class TaskEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.action_space = box  # type: ignore[assignment]
         self.observation_space = observation_space(self.spec_of_policy, robot, self.max_steps)
         self._seeds = seeds
-        self._world_factory = world
-        self._world_arguments = {"control": control} if world == WORLD else {}
+        self._world_kind = world
+        self._world_arguments = {"control": control} if world == SAPIEN_NAME else {}
         self._parts = load_function(parts)
         self._camera = CameraSpec(render_camera, *render_size)
         # What simulates is opened at the first reset: a vector's parent only looks at the spaces.
@@ -216,7 +215,7 @@ class TaskEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     def _opened(self) -> World:
         if self._world is None:
-            opened: World = load_function(self._world_factory)(**self._world_arguments)
+            opened: World = open_world(self._world_kind, self._world_arguments)
             self._world = opened
         return self._world
 

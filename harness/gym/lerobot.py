@@ -22,11 +22,12 @@ from lerobot.envs.configs import EnvConfig
 from lerobot.envs.utils import _LazyAsyncVectorEnv
 from numpy.typing import NDArray
 
-from robospa.harness.gym.environment import PARTS, WORLD, TaskEnv
+from robospa.harness.gym.environment import TaskEnv
 from robospa.harness.robots import embodiment as robot_named
 from robospa.harness.seeds.lists import find_list
 from robospa.harness.selection import parse_levels, parse_tasks
 from robospa.harness.settings import SettingsError
+from robospa.harness.worlds import SAPIEN_NAME, TASK_PARTS
 from robospa.tasks.seeds import ListKey
 from robospa.trial import REFERENCE
 
@@ -105,9 +106,9 @@ class RoboSPAEnv(EnvConfig):
     split: str = "heldout"
     control: str = "rest_to_rest"
     step_scale: float = 1.0
-    world: str = WORLD
+    world: str = SAPIEN_NAME
     """For tests: module:function of another world."""
-    parts: str = PARTS
+    parts: str = TASK_PARTS
     """For tests: module:function of a trial's scene and goal."""
     features: dict[str, PolicyFeature] = field(default_factory=dict)
     features_map: dict[str, str] = field(default_factory=dict)

@@ -24,7 +24,7 @@ from mani_skill.utils.registration import register_env
 from mani_skill.utils.visualization.misc import tile_images
 from numpy.typing import NDArray
 
-from robospa.harness.gym.environment import PARTS, USUAL_CAMERAS, WORLD, TaskEnv
+from robospa.harness.gym.environment import USUAL_CAMERAS, TaskEnv
 from robospa.harness.gym.maniskill_layout import (
     BACKEND,
     MODULE,
@@ -35,6 +35,7 @@ from robospa.harness.gym.maniskill_layout import (
 )
 from robospa.harness.settings import SettingsError
 from robospa.harness.trial import step_limit
+from robospa.harness.worlds import SAPIEN_NAME, TASK_PARTS
 from robospa.observation import CameraSpec
 from robospa.protocol.policy import PolicySpec
 from robospa.results.records.trial_record import TrialRecord
@@ -86,8 +87,8 @@ class RoboSPAEnv(BaseEnv):
         split: str = "heldout",
         seeds: Sequence[int] | None = None,
         control: str = "rest_to_rest",
-        world: str = WORLD,
-        parts: str = PARTS,
+        world: str = SAPIEN_NAME,
+        parts: str = TASK_PARTS,
     ) -> None:
         del reconfiguration_freq  # every trial has a scene of its own
         _check_backend(num_envs, sim_backend)

@@ -11,11 +11,12 @@ from msgspec import Meta
 
 from robospa.harness.clock.clock import PAUSED
 from robospa.harness.settings import EvaluationSettings, Selection, SettingsError
-from robospa.protocol.options import option, read_options, url_options
+from robospa.harness.worlds import Parts, WorldKind
+from robospa.protocol.options import option, plain_options, read_options, url_options
 from robospa.trial import TrialKey
 
 PREFIX = "checkout:"
-FACTORY = "robospa.harness.official.checkout_world:CheckoutWorld"
+PARTS = "robospa.harness.official.checkout_parts:checkout_parts"
 SUITE = "official-checkout"
 """The suite of results in a checkout: its scenes, simulator, robots and rules."""
 CONFIGS = {"clean": "demo_clean", "randomized": "demo_randomized"}
@@ -31,11 +32,6 @@ class CheckoutOptions:
     patience: Annotated[float, Meta(gt=0, le=1000)] = option(
         1.0, "multiplies how long the checkout may take for an answer"
     )
-
-
-def is_checkout(world: str | None) -> bool:
-    """Whether the setting `world` names a checkout."""
-    return world is not None and world.startswith(PREFIX)
 
 
 def parse_checkout(world: str) -> tuple[Path, CheckoutOptions]:
@@ -62,10 +58,30 @@ def episodes_of(keys: Sequence[TrialKey]) -> Episodes:
     return {variant: tuple(seeds) for variant, seeds in found.items()}
 
 
-def checkout_selection(settings: EvaluationSettings) -> Selection:
-    """The trials of `settings` for a checkout, which has sentences of its own, and so the official
-    splits. Raises SettingsError for what a checkout cannot do."""
-    folder, options = parse_checkout(str(settings.simulation.world))
+class _CheckoutKind(WorldKind):
+    alone = "a checkout has one simulator a process"
+    workers = 1  # each takes a share of the GPU
+
+    def selection(self, settings: EvaluationSettings) -> Selection:
+        """With the official splits, because a checkout has sentences of its own."""
+        super().selection(settings)
+        return _selection(settings)
+
+    def arguments(self, settings: EvaluationSettings) -> dict[str, object]:
+        """The folder and the options that the world names."""
+        folder, options = parse_checkout(settings.simulation.world)
+        return {"folder": str(folder), **plain_options(options)}
+
+    def parts(self, settings: EvaluationSettings, keys: Sequence[TrialKey]) -> Parts:
+        """Scenes that only name what is made there."""
+        return PARTS, {"episodes": episodes_of(keys)}
+
+
+CHECKOUT = _CheckoutKind("checkout", "robospa.harness.official.checkout_world:CheckoutWorld")
+
+
+def _selection(settings: EvaluationSettings) -> Selection:
+    folder, options = parse_checkout(settings.simulation.world)
     selection, simulation = settings.selection, settings.simulation
     for wrong, sentence in (
         (selection.instructions, "a checkout has its own sentences: leave instructions out"),
@@ -87,6 +103,10 @@ def checkout_selection(settings: EvaluationSettings) -> Selection:
             "a checkout executes actions in its own way: leave action_rate and clock out",
         ),
         (simulation.parts, "a checkout has goals of its own: leave parts out"),
+        (
+            simulation.shuffle_instructions,
+            "a checkout has its own sentences: leave shuffle_instructions out",
+        ),
         (
             not options.config and any(m not in CONFIGS for m in selection.mode.split(",")),
             f"a checkout has the scene modes {' and '.join(CONFIGS)}, or a file of its own with "

@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from robospa.harness.official.checkout_options import episodes_of
 from robospa.harness.official.switches import chosen
-from robospa.harness.settings import SettingsError, Simulation
+from robospa.harness.settings import EvaluationSettings, Selection, SettingsError, Simulation
 from robospa.harness.textures import VARIABLE
+from robospa.harness.worlds import Parts, SapienKind
 from robospa.protocol.options import option, read_options, url_options
 from robospa.registry import UnknownName, load
 from robospa.tasks import packs
 from robospa.tasks.scene import Scene
+from robospa.trial import TrialKey
 
 NAME = "official"
-FACTORY = "robospa.harness.official.official_world:OfficialWorld"
+PARTS = "robospa.harness.official.official_parts:official_world_parts"
 SUITE = "official-1"
 BUILTIN_SUITE = "official-1-builtin"
 """The suite of results with official objects, and with our own in their place."""
@@ -96,20 +99,15 @@ class OfficialLayout:
 def use_archive(simulation: Simulation) -> None:
     """Let this process and its workers find the archive that `simulation` names.
 
-    Raises SettingsError if that is for another world, or no folder.
+    Raises SettingsError if that is no folder.
     """
     folder = simulation.assets
-    if folder is None or not is_official(simulation.world):
-        raise SettingsError("assets are for the official world: add --world official")
+    if folder is None:
+        return
     if not folder.is_dir():
         raise SettingsError(f"there is no folder {folder}: assets has objects/ and embodiments/")
     os.environ[ASSETS] = str(folder.absolute())
     packs.pack.cache_clear()  # this process may have opened another archive
-
-
-def is_official(world: str | None) -> bool:
-    """Whether the setting `world` names the official world."""
-    return world is not None and world.partition("?")[0] == NAME
 
 
 def parse_official(
@@ -167,3 +165,43 @@ def _use_textures(pack: Any) -> None:
     folder = Path(getattr(getattr(pack, "archive", None), "root", "")) / TEXTURES
     if folder.is_dir():
         os.environ.setdefault(VARIABLE, str(folder))
+
+
+class _OfficialKind(SapienKind):
+    def selection(self, settings: EvaluationSettings) -> Selection:
+        """As they are; lets this process and its workers find the archive that is named."""
+        simulation = settings.simulation
+        if simulation.shuffle_instructions:
+            raise SettingsError("shuffle_instructions goes with the suite's own world alone")
+        if simulation.parts is not None:
+            raise SettingsError("parts has scenes and sentences of its own: leave it out")
+        use_archive(simulation)
+        return settings.selection
+
+    def arguments(self, settings: EvaluationSettings) -> dict[str, object]:
+        """Those of our own simulator, how scenes settle, and what robots look like."""
+        simulation = settings.simulation
+        start, _ = parse_official(simulation.world, simulation.assets is not None)
+        found = {**super().arguments(settings), "settle": start.settle}
+        if simulation.robot_assets != "builtin":
+            found["robot_assets"] = simulation.robot_assets
+        return found
+
+    def parts(self, settings: EvaluationSettings, keys: Sequence[TrialKey]) -> Parts:
+        """Scenes with official quirks and objects; sentences as for the suite."""
+        simulation = settings.simulation
+        _, arguments = super().parts(settings, keys)
+        tasks = {key.task for key in keys}
+        _, layout = parse_official(simulation.world, simulation.assets is not None, tasks)
+        if simulation.robot_assets != "builtin":
+            check_robots({key.embodiment for key in keys})
+        return PARTS, {**arguments, "layout": layout, "episodes": episodes_of(keys)}
+
+    def layout(self, arguments: Mapping[str, object]) -> tuple[dict[str, object], list[str]]:
+        """What objects and quirks there are, and what its owner should know of it."""
+        layout = arguments["layout"]
+        assert isinstance(layout, OfficialLayout)
+        return {"layout": layout.to_json()}, layout.warnings("sentences" in arguments)
+
+
+OFFICIAL = _OfficialKind(NAME, "robospa.harness.official.official_world:OfficialWorld")

@@ -19,16 +19,20 @@ import json
 import re
 import stat
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from robospa.harness.official.slots import NoOfficialSentence, Value, arms, official_values
+from robospa.harness.trial import TrialParts, task_parts
 from robospa.schema import parse_json
+from robospa.tasks.catalog import build_scene
+from robospa.tasks.catalog import task as find_task
 from robospa.tasks.official import official_assets, official_model, official_models
 from robospa.tasks.scene import Scene, SceneObject
+from robospa.trial import TrialKey
 
 SEEN, UNSEEN = "official_seen", "official_unseen"
 """Instruction splits of official sentences: those to train with, and those to test with."""
@@ -168,6 +172,23 @@ def read_checkout(folder: Path, variants: Iterable[tuple[str, int]]) -> Official
     rows += [[name, t.seen, t.unseen, t.plain] for name, t in descriptions.items()]
     digest = hashlib.sha256(json.dumps(rows).encode()).hexdigest()[:16]
     return OfficialSentences(templates, descriptions, digest)
+
+
+def spoken_parts(key: TrialKey, sentences: OfficialSentences, salt: str = "") -> TrialParts:
+    """Scene and goal of `key` from the catalog, with a sentence of the checkout.
+
+    Raises KeyError or ValueError if something of `key` is unknown, or has no official sentence.
+    """
+    task = find_task(key.task)
+    scene = build_scene(key.task, key.level, key.seed, key.embodiment, key.mode, salt)
+    said = sentences.instruction(scene, key.split, salt)
+    return TrialParts(scene, task, task.goal(scene), said)
+
+
+def unspoken_parts(key: TrialKey, salt: str = "") -> TrialParts:
+    """The same without the checkout, for what only shows a trial that has been run: its sentence
+    is one of ours, and tells nothing."""
+    return task_parts(replace(key, split="heldout"), salt)
 
 
 def _read(path: Path, described: bool = False) -> Texts:

@@ -14,7 +14,7 @@ from multiprocessing.connection import Connection
 from typing import Any
 
 from robospa.harness.clock.clock import timed_suite, timing_warning
-from robospa.harness.factory import is_url, load_function
+from robospa.harness.factory import is_url
 from robospa.harness.running.atomic_file import replace_file
 from robospa.harness.running.attempts import spent_trials
 from robospa.harness.running.executor import RunAborted
@@ -35,10 +35,11 @@ from robospa.harness.running.run_lock import run_lock
 from robospa.harness.running.runner import Runner, RunOptions
 from robospa.harness.running.status import Status
 from robospa.harness.running.tracking import Careful, open_tracker
-from robospa.harness.running.worker import SHUFFLED_PARTS, WorkerConfig, describe, load_parts
+from robospa.harness.running.worker import WorkerConfig, describe, load_parts
 from robospa.harness.settings import EvaluationSettings
 from robospa.harness.settings_file import FILE, to_toml
 from robospa.harness.trial_identity import salt_hash
+from robospa.harness.worlds import SHUFFLED_PARTS, open_world, world_kind
 from robospa.results.records.run_io import finished, lost_actions, read_records
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
@@ -76,9 +77,11 @@ class WorldBroken(Exception):
     """No world can be built on this machine."""
 
 
-def _probe_world(pipe: Connection, factory: str, arguments: dict[str, Any]) -> None:
+def _probe_world(
+    pipe: Connection, kind: str, arguments: Mapping[str, Any], render: bool | None
+) -> None:
     try:
-        world = load_function(factory)(**arguments)
+        world = open_world(kind, arguments, render)
         pipe.send((dict(world.info()), ""))
         world.close()
     except Exception as error:
@@ -92,10 +95,8 @@ def probe_world(config: WorkerConfig, render: bool) -> dict[str, Any]:
     """
     spawn = multiprocessing.get_context("spawn")
     ours, theirs = spawn.Pipe()
-    arguments = dict(config.world_arguments)
-    if render and "render" in arguments:
-        arguments["render"] = True
-    child = spawn.Process(target=_probe_world, args=(theirs, config.world, arguments), daemon=True)
+    wanted = (config.world, config.world_arguments, True if render else None)
+    child = spawn.Process(target=_probe_world, args=(theirs, *wanted), daemon=True)
     child.start()
     theirs.close()
     try:
@@ -138,7 +139,7 @@ def make_manifest(request: Request, policies: Mapping[str, ProbedPolicy]) -> Man
         "needs_trial_key": any(spec.needs_trial_key for spec in specs),
         "run_seed": config.run_seed,
         "step_scale": config.step_scale,
-        "world": {"factory": config.world, **config.world_arguments},
+        "world": {"name": config.world, **config.world_arguments},
     }
     if config.parts == SHUFFLED_PARTS:
         settings["shuffled_instructions"] = True
@@ -162,9 +163,9 @@ def make_manifest(request: Request, policies: Mapping[str, ProbedPolicy]) -> Man
         about["instructions"] = report(official)
         about["warnings"].append(sentence_of(official))
     categories = {task: part.task.category for task, part in found.items()}
-    if (layout := config.parts_arguments.get("layout")) is not None:
-        settings["layout"] = layout.to_json()
-        about["warnings"] += layout.warnings(official is not None)
+    laid, warnings = world_kind(config.world).layout(config.parts_arguments)
+    settings.update(laid)
+    about["warnings"] += warnings
     steps = world.get("action_steps", config.world_arguments.get("action_steps"))
     suite = timed_suite(next(iter(found.values())).scene.suite, steps)
     if steps is not None:

@@ -11,7 +11,7 @@ import pickle
 import signal
 import traceback
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -88,6 +88,7 @@ class FilmMaker:
         from robospa.harness.factory import load_function
         from robospa.harness.pictures.video import film
         from robospa.harness.running.atomic_file import StorageError, replace_file, storage_errors
+        from robospa.harness.worlds import open_world
         from robospa.results.records.films import film_name
 
         config = self.config
@@ -98,7 +99,7 @@ class FilmMaker:
                 f"{config.folder} has less than {RESERVE / 1e6:.0f} MB left, which records need"
             )
         if self._world is None:
-            self._world = load_function(config.world)(**config.world_arguments)
+            self._world = open_world(config.world, config.world_arguments, render=True)
         arguments = {**config.parts_arguments, **({"salt": config.salt} if config.salt else {})}
         parts = partial(load_function(config.parts), **arguments)
         data = film(
@@ -128,8 +129,6 @@ def main(pipe: Connection, config: bytes, name: str) -> None:
     from robospa.harness.running.log_file import LOGS, log_to
 
     found: FilmConfig = pickle.loads(config)
-    if "render" in found.world_arguments:
-        found = replace(found, world_arguments={**found.world_arguments, "render": True})
     with contextlib.suppress(StorageError):  # said with the first film
         log_to(found.folder / LOGS / f"{name}.log")
     serve(FilmMaker(found), pipe.recv, pipe.send)

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 
 from robospa.harness.running.film_process import FilmConfig
 from robospa.harness.running.films import Films
 from robospa.harness.running.progress import Progress
-from robospa.harness.running.worker import OFFICIAL_PARTS, TASK_PARTS, WorkerConfig
+from robospa.harness.running.worker import WorkerConfig
 from robospa.harness.settings import Recording, SettingsError
 from robospa.harness.settings_file import FILE, read_settings
+from robospa.harness.worlds import SAPIEN_NAME, TASK_PARTS
 from robospa.results.failures.labels import label
 from robospa.results.records.films import film_name, films_in, owed_films
 from robospa.results.records.manifest import RunError
@@ -20,12 +20,7 @@ from robospa.results.records.run_io import Run, finished
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
-WORLD = "robospa.harness.sim.sapien_world:SapienWorld"
-"""The only world in which a run is filmed afterwards: a folder may come from a stranger, and what
-it names as its world would be loaded."""
-
-RENDER = {"render": True}
-UNSPOKEN_PARTS = "robospa.harness.official.parts:unspoken_parts"
+UNSPOKEN_PARTS = "robospa.harness.official.sentences:unspoken_parts"
 """For trials whose sentence came from a checkout: a film does not show it."""
 
 
@@ -40,11 +35,11 @@ def films_of(config: WorkerConfig, known: Mapping[TrialKey, TrialRecord], worker
             config.folder,
             config.world,
             config.world_arguments,
-            UNSPOKEN_PARTS if config.parts == OFFICIAL_PARTS else config.parts,
+            config.parts,
             config.step_scale,
             config.salt,
             config.cameras,
-            {} if config.parts == OFFICIAL_PARTS else config.parts_arguments,
+            config.parts_arguments,
         ),
         workers,
     )
@@ -107,9 +102,7 @@ def films_afterwards(run: Run) -> Films:
     from its folder."""
     if run.in_progress:
         raise RunError(f"the run in {run.folder} is going on and makes its films itself")
-    config = replay_config(run)
-    arguments = {**config.world_arguments, **RENDER}
-    films = Films(replace(config, world_arguments=arguments))
+    films = Films(replay_config(run))
     films.add(unfilmed(run))
     return films
 
@@ -124,14 +117,15 @@ def replay_config(run: Run) -> FilmConfig:
             f"the scenes of {run.folder} are hidden: resume it to have it filmed; nothing else can "
             "play its trials again"
         )
-    if world.pop("factory", WORLD) != WORLD or world.keys() - {"render", "control", "action_steps"}:
+    known = {"render", "control", "action_steps"}  # a folder may come from a stranger
+    if world.pop("name", SAPIEN_NAME) != SAPIEN_NAME or world.keys() - known:
         raise RunError(
             f"{run.folder} was run in another world: its own run films its trials, and nothing "
             "else can play them again"
         )
     scale = float(settings.get("step_scale", 1.0))
     parts = UNSPOKEN_PARTS if settings.get("instructions") else TASK_PARTS
-    return FilmConfig(run.folder, WORLD, world, parts, scale, cameras=_cameras(run.folder))
+    return FilmConfig(run.folder, SAPIEN_NAME, world, parts, scale, cameras=_cameras(run.folder))
 
 
 def _cameras(folder: Path) -> tuple[str, ...]:

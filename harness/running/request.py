@@ -10,35 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 from robospa.extras import need
 from robospa.harness.clock.clock import Clock, ClockError
-from robospa.harness.clock.settings import FIXED_RATE, frozen_timing, real_clock, steps_of
+from robospa.harness.clock.settings import frozen_timing, real_clock
 from robospa.harness.factory import is_url
-from robospa.harness.official.checkout_options import (
-    FACTORY,
-    checkout_selection,
-    episodes_of,
-    is_checkout,
-    parse_checkout,
-)
-from robospa.harness.official.official_options import FACTORY as OFFICIAL_FACTORY
-from robospa.harness.official.official_options import (
-    check_robots,
-    is_official,
-    parse_official,
-    use_archive,
-)
 from robospa.harness.running.autoscaling import cores, most_workers
 from robospa.harness.running.evaluate import Request
 from robospa.harness.running.policy_probe import read_map
 from robospa.harness.running.runner import RunOptions
-from robospa.harness.running.worker import (
-    CHECKOUT_PARTS,
-    OFFICIAL_PARTS,
-    OFFICIAL_WORLD_PARTS,
-    SHUFFLED_PARTS,
-    TASK_PARTS,
-    Targets,
-    WorkerConfig,
-)
+from robospa.harness.running.worker import Targets, WorkerConfig
 from robospa.harness.selection import list_trials, seed_sources
 from robospa.harness.settings import (
     Compute,
@@ -47,14 +25,13 @@ from robospa.harness.settings import (
     SettingsError,
     flat,
 )
-from robospa.protocol.options import plain_options
+from robospa.harness.worlds import WorldKind, world_kind
+from robospa.registry import UnknownName
 from robospa.trial import TrialKey
 
 if TYPE_CHECKING:
     from robospa.harness.running.ray_cluster import RaySettings
 
-BUILTIN = "builtin"
-"""Our own simulator and assets, as the setting `world`."""
 HELD = 3
 """Trials that a worker holds at once: with two, where model and cores are equally slow, either
 still waits for the other now and then (`benchmarks/throughput.py`)."""
@@ -80,15 +57,12 @@ def make_request(
     """
     if settings.recording.video != "none":
         import av  # noqa: F401  (fails now rather than after the first trial)
-    if settings.simulation.assets is not None:
-        use_archive(settings.simulation)
     if settings.recording.log != "none":
         need(settings.recording.log.partition(":")[0])
     clock = _clock(settings)
     settings = replace(settings, timing=frozen_timing(settings.timing))
-    selection = settings.selection
-    if is_checkout(settings.simulation.world):
-        selection = checkout_selection(settings)
+    kind = _kind(settings)
+    selection = kind.selection(settings)
     trials = list_trials(selection) if keys is None else keys
     servers = check_servers(settings)
     policies = _policy_map(settings.policy_map, trials)
@@ -98,8 +72,8 @@ def make_request(
     one_trial = one_trial_servers(found)
     most = len(set(one_trial.values())) if len(one_trial) == len(set(found)) else 0
     compute = _limited(settings.compute, most)
-    if is_checkout(settings.simulation.world):
-        compute = replace(compute, workers=compute.workers or 1)  # each takes a share of the GPU
+    compute = replace(compute, workers=compute.workers or kind.workers)
+    parts, parts_arguments = kind.parts(settings, trials)
     config = WorkerConfig(
         folder=folder,
         policy=servers or str(settings.policy_map),
@@ -112,8 +86,10 @@ def make_request(
         cameras=settings.recording.cameras,
         salt=salt,
         clock=clock,
-        **_world(settings),
-        **_parts(settings, trials),
+        world=kind.name,
+        world_arguments=kind.arguments(settings),
+        parts=parts,
+        parts_arguments=parts_arguments,
     )
     return Request(
         config,
@@ -214,68 +190,12 @@ def _clock(settings: EvaluationSettings) -> Clock | None:
         raise SettingsError(str(error)) from error
 
 
-def _world(settings: EvaluationSettings) -> dict[str, Any]:
-    """Which world, as arguments of WorkerConfig."""
-    simulation = settings.simulation
-    steps = steps_of(settings.timing, simulation.control)
-    control: dict[str, Any] = {"control": simulation.control}
-    if settings.timing.action_rate is not None:
-        control = {"control": FIXED_RATE, "action_steps": steps}
-    if simulation.world in (None, BUILTIN):
-        return {"world_arguments": {"render": None, **control}}
-    if is_checkout(simulation.world):
-        folder, options = parse_checkout(str(simulation.world))
-        return {
-            "world": FACTORY,
-            "world_arguments": {"folder": str(folder), **plain_options(options)},
-        }
-    if is_official(simulation.world):
-        start, _ = parse_official(str(simulation.world), simulation.assets is not None)
-        arguments = {"render": None, **control, "settle": start.settle}
-        if simulation.robot_assets != BUILTIN:
-            arguments["robot_assets"] = simulation.robot_assets
-        return {"world": OFFICIAL_FACTORY, "world_arguments": arguments}
-    own = {} if settings.timing.action_rate is None else {"action_steps": steps}
-    return {"world": simulation.world, "world_arguments": own}
-
-
-def _parts(settings: EvaluationSettings, keys: Sequence[TrialKey]) -> dict[str, Any]:
-    """What finds a trial's scene and sentence, as arguments of WorkerConfig.
-
-    A checkout's sentences are read here, once: workers get them as data. Raises CheckoutError.
-    """
-    folder, parts = settings.selection.instructions, settings.simulation.parts
-    if settings.simulation.shuffle_instructions:
-        world = settings.simulation.world
-        if folder is not None or is_checkout(world) or is_official(world):
-            raise SettingsError(
-                "shuffle_instructions goes with the suite's own scenes and sentences: leave out "
-                "instructions and the other world"
-            )
-        return {"parts": SHUFFLED_PARTS}
-    if is_checkout(settings.simulation.world):
-        return {"parts": CHECKOUT_PARTS, "parts_arguments": {"episodes": episodes_of(keys)}}
-    official = is_official(settings.simulation.world)
-    if folder is None and not official:
-        return {"parts": parts or TASK_PARTS}
-    if parts is not None:
-        raise SettingsError("parts has scenes and sentences of its own: leave it out")
-    arguments: dict[str, Any] = {}
-    if folder is not None:
-        from robospa.harness.official.sentences import read_checkout
-
-        arguments["sentences"] = read_checkout(folder, {key.variant for key in keys})
-    if not official:
-        return {"parts": OFFICIAL_PARTS, "parts_arguments": arguments}
-    _, arguments["layout"] = parse_official(
-        str(settings.simulation.world),
-        settings.simulation.assets is not None,
-        {key.task for key in keys},
-    )
-    if settings.simulation.robot_assets != BUILTIN:
-        check_robots({key.embodiment for key in keys})
-    arguments["episodes"] = episodes_of(keys)
-    return {"parts": OFFICIAL_WORLD_PARTS, "parts_arguments": arguments}
+def _kind(settings: EvaluationSettings) -> WorldKind:
+    world = settings.simulation.world
+    try:
+        return world_kind(world)
+    except UnknownName as error:
+        raise SettingsError(f"--world {world}: {error}") from error
 
 
 def one_trial_servers(targets: Sequence[str]) -> dict[str, str]:
@@ -313,19 +233,18 @@ def trials_per_worker(
     By itself more than one only in simulators of ours: others may keep something for all worlds of
     a process. One worker asked for means one connection, which is all that some servers take.
     """
-    asked, world = settings.connection.trials_per_worker, settings.simulation.world
+    asked, kind = settings.connection.trials_per_worker, _kind(settings)
     reasons = (
         ("a policy without a server computes in its worker", not all(map(is_url, targets))),
         ("this server keeps one state for all connections", bool(one_trial_servers(targets))),
         ("workers on a Ray cluster hold one", compute.executor == "ray"),
-        ("a checkout has one simulator a process", is_checkout(world)),
+        (kind.alone, bool(kind.alone)),
     )
     if why := next((text for text, so in reasons if so), ""):
         if asked > 1:
             raise SettingsError(f"trials_per_worker is {asked}, but {why}: leave it out")
         return 1
-    ours = world in (None, BUILTIN) or is_official(world)
-    return asked or (HELD if ours and compute.workers != 1 else 1)
+    return asked or (HELD if kind.shared and compute.workers != 1 else 1)
 
 
 def _run_options(settings: EvaluationSettings, workers: int, held: int) -> RunOptions:

@@ -43,6 +43,7 @@ from robospa.harness.running.messages import (
 from robospa.harness.running.policy_probe import over_budget
 from robospa.harness.running.record_store import RecordWriter
 from robospa.harness.running.turn import Turn
+from robospa.harness.worlds import SAPIEN_NAME, TASK_PARTS, open_world
 from robospa.protocol.client import Identity
 from robospa.protocol.errors import printable
 from robospa.protocol.policy import PolicySpec
@@ -64,32 +65,14 @@ SWITCH_SECONDS = 0.0005
 gets the interpreter several times for each."""
 VIDEO = ("none", "failures", "first", "all")
 
-TASK_PARTS = "robospa.harness.trial:task_parts"
-OFFICIAL_PARTS = "robospa.harness.official.parts:official_parts"
-"""The same with a sentence of a RoboSPA checkout."""
-CHECKOUT_PARTS = "robospa.harness.official.checkout_parts:checkout_parts"
-"""Those of a trial in a checkout."""
-SHUFFLED_PARTS = "robospa.harness.ablations:shuffled_parts"
-"""Those of the suite with the sentences of other scenes."""
-OFFICIAL_WORLD_PARTS = "robospa.harness.official.official_parts:official_world_parts"
-"""Those of a trial in the official world."""
-OF_CATALOG = (
-    TASK_PARTS,
-    OFFICIAL_PARTS,
-    CHECKOUT_PARTS,
-    SHUFFLED_PARTS,
-    OFFICIAL_WORLD_PARTS,
-)
-"""Parts whose tasks are those of the catalog."""
-
 
 def task_finder(parts: str) -> Callable[[TrialKey], Task]:
-    """What finds the task of a trial: the catalog, unless `parts` puts something in its place.
+    """What finds the task of a trial: the catalog, unless `parts` are not ours.
 
     The catalog is asked directly because `parts` build the scene as well, and the first scene of a
     variant may take a second.
     """
-    if parts in OF_CATALOG:
+    if parts.startswith("robospa."):
         from robospa.tasks.catalog import task
 
         return lambda key: task(key.task)
@@ -103,19 +86,18 @@ class WorkerConfig:
 
     `policy` is a server's URL, several equal ones or a policy's name, unless `policies` has that
     for every task; `options` go to the client. Of every server `expects` has the spec, and
-    `identities` who it is: what answers there must be the same. `world` and `parts` are
-    `module:function` paths of a world factory and of what finds a trial's scene and goal, with
-    what else they are called with. `video`
-    is one of VIDEO; "first" films the trials in `samples`; films show `cameras` side by side.
-    `one_trial` has the host:port of every policy whose server may do one trial at a time.
-    `step_scale` multiplies the step limits. `salt` is the secret of hidden scenes. `clock`: a real
-    one, None for the paused one.
+    `identities` who it is: what answers there must be the same. `world` names a kind of world, and
+    `parts` (`module:function`) what finds a trial's scene and goal, each with what else it is
+    called with. `video` is one of VIDEO; "first" films the trials in `samples`; films show
+    `cameras` side by side. `one_trial` has the host:port of every policy whose server may do one
+    trial at a time. `step_scale` multiplies the step limits. `salt` is the secret of hidden
+    scenes. `clock`: a real one, None for the paused one.
     """
 
     folder: Path
     policy: Targets
     options: Mapping[str, Any] = field(default_factory=dict)
-    world: str = "robospa.harness.sim.sapien_world:SapienWorld"
+    world: str = SAPIEN_NAME
     world_arguments: Mapping[str, Any] = field(default_factory=dict)
     parts: str = TASK_PARTS
     parts_arguments: Mapping[str, Any] = field(default_factory=dict, repr=False)
@@ -228,7 +210,7 @@ class Worker:
 
     def _open_world(self) -> World:
         if self._world is None:
-            self._world = load_function(self.config.world)(**self.config.world_arguments)
+            self._world = open_world(self.config.world, self.config.world_arguments)
         return self._world
 
     def _open_policy(self, target: str) -> MonitoredPolicy:

@@ -24,7 +24,6 @@ from robospa.harness.settings import (
     Recording,
     Selection,
     SettingsError,
-    Simulation,
     flat,
     group_of,
     updated,
@@ -209,11 +208,3 @@ def test_functions_of_the_command_line_stay_short() -> None:
         if isinstance(node, ast.FunctionDef)
     }
     assert {name: length for name, length in lengths.items() if length > 60} == {}
-
-
-def test_vendors_robots_go_with_the_official_world_alone() -> None:
-    Simulation(world="official?settle=official", robot_assets="official-full")
-    with pytest.raises(SettingsError, match="robot_assets official goes with world official alone"):
-        Simulation(robot_assets="official")
-    with pytest.raises(SettingsError, match="robot_assets"):
-        Simulation(world="official", robot_assets="vendor")

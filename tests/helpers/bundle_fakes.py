@@ -142,7 +142,7 @@ def make_run(
         "privileged": False,
         "run_seed": 0,
         "step_scale": 1.0,
-        "world": {"factory": "bundle_fakes:World"},
+        "world": {"name": "bundle_fakes:World"},
     }
     about = {**about_machine({}), "policy": {"target": "ws://secret:1"}, "arguments": {"token": 1}}
     change(settings, about)

@@ -250,13 +250,13 @@ def test_other_processes_make_scenes_too(valid: Valid, monkeypatch: pytest.Monke
 
 def test_a_real_scene_and_sentence_are_made_again() -> None:
     from robospa.harness.trial import task_parts
-    from robospa.leaderboard.rules import PARTS
+    from robospa.harness.worlds import TASK_PARTS
 
     key = TrialKey(PICK, 1, 100000)
     found = task_parts(key)
-    assert first_wrong(PARTS, [(key, found.scene.digest, found.instruction)]) == ""
+    assert first_wrong(TASK_PARTS, [(key, found.scene.digest, found.instruction)]) == ""
     train = replace(key, split="train")
-    text = first_wrong(PARTS, [(train, found.scene.digest, found.instruction)])
+    text = first_wrong(TASK_PARTS, [(train, found.scene.digest, found.instruction)])
     assert "has another sentence" in text
-    text = first_wrong(PARTS, [(replace(key, mode="moonlight"), "", "")])
+    text = first_wrong(TASK_PARTS, [(replace(key, mode="moonlight"), "", "")])
     assert "is no trial of this suite" in text

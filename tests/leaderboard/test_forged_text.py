@@ -86,7 +86,7 @@ def test_a_privileged_run_with_its_flag_taken_off(files: Files, tmp_path: Path, 
 
 def test_a_world_named_by_the_bundle_is_never_loaded(files: Files, tmp_path: Path) -> None:
     def change(run: Any) -> None:
-        run["settings"]["world"]["factory"] = "os:getcwd"
+        run["settings"]["world"]["name"] = "os:getcwd"
 
     edit(files, layout.RUN, change)
     assert "another world" in refused(zip_up(tmp_path / "b.zip", seal(files)))

@@ -152,7 +152,7 @@ def other_seed(settings: dict[str, Any], about: dict[str, Any]) -> None:
 
 
 def elsewhere(settings: dict[str, Any], about: dict[str, Any]) -> None:
-    settings["world"] = {"factory": "my.world:Easy"}
+    settings["world"] = {"name": "my.world:Easy"}
 
 
 def mixed(settings: dict[str, Any], about: dict[str, Any]) -> None:

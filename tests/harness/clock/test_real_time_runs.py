@@ -214,13 +214,13 @@ def test_no_bundle_is_made_of_it(tmp_path: Path) -> None:
         **manifest["settings"],
         **one,
         "run_seed": 0,
-        "world": {"factory": "x"},
+        "world": {"name": "x"},
         "policy": {"spec": {"name": "x", "action": "joint"}},
     }
     with pytest.raises(BundleError, match="in real time"):
         check_settings(run, REFERENCE)
     del run["settings"]["clock"]
-    run["settings"]["world"] = {"factory": "x", "control": "fixed_rate"}
+    run["settings"]["world"] = {"name": "x", "control": "fixed_rate"}
     with pytest.raises(BundleError, match="at a fixed rate"):
         check_settings(run, REFERENCE)
 

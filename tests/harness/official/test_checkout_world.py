@@ -16,8 +16,8 @@ from standin_checkout import Ringer, write_standin
 from robospa.harness.official.checkout_check import NoValidSeed, examine, valid_seeds
 from robospa.harness.official.checkout_client import CheckoutFailed, CheckoutProcess, numbers
 from robospa.harness.official.checkout_options import (
+    CHECKOUT,
     CheckoutOptions,
-    checkout_selection,
     episodes_of,
     parse_checkout,
 )
@@ -250,7 +250,7 @@ def test_settings_that_a_checkout_cannot_have(
     checkout: Path, more: dict[str, object], sentence: str
 ) -> None:
     with pytest.raises(SettingsError, match=sentence):
-        checkout_selection(settings(checkout, **more))
+        CHECKOUT.selection(settings(checkout, **more))
 
 
 def test_valid_seeds_are_found_as_officially(world: CheckoutWorld) -> None:

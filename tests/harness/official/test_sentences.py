@@ -26,8 +26,9 @@ from robospa.harness.official.slots import NoOfficialSentence
 from robospa.harness.running import evaluate
 from robospa.harness.running.policy_probe import ProbedPolicy
 from robospa.harness.running.request import make_request
-from robospa.harness.running.worker import OFFICIAL_PARTS, load_parts, task_finder
+from robospa.harness.running.worker import load_parts, task_finder
 from robospa.harness.settings import EvaluationSettings, Selection, SettingsError, updated
+from robospa.harness.worlds import SPOKEN_PARTS
 from robospa.protocol.policy import PolicySpec
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.sentences import instruction as own_instruction
@@ -179,7 +180,7 @@ def test_a_run_has_official_splits_sentences_and_their_hash(
 ) -> None:
     made = request(write_checkout(tmp_path), split="heldout,train")
     assert [key.split for key in made.keys] == [UNSEEN, SEEN]
-    assert made.config.parts == OFFICIAL_PARTS
+    assert made.config.parts == SPOKEN_PARTS
     assert task_finder(made.config.parts)(made.keys[0]).name == "Rank_Blocks_Color"
     parts = load_parts(pickle.loads(pickle.dumps(made.config)))
     assert [parts(key).instruction for key in made.keys] == [

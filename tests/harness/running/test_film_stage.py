@@ -173,7 +173,7 @@ def filmable(folder: Path, **settings: Any) -> Run:
     make_run(folder, RECORDS)
     path = folder / "run.json"
     manifest = json.loads(path.read_text())
-    world = {"factory": film_stage.WORLD, "render": None, "control": "rest_to_rest"}
+    world = {"name": "sapien", "render": None, "control": "rest_to_rest"}
     manifest["settings"] |= {"world": world, "step_scale": 0.5, **settings}
     path.write_text(json.dumps(manifest))
     return read_run(folder)
@@ -186,7 +186,7 @@ def test_afterwards_the_failed_trials_without_a_film_are_filmed_as_they_were_run
     assert [r.key for r in unfilmed(run)] == sorted(r.key for r in RECORDS if not r.success)
     films = films_afterwards(run)
     assert films.owed == 3
-    assert films._config.world_arguments == {"render": True, "control": "rest_to_rest"}
+    assert films._config.world_arguments == {"render": None, "control": "rest_to_rest"}
     assert films._config.step_scale == 0.5
     (tmp_path / "videos").mkdir()
     (tmp_path / film_name(RECORDS[3].key)).write_bytes(b"film")
@@ -206,8 +206,8 @@ def test_afterwards_films_show_the_cameras_that_the_run_names(tmp_path: Path) ->
     ("settings", "sentence"),
     [
         ({"salt_sha256": "x"}, "are hidden: resume it"),
-        ({"world": {"factory": "os:system", "command": "true"}}, "was run in another world"),
-        ({"world": {"factory": film_stage.WORLD, "models": "x"}}, "was run in another world"),
+        ({"world": {"name": "os:system", "command": "true"}}, "was run in another world"),
+        ({"world": {"name": "sapien", "models": "x"}}, "was run in another world"),
     ],
 )
 def test_a_run_that_cannot_be_filmed_from_its_folder_is_refused(
@@ -231,9 +231,8 @@ def test_the_command_makes_missing_films_before_it_counts(
 ) -> None:
     evaluate(request(tmp_path))
     assert names(tmp_path) == []
-    monkeypatch.setattr(film_stage, "WORLD", "run_fakes:FakeWorld")
+    monkeypatch.setattr(film_stage, "SAPIEN_NAME", "run_fakes:FakeWorld")
     monkeypatch.setattr(film_stage, "TASK_PARTS", "run_fakes:parts")
-    monkeypatch.setattr(film_stage, "RENDER", {})
     capsys.readouterr()
     failures(tmp_path, by="task", trials=True, film=True, layout="json")
     out, err = capsys.readouterr()

@@ -8,7 +8,8 @@ import pytest
 from run_fakes import LIMIT, fake_task_of
 
 from robospa.harness.running.queue import Pending, TrialQueue
-from robospa.harness.running.worker import TASK_PARTS, task_finder
+from robospa.harness.running.worker import task_finder
+from robospa.harness.worlds import TASK_PARTS
 from robospa.trial import TrialKey
 
 KEYS = [TrialKey("Pick_Fake", 1, 100000 + n) for n in range(3)]
