@@ -1,8 +1,6 @@
-"""Time of the statistics: the paper's bootstrap for four models, marks of its tables, intervals.
+"""Time of the paper's bootstrap for four models, beside resampling every episode.
 
-    python benchmarks/bootstrap.py [--repeat 5] [--json]
-
-The bootstrap is measured against resampling every episode, for the same cells and resamples.
+python benchmarks/bootstrap.py [--repeat 5] [--json]
 """
 
 from __future__ import annotations
@@ -10,12 +8,11 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from common import Metric, Result, argument_parser, finish
+from frame import Figure, Result, main
 
 from robospa.results.paper.published import LEVELS, load
 from robospa.results.statistics import bootstrap, significance
 from robospa.results.statistics.bootstrap import RESAMPLES, Sample, draw, rate, resample_episodes
-from robospa.results.statistics.intervals import METHODS, interval_of
 
 
 def seconds(work: Callable[[], object], repeat: int) -> tuple[float, float]:
@@ -32,51 +29,33 @@ def seconds(work: Callable[[], object], repeat: int) -> tuple[float, float]:
     return times[0], min(times[1:])
 
 
-def main() -> None:
-    """Measure and print."""
-    parser = argument_parser(__doc__)
-    parser.add_argument("--repeat", type=int, default=5)
-    options = parser.parse_args()
-    repeat = options.repeat
+def measure(repeat: int = 5) -> Result:
+    """All figures of one run."""
     data = load()
-    models: dict[str, list[Sample]] = {
-        model: [
+    models: list[list[Sample]] = [
+        [
             rate(round(values[place]), data.trials)
             for values in data.per_task[model, "sr"].rows.values()
             for place in range(len(LEVELS))
         ]
         for model in data.models
-    }
-    count = len(next(iter(models.values())))
+    ]
+    count, table = len(models[0]), [list(row) for row in zip(*models, strict=True)]
     share = [1 / count] * count
-    table = [list(row) for row in zip(*models.values(), strict=True)]
+    few = RESAMPLES // 100
+    first, best = seconds(lambda: [draw(samples, share) for samples in models], repeat)
+    part = seconds(lambda: [resample_episodes(m, share, resamples=few) for m in models], 1)[1]
+    marks = seconds(lambda: significance.supported_best(table), repeat)[1]
     size = f"{len(models)} models x {count} variants x {RESAMPLES:,}"
-
-    def fast() -> None:
-        for samples in models.values():
-            draw(samples, share)
-
-    def slow() -> None:
-        for samples in models.values():
-            resample_episodes(samples, share, resamples=RESAMPLES // 100)
-
-    first, best = seconds(fast, repeat)
-    part = seconds(slow, 1)[1]
-    rows = [
-        Metric(f"the paper's bootstrap: {size}", round(best, 3), "s", at_most=0.5,
+    figures = [
+        Figure(f"the paper's bootstrap: {size}", round(best, 3), "s", at_most=0.5,
             note=f"the first time {first:.3f} s"),
-        Metric("the same episode by episode", round(100 * part, 1), "s",
-            note=f"from {RESAMPLES // 100} resamples"),
+        Figure("the same episode by episode", round(100 * part, 1), "s",
+            note=f"from {few} resamples"),
+        Figure(f"marks of the best in {count} rows", round(marks, 4), "s"),
     ]  # fmt: skip
-    for method in METHODS:
-        first, best = seconds(lambda m=method: [interval_of([s], method=m) for s in table[0]], 1)
-        note = f"the first time {1e3 * first:.2f} ms"
-        rows.append(Metric(f"{method}, {len(models)} cells", round(1e3 * best, 2), "ms", note=note))
-    first, best = seconds(lambda: significance.supported_best(table), repeat)
-    note = f"the first time {first:.3f} s"
-    rows.append(Metric(f"marks of the best in {count} rows", round(best, 4), "s", note=note))
-    finish(Result("bootstrap", "Statistics", tuple(rows)), options)
+    return Result("Statistics", figures)
 
 
 if __name__ == "__main__":
-    main()
+    main(bootstrap=measure)

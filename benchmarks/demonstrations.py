@@ -1,234 +1,282 @@
-"""Recorded demonstrations: do they fit the step limit, and does replaying them meet the goal?
+"""Recorded demonstrations: do replays meet the goal, do mistakes fail, and what does one cost?
 
-    python benchmarks/demonstrations.py [--trials 1] [--first 950000] [--tasks NAME,..] [--json]
+    python benchmarks/demonstrations.py demonstrations [--trials 1] [--tasks NAME,..] [--json]
+    python benchmarks/demonstrations.py corrections [--trials 1] [--tasks NAME,..] [--json]
+    python benchmarks/demonstrations.py collecting [--json]
 
-Records the expert on `--trials` seeds of every variant that no list has, without pictures, and
-replays what was recorded, one recorded action a step, by the official rule and within the official
-step limit. Trials are kept in `--trials-file` (build/demonstrations.jsonl) as they are done; one
-that is there is not done again. `--json` also writes the table of variants beside the result
-(benchmarks/results/demonstrations.csv). The bars: 95 % of the replays succeed, and a demonstration
-takes at most 85 % of its step limit, in every variant; the 205 frames of a demonstration are the
-mean of the official data.
+`demonstrations` records the expert on seeds of every variant that no list has, without pictures,
+and replays one recorded action a step, by the official rule and within the official step limit;
+`--json` also writes a line a variant to benchmarks/results/demonstrations.csv. `corrections` does
+so with noise of several strengths, mid-states and every mistake, at one level of three tasks of
+each category. `collecting` makes episodes as a worker of `robospa collect` does, with three films,
+of two tasks of each category at three levels: all 280 variants cost what the frames of their
+demonstrations (the CSV) say. Trials are kept in build/NAME.jsonl as they are done: stopped
+anywhere, the same command goes on there.
 """
 
 from __future__ import annotations
 
 import csv
-import json
 import time
 from collections.abc import Iterable, Iterator
-from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict, dataclass
-from multiprocessing import get_context
+from functools import cache
 from pathlib import Path
 from statistics import mean
+from types import SimpleNamespace
 
-from common import RESULTS, Metric, Result, argument_parser, finish
+import numpy as np
+from frame import RESULTS, Figure, Json, Result, gather, main
 
 from robospa.categories import BASIC, CATEGORIES
-from robospa.tasks.catalog import LEVELS, task, tasks
+from robospa.harness.datasets.episode_maker import EpisodeMaker
+from robospa.harness.datasets.jobs import Job, attempt_job
+from robospa.harness.demonstrations.kinds import replay, show
+from robospa.harness.demonstrations.mistakes import occasions
+from robospa.harness.demonstrations.recorder import FrameRecorder
+from robospa.harness.demonstrations.strides import stride_of
+from robospa.harness.demonstrations.world import DemonstrationWorld
+from robospa.harness.sim.sapien_world import SapienWorld
+from robospa.harness.world import SceneUnstable
+from robospa.observation import DEFAULT_CAMERAS
+from robospa.results.failures.labels import label
+from robospa.tasks.catalog import LEVELS, build_scene, task, tasks
+from robospa.trial import TrialKey
 
-REPLAYED = 95.0
+SUCCEEDED = 95.0
 SHARE = 85.0
 OFFICIAL_FRAMES = 205
 """Mean of the official data: 108 million time steps in 527 thousand trajectories (the paper)."""
-WORST = 10
-UNSTABLE = "no valid scene"
-
+EPISODES = 50
+"""Of each variant, as in the paper's experiments."""
+STRENGTHS = (0.02, 0.04, 0.08, 0.16)
+"""Of noise [m]."""
+TABLE = RESULTS / "demonstrations.csv"
+Found = SimpleNamespace
 Variant = tuple[str, int]
 
 
-@dataclass(frozen=True)
-class Trial:
-    """One demonstration and its replay: `actions` recorded, `used` until the goal was met."""
-
-    task: str
-    level: int
-    seed: int
-    shown: bool
-    replayed: bool
-    actions: int
-    used: int
-    seconds: float
-    """Simulated, of the demonstration."""
-    failures: tuple[str, ...]
-    end: str
-    """Of the replay."""
-
-    @property
-    def key(self) -> tuple[str, int, int]:
-        """What makes it one trial."""
-        return (self.task, self.level, self.seed)
-
-
-def run(key: tuple[str, int, int]) -> Trial:
-    """Record and replay one trial."""
-    from robospa.harness.demonstrations.expert_run import demonstrate
-    from robospa.harness.demonstrations.recorder import FrameRecorder
-    from robospa.harness.demonstrations.strides import stride_of
-    from robospa.harness.replay import replay
-    from robospa.harness.robots import embodiment
-    from robospa.harness.sim.motion import DEMONSTRATION_LIMITS
-    from robospa.harness.sim.sapien_world import SapienWorld
-    from robospa.harness.world import SceneUnstable
-    from robospa.trial import TrialKey
-
-    name, level, seed = key
-    trial = TrialKey(name, level, seed)
-    recorder = FrameRecorder(stride_of(name))
-    world = SapienWorld(render=False, limits=DEMONSTRATION_LIMITS)
+def made(name: str, level: int, seed: int, kind: str = "expert", strength: float = 0.0) -> Json:
+    """Make one demonstration and replay it; `off` and `turned` are of each push [mm], [degrees]."""
+    key = TrialKey(name, level, seed, split="train")
+    recorder, world = FrameRecorder(stride_of(name)), DemonstrationWorld(render=False)
+    began = time.process_time()
     try:
-        made = demonstrate(world, trial, recorder)
-    except SceneUnstable:
-        return Trial(name, level, seed, False, False, 0, 0, 0.0, (), UNSTABLE)
+        shown = show(world, key, recorder, kind, strength=strength)
+    except (SceneUnstable, ValueError) as error:
+        return {"valid": False, "problem": str(error)}
     finally:
         world.close()
-    space = embodiment(trial.embodiment).action_space("joint")
-    actions = recorder.episode(name, made.instruction, {}, space, ()).actions
+    seconds = time.process_time() - began
+    whose, _ = shown.annotate(recorder.commanded, np.array([f.time for f in recorder.frames]))
+    pushes = shown.noise.pushes if shown.noise is not None else []
     world = SapienWorld(render=False)
-    done = replay(world, trial, actions, "joint")
+    again = replay(world, key, recorder.commanded, shown.prefix_action, kind)
     world.close()
-    return Trial(name, level, seed, made.success, done.success, len(actions), done.steps,
-        round(made.seconds, 2), made.failures, done.end)  # fmt: skip
+    failure = label(again)
+    return {
+        "valid": True,
+        "shown": shown.demonstration.success,
+        "replayed": again.success,
+        "actions": len(recorder.commanded) - 1,
+        "before": len(shown.prefix_action),
+        "labels": np.bincount(whose, minlength=4).tolist(),
+        "off": [round(1000 * m, 1) for m, _ in pushes],
+        "turned": [round(float(np.degrees(turn)), 1) for _, turn in pushes],
+        "failure": failure.kind if failure else "",
+        "problem": " ".join(shown.demonstration.failures),
+        "simulated": round(shown.demonstration.seconds, 2),
+        "seconds": round(seconds, 2),
+    }
 
 
-def known_trials(path: Path) -> list[Trial]:
-    """Those that are done."""
-    if not path.exists():
-        return []
-    return [Trial(**json.loads(line)) for line in path.read_text(encoding="utf-8").splitlines()]
+def per_cent(found: Iterable[bool]) -> float:
+    """Per cent of them that are true."""
+    values = list(found)
+    return round(100 * sum(values) / len(values), 2)
 
 
-def measured(keys: list[tuple[str, int, int]], path: Path, workers: int) -> Iterator[Trial]:
-    """The trials of `keys`, those in `path` first; new ones are appended to it."""
-    wanted = set(keys)
-    done = {trial.key: trial for trial in known_trials(path) if trial.key in wanted}
-    yield from done.values()
-    left = [key for key in keys if key not in done]
-    path.parent.mkdir(parents=True, exist_ok=True)
-    began = time.monotonic()
-    with (
-        ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool,
-        path.open("a", encoding="utf-8") as file,
+def chosen(names: str) -> list[str]:
+    """Tasks named with commas, "" for all."""
+    return [task(n).name for n in names.split(",")] if names else list(tasks())
+
+
+# ---------------------------------------------------------------- replays of every variant
+
+
+def demonstrations(
+    trials: int = 1, first: int = 950_000, names: str = "", levels: str = "1,2,3,4,5",
+    workers: int = 2,
+) -> Result:  # fmt: skip
+    """The expert's demonstrations, replayed."""
+    seeds, numbers = range(first, first + trials), levels.split(",")
+    jobs = [(name, int(n), seed) for seed in seeds for name in chosen(names) for n in numbers]
+    rows = gather(Path("build/demonstrations.jsonl"), jobs, made, workers)
+    variants: dict[Variant, list[Found]] = {}
+    for row in (row for row in rows if row.valid):
+        row.share = 100 * row.actions / task(row.job[0]).levels[row.job[1]].steps
+        variants.setdefault((row.job[0], row.job[1]), []).append(row)
+    return Result(
+        "Demonstrations",
+        list(_overall(variants)),
+        text="""\
+An action is a recorded frame after the first; how many physics steps lie between two frames is data
+of each task. All variants are in `benchmarks/results/demonstrations.csv`.""",
+        files={TABLE: _table(variants)},
+    )
+
+
+def _table(variants: dict[Variant, list[Found]]) -> str:
+    """CSV, one line a variant."""
+    lines = ["category,task,level,trials,shown,replayed,actions,limit,share,seconds"]
+    for (name, level), some in variants.items():
+        cells = (task(name).category, name, level, len(some), sum(t.shown for t in some))
+        cells += (sum(t.replayed for t in some), round(mean(t.actions for t in some)))
+        cells += (task(name).levels[level].steps, f"{mean(t.share for t in some):.0f}%")
+        cells += (round(mean(t.simulated for t in some), 1),)
+        lines.append(",".join(map(str, cells)))
+    return "\n".join(lines) + "\n"
+
+
+def _overall(variants: dict[Variant, list[Found]]) -> Iterator[Figure]:
+    rows, count = [t for some in variants.values() for t in some], len(variants)
+    solved = {v: per_cent(t.replayed for t in some) for v, some in variants.items()}
+    share = {v: mean(t.share for t in some) for v, some in variants.items()}
+    low = {v: value for v, value in solved.items() if value < SUCCEEDED}
+    long = {v: value for v, value in share.items() if value > SHARE}
+    for what, missed in (
+        (f"variants with at least {SUCCEEDED:g} % of the replays successful", low),
+        (f"variants whose demonstrations take at most {SHARE:g} % of the step limit", long),
     ):
-        for i, trial in enumerate(pool.map(run, left), 1):
-            file.write(json.dumps(asdict(trial)) + "\n")
-            file.flush()
-            rest = (time.monotonic() - began) / i * (len(left) - i) / 60
-            how = "" if trial.replayed else f"  replay: {trial.end} {' '.join(trial.failures)}"
-            print(f"{i}/{len(left)} {trial.task} {trial.level} {trial.seed}: {trial.actions} of "
-                f"{limit(trial)} actions{how}  ({rest:.0f} min left)", flush=True)  # fmt: skip
-            yield trial
-
-
-def limit(trial: Trial) -> int:
-    """Its step limit."""
-    return task(trial.task).levels[trial.level].steps
-
-
-def replayed(trials: Iterable[Trial]) -> float:
-    """Per cent of the replays that met the goal."""
-    found = [trial.replayed for trial in trials]
-    return 100 * sum(found) / len(found)
-
-
-def share(trials: Iterable[Trial]) -> float:
-    """Mean per cent of the step limit, every variant counted once."""
-    some = grouped(trials).values()
-    return mean(mean(100 * t.actions / limit(t) for t in trials) for trials in some)
-
-
-def mean_actions(trials: Iterable[Trial]) -> float:
-    """Mean number of recorded actions, every variant counted once."""
-    return mean(mean(t.actions for t in some) for some in grouped(trials).values())
-
-
-def grouped(trials: Iterable[Trial]) -> dict[Variant, list[Trial]]:
-    """Trials by variant, in the catalog's order."""
-    found: dict[Variant, list[Trial]] = {(name, n): [] for name in tasks() for n in LEVELS}
-    for trial in trials:
-        found[trial.task, trial.level].append(trial)
-    return {variant: some for variant, some in found.items() if some}
-
-
-COLUMNS = "category task level trials shown replayed actions limit share seconds"
-
-
-def table(variants: dict[Variant, list[Trial]], path: Path) -> None:
-    """Write one line a variant: COLUMNS."""
-    with path.open("w", encoding="utf-8", newline="") as file:
-        write = csv.writer(file, lineterminator="\n").writerow
-        write(COLUMNS.split())
-        for (name, level), some in variants.items():
-            solved = (sum(t.shown for t in some), sum(t.replayed for t in some))
-            length = (round(mean_actions(some)), limit(some[0]), f"{share(some):.0f}%")
-            seconds = round(sum(t.seconds for t in some) / len(some), 1)
-            write([task(name).category, name, level, len(some), *solved, *length, seconds])
-
-
-def rows(trials: list[Trial]) -> tuple[Metric, ...]:
-    """Figures with bars, then those of each category."""
-    variants = grouped(trials)
-    count, of = len(variants), f"of {len(variants)}"
-    low = {v: replayed(some) for v, some in variants.items() if replayed(some) < REPLAYED}
-    long = {v: share(some) for v, some in variants.items() if share(some) > SHARE}
-    official = [t for t in trials if task(t.task).category not in BASIC]
-    shown = sum(t.shown for t in trials)
-    found = [
-        Metric(f"variants with at least {REPLAYED:g} % of the replays successful",
-            count - len(low), of, at_least=count, note=worst(low)),
-        Metric(f"variants whose demonstrations take at most {SHARE:g} % of the step limit",
-            count - len(long), of, at_least=count, note=worst(long)),
-        Metric("replays that succeed", round(replayed(trials), 2), "%", at_least=REPLAYED,
-            note=f"of {len(trials)}; so do {shown} of the demonstrations"),
-    ]  # fmt: skip
+        note = ", ".join(f"{name} {level}: {x:.0f} %" for (name, level), x in missed.items())
+        yield Figure(what, count - len(missed), f"of {count}", at_least=count, note=note)
+    note = f"of {len(rows)}; so do {sum(t.shown for t in rows)} of the demonstrations"
+    solved_all = per_cent(t.replayed for t in rows)
+    yield Figure("replays that succeed", solved_all, "%", at_least=SUCCEEDED, note=note)
+    official = [mean(t.actions for t in some) for (name, _), some in variants.items()
+                if task(name).category not in BASIC]  # fmt: skip
     if official:
-        found.append(Metric("actions of a demonstration, mean of the 280 variants",
-            round(mean_actions(official)), note=f"official data: {OFFICIAL_FRAMES}"))  # fmt: skip
-    for category in (*CATEGORIES, *BASIC):
-        some = [t for t in trials if task(t.task).category == category]
-        if some:
-            most = max(share(v) for v in variants.values() if v[0] in some)
-            note = f"{mean_actions(some):.0f} actions, {share(some):.0f} % of the step limit"
-            found.append(Metric(f"{category}: replays that succeed", round(replayed(some), 1), "%",
-                note=f"{note}, at most {most:.0f} % in a variant"))  # fmt: skip
-    return tuple(found)
+        yield Figure("actions of a demonstration, mean of the 280 variants", round(mean(official)),
+            note=f"official data: {OFFICIAL_FRAMES}")  # fmt: skip
 
 
-def worst(values: dict[Variant, float]) -> str:
-    """The variants farthest from their bar."""
-    ranked = sorted(values.items(), key=lambda item: -abs(item[1] - REPLAYED))[:WORST]
-    return ", ".join(f"{name} {level}: {value:.0f} %" for (name, level), value in ranked)
+# ---------------------------------------------------------------- noise, mid-states, mistakes
 
 
-TEXT = """An action is a recorded frame after the first. How many physics steps lie between two
-frames is data (`harness/demonstrations/strides.py`); all variants are in
-`benchmarks/results/demonstrations.csv`.
-"""
+def corrections(
+    trials: int = 1, first: int = 950_000, names: str = "", level: int = 3, workers: int = 2
+) -> Result:
+    """Demonstrations of every kind but the expert's plain ones."""
+    of = [[name for name in tasks() if task(name).category == c] for c in CATEGORIES]
+    some = [n[i] for n in of for i in sorted({0, len(n) // 2, len(n) - 1})]
+    jobs = []
+    for seed in range(first, first + trials):
+        for name in chosen(names) if names else some:
+            jobs += [(name, level, seed, "noise", strength) for strength in STRENGTHS]
+            kinds = ["midstate"] if task(name).category != "MIP" else []
+            kinds += [f"mistake:{kind}" for kind in occasions(build_scene(name, level, seed))]
+            jobs += [(name, level, seed, kind, 0.0) for kind in kinds]
+    rows = gather(Path("build/corrections.jsonl"), jobs, made, workers)
+    valid = [row for row in rows if row.valid]
+    figures = [f for strength in STRENGTHS for f in _noise(strength, valid)]
+    if midstates := [t for t in valid if t.job[3] == "midstate"]:
+        figures.append(Figure("mid-states: replays that succeed",
+            per_cent(t.shown and t.replayed for t in midstates), "%", at_least=SUCCEEDED,
+            note=f"of {len(midstates)}; {mean(t.before for t in midstates):.0f} actions before the "
+            f"first frame, {mean(t.actions + 1 for t in midstates):.0f} frames"))  # fmt: skip
+    mistakes = [t for t in valid if t.job[3].startswith("mistake:")]
+    for t in mistakes:
+        t.failed = not t.shown and not t.replayed and not t.problem
+    kinds = {t.job[3]: [u.failed for u in mistakes if u.job[3] == t.job[3]] for t in mistakes}
+    counts = (f"{k.partition(':')[2]} {sum(v)} of {len(v)}" for k, v in sorted(kinds.items()))
+    figures.append(Figure("mistakes: replays that fail", per_cent(t.failed for t in mistakes), "%",
+        note=", ".join(counts)))  # fmt: skip
+    return Result(
+        "Noise, mistakes and mid-states in demonstrations",
+        figures,
+        text="""\
+What each kind is: [demonstrations](demonstrations.md). A push is how far the noise takes the
+fingertips off the expert's way, of which the expert comes back by itself.""",
+    )
 
 
-def main() -> None:
-    """Measure what was asked for and print."""
-    parser = argument_parser(__doc__)
-    parser.add_argument("--trials", type=int, default=1)
-    parser.add_argument("--first", type=int, default=950_000)
-    parser.add_argument("--tasks", default="", help="names, with commas between; default: all")
-    parser.add_argument("--levels", default="1,2,3,4,5")
-    parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--trials-file", type=Path, default=Path("build/demonstrations.jsonl"))
-    parser.add_argument("--report", action="store_true", help="only what the file holds")
-    options = parser.parse_args()
-    names = [task(n).name for n in options.tasks.split(",")] if options.tasks else list(tasks())
-    levels = [int(level) for level in options.levels.split(",")]
-    seeds = range(options.first, options.first + options.trials)
-    keys = [(name, level, seed) for seed in seeds for name in names for level in levels]
-    known = known_trials(options.trials_file) if options.report else None
-    found = known or measured(keys, options.trials_file, options.workers)
-    trials = [trial for trial in found if trial.end != UNSTABLE]
-    if options.json is not None:
-        table(grouped(trials), RESULTS / "demonstrations.csv")
-    finish(Result("demonstrations", "Demonstrations", rows(trials), text=TEXT), options)
+def _noise(strength: float, valid: list[Found]) -> Iterator[Figure]:
+    trials = [t for t in valid if t.job[3:] == ("noise", strength)]
+    if trials:
+        off, turned = ([x for t in trials for x in getattr(t, name)] for name in ("off", "turned"))
+        frames = [sum(t.labels[i] for t in trials) for i in range(3)]
+        yield Figure(f"noise of {1000 * strength:g} mm: replays that succeed",
+            per_cent(t.shown and t.replayed for t in trials), "%", at_least=SUCCEEDED,
+            note=f"of {len(trials)}; {len(off) / len(trials):.1f} pushes an episode, on average of "
+            f"{mean(off or [0]):.1f} mm and {mean(turned or [0]):.1f} degrees; "
+            f"{100 * frames[1] / sum(frames):.0f} % of the frames noise, "
+            f"{100 * frames[2] / sum(frames):.0f} % recovery")  # fmt: skip
+
+
+# ---------------------------------------------------------------- what an episode costs
+
+
+@cache
+def warm_maker() -> EpisodeMaker:
+    """A maker that has made an episode, which opened its renderer."""
+    maker, key = EpisodeMaker(), TrialKey("Press_Stapler_Repeat", 1, 960_001, split="train")
+    attempt_job(maker, Job(key, DEFAULT_CAMERAS, "h264"))
+    return maker
+
+
+def collected(name: str, level: int, seed: int) -> Json:
+    """One episode: frames, bytes and processor time [s] by purpose."""
+    key = TrialKey(name, level, seed, split="train")
+    found = attempt_job(warm_maker(), Job(key, DEFAULT_CAMERAS, "h264"))
+    times = {purpose: round(spent, 3) for purpose, spent in found.times.items()}
+    return {"frames": found.frames, "size": len(found.data), "times": times,
+            "reason": found.reason}  # fmt: skip
+
+
+def collecting() -> Result:
+    """The first and the last task of each category at three levels."""
+    of = [[name for name, one in tasks().items() if one.category == c] for c in CATEGORIES]
+    jobs = [
+        (names[at], level, 960_000) for at in (0, -1) for level in LEVELS[2::-2] for names in of
+    ]
+    jobs += [(names[at], LEVELS[-1], 960_000) for at in (0, -1) for names in of]
+    rows = gather(Path("build/collecting.jsonl"), jobs, collected)
+    good = [row for row in rows if not row.reason]
+    groups = {c: [row for row in good if task(row.job[0]).category == c] for c in CATEGORIES}
+    groups = {category: some for category, some in groups.items() if some}
+    with TABLE.open(encoding="utf-8") as file:
+        lines = [row for row in csv.DictReader(file) if row["category"] in groups]
+    frames = [(row["category"], float(row["actions"]) + 1) for row in lines]
+
+    def whole(cost: dict[str, float]) -> float:
+        """EPISODES of each variant, of a category's cost."""
+        each = {c: cost[c] / sum(row.frames for row in some) for c, some in groups.items()}
+        return sum(EPISODES * count * each[category] for category, count in frames)
+
+    seconds = {c: sum(sum(row.times.values()) for row in some) for c, some in groups.items()}
+    hours, count = whole(seconds) / 3600, EPISODES * len(frames)
+    size = whole({c: sum(row.size for row in some) for c, some in groups.items()})
+    spent = {p: sum(row.times[p] for row in good) for p in good[0].times}
+    shares = ", ".join(f"{p} {100 * s / sum(spent.values()):.0f} %" for p, s in spent.items())
+    figures = [
+        Figure(f"{count} episodes, {EPISODES} of each variant", round(hours, 1), "core-hours",
+            at_most=25.0, note=f"of the processor time {shares}"),
+        Figure("their size", round(size / 1e9, 2), "GB", note="H.264, three cameras"),
+        Figure("episodes an hour and core, mean of all variants", round(count / hours)),
+        Figure("seeds that gave no episode", len(rows) - len(good), f"of {len(rows)}"),
+    ]  # fmt: skip
+    for category, some in groups.items():
+        each = seconds[category] / len(some)
+        count, size = (mean(getattr(row, name) for row in some) for name in ("frames", "size"))
+        note = f"{count:.0f} frames, {size / 1e3:.0f} kB"
+        figures.append(Figure(f"{category}: an episode", round(each, 1), "s", note=note))
+    return Result(
+        "Collecting demonstrations",
+        figures,
+        text="""\
+Processor time of one worker that had made an episode before. What goes to pictures is drawing and
+encoding them; it does not depend on their number of pixels, but on what is in them.""",
+    )
 
 
 if __name__ == "__main__":
-    main()
+    main(demonstrations=demonstrations, corrections=corrections, collecting=collecting)

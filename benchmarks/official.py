@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from common import Metric, Result, argument_parser, finish
+from frame import Figure, Result, main
 
 from robospa.harness.factory import policy_factory
 from robospa.harness.official.official_options import ASSETS, OfficialLayout
@@ -34,12 +34,6 @@ from robospa.tasks.official import needs
 from robospa.trial import TrialKey
 
 SEED = 100_000
-LOAD_BAR = 150.0
-STEP_BAR = 2.0
-TEXT = """\
-With `--world official` objects are those of an archive ([the official world](official-world.md)):
-here a made-up one of the official names, sizes and frames, whose meshes are smaller than the real
-ones. What is drawn and what collides is made of its files once and kept; loading reads that."""
 
 
 def made_up(folder: Path) -> Path:
@@ -68,7 +62,7 @@ def load_all(world: OfficialWorld, layout: OfficialLayout) -> tuple[list[float],
     return spent, unstable
 
 
-def trials(layout: OfficialLayout, keys: list[TrialKey]) -> tuple[float, int]:
+def run_all(layout: OfficialLayout, keys: list[TrialKey]) -> tuple[float, int]:
     """CPU seconds of a physics step in the expert's trials, planning included, and successes."""
     world, policy = OfficialWorld(render=False), policy_factory(ORACLE)()
     parts: Callable[..., Any] = partial(official_world_parts, layout=layout, episodes={})
@@ -81,50 +75,43 @@ def trials(layout: OfficialLayout, keys: list[TrialKey]) -> tuple[float, int]:
     return (time.thread_time() - began) / steps, successes
 
 
-def measure(assets: Path | None, most: int) -> Result:
-    """All figures of one run."""
+def measure(assets: str = "", trials: int = 20) -> Result:
+    """Both kinds of objects; `trials` about so many of the expert."""
     with tempfile.TemporaryDirectory() as folder:
         os.environ.setdefault("ROBOSPA_CACHE", folder)
-        os.environ[ASSETS] = str(assets or made_up(Path(folder) / "assets"))
+        os.environ[ASSETS] = assets or str(made_up(Path(folder) / "assets"))
         official, builtin = OfficialLayout(True, "all"), OfficialLayout(False, "all")
         world = OfficialWorld()
         load_all(world, official)  # fills the cache
         spent, unstable = load_all(world, official)
         ours, _ = load_all(world, builtin)
         names = [name for name, used in needs().items() if used]
-        keys = [TrialKey(name, 5, SEED) for name in names[:: max(1, len(names) // most)]]
-        trials(official, keys[:1])
-        step, solved = trials(official, keys)
-        plain, _ = trials(builtin, keys)
+        keys = [TrialKey(name, 5, SEED) for name in names[:: max(1, len(names) // trials)]]
+        run_all(official, keys[:1])
+        step, solved = run_all(official, keys)
+        plain, _ = run_all(builtin, keys)
     times, others = (1e3 * np.array(values) for values in (spent, ours))
-    rows = (
-        Metric("loading a scene, the slowest", round(float(times.max()), 1), "ms", LOAD_BAR),
-        Metric("loading a scene, the median", round(float(np.median(times)), 1), "ms",
+    figures = [
+        Figure("loading a scene, the slowest", round(float(times.max()), 1), "ms", at_most=150),
+        Figure("loading a scene, the median", round(float(np.median(times)), 1), "ms",
             note=f"built-in objects: {np.median(others):.1f} ms, {others.max():.1f} at most"),
-        Metric("variants that do not settle", unstable, "", at_most=0, note=f"of {len(times)}"),
-        Metric("a physics step in the expert's trials, beside built-in objects",
-            round(step / plain, 2), "x", STEP_BAR,
+        Figure("variants that do not settle", unstable, "", at_most=0, note=f"of {len(times)}"),
+        Figure("a physics step in the expert's trials, beside built-in objects",
+            round(step / plain, 2), "x", at_most=2,
             note=f"{1e6 * step:.0f} and {1e6 * plain:.0f} us, planning included"),
-        Metric("trials that the expert solves", solved, "", note=f"of {len(keys)}"),
-    )  # fmt: skip
+        Figure("trials that the expert solves", solved, f"of {len(keys)}"),
+    ]  # fmt: skip
     return Result(
-        "official",
         "Objects of the official archive",
-        rows,
-        text=TEXT,
+        figures,
+        text="""\
+With `--world official` objects are those of an archive ([the official world](official-world.md)):
+here a made-up one of the official names, sizes and frames, whose meshes are smaller than the real
+ones. What is drawn and what collides is made of its files once and kept; loading reads that.""",
         circumstances=f"{len(times)} variants loaded once with a renderer, models from the cache "
         f"on disk; {len(keys)} trials at level 5; CPU time",
     )
 
 
-def main() -> None:
-    """Measure and print."""
-    parser = argument_parser(__doc__)
-    parser.add_argument("--assets", type=Path, default=None)
-    parser.add_argument("--trials", type=int, default=20, help="about so many of the expert")
-    options = parser.parse_args()
-    finish(measure(options.assets, options.trials), options)
-
-
 if __name__ == "__main__":
-    main()
+    main(official=measure)

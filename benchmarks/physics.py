@@ -4,10 +4,9 @@
 
 Both sides start from the same scene and write the same drive targets in the same physics steps, so
 they must end in the same state to the bit (checked). "bare" is the loop one would write by hand:
-set the targets, step. "alone" is SAPIEN's step with nothing moving, for scale. The trial loop
-("trial", and "contacts" with contacts gathered) includes reading the action, planning, and a poll
-with a snapshot at 50 Hz. They take turns action by action, and of every action the fastest round
-counts, in CPU time, so that other load on the machine does not decide.
+set the targets, step. "trial", and "contacts" with contacts gathered, include reading the action,
+planning, and a poll with a snapshot at 50 Hz. They take turns action by action, and of every action
+the fastest round counts, in CPU time, so that other load on the machine does not decide.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ from collections.abc import Callable
 from functools import partial
 
 import numpy as np
-from common import Metric, Result, argument_parser, finish
+from frame import Figure, Result, main
 from numpy.typing import NDArray
 
 from robospa.geometry import Pose
@@ -28,12 +27,7 @@ from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.snapshot import Snapshot
 from robospa.workcell import TABLE_TOP
 
-BAR = 1.15
-TEXT = """\
-Both sides write the same drive targets, all joints of both arms, in the same steps and end in the
-same state. The trial loop adds reading the action, its trajectory, and a snapshot 50 times a
-simulated second for a goal that looks at every object's height. Of an expert's writes of drive
-targets 8 % repeat the value that is there: too few to look for."""
+Steps = Callable[[], int]
 
 
 def table_of_blocks(count: int) -> Scene:
@@ -63,9 +57,6 @@ def sweeping(count: int) -> list[NDArray[np.float32]]:
 def watch(snapshot: Snapshot) -> bool:
     """A goal that looks at every object's height, as the pick goals do."""
     return any(snapshot.height(name) > 2.0 for name in snapshot.poses)
-
-
-Steps = Callable[[], int]
 
 
 def trial_loop(world: SapienWorld, actions: list[NDArray[np.float32]]) -> list[Steps]:
@@ -112,7 +103,7 @@ def turns(sides: dict[str, list[Steps]]) -> tuple[dict[str, list[float]], int]:
     return spent, min(steps.values())
 
 
-def measure(blocks: int, actions: int, rounds: int) -> Result:
+def measure(blocks: int = 8, actions: int = 40, rounds: int = 5) -> Result:
     """All figures of one run."""
     scene, plan = table_of_blocks(blocks), sweeping(actions)
     worlds = {name: SapienWorld(render=False) for name in ("bare", "trial", "contacts")}
@@ -133,51 +124,28 @@ def measure(blocks: int, actions: int, rounds: int) -> Result:
         name: sum(min(c[name][i] for c in costs) for i in range(actions)) / steps * 1e6
         for name in worlds
     }
-    idle = worlds["bare"]._loaded().system
-    alone, _ = turns({"alone": [lambda: sum(idle.step() is None for _ in range(2000))]})
-    best["alone"] = alone["alone"][0] / 2000 * 1e6
-    rows = (
-        Metric(
-            "trial loop beside bare SAPIEN stepping with the same drive targets",
-            round(best["trial"] / best["bare"], 3),
-            "x",
-            at_most=BAR,
-            note=f"{1e6 / best['trial']:,.0f} steps/s, {1e6 / best['trial'] / RATE:.0f} x real",
-        ),
-        Metric(
-            "the same with contacts gathered for the goal",
-            round(best["contacts"] / best["bare"], 3),
-            "x",
-        ),
-        Metric("trial loop, a physics step", round(best["trial"], 1), "us"),
-        Metric("bare stepping, a physics step", round(best["bare"], 1), "us"),
-        Metric("SAPIEN's step with everything at rest", round(best["alone"], 1), "us"),
-        Metric(
-            "different final states of the sides",
-            len(digests) - 1,
-            "",
-            at_most=0,
-            note="poses, velocities and joints, to the bit",
-        ),
-    )
+    rate = 1e6 / best["trial"]
+    figures = [
+        Figure("trial loop beside bare SAPIEN stepping with the same drive targets",
+            round(best["trial"] / best["bare"], 3), "x", at_most=1.15,
+            note=f"{rate:,.0f} steps/s, {rate / RATE:.0f} x real"),
+        Figure("the same with contacts gathered for the goal",
+            round(best["contacts"] / best["bare"], 3), "x"),
+        Figure("trial loop, a physics step", round(best["trial"], 1), "us"),
+        Figure("bare stepping, a physics step", round(best["bare"], 1), "us"),
+        Figure("different final states of the sides", len(digests) - 1, at_most=0,
+            note="poses, velocities and joints, to the bit"),
+    ]  # fmt: skip
     return Result(
-        "physics",
         "Physics in the trial loop",
-        rows,
-        text=TEXT,
+        figures,
+        text="""\
+Both sides write the same drive targets, all joints of both arms, in the same steps. The trial loop
+adds reading the action, its trajectory, and a snapshot 50 times a simulated second for a goal that
+looks at every object's height.""",
         circumstances=f"{blocks} blocks, {steps} steps, fastest of {rounds} rounds, CPU time",
     )
 
 
-def main() -> None:
-    """Measure and print."""
-    parser = argument_parser(__doc__)
-    parser.add_argument("--blocks", type=int, default=8)
-    parser.add_argument("--actions", type=int, default=40)
-    parser.add_argument("--rounds", type=int, default=5)
-    options = parser.parse_args()
-    finish(measure(options.blocks, options.actions, options.rounds), options)
-
-
 if __name__ == "__main__":
-    main()
+    main(physics=measure)

@@ -6,44 +6,120 @@ Ours is a trial through `run_trial` against a policy server over the wire, with 
 nothing: what is measured from the end of one `World.step` to the begin of the next is the harness.
 A buffered step is one before which nothing was asked. vla-eval keeps the chunk on its server, so
 every step is a round trip with a full observation; openpi's chunk broker is on the client's side.
-Sides take turns in blocks of steps; medians are over steps, means over everything.
+Sides take turns in blocks of steps.
 """
 
 from __future__ import annotations
 
-import json
 import statistics
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import NoReturn
 
 import numpy as np
-from common import Metric, Result, argument_parser, finish
-from idle_world import IdleWorld, endless_trial
+import wire
+from frame import Figure, Result, main
 from numpy.typing import NDArray
-from peers import Peer
-from sides import line_of, peer_of, peers_for, sides, tell, versions_of
-from wire_sides import CAMERAS, frames
 
 from robospa.clients import connect
+from robospa.geometry import Pose
 from robospa.harness.trial import TrialParts, run_trial
 from robospa.harness.world import Poll, StepResult
 from robospa.observation import CameraSpec, Observation
-from robospa.protocol.policy import Policy, PolicySpec
+from robospa.protocol.policy import PolicySpec
+from robospa.tasks.events import Event, ObjectRole
 from robospa.tasks.scene import Scene
+from robospa.tasks.snapshot import Contact, Snapshot
+from robospa.tasks.task import Level, Task
 from robospa.trial import TrialKey
 
 STEPS = 500
 KEY = TrialKey("Nothing", 1, 100_000)
-TEXT = """\
-With chunks of 50 actions the harness asks once in 50 steps and renders only then. A buffered step
-is everything between two calls of the simulator: choosing the action, keeping it for the record,
-counting, the clocks. vla-eval keeps chunks on its server: every step renders, encodes, sends and
-waits."""
-NAMES = {
+PEERS = {
     "openpi steps": "openpi's chunk broker",
     "vla-eval raw steps": "vla-eval, raw images",
     "vla-eval steps": "vla-eval as shipped (PNG)",
 }
+
+
+class IdleWorld:
+    """Executes every action in one step and changes nothing: trials cost only the harness."""
+
+    def __init__(self) -> None:
+        self.steps = 0
+
+    def load(self, scene: Scene, contacts: bool = False) -> None:
+        """Begin a trial."""
+        self.steps = 0
+
+    def step(self, action: NDArray[np.float32], space: str, poll: Poll) -> StepResult:
+        """Count the action and poll once."""
+        self.steps += 1
+        return StepResult(1, poll(self.snapshot()))
+
+    def observe(self, spec: PolicySpec) -> Observation:
+        """Joints (14,) at 0, no images."""
+        return {"images": {}, "state": np.zeros(14, np.float32)}
+
+    def render(self, camera: CameraSpec) -> NDArray[np.uint8]:
+        """A black image."""
+        return np.zeros((camera.height, camera.width, 3), np.uint8)
+
+    def snapshot(self) -> Snapshot:
+        """One block at the origin, open grippers there too."""
+        here = Pose()
+        points = (here.position, here.position)
+        time = 0.02 * self.steps
+        return Snapshot(time, {"block": here}, (1.0, 1.0), (here, here), grasp_points=points)
+
+    def contacts(self) -> tuple[Contact, ...]:
+        """None."""
+        return ()
+
+    def digest(self) -> str:
+        """The number of steps."""
+        return str(self.steps)
+
+    def info(self) -> Mapping[str, object]:
+        """The simulator's name."""
+        return {"simulator": "none"}
+
+    def close(self) -> None:
+        """Nothing to free."""
+
+
+class NeverMet:
+    """A goal that is never met: every trial takes all of its steps."""
+
+    needs_contacts = False
+    total = 1
+    roles: Mapping[str, ObjectRole] = {}
+
+    def start(self, snapshot: Snapshot) -> tuple[Event, ...]:
+        """No events."""
+        return ()
+
+    def update(self, snapshot: Snapshot) -> tuple[Event, ...]:
+        """No events."""
+        return ()
+
+    def diagnostics(self) -> Mapping[str, object]:
+        """None."""
+        return {}
+
+
+def _unused(*_: object) -> NoReturn:
+    raise AssertionError("the task of this benchmark is never drawn")
+
+
+def endless_trial(key: TrialKey, steps: int = STEPS) -> TrialParts:
+    """A trial of `steps` policy actions that no policy ends sooner."""
+    levels = {1: Level(candidates=1, subtasks=1, steps=steps)}
+    task = Task(
+        key.task, "GAC", levels, _unused, _unused, _unused, _unused, _unused, "idle", "never"
+    )
+    scene = Scene(key.task, key.level, key.seed, key.embodiment, key.mode, (), {})
+    return TrialParts(scene, task, NeverMet(), "Do nothing.")
 
 
 class TimedWorld(IdleWorld):
@@ -54,7 +130,7 @@ class TimedWorld(IdleWorld):
 
     def __init__(self, images: Sequence[NDArray[np.uint8]]) -> None:
         super().__init__()
-        self._images = dict(zip(CAMERAS, images, strict=True))
+        self._images = dict(zip(wire.CAMERAS, images, strict=True))
         self._view: Observation = {
             "images": self._images,
             "state": np.zeros(14, np.float32),
@@ -85,83 +161,51 @@ class TimedWorld(IdleWorld):
         return self._images[camera.name]
 
 
-def parts(key: TrialKey) -> TrialParts:
-    """A trial of STEPS steps."""
-    return endless_trial(key, STEPS)
-
-
-def our_block(world: TimedWorld, policy: Policy) -> int:
-    """One trial of STEPS steps; how often the policy was asked."""
-    return run_trial(world, policy, KEY, policy_seed=0, parts=parts).policy_calls
-
-
-def peer_rows(kind: str, spent: list[float], peer: Peer) -> list[Metric]:
-    """Mean and median of a peer's steps."""
-    what = f"{NAMES[kind]}: a step, mean"
-    if not spent:
-        return [Metric(what, None, "ms", note=peer.problem)]
-    note = f"median {statistics.median(spent):.3f}, {len(spent)} steps"
-    return [Metric(what, round(statistics.fmean(spent), 4), "ms", note=note)]
-
-
-def measure(rounds: int) -> Result:
-    """All figures of one run."""
-    peers = peers_for(list(NAMES))
-    times: dict[str, list[float]] = {kind: [] for kind in NAMES}
-    usable = [kind for kind in NAMES if peers[peer_of(kind)].python]
-    with sides() as running:
-        world = TimedWorld(frames(str(running.frames)))
+def measure(rounds: int = 6) -> Result:
+    """Blocks of STEPS steps of every side in turns."""
+    times: dict[str, list[float]] = {kind: [] for kind in PEERS}
+    with wire.sides() as running:
+        world = TimedWorld(np.load(running.frames))
         policy = connect(running.serve("robospa"))
-        servers = {"openpi steps": "openpi"}
         clients = {}
-        for kind in usable:
-            url = running.serve(servers.get(kind, "vla-eval steps"))
-            name = kind if kind == "openpi steps" else kind.removesuffix(" steps")
-            clients[kind] = running.clients(name, url, 1)[0]
+        for kind in (kind for kind in PEERS if not wire.problem_of(kind)):
+            broker = kind == "openpi steps"
+            url = running.serve("openpi" if broker else "vla-eval steps")
+            clients[kind] = running.clients(kind if broker else kind[: -len(" steps")], url, 1)
         for client in clients.values():  # the call that warmed it up was a chunk's first
-            tell(client, "49")
-            line_of(client)
+            wire.ask(client, "49")
         queries = 0
         for _ in range(rounds):
-            queries += our_block(world, policy)
+            found = run_trial(world, policy, KEY, policy_seed=0, parts=endless_trial)
+            queries += found.policy_calls
             for kind, client in clients.items():
-                tell(client, "50" if kind == "vla-eval steps" else str(STEPS))
-                times[kind] += json.loads(line_of(client))
+                times[kind] += wire.ask(client, "50" if kind == "vla-eval steps" else str(STEPS))
         policy.close()
     steps = len(world.buffered) + len(world.asked)
     mean = (sum(world.buffered) + sum(world.asked)) / steps
     p99 = float(np.percentile(world.buffered, 99))
-    note = f"median {statistics.median(world.buffered):.4f}, p99 {p99:.4f}, {steps} steps"
-    rows = [
-        Metric("a buffered step, mean", round(statistics.fmean(world.buffered), 4), "ms",
-            at_most=0.1, note=note),
-        Metric("observations beyond one a query", world.views - queries, "", at_most=0,
+    figures = [
+        Figure("a buffered step, mean", round(statistics.fmean(world.buffered), 4), "ms", 0.1,
+            note=f"median {statistics.median(world.buffered):.4f}, p99 {p99:.4f}, {steps} steps"),
+        Figure("observations beyond one a query", world.views - queries, at_most=0,
             note=f"{queries} queries in {steps + rounds} steps"),
-        Metric("ours: a step, queries included, mean", round(mean, 4), "ms"),
     ]  # fmt: skip
-    for kind in NAMES:
-        rows += peer_rows(kind, times[kind], peers[peer_of(kind)])
-        if times[kind]:
-            what = f"our step, queries included, beside {NAMES[kind]}"
-            rows.append(Metric(what, round(mean / statistics.fmean(times[kind]), 4), "x"))
-    circumstances = f"{running.source}; sides take turns"
+    for kind, name in PEERS.items():
+        theirs = statistics.fmean(times[kind]) if times[kind] else None
+        note = f"{mean:.4g} and {theirs:.4g} ms, means" if theirs else wire.problem_of(kind)
+        ratio = theirs and round(mean / theirs, 4)
+        figures.append(Figure(f"our step, queries included, beside {name}", ratio, "x", note=note))
     return Result(
-        "step",
         "What a step costs beside its physics",
-        tuple(rows),
-        text=TEXT,
-        circumstances=circumstances,
-        versions=versions_of(peers),
+        figures,
+        text="""\
+With chunks of 50 actions the harness asks once in 50 steps and renders only then. A buffered step
+is everything between two calls of the simulator. vla-eval keeps chunks on its server: every step
+renders, encodes, sends and waits.""",
+        circumstances=f"{running.source}; sides take turns",
+        versions=wire.versions(PEERS),
     )
 
 
-def main() -> None:
-    """Measure and print."""
-    parser = argument_parser(__doc__)
-    parser.add_argument("--rounds", type=int, default=6)
-    options = parser.parse_args()
-    finish(measure(options.rounds), options)
-
-
 if __name__ == "__main__":
-    main()
+    main(step=measure)

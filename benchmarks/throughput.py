@@ -7,10 +7,6 @@ leaves the processor alone), the world burns processor time: as much an answer a
 limits are measured in the same run: of the model by calling full batches one after the other, of
 the cores by the same run with a model that answers at once. Throughput is what the server counts
 over `--seconds` once all workers run; then the run is ended.
-
-Workers hold `--held` trials at once. With one each no batch can be larger than their number n, and
-none is full while one simulates: in step they could have n / (one call with n + their simulation on
-these cores). The notes say so, to tell how much of a gap is arithmetic.
 """
 
 from __future__ import annotations
@@ -22,14 +18,14 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from common import Metric, Result, argument_parser, finish, line
-from idle_world import IdleWorld, endless_trial
+from frame import Figure, Result, main
 from numpy.typing import NDArray
+from step import IdleWorld, endless_trial
 
 from robospa.harness.running.autoscaling import cores, most_workers
 from robospa.harness.running.request import HELD
@@ -46,6 +42,8 @@ from robospa.trial import TrialKey
 BASE, ITEM, BATCH = 0.100, 0.002, 8
 CALLS = 25
 """Answers that one trial takes."""
+Calls = tuple[float, int]
+"""When the model answered how many."""
 
 
 class SimulatedModel:
@@ -54,7 +52,7 @@ class SimulatedModel:
     def __init__(self, base: float, item: float) -> None:
         self.spec = PolicySpec("simulated", cameras=(), horizon=1, batch=BATCH)
         self.base, self.item = base, item
-        self.calls: list[tuple[float, int]] = []
+        self.calls: list[Calls] = []
 
     def reset(self, trial: TrialInfo) -> None:
         """Nothing is remembered."""
@@ -93,29 +91,16 @@ def parts(key: TrialKey) -> TrialParts:
     return endless_trial(key, CALLS)
 
 
-@dataclass
-class Served:
-    """A model in a process of its own."""
-
-    process: subprocess.Popen[str]
-    url: str
-    limit: float
-
-    def calls(self) -> list[tuple[float, int]]:
-        """Ends it: when it answered how many."""
-        out, _ = self.process.communicate("\n", timeout=60)
-        return [(when, count) for when, count in json.loads(out)]
-
-
 @contextlib.contextmanager
-def serving(base: float, item: float) -> Iterator[Served]:
-    """The model, its limit measured before anybody asks."""
+def serving(base: float, item: float) -> Iterator[tuple[str, float, Callable[[], list[Calls]]]]:
+    """The model in a process of its own: its URL, its limit measured before anybody asks, and what
+    ends it and says when it answered how many."""
     words = [sys.executable, __file__, "--serve", str(base), str(item)]
     process = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
     try:
         assert process.stdout is not None
         url, limit = process.stdout.readline().split()
-        yield Served(process, url, float(limit))
+        yield url, float(limit), lambda: json.loads(process.communicate("\n", timeout=60)[0])
     finally:
         process.kill()
         process.wait()
@@ -135,22 +120,12 @@ def serve(base: float, item: float) -> None:
     print(json.dumps(model.calls))
 
 
-@dataclass(frozen=True)
-class RunFigures:
-    """A run's answers a second, samples a call, workers at its end, and the model's limit."""
-
-    rate: float
-    batch: float
-    workers: int
-    model: float
-
-
 class Enough(Exception):
     """It was measured for long enough."""
 
 
 @dataclass
-class Window:
+class StableRun:
     """Since when the same workers have been running; ends the run after `seconds` of that."""
 
     seconds: float
@@ -165,103 +140,66 @@ class Window:
             raise Enough
 
 
-def measure(
-    busy: float, workers: int, seconds: float, base: float, item: float, held: int = 1
-) -> RunFigures:
-    """One run; `workers` 0 for as many as the driver finds right, `held` trials each."""
+def run(
+    busy: float, workers: int, seconds: float, model: tuple[float, float], held: int
+) -> tuple[float, float, int, float]:
+    """Answers a second, samples a call, workers at the end, and the limit of the `model` (seconds
+    of a call and of a sample); `workers` 0 for as many as the driver finds right."""
     keys = [TrialKey("Busy", 1, seed) for seed in range(20_000)]
-    window = Window(seconds if workers else 3 * seconds)  # growing takes whole rounds of trials
-    with tempfile.TemporaryDirectory() as folder, serving(base, item) as served:
+    watch = StableRun(seconds if workers else 3 * seconds)  # growing takes whole rounds of trials
+    with tempfile.TemporaryDirectory() as folder, serving(*model) as (url, limit, ended):
         config = WorkerConfig(
-            Path(folder), served.url, world="throughput:BusyWorld",
-            world_arguments={"busy": busy}, parts="throughput:parts",
-            expects={served.url: SimulatedModel(base, item).spec},
+            Path(folder), url, world="throughput:BusyWorld", world_arguments={"busy": busy},
+            parts="throughput:parts", expects={url: SimulatedModel(*model).spec},
         )  # fmt: skip
         options = RunOptions(workers or cores(), most=workers or most_workers(), held=held)
-        runner = Runner(config, keys, options, on_status=window.look)
         with contextlib.suppress(Enough):
-            runner.run()
-        until = time.monotonic()
-        calls = [c for c in served.calls() if window.start_time <= c[0] <= until - 0.5]
+            Runner(config, keys, options, on_status=watch.look).run()
+        until = time.monotonic() - 0.5
+        calls = [call for call in ended() if watch.start_time <= call[0] <= until]
     answers = sum(size for _, size in calls[1:])
     rate = answers / (calls[-1][0] - calls[0][0])
-    return RunFigures(rate, answers / (len(calls) - 1), window.workers, served.limit)
+    return rate, answers / (len(calls) - 1), watch.workers, limit
 
 
 @functools.cache
-def cores_alone(busy: float, seconds: float) -> RunFigures:
-    """A worker a core and a model that answers at once."""
-    return measure(busy, cores(), seconds, 0.0, 0.0)
+def cores_alone(busy: float, seconds: float) -> float:
+    """Answers a second of a worker a core with a model that answers at once."""
+    return run(busy, cores(), seconds, (0.0, 0.0), 1)[0]
 
 
-@dataclass(frozen=True)
-class Case:
-    """`busy` seconds of simulation an answer; `workers` 0 for as many as the driver finds right.
-    `before`: also measured with workers that hold one trial each."""
-
-    name: str
-    busy: float
-    workers: int
-    bar: float
-    before: bool = False
-
-
-def row_of(case: Case, seconds: float, held: int) -> Metric:
-    """A run beside both limits."""
-    few, busy = cores(), case.busy
-    alone = cores_alone(busy, seconds)
-    seen = measure(busy, case.workers, seconds, BASE, ITEM, held)
-    limit, who = min((seen.model, "model"), (alone.rate, "cores"))
-    note = (
-        f"{seen.rate:.1f} answers/s with {seen.workers} workers, {seen.batch:.1f} samples a call; "
-        f"the model alone gives {seen.model:.1f}, {few} cores alone {alone.rate:.1f}: the {who} "
-        f"bind{'s' if who == 'model' else ''}"
-    )
-    before = None
-    if case.before:
-        one = measure(busy, case.workers, seconds, BASE, ITEM)
-        before = round(one.rate / limit, 3)
-        together = one.workers / (BASE + ITEM * min(BATCH, one.workers) + busy * one.workers / few)
-        note += (
-            f"; before: one trial a worker, {one.rate:.1f} answers/s and {one.batch:.1f} samples a "
-            f"call, of {min(limit, together):.1f} that {one.workers} in step could have"
+def measure(workers: int = 8, held: int = HELD, seconds: float = 8.0) -> Result:
+    """Every case beside both limits; `held` trials a worker, `seconds` for which each run lasts."""
+    figures = []
+    for what, busy, count, bar in (
+        (f"{workers} workers, 1 ms of simulation an answer", 0.001, workers, 0.95),
+        (f"{workers} workers, 150 ms of simulation an answer", 0.150, workers, 0.9),
+        (f"{workers} workers, 30 ms: model and cores alike", 0.030, workers, 0.95),
+        ("workers by default, 1 ms of simulation", 0.001, 0, 0.9),
+        ("workers by default, 30 ms", 0.030, 0, 0.9),
+    ):
+        alone = cores_alone(busy, seconds)
+        rate, batch, used, model = run(busy, count, seconds, (BASE, ITEM), held)
+        note = (
+            f"{rate:.1f} answers/s, {batch:.1f} samples a call, {used} workers; "
+            f"model alone {model:.1f}, cores alone {alone:.1f}"
         )
-    value = round(seen.rate / limit, 3)
-    return Metric(case.name, value, "of the limit", at_least=case.bar, note=note, before=before)
-
-
-def main() -> None:
-    """Measure and print."""
-    if sys.argv[1:2] == ["--serve"]:
-        return serve(float(sys.argv[2]), float(sys.argv[3]))
-    parser = argument_parser(__doc__)
-    parser.add_argument("--workers", type=int, default=8)
-    parser.add_argument("--held", type=int, default=HELD, help="trials that a worker holds at once")
-    parser.add_argument("--seconds", type=float, default=8.0, help="for which each run is measured")
-    options = parser.parse_args()
-    n = options.workers
-    cases = (
-        Case(f"{n} workers, 1 ms of simulation an answer", 0.001, n, 0.95, before=True),
-        Case(f"{n} workers, 150 ms of simulation an answer", 0.150, n, 0.9),
-        Case(f"{n} workers, 30 ms: model and cores alike", 0.030, n, 0.95, before=True),
-        Case("workers by default, 1 ms of simulation", 0.001, 0, 0.9),
-        Case("workers by default, 30 ms", 0.030, 0, 0.9),
+        value = round(rate / min(model, alone), 3)
+        figures.append(Figure(what, value, "of the limit", at_least=bar, note=note))
+        print(figures[-1], file=sys.stderr, flush=True)
+    return Result(
+        "A run against a slow model",
+        figures,
+        text=f"""\
+The model takes 100 ms and 2 ms a sample, at most 8 at once; a trial takes {CALLS} answers. Driver,
+workers, wire, server and batching are the real ones; the simulation is a busy loop, so that either
+side can be made the scarcer one. A worker holds {held} trials at once: one computes, or is loaded,
+while the others wait for answers.""",
     )
-    rows = []
-    for case in cases:
-        rows.append(row_of(case, options.seconds, options.held))
-        print(line(rows[-1]), file=sys.stderr, flush=True)
-    text = (
-        "The model takes 100 ms and 2 ms a sample, at most 8 at once; a trial takes "
-        f"{CALLS} answers. Driver, workers, wire, server and batching are the real ones; the "
-        "simulation is a busy loop, so that either side can be made the scarcer one. A worker "
-        f"holds {options.held} trials at once: one computes, or is loaded, while the others wait "
-        "for answers. With one trial each, 8 workers miss a call between two trials, and cannot "
-        "keep both busy where model and cores are equally scarce: while they simulate, the model "
-        "has nothing to do."
-    )
-    finish(Result("throughput", "A run against a slow model", tuple(rows), text=text), options)
 
 
 if __name__ == "__main__":
-    main()
+    if sys.argv[1:2] == ["--serve"]:
+        serve(float(sys.argv[2]), float(sys.argv[3]))
+    else:
+        main(throughput=measure)

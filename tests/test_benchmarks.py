@@ -1,71 +1,73 @@
-"""The results of benchmarks have the common form, and their page says what they say."""
+"""The results of benchmarks have one form, and their page says what they say."""
 
 from __future__ import annotations
 
 import importlib.util
 import json
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 FOLDER = Path(__file__).resolve().parents[1] / "benchmarks"
-FILES = sorted((FOLDER / "results").glob("*.json"))
-
-
-def script(name: str, patch: pytest.MonkeyPatch) -> Any:
-    """A module of benchmarks/, which import each other by name as scripts do."""
-    patch.syspath_prepend(str(FOLDER))
-    spec = importlib.util.spec_from_file_location(name, FOLDER / f"{name}.py")
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    patch.setitem(sys.modules, name, module)
-    spec.loader.exec_module(module)
-    return module
 
 
 @pytest.fixture
-def common(monkeypatch: pytest.MonkeyPatch) -> Any:
-    return script("common", monkeypatch)
+def frame() -> Iterator[Any]:
+    """The module `frame` of benchmarks/, where scripts import each other by name."""
+    spec = importlib.util.spec_from_file_location("frame", FOLDER / "frame.py")
+    assert spec is not None and spec.loader is not None
+    sys.modules["frame"] = module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    yield module
+    del sys.modules["frame"]
 
 
-@pytest.mark.usefixtures("common")
-def test_the_page_is_up_to_date(monkeypatch: pytest.MonkeyPatch) -> None:
-    report = script("report", monkeypatch)
-    written = report.PAGE.read_text(encoding="utf-8")
-    assert report.page(report.load()) == written, "run: python benchmarks/report.py"
+def test_the_page_says_what_the_files_do(frame: Any) -> None:
+    results = frame.load()
+    page = frame.PAGE.read_text(encoding="utf-8")
+    assert frame.page(results) == page, "run: python benchmarks/frame.py"
+    for result in results:
+        assert {"command", "date", "circumstances", "text"} <= set(result)
+        for figure in frame.figures(result):
+            assert figure.value is not None or figure.note, "what was not measured says why"
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
-def test_a_result_has_the_common_form(path: Path, common: Any) -> None:
-    found = json.loads(path.read_text(encoding="utf-8"))
-    assert found["benchmark"] == path.stem
-    assert found["command"] and found["date"]
-    assert {"cores", "cpu"} <= set(found["machine"]) and "python" in found["versions"]
-    for row in found["rows"]:
-        again = common.Metric(**{k: v for k, v in row.items() if k != "met"})
-        assert again.to_json() == row
-        assert row["value"] is not None or row["note"], "what was not measured says why"
+def test_a_bar_is_judged_by_its_numbers(frame: Any) -> None:
+    assert frame.Figure("a", 1.2, "x", at_most=1.25).met is True
+    assert frame.Figure("a", 1.3, "x", at_most=1.25).met is False
+    assert frame.Figure("a", 0.89, "", at_least=0.9).met is False
+    assert frame.Figure("a", None, "", at_least=0.9, note="no peer").met is None
 
 
-def test_a_bar_is_judged_by_its_numbers(common: Any) -> None:
-    assert common.Metric("a", 1.2, "x", at_most=1.25).met is True
-    assert common.Metric("a", 1.3, "x", at_most=1.25).met is False
-    assert common.Metric("a", 0.89, "", at_least=0.9).met is False
-    assert common.Metric("a", None, "", at_least=0.9, note="no peer").met is None
-
-
-def test_figures_from_before_are_kept(tmp_path: Path, common: Any) -> None:
-    path = tmp_path / "x.json"
-    common.write(common.Result("x", "X", (common.Metric("a", 2.0, before=3.0),)), path)
-    common.write(common.Result("x", "X", (common.Metric("a", 1.0),)), path)
-    assert json.loads(path.read_text())["rows"][0]["before"] == 3.0
-
-
-def test_the_command_is_noted_without_where_to_write(
-    common: Any, monkeypatch: pytest.MonkeyPatch
+def test_options_become_arguments_and_the_result_is_kept(
+    frame: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    words = ["/there/wire.py", "--json", "--requests", "5", "--circumstances", "it rains", "--fill"]
+    monkeypatch.setattr(frame, "RESULTS", tmp_path)
+    monkeypatch.setattr(frame, "PAGE", tmp_path / "page.md")
+    words = ["/x/wire.py", "b", "--json", "--rounds", "5", "--circumstances", "it rains", "--quick"]
     monkeypatch.setattr(sys, "argv", words)
-    assert common.command() == "python benchmarks/wire.py --requests 5 --fill"
+
+    def measure(rounds: int = 2, quick: bool = False) -> Any:
+        return frame.Result("T", [frame.Figure("a | b", rounds + quick, "ms", at_most=6)])
+
+    frame.main(a=lambda: None, b=measure)
+    found = json.loads((tmp_path / "b.json").read_text())
+    assert found["command"] == "python benchmarks/wire.py b --rounds 5 --quick"
+    assert "| a \\| b | 6 ms | <= 6 met |  |" in (tmp_path / "page.md").read_text()
+    assert found["circumstances"] == "it rains"
+
+
+def test_finished_jobs_are_not_done_again(frame: Any, tmp_path: Path) -> None:
+    path, done = tmp_path / "build" / "x.jsonl", []
+
+    def run(name: str, seed: int) -> dict[str, int]:
+        done.append((name, seed))
+        return {"value": seed}
+
+    frame.gather(path, [("a", 1)], run)
+    found = frame.gather(path, [("a", 1), ("b", 2)], run)
+    assert done == [("a", 1), ("b", 2)]
+    assert [(row.job, row.value) for row in found] == [(("a", 1), 1), (("b", 2), 2)]
