@@ -35,5 +35,4 @@ def main() -> None:
     print(f"{made.episodes} episodes in {', '.join(map(str, made.folders))}")
 
 
-if __name__ == "__main__":  # episodes are made in processes of their own, which import this file
-    main()
+main()

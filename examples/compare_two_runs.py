@@ -31,5 +31,4 @@ def main() -> None:
     print(f"{found.first} and {found.second} {sure}: [{low:+.1f}, {high:+.1f}] points at 95 %")
 
 
-if __name__ == "__main__":
-    main()
+main()

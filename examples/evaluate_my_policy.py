@@ -62,5 +62,4 @@ def main() -> None:
     print(f"{run.folder}: robospa report {run.folder} writes a page with every trial")
 
 
-if __name__ == "__main__":  # trials run in processes of their own, which import this file
-    main()
+main()

@@ -43,5 +43,4 @@ def main() -> None:
     print(f"{words.out}: {words.cameras}")
 
 
-if __name__ == "__main__":
-    main()
+main()

@@ -54,5 +54,4 @@ def main() -> None:
     world.close()
 
 
-if __name__ == "__main__":
-    main()
+main()

@@ -9,13 +9,13 @@ state is not, as on another processor or with another build of the simulator; ot
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
+from concurrent.futures import as_completed
 from dataclasses import dataclass
-from multiprocessing import get_context
-from typing import Any
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 from robospa.harness.factory import load_function
+from robospa.harness.pool import JobProcess, Pool, WorkerDied
 from robospa.harness.running.manifest import about_machine, changed_settings
 from robospa.harness.worlds import open_world
 from robospa.leaderboard.bundle import BundleError
@@ -26,6 +26,10 @@ from robospa.leaderboard.verify import Valid, read_traces
 from robospa.results.records.run_io import differences
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
+
+if TYPE_CHECKING:
+    from robospa.harness.trial import TrialParts
+    from robospa.harness.world import World
 
 IDENTICAL, AGREES, DIFFERENT = "identical", "agrees", "different"
 STATE = ("digest", "physics_steps")
@@ -127,21 +131,18 @@ def replay(
         (valid.run.records[key], traces[key], valid.settings.spec(key.task).action) for key in keys
     ]
     found: dict[TrialKey, Replayed] = {}
-    start = (reference.world, reference.parts)
-    spawn = get_context("spawn")
-    with ProcessPoolExecutor(max(1, workers), spawn, _start, start) as pool:
-        futures = [pool.submit(_again, *job) for job in jobs]
+    where = (reference.world, reference.parts)
+    start = partial(JobProcess, _replayer, where, name="replay")
+    with Pool[Job, Replayed](start, max(1, workers), deaths=1) as pool:
         try:
-            for future in as_completed(futures):
+            for future in as_completed([pool.submit(job) for job in jobs]):
                 trial = future.result()
                 found[trial.key] = trial
                 on_trial(trial)
-        except BrokenProcessPool:
+        except WorkerDied:
             raise BundleError(
                 "the simulator does not run here, or crashed: `robospa doctor` says what is missing"
             ) from None
-        finally:
-            pool.shutdown(cancel_futures=True)
     trials = tuple(found[key] for key in keys)
     return Replay(trials, len(valid.keys), challenge.strip(), _changed(valid.run.manifest))
 
@@ -161,19 +162,25 @@ def judge(claimed: TrialRecord, again: TrialRecord) -> Replayed:
     return Replayed(claimed.key, kind, tuple(differs), again)
 
 
-_WORLD: list[Any] = []
+Job = tuple[TrialRecord, Trace, str]
+"""What a record claims, what was executed, and in which action space."""
 
 
-def _start(world: str, parts: str) -> None:
-    """What a process keeps: a world without renderer, and what finds scenes and goals."""
-    _WORLD[:] = [open_world(world, render=False), load_function(parts)]
+def _replayer(where: tuple[str, str]) -> Callable[[Job], Replayed]:
+    """What plays trials again in one process: in a world without renderer, with scenes and goals of
+    these parts."""
+    world, parts = where
+    try:
+        return partial(_again, open_world(world, render=False), load_function(parts))
+    except Exception as error:
+        raise WorkerDied(str(error)) from None
 
 
-def _again(claimed: TrialRecord, trace: Trace, space: str) -> Replayed:
+def _again(world: World, parts: Callable[[TrialKey], TrialParts], job: Job) -> Replayed:
     """Play one trial again and compare."""
     from robospa.harness.replay import replay
 
-    world, parts = _WORLD
+    claimed, trace, space = job
     try:
         actions, joints = split_trace(trace, claimed.key.embodiment, space)
         again = replay(

@@ -28,8 +28,7 @@ from robospa.harness.running.atomic_file import replace_file
 from robospa.harness.running.evaluate import Request
 from robospa.harness.running.manifest import changed_settings
 from robospa.harness.running.policy_probe import probe_policies
-from robospa.harness.seeds.attempt import ExpertPool
-from robospa.harness.seeds.sweep import try_seeds
+from robospa.harness.seeds.attempt import expert_pool
 from robospa.harness.trial_identity import salt_hash
 from robospa.leaderboard.agreement import (
     LEAST_POWER,
@@ -99,7 +98,7 @@ def draw_block(
         raise BundleError(f"a block of {count} trials a variant shows nothing; draw at least 1")
     seeds: dict[tuple[str, int], tuple[int, ...]] = {}
     salt = secrets.token_hex(SALT)
-    with ExpertPool(workers, salt) as pool:
+    with expert_pool(workers, salt) as pool:
         for task, level in variants:
             found: list[int] = []
             tried = 0
@@ -108,7 +107,9 @@ def draw_block(
                     raise BundleError(f"the expert does not solve {task} level {level}")
                 wanted = [_fresh() for _ in range(count - len(found))]
                 tried += len(wanted)
-                attempts = try_seeds(pool, ListKey(task, level, embodiment, mode), wanted)
+                key = ListKey(task, level, embodiment, mode)
+                futures = [pool.submit((key, seed)) for seed in wanted]
+                attempts = [future.result() for future in futures]
                 found += [item.seed for item in attempts if item.accepted]
             seeds[task, level] = tuple(sorted(set(found)))
             note(f"{task} level {level}: {len(found)} of {tried} seeds accepted")

@@ -9,11 +9,9 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import cache
 from itertools import groupby
-from multiprocessing import get_context
 from typing import Annotated, Any
 
 import numpy as np
@@ -22,6 +20,7 @@ from numpy.typing import NDArray
 
 from robospa.action_space import KINDS
 from robospa.harness.factory import load_function
+from robospa.harness.pool import JobProcess, Pool
 from robospa.harness.worlds import SAPIEN_NAME, TASK_PARTS
 from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.card import Card
@@ -348,12 +347,10 @@ def check_scenes(
     if workers < 2 or len(claims) <= FEW:
         _judge((first_wrong(parts, found) for found in variants), variants, done)
         return
-    with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
-        try:
-            wrong = pool.map(first_wrong, [parts] * len(variants), variants)
-            _judge(wrong, variants, done)
-        finally:
-            pool.shutdown(cancel_futures=True)
+    start = partial(JobProcess, _checker, parts, name="scenes")
+    with Pool[Sequence[Claim], str](start, workers) as pool:
+        futures = [pool.submit(found) for found in variants]
+        _judge((future.result() for future in futures), variants, done)
 
 
 def _judge(wrong: Iterable[str], variants: Sequence[Sequence[Claim]], done: Done) -> None:
@@ -363,6 +360,10 @@ def _judge(wrong: Iterable[str], variants: Sequence[Sequence[Claim]], done: Done
             raise BundleError(text)
         count += len(claims)
         done(count, trials)
+
+
+def _checker(parts: str) -> Callable[[Sequence[Claim]], str]:
+    return partial(first_wrong, parts)
 
 
 def first_wrong(parts: str, claims: Sequence[Claim]) -> str:

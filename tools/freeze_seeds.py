@@ -27,7 +27,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from robospa.harness.robots import embodiments
-from robospa.harness.seeds.attempt import ExpertPool
+from robospa.harness.seeds.attempt import expert_pool
 from robospa.harness.seeds.confirm import confirm
 from robospa.harness.seeds.evidence import Evidence
 from robospa.harness.seeds.inputs import inputs
@@ -137,8 +137,8 @@ def confirmed(keys: list[ListKey], options: argparse.Namespace) -> Iterator[tupl
     evidence = Evidence(options.attempts)
     made = {key: row.inputs for key in keys if (row := rows.get((key, options.start)))}
     old = {key: name for key, name in made.items() if name != inputs(key)}
-    with ExpertPool(options.workers) as pool:
-        for found in confirm(pool, old, evidence, options.confirm):
+    with expert_pool(options.workers) as pool:
+        for found in confirm(lambda *job: pool.submit(job), old, evidence, options.confirm):
             key = found.key
             if found.holds:
                 evidence.adopt(key, old[key], inputs(key))

@@ -51,7 +51,7 @@ def failures(
 
 def make_films(run: Run) -> None:
     """Make the films that `run` lacks; ends the program with 130 on Ctrl-C."""
-    from robospa.harness.running.film_stage import FilmsInterrupted, film_now
+    from robospa.harness.running.films import FilmsInterrupted, film_now
 
     try:
         for text in film_now(run):

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from robospa.harness.running.evaluate import Request, RunAborted, evaluate
-from robospa.harness.running.film_stage import FilmsInterrupted
+from robospa.harness.running.films import FilmsInterrupted
 
 if TYPE_CHECKING:
     from robospa.results.records.run_io import Run

@@ -60,7 +60,7 @@ def _report(run: Path, with_published: bool, film: bool, port: int, minutes: flo
 
     from robospa.harness.live_report import LiveReport
     from robospa.harness.report_server import serving
-    from robospa.harness.running.film_stage import film_lines, films_afterwards
+    from robospa.harness.running.films import film_lines, films_afterwards
     from robospa.results.paper.published import load
     from robospa.results.records.run_io import read_run
 
@@ -79,5 +79,5 @@ def _report(run: Path, with_published: bool, film: bool, port: int, minutes: flo
         finally:
             if films is not None:
                 films.close()
-                for text in film_lines(films, run):
+                for text in film_lines(films):
                     print(text)

@@ -4,7 +4,7 @@
 |---|---|
 | `episode`, `episode_file` | a verified demonstration as a value, and its file |
 | `episode_maker`, `encoding`, `subtasks` | making one: expert, replay, pictures |
-| `jobs`, `worker_pool`, `local_makers`, `ray_makers`, `open_pool` | making many: processes, Ray |
+| `jobs`, `ray_makers`, `open_pool` | making many: processes, Ray |
 | `settings`, `identity`, `disk_use` | what is collected, with what, and the room that it takes |
 | `collect`, `store`, `collection_progress` | the collection: what is done on disk, and going on |
 | `pack`, `features`, `tables`, `statistics`, `films`, `numbered_files` | packing, for all formats |

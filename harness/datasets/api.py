@@ -38,9 +38,6 @@ def collect(
 
         made = robospa.collect("data/mine", tasks="GAC", levels=1, episodes=10)
 
-    Episodes are made in worker processes, so a script calls this under
-    `if __name__ == "__main__":`.
-
     Args:
         out: Folder of the data set.
         tasks: Names of tasks, categories or dimensions.

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future
 from contextlib import AbstractContextManager
 from dataclasses import asdict, dataclass
 from functools import partial
@@ -21,18 +22,18 @@ from robospa.harness.datasets.manifest import MANIFEST, DatasetManifest, Failure
 from robospa.harness.datasets.pack import FORMATS, check_packages, images_of, pack
 from robospa.harness.datasets.settings import AUTO, KEYFRAMES, Collection, lists_of, trial_of
 from robospa.harness.datasets.store import EPISODES, EpisodeStore, Facts
+from robospa.harness.pool import Pool
 from robospa.harness.running.atomic_file import PARTIAL
 from robospa.harness.running.run_lock import run_lock
 from robospa.harness.seeds.attempt import Attempt
-from robospa.harness.seeds.sweep import Pool, Search, sweep
+from robospa.harness.seeds.sweep import Search, sweep
 from robospa.harness.settings import SettingsError
 from robospa.registry import did_you_mean
 from robospa.results.records.run_state import LOCK
 from robospa.tasks.seeds import FIRST_TRAINING_SEED, ListKey
 from robospa.trial import path_part
 
-JobOf = Callable[[ListKey, int], Job]
-OpenPool = Callable[[JobOf, int], AbstractContextManager[Pool]]
+OpenPool = Callable[[int], AbstractContextManager[Pool[Job, Attempt]]]
 """Opens the workers, at most as many as there are episodes left."""
 
 
@@ -219,8 +220,11 @@ def _make(
         search.attempts[item.seed] = store.add(search.key, item)
         progress.add(item, frames(search.key))
 
-    with open_pool(order.job, left) as pool, progress:
-        for search in sweep(pool, wanted, note):
+    def submit(key: ListKey, seed: int) -> Future[Attempt]:
+        return pool.submit(order.job(key, seed))
+
+    with open_pool(left) as pool, progress:
+        for search in sweep(submit, pool.workers, wanted, note):
             if search.given_up:
                 lacking = count - len(search.accepted)
                 progress.give_up(lacking, lacking * frames(search.key))

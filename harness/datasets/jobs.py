@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 
 from robospa.harness.datasets.encoding import CodecMissing
-from robospa.harness.seeds.attempt import Attempt
+from robospa.harness.factory import load_function
+from robospa.harness.seeds.attempt import CRASHED, Attempt
 from robospa.harness.world import RenderUnavailable, SceneUnstable
 from robospa.observation import CameraSpec
 from robospa.trial import TrialKey
@@ -69,6 +71,20 @@ def attempt_job(maker: Maker, job: Job) -> MadeEpisode:
         return refused(job.key.seed, str(error))
     except Exception as error:
         return refused(job.key.seed, f"{type(error).__name__}: {error}")
+
+
+def maker_at(path: str) -> Callable[[Job], Attempt]:
+    """What a worker makes episodes with: the maker at `path`, `module:function`."""
+    try:
+        maker = load_function(path)()
+    except Exception as error:
+        raise CannotMake(f"{error}" or type(error).__name__) from error
+    return partial(attempt_job, maker)
+
+
+def crashed(job: Job) -> Attempt:
+    """What comes of a seed at which several workers died."""
+    return refused(job.key.seed, CRASHED)
 
 
 def refused(seed: int, reason: str) -> MadeEpisode:

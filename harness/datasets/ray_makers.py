@@ -7,7 +7,7 @@ from contextlib import contextmanager, suppress
 from typing import Any
 
 from robospa.harness.datasets.jobs import CannotMake, Job, MadeEpisode
-from robospa.harness.datasets.worker_pool import WorkerDied
+from robospa.harness.pool import WorkerDied
 from robospa.harness.running.ray_cluster import NoCluster, RaySettings, error_line, join_cluster
 
 

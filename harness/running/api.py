@@ -37,8 +37,6 @@ def evaluate(
         run = robospa.evaluate("ws://gpu:8000", tasks="spatial", levels=[1, 3], trials=20)
         successes = sum(record.success for record in run.records.values())
 
-    Trials run in worker processes, so a script calls this under `if __name__ == "__main__":`.
-
     Args:
         policy: One of
             the URL of a policy server, or a list of URLs of equal servers;

@@ -6,19 +6,18 @@ earlier run of the same folder.
 
 from __future__ import annotations
 
-import multiprocessing
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from multiprocessing.connection import Connection
 from typing import Any
 
 from robospa.harness.clock.clock import timed_suite, timing_warning
 from robospa.harness.factory import is_url
+from robospa.harness.pool import JobProcess, WorkerDied, WorkerStuck
 from robospa.harness.running.atomic_file import replace_file
 from robospa.harness.running.attempts import spent_trials
 from robospa.harness.running.executor import RunAborted
-from robospa.harness.running.film_stage import films_of, finish_films
+from robospa.harness.running.films import films_of, finish_films
 from robospa.harness.running.manifest import Manifest, about_machine, check_folder, open_run
 from robospa.harness.running.policy_probe import (
     ProbedPolicy,
@@ -77,15 +76,21 @@ class WorldBroken(Exception):
     """No world can be built on this machine."""
 
 
-def _probe_world(
-    pipe: Connection, kind: str, arguments: Mapping[str, Any], render: bool | None
-) -> None:
-    try:
-        world = open_world(kind, arguments, render)
-        pipe.send((dict(world.info()), ""))
-        world.close()
-    except Exception as error:
-        pipe.send(({}, describe(error)))
+def world_info(
+    asked: tuple[str, Mapping[str, object], bool | None],
+) -> Callable[[None], dict[str, Any]]:
+    """What asks a world of this kind with these arguments, drawing or not, about itself."""
+
+    def ask(_: None) -> dict[str, Any]:
+        try:
+            world = open_world(*asked)
+            info = dict(world.info())
+            world.close()
+        except Exception as error:
+            raise WorldBroken(describe(error)) from None
+        return info
+
+    return ask
 
 
 def probe_world(config: WorkerConfig, render: bool) -> dict[str, Any]:
@@ -93,32 +98,19 @@ def probe_world(config: WorkerConfig, render: bool) -> dict[str, Any]:
 
     Raises WorldBroken: better now than in every trial.
     """
-    spawn = multiprocessing.get_context("spawn")
-    ours, theirs = spawn.Pipe()
-    wanted = (config.world, config.world_arguments, True if render else None)
-    child = spawn.Process(target=_probe_world, args=(theirs, *wanted), daemon=True)
-    child.start()
-    theirs.close()
+    asked = (config.world, config.world_arguments, True if render else None)
+    worker = JobProcess(world_info, asked, seconds=PROBE_SECONDS, name="world")
+    advice = "`robospa doctor` says what is missing"
     try:
-        if not ours.poll(PROBE_SECONDS):
-            raise WorldBroken(f"the world was not ready after {PROBE_SECONDS:g} s")
-        info, trouble = ours.recv()
-    except EOFError as error:
-        child.join()
-        raise WorldBroken(
-            f"the simulator crashed while starting (exit code {child.exitcode}); "
-            "`robospa doctor` says what is missing"
-        ) from error
+        return worker.run(None)
+    except WorkerStuck:
+        raise WorldBroken(f"the world was not ready after {PROBE_SECONDS:g} s") from None
+    except WorkerDied as error:
+        raise WorldBroken(f"the simulator crashed while starting ({error}); {advice}") from error
+    except WorldBroken as error:
+        raise WorldBroken(f"no world can be built: {error}; {advice}") from error
     finally:
-        child.join(5.0)
-        child.kill()
-        child.join()
-        ours.close()
-    if trouble:
-        raise WorldBroken(
-            f"no world can be built: {trouble}; `robospa doctor` says what is missing"
-        )
-    return dict(info)
+        worker.kill()
 
 
 def make_manifest(request: Request, policies: Mapping[str, ProbedPolicy]) -> Manifest:
@@ -275,13 +267,13 @@ def evaluate(request: Request) -> None:
             def show(status: Status) -> None:
                 lock.check(folder)
                 films.poll()
-                progress.show(replace(status, films=films.owed))
+                progress.show(replace(status, films=films.pending))
 
             runner.on_record, runner.on_status = add, show
             try:
                 runner.run()
                 tracker.finish(folder)
-                about_films = finish_films(films, progress, folder)
+                about_films = finish_films(films, progress)
             finally:
                 films.close()
                 tracker.close()

@@ -1,35 +1,48 @@
-"""The films of a run, made in processes of their own while its trials go on and after them.
+"""The films of a run, made after their trials in processes of their own, while others go on.
 
-A film follows its record: nothing of it happens in a worker, and what goes wrong with it ends no
-trial and no run. What waits is only a queue of records, because a film is made from the actions on
-disk. Beside the run few processes work, at the lowest priority; once its trials are done, as many
-as there are cores. A film that is not made, whatever the reason, stays owed: its record names it.
+Nothing of a film happens in a worker, and what goes wrong with it ends no trial and no run. Beside
+the run few processes work; once its trials are done, as many as there are cores. A film that is not
+made, whatever the reason, can be made later: its record names it.
 """
 
 from __future__ import annotations
 
+import contextlib
 import os
-import pickle
 import time
-from collections import deque
-from collections.abc import Callable, Iterable
-from contextlib import suppress
+import traceback
+from collections.abc import Callable, Iterable, Mapping
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass
-from multiprocessing.connection import Connection, wait
-from multiprocessing.context import SpawnProcess
+from itertools import count
+from pathlib import Path
+from typing import TYPE_CHECKING
 
+from robospa.harness.pool import LOWEST_PRIORITY, JobProcess, JobWorker, Pool, WorkerDied
+from robospa.harness.running.atomic_file import StorageError, replace_file, storage_errors
 from robospa.harness.running.autoscaling import cores
-from robospa.harness.running.film_process import FilmConfig, FilmDone
-from robospa.harness.running.film_process import main as film_process
-from robospa.harness.running.local_workers import start_process
+from robospa.harness.running.log_file import LOGS, log_to
+from robospa.harness.running.progress import Progress
+from robospa.harness.running.worker import WorkerConfig, describe, load_parts
+from robospa.harness.settings import Recording, SettingsError
+from robospa.harness.settings_file import FILE, read_settings
+from robospa.harness.worlds import SAPIEN_NAME, TASK_PARTS, open_world
+from robospa.results.failures.labels import label
+from robospa.results.records.films import film_name, films_in, owed_films
+from robospa.results.records.manifest import RunError
+from robospa.results.records.run_io import Run, finished
 from robospa.results.records.trial_record import TrialRecord
+from robospa.trial import TrialKey
 
-LOWEST_PRIORITY = 19
-"""The `nice` value of least weight: a seventieth of that of a process with the usual one."""
+if TYPE_CHECKING:
+    from robospa.harness.world import World
+
+UNSPOKEN_PARTS = "robospa.harness.official.sentences:unspoken_parts"
+"""For trials whose sentence came from a checkout: a film does not show it."""
+RESERVE = 100e6
+"""Bytes that films leave free on the run's disk: records need them, and end a run that has none."""
 CORES_EACH = 4
 """Beside a run there is one process for so many cores."""
-GRACE = 20.0
-"""After the run a process of low priority may take so long to end its film [s]."""
 LONGEST = 1800.0
 """A film that takes longer is given up, and its process killed [s]."""
 CRASHES = 3
@@ -37,18 +50,82 @@ CRASHES = 3
 POLL_SECONDS = 0.5
 
 
-@dataclass
-class _Process:
-    process: SpawnProcess
-    pipe: Connection
-    beside: bool
-    record: TrialRecord | None = None
-    since: float = 0.0
+class FilmsInterrupted(KeyboardInterrupt):
+    """Ctrl-C while only films were missing; the message says how to make them."""
 
-    def kill(self) -> None:
-        self.process.kill()
-        self.process.join()
-        self.pipe.close()
+
+@dataclass(frozen=True)
+class FilmDone:
+    """The film of `key` is on disk, or could not be made because of `trouble`, a sentence; `stop`:
+    no other can be made either."""
+
+    key: TrialKey
+    trouble: str = ""
+    stop: bool = False
+
+
+class FilmMaker:
+    """Makes one film after the other in one world, which is built anew after an error."""
+
+    def __init__(self, config: WorkerConfig) -> None:
+        self.config = config
+        self._world: World | None = None
+
+    def make(self, record: TrialRecord) -> FilmDone:
+        """Film the trial of `record`; whatever goes wrong is in the answer."""
+        from robospa.harness.replay import ReplayError
+        from robospa.harness.world import RenderUnavailable
+
+        try:
+            self._film(record)
+        except (StorageError, RenderUnavailable) as error:
+            return FilmDone(record.key, describe(error), stop=True)
+        except ReplayError as error:
+            return FilmDone(record.key, str(error))
+        except Exception as error:
+            with contextlib.suppress(OSError):  # the log's disk may be full
+                traceback.print_exc()
+            world, self._world = self._world, None
+            if world is not None:
+                with contextlib.suppress(Exception):
+                    world.close()
+            return FilmDone(record.key, f"{record.key.slug}: {describe(error)}")
+        return FilmDone(record.key)
+
+    def _film(self, record: TrialRecord) -> None:
+        from robospa.harness.pictures.video import film
+
+        config = self.config
+        with storage_errors(config.folder):
+            disk = os.statvfs(config.folder)
+        if disk.f_bavail * disk.f_frsize < RESERVE:
+            raise StorageError(
+                f"{config.folder} has less than {RESERVE / 1e6:.0f} MB left, which records need"
+            )
+        if self._world is None:
+            self._world = open_world(config.world, config.world_arguments, render=True)
+        data = film(
+            self._world,
+            record,
+            config.folder,
+            parts=load_parts(config),
+            step_scale=config.step_scale,
+            cameras=config.cameras,
+        )
+        replace_file(config.folder / film_name(record.key), data, parents=False)
+
+
+def film_maker(argument: tuple[WorkerConfig, str]) -> Callable[[TrialRecord], FilmDone]:
+    """What the process of that name makes films with."""
+    config, name = argument
+    with contextlib.suppress(StorageError):  # said with the first film
+        log_to(config.folder / LOGS / f"{name}.log")
+    return FilmMaker(config).make
+
+
+def film_process(config: WorkerConfig, name: str, nice: int) -> JobWorker[TrialRecord, FilmDone]:
+    """A process of that name that makes films."""
+    return JobProcess(film_maker, (config, name), seconds=LONGEST, name=name, nice=nice)
 
 
 class Films:
@@ -57,14 +134,17 @@ class Films:
     Only `finish` waits, and nothing but it raises: errors become `troubles`.
     """
 
-    def __init__(self, config: FilmConfig, most: int = 0) -> None:
-        self._config = config
+    def __init__(self, config: WorkerConfig, most: int = 0, nice: int = LOWEST_PRIORITY) -> None:
+        self.config = config
         self._most = most or cores()
-        self._queue: deque[TrialRecord] = deque()
-        self._processes: list[_Process] = []
-        self._started = 0
+        names = (f"films-{number:03d}" for number in count())
+        self._pool: Pool[TrialRecord, FilmDone] = Pool(
+            lambda: film_process(config, next(names), nice),
+            max(1, cores() // CORES_EACH),
+            deaths=1,
+        )
+        self._jobs: dict[Future[FilmDone], TrialRecord] = {}
         self._crashes = 0
-        self._beside = True
         self.made = 0
         self.failed = 0
         self.troubles: list[str] = []
@@ -72,119 +152,168 @@ class Films:
         """Why no more films can be made, if that is so."""
 
     @property
-    def owed(self) -> int:
+    def pending(self) -> int:
         """Films that are waiting or being made."""
-        return len(self._queue) + sum(p.record is not None for p in self._processes)
+        return len(self._jobs)
 
     def add(self, records: Iterable[TrialRecord]) -> None:
         """Film `records` in their order, after those that wait."""
-        self._queue += records
+        for record in records:
+            self._jobs[self._pool.submit(record)] = record
 
     def poll(self) -> None:
-        """Take what was made and hand out what waits; returns at once."""
-        try:
-            self._receive()
-            self._hand_out()
-        except OSError as error:  # no process or pipe can be made: memory, limits
-            self._stop(f"no process for films can be started: {error}")
+        """Take what was made; returns at once."""
+        for future in [future for future in self._jobs if future.done()]:
+            if not self.stopped:
+                self._take(future)
 
     def finish(self, show: Callable[[], None] = lambda: None) -> None:
         """Make all that wait, now with all cores; `show` is called a few times a second."""
-        self._beside = False
-        until = time.monotonic() + GRACE
-        while self.owed and not self.stopped:
-            if time.monotonic() > until:
-                self._take_back()
+        self._pool.grow(min(self._most, self.pending))
+        while self._jobs and not self.stopped:
+            wait(self._jobs, POLL_SECONDS, FIRST_COMPLETED)
             self.poll()
             show()
-            wait([w for p in self._processes for w in (p.pipe, p.process.sentinel)], POLL_SECONDS)
-        self.poll()
 
     def close(self) -> None:
-        """End the processes; what they were making stays owed."""
-        for one in self._processes:
-            one.kill()
-        self._processes = []
+        """End the processes; what they were making can be made later."""
+        self._pool.close()
 
-    def _receive(self) -> None:
-        for one in list(self._processes):
-            ended = not one.process.is_alive()  # asked first: its last answer may have come
-            try:
-                while one.pipe.poll():
-                    self._take(one, one.pipe.recv())
-            except (EOFError, OSError):
-                ended = True
-            if one.record is not None and time.monotonic() - one.since > LONGEST:
-                self._fail(f"{one.record.key.slug}: its film took longer than {LONGEST:g} s")
-                self._remove(one)
-            elif ended:
-                self._lost(one)
-
-    def _take(self, one: _Process, done: FilmDone) -> None:
-        record, one.record, self._crashes = one.record, None, 0
+    def _take(self, future: Future[FilmDone]) -> None:
+        key = self._jobs[future].key
+        try:
+            done = future.result()
+        except WorkerDied as error:
+            done = FilmDone(key, f"{key.slug}: the process that filmed it died ({error})")
+            self._crashes += 1
+            if self._crashes >= CRASHES:
+                self._stop(f"{CRASHES} processes in a row died while they filmed")
+        except OSError as error:  # no process or pipe can be made: memory, limits
+            done = FilmDone(key, f"no process for films can be started: {error}", stop=True)
+        else:
+            self._crashes = 0
         if done.stop:
-            self._queue.extendleft([] if record is None else [record])
             self._stop(done.trouble)
-        elif done.trouble:
-            self._fail(done.trouble)
+            return
+        del self._jobs[future]
+        if done.trouble:
+            self.failed += 1
+            self.troubles.append(done.trouble)
         else:
             self.made += 1
 
-    def _lost(self, one: _Process) -> None:
-        """A process has died, most likely over its film, which is left out then."""
-        self._remove(one)
-        one.process.join()
-        if one.record is not None:
-            self._fail(
-                f"{one.record.key.slug}: the process that filmed it died "
-                f"(exit code {one.process.exitcode})"
-            )
-        self._crashes += 1
-        if self._crashes >= CRASHES:
-            self._stop(f"{CRASHES} processes in a row died while they filmed")
-
-    def _fail(self, trouble: str) -> None:
-        self.failed += 1
-        self.troubles.append(trouble)
-
     def _stop(self, trouble: str) -> None:
-        self.stopped = self.stopped or trouble
+        self.stopped = trouble
+        self._pool.close()
 
-    def _remove(self, one: _Process) -> None:
-        one.kill()
-        self._processes.remove(one)
 
-    def _take_back(self) -> None:
-        """Whoever still works at low priority loses its film to another."""
-        for one in [p for p in self._processes if p.beside]:
-            if one.record is not None:
-                self._queue.appendleft(one.record)
-            self._remove(one)
+def films_of(config: WorkerConfig, known: Mapping[TrialKey, TrialRecord], workers: int) -> Films:
+    """The films of a run: those that its `known` trials lack, unless it wants none now."""
+    films = Films(config, workers)
+    if config.video != "none":
+        films.add(owed_films(config.folder, known.values()))
+    return films
 
-    def _hand_out(self) -> None:
-        if self.stopped:
-            return
-        for one in [p for p in self._processes if p.record is None]:
-            if one.beside and not self._beside:
-                self._remove(one)
-            elif self._queue:
-                self._give(one)
-        limit = max(1, cores() // CORES_EACH) if self._beside else self._most
-        while self._queue and len(self._processes) < limit:
-            config = pickle.dumps(self._config)
-            name = f"films-{self._started:03d}"
-            process, pipe = start_process(film_process, config, name)
-            if self._beside and process.pid is not None:
-                with suppress(ProcessLookupError):  # before it has any thread: they inherit it
-                    os.setpriority(os.PRIO_PROCESS, process.pid, LOWEST_PRIORITY)
-            self._started += 1
-            self._processes.append(_Process(process, pipe, self._beside))
-            self._give(self._processes[-1])
 
-    def _give(self, one: _Process) -> None:
-        one.record, one.since = self._queue.popleft(), time.monotonic()
-        try:
-            one.pipe.send(one.record)
-        except OSError:
-            self._queue.appendleft(one.record)  # it has just died, which `_receive` will see
-            one.record = None
+def finish_films(films: Films, progress: Progress) -> list[str]:
+    """Wait for the films of a run whose trials are done; sentences about them.
+
+    Raises FilmsInterrupted on Ctrl-C; what is not made can be made later.
+    """
+    began, before = time.monotonic(), films.made
+    try:
+        films.finish(lambda: progress.show_films(films.made - before, films.pending))
+    except KeyboardInterrupt:
+        how = how_to_film(films.config.folder)
+        raise FilmsInterrupted(f"{films.pending} films are still to be made: {how}") from None
+    finally:
+        films.close()
+    return film_lines(films, time.monotonic() - began)
+
+
+def film_lines(films: Films, seconds: float = 0.0) -> list[str]:
+    """How many films were made, how long that was waited for, and why others were not."""
+    lines = []
+    if films.made:
+        waited = f"; waited {seconds:.0f} s for them" if seconds >= 1.0 else ""
+        lines.append(f"{films.made} films made{waited}")
+    if films.failed:
+        lines.append(f"warning: {films.failed} films could not be made: {films.troubles[0]}")
+    if films.stopped and films.pending:
+        lines.append(
+            f"warning: {films.pending} films are still to be made ({films.stopped}): "
+            f"{how_to_film(films.config.folder)}"
+        )
+    return lines
+
+
+def how_to_film(folder: Path) -> str:
+    """What makes the films that a run lacks."""
+    return f"`robospa failures {folder} --film` makes them"
+
+
+def unfilmed(run: Run) -> list[TrialRecord]:
+    """The trials that `run` wants a film of and those that failed, as far as they have none."""
+    there = films_in(run.folder)
+    results = [record for _, record in sorted(run.records.items()) if finished(record)]
+    return [
+        record
+        for record in results
+        if film_name(record.key) not in there
+        and (record.video == film_name(record.key) or label(record) is not None)
+    ]
+
+
+def films_afterwards(run: Run) -> Films:
+    """The films that a `run` lacks which nobody is running; raises RunError if it cannot be filmed
+    from its folder."""
+    if run.in_progress:
+        raise RunError(f"the run in {run.folder} is going on and makes its films itself")
+    films = Films(replay_config(run), nice=0)
+    films.add(unfilmed(run))
+    return films
+
+
+def replay_config(run: Run) -> WorkerConfig:
+    """With which world and scenes trials of `run` are played again from its folder; raises RunError
+    if they cannot be."""
+    settings = run.manifest["settings"]
+    world = dict(settings.get("world") or {})
+    if settings.get("salt_sha256"):
+        raise RunError(
+            f"the scenes of {run.folder} are hidden: resume it to have it filmed; nothing else can "
+            "play its trials again"
+        )
+    known = {"render", "control", "action_steps"}  # a folder may come from a stranger
+    if world.pop("name", SAPIEN_NAME) != SAPIEN_NAME or world.keys() - known:
+        raise RunError(
+            f"{run.folder} was run in another world: its own run films its trials, and nothing "
+            "else can play them again"
+        )
+    return WorkerConfig(
+        run.folder,
+        "",
+        world=SAPIEN_NAME,
+        world_arguments=world,
+        parts=UNSPOKEN_PARTS if settings.get("instructions") else TASK_PARTS,
+        step_scale=float(settings.get("step_scale", 1.0)),
+        cameras=_cameras(run.folder),
+    )
+
+
+def _cameras(folder: Path) -> tuple[str, ...]:
+    """The cameras that the run's own settings name for its films; the usual one without them."""
+    try:
+        return read_settings(folder / FILE).recording.cameras
+    except SettingsError:
+        return Recording().cameras
+
+
+def film_now(run: Run) -> list[str]:
+    """Make the films that `run` lacks, at full speed; sentences about them. Raises RunError, and
+    FilmsInterrupted on Ctrl-C."""
+    films = films_afterwards(run)
+    if not films.pending:
+        films.close()
+        return ["no film is missing"]
+    return finish_films(films, Progress(len(run.keys), len(run.keys)))

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from robospa.extras import remedy
-from robospa.harness.running.local_workers import sigint_ignored
+from robospa.harness.pool import sigint_blocked
 
 PROBE_SECONDS = 5.0
 NONE_HERE = (
@@ -59,7 +59,7 @@ def join_cluster(address: str) -> Any:
     logging.getLogger("ray").setLevel(logging.CRITICAL)
     on_sigterm = signal.getsignal(signal.SIGTERM)
     try:
-        with sigint_ignored():
+        with sigint_blocked():
             ray.init(address=address, **options)
     except Exception as error:
         text = f"cannot join the Ray cluster at {address}: {error_line(error)}"

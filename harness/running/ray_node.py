@@ -18,7 +18,7 @@ from importlib import metadata
 from pathlib import Path
 
 from robospa.harness.running.code_hash import code_hash
-from robospa.harness.running.local_workers import LocalExecutor
+from robospa.harness.running.executor import LocalExecutor
 from robospa.harness.running.log_file import LOGS
 from robospa.harness.running.messages import Command, Heartbeat, Message, Ready, TrialDone
 from robospa.harness.running.worker import WorkerConfig
@@ -77,8 +77,6 @@ class WorkerActor:
         self._path = Path(self._folder.name)
         self._log = self._path / LOGS / f"{name}.log"
         self._read = 0
-        # A spawned process imports its parent's main module, which is Ray's and loads all of Ray.
-        vars(sys.modules["__main__"]).update(__spec__=None, __file__=None)
         self._executor = LocalExecutor(replace(unpickled, folder=self._path), 1)
         self._worker = self._executor.start(name)
         return ""

@@ -24,8 +24,7 @@ from robospa.harness.running.attempts import (
 )
 from robospa.harness.running.autoscaling import Autoscaler
 from robospa.harness.running.error_watch import ErrorWatch
-from robospa.harness.running.executor import Executor, RunAborted
-from robospa.harness.running.local_workers import LocalExecutor
+from robospa.harness.running.executor import Executor, LocalExecutor, RunAborted
 from robospa.harness.running.log_file import LOGS
 from robospa.harness.running.messages import (
     Fatal,

@@ -5,15 +5,13 @@ its own; one computes while the others wait for their servers (`harness.running.
 commands are answered with the messages of `harness.running.messages`: Ready, then TrialDone for
 each trial once the record is on disk, TrialLost if it could not be run, or Fatal if no trial could
 ever be run. After a loss the world is rebuilt and the policy reconnected before the next trial,
-never within one. Threads send heartbeats. A worker whose driver has died ends at once
-(`worker_start`).
+never within one. Threads send heartbeats.
 """
 
 from __future__ import annotations
 
 import contextlib
 import os
-import signal
 import sys
 import threading
 import traceback
@@ -336,10 +334,9 @@ def _hold_beside(*arguments: Any) -> None:
         os._exit(1)
 
 
-def main(pipes: Sequence[Connection], config: WorkerConfig, name: str) -> None:
+def main(pipes: Sequence[Connection], argument: tuple[WorkerConfig, str]) -> None:
     """All that a worker process does; it holds as many trials at once as there are pipes."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    config, name = argument
     try:
         log_to(config.folder / LOGS / f"{name}.log")
         writer = RecordWriter(config.folder)

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
-from concurrent.futures import Future, ProcessPoolExecutor
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from multiprocessing import get_context
 
+from robospa.harness.pool import JobProcess, Pool
 from robospa.harness.world import SceneUnstable, World
 from robospa.protocol.policy import Policy
 from robospa.tasks.sampling.places import LayoutError
@@ -18,6 +17,7 @@ from robospa.trial import TrialKey
 ORACLE = "robospa.baselines.oracle:create"
 """By path, not by entry point: the harness does not import baselines, and a list of seeds must come
 from this very policy."""
+CRASHED = "the simulator crashed"
 MOST_TEXT = 300
 """Characters of a reason that are kept."""
 
@@ -77,41 +77,24 @@ def _line(text: str) -> str:
     return " ".join(text.split())[:MOST_TEXT]
 
 
-_WORKER: list[tuple[World, Policy]] = []
+SeedJob = tuple[ListKey, int]
+"""A seed of a list, to be tried."""
 
 
-def _in_worker(key: ListKey, seeds: Sequence[int], salt: str) -> list[Attempt]:
-    if not _WORKER:  # a pool has one salt
-        from robospa.harness.factory import policy_factory
-        from robospa.harness.sim.sapien_world import SapienWorld
+def expert(salt: str) -> Callable[[SeedJob], Attempt]:
+    """What tries seeds in one process, on hidden scenes if there is a `salt`."""
+    from robospa.harness.factory import policy_factory
+    from robospa.harness.sim.sapien_world import SapienWorld
 
-        _WORKER.append((SapienWorld(render=False), policy_factory(ORACLE)(salt)))
-    world, policy = _WORKER[0]
-    return [attempt(world, policy, key, seed, salt) for seed in seeds]
+    world, policy = SapienWorld(render=False), policy_factory(ORACLE)(salt)
+    return lambda job: attempt(world, policy, *job, salt)
 
 
-class ExpertPool:
-    """Processes that run the expert, on hidden scenes if there is a `salt`; a context manager."""
+def expert_pool(workers: int, salt: str = "") -> Pool[SeedJob, Attempt]:
+    """Processes that run the expert; a seed at which several of them die is refused."""
 
-    def __init__(self, workers: int, salt: str = "") -> None:
-        self.workers = max(1, workers)
-        self._salt = salt
-        self._pool = self._start()
+    def crashed(job: SeedJob) -> Attempt:
+        return Attempt(job[1], False, CRASHED)
 
-    def _start(self) -> ProcessPoolExecutor:
-        return ProcessPoolExecutor(self.workers, mp_context=get_context("spawn"))
-
-    def __enter__(self) -> ExpertPool:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._pool.shutdown(cancel_futures=True)
-
-    def submit(self, key: ListKey, seeds: Sequence[int]) -> Future[list[Attempt]]:
-        """Attempts for `seeds`, in their order, in one process."""
-        return self._pool.submit(_in_worker, key, list(seeds), self._salt)
-
-    def restart(self) -> None:
-        """New processes in place of a pool of which one died."""
-        self._pool.shutdown(wait=False, cancel_futures=True)
-        self._pool = self._start()
+    start = partial(JobProcess, expert, salt, name="expert")
+    return Pool(start, max(1, workers), crashed=crashed)

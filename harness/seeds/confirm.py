@@ -9,8 +9,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from robospa.harness.seeds.attempt import Attempt, ExpertPool
+from robospa.harness.seeds.attempt import Attempt
 from robospa.harness.seeds.evidence import Evidence
+from robospa.harness.seeds.sweep import Submit
 from robospa.tasks.seeds import ListKey
 
 
@@ -30,16 +31,16 @@ class Confirmed:
 
 
 def confirm(
-    pool: ExpertPool, lists: Mapping[ListKey, str], evidence: Evidence, count: int
+    submit: Submit, lists: Mapping[ListKey, str], evidence: Evidence, count: int
 ) -> Iterator[Confirmed]:
     """Run the first `count` accepted and the first refused trial of every list again.
 
     `lists` says with which inputs each was made.
     """
     known = {key: _sample(evidence.attempts(key, made), count) for key, made in lists.items()}
-    running = {key: pool.submit(key, [a.seed for a in some]) for key, some in known.items() if some}
+    running = {key: [submit(key, a.seed) for a in some] for key, some in known.items()}
     for key, before in known.items():
-        now = running[key].result() if key in running else []
+        now = [future.result() for future in running[key]]
         pairs = zip(before, now, strict=True)
         yield Confirmed(key, len(now), tuple(a.seed for a, b in pairs if _end(a) != _end(b)))
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future
 
-from robospa.harness.seeds.attempt import Attempt, ExpertPool
+from robospa.harness.seeds.attempt import Attempt, expert_pool
 from robospa.harness.seeds.evidence import Evidence
 from robospa.harness.seeds.inputs import inputs
 from robospa.harness.seeds.sweep import Search, sweep
@@ -52,7 +53,7 @@ def sweep_with_bar(
     total = sum(search.count for search in wanted)
     known = sum(_got(search) for search in wanted)
     begun, tried = time.monotonic(), 0
-    with Progress(*columns, console=plain_console()) as bar, ExpertPool(workers) as pool:
+    with Progress(*columns, console=plain_console()) as bar, expert_pool(workers) as pool:
         row = bar.add_task("seeds", total=total, completed=known, speed="")
 
         def note(search: Search, item: Attempt) -> None:
@@ -66,7 +67,10 @@ def sweep_with_bar(
             left = bar.tasks[0].remaining or 0
             bar.update(row, speed=f"{rate:.2f} trials/s, {duration_text(left / rate)} left")
 
-        for search in sweep(pool, wanted, note, stop):
+        def submit(key: ListKey, seed: int) -> Future[Attempt]:
+            return pool.submit((key, seed))
+
+        for search in sweep(submit, workers, wanted, note, stop):
             bar.advance(row, search.count - _got(search))  # of one that was given up
             yield search
 

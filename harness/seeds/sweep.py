@@ -7,29 +7,15 @@ the last one of the list.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, wait
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
-from typing import Protocol
 
 from robospa.harness.seeds.attempt import Attempt
 from robospa.tasks.seeds import ListKey
 
-
-class Pool(Protocol):
-    """Processes that try seeds."""
-
-    workers: int
-
-    def submit(self, key: ListKey, seeds: Sequence[int]) -> Future[list[Attempt]]:
-        """What comes of `seeds`, in their order; BrokenProcessPool if a process died."""
-        ...
-
-    def restart(self) -> None:
-        """New processes in place of those of which one died."""
-
-
+Submit = Callable[[ListKey, int], Future[Attempt]]
+"""Has a seed tried, in a while."""
 PATIENCE = 20
 """A variant is given up when more seeds than this, and more than half of all, were refused."""
 
@@ -108,18 +94,19 @@ Note = Callable[[Search, Attempt], None]
 
 
 def sweep(
-    pool: Pool,
+    submit: Submit,
+    workers: int,
     searches: Iterable[Search],
     note: Note = lambda search, item: None,
     stop: Callable[[], bool] = lambda: False,
 ) -> Iterator[Search]:
     """Every search once it is done, in the order in which they are; once `stop` says so, only
-    those for which no more trial has to begin."""
+    those for which no more trial has to begin. `workers` try what is submitted."""
     waiting, opened = iter(searches), list[Search]()
-    tasks: dict[Future[list[Attempt]], tuple[Search, int]] = {}
+    tasks: dict[Future[Attempt], Search] = {}
     while True:
         yield from _take_done(opened)
-        while len(tasks) < 2 * pool.workers and not stop():
+        while len(tasks) < 2 * workers and not stop():
             found = next(((s, n) for s in opened if (n := s.missing()) is not None), None)
             if found is None:
                 following = next(waiting, None)
@@ -129,58 +116,18 @@ def sweep(
                 continue
             search, seed = found
             search.running.add(seed)
-            tasks[pool.submit(search.key, [seed])] = search, seed
+            tasks[submit(search.key, seed)] = search
         yield from _take_done(opened)
         if not tasks:
             return
-        done, _ = wait(tasks, return_when=FIRST_COMPLETED)
-        try:
-            for future in done:
-                search, seed = tasks[future]
-                (item,) = future.result()
-                _finish(search, item, note)
-                del tasks[future]
-        except BrokenProcessPool:
-            pool.restart()
-            for search, item in _one_by_one(pool, tasks):
-                _finish(search, item, note)
-            tasks.clear()
+        for future in wait(tasks, return_when=FIRST_COMPLETED).done:
+            search, item = tasks.pop(future), future.result()
+            search.running.discard(item.seed)
+            search.attempts[item.seed] = item
+            note(search, item)
 
 
 def _take_done(opened: list[Search]) -> Iterator[Search]:
     for search in [s for s in opened if s.done]:
         opened.remove(search)
         yield search
-
-
-def _finish(search: Search, item: Attempt, note: Note) -> None:
-    search.running.discard(item.seed)
-    search.attempts[item.seed] = item
-    note(search, item)
-
-
-def _one_by_one(
-    pool: Pool, tasks: Mapping[Future[list[Attempt]], tuple[Search, int]]
-) -> Iterator[tuple[Search, Attempt]]:
-    """The attempts of a pool that broke; alone, a seed shows whether it was the one to break it."""
-    for search, seed in tasks.values():
-        try:
-            yield search, pool.submit(search.key, [seed]).result()[0]
-        except BrokenProcessPool:
-            pool.restart()
-            yield search, Attempt(seed, False, "the simulator crashed")
-
-
-def try_seeds(
-    pool: Pool,
-    key: ListKey,
-    seeds: Iterable[int],
-    on_progress: Callable[[int], None] = lambda n: None,
-) -> list[Attempt]:
-    """Attempts for `seeds`, in their order; `on_progress(n)` is called as n more finish."""
-    futures = [pool.submit(key, [seed]) for seed in seeds]
-    found = []
-    for future in futures:
-        found += future.result()
-        on_progress(1)
-    return found

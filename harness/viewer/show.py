@@ -40,7 +40,7 @@ def of_run(folder: Path, name: str) -> tuple[Playback, list[DrawnBody]]:
     """The trial called `name` of the run in `folder`, replayed; raises RunError, ReplayError."""
     from robospa.harness.factory import load_function
     from robospa.harness.robots import embodiment
-    from robospa.harness.running.film_stage import replay_config
+    from robospa.harness.running.films import replay_config
     from robospa.harness.sim.sapien_world import SapienWorld
     from robospa.harness.viewer.replay import recorded_playback
 

@@ -7,18 +7,17 @@ import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from pathlib import Path
-from types import TracebackType
 
 from dataset_fakes import fake_episode
 
-from robospa.harness.datasets.collect import JobOf, Order
+from robospa.harness.datasets.collect import Order
 from robospa.harness.datasets.episode_file import episode_bytes, read_episode_file
 from robospa.harness.datasets.jobs import Job, MadeEpisode, NotGood, attempt_job
 from robospa.harness.datasets.manifest import DatasetManifest
 from robospa.harness.datasets.settings import Collection
+from robospa.harness.pool import Pool
 from robospa.harness.running.atomic_file import replace_file
 from robospa.harness.seeds.attempt import Attempt
-from robospa.tasks.seeds import ListKey
 
 TASKS = "Pick_Blocks_Size,Press_Stapler_Repeat"
 
@@ -39,31 +38,18 @@ class FakeMaker:
         return MadeEpisode(seed, True, data=data, frames=3, times={"pictures": 0.5})
 
 
-class FakePool:
+class FakePool(Pool[Job, Attempt]):
     """Makes every episode at once, in this process."""
 
-    def __init__(self, job_of: JobOf, episodes: int, workers: int = 2) -> None:
-        self.workers, self._job_of = workers, job_of
-        self.made: list[tuple[ListKey, int]] = []
+    def __init__(self, episodes: int, workers: int = 2) -> None:
+        super().__init__(lambda: None, 0)  # type: ignore[arg-type, return-value]
+        self.workers, self.made = workers, list[int]()
 
-    def __enter__(self) -> FakePool:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None: ...
-
-    def submit(self, key: ListKey, seeds: Sequence[int]) -> Future[list[Attempt]]:
-        future: Future[list[Attempt]] = Future()
-        (seed,) = seeds
-        self.made.append((key, seed))
-        future.set_result([attempt_job(FakeMaker(), self._job_of(key, seed))])
+    def submit(self, job: Job) -> Future[Attempt]:
+        future: Future[Attempt] = Future()
+        self.made.append(job.key.seed)
+        future.set_result(attempt_job(FakeMaker(), job))
         return future
-
-    def restart(self) -> None: ...
 
 
 def fake_pack(

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import pickle
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from multiprocessing import Pipe
-from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Any
 
 from run_fakes import FakePolicy, FakeWorld, parts
 
+from robospa.harness.pool import WorkerDied
 from robospa.harness.running.action_files import ActionRecorder, write_actions
-from robospa.harness.running.film_process import FilmConfig, FilmDone
+from robospa.harness.running.films import FilmDone
+from robospa.harness.running.worker import WorkerConfig
 from robospa.harness.trial import run_trial
 from robospa.results.records.films import film_name
 from robospa.results.records.trial_record import TrialRecord
@@ -22,8 +20,9 @@ from robospa.trial import TrialKey
 KEYS = [TrialKey("Pick_Fake", 1, 100000 + n) for n in range(6)]
 
 
-def config(folder: Path, world: str = "run_fakes:FakeWorld", **changes: Any) -> FilmConfig:
-    return replace(FilmConfig(folder, world, {}, "run_fakes:parts"), **changes)
+def config(folder: Path, world: str = "run_fakes:FakeWorld", **changes: object) -> WorkerConfig:
+    made = WorkerConfig(folder, "", world=world, parts="run_fakes:parts")
+    return replace(made, **changes)  # type: ignore[arg-type]
 
 
 def recorded(
@@ -46,63 +45,36 @@ def recorded(
 
 
 @dataclass
-class FakeProcess:
-    """Stands for a process and its end of the pipe; the test says what it answers, and when."""
+class Filmers:
+    """Put in place of `film_process`: threads of this process, which make what `film` makes."""
 
-    config: FilmConfig
-    name: str
-    pipe: Connection
-    pid: int
-    exitcode: int | None = None
-    sentinel: Connection = field(init=False)
+    film: Callable[[WorkerConfig, TrialRecord], FilmDone] = lambda _, record: FilmDone(record.key)
+    asked: list[TrialKey] = field(default_factory=list)
+    started: list[int] = field(default_factory=list)
+    """The priority of each."""
+    alive: int = 0
 
-    def __post_init__(self) -> None:
-        self.sentinel, self._end = Pipe(duplex=False)
+    def __call__(self, config: WorkerConfig, name: str, nice: int) -> Filmer:
+        self.started.append(nice)
+        self.alive += 1
+        return Filmer(self, config)
 
-    def asked(self) -> TrialRecord:
-        assert self.pipe.poll()
-        record: TrialRecord = self.pipe.recv()
-        return record
 
-    def answer(self, trouble: str = "", stop: bool = False) -> TrialRecord:
-        """Answer what was asked."""
-        record = self.asked()
-        self.pipe.send(FilmDone(record.key, trouble, stop))
-        return record
+@dataclass(eq=False)
+class Filmer:
+    """One of them."""
 
-    def die(self, code: int) -> None:
-        self.exitcode = code
-        self.pipe.close()
-        self._end.close()
+    all: Filmers
+    config: WorkerConfig
+    killed: bool = False
 
-    def is_alive(self) -> bool:
-        return self.exitcode is None
+    def run(self, record: TrialRecord) -> FilmDone:
+        self.all.asked.append(record.key)
+        done = self.all.film(self.config, record)
+        if self.killed:
+            raise WorkerDied("signal 9")
+        return done
 
     def kill(self) -> None:
-        if self.exitcode is None:
-            self.die(-9)
-
-    def join(self) -> None: ...
-
-
-@dataclass
-class Spawned:
-    """Put in place of `start_process`: keeps the processes that were asked for."""
-
-    processes: list[FakeProcess] = field(default_factory=list)
-    nice: dict[int, int] = field(default_factory=dict)
-    """What `os.setpriority` was told, by process."""
-    on_start: Callable[[FakeProcess], None] = lambda process: None
-
-    def __call__(
-        self, target: Callable[..., None], config: bytes, name: str
-    ) -> tuple[FakeProcess, Connection]:
-        ours, theirs = Pipe()
-        process = FakeProcess(pickle.loads(config), name, theirs, 10**9 + len(self.processes))
-        self.processes.append(process)
-        self.on_start(process)
-        return process, ours
-
-    @property
-    def alive(self) -> list[FakeProcess]:
-        return [process for process in self.processes if process.is_alive()]
+        self.all.alive -= not self.killed
+        self.killed = True

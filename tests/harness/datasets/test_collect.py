@@ -104,7 +104,7 @@ def test_kills_at_any_moment_change_nothing(tmp_path: Path) -> None:
 
 def test_neither_the_number_of_workers_nor_their_order_matters(tmp_path: Path) -> None:
     run(order(tmp_path / "a"))
-    collect(order(tmp_path / "b"), lambda job_of, n: FakePool(job_of, n, 7), say=quiet)
+    collect(order(tmp_path / "b"), lambda episodes: FakePool(episodes, 7), say=quiet)
     assert contents(tmp_path / "a") == contents(tmp_path / "b")
 
 
@@ -115,12 +115,12 @@ def test_what_is_there_is_not_made_again(tmp_path: Path) -> None:
     damaged.write_bytes(damaged.read_bytes()[:-40])
     pools: list[FakePool] = []
 
-    def open_pool(job_of: module.JobOf, episodes: int) -> FakePool:
-        pools.append(FakePool(job_of, episodes))
+    def open_pool(episodes: int) -> FakePool:
+        pools.append(FakePool(episodes))
         return pools[0]
 
     collect(order(tmp_path / "b"), open_pool, resume=True, keep_episodes=True, say=quiet)
-    assert pools[0].made == [(FIRST, 1_000_002)]
+    assert pools[0].made == [1_000_002]
     assert contents(tmp_path / "a") == contents(tmp_path / "b")
 
 
@@ -151,7 +151,7 @@ def test_no_episode_stays_in_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(
         module,
         "sweep",
-        lambda pool, some, note: (searches.extend(some), sweep(pool, some, note))[1],
+        lambda submit, n, some, note: (searches.extend(some), sweep(submit, n, some, note))[1],
     )
     run(order(tmp_path))
     assert kept and all(type(item) is Attempt for item in kept)

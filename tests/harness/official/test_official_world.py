@@ -24,7 +24,7 @@ from robospa.harness.official.official_options import (
 from robospa.harness.official.official_parts import official_world_parts
 from robospa.harness.official.sentences import SEEN, UNSEEN
 from robospa.harness.running import evaluate
-from robospa.harness.running.film_stage import films_of
+from robospa.harness.running.films import films_of
 from robospa.harness.running.policy_probe import ProbedPolicy
 from robospa.harness.running.request import make_request
 from robospa.harness.running.worker import load_parts

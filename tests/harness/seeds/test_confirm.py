@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from concurrent.futures import Future
 from pathlib import Path
 
-from robospa.harness.seeds.attempt import Attempt, ExpertPool
+from robospa.harness.seeds.attempt import Attempt
 from robospa.harness.seeds.confirm import confirm
 from robospa.harness.seeds.evidence import Evidence
 from robospa.tasks.seeds import ListKey
@@ -14,16 +13,11 @@ from robospa.tasks.seeds import ListKey
 SAME, CHANGED, UNKNOWN = ListKey("Same", 1), ListKey("Changed", 1), ListKey("Unknown", 1)
 
 
-class Pool(ExpertPool):
+def submit(key: ListKey, seed: int) -> Future[Attempt]:
     """Ends every trial after as many physics steps as its seed has, one more for CHANGED."""
-
-    def __init__(self) -> None:
-        self.workers = 1
-
-    def submit(self, key: ListKey, seeds: Sequence[int]) -> Future[list[Attempt]]:
-        future: Future[list[Attempt]] = Future()
-        future.set_result([_ended(seed, seed + (key == CHANGED)) for seed in seeds])
-        return future
+    future: Future[Attempt] = Future()
+    future.set_result(_ended(seed, seed + (key == CHANGED)))
+    return future
 
 
 def _ended(seed: int, steps: int) -> Attempt:
@@ -36,7 +30,7 @@ def test_what_ends_as_before_holds(tmp_path: Path) -> None:
         for seed in range(6):
             kept.add(key, "old", _ended(seed, seed))
     made = {SAME: "old", CHANGED: "old", UNKNOWN: "old"}
-    same, changed, unknown = confirm(Pool(), made, kept, 2)
+    same, changed, unknown = confirm(submit, made, kept, 2)
     assert same.holds and same.tried == 3  # seeds 0 and 2, and 1, which was refused
     assert not changed.holds and changed.differs == (0, 2, 1)
     assert not unknown.holds and unknown.tried == 0
