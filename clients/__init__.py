@@ -3,10 +3,9 @@
     ws://localhost:8000                       robospa.v1, or openpi's dialect
     go1+http://gpu:9000?wrists=swapped        options of the dialect in the query
 
-One folder a vendor: `conventions` where both ends share something, `client` to its own server,
-`serve` for a server of ours with its model. Dialects are entry points (`robospa.clients.dialect`).
-Everything else (time limits, request ids, checking chunks, reconnecting between trials) is the same
-for all.
+One module a vendor: a client to its own server, and a server of ours with its model. Dialects are
+entry points (`robospa.clients.dialect`). Everything else (time limits, request ids, checking
+chunks, reconnecting between trials) is the same for all.
 """
 
 from __future__ import annotations

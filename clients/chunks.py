@@ -1,9 +1,13 @@
-"""Action chunks out of whatever a server calls one."""
+"""What all dialects share: action chunks out of whatever a server calls one, and their options.
+
+Options: the robot, how many actions a chunk has, and how many tokens of text a model reads.
+"""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,7 +15,9 @@ from numpy.typing import NDArray
 
 from robospa.action_space import ActionSpace
 from robospa.protocol.errors import PolicyAnswerError, printable
+from robospa.protocol.options import option
 from robospa.protocol.policy import MAX_HORIZON
+from robospa.trial import REFERENCE
 
 NAMED = 160
 """Characters of foreign names in an error."""
@@ -94,3 +100,56 @@ def check_horizon(horizon: int | None, execute: int | None) -> None:
         raise ValueError(
             f"options horizon and execute: 1 <= execute <= horizon <= {MAX_HORIZON} is needed"
         )
+
+
+PIECES = re.compile(r"[^\W\d_]+|\d+|(?:[^\w\s]|_)+")
+END_TOKENS = 2
+"""Those that mark the beginning and the end of a text."""
+BUDGET = "tokens of an instruction that the model reads, as X-VLA's 50 or pi0's 48; none for all"
+"""Help of the option `text_budget` where the server may run any model."""
+STATE_TOKENS = 50
+"""What pi0.5's prompt has beside the instruction: fourteen numbers and the words around them."""
+
+
+def least_tokens(text: str) -> int:
+    """The fewest tokens that `text` can have, with those at its two ends.
+
+    No tokenizer is at hand here: those of these models never join two words, or a word and a comma,
+    into one token. What is over a budget by this count is cut off for certain.
+    """
+    return len(PIECES.findall(text)) + END_TOKENS
+
+
+def check_budget(budget: int | None) -> None:
+    """ValueError if `budget` cannot be one."""
+    if budget is not None and budget < 1:
+        raise ValueError(f"option text_budget={budget}: at least 1, or none for no limit")
+
+
+def budget_warning(budget: int | None, instructions: dict[str, str]) -> str | None:
+    """One sentence if any of `instructions` (by the name of their task) is over `budget`."""
+    counts = {name: least_tokens(text) for name, text in instructions.items()}
+    over = [name for name, count in counts.items() if budget is not None and count > budget]
+    if not over:
+        return None
+    worst = max(over, key=lambda name: counts[name])
+    return (
+        f"the model reads {budget} tokens of an instruction, and those of {len(over)} of "
+        f"{len(counts)} tasks are longer ({worst}: at least {counts[worst]}): their end never "
+        "reaches it"
+    )
+
+
+@dataclass(frozen=True)
+class RobotOption:
+    """The option that every dialect and every server of a learned model has."""
+
+    embodiment: str = option(
+        REFERENCE, "robot that the model was trained with: evaluations of another are refused"
+    )
+
+    def columns(self, kind: str) -> int | None:
+        """Columns of an action of this `kind`; None if only the trial says it, whose robot may have
+        other joints."""
+        known = kind != "joint" or self.embodiment == REFERENCE
+        return ActionSpace(kind).width if known else None

@@ -1,19 +1,67 @@
 """Which dialect a server speaks, if it is not the one it was spoken to in.
 
 Only asked when something has gone wrong already. A server that is busy answers none of the
-questions (`robospa.clients.probe`), and the error stays as it was.
+questions (`Probe`), and the error stays as it was.
 """
 
 from __future__ import annotations
 
 import contextlib
-from dataclasses import replace
+import http.client
+import json
+from dataclasses import dataclass, field, replace
 
 from robospa.clients.dialect import ConnectionParams, Dialect, dialects
-from robospa.clients.probe import Probe
 from robospa.protocol.codec import Limits
 from robospa.protocol.errors import HandshakeError, WireError
 from robospa.protocol.transport import Timeouts, Transport
+
+ANSWER = 2**16
+"""Bytes of an HTTP answer that are read."""
+
+
+@dataclass(frozen=True)
+class HttpAnswer:
+    """`status` is None if what came back, or did not, was no HTTP."""
+
+    status: int | None
+    body: bytes = b""
+
+    def json(self) -> dict[str, object] | None:
+        """The body as a JSON map, None for anything else."""
+        try:
+            value = json.loads(self.body)
+        except (ValueError, RecursionError):
+            return None
+        return value if isinstance(value, dict) else None
+
+
+@dataclass(frozen=True)
+class Probe:
+    """Harmless questions to a server to be recognised: `params` have short deadlines and small
+    limits, answers are bounded, and none runs a model."""
+
+    params: ConnectionParams
+    _answers: dict[tuple[str, str, bytes | None], HttpAnswer] = field(default_factory=dict)
+
+    def http(self, method: str, path: str, body: bytes | None = None) -> HttpAnswer:
+        """What the server answers; the same request is sent once."""
+        request = (method, path, body)
+        if request not in self._answers:
+            self._answers[request] = self._ask(method, path, body)
+        return self._answers[request]
+
+    def _ask(self, method: str, path: str, body: bytes | None) -> HttpAnswer:
+        connection = self.params.open_http()
+        try:
+            connection.request(method, path, body, {"Content-Type": "application/json"})
+            response = connection.getresponse()
+            return HttpAnswer(response.status, response.read(ANSWER))
+        except (OSError, ValueError, http.client.HTTPException):
+            return HttpAnswer(None)
+        finally:
+            connection.close()
+
 
 SECONDS = 1.5
 """Deadline of each question."""

@@ -10,19 +10,22 @@ docs/adding-a-dialect.md has a whole example.
 
 from __future__ import annotations
 
+import http.client
 import ssl as ssl_module
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import metadata
 from typing import TYPE_CHECKING, Any, Literal
 
 from robospa.protocol.codec import DEFAULT_LIMITS, Limits
+from robospa.protocol.options import plain_options
+from robospa.protocol.policy import PolicySpec, TrialInfo
 from robospa.protocol.transport import Address, Timeouts
 from robospa.registry import DIALECTS, UnknownName, load
 
 if TYPE_CHECKING:
-    from robospa.clients.probe import Probe
+    from robospa.clients.detect import Probe
     from robospa.protocol.client import WireClient
 
 TLS_PORT = 443
@@ -106,6 +109,45 @@ class ConnectionParams:
         scheme = "wss" if self.endpoint.secure else "ws"
         url = f"{scheme}://{self.endpoint.authority}{self.endpoint.path}"
         return Address(url, self.token, self.ssl, redirects=self.redirects)
+
+    def open_http(self) -> http.client.HTTPConnection:
+        """An HTTP connection to be made, with TLS if the scheme asks for it."""
+        host, port, seconds = self.endpoint.host, self.endpoint.port, self.timeouts.connect
+        if self.endpoint.secure:
+            return http.client.HTTPSConnection(host, port, timeout=seconds, context=self.ssl)
+        return http.client.HTTPConnection(host, port, timeout=seconds)
+
+
+class StatelessSession:
+    """A connection to a server that is sent nothing but observations: it keeps no trial.
+
+    A subclass adds `infer` and `close` (`robospa.protocol.client.WireClient`), and `reset` and
+    `end` where its server wants to know of them.
+    """
+
+    def __init__(
+        self,
+        dialect: str,
+        spec: PolicySpec,
+        options: object,
+        warnings: Sequence[str],
+        **said: object,
+    ) -> None:
+        """`said`: what the server tells of itself; all parts of `hello` are JSON values."""
+        self.spec = spec
+        self.hello: dict[str, object] = {
+            "dialect": dialect,
+            **said,
+            "spec": spec.to_json(),
+            "options": plain_options(options),
+            "warnings": list(warnings),
+        }
+
+    def reset(self, id: int, trial: TrialInfo) -> None:
+        """Nothing to send."""
+
+    def end(self, id: int, outcome: Mapping[str, object]) -> None:
+        """Nothing to send."""
 
 
 def dialects() -> list[Dialect]:

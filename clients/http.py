@@ -7,6 +7,7 @@ library only, and no proxies: a model server is a machine of one's own.
 
 from __future__ import annotations
 
+import base64
 import contextlib
 import http.client
 import json
@@ -15,9 +16,15 @@ import socket
 import ssl as ssl_module
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from typing import Any
 
-from robospa.clients.dialect import ConnectionParams, Endpoint
+import numpy as np
+from numpy.typing import NDArray
+
+from robospa.clients.chunks import as_chunk, plain_dtype
+from robospa.clients.detect import explain_error
+from robospa.clients.dialect import ConnectionParams, StatelessSession
 from robospa.protocol.errors import (
     CallTimeout,
     ConnectFailed,
@@ -29,7 +36,8 @@ from robospa.protocol.errors import (
     printable,
     without_secrets,
 )
-from robospa.protocol.transport import MOVED
+from robospa.protocol.policy import PolicySpec
+from robospa.protocol.transport import MOVED, connect_until
 
 MAX_ANSWER = 64 * 2**20
 """Bytes of an answer; a chunk as JSON is some kilobytes."""
@@ -52,23 +60,13 @@ FIRST_PAUSE, LONGEST_PAUSE = 0.02, 1.0
 STALE_CONNECTION = (http.client.RemoteDisconnected, ConnectionResetError, BrokenPipeError)
 
 
-def open_http(
-    endpoint: Endpoint, timeout: float, ssl: ssl_module.SSLContext | None
-) -> http.client.HTTPConnection:
-    """A connection to be made, with TLS if the scheme asks for it."""
-    host, port = endpoint.host, endpoint.port
-    if endpoint.secure:
-        return http.client.HTTPSConnection(host, port, timeout=timeout, context=ssl)
-    return http.client.HTTPConnection(host, port, timeout=timeout)
-
-
 class JsonServer:
     """The HTTP server at `params.endpoint`. Not thread-safe."""
 
     def __init__(self, params: ConnectionParams) -> None:
         endpoint, timeouts, token = params.endpoint, params.timeouts, params.token
         self.url = f"{'https' if endpoint.secure else 'http'}://{endpoint.authority}"
-        self._connection = open_http(endpoint, timeouts.connect, params.ssl)
+        self._connection = params.open_http()
         self._headers = {"Content-Type": "application/json", "Accept": "application/json"}
         if token is not None:
             self._headers["Authorization"] = f"Bearer {token}"
@@ -78,7 +76,7 @@ class JsonServer:
     def greet(self, path: str, timeout: float) -> None:
         """Ask whether `path` takes POST at all, without running a model.
 
-        Raises HandshakeError if it does not exist or is a WebSocket's, and what `post` raises. An
+        Raises HandshakeError if it does not exist or is a WebSocket's, and what `request` does. An
         endpoint for POST answers a GET with 405, which is as good as anything else.
         """
         try:
@@ -91,19 +89,6 @@ class JsonServer:
         except ProtocolViolation:
             return  # it answered, only not in JSON
 
-    def post(self, path: str, body: bytes, timeout: float) -> object:
-        """The decoded JSON answer to a POST.
-
-        While the server is not available (UNAVAILABLE) the request is repeated until it is late.
-        Raises ConnectFailed, ConnectionLost, CallTimeout, Unauthorized, ServerError for any other
-        status that is not 200, ProtocolViolation for an answer that is no JSON.
-        """
-        return self.request("POST", path, body, timeout)
-
-    def get(self, path: str, timeout: float) -> object:
-        """The decoded JSON answer to a GET; errors as in `post`."""
-        return self.request("GET", path, None, timeout)
-
     def request(
         self,
         method: str,
@@ -112,8 +97,13 @@ class JsonServer:
         timeout: float,
         patience: float | None = None,
     ) -> object:
-        """One request; see `post`. `patience`: how long the server may be unavailable [s], by
-        default for all of `timeout`."""
+        """The decoded JSON answer to one request.
+
+        While the server is not available (UNAVAILABLE) the request is repeated for `patience` s, by
+        default for all of `timeout`. Raises ConnectFailed, ConnectionLost, CallTimeout,
+        Unauthorized, ServerError for any other status that is not 200, ProtocolViolation for an
+        answer that is no JSON.
+        """
         now, pause = time.monotonic(), FIRST_PAUSE
         until, give_up = now + timeout, now + (timeout if patience is None else patience)
         while True:
@@ -159,21 +149,8 @@ class JsonServer:
         self._connection.close()
 
     def _connect(self, wait: float) -> None:
-        give_up = time.monotonic() + wait
-        while True:
-            try:
-                self._connection.connect()
-                self._fresh = True
-                return
-            except ConnectionRefusedError as error:
-                if time.monotonic() >= give_up:
-                    raise ConnectFailed(
-                        f"cannot connect to {self.url}: nothing listens there; "
-                        "start the policy server first"
-                    ) from error
-                time.sleep(0.05)
-            except OSError as error:
-                raise ConnectFailed(f"cannot connect to {self.url}: {error}") from error
+        connect_until(self.url, wait, self._connection.connect)
+        self._fresh = True
 
     def _exchange(
         self, method: str, path: str, body: bytes | None, until: float
@@ -240,6 +217,47 @@ class JsonServer:
             raise ProtocolViolation(f"{self.url}{path} did not answer JSON: {error}") from error
 
 
+class HttpSession(StatelessSession):
+    """One kept-alive HTTP connection, over which every query is a POST of JSON.
+
+    `path` is used where the URL has none. `silent`: a status that the server answers to any
+    failure, without a reason, and what to say.
+    """
+
+    path = "/act"
+
+    def __init__(
+        self,
+        params: ConnectionParams,
+        dialect: str,
+        spec: PolicySpec,
+        options: object,
+        warnings: Sequence[str],
+        silent: tuple[str, str] = ("", ""),
+    ) -> None:
+        super().__init__(dialect, spec, options, warnings)
+        self._params, self._silent, self._answered = params, silent, False
+        if params.endpoint.path.strip("/"):
+            self.path = params.endpoint.path
+        self._server = JsonServer(params)
+        self._server.greet(self.path, params.timeouts.hello)
+
+    def ask(self, body: bytes, timeout: float) -> object:
+        """The decoded answer to one query; before the first one, an error says what server it may
+        be. Raises what `JsonServer.request` raises."""
+        try:
+            answer = self._server.request("POST", self.path, body, timeout)
+        except ServerError as error:
+            if error.code == self._silent[0]:
+                error = ServerError(error.code, f"{error.message}; {self._silent[1]}", True)
+            raise error if self._answered else explain_error(error, self._params) from error
+        self._answered = True
+        return answer
+
+    def close(self) -> None:
+        self._server.close()
+
+
 def has_unread_bytes(sock: socket.socket) -> bool:
     """Whether bytes have arrived at `sock` that were not read yet; False if it is closed."""
     if isinstance(sock, ssl_module.SSLSocket):
@@ -269,3 +287,48 @@ def _reason(data: bytes) -> str:
     if isinstance(value, Mapping):
         value = value.get("error", value.get("detail", value.get("message", value)))
     return printable(str(value), MAX_REASON)
+
+
+def array_object(array: NDArray[Any]) -> dict[str, object]:
+    """The JSON object of an array; C order, little-endian."""
+    plain = np.ascontiguousarray(array)
+    if plain.dtype.byteorder == ">":
+        plain = plain.astype(plain.dtype.newbyteorder("<"))
+    data = base64.b64encode(plain.tobytes()).decode("ascii")
+    return {"__numpy__": data, "dtype": plain.dtype.str, "shape": list(array.shape)}
+
+
+def dumps(value: object) -> str:
+    """JSON text in which arrays, anywhere, are their objects."""
+    return json.dumps(value, default=_default, separators=(",", ":"))
+
+
+def _default(value: object) -> object:
+    if isinstance(value, np.ndarray):
+        return array_object(value)
+    if isinstance(value, np.generic):
+        return value.item()
+    raise TypeError(f"{type(value).__name__} cannot be written as JSON")
+
+
+def chunk_of(value: object) -> object:
+    """An action chunk in a decoded answer as float32 (T, D), wherever that is possible.
+
+    Lists of lists and array objects are understood; anything else is returned as it is, and
+    refused by the check that follows every answer.
+    """
+    if isinstance(value, Mapping) and "__numpy__" in value:
+        value = array_of(value, "__numpy__")
+    return as_chunk(value)
+
+
+def array_of(value: Mapping[str, Any], data: str) -> object:
+    """The array whose base64 bytes are under the key `data`; `value` itself if it is none."""
+    try:
+        raw = base64.b64decode(value[data], validate=True)
+        dtype = plain_dtype(value["dtype"])
+        if dtype is None:
+            return value
+        return np.frombuffer(raw, dtype).reshape(tuple(value["shape"]))
+    except (KeyError, TypeError, ValueError):
+        return value

@@ -9,9 +9,13 @@ folder given as option `code`. `ModelMissing` says what could not be found.
 
 from __future__ import annotations
 
+import contextlib
+import hashlib
 import importlib
+import io
+import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -20,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.observation import Observation
+from robospa.protocol.errors import printable
 from robospa.protocol.policy import PolicySpec, TrialInfo
 
 Chunk = NDArray[np.float32]
@@ -134,3 +139,207 @@ def existing(path: str, what: str) -> str:
     if not found.exists():
         raise ModelMissing(f"there is no {found}: option {what} must name a file or a folder")
     return str(found)
+
+
+SAMPLES, BLOCK = 16, 2**16
+"""Blocks that are read of a file, spread evenly, and bytes of each."""
+FILES = 10_000
+"""Of a larger folder only the first files by name count."""
+
+
+def describe_checkpoint(path: str) -> str:
+    """A name that changes with the weights: the last one of `path` and a hash of what lies there,
+    `29999 sample:6b1f...`. Weights are gigabytes and a server should start at once, so the hash is
+    of names, sizes and samples: it guards against mistakes, not against a forger.
+
+    A hub's name (`org/model`) is looked up in the cache of this machine, where its loader has put
+    it, and gets its revision. What is found in neither place is named as it was given.
+    """
+    found = Path(path).expanduser()
+    if os.path.exists(found):
+        return f"{printable(found.resolve().name, 170)} sample:{sample_hash(found)}"
+    revision = _cached_revision(path)
+    return printable(f"{path}@{revision}" if revision else path, 200)
+
+
+def sample_hash(path: Path) -> str:
+    """16 hexadecimal digits of a file or folder: names, sizes and samples of the contents."""
+    files = [path] if path.is_file() else sorted(p for p in path.rglob("*") if p.is_file())[:FILES]
+    made = hashlib.sha256()
+    for file in files:
+        size = file.stat().st_size
+        name = "" if file == path else file.relative_to(path).as_posix()
+        made.update(f"{name}\0{size}\0".encode(errors="surrogateescape"))
+        with file.open("rb") as opened:
+            if size <= SAMPLES * BLOCK:
+                made.update(opened.read())
+                continue
+            for number in range(SAMPLES):
+                opened.seek((size - BLOCK) * number // (SAMPLES - 1))
+                made.update(opened.read(BLOCK))
+    return made.hexdigest()[:16]
+
+
+def _cached_revision(name: str) -> str:
+    """The revision of a hub's model that lies in the cache of this machine; empty if none does."""
+    try:
+        from huggingface_hub import try_to_load_from_cache
+
+        found = try_to_load_from_cache(name, "config.json")
+    except (ImportError, ValueError, OSError):  # no such library, or no name of a hub
+        return ""
+    return Path(found).parent.name if isinstance(found, str) else ""
+
+
+class NotByRow(Exception):
+    """The model drew random numbers that do not belong to one row each."""
+
+
+@contextlib.contextmanager
+def seeded_rows(seeds: Sequence[int]) -> Iterator[None]:
+    """Random numbers of torch from `seeds`, one per row of a batch, in models that take none.
+
+    Diffusion and flow policies draw their start (and some every step) from torch's global
+    generator. As long as this is entered, torch's random functions draw the first axis of their
+    result from one generator per row, so that each gets what it would get alone.
+
+    A draw whose first axis is not the batch comes from the global generator, seeded for it: right
+    for one row, and refused with NotByRow for several.
+    """
+    torch = import_torch()
+    generators = [torch.Generator("cpu").manual_seed(seed) for seed in seeds]
+    torch.manual_seed(seeds[0])
+    like = {
+        torch.randn_like: torch.randn,
+        torch.rand_like: torch.rand,
+    }
+    fresh = {torch.randn, torch.rand}
+    inplace = {torch.Tensor.normal_, torch.Tensor.uniform_}
+    others = {
+        torch.randint,
+        torch.randperm,
+        torch.bernoulli,
+        torch.multinomial,
+        torch.Tensor.bernoulli_,
+        torch.Tensor.exponential_,
+    }
+
+    def rows(draw: Callable[..., Any], shape: Sequence[int], dtype: Any, device: Any) -> Any:
+        if not shape or shape[0] != len(generators):
+            return None
+        one = [draw(tuple(shape[1:]), generator=g, dtype=torch.float32) for g in generators]
+        return torch.stack(one).to(device=device, dtype=dtype or torch.get_default_dtype())
+
+    class ByRow(torch.overrides.TorchFunctionMode):  # type: ignore[misc,name-defined]
+        def __torch_function__(
+            self,
+            function: Any,
+            types: Any,
+            args: tuple[Any, ...] = (),
+            kwargs: dict[str, Any] | None = None,
+        ) -> Any:
+            kwargs = dict(kwargs or {})
+            if kwargs.get("generator") is None:
+                drawn = self.drawn(function, args, kwargs)
+                if drawn is not None:
+                    return drawn
+            return function(*args, **kwargs)
+
+        def drawn(self, function: Any, args: tuple[Any, ...], kwargs: dict[str, Any]) -> Any:
+            """The numbers by row; None where the call is none of ours."""
+            result = None
+            if function in fresh:
+                result = rows(
+                    function, _shape(args, kwargs), kwargs.get("dtype"), kwargs.get("device")
+                )
+            elif function in like:
+                model = args[0]
+                dtype, device = kwargs.get("dtype"), kwargs.get("device")
+                result = rows(
+                    like[function], model.shape, dtype or model.dtype, device or model.device
+                )
+            elif function is torch.normal and "size" in kwargs:
+                mean, std = _two(args, kwargs, "mean", "std", (0.0, 1.0))
+                unit = rows(torch.randn, kwargs["size"], kwargs.get("dtype"), kwargs.get("device"))
+                result = None if unit is None else unit * std + mean
+            elif function in inplace:
+                target, normal = args[0], function is torch.Tensor.normal_
+                names = ("mean", "std", (0.0, 1.0)) if normal else ("from", "to", (0.0, 1.0))
+                low, high = _two(args[1:], kwargs, *names)
+                draw = torch.randn if normal else torch.rand
+                unit = rows(draw, target.shape, target.dtype, target.device)
+                if unit is not None:
+                    scaled = unit * high + low if normal else unit * (high - low) + low
+                    result = target.copy_(scaled)
+            elif function not in others and function is not torch.normal:
+                return None
+            if result is None and len(generators) > 1:
+                raise NotByRow(f"{function.__name__} was not drawn row by row")
+            return result
+
+    with ByRow():
+        yield
+
+
+def _shape(args: tuple[Any, ...], kwargs: dict[str, Any]) -> tuple[int, ...]:
+    size = kwargs.get("size", args)
+    if len(size) == 1 and not isinstance(size[0], int):
+        size = size[0]
+    return tuple(size)
+
+
+def _two(
+    args: tuple[Any, ...], kwargs: dict[str, Any], first: str, second: str, default: Any
+) -> tuple[float, float]:
+    """Two parameters given by place or by name."""
+    low = args[0] if args else kwargs.get(first, default[0])
+    high = args[1] if len(args) > 1 else kwargs.get(second, default[1])
+    return low, high
+
+
+Image = NDArray[np.uint8]
+JPEG_QUALITY = 95
+"""OpenCV's default."""
+
+
+def resize(image: Image, width: int, height: int) -> Image:
+    """uint8 (H, W, 3) to (height, width, 3), bilinear, aspect not kept; by OpenCV, as the
+    official clients do, or else by Pillow, which differs by a grey level here and there."""
+    if image.shape[:2] == (height, width):
+        return image
+    cv2 = _module("cv2")
+    if cv2 is not None:
+        return np.asarray(cv2.resize(image, (width, height), interpolation=cv2.INTER_LINEAR))
+    pillow = pillow_image()
+    resized = pillow.fromarray(image).resize((width, height), pillow.Resampling.BILINEAR)
+    return np.asarray(resized)
+
+
+def jpeg_round_trip(image: Image) -> Image:
+    """What JPEG leaves of uint8 (H, W, 3) RGB, coded as if it were BGR: so official code does it,
+    and the chroma that is lost is therefore another than usual."""
+    cv2 = _module("cv2")
+    if cv2 is not None:
+        _, data = cv2.imencode(".jpg", np.ascontiguousarray(image))
+        return np.asarray(cv2.imdecode(data, cv2.IMREAD_COLOR))
+    stream = io.BytesIO()
+    pillow = pillow_image()
+    swapped = np.ascontiguousarray(image[..., ::-1])
+    pillow.fromarray(swapped).save(stream, "JPEG", quality=JPEG_QUALITY)
+    with pillow.open(stream, formats=("JPEG",)) as picture:
+        return np.ascontiguousarray(np.asarray(picture.convert("RGB"))[..., ::-1])
+
+
+def pillow_image() -> Any:
+    """Pillow's Image module; raises ModelMissing."""
+    found = _module("PIL.Image")
+    if found is None:
+        raise ModelMissing("images need Pillow, which is not installed: pip install pillow")
+    return found
+
+
+def _module(name: str) -> Any:
+    try:
+        return importlib.import_module(name)
+    except ImportError:
+        return None

@@ -20,8 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.clients.chunks import plain_dtype
+from robospa.clients.dialect import ConnectionParams
+from robospa.protocol.client import violation
 from robospa.protocol.codec import Limits
-from robospa.protocol.errors import DecodeError, EncodeError
+from robospa.protocol.errors import DecodeError, EncodeError, TransportError, printable
+from robospa.protocol.transport import Transport
 
 Form = Callable[[NDArray[Any]], dict[object, object]]
 KINDS = "biuf"
@@ -186,3 +189,39 @@ def _build(dtype: object, shape: Any, data: object) -> NDArray[Any]:
         return np.frombuffer(data, kind).reshape(tuple(shape))
     except (TypeError, ValueError) as error:
         raise DecodeError(f"an array that cannot be: {error}") from error
+
+
+class MsgpackSocket:
+    """Whole maps over a WebSocket, every failure an error of the protocol; `form` of arrays."""
+
+    def __init__(self, params: ConnectionParams, form: Form) -> None:
+        address = params.websocket_address()
+        self._transport = Transport(address, params.timeouts, params.limits, None)
+        self._form, self._limits = form, params.limits
+        self.url = params.endpoint.url
+
+    def send(self, message: dict[str, object]) -> None:
+        """Raises EncodeError and ConnectionLost."""
+        self._transport.send(pack(message, self._form, self._limits))
+
+    def receive(self, timeout: float, what: str) -> dict[str, object]:
+        """The next message; raises CallTimeout, ConnectionLost, ProtocolViolation."""
+        data = self._transport.receive(timeout, what)
+        if isinstance(data, str):
+            raise self.violation(f"a text frame came instead of {what}: {printable(data, 200)!r}")
+        try:
+            value = unpack(data, self._limits)
+        except DecodeError as error:
+            raise self.violation(f"the answer cannot be read: {error}") from error
+        if not isinstance(value, dict):
+            raise self.violation(f"{what} is not a map")
+        return value
+
+    def violation(self, reason: str) -> TransportError:
+        """The error for an answer that the protocol does not allow; closes the connection."""
+        self.close()
+        return violation(self.url, printable(reason))
+
+    def close(self) -> None:
+        """Close; harmless when closed already."""
+        self._transport.close()

@@ -18,8 +18,8 @@ import pytest
 
 from robospa.action_space import ActionSpace
 from robospa.clients import connect
-from robospa.clients.go1.conventions import Go1Conventions
-from robospa.clients.xvla.conventions import XvlaConventions
+from robospa.clients.go1 import Go1Conventions
+from robospa.clients.xvla import XvlaConventions
 from robospa.harness.action_decoder import ActionDecoder
 from robospa.harness.convention_check.episodes import VIEWS, Episode, write_episode
 from robospa.harness.robots import embodiment

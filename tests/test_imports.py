@@ -32,7 +32,6 @@ ALLOWED = {
         "harness.quantize",
         "harness.running.atomic_file",
         "clients.model_policy",
-        "clients.checkpoint",
         "results.figures",
     ),
     "leaderboard": ("results", "harness", "tasks"),

@@ -63,10 +63,10 @@ def test_it_imports_on_python_310_where_there_is_one() -> None:
         pytest.skip(
             "no Python 3.10 with numpy, msgpack, msgspec, websockets, typer (ROBOSPA_PYTHON310)"
         )
-    vendors = ("rdt", "lerobot", "go1", "xvla", "openpi")
-    imports = "".join(f"from robospa.clients.{vendor} import serve\n" for vendor in vendors)
     code = (
-        f"{imports}from robospa.baselines import random, hold\n"
+        "from robospa.clients import go1, lerobot, rdt, xvla\n"
+        "from robospa.clients.openpi import serve as openpi\n"
+        "from robospa.baselines import random, hold\n"
         "from robospa.harness.cli import main, serve\n"
         "from robospa.protocol.server import ServerThread\n"
         "from robospa.protocol.client import connect\n"

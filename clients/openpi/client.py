@@ -10,18 +10,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from robospa.action_space import ActionSpace
-from robospa.clients.chunks import HORIZON, as_chunk, refuse_unread
-from robospa.clients.dialect import ConnectionParams, Dialect
+from robospa.clients.chunks import HORIZON, RobotOption, as_chunk, check_budget, refuse_unread
+from robospa.clients.detect import Probe
+from robospa.clients.dialect import ConnectionParams, Dialect, StatelessSession
 from robospa.clients.numpy_msgpack import unpack
-from robospa.clients.probe import Probe
-from robospa.clients.robot_option import RobotOption
-from robospa.clients.token_budget import check_budget
 from robospa.observation import CameraSpec, Observation
 from robospa.protocol.codec import Limits, encode
 from robospa.protocol.errors import DecodeError, ProtocolViolation, ServerError, json_values
 from robospa.protocol.openpi import CAMERA_NAMES, to_openpi
-from robospa.protocol.options import option, plain_options
-from robospa.protocol.policy import PolicySpec, TrialInfo
+from robospa.protocol.options import option
+from robospa.protocol.policy import PolicySpec
 from robospa.protocol.transport import Timeouts, Transport
 
 WARNINGS = (
@@ -115,7 +113,7 @@ class OpenPiClientOptions(RobotOption):
         return extra
 
 
-class OpenPiSession:
+class OpenPiSession(StatelessSession):
     """One connection to an openpi server, over an open `transport`.
 
     The server sends one metadata map, then answers each observation map with a map that has
@@ -133,18 +131,8 @@ class OpenPiSession:
         self._transport, self._limits = transport, limits
         self._cameras, self._extra = options.camera_names, options.extra_fields
         self._committed = options.committed_names
-        metadata = self._receive(timeouts.hello, "metadata")
-        self.spec = options.spec
-        self.hello = {
-            "dialect": "openpi",
-            "metadata": json_values(metadata),
-            "spec": self.spec.to_json(),
-            "options": plain_options(options),
-            "warnings": list(WARNINGS),
-        }
-
-    def reset(self, id: int, trial: TrialInfo) -> None:
-        """Nothing to send: openpi policies keep no state between calls."""
+        metadata = json_values(self._receive(timeouts.hello, "metadata"))
+        super().__init__("openpi", options.spec, options, WARNINGS, metadata=metadata)
 
     def infer(
         self, id: int, observation: Observation, timeout: float
@@ -157,9 +145,6 @@ class OpenPiSession:
         answer = self._receive(timeout, "actions")
         refuse_unread(answer, KNOWN)
         return as_chunk(answer.get("actions")), _timing(answer)
-
-    def end(self, id: int, outcome: Mapping[str, object]) -> None:
-        """Nothing to send."""
 
     def close(self) -> None:
         self._transport.close()

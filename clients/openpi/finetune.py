@@ -29,10 +29,11 @@ from pathlib import Path
 from typing import Any
 
 from robospa.clients.model_policy import import_code
+from robospa.protocol.openpi import CAMERA_NAMES
 
 NAME = re.compile(r"pi05_(?P<lora>lora_)?robospa_(?P<dataset>[A-Za-z0-9][A-Za-z0-9._-]*)")
 SOURCES = "openpi's sources"
-CAMERAS = {"cam_high": "head", "cam_left_wrist": "left_wrist", "cam_right_wrist": "right_wrist"}
+CAMERAS = {theirs: ours for ours, theirs in CAMERA_NAMES.items() if ours != "front"}
 """Our camera for each image of openpi's Aloha transform."""
 WEIGHTS = "gs://openpi-assets/checkpoints/pi05_base/params"
 STEPS = 20_000

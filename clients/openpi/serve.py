@@ -16,12 +16,9 @@ from typing import Any
 import numpy as np
 
 from robospa.action_space import ActionSpace
-from robospa.clients.checkpoint import describe_checkpoint
-from robospa.clients.chunks import check_horizon
-from robospa.clients.model_policy import Chunk, ModelPolicy, Query, import_code
+from robospa.clients.chunks import STATE_TOKENS, RobotOption, check_horizon
+from robospa.clients.model_policy import Chunk, ModelPolicy, Query, describe_checkpoint, import_code
 from robospa.clients.openpi.finetune import CAMERAS, NAME, SOURCES, register
-from robospa.clients.robot_option import RobotOption
-from robospa.clients.token_budget import STATE_TOKENS
 from robospa.protocol.options import option
 from robospa.protocol.policy import PolicySpec
 

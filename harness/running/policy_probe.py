@@ -257,7 +257,7 @@ def warnings_of(
         if (budget := policy.spec.text_budget) is not None:
             budgets.setdefault(budget, {})[task] = instructions.get(task, "")
     if budgets:
-        from robospa.clients.token_budget import budget_warning
+        from robospa.clients.chunks import budget_warning
 
         found += [
             text
@@ -272,7 +272,7 @@ def over_budget(spec: PolicySpec, instruction: str) -> dict[str, int] | None:
     budget = spec.text_budget
     if budget is None:
         return None
-    from robospa.clients.token_budget import least_tokens
+    from robospa.clients.chunks import least_tokens
 
     count = least_tokens(instruction)
     return {"instruction_tokens": count, "text_budget": budget} if count > budget else None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
-from robospa.clients.checkpoint import BLOCK, SAMPLES, describe_checkpoint
+from robospa.clients.model_policy import BLOCK, SAMPLES, describe_checkpoint
 
 
 def weights(folder: Path, byte: int) -> Path:

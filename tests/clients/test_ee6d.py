@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robospa.clients.ee6d import LAYOUTS, ORDERS, decode_rotation, encode_rotation
+from robospa.clients.state_encoding import LAYOUTS, ORDERS, decode_rotation, encode_rotation
 
 quaternions = st.lists(st.floats(-1, 1), min_size=4, max_size=4).filter(
     lambda q: np.linalg.norm(q) > 0.1

@@ -51,7 +51,7 @@ def test_a_whole_answer_without_a_length_whose_end_never_comes_is_late() -> None
         answering(b"HTTP/1.1 200 OK\r\n\r\n[[0, 1]]") as server,
         pytest.raises(CallTimeout, match="did not answer within"),
     ):
-        server.get("/act", 0.2)
+        server.request("GET", "/act", None, 0.2)
 
 
 def test_a_redirect_is_not_followed_and_named() -> None:
@@ -61,7 +61,7 @@ def test_a_redirect_is_not_followed_and_named() -> None:
         ) as server,
         pytest.raises(HandshakeError, match=r"redirects to https://evil\.org/act, which is not"),
     ):
-        server.post("/act", b"{}", 10.0)
+        server.request("POST", "/act", b"{}", 10.0)
 
 
 def test_what_the_library_thinks_of_odd_servers_is_not_printed() -> None:

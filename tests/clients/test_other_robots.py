@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from robospa.action_space import ActionSpace
+from robospa.clients.chunks import RobotOption
 from robospa.clients.dialect import dialects
-from robospa.clients.robot_option import RobotOption
-from robospa.clients.robotwin.client import robotwin_observation
-from robospa.clients.xpolicylab.client import XPolicyLabClientOptions, decode, robot_state
+from robospa.clients.robotwin import robotwin_observation
+from robospa.clients.xpolicylab import XPolicyLabClientOptions, decode, robot_state
 from robospa.observation import Observation
 
 JOINTS = (6, 7)

@@ -8,8 +8,14 @@ import numpy as np
 import pytest
 from model_fakes import seen, trial
 
-from robospa.clients.model_policy import ModelMissing, ModelPolicy, import_code, seed_of
-from robospa.clients.seeded_noise import NotByRow, seeded_rows
+from robospa.clients.model_policy import (
+    ModelMissing,
+    ModelPolicy,
+    NotByRow,
+    import_code,
+    seed_of,
+    seeded_rows,
+)
 from robospa.protocol.policy import PolicySpec
 
 

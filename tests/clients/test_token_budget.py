@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from robospa.clients.token_budget import budget_warning, least_tokens
+from robospa.clients.chunks import budget_warning, least_tokens
 
 
 @pytest.mark.parametrize(

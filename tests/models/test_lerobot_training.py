@@ -20,7 +20,7 @@ from robospa.protocol.transport import Timeouts
 
 ROOT = Path(__file__).resolve().parents[2]
 PYTHON = os.environ.get("ROBOSPA_MODELS_PYTHON", str(ROOT / ".venv-models" / "bin" / "python"))
-SERVED = "robospa.clients.lerobot.serve:create"
+SERVED = "robospa.clients.lerobot:create"
 SIZES = {
     "dim_model": 32,
     "n_heads": 2,

@@ -26,9 +26,9 @@ ROOT = Path(__file__).resolve().parents[2]
 HERE = Path(__file__).resolve().parent
 PYTHON = os.environ.get("ROBOSPA_MODELS_PYTHON", str(ROOT / ".venv-models" / "bin" / "python"))
 SERVED = {
-    "act": "robospa.clients.lerobot.serve:create",
-    "diffusion": "robospa.clients.lerobot.serve:create",
-    "xvla": "robospa.clients.lerobot.serve:create",
+    "act": "robospa.clients.lerobot:create",
+    "diffusion": "robospa.clients.lerobot:create",
+    "xvla": "robospa.clients.lerobot:create",
     "pi05": "tiny:serve_pi05",
 }
 SIZES = {"xvla": 856_344, "pi05": 455_520}

@@ -26,9 +26,8 @@ import torch
 from lerobot.configs.types import FeatureType, PolicyFeature
 from lerobot.policies.factory import make_pre_post_processors
 
-from robospa.clients.lerobot import serve as served
-from robospa.clients.model_policy import Query
-from robospa.clients.seeded_noise import NotByRow, seeded_rows
+from robospa.clients import lerobot as served
+from robospa.clients.model_policy import NotByRow, Query, seeded_rows
 from robospa.protocol.policy import TrialInfo
 
 VIEWS = ("head_camera", "left_camera", "right_camera")

@@ -58,7 +58,7 @@ def load(folder: Path) -> ActPolicy:
     from robospa.baselines.learned.act.network import inputs, keyframes
     from robospa.baselines.learned.act.policy import ActPolicy
     from robospa.baselines.learned.act.training import load_network
-    from robospa.clients.checkpoint import describe_checkpoint
+    from robospa.clients.model_policy import describe_checkpoint
 
     torch.set_num_threads(1)
     network = load_network(folder, about)

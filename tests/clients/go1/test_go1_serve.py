@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from model_fakes import COLORS, color_of, install, seen, trial
 
-from robospa.clients.go1 import serve as go1
+from robospa.clients import go1
 from robospa.clients.model_policy import ModelMissing
 
 

@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 from model_fakes import COLORS, install, seen, tensor, trial
 
-from robospa.clients.lerobot import serve as lerobot
-from robospa.clients.lerobot.cameras import match_cameras
-from robospa.clients.lerobot.state_prompt import print_state
+from robospa.clients import lerobot as lerobot
+from robospa.clients.lerobot import match_cameras, print_state
 from robospa.clients.model_policy import ModelMissing
 
 HEAD = "observation.images.head_camera"

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from model_fakes import COLORS, close, color_of, install, seen, tensor, trial
 
+from robospa.clients import rdt as rdt
 from robospa.clients.model_policy import ModelMissing
-from robospa.clients.rdt import serve as rdt
-from robospa.clients.rdt.t5 import Embeddings
+from robospa.clients.rdt import Embeddings
 
 TEXT = trial().instruction
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from model_fakes import COLORS, close, color_of, install, seen, tensor, trial
 
+from robospa.clients import xvla
 from robospa.clients.model_policy import ModelMissing
-from robospa.clients.xvla import serve as xvla
 from robospa.protocol.errors import PolicyAnswerError
 
 

@@ -11,7 +11,7 @@ import pytest
 import standins
 from replay_fakes import CHUNK, FRAMES, Learned, episode
 
-from robospa.clients.ee6d import poses_to_ee6d
+from robospa.clients.state_encoding import poses_to_ee6d
 from robospa.harness.cli.main import main
 from robospa.harness.convention_check.episodes import write_episode
 

@@ -12,19 +12,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from robospa.clients.chunks import HORIZON, as_chunk, check_horizon
+from robospa.clients.detect import Probe
 from robospa.clients.dialect import ConnectionParams, Dialect
-from robospa.clients.http import JsonServer
-from robospa.clients.numpy_json import dumps
-from robospa.clients.probe import Probe
+from robospa.clients.http import HttpSession, dumps
 from robospa.observation import CameraSpec, Observation
 from robospa.protocol.errors import ProtocolViolation
-from robospa.protocol.options import option, plain_options
-from robospa.protocol.policy import PolicySpec, TrialInfo
+from robospa.protocol.options import option
+from robospa.protocol.policy import PolicySpec
 
 SCALE = np.where(np.isin(np.arange(14), [6, 13]), 100, 1).astype(np.float32)
 """Their numbers are ours times this."""
@@ -41,49 +39,36 @@ class AcmeOptions:
         check_horizon(self.horizon, self.execute)
 
 
-class AcmeSession:
+class AcmeSession(HttpSession):
     """One connection."""
 
+    path = "/predict"
+
     def __init__(self, params: ConnectionParams, options: AcmeOptions) -> None:
-        self.spec = PolicySpec(
+        spec = PolicySpec(
             "acme",
             cameras=(CameraSpec("head"),),
             horizon=options.horizon,
             execute=options.execute,
             action_dim=14,
         )
-        self.hello: dict[str, Any] = {
-            "dialect": "acme",
-            "spec": self.spec.to_json(),
-            "options": plain_options(options),
-            "warnings": ["Acme's server does not say which tasks its model was trained on"],
-        }
-        self._server = JsonServer(params)
-        self._server.greet("/predict", params.timeouts.hello)
-
-    def reset(self, id: int, trial: TrialInfo) -> None:
-        """Nothing to send: the server keeps no state between calls."""
+        warning = "Acme's server does not say which tasks its model was trained on"
+        super().__init__(params, "acme", spec, options, [warning])
 
     def infer(
         self, id: int, observation: Observation, timeout: float
-    ) -> tuple[Any, Mapping[str, float]]:
+    ) -> tuple[object, Mapping[str, float]]:
         sent = {
             "camera": observation["images"]["head"],
             "joints": (observation["state"] * SCALE).tolist(),
             "text": observation["instruction"],
         }
-        answer = self._server.post("/predict", dumps(sent).encode(), timeout)
+        answer = self.ask(dumps(sent).encode(), timeout)
         if not isinstance(answer, Mapping) or "joints" not in answer:
-            raise ProtocolViolation(f"{self._server.url}/predict did not answer 'joints'")
+            raise ProtocolViolation("Acme's server did not answer 'joints'")
         chunk = as_chunk(answer["joints"])
         fits = isinstance(chunk, np.ndarray) and chunk.shape[-1:] == SCALE.shape
         return chunk / SCALE if fits else chunk, {}  # what does not fit is refused by the caller
-
-    def end(self, id: int, outcome: Mapping[str, Any]) -> None:
-        """Nothing to send."""
-
-    def close(self) -> None:
-        self._server.close()
 
 
 def recognise(probe: Probe) -> bool:

@@ -11,34 +11,135 @@ anew, so trials never mix and several of them make one batch.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from robospa.action_space import ActionSpace
-from robospa.clients.checkpoint import describe_checkpoint
-from robospa.clients.chunks import check_horizon
-from robospa.clients.ee6d import LAYOUTS, ORDERS
-from robospa.clients.image_preprocessing import resize
-from robospa.clients.lerobot.cameras import ImageInput, match_cameras, sources_of
-from robospa.clients.lerobot.state_prompt import STATE, print_state
+from robospa.clients.chunks import STATE_TOKENS, RobotOption, check_horizon
 from robospa.clients.model_policy import (
     Chunk,
     ModelMissing,
     ModelPolicy,
+    NotByRow,
     Query,
+    describe_checkpoint,
     import_installed,
     import_torch,
+    resize,
+    seeded_rows,
 )
-from robospa.clients.robot_option import RobotOption
-from robospa.clients.seeded_noise import NotByRow, seeded_rows
-from robospa.clients.state_encoding import SPACES, StateEncoding
-from robospa.clients.token_budget import STATE_TOKENS
-from robospa.observation import CameraSpec
+from robospa.clients.state_encoding import LAYOUTS, ORDERS, SPACES, StateEncoding
+from robospa.observation import CAMERAS, CameraSpec
 from robospa.protocol.options import option
 from robospa.protocol.policy import PolicySpec
+
+STATE = "observation.state"
+STATE_STEP = "Pi05PrepareStateTokenizerProcessorStep"
+
+
+class StateWidth:
+    """A processor step that pads or cuts the state before pi0.5 prints it into its prompt."""
+
+    def __init__(self, width: int) -> None:
+        self.width = width
+
+    def __call__(self, transition: Any) -> Any:
+        """The transition with a state of `width` numbers, zeros appended."""
+        torch = import_torch()
+        changed = dict(transition)
+        observation = dict(changed["observation"])
+        state = observation[STATE]
+        lacking = self.width - state.shape[-1]
+        observation[STATE] = torch.nn.functional.pad(state, (0, lacking)) if lacking > 0 else state
+        changed["observation"] = observation
+        return changed
+
+
+def print_state(before: Any, width: int) -> None:
+    """Make the processors of pi0.5 print `width` numbers of state; ValueError for others'."""
+    steps = list(before.steps)
+    places = [i for i, step in enumerate(steps) if type(step).__name__ == STATE_STEP]
+    if not places:
+        raise ValueError("option state_prompt is for pi0.5: these processors print no state")
+    steps[places[0]].max_state_dim = width  # LeRobot < 0.5 pads to this itself
+    steps.insert(places[0], StateWidth(width))
+    before.steps = steps
+
+
+CAMERA_WORDS = {
+    "head": ("head", "high", "top"),
+    "left_wrist": ("left",),
+    "right_wrist": ("right",),
+    "front": ("front", "low"),
+}
+"""Parts of an image's name that tell which of our cameras it is."""
+
+
+@dataclass(frozen=True)
+class ImageInput:
+    """One image of the policy: its `key`, our `camera`, its declared size [px]."""
+
+    key: str
+    camera: str
+    width: int
+    height: int
+
+
+def sources_of(before: Any) -> dict[str, str]:
+    """The data set's name of each image that the processors `before` rename (`rename_map` of
+    `lerobot-train`), by the policy's name."""
+    maps = [getattr(step, "rename_map", None) or {} for step in getattr(before, "steps", ())]
+    return {theirs: source for one in maps for source, theirs in one.items()}
+
+
+def match_cameras(
+    features: Mapping[str, Sequence[int]],
+    images: str | None,
+    sources: Mapping[str, str] | None = None,
+) -> tuple[ImageInput, ...]:
+    """Which of our cameras each image (key to (C, H, W)) is; raises ValueError.
+
+    Keys that say `empty` are left out: the policy fills them itself. One that is among `sources`
+    goes by its name there.
+    """
+    renamed = sources or {}
+    shapes = {key: shape for key, shape in features.items() if "empty" not in key}
+    named: dict[str, str] = {}
+    for pair in (images or "").split(","):
+        camera, colon, key = pair.strip().partition(":")
+        if not pair.strip():
+            continue
+        if not colon or camera not in CAMERAS or key not in shapes or key in named:
+            raise ValueError(
+                f"option images={images!r}: {pair!r} is no camera:key with a camera of "
+                f"{', '.join(CAMERAS)} and a key of {', '.join(shapes) or 'no images'}"
+            )
+        named[key] = camera
+    inputs = []
+    for key, (_, height, width) in shapes.items():
+        camera = named.get(key) or _camera_named(renamed.get(key, key))
+        inputs.append(ImageInput(key, camera, int(width), int(height)))
+    cameras = [view.camera for view in inputs]
+    if len(set(cameras)) != len(cameras):
+        raise ValueError(f"two images of the policy are the same camera: {inputs}; set images")
+    return tuple(inputs)
+
+
+def _camera_named(key: str) -> str:
+    words = re.split(r"[^a-z]+", key.rpartition(".")[2].lower())
+    found = [
+        camera for camera, names in CAMERA_WORDS.items() if any(name in words for name in names)
+    ]
+    if len(found) != 1:
+        raise ValueError(
+            f"the name {key!r} does not tell which camera it is; say "
+            f"--option images=head:{key}, with a pair for every image"
+        )
+    return found[0]
 
 
 @dataclass(frozen=True)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from robospa.clients.detect import Probe
 from robospa.clients.dialect import ConnectionParams, Dialect
 from robospa.clients.openpi.client import (
     DECIDING_OPTIONS,
     OpenPiClientOptions,
     OpenPiSession,
 )
-from robospa.clients.probe import Probe
 from robospa.protocol.client import WireClient, open_wire
 from robospa.protocol.transport import Transport
 

@@ -22,16 +22,22 @@ from dataclasses import dataclass
 import numpy as np
 
 from robospa.action_space import SIX_JOINT_ARMS, ActionSpace
-from robospa.clients.chunks import HORIZON, as_chunk, check_horizon, invert_grippers, refuse_unread
-from robospa.clients.dialect import ConnectionParams, Dialect
-from robospa.clients.msgpack_socket import MsgpackSocket
-from robospa.clients.numpy_msgpack import text_form
-from robospa.clients.probe import Probe
-from robospa.clients.robot_option import RobotOption
-from robospa.clients.token_budget import BUDGET, check_budget
+from robospa.clients.chunks import (
+    BUDGET,
+    HORIZON,
+    RobotOption,
+    as_chunk,
+    check_budget,
+    check_horizon,
+    invert_grippers,
+    refuse_unread,
+)
+from robospa.clients.detect import Probe
+from robospa.clients.dialect import ConnectionParams, Dialect, StatelessSession
+from robospa.clients.numpy_msgpack import MsgpackSocket, text_form
 from robospa.observation import CameraSpec, Observation
 from robospa.protocol.errors import HandshakeError, ServerError, json_values, printable
-from robospa.protocol.options import option, plain_options
+from robospa.protocol.options import option
 from robospa.protocol.policy import PolicySpec, TrialInfo
 
 CAMERAS = {"head": "head_camera", "left_wrist": "left_camera", "right_wrist": "right_camera"}
@@ -92,14 +98,14 @@ def encode(observation: Observation, options: VlaEvalClientOptions) -> dict[str,
     return {**sent, **{key: state for key in options.state_keys.split(",") if key}}
 
 
-class VlaEvalSession:
+class VlaEvalSession(StatelessSession):
     """One WebSocket, which is one session of the server."""
 
     def __init__(self, params: ConnectionParams, options: VlaEvalClientOptions) -> None:
         self._options, self._joints = options, SIX_JOINT_ARMS
         self._number = 0
         self._socket = MsgpackSocket(params, text_form)
-        self.spec = PolicySpec(
+        spec = PolicySpec(
             name="vla-eval",
             cameras=tuple(CameraSpec(name) for name in options.views),
             state=options.state,
@@ -121,14 +127,9 @@ class VlaEvalSession:
             )
         name = str(greeting.get("model_server", ""))
         announced = {key: json_values(greeting[key]) for key in ANNOUNCED if key in greeting}
-        self.hello: dict[str, object] = {
-            "dialect": "vla-eval",
-            "server": printable(f"{name} {greeting.get('harness_version', '')}", 200),
-            "said": announced,
-            "spec": self.spec.to_json(),
-            "options": plain_options(options),
-            "warnings": [*WARNINGS, *_mismatches(announced, options)],
-        }
+        server = printable(f"{name} {greeting.get('harness_version', '')}", 200)
+        warnings = (*WARNINGS, *_mismatches(announced, options))
+        super().__init__("vla-eval", spec, options, warnings, server=server, said=announced)
 
     def reset(self, id: int, trial: TrialInfo) -> None:
         self._joints = trial.joints

@@ -8,7 +8,15 @@
     ee (2, 8)                  state.left_ee_pose (7,) x y z qw qx qy qz, left_tcp_pose, right..
     instruction                instruction, instructions
 
-Answered is a list of maps, one an action (`robospa.clients.xpolicylab.actions`). Every message has
+Answered is a list of maps, one an action; a single map; rows of numbers (T, D); or one row. A map
+has these names, or others in `NAMES`, the first of which wins:
+
+    joint      left_arm_joint_state (6,), left_ee_joint_state (1,), and the same for the right arm
+    ee         left_ee_pose (7,) x y z qw qx qy qz, left_ee_joint_state (1,), and for the right arm
+
+Names of the space that was not asked for are ignored, as by RoboTwin's client of it; any other name
+is refused, because what it holds would be lost. An arm or a gripper that an action does not name
+stays as it was commanded last. Every message has
 an id, which its answer must repeat. A message that the server cannot read is never answered: then
 the deadline is the only news.
 """
@@ -24,19 +32,129 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.action_space import ARMS, POSE, SIX_JOINT_ARMS, ActionSpace
-from robospa.clients.chunks import HORIZON, check_horizon, invert_grippers, refuse_unread
-from robospa.clients.dialect import ConnectionParams, Dialect
-from robospa.clients.msgpack_socket import MsgpackSocket
-from robospa.clients.numpy_msgpack import binary_form
-from robospa.clients.probe import Probe
-from robospa.clients.robot_option import RobotOption
-from robospa.clients.token_budget import BUDGET, check_budget
-from robospa.clients.xpolicylab.actions import read_actions
+from robospa.clients.chunks import (
+    BUDGET,
+    HORIZON,
+    NAMED,
+    RobotOption,
+    as_chunk,
+    check_budget,
+    check_horizon,
+    invert_grippers,
+    refuse_unread,
+)
+from robospa.clients.detect import Probe
+from robospa.clients.dialect import ConnectionParams, Dialect, StatelessSession
+from robospa.clients.numpy_msgpack import MsgpackSocket, binary_form
 from robospa.observation import Observation
-from robospa.protocol.errors import ServerError, printable
-from robospa.protocol.options import option, plain_options
+from robospa.protocol.errors import PolicyAnswerError, ServerError, printable
+from robospa.protocol.options import option
 from robospa.protocol.policy import PolicySpec, TrialInfo
+from robospa.registry import did_you_mean
 from robospa.rotations import quaternion_to_matrix
+
+BODIES = {"joint": "arm_joint_state", "ee": "ee_pose"}
+"""What moves an arm in each space, under its usual name without the arm."""
+NAMES = {
+    "left_arm_joint_state": (
+        "left_arm_joint",
+        "left_joint_state",
+        "arm_joint_state",
+        "joint_state",
+    ),
+    "right_arm_joint_state": ("right_arm_joint", "right_joint_state"),
+    "left_ee_pose": ("left_endpose", "ee_pose"),
+    "right_ee_pose": ("right_endpose",),
+    "left_ee_joint_state": ("left_gripper", "left_gripper_pos", "ee_joint_state"),
+    "right_ee_joint_state": ("right_gripper", "right_gripper_pos"),
+}
+"""Other names of each part of an action, in the order in which they are looked for."""
+SPACES = {"joint": "joint", "qpos": "joint", "ee": "ee", "endpose": "ee"}
+"""The space that an `action_type` names."""
+PART_NAMES = {"action_type", *NAMES, *(other for others in NAMES.values() for other in others)}
+
+
+def read_actions(answer: object, seen: Mapping[str, NDArray[np.float32]], space: str) -> object:
+    """The chunk (T, D) in an answer; anything that is none is returned, to be refused as one.
+
+    `seen`: joints, grippers and poses at the query, by their usual names. Raises PolicyAnswerError
+    for an action that cannot be read whole.
+    """
+    if isinstance(answer, Mapping) and "actions" in answer:
+        refuse_unread(answer, ("actions", "latency_ms"))
+        return read_actions(answer["actions"], seen, space)
+    if isinstance(answer, Mapping):
+        answer = [answer]
+    if isinstance(answer, list) and any(isinstance(item, Mapping) for item in answer):
+        return _from_maps(answer, dict(seen), space)
+    chunk = as_chunk(answer)
+    if isinstance(chunk, np.ndarray) and chunk.ndim == 1 and len(chunk):
+        chunk = chunk[None]  # one action
+    return chunk
+
+
+def _from_maps(
+    actions: list[object], last: dict[str, NDArray[np.float32]], space: str
+) -> NDArray[np.float32]:
+    parts = [f"{arm}_{part}" for arm in ARMS for part in (BODIES[space], "ee_joint_state")]
+    rows = []
+    for action in actions:
+        found = _named(action, space)
+        for part in parts:
+            if part in found:
+                last[part] = _numbers(part, found[part], len(last[part]))
+        rows.append(np.concatenate([last[part] for part in parts]))
+    return np.stack(rows)
+
+
+def _named(action: object, space: str) -> dict[str, object]:
+    """The parts of one action by their usual names."""
+    if not isinstance(action, Mapping):
+        raise PolicyAnswerError(
+            f"the policy answered a list of maps and a {type(action).__name__} among them"
+        )
+    unknown = sorted(str(name) for name in action if name not in PART_NAMES)
+    if unknown:
+        near = did_you_mean(unknown[0][:NAMED], PART_NAMES)
+        raise PolicyAnswerError(
+            f"the policy answered an action with {printable(', '.join(unknown), NAMED)}, which "
+            f"XPolicyLab's RoboTwin client does not read either; {near}the usual names are "
+            f"{', '.join(NAMES)}"
+        )
+    stated = str(action.get("action_type", space)).lower()
+    if SPACES.get(stated) != space:
+        remedy = f"; write ?space={SPACES[stated]}" if stated in SPACES else ""
+        raise PolicyAnswerError(
+            f"the policy answered an action of action_type {stated[:40]!r}, not {space}{remedy}"
+        )
+    found = {}
+    for name, others in NAMES.items():
+        first = next((one for one in (name, *others) if one in action), None)
+        if first is not None and action[first] is not None:
+            found[name] = action[first]
+    bodies = [f"{arm}_{BODIES[space]}" for arm in ARMS]
+    if not any(body in found for body in bodies):
+        names = ", ".join(sorted(map(str, action))) or "nothing"
+        raise PolicyAnswerError(
+            f"the policy answered an action of {names}, without {' or '.join(bodies)}; is option "
+            "space its action_type?"
+        )
+    return found
+
+
+def _numbers(name: str, value: object, count: int) -> NDArray[np.float32]:
+    try:
+        numbers = np.ravel(np.asarray(value))
+    except ValueError as error:
+        raise PolicyAnswerError(f"the policy answered a {name} of uneven lists") from error
+    if numbers.dtype.kind not in "iuf" or len(numbers) != count:
+        raise PolicyAnswerError(
+            f"the policy answered {len(numbers)} values of {numbers.dtype} as {name}, not {count} "
+            "numbers"
+        )
+    with np.errstate(over="ignore"):
+        return numbers.astype(np.float32)
+
 
 CAMERAS = {"head": "cam_head", "left_wrist": "cam_left_wrist", "right_wrist": "cam_right_wrist"}
 TCP_AHEAD = 0.12
@@ -135,7 +253,7 @@ def decode(
     return invert_grippers(read_actions(answer.get("actions"), seen, options.space), space)
 
 
-class XPolicyLabSession:
+class XPolicyLabSession(StatelessSession):
     """One WebSocket."""
 
     def __init__(self, params: ConnectionParams, options: XPolicyLabClientOptions) -> None:
@@ -143,7 +261,7 @@ class XPolicyLabSession:
         self._trial: dict[str, object] = {}
         self._joints = SIX_JOINT_ARMS
         self._ids: dict[str, object] = {}
-        self.spec = PolicySpec(
+        spec = PolicySpec(
             name="xpolicylab",
             state=options.state,
             action=options.space,
@@ -155,13 +273,8 @@ class XPolicyLabSession:
         )
         self._socket = MsgpackSocket(params, binary_form)
         greeting = self._call(0, "hello", "hello_ack", {}, params.timeouts.hello)
-        self.hello: dict[str, object] = {
-            "dialect": "xpolicylab",
-            "server": printable(str(greeting.get("server", "")), 200),
-            "spec": self.spec.to_json(),
-            "options": plain_options(options),
-            "warnings": list(WARNINGS),
-        }
+        server = printable(str(greeting.get("server", "")), 200)
+        super().__init__("xpolicylab", spec, options, WARNINGS, server=server)
 
     def reset(self, id: int, trial: TrialInfo) -> None:
         case, self._joints = trial.task, trial.joints

@@ -1,0 +1,204 @@
+"""GO-1 (AgiBot World): its own `deploy.py` (POST /act, JSON with arrays inside), or its class here.
+
+    ours                   read
+    images.head            top     (240, 320, 3) uint8 RGB
+    images.right_wrist     right   (swapped with left if `wrists=swapped`)
+    images.left_wrist      left
+    state (14,)            state   (1, 14) float64
+    instruction            instruction
+    option ctrl_freq       ctrl_freqs (1,) int64, float64 for a fraction
+
+The answer is a bare list (T, 14) of absolute joint targets. There is no reset, no spec and no
+reason in its errors: every failure inside the server is a bare HTTP 500.
+
+`robospa serve go1` runs the official inference class in this process instead: the policy seed of a
+trial decides the noise, and nothing is coded as JSON. It takes one observation at a time.
+
+    PYTHONPATH=AgiBot-World robospa serve go1 --option checkpoint=... --option stats=...
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from robospa.action_space import ActionSpace
+from robospa.clients.chunks import HORIZON, RobotOption, check_horizon
+from robospa.clients.detect import Probe
+from robospa.clients.dialect import ConnectionParams, Dialect
+from robospa.clients.http import HttpSession, chunk_of, dumps
+from robospa.clients.model_policy import (
+    Chunk,
+    ModelPolicy,
+    Query,
+    describe_checkpoint,
+    existing,
+    import_code,
+    import_torch,
+    seeded_rows,
+)
+from robospa.observation import Observation
+from robospa.protocol.options import option
+from robospa.protocol.policy import PolicySpec
+
+
+@dataclass(frozen=True)
+class Go1Conventions(RobotOption):
+    """What neither the checkpoint nor GO-1's server says."""
+
+    wrists: str = option(
+        "correct",
+        "`swapped` sends each wrist image under the other's name, as RoboTwin's client does",
+        ("correct", "swapped"),
+    )
+    ctrl_freq: float = option(30.0, "control frequency [Hz] given to the network")
+    horizon: int | None = option(None, HORIZON)
+    execute: int | None = option(None, "actions executed before the next query; none for all")
+
+    def __post_init__(self) -> None:
+        """ValueError for options that cannot be."""
+        if not 0 < self.ctrl_freq < 10_000:
+            raise ValueError(f"option ctrl_freq={self.ctrl_freq:g} is no frequency in Hz")
+        check_horizon(self.horizon, self.execute)
+
+    @property
+    def cameras(self) -> dict[str, str]:
+        """Our camera for each image of the model."""
+        if self.wrists == "swapped":
+            return {"top": "head", "right": "left_wrist", "left": "right_wrist"}
+        return {"top": "head", "right": "right_wrist", "left": "left_wrist"}
+
+    def inputs(self, observation: Observation) -> dict[str, object]:
+        """One query, arrays as they are in `observation`."""
+        images, frequency = observation["images"], self.ctrl_freq
+        return {
+            **{theirs: images[ours] for theirs, ours in self.cameras.items()},
+            "instruction": observation.get("instruction", ""),
+            "state": np.asarray(observation["state"], np.float64)[None],
+            "ctrl_freqs": np.array([int(frequency) if frequency.is_integer() else frequency]),
+        }
+
+
+WARNINGS = (
+    "the control frequency that the model was trained with is invisible on the wire: `ctrl_freq` "
+    "must equal ctrl_freq of its training config",
+    "a stock AgileX config trains on one constant prompt: unless it maps final_prompt to the task, "
+    "the model ignores the instruction",
+)
+SWAPPED = (
+    "left and right wrist images are swapped, as in RoboTwin's GO-1 client, to reproduce "
+    "numbers made with it"
+)
+SILENT = (
+    "GO-1's server gives no reason: its log has it (actions of NaN or infinity, which JSON cannot "
+    "carry, look like this too)"
+)
+
+
+@dataclass(frozen=True)
+class Go1ClientOptions(Go1Conventions):
+    """What GO-1's server does not say."""
+
+    state: str = option("commanded", "which joints to send", ("commanded", "measured"))
+
+
+class Go1Session(HttpSession):
+    """One kept-alive HTTP connection."""
+
+    def __init__(self, params: ConnectionParams, options: Go1ClientOptions) -> None:
+        self._options = options
+        spec = PolicySpec(
+            name="go1",
+            state=options.state,
+            horizon=options.horizon,
+            execute=options.execute,
+            embodiments=(options.embodiment,),
+            action_dim=ActionSpace().width,
+        )
+        warnings = (*WARNINGS, SWAPPED) if options.wrists == "swapped" else WARNINGS
+        super().__init__(params, "go1", spec, options, warnings, ("HTTP 500", SILENT))
+
+    def infer(
+        self, id: int, observation: Observation, timeout: float
+    ) -> tuple[object, Mapping[str, float]]:
+        body = dumps(self._options.inputs(observation)).encode()
+        return chunk_of(self.ask(body, timeout)), {}
+
+
+def recognise(probe: Probe) -> bool:
+    """Any failure inside GO-1's server is a bare HTTP 500."""
+    return probe.http("POST", "/act", b"{}").status == 500
+
+
+DIALECT = Dialect(
+    server="GO-1's server",
+    scheme="go1+http",
+    secure_scheme="go1+https",
+    wire="http",
+    port=9000,
+    options=Go1ClientOptions,
+    open_session=Go1Session,
+    recognise=recognise,
+    weak_sign=True,
+    deciding_options={
+        "wrist images swapped": "wrists",
+        "measured state": "state",
+    },
+)
+
+
+@dataclass(frozen=True)
+class Go1ServerOptions(Go1Conventions):
+    """How GO-1 is loaded; the conventions are those of the client `go1+http`."""
+
+    checkpoint: str = option("", "folder of the fine-tuned model")
+    stats: str | None = option(None, "dataset_stats.json of its training run, if it normalises")
+    code: str | None = option(None, "checkout of AgiBot-World, or set PYTHONPATH")
+
+    def __post_init__(self) -> None:
+        """ValueError for options that cannot be."""
+        super().__post_init__()
+        if not self.checkpoint:
+            raise ValueError("option checkpoint is needed: the folder of the fine-tuned model")
+
+
+class Go1(ModelPolicy):
+    """The official class, one observation at a time."""
+
+    def __init__(self, model: Any, options: Go1ServerOptions) -> None:
+        super().__init__()
+        self.model, self.options = model, options
+        self.spec = PolicySpec(
+            name="go1",
+            horizon=options.horizon,
+            execute=options.execute,
+            seeded=True,
+            embodiments=(options.embodiment,),
+            action_dim=ActionSpace().width,
+            checkpoint=describe_checkpoint(options.checkpoint),
+        )
+
+    def predict(self, queries: Sequence[Query]) -> list[Chunk]:
+        """One chunk (T, 14) of absolute joint targets per query."""
+        chunks = []
+        for query in queries:
+            with seeded_rows([query.seed]):
+                answer = self.model.inference(self._payload(query))
+            chunks.append(np.array(answer, np.float32)[: self.options.horizon])
+        return chunks
+
+    def _payload(self, query: Query) -> dict[str, Any]:
+        """What its server would have read from the wire, in arrays of its own."""
+        inputs = self.options.inputs(query.observation)
+        return {k: np.array(v) if isinstance(v, np.ndarray) else v for k, v in inputs.items()}
+
+
+def create(options: Go1ServerOptions) -> Go1:
+    """Load the model. Raises ModelMissing."""
+    import_torch()
+    source = import_code("evaluate.deploy", options.code, "a checkout of AgiBot-World")
+    stats = None if options.stats is None else existing(options.stats, "stats")
+    return Go1(source.GO1Infer(existing(options.checkpoint, "checkpoint"), stats), options)

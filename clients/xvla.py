@@ -1,0 +1,358 @@
+"""X-VLA behind its own `deploy.py`: POST /act, JSON whose arrays are JSON texts themselves.
+
+    ours                   sent (each array as the text of its JSON object)
+    images.head            image0
+    images.left_wrist      image1
+    images.right_wrist     image2
+    ee (2, 8)              proprio (20,): per arm position, six of the rotation, gripper
+    instruction            language_instruction
+    options                domain_id, steps
+
+Answered are T x 20 absolute end-effector poses, executed as our `ee` actions; with `space=joint`
+T x 14 joint targets for a joint-space fine-tune. From the second query of a trial on, the state
+sent is not measured but the command executed last, as in X-VLA's own evaluation.
+Errors inside the server are a bare HTTP 400 without a reason.
+
+`robospa serve xvla` runs the official class in this process instead: several trials in one call,
+and noise from our seeds, which X-VLA's own server draws from none.
+
+    PYTHONPATH=X-VLA robospa serve xvla --option checkpoint=2toINF/X-VLA-RoboTwin2
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robospa.action_space import ActionSpace
+from robospa.clients.chunks import (
+    HORIZON,
+    RobotOption,
+    check_budget,
+    check_horizon,
+    invert_grippers,
+    refuse_unread,
+)
+from robospa.clients.detect import Probe
+from robospa.clients.dialect import ConnectionParams, Dialect
+from robospa.clients.http import HttpSession, chunk_of, dumps
+from robospa.clients.model_policy import (
+    Chunk,
+    ModelMissing,
+    ModelPolicy,
+    Query,
+    describe_checkpoint,
+    import_code,
+    import_torch,
+    pillow_image,
+    seeded_rows,
+)
+from robospa.clients.state_encoding import (
+    ARM,
+    LAYOUTS,
+    ORDERS,
+    StateEncoding,
+    ee6d_to_actions,
+    poses_to_ee6d,
+)
+from robospa.observation import CameraSpec, Observation
+from robospa.protocol.errors import PolicyAnswerError, ProtocolViolation
+from robospa.protocol.options import option
+from robospa.protocol.policy import PolicySpec, TrialInfo
+
+VIEWS = ("head", "left_wrist", "right_wrist")
+"""Our cameras in the order of the model's views."""
+
+
+@dataclass(frozen=True)
+class XvlaConventions(RobotOption):
+    """What neither the checkpoint nor X-VLA's server says: the same whoever loads the model."""
+
+    space: str = option("ee6d", "what the model answers", ("ee6d", "joint"))
+    domain_id: int = option(6, "the soft prompt, 0 to 29; 6 is the released RoboTwin checkpoint's")
+    steps: int = option(10, "denoising steps")
+    quaternions: str = option(
+        "xyzw", "how RoboTwin's w x y z are read: `xyzw` repeats the official slip", ORDERS
+    )
+    rotation: str = option("interleaved", "order of the six rotation numbers", LAYOUTS)
+    colors: str = option("rgb", "order of an image's channels", ("rgb", "bgr"))
+    cameras: str = option("head,left_wrist,right_wrist", "our cameras to send, in this order")
+    proprio: str = option(
+        "commanded",
+        "after the first query: the last command executed, or what the robot measures",
+        ("commanded", "measured"),
+    )
+    closed_above: float = option(
+        0.7, "a gripper number of the 20 above this closes the gripper, any other opens it"
+    )
+    horizon: int | None = option(None, HORIZON)
+    execute: int | None = option(None, "actions executed before the next query; none for all")
+    text_budget: int | None = option(
+        50, "tokens of text that the model's processor keeps; the rest is cut off in silence"
+    )
+
+    def __post_init__(self) -> None:
+        """ValueError for options that cannot be."""
+        if not 0 <= self.domain_id < 30:
+            raise ValueError(f"option domain_id={self.domain_id} is not one of 0 to 29")
+        if self.steps < 1:
+            raise ValueError(f"option steps={self.steps}: at least one is needed")
+        check_horizon(self.horizon, self.execute)
+        check_budget(self.text_budget)
+        wrong = [name for name in self.views if name not in VIEWS]
+        if wrong or len(set(self.views)) != len(self.views) or not self.views:
+            raise ValueError(f"option cameras={self.cameras!r}: one to three of {', '.join(VIEWS)}")
+
+    @property
+    def views(self) -> tuple[str, ...]:
+        """Cameras in the order of the model's views."""
+        return tuple(name for name in self.cameras.split(",") if name)
+
+    def spec_of_model(self, text_budget: int | None) -> PolicySpec:
+        """The spec that these options make of a server or a model."""
+        action = "joint" if self.space == "joint" else "ee"
+        return PolicySpec(
+            name="xvla",
+            cameras=tuple(CameraSpec(name) for name in self.views),
+            action=action,
+            horizon=self.horizon,
+            execute=self.execute,
+            embodiments=(self.embodiment,),
+            action_dim=ActionSpace(action).width,
+            text_budget=text_budget,
+        )
+
+
+WARNINGS = (
+    "whether a checkpoint was trained with red and blue exchanged is invisible on the wire: one "
+    "made from RoboTwin's files with X-VLA's loader of after January 2026 was (`colors=bgr`), one "
+    "of the releases before, as the released checkpoint, was not",
+    "the order of quaternions is invisible on the wire: the released RoboTwin checkpoint needs "
+    "`quaternions=xyzw`, an own fine-tune with the correct order `wxyz`",
+    "domain_id chooses the soft prompt: 6 is the released RoboTwin checkpoint's",
+)
+SILENT = (
+    "X-VLA's server gives no reason: its log has it (a wrong domain_id, a wrong size of proprio, "
+    "and actions of NaN or infinity, which JSON cannot carry, look like this)"
+)
+
+
+@dataclass(frozen=True)
+class XvlaClientOptions(XvlaConventions):
+    """What X-VLA's server does not say."""
+
+    joint_grippers: str = option(
+        "open",
+        "what 1 means in a gripper number of `space=joint`, sent and answered, which are then "
+        "executed as they are",
+        ("open", "closed"),
+    )
+    text: str = option(
+        "instruction",
+        "text given to the model: the instruction, or the task's name as words, as in X-VLA's own "
+        "RoboTwin evaluation",
+        ("instruction", "task"),
+    )
+
+
+class XvlaSession(HttpSession):
+    """One kept-alive HTTP connection, and the last chunk of the trial in progress."""
+
+    def __init__(self, params: ConnectionParams, options: XvlaClientOptions) -> None:
+        self._options = options
+        self._task = ""
+        self._chunk: NDArray[np.float32] | None = None
+        self._asked_at = 0
+        limit = options.text_budget if options.text == "instruction" else None
+        spec = options.spec_of_model(text_budget=limit)
+        super().__init__(params, "xvla", spec, options, WARNINGS, ("HTTP 400", SILENT))
+
+    def reset(self, id: int, trial: TrialInfo) -> None:
+        """The command of the trial before is forgotten."""
+        self._chunk = None
+        self._task = trial.task.replace("_", " ")
+
+    def infer(
+        self, id: int, observation: Observation, timeout: float
+    ) -> tuple[object, Mapping[str, float]]:
+        answer = self.ask(self.body(observation), timeout)
+        if not isinstance(answer, Mapping) or "action" not in answer:
+            raise ProtocolViolation(
+                f"{self._server.url}{self.path} did not answer an 'action': is it X-VLA's server?"
+            )
+        refuse_unread(answer, ("action",))
+        self._chunk = self._actions(chunk_of(answer["action"]))
+        self._asked_at = int(observation["step"])
+        return self._chunk, {}
+
+    def _actions(self, chunk: object) -> NDArray[np.float32]:
+        joint = self._options.space == "joint"
+        width = ActionSpace("joint").width if joint else 2 * ARM
+        if not isinstance(chunk, np.ndarray) or chunk.ndim != 2 or chunk.shape[1] != width:
+            shape = chunk.shape if isinstance(chunk, np.ndarray) else type(chunk).__name__
+            hint = "; is it a fine-tune in the other space (option space)?"
+            raise PolicyAnswerError(f"the policy answered {shape}, not (T, {width}){hint}")
+        if not joint:
+            how = self._options
+            return ee6d_to_actions(chunk, how.quaternions, how.rotation, how.closed_above)
+        actions: NDArray[np.float32] = (
+            chunk
+            if self._options.joint_grippers == "open"
+            else invert_grippers(chunk, ActionSpace("joint"))
+        )
+        return actions
+
+    def body(self, observation: Observation) -> bytes:
+        """The JSON body of one request."""
+        sent: dict[str, object] = {}
+        for place, name in enumerate(self._options.views):
+            image = observation["images"][name]
+            sent[f"image{place}"] = dumps(
+                image if self._options.colors == "rgb" else image[..., ::-1]
+            )
+        sent["proprio"] = dumps(self.proprio(observation))
+        instruction = observation.get("instruction", "")
+        sent["language_instruction"] = (
+            instruction if self._options.text == "instruction" else self._task
+        )
+        sent["domain_id"] = self._options.domain_id
+        sent["steps"] = self._options.steps
+        return dumps(sent).encode()
+
+    def proprio(self, observation: Observation) -> NDArray[np.float64]:
+        """The robot's state as the model reads it."""
+        last = self._last_command(observation)
+        if self._options.space == "joint":
+            state = np.array(observation["state"] if last is None else last, dtype=float)
+            if self._options.joint_grippers == "closed":
+                grippers = ActionSpace("joint").grippers
+                state[grippers] = 1 - state[grippers]
+            return state
+        poses = observation["ee"] if last is None else last.reshape(2, 8)
+        how = self._options
+        return poses_to_ee6d(np.asarray(poses), how.quaternions, how.rotation)
+
+    def _last_command(self, observation: Observation) -> NDArray[np.float32] | None:
+        """The action executed just before this query, if proprioception is to be that."""
+        if self._chunk is None or self._options.proprio == "measured":
+            return None
+        done = int(observation["step"]) - self._asked_at
+        return self._chunk[min(done, len(self._chunk)) - 1] if done > 0 else None
+
+
+def recognise(probe: Probe) -> bool:
+    """A request without images is refused with a reason in `error`."""
+    answer = probe.http("POST", "/act", b"{}")
+    return answer.status == 400 and "error" in (answer.json() or {})
+
+
+DIALECT = Dialect(
+    server="X-VLA's server",
+    scheme="xvla+http",
+    secure_scheme="xvla+https",
+    wire="http",
+    port=8010,
+    options=XvlaClientOptions,
+    open_session=XvlaSession,
+    recognise=recognise,
+    deciding_options={
+        "blue for red": "colors",
+        "quaternion x y z w": "quaternions",
+        "quaternion slip": "quaternions",
+        "quaternions of the state x y z w": "quaternions",
+        "gripper inverted": "joint_grippers",
+    },
+)
+
+
+CHECKOUT = "a checkout of X-VLA"
+
+
+@dataclass(frozen=True)
+class XvlaServerOptions(XvlaConventions):
+    """How X-VLA is loaded; the conventions are those of the client `xvla+http`."""
+
+    checkpoint: str = option("", "folder or hub name of the model and its processor")
+    code: str | None = option(None, "checkout of X-VLA, or set PYTHONPATH")
+    device: str = option("cuda", "device of the model")
+    batch: int = option(8, "observations in one call of the model, at most")
+
+    def __post_init__(self) -> None:
+        """ValueError for options that cannot be."""
+        super().__post_init__()
+        if not self.checkpoint:
+            raise ValueError("option checkpoint is needed: a folder or a hub name")
+        if self.batch < 1:
+            raise ValueError("option batch: at least 1 is needed")
+
+
+class Xvla(ModelPolicy):
+    """The official model and its processor."""
+
+    def __init__(self, model: Any, processor: Any, options: XvlaServerOptions) -> None:
+        super().__init__()
+        self.model, self.processor, self.options = model, processor, options
+        self.encoding = StateEncoding(
+            options.space,
+            options.quaternions,
+            options.rotation,
+            options.proprio,
+            "closed",
+            options.closed_above,
+        )
+        self.spec = replace(
+            options.spec_of_model(options.text_budget),
+            batch=options.batch,
+            seeded=True,
+            checkpoint=describe_checkpoint(options.checkpoint),
+        )
+
+    def predict(self, queries: Sequence[Query]) -> list[Chunk]:
+        """One chunk per query: `ee` actions (T, 16), or joint targets (T, 14)."""
+        torch = import_torch()
+        shown = [self._shown(query) for query in queries]
+        inputs = {name: torch.cat([one[name] for one in shown]) for name in shown[0]}
+        inputs["proprio"] = torch.from_numpy(
+            np.stack([self.encoding.state(query) for query in queries])
+        )
+        inputs["domain_id"] = torch.full((len(queries),), self.options.domain_id, dtype=torch.long)
+        weight = next(iter(self.model.parameters()))
+        inputs = {
+            name: value.to(weight.device, weight.dtype)
+            if value.is_floating_point()
+            else value.to(weight.device)
+            for name, value in inputs.items()
+        }
+        with torch.inference_mode(), seeded_rows([query.seed for query in queries]):
+            answer = self.model.generate_actions(**inputs, steps=self.options.steps)
+        chunks = answer.float().cpu().numpy()[:, : self.options.horizon]
+        return [self.encoding.actions(query, c) for query, c in zip(queries, chunks, strict=True)]
+
+    def _shown(self, query: Query) -> dict[str, Any]:
+        """What the processor makes of images and text: tensors whose first axis is 1."""
+        images = [query.observation["images"][name] for name in self.options.views]
+        if self.options.colors == "bgr":
+            images = [np.ascontiguousarray(image[..., ::-1]) for image in images]
+        views = [pillow_image().fromarray(image) for image in images]
+        inputs = self.processor(views, query.observation["instruction"])
+        lacking = {"input_ids", "image_input", "image_mask"} - set(inputs)
+        if lacking:
+            raise ModelMissing(f"the checkpoint's processor gives no {', '.join(sorted(lacking))}")
+        return dict(inputs)
+
+
+def create(options: XvlaServerOptions) -> Xvla:
+    """Load the model. Raises ModelMissing."""
+    torch = import_torch()
+    modeling = import_code("models.modeling_xvla", options.code, CHECKOUT)
+    processing = import_code("models.processing_xvla", options.code, CHECKOUT)
+    try:
+        processor = processing.XVLAProcessor.from_pretrained(options.checkpoint)
+        model = modeling.XVLA.from_pretrained(options.checkpoint, torch_dtype=torch.float32)
+    except OSError as error:
+        raise ModelMissing(f"cannot load {options.checkpoint}: {error}") from error
+    return Xvla(model.to(options.device).to(torch.float32).eval(), processor, options)
