@@ -311,10 +311,10 @@ def _warnings(connect: Connect) -> list[str]:
 
 def _replay(console: Console, target: Target, episode: Episode, points: int) -> Findings:
     """Compare the policy's answers with a demonstration, and print the comparison."""
-    from robospa.harness.convention_check.check import replay
+    from robospa.harness.convention_check.check import check_conventions
 
     with target.connect() as policy:
-        findings = replay(policy, episode, points)
+        findings = check_conventions(policy, episode, points)
         chosen = policy.hello.get("options")  # a robospa.v1 server leaves nothing to choose
     known = chosen if isinstance(chosen, Mapping) else {}
     options = {m: name for m, name in target.deciding_options.items() if name in known}

@@ -1,7 +1,8 @@
-"""Mistakes in what a policy answers, each as something to undo.
+"""A policy's answer beside what came next in a demonstration, and the mistakes that it may show.
 
-`robospa.harness.convention_check.check` undoes them one by one and in pairs and looks which brings
-the answers nearest to a recorded demonstration. Order, signs and origin are fitted to the answers.
+Each mistake is something to undo: `robospa.harness.convention_check.check` undoes them one by one
+and in pairs and looks which brings the answers nearest to a recorded demonstration. Order, signs
+and origin are fitted to the answers.
 """
 
 from __future__ import annotations
@@ -12,9 +13,70 @@ from itertools import permutations
 
 import numpy as np
 
+from robospa.action_space import ARMS, ActionSpace, ArmColumns
 from robospa.geometry import Array
-from robospa.harness.convention_check.samples import AnswerSample
-from robospa.rotations import product, quaternion_to_matrix
+from robospa.rotations import angle_between, product, quaternion_to_matrix
+
+SCALES = {"joints": 0.1, "gripper": 0.2, "position": 0.03, "rotation": 0.2}
+"""The mean error [rad, 1, m, rad] of an answer that is about as good as it should be."""
+UNITS = {"joints": "rad", "gripper": "", "position": "m", "rotation": "rad"}
+WORST = 20.0
+"""Errors count up to this many times their scale, so that none hides the others."""
+
+
+@dataclass(frozen=True)
+class AnswerSample:
+    """One answer: `given` (K, D) beside what came next in the record, `recorded` (K, D).
+
+    `now` (D,) is the command at that frame, `track` (T, D) the whole record of which `now` is row
+    `t`; `measured` the same as the robot measured it, if known. All in `space`, of the kind joint
+    or ee.
+    """
+
+    space: ActionSpace
+    given: Array
+    recorded: Array
+    now: Array
+    track: Array | None = None
+    t: int = 0
+    measured: Array | None = None
+
+
+def groups(space: ActionSpace) -> list[str]:
+    """The groups of columns that errors are reported for, in order."""
+    parts = ("joints", "gripper") if space.kind == "joint" else ("position", "rotation", "gripper")
+    return [f"{arm} {part}" for arm in ARMS for part in parts]
+
+
+def errors(case: AnswerSample) -> Array:
+    """Mean error of each of `groups`: [rad] over joints, [m], [rad] of turning, gripper 0..1."""
+    found = []
+    a, b = case.given, case.recorded
+    for arm in case.space.arms:
+        if case.space.kind == "joint":
+            found.append(np.abs(a[:, arm.body] - b[:, arm.body]).mean())
+        else:
+            place, turn = arm.position, arm.quaternion
+            found.append(np.linalg.norm(a[:, place] - b[:, place], axis=1).mean())
+            found.append(_angle(a[:, turn], b[:, turn]).mean())
+        found.append(np.abs(a[:, arm.gripper] - b[:, arm.gripper]).mean())
+    return np.array(found)
+
+
+def score(case: AnswerSample) -> float:
+    """All errors in one number: about 1 for an answer as good as it should be."""
+    scales = np.array([SCALES[name.split()[1]] for name in groups(case.space)])
+    return float(np.minimum(errors(case) / scales, WORST).mean())
+
+
+def _angle(a: Array, b: Array) -> Array:
+    """Angles [rad] between rotations of any length; pi for what is none."""
+    lengths = np.linalg.norm(a, axis=1, keepdims=True) * np.linalg.norm(b, axis=1, keepdims=True)
+    real = lengths > 1e-9
+    # both lengths at once: the vector part of a product scales with them
+    angle = angle_between(a / np.where(real, lengths, 1.0), b)
+    return np.where(real[:, 0], angle, np.pi)
+
 
 TCP_AHEAD = 0.12
 """The tool centre point is this far [m] along the x axis of the end-effector frame."""
@@ -78,26 +140,32 @@ def _joints(change: Callable[[AnswerSample, Array], Array]) -> Undo:
     return _given(changed, "joint")
 
 
-def _positions(change: Callable[[Array], Array]) -> Undo:
+def _poses(change: Callable[[Array, ArmColumns], None]) -> Undo:
+    """`change` writes into a copy of the answer, once for the columns of each arm."""
+
     def changed(case: AnswerSample) -> Array:
         given = case.given.copy()
         for arm in case.space.arms:
-            given[:, arm.position] = change(given[:, arm.position])
+            change(given, arm)
         return given
 
     return _given(changed, "ee")
+
+
+def _positions(change: Callable[[Array], Array]) -> Undo:
+    def changed(given: Array, arm: ArmColumns) -> None:
+        given[:, arm.position] = change(given[:, arm.position])
+
+    return _poses(changed)
 
 
 def _quaternions(order: Columns) -> Undo:
     """Number i of our quaternions, w x y z, is number order[i] of theirs."""
 
-    def changed(case: AnswerSample) -> Array:
-        given = case.given.copy()
-        for arm in case.space.arms:
-            given[:, arm.quaternion] = given[:, arm.quaternion][:, order]
-        return given
+    def changed(given: Array, arm: ArmColumns) -> None:
+        given[:, arm.quaternion] = given[:, arm.quaternion][:, order]
 
-    return _given(changed, "ee")
+    return _poses(changed)
 
 
 def _later(shift: int, stride: int = 1) -> Undo:
@@ -164,153 +232,102 @@ def _pose_delta(case: AnswerSample, each: bool) -> Array:
     return given
 
 
-ORDER, HAND, TIME = "order", "grippers", "time"
-
-PARTS: tuple[ActionFault, ...] = (
-    ActionFault(
-        "arms swapped",
-        "its actions name the right arm first",
-        "arms",
-        _columns(lambda a, b: [*(c + len(b) for c in a), *(c - len(a) for c in b)]),
+PHRASES = {
+    "arms swapped": "its actions name the right arm first",
+    "grippers last": "its actions have both grippers at the end",
+    "grippers first": "its actions have each gripper before its arm",
+    "arms interleaved": "its actions alternate between left and right",
+    "joints reversed": "its joints run from the hand to the shoulder",
+    "degrees": "its joints are in degrees, not radians",
+    "millimetres": "its positions are in millimetres, not metres",
+    "quaternion x y z w": "its quaternions are x y z w, not w x y z",
+    "quaternion slip": (
+        "its quaternions come from w x y z read as x y z w, as in X-VLA's official data"
     ),
-    ActionFault(
-        "grippers last",
-        "its actions have both grippers at the end",
-        ORDER,
-        _columns(lambda a, b: [*a[:-1], b[-2], *(c - 1 for c in b[:-1]), b[-1]], "joint"),
+    "gripper inverted": "1 is a closed gripper in its actions, not an open one",
+    "gripper 0..0.1": "its grippers go from 0 to 0.1 (an opening in metres), not to 1",
+    "gripper 0..0.045": "its grippers go from 0 to 0.045 (a finger's way in metres), not to 1",
+    "gripper 0..100": "its grippers are in percent",
+    "gripper 0..255": "its grippers go from 0 to 255, not to 1",
+    "gripper -1..1": "its grippers go from -1 (closed) to 1, not from 0",
+    "gripper 1..-1": "its grippers go from -1 (open) to 1 (closed), not from 1 (open) to 0",
+    "delta from the start": (
+        "its actions are differences to the state at the query, not absolute targets"
     ),
-    ActionFault(
-        "grippers first",
-        "its actions have each gripper before its arm",
-        ORDER,
-        _columns(lambda a, b: [*a[1:], a[0], *b[1:], b[0]], "joint"),
+    "delta from the last": (
+        "each of its actions is a difference to the one before, not an absolute target"
     ),
-    ActionFault(
-        "arms interleaved",
-        "its actions alternate between left and right",
-        ORDER,
-        _interleaved,
+    "pose delta from the start": (
+        "its poses are differences to the pose at the query, not absolute"
     ),
-    ActionFault(
-        "joints reversed",
-        "its joints run from the hand to the shoulder",
-        ORDER,
-        _columns(lambda a, b: [*a[-2::-1], a[-1], *b[-2::-1], b[-1]], "joint"),
+    "pose delta from the last": "each of its poses is a difference to the one before, not absolute",
+    "tool centre": (
+        "its poses are those of the tool centre point, 0.12 m ahead of the frame in use here"
     ),
-    ActionFault(
-        "degrees",
-        "its joints are in degrees, not radians",
-        "units",
-        _joints(lambda case, joints: np.radians(joints)),
-    ),
-    ActionFault(
-        "millimetres",
-        "its positions are in millimetres, not metres",
-        "units",
-        _positions(lambda positions: positions / 1000.0),
-    ),
-    ActionFault(
-        "quaternion x y z w",
-        "its quaternions are x y z w, not w x y z",
-        "quaternion",
-        _quaternions([3, 0, 1, 2]),
-    ),
-    ActionFault(
-        "quaternion slip",
-        "its quaternions come from w x y z read as x y z w, as in X-VLA's official data",
-        "quaternion",
-        _quaternions([1, 2, 3, 0]),
-    ),
-    ActionFault(
-        "gripper inverted",
-        "1 is a closed gripper in its actions, not an open one",
-        HAND,
-        _grippers(lambda g: 1 - g),
-    ),
-    ActionFault(
-        "gripper 0..0.1",
-        "its grippers go from 0 to 0.1 (an opening in metres), not to 1",
-        HAND,
-        _grippers(lambda g: g / 0.1),
-    ),
-    ActionFault(
-        "gripper 0..0.045",
-        "its grippers go from 0 to 0.045 (a finger's way in metres), not to 1",
-        HAND,
-        _grippers(lambda g: g / 0.045),
-    ),
-    ActionFault(
-        "gripper 0..100",
-        "its grippers are in percent",
-        HAND,
-        _grippers(lambda g: g / 100),
-    ),
-    ActionFault(
-        "gripper 0..255",
-        "its grippers go from 0 to 255, not to 1",
-        HAND,
-        _grippers(lambda g: g / 255),
-    ),
-    ActionFault(
-        "gripper -1..1",
-        "its grippers go from -1 (closed) to 1, not from 0",
-        HAND,
-        _grippers(lambda g: (g + 1) / 2),
-    ),
-    ActionFault(
-        "gripper 1..-1",
-        "its grippers go from -1 (open) to 1 (closed), not from 1 (open) to 0",
-        HAND,
-        _grippers(lambda g: (1 - g) / 2),
-    ),
-    ActionFault(
-        "delta from the start",
-        "its actions are differences to the state at the query, not absolute targets",
-        "delta",
-        _joints(lambda case, joints: case.now[case.space.bodies] + joints),
-    ),
-    ActionFault(
-        "delta from the last",
-        "each of its actions is a difference to the one before, not an absolute target",
-        "delta",
-        _joints(lambda case, joints: case.now[case.space.bodies] + np.cumsum(joints, axis=0)),
-    ),
-    ActionFault(
-        "pose delta from the start",
-        "its poses are differences to the pose at the query, not absolute",
-        "delta",
-        _given(lambda case: _pose_delta(case, False), "ee"),
-    ),
-    ActionFault(
-        "pose delta from the last",
-        "each of its poses is a difference to the one before, not absolute",
-        "delta",
-        _given(lambda case: _pose_delta(case, True), "ee"),
-    ),
-    ActionFault(
-        "tool centre",
-        "its poses are those of the tool centre point, 0.12 m ahead of the frame in use here",
-        "frame",
-        _given(lambda case: _moved(case, -TCP_AHEAD), "ee"),
-    ),
-    ActionFault(
-        "a frame late", "its first action is the present command, not the next", TIME, _later(-1)
-    ),
-    ActionFault("a frame early", "its first action is one frame too far ahead", TIME, _later(1)),
-    ActionFault("three early", "its first action is three frames too far ahead", TIME, _later(3)),
-    ActionFault(
-        "twice as fast", "each of its actions spans two recorded frames", TIME, _later(0, 2)
-    ),
-    ActionFault(
-        "three times as fast", "each of its actions spans three recorded frames", TIME, _later(0, 3)
-    ),
-    ActionFault("half as fast", "it gives two actions for every recorded frame", TIME, _slower),
-    ActionFault(
-        "measured joints",
-        "it predicts what the robot will measure, not what it is commanded",
-        "measured",
-        _measured,
-    ),
+    "a frame late": "its first action is the present command, not the next",
+    "a frame early": "its first action is one frame too far ahead",
+    "three early": "its first action is three frames too far ahead",
+    "twice as fast": "each of its actions spans two recorded frames",
+    "three times as fast": "each of its actions spans three recorded frames",
+    "half as fast": "it gives two actions for every recorded frame",
+    "measured joints": "it predicts what the robot will measure, not what it is commanded",
+}
+ORDER = "order"
+UNDO: dict[str, dict[str, Undo]] = {
+    "arms": {
+        "arms swapped": _columns(
+            lambda a, b: [*(c + len(b) for c in a), *(c - len(a) for c in b)],
+        ),
+    },
+    ORDER: {
+        "grippers last": _columns(
+            lambda a, b: [*a[:-1], b[-2], *(c - 1 for c in b[:-1]), b[-1]], "joint"
+        ),
+        "grippers first": _columns(lambda a, b: [*a[1:], a[0], *b[1:], b[0]], "joint"),
+        "arms interleaved": _interleaved,
+        "joints reversed": _columns(lambda a, b: [*a[-2::-1], a[-1], *b[-2::-1], b[-1]], "joint"),
+    },
+    "units": {
+        "degrees": _joints(lambda case, joints: np.radians(joints)),
+        "millimetres": _positions(lambda positions: positions / 1000.0),
+    },
+    "quaternion": {
+        "quaternion x y z w": _quaternions([3, 0, 1, 2]),
+        "quaternion slip": _quaternions([1, 2, 3, 0]),
+    },
+    "grippers": {
+        "gripper inverted": _grippers(lambda g: 1 - g),
+        "gripper 0..0.1": _grippers(lambda g: g / 0.1),
+        "gripper 0..0.045": _grippers(lambda g: g / 0.045),
+        "gripper 0..100": _grippers(lambda g: g / 100),
+        "gripper 0..255": _grippers(lambda g: g / 255),
+        "gripper -1..1": _grippers(lambda g: (g + 1) / 2),
+        "gripper 1..-1": _grippers(lambda g: (1 - g) / 2),
+    },
+    "delta": {
+        "delta from the start": _joints(lambda case, q: case.now[case.space.bodies] + q),
+        "delta from the last": _joints(
+            lambda case, q: case.now[case.space.bodies] + np.cumsum(q, axis=0)
+        ),
+        "pose delta from the start": _given(lambda case: _pose_delta(case, False), "ee"),
+        "pose delta from the last": _given(lambda case: _pose_delta(case, True), "ee"),
+    },
+    "frame": {"tool centre": _given(lambda case: _moved(case, -TCP_AHEAD), "ee")},
+    "time": {
+        "a frame late": _later(-1),
+        "a frame early": _later(1),
+        "three early": _later(3),
+        "twice as fast": _later(0, 2),
+        "three times as fast": _later(0, 3),
+        "half as fast": _slower,
+    },
+    "measured": {"measured joints": _measured},
+}
+"""By family: how each mistake is undone."""
+PARTS = tuple(
+    ActionFault(name, PHRASES[name], family, undo)
+    for family, members in UNDO.items()
+    for name, undo in members.items()
 )
 
 

@@ -2,7 +2,7 @@
 
 A policy is shown frames of a demonstration and answers chunks; what the demonstrator commanded next
 is known. A policy that has learned from such data comes close. If it does not, the usual mistakes
-are undone one by one (`action_faults`, `observation_faults`), and one that brings it much closer,
+are undone one by one (`action_faults`, VIEWS), and one that brings it much closer,
 at nearly every frame, is most likely the mistake. Success in a simulator cannot tell them apart.
 
 A wrong convention is named only if undoing it takes away most of the error: noise and a mediocre
@@ -11,21 +11,147 @@ policy do not look like that. A policy that fits nothing gets no name, but is sa
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from robospa.action_space import ActionSpace
 from robospa.geometry import Array
-from robospa.harness.convention_check.action_faults import PARTS, ActionFault, fitted
+from robospa.harness.convention_check import action_faults
+from robospa.harness.convention_check.action_faults import ActionFault, AnswerSample, fitted, score
 from robospa.harness.convention_check.episodes import Episode, EpisodeError
-from robospa.harness.convention_check.observation_faults import VIEWS, ObservationFault
-from robospa.harness.convention_check.samples import UNITS, AnswerSample, errors, groups, score
+from robospa.observation import Observation, View
 from robospa.protocol.policy import Policy, PolicySpec, TrialInfo
 from robospa.rotations import product
 from robospa.trial import REFERENCE
+
+Image = NDArray[np.uint8]
+
+
+Undo = Callable[[Observation, Array | None], Observation | None]
+"""(what was shown, joints [rad] and grippers (D,) as measured if known) -> what to show instead."""
+
+
+@dataclass(frozen=True)
+class ObservationFault:
+    """One mistake in what a policy is shown. `undo` gives the observation that it may have been
+    trained on, or None where that cannot be told. `touches` is what it changes: a policy that is
+    not shown that need not be asked again."""
+
+    name: str
+    phrase: str
+    touches: str
+    undo: Undo
+
+
+def _each(seen: Observation, change: Callable[[View], View]) -> Observation:
+    """`seen` with its own view and those of history changed."""
+    turned: Observation = {**seen, **change(seen)}
+    if "history" in seen:
+        turned["history"] = {o: {**v, **change(v)} for o, v in seen["history"].items()}
+    return turned
+
+
+def _images(change: Callable[[Image], Image]) -> Undo:
+    """Changes every image, those of history as well."""
+
+    def changed(view: View) -> View:
+        return {"images": {name: change(image) for name, image in view["images"].items()}}
+
+    return lambda seen, measured: _each(seen, changed)
+
+
+def _wrists(seen: Observation, measured: Array | None) -> Observation | None:
+    other = {"left_wrist": "right_wrist", "right_wrist": "left_wrist"}
+    if not set(other) <= set(seen["images"]):
+        return None
+    return _each(
+        seen,
+        lambda view: {"images": {n: view["images"][other.get(n, n)] for n in view["images"]}},
+    )
+
+
+def _state(change: Callable[[Array], Array], poses: Callable[[Array], Array] | None = None) -> Undo:
+    """Changes the joints shown, rows (2, J + 1) of the arms, and the `poses` (2, 8)."""
+
+    def changed(view: View) -> View:
+        new: View = {}
+        if "state" in view:
+            rows = np.asarray(view["state"], float).reshape(2, -1)
+            new["state"] = change(rows).reshape(-1).astype(np.float32)
+        if poses is not None and "ee" in view:
+            new["ee"] = poses(np.asarray(view["ee"], float)).astype(np.float32)
+        return new
+
+    def undo(seen: Observation, measured: Array | None) -> Observation | None:
+        if "state" in seen and len(seen["state"]) % 2:  # arms of different joint counts
+            return None
+        return _each(seen, changed)
+
+    return undo
+
+
+def _hands(rows: Array) -> Array:
+    return np.hstack([rows[:, :-1], 1 - rows[:, -1:]])
+
+
+def _shown_measured(seen: Observation, measured: Array | None) -> Observation | None:
+    if "state" not in seen or measured is None:
+        return None
+    return {**seen, "state": np.asarray(measured, np.float32)}
+
+
+VIEWS: tuple[ObservationFault, ...] = (
+    ObservationFault(
+        "wrist images swapped", "left and right wrist images are swapped", "images", _wrists
+    ),
+    ObservationFault(
+        "blue for red",
+        "it was trained on images with red and blue swapped",
+        "images",
+        _images(lambda image: np.ascontiguousarray(image[..., ::-1])),
+    ),
+    ObservationFault(
+        "images upside down",
+        "it was trained on images turned by 180 degrees",
+        "images",
+        _images(lambda image: np.ascontiguousarray(image[::-1, ::-1])),
+    ),
+    ObservationFault(
+        "arms of the state swapped",
+        "it expects the right arm first in the state",
+        "robot",
+        _state(lambda rows: rows[::-1], lambda rows: rows[::-1]),
+    ),
+    ObservationFault(
+        "grippers of the state inverted",
+        "1 is a closed gripper in the state that it expects",
+        "robot",
+        _state(_hands, _hands),
+    ),
+    ObservationFault(
+        "state in degrees",
+        "it expects the state in degrees",
+        "state",
+        _state(lambda rows: np.hstack([np.degrees(rows[:, :-1]), rows[:, -1:]])),
+    ),
+    ObservationFault(
+        "quaternions of the state x y z w",
+        "it expects quaternions x y z w in the state",
+        "poses",
+        _state(lambda rows: rows, lambda rows: rows[:, [0, 1, 2, 4, 5, 6, 3, 7]]),
+    ),
+    ObservationFault(
+        "measured state",
+        "it expects the measured joints, not the commanded ones",
+        "state",
+        _shown_measured,
+    ),
+)
+
 
 POINTS = 8
 """Frames at which the policy is asked."""
@@ -103,10 +229,13 @@ class Findings:
     def describe(self, guess: Guess) -> list[str]:
         """The errors of `guess` with their units."""
         names = [name.split()[1] for name in self.groups]
-        return [f"{e:.3f} {UNITS[n]}".strip() for e, n in zip(guess.errors, names, strict=True)]
+        return [
+            f"{e:.3f} {action_faults.UNITS[n]}".strip()
+            for e, n in zip(guess.errors, names, strict=True)
+        ]
 
 
-def replay(policy: Policy, episode: Episode, points: int = POINTS) -> Findings:
+def check_conventions(policy: Policy, episode: Episode, points: int = POINTS) -> Findings:
     """Ask `policy` at `points` frames of `episode` and look for the mistake that explains it best.
 
     Raises EpisodeError if the two do not go together, and whatever the policy raises.
@@ -146,12 +275,13 @@ def _case(
     spec = policy.spec
     seen = episode.observation(spec, t)
     if view is not None:
-        measured = None if episode.measured is None else episode.measured[t]
-        changed = view.undo(seen, {"measured": measured})
+        changed = view.undo(seen, None if episode.measured is None else episode.measured[t])
         if changed is None:
             return None
         seen = changed
-    policy.reset(_trial(episode))
+    task = str(episode.about.get("task", "")) or "Pick_Blocks_Size"
+    robot = str(episode.about.get("embodiment", REFERENCE))
+    policy.reset(TrialInfo(task=task, embodiment=robot, instruction=episode.instruction))
     chunk = np.asarray(policy.infer(seen), dtype=float)
     chunk = chunk[: spec.execute] if spec.execute else chunk
     joint = spec.action == "joint"
@@ -172,22 +302,9 @@ def _case(
 
 def _shown(spec: PolicySpec, view: ObservationFault) -> bool:
     """True if the policy's spec asks for what `view` changes."""
-    poses = spec.action != "joint"
-    return {
-        "images": bool(spec.cameras),
-        "state": spec.state != "none",
-        "poses": poses,
-        "robot": poses or spec.state != "none",
-    }[view.touches]
-
-
-def _trial(episode: Episode) -> TrialInfo:
-    about = episode.about
-    return TrialInfo(
-        task=str(about.get("task", "")) or "Pick_Blocks_Size",
-        embodiment=str(about.get("embodiment", REFERENCE)),
-        instruction=episode.instruction,
-    )
+    state, poses = spec.state != "none", spec.action != "joint"
+    asked = {"images": bool(spec.cameras), "state": state, "poses": poses, "robot": state or poses}
+    return asked[view.touches]
 
 
 def absolute(chunk: Array, now: Array, space: ActionSpace) -> Array:
@@ -219,7 +336,7 @@ def judge(
     before = [score(case) for case in cases]
     base = _guess((), None, cases, before)
     still = _guess((), None, [_held(case) for case in cases], before)
-    parts = [*PARTS, *fitted(cases)]
+    parts = [*action_faults.PARTS, *fitted(cases)]
     views = [view for view in VIEWS if view.name in shown]
     singles = list(_tried(cases, None, parts, before, 1))
     singles += [_guess((), view, shown[view.name], before) for view in views]
@@ -228,12 +345,14 @@ def judge(
     if min(guess.score for guess in (base, *guesses)) > EXPLAINED:  # perhaps two at once
         more += _tried(cases, None, parts, before, 2)
         for view in views:
-            more += _tried(shown[view.name], view, [*PARTS, *fitted(shown[view.name])], before, 1)
+            more += _tried(
+                shown[view.name], view, [*action_faults.PARTS, *fitted(shown[view.name])], before, 1
+            )
     fits = base.score <= FITS and base.score <= BETTER * still.score
     best = _simplest([g for g in (*guesses, *more) if _convincing(g, base, gain)])
     kind = "mistaken" if best is not None else "fits" if fits else "unclear"
     sentence = _sentence(kind, base, still, best)
-    names = tuple(groups(cases[0].space))
+    names = tuple(action_faults.groups(cases[0].space))
     return Findings(kind, names, base, still, tuple(guesses), best, sentence, frames, untried)
 
 
@@ -265,7 +384,7 @@ def _guess(
     cases: Sequence[AnswerSample],
     before: Sequence[float],
 ) -> Guess:
-    each = np.array([errors(case) for case in cases])
+    each = np.array([action_faults.errors(case) for case in cases])
     after = [score(case) for case in cases]
     change = np.subtract(before, after)
     felt = change[np.abs(change) > FELT]

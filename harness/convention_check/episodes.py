@@ -22,6 +22,7 @@ import json
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
+from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING
@@ -107,8 +108,7 @@ class Episode:
             )
         frame = self.own_picture(camera.name, t)
         if frame.shape[:2] != (camera.height, camera.width):
-            pillow = _pillow()
-            small = pillow.fromarray(np.ascontiguousarray(frame))
+            small = _module("PIL.Image", "Pillow").fromarray(np.ascontiguousarray(frame))
             frame = np.asarray(small.resize((camera.width, camera.height)))
         return np.ascontiguousarray(frame)
 
@@ -156,7 +156,7 @@ def read_episode(path: Path, instruction: str | None = None) -> Episode:
     Official files do not hold their instruction: it is taken from `../instructions/<name>.json`.
     Raises EpisodeError, in one sentence, for whatever cannot be read.
     """
-    h5py = _h5py()
+    h5py = _module("h5py", "h5py")
     if not path.is_file():
         raise EpisodeError(f"there is no file {path}")
     try:
@@ -277,7 +277,7 @@ def write_episode(
     path: Path, episode: Episode, more: Mapping[str, str | NDArray[np.generic]] = NOTHING_MORE
 ) -> None:
     """Write `episode`, frames as JPEG, and `more` data by name, at once or not at all."""
-    h5py = _h5py()
+    h5py = _module("h5py", "h5py")
     stream = io.BytesIO()
     with h5py.File(stream, "w") as file:
         file.attrs["instruction"] = episode.instruction
@@ -305,34 +305,21 @@ def to_jpeg(frame: Frame) -> bytes:
         return frame
     stream = io.BytesIO()
     swapped = np.ascontiguousarray(frame[..., ::-1])
-    _pillow().fromarray(swapped).save(stream, "JPEG", quality=QUALITY)
+    _module("PIL.Image", "Pillow").fromarray(swapped).save(stream, "JPEG", quality=QUALITY)
     return stream.getvalue()
 
 
 def require() -> None:
     """Raises EpisodeError, saying what to install, if demonstrations cannot be read or written."""
-    _h5py()
-    _pillow()
+    _module("h5py", "h5py")
+    _module("PIL.Image", "Pillow")
 
 
-def _h5py() -> ModuleType:
+def _module(name: str, package: str) -> ModuleType:
     try:
-        import h5py
+        return import_module(name)
     except ImportError as error:
         raise EpisodeError(
-            "reading and recording demonstrations needs h5py, which is not installed; "
-            f"{remedy('h5py')}"
+            f"reading and recording demonstrations needs {package}, which is not installed; "
+            f"{remedy(name.partition('.')[0])}"
         ) from error
-    module: ModuleType = h5py
-    return module
-
-
-def _pillow() -> ModuleType:
-    try:
-        from PIL import Image
-    except ImportError as error:
-        raise EpisodeError(
-            "reading and recording demonstrations needs Pillow, which is not installed; "
-            f"{remedy('PIL')}"
-        ) from error
-    return Image

@@ -15,8 +15,8 @@ import numpy as np
 
 from robospa.action_space import ActionSpace
 from robospa.geometry import Array
+from robospa.harness.convention_check.action_faults import AnswerSample
 from robospa.harness.convention_check.check import judge
-from robospa.harness.convention_check.samples import AnswerSample
 from robospa.harness.robots import embodiment
 from robospa.harness.robots.kinematics import chain_of, end_effector
 from robospa.observation import Observation

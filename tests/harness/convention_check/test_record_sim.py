@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from robospa.harness.cli.main import main
-from robospa.harness.convention_check.check import replay
+from robospa.harness.convention_check.check import check_conventions
 from robospa.harness.convention_check.episodes import Episode, read_episode
 from robospa.harness.factory import policy_names
 from robospa.observation import DEFAULT_CAMERAS
@@ -57,8 +57,8 @@ def test_a_recorded_trial_is_a_demonstration(
     assert np.abs(made.measured - made.commanded)[:, arms].max() < 0.1
     pictures = [made.picture(camera, len(made) // 2) for camera in DEFAULT_CAMERAS]
     assert all(picture.shape == (240, 320, 3) and picture.std() > 5 for picture in pictures)
-    assert replay(ByHeart(made, False), made, 3).kind == "fits"
-    wrong = replay(ByHeart(made, True), made, 4)
+    assert check_conventions(ByHeart(made, False), made, 3).kind == "fits"
+    wrong = check_conventions(ByHeart(made, True), made, 4)
     assert wrong.best is not None and wrong.best.names == ("gripper inverted",)
     with pytest.raises(SystemExit) as end:  # nothing is overwritten
         main(words)

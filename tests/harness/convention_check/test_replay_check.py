@@ -25,14 +25,14 @@ from replay_fakes import (
 
 from robospa.action_space import ActionSpace
 from robospa.geometry import Pose
-from robospa.harness.convention_check.check import Findings, absolute, replay
+from robospa.harness.convention_check.check import Findings, absolute, check_conventions
 from robospa.harness.convention_check.episodes import EpisodeError
 
 MADE = episode()
 
 
 def found(policy: Learned, made: Any = MADE) -> Findings:
-    return replay(policy, made)
+    return check_conventions(policy, made)
 
 
 SWAP = columns([*range(7, 14), *range(7)])
@@ -223,4 +223,4 @@ def test_what_cannot_be_compared_is_one_sentence(change: dict[str, Any], told: s
     if "action_dim" in change:
         wide.answer = lambda chunk, now: np.hstack([chunk, chunk[:, :2]])
     with pytest.raises(EpisodeError, match=told):
-        replay(wide, episode(measured=False))
+        check_conventions(wide, episode(measured=False))
