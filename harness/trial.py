@@ -38,8 +38,7 @@ from robospa.tasks.catalog import build_scene
 from robospa.tasks.catalog import task as find_task
 from robospa.tasks.descriptions import describe_objects
 from robospa.tasks.events import Event, outcome
-from robospa.tasks.goals.clutter_events import ClutterMonitor
-from robospa.tasks.goals.grasp_events import GraspMonitor
+from robospa.tasks.goals.monitors import ClutterMonitor, GraspMonitor
 from robospa.tasks.scene import Scene
 from robospa.tasks.snapshot import Snapshot
 from robospa.tasks.task import Task, Tracker

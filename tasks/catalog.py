@@ -15,46 +15,46 @@ from robospa.tasks.task import Task
 from robospa.trial import REFERENCE
 from robospa.workcell import WORKCELL
 
-MODULES = (
-    "block_measures.task",
-    "distance.task",
-    "canonical_index.task",
-    "relational.task",
-    "cross_view.task",
-    "repeat.press_stapler",
-    "repeat.lift",
-    "repeat.click_bell",
-    "dustbin.bottles",
-    "move_apart.blocks",
-    "move_apart.cards",
-    "nest_bowls.task",
-    "move_apart.food",
-    "rank_blocks.task",
-    "tool_order.hammer",
-    "click_order.objects",
-    "tool_order.seal",
-    "click_order.bells",
-    "stack_blocks.color",
-    "stack_blocks.size",
-    "stack_blocks.length",
-    "action_chain.phone_stapler",
-    "dustbin.bottles_and_cups",
-    "action_chain.mug_tower",
-    "action_chain.scale",
-    "action_chain.tray",
-    "action_chain.can_basket",
-    "action_chain.seals_stapler",
-    "action_chain.microwave",
-    "memory_wall.blocks",
-    "memory_wall.objects",
-    "memory_cover.task",
-    "memory_wall.orientation",
-    "memory_counts.task",
+DEFINED = (
+    "block_measures.TASKS",
+    "distance.TASKS",
+    "canonical_index.TASKS",
+    "relational.TASKS",
+    "cross_view.TASKS",
+    "repeat.PRESS_STAPLER",
+    "repeat.LIFT",
+    "repeat.CLICK_BELL",
+    "dustbin.BOTTLES",
+    "move_apart.BLOCKS",
+    "move_apart.CARDS",
+    "nest_bowls.TASK",
+    "move_apart.FOOD",
+    "rank_blocks.TASKS",
+    "tool_order.HAMMER",
+    "click_order.OBJECTS",
+    "tool_order.SEAL",
+    "click_order.BELLS",
+    "stack_blocks.COLOR",
+    "stack_blocks.SIZE",
+    "stack_blocks.LENGTH",
+    "chain_stapler.PHONE",
+    "dustbin.CUPS",
+    "chain_mug.TASK",
+    "chain_back.SCALE",
+    "chain_back.TRAY",
+    "chain_clicks.CAN",
+    "chain_stapler.SEALS",
+    "chain_clicks.MICROWAVE",
+    "memory_wall.BLOCKS",
+    "memory_wall.OBJECTS",
+    "memory_cover.TASK",
+    "memory_wall.ORIENTATION",
+    "memory_counts.TASK",
 )
-"""Modules of `robospa.tasks.families`, in the paper's order; each defines TASK, or TASKS for
+"""Tasks in the paper's order: a module of `robospa.tasks.families` and its Task, or a tuple of
 several that differ in data alone."""
 
-BASIC_MODULES = ("basic_color.task", "cross_view.basic", "canonical_index.basic")
+BASIC = ("basic_color.TASKS", "cross_view.BASIC", "canonical_index.BASIC")
 """The appendix's basic grounding tasks, outside the 280 variants."""
 
 LEVELS = (1, 2, 3, 4, 5)
@@ -66,7 +66,7 @@ EXTENSIONS = "robospa.tasks"
 @cache
 def tasks() -> dict[str, Task]:
     """All tasks by name, in the paper's order, the basic ones last; no extensions."""
-    return {t.name: t for module in (*MODULES, *BASIC_MODULES) for t in _defined(module)}
+    return {t.name: t for where in (*DEFINED, *BASIC) for t in _defined(where)}
 
 
 @cache
@@ -101,17 +101,18 @@ def offer(task: Task) -> None:
 
 
 @cache
-def _defined(module: str) -> tuple[Task, ...]:
-    found = importlib.import_module(f"robospa.tasks.families.{module}")
-    return tuple(found.TASKS) if hasattr(found, "TASKS") else (found.TASK,)
+def _defined(where: str) -> tuple[Task, ...]:
+    module, _, name = where.rpartition(".")
+    found = getattr(importlib.import_module(f"robospa.tasks.families.{module}"), name)
+    return found if isinstance(found, tuple) else (found,)
 
 
 @cache
 def home_of(name: str) -> str:
     """The module that defines the task called `name`, "" if there is none."""
-    for module in (*MODULES, *BASIC_MODULES):
-        if any(found.name == name for found in _defined(module)):
-            return f"robospa.tasks.families.{module}"
+    for where in (*DEFINED, *BASIC):
+        if any(found.name == name for found in _defined(where)):
+            return f"robospa.tasks.families.{where.rpartition('.')[0]}"
     from importlib.metadata import entry_points
 
     for point in entry_points(group=EXTENSIONS):

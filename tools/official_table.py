@@ -20,13 +20,10 @@ from robospa.geometry import Pose
 from robospa.harness.official.slots import official_values
 from robospa.harness.official.switches import SWITCHES, Switch
 from robospa.tasks import catalog, objects, plan
-from robospa.tasks.goals.nest import Nested
-from robospa.tasks.goals.parts import Inside, Rests
+from robospa.tasks.goals.arranging import Layer, Nested, Pair
+from robospa.tasks.goals.conditions import Inside, Rests
+from robospa.tasks.goals.counters import PressCounter
 from robospa.tasks.goals.pick import Lift, PickTracker
-from robospa.tasks.goals.repeat import PressCounter
-from robospa.tasks.goals.restore import Restore
-from robospa.tasks.goals.row import Pair
-from robospa.tasks.goals.stack import Bring, Stack
 from robospa.tasks.official import needs, official_assets, official_models
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.shapes import ObjectModel
@@ -86,7 +83,10 @@ RULES = (
     Rule(
         "let-go",
         ("| placing |",),
-        applies=_is_a(Rests, Nested, Pair, Stack, Bring, Restore),
+        applies=lambda part: (
+            isinstance(part, Nested | Pair | Layer)
+            or (isinstance(part, Rests) and part.held_radius > 0)
+        ),
     ),
     Rule(
         "low",

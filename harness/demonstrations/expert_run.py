@@ -20,7 +20,7 @@ from robospa.harness.skills import Expert
 from robospa.harness.trial import Recorder, TrialParts, task_parts
 from robospa.harness.world import World
 from robospa.tasks.events import Event
-from robospa.tasks.goals.grasp_events import GraspMonitor
+from robospa.tasks.goals.monitors import GraspMonitor
 from robospa.tasks.scene import Scene
 from robospa.tasks.snapshot import Snapshot
 from robospa.trial import TrialKey

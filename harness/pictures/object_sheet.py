@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.geometry import Pose, Vec3, look_rotation, yaw_rotation
-from robospa.tasks.objects import assets, look_count, object_model
+from robospa.tasks.objects import assets, object_model, variant_count
 from robospa.tasks.shapes import Hinge, ObjectModel, Shape
 from robospa.workcell import TABLE_TOP
 
@@ -118,7 +118,7 @@ def _looking(eye: NDArray[np.float64], target: NDArray[np.float64]) -> Pose:
 
 def asset_row(booth: Booth, asset: str) -> NDArray[np.uint8]:
     """All looks of `asset`: portraits above, head camera cuts below."""
-    pairs = [booth.portrait(object_model(asset, {"look": k})) for k in range(look_count(asset))]
+    pairs = [booth.portrait(object_model(asset, {"look": k})) for k in range(variant_count(asset))]
     return np.concatenate([np.concatenate(pair, axis=0) for pair in pairs], axis=1)
 
 
@@ -132,7 +132,7 @@ def sheet(booth: Booth, names: Sequence[str]) -> Image.Image:
     for i, name in enumerate(names):
         x, y = i % COLUMNS * LARGE, i // COLUMNS * (LARGE + 20)
         page.paste(Image.fromarray(booth.portrait(object_model(name))[0]), (x, y))
-        draw.text((x + 6, y + LARGE + 4), f"{name} ({look_count(name)} looks)", fill="black")
+        draw.text((x + 6, y + LARGE + 4), f"{name} ({variant_count(name)} looks)", fill="black")
     return page
 
 

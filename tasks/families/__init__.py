@@ -1,5 +1,5 @@
-"""The tasks: one folder a family, in which tasks that are the same idea stand with their words.
+"""The tasks: a module for each family of tasks that are the same idea.
 
-A module with a `TASK` (or `TASKS`) has its levels, draw, goal and plan; the TOML file beside it has
-its instructions. `robospa.tasks.catalog` lists the modules in the paper's order.
+A module has levels, draw, goal and plan of its tasks; the TOML files beside it, which begin with
+its name, have their instructions. `robospa.tasks.catalog` lists the tasks in the paper's order.
 """

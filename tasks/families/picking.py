@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from robospa.tasks.colors import NAMED
-from robospa.tasks.families.tabletop import draw_look
+from robospa.tasks.families.tabletop import draw_variant
 from robospa.tasks.goals.pick import Lift, PickTracker
-from robospa.tasks.objects import object_model
+from robospa.tasks.objects import model_of
 from robospa.tasks.plan import Pick, Skill
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import SceneFacts, Tracker
@@ -37,7 +37,7 @@ def lifted(lift: Lift) -> Callable[[Scene], Tracker]:
     def goal(scene: Scene) -> Tracker:
         above = None if lift.above is None else lift.above + scene.table_rise
         names = tuple(o.name for o in scene.objects)
-        models = {o.name: object_model(o.asset, o.params) for o in scene.objects}
+        models = {o.name: model_of(o) for o in scene.objects}
         middles = {n: (0.0, 0.0, m.bottom + m.size[2] / 2) for n, m in models.items()}
         target = PickFacts.of(scene).target
         return PickTracker(target, names, replace(lift, above=above), middles)
@@ -57,8 +57,8 @@ BLOCK_COLORS = ("red", "blue", "green", "yellow", "purple", "black")
 
 
 def draw_params(rng: np.random.Generator, asset: str) -> dict[str, object]:
-    """One of the looks of `asset`; for a block among mixed objects one of six colours."""
+    """One of the variants of `asset`; for a block among mixed objects one of six colours."""
     if asset == "block":
         color = NAMED[BLOCK_COLORS[int(rng.integers(len(BLOCK_COLORS)))]]
         return {"half": [BLOCK_HALF] * 3, "color": list(color)}
-    return dict(draw_look(rng, asset))
+    return dict(draw_variant(rng, asset))

@@ -1,4 +1,4 @@
-"""What tasks put on the table: items with neutral names, looks, poses, and what is in view."""
+"""What tasks put on the table: items with neutral names, variants, colours, poses, and the view."""
 
 from __future__ import annotations
 
@@ -7,12 +7,46 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from robospa.geometry import Pose, yaw_rotation
+from robospa.geometry import Pose, Vec3, yaw_rotation
 from robospa.tasks import objects
-from robospa.tasks.sampling.places import Point
-from robospa.tasks.scene import SceneObject
-from robospa.tasks.shapes import ObjectModel, Params
+from robospa.tasks.colors import NAMED, stands_out
+from robospa.tasks.instructions.grammar import Phrasings
+from robospa.tasks.plan import Pick, Place
+from robospa.tasks.sampling.places import LayoutError, Point
+from robospa.tasks.scene import Scene, SceneObject
+from robospa.tasks.shapes import Color, ObjectModel, Params
 from robospa.workcell import TABLE_TOP, Workcell
+
+COLORS: dict[str, Color] = {
+    word: NAMED[word]
+    for word in (
+        *("red", "green", "blue", "yellow", "cyan", "magenta"),
+        *("orange", "purple", "white", "black", "brown", "pink"),
+    )
+}
+"""Linear RGB by word; a task uses the first few (official order)."""
+
+ORDERED = {**dict(list(COLORS.items())[:4]), "purple": NAMED["purple"]}
+"""The colours of tasks that ask for blocks in a fixed order of colours."""
+
+TRIES = 60
+
+
+def first_colors(count: int) -> dict[str, Color]:
+    """The first `count` of COLORS."""
+    return dict(list(COLORS.items())[:count])
+
+
+def drawn_color(rng: np.random.Generator, low: float = 0.0, high: float = 1.0) -> list[float]:
+    """A random linear RGB that is not the table's, each part uniform in `low`..`high`.
+
+    LayoutError if 60 draws are like the table, which happens to none of 10^60 scenes.
+    """
+    for _ in range(TRIES):
+        r, g, b = (round(float(c), 4) for c in rng.uniform(low, high, 3))
+        if stands_out((r, g, b)):
+            return [r, g, b]
+    raise LayoutError(f"{TRIES} random colours all looked like the table; skip this seed")
 
 
 @dataclass(frozen=True)
@@ -42,15 +76,22 @@ def named(
     return tuple(scene_objects), names
 
 
-def draw_look(rng: np.random.Generator, asset: str) -> dict[str, int]:
-    """Parameters of one of the asset's looks, each equally likely."""
-    return {"look": int(rng.integers(objects.look_count(asset)))}
+def draw_variant(
+    rng: np.random.Generator, asset: str, some: Sequence[int] | None = None
+) -> dict[str, int]:
+    """Parameters of one of the asset's variants (of `some` of them), each equally likely."""
+    some = range(objects.variant_count(asset)) if some is None else some
+    return {"look": int(some[int(rng.integers(len(some)))])}
+
+
+def cube(half: float, color: Sequence[float]) -> dict[str, list[float]]:
+    """Parameters of a block with equal edges, `half` [m] each."""
+    return {"half": [half, half, half], "color": list(color)}
 
 
 def radius(asset: str, params: Params) -> float:
     """Radius [m] of the asset's footprint around its origin."""
-    model: ObjectModel = objects.object_model(asset, params)
-    return model.radius
+    return objects.object_model(asset, params).radius
 
 
 def standing(point: Point, yaw: float = 0.0, height: float = 0.0) -> Pose:
@@ -60,7 +101,7 @@ def standing(point: Point, yaw: float = 0.0, height: float = 0.0) -> Pose:
 
 def in_view(workcell: Workcell, asset: str, params: Params) -> Callable[[Point], bool]:
     """Whether the head camera sees the whole asset when it stands at a point."""
-    model: ObjectModel = objects.object_model(asset, params)
+    model = objects.object_model(asset, params)
 
     def seen(point: Point) -> bool:
         x, y = np.array(point[0]), np.array(point[1])
@@ -80,7 +121,22 @@ def side(x: float) -> str:
     return "left" if x < 0 else "right"
 
 
-def look_phrasings(model: ObjectModel) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def side_of(scene: Scene, name: str) -> str:
+    """The arm on whose side an object starts."""
+    return side(scene.object(name).pose.position[0])
+
+
+def frame_of(scene: Scene, name: str, frame: str) -> Pose:
+    """The named frame of an object, in the object's own frame."""
+    return objects.model_of(scene.object(name)).frames[frame]
+
+
+def moved(name: str, to: Vec3, arm: str, lift: float = 0.08) -> tuple[Pick, Place]:
+    """The skills that bring an object to a place [m, world], lifted by so much [m]."""
+    return Pick(name, lift=lift, arm=arm), Place(name, to, arm=arm)
+
+
+def variant_phrasings(model: ObjectModel) -> Phrasings:
     """A model's own phrases: those for training sentences, and the last third, held out."""
     cut = len(model.phrases) - max(1, len(model.phrases) // 3)
     return model.phrases[:cut], model.phrases[cut:]

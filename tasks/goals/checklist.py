@@ -1,103 +1,141 @@
 """A list of things to do: presses and clicks, placements, stamps; order noted, never enforced.
 
-A subtask is a counter's next count (a counter may occur several times) or a `Part`, a condition on
-where an object is. Counts latch; a part latches if it says so.
+A subtask is a counter's next count (a counter may occur several times) or a `Condition` on where an
+object is. Counts latch; a condition latches if it says so.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Protocol, TypeGuard
 
 from robospa.geometry import Vec3
 from robospa.tasks.events import Event, ObjectRole
-from robospa.tasks.goals.lift_tracker import LiftTracker
-from robospa.tasks.goals.parts import Part
-from robospa.tasks.goals.repeat import ActionCounter
-from robospa.tasks.goals.subtask_flags import SubtaskFlags, grippers_open
+from robospa.tasks.goals.conditions import Condition, Inside
+from robospa.tasks.goals.counters import FIGURES, ActionCounter
+from robospa.tasks.goals.lift_tracker import LiftTracker, grippers_open
 from robospa.tasks.snapshot import Snapshot
 
 
-class Watch(Protocol):
+class SubtaskFlags:
+    """The state of `total` subtasks; every change becomes an event."""
+
+    def __init__(self, total: int) -> None:
+        self.held = [False] * total
+        self.order: list[int] = []
+        """Indices in the order in which they were first done."""
+
+    def set(self, index: int, value: bool, time: float, name: str = "") -> tuple[Event, ...]:
+        """Give subtask `index` a value; an event if it changes."""
+        if self.held[index] == value:
+            return ()
+        self.held[index] = value
+        if value and index not in self.order:
+            self.order.append(index)
+        return (Event(time, "subtask_done" if value else "subtask_undone", name, index),)
+
+    @property
+    def all(self) -> bool:
+        """True if every subtask holds."""
+        return all(self.held)
+
+
+class Watch:
     """A monitor beside the subtasks, with events and diagnostics of its own.
 
     `roles` are the objects that no subtask moves. `events` are those of this instant so far; an
     event "failed" among what `update` returns ends the trial.
     """
 
-    @property
-    def roles(self) -> Mapping[str, ObjectRole]: ...
+    roles: Mapping[str, ObjectRole] = {}
 
-    def start(self, snapshot: Snapshot) -> tuple[Event, ...]: ...
+    def start(self, snapshot: Snapshot) -> tuple[Event, ...]:
+        """Events that hold before the first action."""
+        return ()
 
-    def update(self, snapshot: Snapshot, events: Sequence[Event]) -> tuple[Event, ...]: ...
+    def update(self, snapshot: Snapshot, events: Sequence[Event]) -> tuple[Event, ...]:
+        """Events of this instant."""
+        return ()
 
-    def diagnostics(self) -> Mapping[str, float]: ...
+    def diagnostics(self) -> Mapping[str, float]:
+        """What it adds to the record."""
+        return {}
 
 
-def _is_part(item: ActionCounter | Part) -> TypeGuard[Part]:
-    return hasattr(item, "holds")
+Subtask = ActionCounter | Condition
+Early = Callable[[int, SubtaskFlags], bool]
+"""Whether a subtask that is done for the first time comes before what has to be done first."""
+CHAIN = ("order_obeyed", "out_of_order", *FIGURES, "drops")
+"""Figures of the order and of the presses, for records of chains of actions."""
 
 
-def _is_counter(item: ActionCounter | Part) -> TypeGuard[ActionCounter]:
-    return hasattr(item, "count")
+def by_turns(turns: Sequence[int]) -> Early:
+    """Whether a subtask of an earlier turn was never done; several may have the same turn."""
+
+    def early(i: int, flags: SubtaskFlags) -> bool:
+        return any(turn < turns[i] and k not in flags.order for k, turn in enumerate(turns))
+
+    return early
 
 
 class Checklist:
     """`subtasks` in the asked order. Success: all hold, with `released` both grippers open too.
 
-    `radius` [m] bounds the distance from grasp centre to a held object's origin, `may_fall` says
-    where falling is part of the task. `turns` gives each subtask its turn in the asked order where
-    several have the same one, `tools` the subtask of objects that are only used for it. Nothing is
-    noted of the order if it is not `ordered`. `handled` are the objects whose grasps and drops are
-    followed, by default all that are moved; `watch` looks at something more.
+    `radius` [m] bounds the distance from grasp centre to a held object's origin. `early` says what
+    is out of order; without it nothing is noted of the order. Falling into a container is part of
+    the task. `tools` gives the subtask of objects that are only used for it. `handled`
+    are the objects whose grasps and drops are followed, by default all that are moved; `watch`
+    looks at something more. `figures` are those that a record keeps beside the free progress.
     """
 
     def __init__(
         self,
-        subtasks: Sequence[ActionCounter | Part],
+        subtasks: Sequence[Subtask],
         released: bool = False,
         radius: float = 0.12,
-        may_fall: Callable[[Vec3], bool] = lambda position: False,
-        turns: Sequence[int] | None = None,
+        *,
+        early: Early | None = None,
         tools: Mapping[str, int] | None = None,
-        ordered: bool = True,
         handled: Sequence[str] | None = None,
         watch: Watch | None = None,
+        figures: Sequence[str] = ("drops",),
     ) -> None:
         self.total = len(subtasks)
-        self._ordered = ordered
-        self._watch = watch
-        self._turns = tuple(range(self.total)) if turns is None else tuple(turns)
-        self._parts: dict[int, Part] = {}
+        self._early = early
+        self._watch = watch or Watch()
+        self._conditions: dict[int, Condition] = {}
         self._counters: dict[str, ActionCounter] = {}
         self._counts: dict[str, list[int]] = {}
         for i, item in enumerate(subtasks):
-            if _is_part(item):
-                self._parts[i] = item
-            elif _is_counter(item):
+            if isinstance(item, Condition):
+                self._conditions[i] = item
+            else:
                 self._counters[item.name] = item
                 self._counts.setdefault(item.name, []).append(i)
         self._tools = dict(tools or {})
         self.needs_contacts = not all(c.carried for c in self._counters.values())
         self._released = released
         self._flags = SubtaskFlags(self.total)
-        names = {part.name for part in self._parts.values()}
+        names = {condition.name for condition in self._conditions.values()}
         names |= set(self._tools)
         names |= {name for name, counter in self._counters.items() if counter.carried}
         self._lift_tracker = LiftTracker(
-            sorted(names) if handled is None else handled, radius, may_fall
+            sorted(names) if handled is None else handled, radius, self._may_fall
         )
+        self._figures = tuple(figures)
         self._idle = 0
         self._out_of_order = 0
+
+    def _may_fall(self, point: Vec3) -> bool:
+        conditions = self._conditions.values()
+        return any(c.container.over(point) for c in conditions if isinstance(c, Inside))
 
     @property
     def roles(self) -> dict[str, ObjectRole]:
         """Objects that are moved or pressed; targets of placements count as distractors."""
-        found: dict[str, ObjectRole] = dict(self._watch.roles) if self._watch else {}
-        found |= {t: ObjectRole() for p in self._parts.values() for t in p.targets}
-        for i, part in self._parts.items():
-            for name in part.movers:
+        found: dict[str, ObjectRole] = dict(self._watch.roles)
+        found |= {t: ObjectRole() for c in self._conditions.values() for t in c.targets}
+        for i, condition in self._conditions.items():
+            for name in condition.movers:
                 found[name] = ObjectRole((*found.get(name, ObjectRole()).subtasks, i))
         found |= {name: ObjectRole((index,)) for name, index in self._tools.items()}
         for name, indices in self._counts.items():
@@ -109,10 +147,9 @@ class Checklist:
         self._lift_tracker.start(snapshot)
         for counter in self._counters.values():
             counter.start(snapshot)
-        for part in self._parts.values():
-            part.start(snapshot)
-        events = self._watch.start(snapshot) if self._watch else ()
-        events += self._look(snapshot)
+        for condition in self._conditions.values():
+            condition.start(snapshot)
+        events = (*self._watch.start(snapshot), *self._test(snapshot))
         self._idle = sum(self._flags.held)
         self._out_of_order = 0
         return tuple(e for e in events if e.kind != "wrong_order")
@@ -123,12 +160,11 @@ class Checklist:
         for name, counter in self._counters.items():
             if counter.update(snapshot):
                 events += self._count(name, counter.count, snapshot.time)
-        if self._watch:
-            watched = self._watch.update(snapshot, events)
-            events += watched
-            if any(event.kind == "failed" for event in watched):
-                return events
-        events += self._look(snapshot)
+        watched = self._watch.update(snapshot, events)
+        events += watched
+        if any(event.kind == "failed" for event in watched):
+            return events
+        events += self._test(snapshot)
         if self._flags.all and (not self._released or grippers_open(snapshot)):
             events += (Event(snapshot.time, "success"),)
         return events
@@ -139,29 +175,23 @@ class Checklist:
             return (Event(time, "repeated", name, indices[-1]),)
         return self._set(indices[count - 1], True, time, name)
 
-    def _look(self, snapshot: Snapshot) -> tuple[Event, ...]:
+    def _test(self, snapshot: Snapshot) -> tuple[Event, ...]:
+        """Look at every condition."""
         events: tuple[Event, ...] = ()
-        for i, part in self._parts.items():
+        for i, condition in self._conditions.items():
             before = self._flags.held[i]
-            if before and part.latched:
+            if before and condition.latched:
                 continue
-            now = part.holds(snapshot, before)
-            if now and part.after is not None and part.after not in self._flags.order:
+            now = condition.holds(snapshot, before)
+            if now and condition.after is not None and condition.after not in self._flags.order:
                 now = False
             if now != before:
-                events += self._set(i, now, snapshot.time, part.name)
+                events += self._set(i, now, snapshot.time, condition.name)
         return events
 
     def _set(self, i: int, value: bool, time: float, name: str) -> tuple[Event, ...]:
         first = value and i not in self._flags.order
-        early = (
-            self._ordered
-            and first
-            and any(
-                turn < self._turns[i] and k not in self._flags.order
-                for k, turn in enumerate(self._turns)
-            )
-        )
+        early = first and self._early is not None and self._early(i, self._flags)
         events = self._flags.set(i, value, time, name)
         if early:
             self._out_of_order += 1
@@ -169,16 +199,14 @@ class Checklist:
         return events
 
     def diagnostics(self) -> dict[str, float | bool]:
-        """Free progress, drops, what is watched, the order, counts with and without chatter."""
-        found: dict[str, float | bool] = {"idle_progress": self._idle / self.total}
-        if self._ordered:
-            counters = self._counters.values()
-            found["order_obeyed"] = self._out_of_order == 0
-            found["out_of_order"] = self._out_of_order
-            found["presses"] = sum(c.count for c in counters)
-            found["touched"] = sum(c.touched for c in counters)
-            found["raw_presses"] = sum(c.raw_count for c in counters)
-        if self._watch:
-            found |= self._watch.diagnostics()
-        found["drops"] = self._lift_tracker.drops
-        return found
+        """Free progress, the chosen figures (counters' summed up), and what is watched."""
+        found: dict[str, float | bool] = {
+            "order_obeyed": self._out_of_order == 0,
+            "out_of_order": self._out_of_order,
+            "drops": self._lift_tracker.drops,
+        }
+        for counter in self._counters.values():
+            for name, value in counter.figures().items():
+                found[name] = found.get(name, 0) + value
+        chosen = {name: found.get(name, 0) for name in self._figures}
+        return {"idle_progress": self._idle / self.total, **chosen, **self._watch.diagnostics()}

@@ -1,9 +1,10 @@
 """Clicking several objects: in a given order, or each a given number of times.
 
-A click is a press (see `repeat`): it counts when the touch begins, and the next one on the same
+A click is a press (see `counters`): it counts when the touch begins, and the next one on the same
 object needs the finger to leave. Where official rules look at every instant for itself, an object
 that is touched when its turn comes is clicked as well. Clicks at the wrong time are never punished
-(official); events and diagnostics say how many there were.
+(official); events and diagnostics say how many there were. A tool that is used on several objects
+in an order keeps to the same rules; it is grasped, may fall, and belongs to every subtask.
 """
 
 from __future__ import annotations
@@ -11,8 +12,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from robospa.tasks.events import Event, ObjectRole
-from robospa.tasks.goals.repeat import ActionCounter, PressCounter
-from robospa.tasks.goals.subtask_flags import SubtaskFlags
+from robospa.tasks.goals.checklist import SubtaskFlags
+from robospa.tasks.goals.counters import FIGURES, ActionCounter, PressCounter
+from robospa.tasks.goals.lift_tracker import LiftTracker
 from robospa.tasks.snapshot import Snapshot
 
 
@@ -87,8 +89,36 @@ class ClickInOrder:
             "repeated_clicks": self._again,
             "wrong_clicks": self._wrong,
             "presses": sum(c.count for c in (*self._counters, *self._others)),
-            "touched": sum(c.touched for c in (*self._counters, *self._others)),
+            "touched": sum(c.figures()["touched"] for c in (*self._counters, *self._others)),
         }
+
+
+class UseInOrder(ClickInOrder):
+    """Use `tool` on the objects of `counters` one after the other; subtask i is counter i."""
+
+    def __init__(self, counters: Sequence[ActionCounter], tool: str) -> None:
+        super().__init__(counters)
+        self._tool = tool
+        self._lift_tracker = LiftTracker((tool,), radius=0.15)
+
+    @property
+    def roles(self) -> dict[str, ObjectRole]:
+        """The tool serves all; the objects are only places where it is used."""
+        places = {name: ObjectRole(pressed=True) for name in super().roles}
+        return places | {self._tool: ObjectRole(tuple(range(self.total)))}
+
+    def start(self, snapshot: Snapshot) -> tuple[Event, ...]:
+        """Nothing is done yet; remember where the tool lies."""
+        self._lift_tracker.start(snapshot)
+        return super().start(snapshot)
+
+    def update(self, snapshot: Snapshot) -> tuple[Event, ...]:
+        """Grasps and drops of the tool, and what the order says."""
+        return (*self._lift_tracker.update(snapshot), *super().update(snapshot))
+
+    def diagnostics(self) -> dict[str, float]:
+        """Those of the order, and drops of the tool."""
+        return {**super().diagnostics(), "drops": self._lift_tracker.drops}
 
 
 class PressCounts:
@@ -138,9 +168,7 @@ class PressCounts:
         """Presses, those that touched, those beyond what was asked, and those out of order."""
         return {
             "idle_progress": 0.0,
-            "presses": sum(c.count for c in self._counters),
-            "touched": sum(c.touched for c in self._counters),
-            "raw_presses": sum(c.raw_count for c in self._counters),
+            **{name: sum(c.figures()[name] for c in self._counters) for name in FIGURES},
             "excess_presses": self._excess,
             "out_of_order": self._out_of_order,
         }

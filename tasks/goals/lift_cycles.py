@@ -10,9 +10,8 @@ import math
 from collections.abc import Callable, Sequence
 
 from robospa.geometry import Pose, Vec3, rotate
-from robospa.tasks.events import Event, ObjectRole
-from robospa.tasks.goals.lift_tracker import LiftTracker
-from robospa.tasks.goals.subtask_flags import SubtaskFlags, closed_near
+from robospa.tasks.goals.checklist import Checklist
+from robospa.tasks.goals.lift_tracker import closed_near
 from robospa.tasks.snapshot import Snapshot
 
 UPRIGHT = math.cos(math.radians(36.87))
@@ -86,69 +85,54 @@ def upright(pose: Pose) -> bool:
     return rotate(pose.rotation, (0.0, 0.0, 1.0))[2] > UPRIGHT
 
 
-class LiftCycles:
-    """`times` cycles of `up`, then `down` while not `up`; subtask i is cycle i + 1, latched.
+class CycleCounter:
+    """Counts cycles of `up`, then `down` while not `up`, of object `name`.
 
     A gripper that is not open holds the object while its grasp centre is within `radius` [m] of the
     origin.
     """
 
-    needs_contacts = False
+    carried = True
 
-    def __init__(
-        self, name: str, times: int, up: PoseTest, down: PoseTest, radius: float = 0.12
-    ) -> None:
-        self.total = times
-        self._name = name
+    def __init__(self, name: str, up: PoseTest, down: PoseTest, radius: float = 0.12) -> None:
+        self.name = name
+        self.count = 0
+        self.pressing = False
+        """Whether the object is up or on its way down."""
+        self.radius = radius
         self._up = up
         self._down = down
-        self._flags = SubtaskFlags(times)
-        self._radius = radius
-        self._lift_tracker = LiftTracker((name,), radius)
         self._home = Pose()
-        self._was_up = False
         self._lifts = 0
-        self._done = 0
         self._pending = False
         self._released = 0
 
-    @property
-    def roles(self) -> dict[str, ObjectRole]:
-        """The lifted object."""
-        return {self._name: ObjectRole(tuple(range(self.total)))}
-
-    def start(self, snapshot: Snapshot) -> tuple[Event, ...]:
+    def start(self, snapshot: Snapshot) -> None:
         """Remember where the object stands."""
-        self._lift_tracker.start(snapshot)
-        self._home = snapshot.poses[self._name]
-        return ()
+        self._home = snapshot.poses[self.name]
 
-    def update(self, snapshot: Snapshot) -> tuple[Event, ...]:
-        """A subtask per cycle, success with the last one."""
-        events = self._lift_tracker.update(snapshot)
-        if self._done == self.total:
-            return events
-        if self._pending and not closed_near(snapshot, snapshot.position(self._name), self._radius):
+    def update(self, snapshot: Snapshot) -> bool:
+        """True if a cycle ends at this instant."""
+        if self._pending and not closed_near(snapshot, snapshot.position(self.name), self.radius):
             self._pending, self._released = False, self._released + 1
         if self._up(snapshot, self._home):
-            self._lifts += not self._was_up
-            self._was_up, self._pending = True, False
-        elif self._was_up and self._down(snapshot, self._home):
-            self._was_up, self._pending = False, True
-            events += self._flags.set(self._done, True, snapshot.time, self._name)
-            self._done += 1
-            if self._done == self.total:
-                events += (Event(snapshot.time, "success"),)
-        return events
+            self._lifts += not self.pressing
+            self.pressing, self._pending = True, False
+        elif self.pressing and self._down(snapshot, self._home):
+            self.pressing, self._pending = False, True
+            self.count += 1
+            return True
+        return False
 
-    def diagnostics(self) -> dict[str, float]:
-        """Progress of doing nothing (none), lifts, cycles before the last that ended in a release.
+    def figures(self) -> dict[str, int]:
+        """Lifts, and cycles before the last that ended in a release.
 
         The last cycle ends the trial, so that its release is not seen.
         """
-        return {
-            "idle_progress": 0.0,
-            "lifts": self._lifts,
-            "released": self._released,
-            "drops": self._lift_tracker.drops,
-        }
+        return {"lifts": self._lifts, "released": self._released}
+
+
+def cycles(counter: CycleCounter, times: int) -> Checklist:
+    """The goal of `times` cycles; subtask i is cycle i + 1."""
+    figures = ("lifts", "released", "drops")
+    return Checklist([counter] * times, radius=counter.radius, figures=figures)

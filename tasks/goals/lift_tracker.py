@@ -1,4 +1,6 @@
-"""Objects that are lifted and dropped: events for the failure analysis, never for success.
+"""What grippers hold, and objects that are lifted and dropped.
+
+`LiftTracker` gives events for the failure analysis, never for success.
 
 An object is grasped once it is 3 cm above its rest height with a gripper that is not open around
 it. It is dropped if it then falls faster than 0.6 m/s, which takes about 2 cm of free fall, away
@@ -13,8 +15,7 @@ from types import MappingProxyType
 
 from robospa.geometry import Vec3
 from robospa.tasks.events import Event
-from robospa.tasks.goals.subtask_flags import holding_arm
-from robospa.tasks.snapshot import Snapshot
+from robospa.tasks.snapshot import GRIPPER_OPEN, Snapshot
 
 LIFT = 0.03
 """Height [m] above the last rest height at which a held object counts as lifted."""
@@ -25,9 +26,30 @@ FALL_SPEED = 0.6
 RELEASE = 0.2
 """Seconds after letting go during which a fall still belongs to the lift."""
 
-
 SLIP = 0.01
 """A falling object has left the gripper by more than this [m]."""
+
+
+def grippers_open(snapshot: Snapshot) -> bool:
+    """True if both grippers are commanded open."""
+    left, right = snapshot.gripper
+    return left > GRIPPER_OPEN and right > GRIPPER_OPEN
+
+
+def closed_near(snapshot: Snapshot, point: Vec3, radius: float) -> bool:
+    """True if a gripper that is not open has its grasp centre within `radius` [m] of `point`."""
+    return holding_arm(snapshot, point, radius) is not None
+
+
+def holding_arm(snapshot: Snapshot, point: Vec3, radius: float) -> int | None:
+    """The arm (0 left, 1 right) whose gripper is not open and within `radius` [m] of `point`."""
+    for arm, opening in enumerate(snapshot.gripper):
+        if opening <= GRIPPER_OPEN:
+            x, y, z = snapshot.grasp_points[arm]
+            dx, dy, dz = x - point[0], y - point[1], z - point[2]
+            if dx * dx + dy * dy + dz * dz < radius * radius:
+                return arm
+    return None
 
 
 @dataclass

@@ -1,132 +1,205 @@
-"""Opening covers in an order that could be seen only before the covers came.
+"""Goals of memory tasks: hold still while something is shown, then do something about it.
 
-Rules are the official ones: hold still until the covers are there; then open them one by one, each
-into the place behind it, and never touch an opened one again. Whatever breaks them fails for good.
+What has to be remembered is hidden by objects that appear. Until then no arm may move; that is
+official, and whoever breaks it has failed for good.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from robospa.geometry import Pose, Quat, Vec3
 from robospa.tasks.events import Event, ObjectRole
-from robospa.tasks.goals.cue import MOVED_EARLY, Stillness
-from robospa.tasks.goals.lift_tracker import LiftTracker
-from robospa.tasks.goals.subtask_flags import SubtaskFlags, closed_near
+from robospa.tasks.goals.checklist import Checklist, Watch
+from robospa.tasks.goals.conditions import Near, Rests
+from robospa.tasks.goals.lift_tracker import closed_near
+from robospa.tasks.goals.placing import Bystanders
 from robospa.tasks.snapshot import Snapshot
+from robospa.tasks.task import Tracker
+
+STILL = 0.03
+"""No end effector may be farther [m] from its start before the cue is hidden."""
+
+MOVED_EARLY = "moved before the cue was hidden"
+
+
+class Stillness:
+    """Largest distance [m] of an end effector from where it was at the start."""
+
+    def __init__(self) -> None:
+        self.motion = 0.0
+        self._origins: tuple[Vec3, ...] = ()
+
+    def start(self, snapshot: Snapshot) -> None:
+        """Remember where the end effectors are."""
+        self._origins = tuple(pose.position for pose in snapshot.end_effector)
+
+    def broken(self, snapshot: Snapshot) -> bool:
+        """True once an end effector has moved more than STILL from its start."""
+        for origin, pose in zip(self._origins, snapshot.end_effector, strict=True):
+            self.motion = max(self.motion, math.dist(origin, pose.position))
+        return self.motion > STILL
+
+
+class AfterCue:
+    """`goal`, which starts when the objects called `covers` have appeared; stillness before."""
+
+    def __init__(self, goal: Tracker, covers: Sequence[str]) -> None:
+        self.total = goal.total
+        self.needs_contacts = goal.needs_contacts
+        self._goal = goal
+        self._covers = tuple(covers)
+        self._still = Stillness()
+        self._hidden_at: float | None = None
+        self._over = False
+
+    @property
+    def roles(self) -> Mapping[str, ObjectRole]:
+        """Those of the goal."""
+        return self._goal.roles
+
+    def start(self, snapshot: Snapshot) -> tuple[Event, ...]:
+        """Remember where the end effectors are."""
+        self._still.start(snapshot)
+        return ()
+
+    def update(self, snapshot: Snapshot) -> tuple[Event, ...]:
+        """Before the covers: stillness. After: what the goal says, until it is won or lost."""
+        if self._over:
+            return ()
+        if self._hidden_at is None:
+            if any(name not in snapshot.poses for name in self._covers):
+                if not self._still.broken(snapshot):
+                    return ()
+                self._over = True
+                return (Event(snapshot.time, "failed", note=MOVED_EARLY),)
+            self._hidden_at = snapshot.time
+            return (Event(snapshot.time, "cue_hidden"), *self._goal.start(snapshot))
+        events = self._goal.update(snapshot)
+        self._over = any(e.kind in ("success", "failed") for e in events)
+        return events
+
+    def diagnostics(self) -> dict[str, object]:
+        """The goal's own, when the cue was hidden (-1: not yet) and the motion [m] before."""
+        return {
+            **self._goal.diagnostics(),
+            "cue_hidden_at": -1.0 if self._hidden_at is None else self._hidden_at,
+            "motion_before": self._still.motion,
+        }
+
 
 OPEN_REACH = 0.045
 """Horizontal distance [m] from its open place at which a cover is open."""
-
-
-HELD_RADIUS = 0.1
+COVER_RADIUS = 0.1
 """A gripper that is not open and whose grasp centre is nearer [m] than this holds a cover."""
 
 
 @dataclass(frozen=True)
 class Cover:
-    """A cover, and the place (x, y) [m] where it has to be put."""
+    """A cover, and the place (x, y) [m] where it has to be put, its origin lower than `below`."""
 
     name: str
     place: tuple[float, float]
+    below: float
+
+    def is_open(self, pose: Pose, home: Pose) -> bool:
+        """True if its origin is there, wherever it began."""
+        x, y, z = pose.position
+        return z < self.below and math.hypot(x - self.place[0], y - self.place[1]) < OPEN_REACH
 
 
-class UncoverInOrder:
-    """`covers` in the order in which they have to be opened; subtask i is cover i.
+def uncover(covers: Sequence[Cover]) -> AfterCue:
+    """Open `covers` in this order, each into its place, and never touch an opened one again.
 
-    A cover is open when its origin is within 4.5 cm of its place and lower than `below` [m].
+    Subtask i is cover i. Whatever breaks the rules fails for good (official).
     """
+    names = [cover.name for cover in covers]
+    opened = [
+        Rests(c.name, c.is_open, held_radius=0.0, latched=True, after=i - 1 if i else None)
+        for i, c in enumerate(covers)
+    ]
+    watch = _Covers(covers)
+    return AfterCue(Checklist(opened, radius=COVER_RADIUS, handled=names, watch=watch), names)
 
-    needs_contacts = False
 
-    def __init__(self, covers: Sequence[Cover], below: float) -> None:
-        self.total = len(covers)
+class _Covers(Watch):
+    """Covers that are lifted or opened too early, and opened ones that do not stay open."""
+
+    def __init__(self, covers: Sequence[Cover]) -> None:
         self._covers = tuple(covers)
-        self._below = below
-        self._flags = SubtaskFlags(self.total)
-        self._lift_tracker = LiftTracker((c.name for c in covers), radius=HELD_RADIUS)
-        self._stillness = Stillness()
-        self._hidden_at: float | None = None
+        self._open = 0
         self._wrong_lifts = 0
-        self._over = False
 
-    @property
-    def roles(self) -> dict[str, ObjectRole]:
-        """The covers."""
-        return {cover.name: ObjectRole((i,)) for i, cover in enumerate(self._covers)}
-
-    def start(self, snapshot: Snapshot) -> tuple[Event, ...]:
-        """Remember where the end effectors are."""
-        self._stillness.start(snapshot)
-        return ()
-
-    def update(self, snapshot: Snapshot) -> tuple[Event, ...]:
-        """Before the covers: stillness. After: the next cover, or what broke the order."""
-        if self._over:
-            return ()
-        if self._hidden_at is None:
-            if any(cover.name not in snapshot.poses for cover in self._covers):
-                return self._still(snapshot)
-            self._hidden_at = snapshot.time
-            return (Event(snapshot.time, "cue_hidden"),)
-        events = self._handled(snapshot)
-        stage = sum(self._flags.held)
-        for i, cover in enumerate(self._covers):
-            is_open = self._is_open(snapshot, cover)
-            if i < stage and not is_open:
-                return (
-                    *events,
-                    self._fail(snapshot, cover.name, i, self._why_moved(snapshot, cover)),
-                )
-            if i > stage and is_open:
-                wrong = Event(snapshot.time, "wrong_order", cover.name, i)
-                return (*events, wrong, self._fail(snapshot, cover.name, i, "opened too early"))
-            if i == stage and is_open:
-                events += self._flags.set(i, True, snapshot.time, cover.name)
-        if self._flags.all:
-            self._over = True
-            events += (Event(snapshot.time, "success"),)
-        return events
-
-    def _is_open(self, snapshot: Snapshot, cover: Cover) -> bool:
-        x, y, z = snapshot.poses[cover.name].position
-        px, py = cover.place
-        return z < self._below and math.hypot(x - px, y - py) < OPEN_REACH
-
-    def _why_moved(self, snapshot: Snapshot, cover: Cover) -> str:
-        taken = closed_near(snapshot, snapshot.poses[cover.name].position, HELD_RADIUS)
-        return "opened cover taken again" if taken else "opened cover moved away"
-
-    def _still(self, snapshot: Snapshot) -> tuple[Event, ...]:
-        if self._stillness.broken(snapshot):
-            return (self._fail(snapshot, "", -1, MOVED_EARLY),)
-        return ()
-
-    def _handled(self, snapshot: Snapshot) -> tuple[Event, ...]:
-        """Grasps and drops, and `wrong_object` for a lifted cover that is not due."""
-        events = self._lift_tracker.update(snapshot)
-        if not events:
-            return ()
-        due = self._covers[sum(self._flags.held)].name
-        wrong = tuple(
-            Event(e.time, "wrong_object", e.object)
-            for e in events
-            if e.kind == "grasped" and e.object != due
-        )
-        self._wrong_lifts += len(wrong)
-        return (*events, *wrong)
-
-    def _fail(self, snapshot: Snapshot, name: str, index: int, note: str) -> Event:
-        self._over = True
-        return Event(snapshot.time, "failed", name, index, note)
+    def update(self, snapshot: Snapshot, events: Sequence[Event]) -> tuple[Event, ...]:
+        time, next_one = snapshot.time, self._covers[min(self._open, len(self._covers) - 1)].name
+        lifted = [e.object for e in events if e.kind == "grasped" and e.object != next_one]
+        self._wrong_lifts += len(lifted)
+        found = tuple(Event(time, "wrong_object", name) for name in lifted)
+        poses = [snapshot.poses[cover.name] for cover in self._covers]
+        opened = [c.is_open(pose, pose) for c, pose in zip(self._covers, poses, strict=True)]
+        for i, (cover, is_open) in enumerate(zip(self._covers, opened, strict=True)):
+            if i < self._open and not is_open:
+                here = snapshot.position(cover.name)
+                how = "taken again" if closed_near(snapshot, here, COVER_RADIUS) else "moved away"
+                return (*found, Event(time, "failed", cover.name, i, f"opened cover {how}"))
+            if i > self._open and is_open:
+                wrong = Event(time, "wrong_order", cover.name, i)
+                return (*found, wrong, Event(time, "failed", cover.name, i, "opened too early"))
+        self._open += self._open < len(opened) and opened[self._open]
+        return found
 
     def diagnostics(self) -> dict[str, float]:
-        """Time at which the cue was hidden (-1: not yet), motion [m] before, wrong lifts, drops."""
-        return {
-            "idle_progress": 0.0,
-            "cue_hidden_at": -1.0 if self._hidden_at is None else self._hidden_at,
-            "motion_before": self._stillness.motion,
-            "wrong_lifts": self._wrong_lifts,
-            "drops": self._lift_tracker.drops,
-        }
+        return {"wrong_lifts": self._wrong_lifts}
+
+
+NEAR = 0.03
+"""Horizontal distance [m] from its start within which an object is in its place."""
+TURN = math.radians(15)
+"""Allowed error [rad] of the whole rotation."""
+TURNED_RADIUS = 0.06
+"""A gripper that is not open and whose grasp centre is nearer [m] than this holds the object."""
+
+
+@dataclass(frozen=True)
+class OrientationTarget:
+    """Object `name` is to lie with this `rotation`, its origin lower than `below` [m]."""
+
+    name: str
+    rotation: Quat
+    below: float
+
+
+def restore(targets: Sequence[OrientationTarget], references: Sequence[str]) -> Checklist:
+    """Every object turned as asked at its own place, low, not held, all at once.
+
+    Subtask i is object i; flags do not latch and there is no order (official). Success needs both
+    grippers open. `references` must not be moved: lifting one is an event, not a failure.
+    """
+    return Checklist(
+        [Rests(t.name, _turned(t), held_radius=TURNED_RADIUS) for t in targets],
+        released=True,
+        radius=0.08,
+        early=lambda i, flags: not all(flags.held[:i]),
+        handled=[*(t.name for t in targets), *references],
+        watch=Bystanders(references),
+        figures=("out_of_order", "drops"),
+    )
+
+
+def _turned(target: OrientationTarget) -> Near:
+    def near(pose: Pose, home: Pose) -> bool:
+        return (
+            pose.position[2] < target.below
+            and math.dist(pose.position[:2], home.position[:2]) < NEAR
+            and angle_between(pose.rotation, target.rotation) < TURN
+        )
+
+    return near
+
+
+def angle_between(a: Quat, b: Quat) -> float:
+    """Angle [rad] of the rotation that leads from one to the other."""
+    cosine = abs(sum(p * q for p, q in zip(a, b, strict=True)))
+    return 2 * math.acos(min(1.0, cosine))

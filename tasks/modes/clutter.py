@@ -27,7 +27,7 @@ from robospa.geometry import Array, Pose, to_matrix, yaw_rotation
 from robospa.tasks import catalog
 from robospa.tasks.colors import LOOK_ALIKES as COLORS_ALIKE
 from robospa.tasks.colors import NAMED
-from robospa.tasks.objects import assets, look_count, object_model
+from robospa.tasks.objects import assets, object_model, variant_count
 from robospa.tasks.objects.build import PALETTE, points_of
 from robospa.tasks.plan import Place
 from robospa.tasks.sampling.places import Mask
@@ -57,7 +57,7 @@ class ClutterKind:
 def own_kinds(scene: Scene) -> tuple[ClutterKind, ...]:
     """The kinds of the built-in library that may lie about in `scene`."""
     return tuple(
-        ClutterKind(asset, [{"look": look} for look in range(look_count(asset))])
+        ClutterKind(asset, [{"look": look} for look in range(variant_count(asset))])
         for asset in candidates(scene)
     )
 

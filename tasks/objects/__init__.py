@@ -35,9 +35,10 @@ from robospa.tasks.objects import (
 )
 from robospa.tasks.objects.build import Asset
 from robospa.tasks.objects.tint import TINTS, tinted
+from robospa.tasks.scene import SceneObject
 from robospa.tasks.shapes import ObjectModel, Params
 
-__all__ = ["assets", "look_count", "object_model"]
+__all__ = ["assets", "model_of", "object_model", "variant_count"]
 
 FAMILIES = (
     blocks,
@@ -85,8 +86,8 @@ def assets() -> tuple[str, ...]:
     return tuple(sorted(_library()))
 
 
-def look_count(asset: str) -> int:
-    """Number of looks of `asset`: params {"look": k} takes k = 0 .. count - 1."""
+def variant_count(asset: str) -> int:
+    """Number of variants of `asset`: params {"look": k} takes k = 0 .. count - 1."""
     return _asset(asset).look_count
 
 
@@ -107,6 +108,11 @@ def object_model(asset: str, params: Params = MappingProxyType({})) -> ObjectMod
     if len(params) == 1 and type(look) is int:  # by far the most frequent: what dumps would say
         return _build(asset, f'{{"look":{look}}}')
     return _build(asset, json.dumps(dict(params), sort_keys=True, separators=(",", ":")))
+
+
+def model_of(item: SceneObject) -> ObjectModel:
+    """The model of an object of a scene."""
+    return object_model(item.asset, item.params)
 
 
 def _asset(name: str) -> Asset:

@@ -5,10 +5,11 @@ A few of each variant by default; `ROBOSPA_SCENES=10000` looks at that many wher
 
 from __future__ import annotations
 
+import itertools
 import math
 import os
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from functools import cache
 
 import numpy as np
@@ -39,6 +40,25 @@ def scenes(name: str, level: int) -> Iterator[Scene]:
     """The first SCENES scenes of a variant."""
     yield from kept(name, level, min(SCENES, KEPT))
     yield from (catalog.build_scene(name, level, FIRST_SEED + k) for k in range(KEPT, SCENES))
+
+
+@cache
+def many(name: str, level: int, count: int = 100, first: int = 500_000) -> tuple[Scene, ...]:
+    """So many scenes of a variant, for what has to be right on average."""
+    return tuple(catalog.build_scene(name, level, first + k) for k in range(count))
+
+
+def at(scene: Scene, fact: str) -> list[tuple[float, float]]:
+    """Where [m] the objects lie that a fact names, one or several."""
+    names = scene.facts[fact]
+    names = [names] if isinstance(names, str) else names
+    return [scene.object(name).pose.position[:2] for name in names]
+
+
+def apart(points: Iterable[Sequence[float]]) -> float:
+    """The least distance [m] of two points; infinite for one."""
+    pairs = itertools.combinations(points, 2)
+    return min((math.dist(a, b) for a, b in pairs), default=math.inf)
 
 
 def places(scene: Scene) -> np.ndarray:

@@ -327,3 +327,5 @@ PICKS = (
     *(Limit(task, 3, "closed gripper", 0.2, lambda h, v: held(h, 0.08, v))
       for task in ("Pick_Tea_Box_Relational", "Pick_Seals_Multi_View")),
 )  # fmt: skip
+
+LIMITS = (*PRESSES, *PLACES, *MEMORY, *PICKS)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 
 from robospa.geometry import Pose, Vec3
 from robospa.tasks.events import Event
@@ -42,6 +43,12 @@ def run(tracker: Tracker, snapshots: Iterable[Snapshot]) -> list[Event]:
     for snapshot in rest:
         events += tracker.update(snapshot)
     return events
+
+
+def play(tracker: Tracker, *instants: Snapshot | Mapping[str, Vec3]) -> list[Event]:
+    """`run` through instants a TICK apart: snapshots, or positions of what nothing holds."""
+    snapshots = [s if isinstance(s, Snapshot) else snap(0, s) for s in instants]
+    return run(tracker, [replace(s, time=i * TICK) for i, s in enumerate(snapshots)])
 
 
 def kinds(events: Iterable[Event]) -> list[str]:

@@ -18,12 +18,12 @@ from robospa.harness.sim.renderer import Renderer
 from robospa.harness.world import RenderUnavailable
 from robospa.observation import CameraSpec
 from robospa.tasks.colors import LOOK_ALIKES, NAMED, difference, lab
-from robospa.tasks.families.basic_color.task import COLORS as TINTED
-from robospa.tasks.families.colors import COLORS
-from robospa.tasks.families.distance.object_sets import BLOCK_COLORS
-from robospa.tasks.families.tool_order.seal import PADS
-from robospa.tasks.objects import assets, look_count, object_model
+from robospa.tasks.families.basic_color import COLORS as TINTED
+from robospa.tasks.families.distance import BLOCK_COLORS
+from robospa.tasks.families.tabletop import COLORS
+from robospa.tasks.objects import assets, object_model, variant_count
 from robospa.tasks.objects.tint import TINTS
+from robospa.tasks.objects.tools import PADS
 from robospa.tasks.scene import Scene
 from robospa.tasks.shapes import Box, ObjectModel, Shape
 from robospa.workcell import TABLE_TOP
@@ -117,7 +117,7 @@ def test_named_colors_of_a_scene_are_told_apart(renderer: Renderer) -> None:
 
 
 def test_every_object_stands_out_from_the_table(renderer: Renderer) -> None:
-    models = [object_model(a, {"look": k}) for a in assets() for k in range(look_count(a))]
+    models = [object_model(a, {"look": k}) for a in assets() for k in range(variant_count(a))]
     models = [m for m in models if m.size[2] <= 0.3]  # higher ones stand on the floor
     faint, least = [], 0.0
     for most, row, rows in ((0.12, 4, 3), (0.20, 3, 2), (0.50, 2, 1)):

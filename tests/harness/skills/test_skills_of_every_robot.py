@@ -23,7 +23,7 @@ from robospa.harness.skills.clearance import (
 from robospa.harness.skills.grasping import TOO_THIN, reachable_grasps
 from robospa.harness.skills.open import Pull, _clear, _ways, pull_open
 from robospa.harness.skills.press import DEPTH, press
-from robospa.tasks.objects import assets, look_count, object_model
+from robospa.tasks.objects import assets, object_model, variant_count
 from robospa.tasks.objects.appliances import OVENS
 from robospa.tasks.plan import Open, Press
 from robospa.tasks.scene import SceneObject
@@ -112,7 +112,7 @@ RIMS = ("bowl", "cup", "mug", "table_trash_bin")
 def test_rims_are_thicker_than_the_gap_of_closed_fingers(name: str) -> None:
     assert set(RIMS) <= set(assets())
     for asset in RIMS:
-        for look in range(look_count(asset)):
+        for look in range(variant_count(asset)):
             widths = [grasp.width for grasp in object_model(asset, {"look": look}).grasps]
             gaps = [gripper.gap for gripper in embodiment(name).grippers]
             assert min(widths) > max(gaps) + 0.0005, (asset, look)

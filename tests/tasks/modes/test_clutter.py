@@ -20,7 +20,7 @@ from robospa.tasks.modes.clutter import (
     colors_asked,
     keep_out,
 )
-from robospa.tasks.objects import assets, look_count, object_model
+from robospa.tasks.objects import assets, object_model, variant_count
 from robospa.tasks.plan import Place
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.workcell import WORKCELL
@@ -127,7 +127,7 @@ def test_there_is_enough_to_choose_from() -> None:
     known = set(assets())
     assert known >= FURNITURE and set().union(*LOOK_ALIKES) <= known
     kinds = known - FURNITURE
-    assert len(kinds) >= 30 and sum(map(look_count, kinds)) >= 150
+    assert len(kinds) >= 30 and sum(map(variant_count, kinds)) >= 150
     for name in NAMES:
         assert len(candidates(scene_of(name, 1))) >= 10  # fewer where many kinds are mixed
 

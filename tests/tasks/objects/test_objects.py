@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from robospa.geometry import to_matrix
-from robospa.tasks.objects import assets, look_count, object_model
+from robospa.tasks.objects import assets, object_model, variant_count
 from robospa.tasks.objects import meshes as m
 from robospa.tasks.objects.build import MAX_WIDTH
 from robospa.tasks.objects.containers import COVER_INNER_HEIGHT, COVER_INNER_RADIUS
@@ -53,7 +53,7 @@ each_asset = pytest.mark.parametrize("asset", assets())
 
 def models(asset: str) -> Iterator[ObjectModel]:
     """Every look of an asset; a failing assertion names the model that it is about."""
-    return (object_model(asset, {"look": look}) for look in range(look_count(asset)))
+    return (object_model(asset, {"look": look}) for look in range(variant_count(asset)))
 
 
 def corners(shape: Shape) -> Array:
@@ -115,7 +115,7 @@ def test_collision_shapes_stand_on_the_underside(asset: str) -> None:
 
 @pytest.mark.parametrize("asset", RADIUS_LIMITS)
 def test_footprints_fit_the_layouts(asset: str) -> None:
-    for look in range(look_count(asset)):
+    for look in range(variant_count(asset)):
         assert object_model(asset, {"look": look}).radius <= RADIUS_LIMITS[asset]
 
 
@@ -260,14 +260,16 @@ def test_phrases_describe_a_look_in_several_ways(asset: str) -> None:
 
 @pytest.mark.parametrize("asset", assets())
 def test_looks_of_an_asset_share_no_phrase(asset: str) -> None:
-    found = [p for k in range(look_count(asset)) for p in object_model(asset, {"look": k}).phrases]
+    found = [
+        p for k in range(variant_count(asset)) for p in object_model(asset, {"look": k}).phrases
+    ]
     assert len(set(found)) == len(found)
 
 
 def test_covers_hide_a_block_of_four_centimetres() -> None:
     assert math.hypot(0.02, 0.02) + 0.002 < COVER_INNER_RADIUS
     assert COVER_INNER_HEIGHT >= 0.045
-    for look in range(look_count("cover")):
+    for look in range(variant_count("cover")):
         model = object_model("cover", {"look": look})
         for shape in (s for s in model.shapes if s.collision):
             for corner in [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (0, 2)]:
@@ -297,7 +299,7 @@ def test_the_hammer_strikes_where_the_official_one_does() -> None:
 
 
 def test_the_basket_takes_every_bread() -> None:
-    for look in range(look_count("bread_basket")):
+    for look in range(variant_count("bread_basket")):
         basket = object_model("bread_basket", {"look": look})
         assert basket.frames["support"].position[2] < 0.01
         wall = 0.01
@@ -364,7 +366,7 @@ def test_triangulate_handles_a_concave_polygon() -> None:
     ],
 )
 def test_assets_name_the_places_that_tasks_need(asset: str, frames: set[str]) -> None:
-    for look in range(look_count(asset)):
+    for look in range(variant_count(asset)):
         assert set(object_model(asset, {"look": look}).frames) >= frames
 
 

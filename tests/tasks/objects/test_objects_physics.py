@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from robospa.geometry import Pose, Vec3, look_rotation
-from robospa.tasks.objects import assets, look_count, object_model
+from robospa.tasks.objects import assets, object_model, variant_count
 from robospa.tasks.shapes import Box, Grasp, ObjectModel, Shape
 
 pytestmark = pytest.mark.sim
@@ -17,7 +17,7 @@ pytestmark = pytest.mark.sim
 EVERY = [
     (asset, look)
     for asset in assets()
-    for look in range(look_count(asset))
+    for look in range(variant_count(asset))
     if object_model(asset).hinge is None  # what opens is always fixed
     and any(shape.collision for shape in object_model(asset).shapes)
 ]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from robospa.geometry import Pose, Vec3, axis_rotation, rotate, yaw_rotation
-from robospa.tasks.objects import look_count, object_model
+from robospa.tasks.objects import object_model, variant_count
 from robospa.tasks.shapes import ObjectModel
 
 pytestmark = pytest.mark.sim
@@ -51,7 +51,7 @@ def put_by(frame: Vec3, at: Vec3, yaw: float) -> Pose:
     return Pose((at[0] - x, at[1] - y, at[2] - z), yaw_rotation(yaw))
 
 
-@pytest.mark.parametrize("look", range(look_count("mug")))
+@pytest.mark.parametrize("look", range(variant_count("mug")))
 @pytest.mark.parametrize(("yaw", "off"), [(0.0, -0.003), (math.pi, 0.003)])
 def test_a_mug_let_go_on_the_peg_hangs_there(look: int, yaw: float, off: float) -> None:
     rack, mug = object_model("mug_rack"), object_model("mug", {"look": look})
@@ -69,7 +69,7 @@ def test_a_mug_let_go_on_the_peg_hangs_there(look: int, yaw: float, off: float) 
     )  # by its handle, leaning on the post
 
 
-@pytest.mark.parametrize("look", range(look_count("phone")))
+@pytest.mark.parametrize("look", range(variant_count("phone")))
 def test_a_phone_on_its_stand_stays(look: int) -> None:
     stand, phone = object_model("phone_stand"), object_model("phone", {"look": look})
     frame = stand.frames["support"]

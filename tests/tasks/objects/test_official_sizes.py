@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from robospa.tasks.objects import look_count, object_model
+from robospa.tasks.objects import object_model, variant_count
 from robospa.tasks.official import official_assets, official_models, official_size
 
 HEIGHT = 0.05
@@ -45,7 +45,7 @@ def official(asset: str, look: int) -> Size:
 
 @pytest.mark.parametrize("asset", [a for a in official_assets() if a not in UNKNOWN])
 def test_every_look_is_as_large_as_its_official_model(asset: str) -> None:
-    for look in range(look_count(asset)):
+    for look in range(variant_count(asset)):
         x, depth, up = object_model(asset, {"look": look}).size
         across, high, deep = official(asset, look)
         what = f"{asset} look {look}"

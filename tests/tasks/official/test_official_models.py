@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from robospa.tasks import catalog
-from robospa.tasks.objects import assets, look_count, object_model
+from robospa.tasks.objects import assets, object_model, variant_count
 from robospa.tasks.official import (
     POINTS,
     needs,
@@ -21,7 +21,7 @@ BUILT_IN = {"block", "cover", "garbage", "pad", "t_block"}
 def test_every_asset_but_boxes_has_an_official_model_for_each_look() -> None:
     assert {*official_assets()} == {*assets()} - BUILT_IN
     for asset in official_assets():
-        assert len(official_models(asset)) == look_count(asset), asset
+        assert len(official_models(asset)) == variant_count(asset), asset
 
 
 def test_a_model_is_called_as_in_the_official_files() -> None:

@@ -1,1 +1,0 @@
-"""Basic_Color_*: the object of a named colour."""

@@ -1,1 +1,0 @@
-"""Click_Objects_Order and Click_Bell_Clockwise_Order: clicks in a given order."""

@@ -1,0 +1,355 @@
+"""Pick * Multi View (CVR) and Basic Position * (EPG): the extreme object as seen from a named side.
+
+Objects lie free on the table. One of four extremes (leftmost, rightmost, farthest, nearest) is
+asked for in the words of a viewer: the robot, one opposite, one at the left and one at the right of
+the table; in the basic tasks always the robot, a reference for how much of the difficulty lies in
+taking a viewpoint. Viewpoints exist in words only; no image shows them. There are three sets of
+equal objects and two of seven different ones. Spacings are the official ones, those of the largest
+kind where objects differ: the place then tells nothing about what lies there.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robospa.geometry import Array
+from robospa.tasks.families.picking import (
+    BLOCK_HALF,
+    PickFacts,
+    draw_params,
+    lifted,
+    pick_name,
+    pick_target,
+)
+from robospa.tasks.families.tabletop import standing
+from robospa.tasks.goals.pick import Lift
+from robospa.tasks.instructions.grammar import Slots
+from robospa.tasks.instructions.text import TaskText
+from robospa.tasks.sampling.markov import Fits, pool, walk
+from robospa.tasks.sampling.places import LayoutError, Mask
+from robospa.tasks.sampling.turns import Turnable, free_turns
+from robospa.tasks.scene import Scene, SceneObject
+from robospa.tasks.shapes import Params
+from robospa.tasks.task import Draw, Level, SceneSample, Task
+from robospa.workcell import TABLE_TOP, Workcell
+
+MEANINGS = {"front": "farthest from", "back": "nearest to"}
+"""What the extremes in depth mean, said of the viewer (official: front is far)."""
+
+TEXT = TaskText.beside(__file__, "cross_view.toml")
+
+OBJECTS = {1: 3, 2: 4, 3: 5, 4: 6, 5: 7}
+"""How many objects lie there; the paper's n counts the at most four extreme ones."""
+PIXELS = 60.0
+"""Least distance of two different objects' centres in the head image [px]."""
+MARGIN = (0.05, 0.05)
+LEADS = {1: 0.04, 2: 0.03, 3: 0.025, 4: 0.025, 5: 0.02}
+"""Every extreme object leads the next one by at least this [m], whichever is asked for: if only
+the asked one had to lead (officially, by 0.06), its place alone would tell the answer."""
+LAYOUTS = 100
+"""Layouts that are drawn until the objects lie free of each other in one."""
+SHIFT = 0.02
+"""A layout's places are moved once more by up to this [m] in each trial, where they fit."""
+CHAINS = 256
+"""Random walks that the layouts of a level come from."""
+STARTS = (
+    ((-0.1816, -0.1308), (0.1759, -0.0708), (0.1112, 0.0423), (0.0899, -0.1705),
+     (-0.0155, -0.022), (-0.1462, -0.0043), (-0.0536, -0.1493)),
+    ((-0.1846, -0.0574), (0.1858, 0.003), (-0.0787, 0.0425), (-0.1259, -0.1729),
+     (0.0488, 0.0074), (0.0254, -0.1362), (0.1546, -0.1412)),
+    ((-0.1874, 0.0087), (0.1801, -0.0598), (0.0922, 0.0419), (0.1056, -0.1729),
+     (-0.0213, -0.1311), (-0.1558, -0.1418), (-0.049, 0.0167)),
+    ((-0.1856, -0.0736), (0.165, -0.1157), (-0.1157, 0.042), (-0.0948, -0.1723),
+     (0.0319, -0.1432), (0.0127, 0.0098), (0.1423, 0.0179)),
+    ((-0.2361, -0.0030), (0.1751, 0.0296), (0.0690, 0.0824), (-0.1863, -0.1632),
+     (-0.1364, 0.0354), (-0.0353, -0.0164), (0.0602, -0.1206)),
+    ((-0.2277, -0.0087), (0.1669, -0.0173), (-0.1219, 0.0778), (-0.1732, -0.1835),
+     (-0.0655, -0.1009), (0.0537, -0.1395), (0.0535, 0.0330)),
+    ((-0.2356, 0.0374), (0.1675, -0.0141), (0.0384, 0.0880), (-0.0861, -0.1836),
+     (-0.1157, 0.0388), (0.0201, -0.1340), (-0.1908, -0.1347)),
+    ((-0.2379, -0.0038), (0.1961, 0.0408), (-0.0979, 0.0936), (-0.1877, -0.1772),
+     (-0.0697, -0.1000), (0.1512, -0.1294), (0.0623, -0.0033)),
+)  # fmt: skip
+"""Layouts of seven, the four of EXTREMES first, where the pools start; found by annealing."""
+
+EXTREMES = ("leftmost", "rightmost", "frontmost", "backmost")
+"""In the robot's frame: least x, largest x, largest y (far), least y (near)."""
+VIEWS = ("robot", "opposite", "left", "right")
+SEEN_AS = {
+    "robot": EXTREMES,
+    "opposite": ("rightmost", "leftmost", "backmost", "frontmost"),
+    "left": ("backmost", "frontmost", "leftmost", "rightmost"),
+    "right": ("frontmost", "backmost", "rightmost", "leftmost"),
+}
+"""How a viewer names the four extremes; front is the side away from the viewer."""
+
+
+@dataclass(frozen=True)
+class ObjectSpread:
+    """The data of one task: equal objects if there is one asset, else different ones.
+
+    `radius` and `tall` bound the objects [m] in view, where their turns do not. Two of them are
+    apart by `spacing`: in x or in y,
+    and in any case. `inset` keeps the origins that far inside the region. In the head image
+    centres of different objects are 60 px apart; equal ones, taken to be of radius `seen`, do
+    not overlap.
+    """
+
+    kind: str
+    assets: tuple[str, ...]
+    what: str
+    radius: float
+    tall: float
+    spacing: tuple[float, float, float]
+    inset: float = 0.0
+    seen: float = 0.0
+
+    @property
+    def alike(self) -> bool:
+        """Whether all objects of a scene are equal."""
+        return len(self.assets) == 1
+
+    def allowed(self, workcell: Workcell, x: Array, y: Array) -> Mask:
+        """Whether origins are in the official region with the whole object in view."""
+        inside = (np.abs(x) <= 0.24 - self.inset) & (y >= -0.225 + self.inset)
+        inside &= y <= 0.095 - self.inset
+        return inside & workcell.in_view(x, y, self.radius, self.tall, MARGIN)
+
+    def apart(self, workcell: Workcell, points: Array, moved_to: Array, i: int) -> Mask:
+        """Whether `moved_to` is far enough from its chain's other places, on table and image."""
+        dx = np.abs(points[..., 0] - moved_to[:, None, 0])
+        dy = np.abs(points[..., 1] - moved_to[:, None, 1])
+        free = ((dx >= self.spacing[0]) | (dy >= self.spacing[1])) & (
+            dx**2 + dy**2 >= self.spacing[2] ** 2
+        )
+        if self.alike:
+            free &= self._separate(workcell, points, moved_to)
+        else:
+            u, v = workcell.head.pixel(points[..., 0], points[..., 1], TABLE_TOP + self.tall / 2)
+            wu, wv = workcell.head.pixel(
+                moved_to[:, :1], moved_to[:, 1:], TABLE_TOP + self.tall / 2
+            )
+            free &= (u - wu) ** 2 + (v - wv) ** 2 >= PIXELS**2
+        free[:, i] = True
+        return np.asarray(free.all(axis=1))
+
+    def _separate(self, workcell: Workcell, points: Array, moved_to: Array) -> Mask:
+        """Whether the bounding boxes in the head image do not overlap."""
+        left, right, top, bottom = self._box(workcell, points[..., 0], points[..., 1])
+        wl, wr, wt, wb = self._box(workcell, moved_to[:, :1], moved_to[:, 1:])
+        return np.asarray((left >= wr) | (wl >= right) | (top >= wb) | (wt >= bottom))
+
+    def _box(self, workcell: Workcell, x: Array, y: Array) -> tuple[Array, Array, Array, Array]:
+        """Left, right, top and bottom [px] of the upright cylinders that bound the objects."""
+        return workcell.head.box(x, y, self.seen, TABLE_TOP, TABLE_TOP + self.tall)
+
+
+AXES = np.array([0, 0, 1, 1])
+SIGNS = np.array([-1.0, 1.0, 1.0, -1.0])
+"""For each of EXTREMES the axis along which it leads, and which way."""
+
+
+def leaders(points: Array) -> tuple[NDArray[np.int64], Array]:
+    """Which place each of EXTREMES is in layouts (..., n, 2), and by how much [m] it leads."""
+    along = SIGNS * points[..., AXES]
+    ordered = np.sort(along, axis=-2)
+    return along.argmax(axis=-2), ordered[..., -1, :] - ordered[..., -2, :]
+
+
+def fits(workcell: Workcell, spread: ObjectSpread, level: int, roles: NDArray[np.int64]) -> Fits:
+    """The rule of layouts in which place `roles[chain, e]` is the e-th of EXTREMES.
+
+    It must be so in the head image as well, where perspective could put another object outermost.
+    """
+    middle = TABLE_TOP + spread.tall / 2
+
+    def rule(points: Array, moved_to: Array, i: int) -> Mask:
+        moved = points.copy()
+        moved[:, i] = moved_to
+        place, lead = leaders(moved)
+        u, v = workcell.head.pixel(moved[..., 0], moved[..., 1], middle)
+        seen = leaders(np.stack([u, -v], axis=-1))[0]
+        clear = ((place == roles) & (seen == roles) & (lead >= LEADS[level])).all(axis=1)
+        allowed = spread.allowed(workcell, moved_to[:, 0], moved_to[:, 1])
+        return np.asarray(clear & allowed & spread.apart(workcell, points, moved_to, i))
+
+    return rule
+
+
+def _starts(workcell: Workcell, spread: ObjectSpread, level: int) -> list[Array]:
+    """Start layouts of the level's size, no object extreme more often than it must be.
+
+    LayoutError if none keeps to the rule.
+    """
+    count = OBJECTS[level]
+    good = []
+    for layout in np.array(STARTS):
+        parts = [layout[:count]] if count > 3 else [np.delete(layout[:4], k, 0) for k in range(4)]
+        for part in parts:
+            roles = leaders(part)[0]
+            rule = fits(workcell, spread, level, roles[None])
+            whole = len(set(roles.tolist())) == min(count, 4)
+            if whole and all(rule(part[None], part[None, i], i).all() for i in range(count)):
+                good.append(part)
+    if not good:
+        raise LayoutError(f"no start layout fits {spread.kind} level {level}; add one to STARTS")
+    return good
+
+
+@cache
+def layouts(workcell: Workcell, spread: ObjectSpread, level: int) -> Array:
+    """The level's layouts (many, n, 2) [m]; which place is extreme differs between them."""
+    good = _starts(workcell, spread, level)
+    starts = np.stack([good[k % len(good)] for k in range(CHAINS)])
+    found = pool(starts, fits(workcell, spread, level, leaders(starts)[0]))
+    return found.reshape(-1, *starts.shape[1:])
+
+
+@dataclass(frozen=True)
+class Facts(PickFacts):
+    """Target, viewer, and the extreme in the robot's frame and in the viewer's words."""
+
+    extreme: str
+    viewpoint: str
+    position: str
+
+
+def _lying(
+    rng: np.random.Generator,
+    workcell: Workcell,
+    spread: ObjectSpread,
+    level: int,
+    known: Array,
+    things: Sequence[tuple[str, Params]],
+) -> tuple[Array, list[int], list[float]]:
+    """A layout (n, 2) [m], the place of each of `things` in it, and their turns [rad]."""
+    for _ in range(LAYOUTS):
+        points = known[int(rng.integers(len(known)))][None].copy()
+        walk(rng, points, fits(workcell, spread, level, leaders(points)[0]), SHIFT)
+        order = [int(i) for i in rng.permutation(len(things))]
+        items = [
+            Turnable(asset, params, (float(x), float(y)), 0.75 if asset == "block" else math.pi)
+            for (asset, params), (x, y) in zip(things, points[0][order], strict=True)
+        ]
+        try:
+            return points[0], order, free_turns(rng, workcell, items, MARGIN)
+        except LayoutError:
+            continue
+    raise LayoutError(f"no free layout of {len(things)} objects in {LAYOUTS} draws; skip this seed")
+
+
+def drawer(spread: ObjectSpread, views: tuple[str, ...]) -> Draw:
+    """The draw of `spread`: a uniform viewpoint of `views`, a layout, what lies where, and one of
+    the objects that are extreme there, each equally likely: the scene does not tell which.
+    """
+
+    def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
+        count = OBJECTS[level]
+        view = views[int(rng.integers(len(views)))]
+        known = layouts(workcell, spread, level)
+        if spread.alike:
+            things = [(spread.assets[0], draw_params(rng, spread.assets[0]))] * count
+        else:
+            kinds = [spread.assets[int(i)] for i in rng.permutation(len(spread.assets))[:count]]
+            things = [(kind, draw_params(rng, kind)) for kind in kinds]
+        points, order, yaws = _lying(rng, workcell, spread, level, known, things)
+        roles = leaders(points[None])[0]
+        asked = int(rng.choice(np.unique(roles)))
+        extreme = int(rng.choice(np.flatnonzero(roles[0] == asked)))
+        objects = []
+        for k, (asset, params) in enumerate(things):
+            x, y = points[order[k]].tolist()
+            pose = standing((x, y), yaws[k], BLOCK_HALF if asset == "block" else 0.0)
+            objects.append(SceneObject(f"object_{k}", asset, pose, params))
+        facts = Facts(
+            target=f"object_{order.index(asked)}",
+            extreme=EXTREMES[extreme],
+            viewpoint=view,
+            position=SEEN_AS[view][extreme],
+        )
+        return SceneSample(tuple(objects), facts)
+
+    return draw
+
+
+def slots(scene: Scene) -> Slots:
+    """What the instruction says: the extreme in the viewer's words, and the viewer."""
+    facts = Facts.of(scene)
+    position, view = facts.position, facts.viewpoint
+    side = position.removesuffix("most")
+    kind = "in_depth" if side in MEANINGS else "sideways"
+    words = {"position": position, "side": side, "meaning": MEANINGS.get(side, "")}
+    return TEXT.slots(f"target.{kind}", f"view.{view}", **words)
+
+
+def spread_task(spread: ObjectSpread, basic: bool = False) -> Task:
+    """The CVR task of `spread` or, if `basic`, the EPG one, where the robot is the viewer."""
+    kind = spread.kind
+    seen = "the robot" if basic else "a named side"
+    return Task(
+        name=f"Basic_Position_{kind}" if basic else pick_name(kind, "Multi_View"),
+        category="EPG" if basic else "CVR",
+        levels={k: Level(min(n, 4), 1, 150) for k, n in OBJECTS.items()},
+        draw=drawer(spread, VIEWS[:1] if basic else VIEWS),
+        goal=lifted(Lift(rise=0.06, closed=True, touching=True)),
+        plan=pick_target,
+        templates=TEXT.templates,
+        slots=slots,
+        summary=f"Pick the extreme one of 3 to 7 {spread.what} as seen from {seen}.",
+        success="the target rose by more than 6 cm, touched by a gripper and carried by a closed "
+        "one",
+    )
+
+
+SPREADS = (
+    ObjectSpread(
+        "Sauce_Can",
+        ("sauce_can",),
+        "equal sauce cans",
+        0.0425,
+        0.117,
+        (0.098, 0.092, 0.103),
+        seen=0.0405,
+    ),
+    ObjectSpread(
+        "Seals", ("seal",), "equal seals", 0.0305, 0.0964, (0.094, 0.086, 0.099), seen=0.0270
+    ),
+    ObjectSpread(
+        "Breads",
+        ("bread",),
+        "equal pieces of bread",
+        0.0475,
+        0.063,
+        (0.112, 0.092, 0.105),
+        seen=0.041,
+    ),
+    ObjectSpread(
+        "Mixed_Objects_A",
+        ("block", "bread", "seal", "toycar", "phone", "rubikscube", "remote_control"),
+        "different objects",
+        0.052,
+        0.08,
+        (0.126, 0.098, 0.118),
+        inset=0.052,
+    ),
+    ObjectSpread(
+        "Mixed_Objects_B",
+        ("stapler", "can", "soap", "tea_box", "mouse", "playing_cards", "bell"),
+        "different objects",
+        0.0435,
+        0.099,
+        (0.118, 0.092, 0.104),
+        inset=0.0435,
+    ),
+)
+
+TASKS = tuple(spread_task(spread) for spread in SPREADS)
+
+
+BASIC = tuple(spread_task(spread, basic=True) for spread in SPREADS)

@@ -1,1 +1,0 @@
-"""Pick_*_Distance: the k-th farthest object from a named one."""

@@ -1,0 +1,338 @@
+"""Observe_Blocks_Move_Memory, Observe_Objects_Click_Memory, Remember_Orientation_Restore.
+
+Something is shown, and after 2.0 s a wall hides it; before that, motion fails for good.
+
+Blocks: k blocks of different colours on a stand at the back; 2 k blocks on the table, among them
+one of each colour shown. Objects: k objects of different kinds in a row on a stand at the back, and
+one like each of them on the table, all fixed. Orientation: k pairs of T-shaped blocks, one in a far
+and one in a near row, each turned by a quarter turn or none, partners differently.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from robospa.geometry import Pose, yaw_rotation
+from robospa.tasks import objects
+from robospa.tasks.colors import NAMED
+from robospa.tasks.families import click_order
+from robospa.tasks.families.tabletop import (
+    COLORS,
+    Item,
+    cube,
+    moved,
+    named,
+    side_of,
+    standing,
+)
+from robospa.tasks.goals.conditions import Region
+from robospa.tasks.goals.memory import AfterCue, OrientationTarget, restore
+from robospa.tasks.goals.placing import gather
+from robospa.tasks.instructions.grammar import Slots
+from robospa.tasks.instructions.text import NUMBERS, TaskText, by_count
+from robospa.tasks.plan import Home, Pick, Place, Skill, Wait
+from robospa.tasks.sampling.places import Area, candidates, scatter, shuffled
+from robospa.tasks.scene import Scene, SceneObject
+from robospa.tasks.task import Level, SceneFacts, SceneSample, Task
+from robospa.workcell import TABLE_TOP, Workcell
+
+BLOCKS_TEXT = TaskText.beside(__file__, "memory_wall_blocks.toml")
+OBJECTS_TEXT = TaskText.beside(__file__, "memory_wall_objects.toml")
+TURNED_TEXT = TaskText.beside(__file__, "memory_wall_orientation.toml")
+
+HIDDEN_AT = 2.0
+"""When the wall appears [s]."""
+WALL, WALL_COLOR = "wall", (1.0, 0.9, 0.9)
+WALL_HALF = (0.34, 0.005, 0.205)
+WALL_Z = TABLE_TOP + WALL_HALF[2]
+STAND_Z, STAND_TOP = 0.82, 0.83
+"""Heights of a stand's centre and upper face [m]."""
+HOLD_STILL = Wait(HIDDEN_AT + 0.2)
+"""What the expert begins with."""
+SHOWN_X = 0.18
+"""Largest |x| [m] of what is shown on a stand."""
+
+
+def wall(y: float, half_x: float = WALL_HALF[0]) -> Item:
+    """The wall across the table at `y` [m]; it stands there from HIDDEN_AT on."""
+    params = {"half": [half_x, *WALL_HALF[1:]], "color": list(WALL_COLOR)}
+    pose = Pose((0.0, y, WALL_Z))
+    return Item(WALL, "block", pose, params, fixed=True, appears_at=HIDDEN_AT)
+
+
+def stand(y: float, half: tuple[float, float, float]) -> Item:
+    """A flat gray stand over the table at `y` [m]: white is seen on it, and black."""
+    params = {"half": list(half), "color": list(NAMED["gray"])}
+    return Item("stand", "block", Pose((0.0, y, STAND_Z)), params, fixed=True)
+
+
+def noun_of(item: SceneObject) -> str:
+    """What a reader calls `item` if it is the wall or the stand; empty for everything else.
+
+    Both are blocks to the simulator, of which scenes have no name that tells their role.
+    """
+    if item.asset != "block" or not item.fixed:
+        return ""
+    color = tuple(item.params["color"])
+    if item.appears_at is not None and color == WALL_COLOR:
+        return "wall"
+    return "stand" if item.pose.position[2] == STAND_Z and color == NAMED["gray"] else ""
+
+
+def row(count: int, most: float) -> tuple[float, ...]:
+    """x of `count` things evenly from -most to most; the middle for a single one."""
+    if count == 1:
+        return (0.0,)
+    return tuple(-most + 2 * most * i / (count - 1) for i in range(count))
+
+
+def levels(candidates: int) -> dict[int, Level]:
+    """The five levels, with so many candidates for each subtask."""
+    return {n: Level(candidates * n, subtasks=n, steps=50 + 200 * n) for n in range(1, 6)}
+
+
+HALF = 0.015
+BLOCKS_STAND = stand(0.20, (0.26, 0.055, 0.01))
+AREA, MIDDLE, DISTANCE, TRIES = Area((-0.25, 0.25), (-0.10, 0.08)), 0.04, 0.06, 100
+NEAR = Region((-0.26, 0.26), (-1.0, -0.11))
+"""Where the shown blocks have to go, and no others may be."""
+GOAL_Y, GOAL_X = -0.18, 0.16
+"""Where the expert puts them."""
+
+
+@dataclass(frozen=True)
+class BlocksFacts(SceneFacts):
+    """The colours shown, the blocks of these colours, all other blocks, and the wall."""
+
+    colors: tuple[str, ...]
+    targets: tuple[str, ...]
+    others: tuple[str, ...]
+    wall: str
+
+
+def _draw_blocks(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
+    """Colours on the stand; the same and as many others on the table, all places alike."""
+    colors = [list(COLORS)[int(i)] for i in rng.permutation(len(COLORS))[: 2 * level]]
+    shape, radius = (2 * level, TRIES), HALF * math.sqrt(2)
+    propose = candidates(workcell, AREA, shape, radius, 2 * HALF, MIDDLE)
+    points = shuffled(rng, scatter(rng, propose, DISTANCE))
+    items = [wall(0.12), BLOCKS_STAND]
+    for color, x in zip(colors[:level], row(level, SHOWN_X), strict=True):
+        pose = Pose((x, BLOCKS_STAND.pose.position[1], STAND_TOP + HALF))
+        items.append(Item(f"{color} shown", "block", pose, cube(HALF, COLORS[color]), fixed=True))
+    for color, point in zip(colors, points, strict=True):
+        items.append(Item(color, "block", standing(point, height=HALF), cube(HALF, COLORS[color])))
+    scene_objects, names = named(rng, items)
+    facts = BlocksFacts(
+        colors=tuple(colors[:level]),
+        targets=tuple(names[color] for color in colors[:level]),
+        others=tuple(names[color] for color in colors[level:]),
+        wall=names[WALL],
+    )
+    return SceneSample(scene_objects, facts)
+
+
+def _blocks_goal(scene: Scene) -> AfterCue:
+    """The shown colours' blocks in the strip near the robot, after the wall has come."""
+    facts = BlocksFacts.of(scene)
+    return AfterCue(gather(facts.targets, facts.others, NEAR), [facts.wall])
+
+
+def _blocks_plan(scene: Scene) -> tuple[Skill, ...]:
+    """Hold still, then bring the blocks of each side to the nearest free place of the strip."""
+    targets = BlocksFacts.of(scene).targets
+    targets = tuple(sorted(targets, key=lambda n: scene.object(n).pose.position[0]))
+    skills: list[Skill] = [HOLD_STILL]
+    for name, x in zip(targets, row(len(targets), GOAL_X), strict=True):
+        skills += moved(name, (x, GOAL_Y, scene.table_top + HALF), side_of(scene, name))
+    return (*skills, Home())
+
+
+def _blocks_slots(scene: Scene) -> Slots:
+    """What is shown, and where the blocks have to go; no colour is named."""
+    count = len(BlocksFacts.of(scene).targets)
+    return BLOCKS_TEXT.slots("wall", f"blocks.{by_count(count)}", "strip", word=NUMBERS[count])
+
+
+BLOCKS = Task(
+    name="Observe_Blocks_Move_Memory",
+    category="MIP",
+    levels=levels(candidates=2),
+    draw=_draw_blocks,
+    goal=_blocks_goal,
+    plan=_blocks_plan,
+    templates=BLOCKS_TEXT.templates,
+    slots=_blocks_slots,
+    summary="Remember the colours shown and bring the blocks of these colours near the robot.",
+    success=(
+        "After the wall has come, the blocks of all colours that were shown lie in the strip "
+        "nearest to the robot and both grippers are open; moving before, or bringing another block "
+        "there, fails for good."
+    ),
+)
+
+KINDS = ("bread", "stapler", "can", "playing_cards", "bell")
+OBJECTS_STAND = stand(0.15, (0.24, 0.05, 0.01))
+SHOWN_TURN = math.pi / 4
+TABLE_AREA, OFF_MIDDLE, APART = Area((-0.27, 0.27), (-0.21, -0.05)), 0.05, 0.10
+
+
+@dataclass(frozen=True)
+class ObjectsFacts(SceneFacts):
+    """Objects and kinds in the order shown, and the wall."""
+
+    order: tuple[str, ...]
+    kinds: tuple[str, ...]
+    wall: str
+
+
+def _draw_objects(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
+    """Different kinds, in random order on the stand, at random places on the table."""
+    kinds = [KINDS[int(i)] for i in rng.permutation(len(KINDS))[:level]]
+    things = [(kind, click_order.clickable(rng, kind)) for kind in kinds]
+    turns = dict.fromkeys(click_order.TURNS, math.pi)
+    places = click_order.laid_out(rng, workcell, TABLE_AREA, OFF_MIDDLE, APART, things, turns)
+    items = [wall(0.05, 0.32), OBJECTS_STAND]
+    for (kind, variant), x, place in zip(things, row(level, SHOWN_X), places, strict=True):
+        turn = float(rng.uniform(-SHOWN_TURN, SHOWN_TURN)) if kind == "bread" else 0.0
+        pose = Pose((x, OBJECTS_STAND.pose.position[1], STAND_TOP), yaw_rotation(turn))
+        items.append(Item(f"{kind} shown", kind, pose, variant, fixed=True))
+        items.append(Item(kind, kind, standing(*place), variant, fixed=True))
+    scene_objects, names = named(rng, items)
+    facts = ObjectsFacts(tuple(names[kind] for kind in kinds), tuple(kinds), names[WALL])
+    return SceneSample(scene_objects, facts)
+
+
+def _objects_goal(scene: Scene) -> AfterCue:
+    """The objects on the table in the order of the stand, after the wall has come.
+
+    One that is touched when its turn comes is clicked (official).
+    """
+    facts = ObjectsFacts.of(scene)
+    return AfterCue(click_order.in_order(scene, facts.order, standing=True), [facts.wall])
+
+
+def _objects_plan(scene: Scene) -> tuple[Skill, ...]:
+    """Hold still, then one press each."""
+    return (HOLD_STILL, *click_order.clicks(scene, ObjectsFacts.of(scene).order))
+
+
+def _objects_slots(scene: Scene) -> Slots:
+    """What is shown and which way round to go; no object is named."""
+    count = len(ObjectsFacts.of(scene).order)
+    return OBJECTS_TEXT.slots("wall", f"objects.{by_count(count)}", word=NUMBERS[count])
+
+
+OBJECTS = Task(
+    name="Observe_Objects_Click_Memory",
+    category="MIP",
+    levels=levels(candidates=1),
+    draw=_draw_objects,
+    goal=_objects_goal,
+    plan=_objects_plan,
+    templates=OBJECTS_TEXT.templates,
+    slots=_objects_slots,
+    summary="Remember the row of objects shown and click the same ones in that order.",
+    success=(
+        "After the wall has come, the objects on the table were clicked in the order in which they "
+        "were shown from left to right, the gripper on their side being closed; moving before "
+        "fails for good."
+    ),
+)
+
+TURNS = (0.0, -math.pi / 2, math.pi, math.pi / 2)
+"""Up, right, down, left: where the bar of the T points, seen from the robot."""
+FAR_Y, FAR_X, NEAR_Y, NEAR_X = 0.18, 0.20, -0.10, 0.21
+LOW = 0.014
+"""A turned block is lower than this [m] above the table (official: z < 0.77, from 0.756 on)."""
+FULL_TURN = 0.2
+"""Only this far [m] from the middle or more can the expert make half a turn at once."""
+
+
+@dataclass(frozen=True)
+class TurnedFacts(SceneFacts):
+    """Both rows, how the far and the near blocks lie (indices of TURNS), and the wall."""
+
+    near: tuple[str, ...]
+    far: tuple[str, ...]
+    turns: tuple[int, ...]
+    start: tuple[int, ...]
+    wall: str
+
+
+def _draw_turned(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
+    """Two rows; a near block never lies as its partner does. All blocks of a row look alike."""
+    shown = [int(i) for i in rng.integers(4, size=level)]
+    start = [(turn + int(rng.integers(1, 4))) % 4 for turn in shown]
+    far_kind = int(rng.integers(2))
+    variant = int(rng.integers(objects.variant_count("t_block")))
+    items = [wall(0.10)]
+    for i, (x, turn) in enumerate(zip(row(level, FAR_X), shown, strict=True)):
+        pose = standing((x, FAR_Y), TURNS[turn])
+        items.append(Item(f"far {i}", "t_block", pose, {"look": variant, "kind": far_kind}))
+    for i, (x, turn) in enumerate(zip(row(level, NEAR_X), start, strict=True)):
+        pose = standing((x, NEAR_Y), TURNS[turn])
+        items.append(Item(f"near {i}", "t_block", pose, {"look": variant, "kind": 1 - far_kind}))
+    scene_objects, names = named(rng, items)
+    facts = TurnedFacts(
+        near=tuple(names[f"near {i}"] for i in range(level)),
+        far=tuple(names[f"far {i}"] for i in range(level)),
+        turns=tuple(shown),
+        start=tuple(start),
+        wall=names[WALL],
+    )
+    return SceneSample(scene_objects, facts)
+
+
+def _turned_goal(scene: Scene) -> AfterCue:
+    """The near blocks turned like the far ones, after the wall has come."""
+    facts = TurnedFacts.of(scene)
+    wanted = [
+        OrientationTarget(name, yaw_rotation(TURNS[turn]), scene.table_top + LOW)
+        for name, turn in zip(facts.near, facts.turns, strict=True)
+    ]
+    return AfterCue(restore(wanted, facts.far), [facts.wall])
+
+
+def _turned_plan(scene: Scene) -> tuple[Skill, ...]:
+    """Hold still, then turn the near blocks from left to right.
+
+    Where the wrist cannot, half a turn is made of two quarters.
+    """
+    skills: list[Skill] = [HOLD_STILL]
+    facts = TurnedFacts.of(scene)
+    for name, start, turn in zip(facts.near, facts.start, facts.turns, strict=True):
+        place, arm = scene.object(name).pose.position, side_of(scene, name)
+        half = (turn - start) % 4 == 2 and abs(place[0]) < FULL_TURN
+        for way in ((start + 1) % 4, turn) if half else (turn,):
+            skills.append(Pick(name, lift=0.08, arm=arm))
+            skills.append(Place(name, place, yaw=TURNS[way], arm=arm))
+    return (*skills, Home())
+
+
+def _turned_slots(scene: Scene) -> Slots:
+    """Which blocks are to be turned like which; no direction is named."""
+    count = len(TurnedFacts.of(scene).near)
+    some = "one" if count == 1 else "many"
+    entries = (f"{slot}.{some}" for slot in ("wall", "near", "far"))
+    return TURNED_TEXT.slots(*entries, word=NUMBERS[count])
+
+
+ORIENTATION = Task(
+    name="Remember_Orientation_Restore",
+    category="MIP",
+    levels=levels(candidates=2),
+    draw=_draw_turned,
+    goal=_turned_goal,
+    plan=_turned_plan,
+    templates=TURNED_TEXT.templates,
+    slots=_turned_slots,
+    summary="Remember how the far blocks lie and turn the near ones the same way.",
+    success=(
+        "After the wall has come, every near block lies within 3 cm of its place and 15 degrees of "
+        "its partner's direction, and both grippers are open; moving before fails for good."
+    ),
+)

@@ -1,1 +1,0 @@
-"""Place_Bowls_Plates: a stack of bowls on a plate."""

@@ -1,0 +1,260 @@
+"""Rank_Blocks_Height, _Color and _Size: line blocks up from left to right in a given order.
+
+Draw: k blocks scattered in front of the robot, never in the right order already. Success: each
+block lies farther right than the one before it, hardly nearer or farther away, let go of; for sizes
+both grippers are open, too. Level 1 has one block, to be brought to the middle of the near edge.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from robospa.geometry import Vec3
+from robospa.tasks.families.stack_blocks import NEAR_BAND
+from robospa.tasks.families.tabletop import ORDERED, Item, drawn_color, moved, named, side, standing
+from robospa.tasks.goals.arranging import row
+from robospa.tasks.goals.placing import bring_alone
+from robospa.tasks.instructions.grammar import Phrasings, Slots
+from robospa.tasks.instructions.text import COMMON, NUMBERS, TaskText, by_count
+from robospa.tasks.plan import Skill
+from robospa.tasks.sampling.places import (
+    LAYOUTS,
+    LayoutError,
+    Point,
+    apart,
+    scatter_points,
+    shuffled,
+)
+from robospa.tasks.scene import Scene
+from robospa.tasks.task import Level, SceneFacts, SceneSample, Task, Tracker
+from robospa.text import listed
+from robospa.workcell import Workcell
+
+TEXT = TaskText.beside(__file__, "rank_blocks.toml")
+
+Color = list[float]
+Block = tuple[Vec3, Color]
+"""Half sizes [m] and colour of one block."""
+
+HALF_HEIGHTS = ((0.058, 0.060), (0.042, 0.044), (0.028, 0.030), (0.016, 0.018), (0.006, 0.008))
+HALF_SIZES = ((0.032, 0.034), (0.027, 0.029), (0.022, 0.024), (0.017, 0.019), (0.012, 0.014))
+"""Ranges [m] by rank at level 5; the levels below leave out the first."""
+
+X, Y, DISTANCE, YAW = (-0.28, 0.28), (-0.08, 0.05), 0.10, 0.75
+TRIES = 14
+"""Draws per block before a layout is started again: five blocks nearly fill the region."""
+
+BAND, NEAR_MIDDLE = 0.05, (0.0, -0.10)
+"""No block starts with |x| below the band, or within DISTANCE of that point."""
+
+TIGHT = (0.12, 0.03)
+"""A layout whose neighbours in rank are all this near [m] in x and y is drawn anew."""
+
+ROWS = {
+    1: (0.0,),
+    2: (-0.07, 0.07),
+    3: (-0.11, 0.0, 0.11),
+    4: (-0.15, -0.05, 0.05, 0.15),
+    5: (-0.19, -0.095, 0.0, 0.095, 0.19),
+}
+ROW_Y = -0.175
+"""Where the expert lines them up; not part of the rule."""
+
+LEVELS = {n: Level(candidates=n, subtasks=n, steps=200 * n) for n in range(1, 6)}
+
+
+@dataclass(frozen=True)
+class Facts(SceneFacts):
+    """The blocks from left to right."""
+
+    order: tuple[str, ...]
+
+
+def _heights(level: int, rng: np.random.Generator) -> list[Block]:
+    half, color = float(rng.uniform(0.013, 0.015)), drawn_color(rng)
+    if level == 1:
+        return [((half, half, half), color)]
+    ranges = HALF_HEIGHTS if level == 5 else HALF_HEIGHTS[1 : level + 1]
+    return [((half, half, float(rng.uniform(*ends))), color) for ends in ranges]
+
+
+def _colors(level: int, rng: np.random.Generator) -> list[Block]:
+    half = float(rng.uniform(0.015, 0.025))
+    return [((half, half, half), color) for color in map(list, list(ORDERED.values())[:level])]
+
+
+def _sizes(level: int, rng: np.random.Generator) -> list[Block]:
+    color = drawn_color(rng)
+    ranges = HALF_SIZES if level == 5 else HALF_SIZES[1 : level + 1]
+    halves = [float(rng.uniform(*ends)) for ends in ranges]
+    if level == 1:
+        halves = [float(rng.uniform(0.015, 0.025))]
+    return [((half, half, half), color) for half in halves]
+
+
+def _scattered(points: Sequence[Point]) -> bool:
+    """Neither in the right order already nor all in one tight row (one block always passes)."""
+    pairs = list(pairwise(points))
+    if not pairs:
+        return True
+    ordered = all(b[0] > a[0] for a, b in pairs)
+    tight = all(abs(b[0] - a[0]) < TIGHT[0] and abs(b[1] - a[1]) < TIGHT[1] for a, b in pairs)
+    return not ordered and not tight
+
+
+def _places(looks: Sequence[Block], rng: np.random.Generator, workcell: Workcell) -> list[Point]:
+    """Free places, all wholly in the head camera's view."""
+    reach = max(math.hypot(half[0], half[1]) for half, _ in looks)
+    height = max(2 * half[2] for half, _ in looks)
+
+    def allowed(point: Point) -> bool:
+        x, y = point
+        if abs(x) < BAND or not apart(point, [NEAR_MIDDLE], DISTANCE):
+            return False
+        low, high = workcell.view_span(y, reach, height)
+        return low <= x <= high
+
+    for _ in range(LAYOUTS):
+        found = scatter_points(rng, len(looks), X, Y, DISTANCE, allowed, True, TRIES)
+        points = shuffled(rng, found)
+        if _scattered(points):
+            return points
+    raise LayoutError(f"no mixed-up layout of {len(looks)} blocks; skip this seed")
+
+
+def _draw(looks: Sequence[Block], rng: np.random.Generator, workcell: Workcell) -> SceneSample:
+    items = [
+        Item(
+            str(rank),
+            "block",
+            standing(point, float(rng.uniform(-YAW, YAW)), half[2]),
+            {"half": list(half), "color": list(color)},
+        )
+        for rank, ((half, color), point) in enumerate(
+            zip(looks, _places(looks, rng, workcell), strict=True)
+        )
+    ]
+    scene_objects, names = named(rng, items)
+    return SceneSample(scene_objects, Facts(tuple(names[item.role] for item in items)))
+
+
+def plan(scene: Scene) -> tuple[Skill, ...]:
+    """Each block to its place, first those on the left, from the outside in.
+
+    In that order the arms change only once, and no block is set down beside one not yet moved.
+    """
+    order = Facts.of(scene).order
+    at = {name: scene.object(name).pose.position for name in order}
+    skills: list[Skill] = []
+    for name in sorted(order, key=lambda n: (at[n][0] > 0, -abs(at[n][0]))):
+        arm = side(at[name][0])
+        x = ROWS[scene.level][order.index(name)]
+        half = float(scene.object(name).params["half"][2])
+        skills += moved(name, (x, ROW_Y, scene.table_top + half), arm)
+    return tuple(skills)
+
+
+def _falling(count: int, ends: tuple[str, str], measure: str) -> Phrasings:
+    """Phrasings for an order by a measure: comparatives for two blocks, superlatives for more."""
+    ending = "er" if count == 2 else "est"
+    most, least = (word.removesuffix("e") + ending for word in ends)
+    return TEXT.phrasings("order.falling", most=most, least=least, measure=measure)
+
+
+def _color_order(colors: list[str]) -> Phrasings:
+    return TEXT.phrasings(
+        "order.colors",
+        colors=listed(colors),
+        steps=(", then " if len(colors) > 2 else " and then ").join(colors),
+        first=colors[0],
+        rest=listed(colors[1:]),
+    )
+
+
+def _slots(ranking: Ranking, count: int) -> Slots:
+    if count == 1:
+        return TEXT.slots(ranking.single) | {"middle": COMMON.phrasings("middle.near")}
+    blocks = TEXT.slots(f"blocks.{by_count(count)}", count=count, word=NUMBERS[count])
+    return blocks | {"order": ranking.phrases(count)}
+
+
+@dataclass(frozen=True)
+class Ranking:
+    """What distinguishes the three tasks: looks, phrasings and order of the blocks.
+
+    `single` is the entry of the phrasings for the only block of level 1, `phrases(count)` are those
+    of the order of several. `released`: both grippers have to be open (official).
+    """
+
+    name: str
+    looks: Callable[[int, np.random.Generator], list[Block]]
+    single: str
+    phrases: Callable[[int], Phrasings]
+    summary: str
+    order: str
+    released: bool = False
+
+
+RANKINGS = (
+    Ranking(
+        "Height",
+        _heights,
+        "block.plain",
+        lambda count: _falling(count, ("tall", "short"), "height"),
+        "Line the blocks up from left to right, from the tallest to the shortest.",
+        "the next shorter",
+    ),
+    Ranking(
+        "Color",
+        _colors,
+        "block.red",
+        lambda count: _color_order(list(ORDERED)[:count]),
+        "Line the blocks up from left to right: red, green, blue, yellow, purple.",
+        "the next colour's",
+    ),
+    Ranking(
+        "Size",
+        _sizes,
+        "block.plain",
+        lambda count: _falling(count, ("large", "small"), "size"),
+        "Line the blocks up from left to right, from the largest to the smallest.",
+        "the next smaller",
+        released=True,
+    ),
+)
+
+
+def _goal(ranking: Ranking, scene: Scene) -> Tracker:
+    """The row from left to right, or at level 1 a block in the near band."""
+    order = Facts.of(scene).order
+    if scene.level == 1:
+        return bring_alone(order[0], NEAR_BAND, ranking.released)
+    return row(order, ranking.released)
+
+
+def _task(ranking: Ranking) -> Task:
+    open_too = ", both grippers open" if ranking.released else ""
+    return Task(
+        name=f"Rank_Blocks_{ranking.name}",
+        category="OFE",
+        levels=LEVELS,
+        draw=lambda level, rng, workcell: _draw(ranking.looks(level, rng), rng, workcell),
+        goal=lambda scene: _goal(ranking, scene),
+        plan=plan,
+        templates=TEXT.templates,
+        slots=lambda scene: _slots(ranking, len(Facts.of(scene).order)),
+        summary=ranking.summary,
+        success=(
+            f"From left to right every block is followed by {ranking.order} block, at most 3 cm "
+            f"nearer or farther, and all lie on the table, let go of{open_too}. Level 1: the block "
+            "lies near the robot in the middle."
+        ),
+    )
+
+
+TASKS = tuple(_task(ranking) for ranking in RANKINGS)

@@ -1,1 +1,0 @@
-"""Rank_Blocks_Height, Color, Size: a row of blocks in a given order."""

@@ -1,0 +1,388 @@
+"""Pick * Relational (RRR): pick the object beside a named one, in a named direction.
+
+Objects lie in straight rows and columns. The reference is named by its place in the layout, the
+target by its direction from there; it is always the next one in that direction. Front is the side
+away from the robot. There are three sets of equal objects (tea boxes, cans, soap bars) and two of
+nine different ones; spacings and pitches are the official ones.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from robospa.geometry import Array
+from robospa.tasks.families.picking import (
+    BLOCK_HALF,
+    PickFacts,
+    draw_params,
+    lifted,
+    pick_name,
+    pick_target,
+)
+from robospa.tasks.families.tabletop import standing
+from robospa.tasks.goals.pick import Lift
+from robospa.tasks.instructions.grammar import Slots
+from robospa.tasks.instructions.text import TaskText
+from robospa.tasks.sampling.grid import StraightLines
+from robospa.tasks.sampling.places import LayoutError
+from robospa.tasks.sampling.turns import Turnable, free_turns
+from robospa.tasks.scene import Scene, SceneObject
+from robospa.tasks.shapes import Params
+from robospa.tasks.task import Draw, Level, SceneSample, Task
+from robospa.workcell import Workcell
+
+TEXT = TaskText.beside(__file__, "relational.toml")
+
+MARGIN = (0.06, 0.08)
+"""Centres are this far inside the head image (official)."""
+EDGE = (0.02, 0.02)
+"""Whole objects are this far inside."""
+LAYOUTS = 200
+"""Layouts that are drawn until the objects lie free of each other in one."""
+DIRECTIONS: Mapping[str, tuple[int, int]] = {
+    "left": (-1, 0),
+    "right": (1, 0),
+    "front": (0, 1),
+    "back": (0, -1),
+    "front_left": (-1, 1),
+    "front_right": (1, 1),
+    "back_left": (-1, -1),
+    "back_right": (1, -1),
+}
+"""Steps in columns (to the right) and rows (away from the robot)."""
+
+
+@dataclass(frozen=True)
+class SlotGrid:
+    """A level's slots: how many are used, and ranges [m] that all tasks share.
+
+    `jitter` is that of a whole column or row, `scale` the factor on the spacings of the objects.
+    """
+
+    count: int
+    columns: int
+    rows: int
+    jitter: tuple[float, float]
+    x: tuple[float, float]
+    y: tuple[float, float]
+    scale: float
+
+    @property
+    def cells(self) -> list[tuple[int, int]]:
+        """(column, row) of every slot, row by row from the robot."""
+        return [(c, r) for r in range(self.rows) for c in range(self.columns)]
+
+
+_SMALL = (2, 2, (0.014, 0.012), (-0.205, 0.205), (-0.195, 0.035), 0.78)
+SHAPES = {
+    1: SlotGrid(2, *_SMALL),
+    2: SlotGrid(3, *_SMALL),
+    3: SlotGrid(4, *_SMALL),
+    4: SlotGrid(6, 3, 2, (0.018, 0.012), (-0.225, 0.225), (-0.205, 0.045), 0.92),
+    5: SlotGrid(9, 3, 3, (0.016, 0.014), (-0.228, 0.228), (-0.215, 0.075), 0.86),
+}
+
+Pitches = tuple[tuple[float, float], tuple[float, float]]
+Spacing = tuple[float, float, float]
+"""Least distance [m] of columns, of rows and of any two objects."""
+
+
+@dataclass(frozen=True)
+class SpacedKind:
+    """One kind of object and its official spacing; yaws are uniform in +-`half_range` [rad]."""
+
+    asset: str
+    spacing: Spacing
+    half_range: float = math.pi
+
+
+@dataclass(frozen=True)
+class Crowd:
+    """The data of one task. With one family all objects look alike, else each is of another one.
+
+    `pitches`: ranges of the distances of columns and of rows [m] on 2 x 2, 3 x 2 and 3 x 3 slots.
+    Any two objects keep apart by their spacing, and are turned so that they do not touch. `wording`
+    is the set of templates: "noun" or, for the official sentences about soap, "soap".
+    """
+
+    kind: str
+    noun: str
+    families: tuple[SpacedKind, ...]
+    pitches: tuple[Pitches, Pitches, Pitches]
+    what: str
+    wording: str = "noun"
+
+    @property
+    def alike(self) -> bool:
+        """Whether all objects of a scene are equal."""
+        return len(self.families) == 1
+
+
+@cache
+def weights(level: int) -> Array:
+    """How likely each (direction, target slot) is: uniform over directions and over slots.
+
+    Balanced by alternate scaling. The official draw (direction, then reference) favours the
+    middle of the grid, so that a guess without reading could beat chance.
+    """
+    shape = SHAPES[level]
+    table = np.array(
+        [
+            [float((c - dx, r - dy) in shape.cells) for c, r in shape.cells]
+            for dx, dy in DIRECTIONS.values()
+        ]
+    )
+    for _ in range(200):
+        table /= table.sum(axis=1, keepdims=True) * table.shape[0]
+        table /= table.sum(axis=0, keepdims=True) * table.shape[1]
+    return table
+
+
+def least_distances(crowd: Crowd, families: Sequence[SpacedKind], scale: float) -> Array:
+    """How far apart [m] the centres of each two objects have to be, (count, count); 0 on i = j."""
+    spacing = np.array([f.spacing[2] for f in families]) * (scale if crowd.alike else 1.0)
+    least: Array = np.maximum(spacing[:, None], spacing)
+    np.fill_diagonal(least, 0.0)
+    return least
+
+
+def _places(
+    workcell: Workcell,
+    crowd: Crowd,
+    shape: SlotGrid,
+    families: Sequence[SpacedKind],
+    used: list[tuple[int, int]],
+    rng: np.random.Generator,
+) -> Array:
+    """Where the used slots lie: (count, 2) [m]; LayoutError if nothing fits."""
+    pitch = crowd.pitches[shape.columns + shape.rows - 4]
+    gap_x, gap_y = (round(shape.scale * max(f.spacing[k] for f in families), 4) for k in (0, 1))
+    lines = StraightLines(pitch, shape.jitter, (gap_x, gap_y), shape.x, shape.y)
+    least = least_distances(crowd, families, shape.scale)
+    return lines.places(rng, used, least, lambda points: _seen(workcell, points))
+
+
+def _lying(
+    workcell: Workcell,
+    crowd: Crowd,
+    shape: SlotGrid,
+    families: Sequence[SpacedKind],
+    params: Sequence[Params],
+    used: list[tuple[int, int]],
+    rng: np.random.Generator,
+) -> tuple[list[tuple[float, float]], list[float]]:
+    """Where the objects lie [m], and their turns [rad]; LayoutError if nothing fits."""
+    for _ in range(LAYOUTS):
+        points = [(x, y) for x, y in _places(workcell, crowd, shape, families, used, rng).tolist()]
+        items = [
+            Turnable(family.asset, own, point, family.half_range)
+            for family, own, point in zip(families, params, points, strict=True)
+        ]
+        try:
+            return points, free_turns(rng, workcell, items, EDGE)
+        except LayoutError:
+            continue
+    raise LayoutError(f"no free layout of {len(used)} objects in {LAYOUTS} draws; skip this seed")
+
+
+def _seen(workcell: Workcell, points: Array) -> bool:
+    """Whether centres keep the margin."""
+    return bool(workcell.in_view(points[:, 0], points[:, 1], 0.0, 0.0, MARGIN).all())
+
+
+def _label(shape: SlotGrid, slot: tuple[int, int], used: list[tuple[int, int]]) -> str:
+    """Name of a slot in the layout, unique in it: "front_left", "center", "left"..."""
+    columns, rows = {c for c, _ in used}, {r for _, r in used}
+    side = ("left", "middle", "right") if shape.columns == 3 else ("left", "right")
+    depth = ("back", "middle", "front") if shape.rows == 3 else ("back", "front")
+    if len(rows) == 1:
+        return side[slot[0]]
+    if len(columns) == 1:
+        return depth[slot[1]]
+    if side[slot[0]] == depth[slot[1]] == "middle":
+        return "center"
+    return f"{depth[slot[1]]}_{side[slot[0]]}"
+
+
+def _in_line(a: tuple[int, int], b: tuple[int, int]) -> bool:
+    """Whether two slots share a column or a row."""
+    return a[0] == b[0] or a[1] == b[1]
+
+
+@dataclass(frozen=True)
+class Facts(PickFacts):
+    """Target, its direction from the reference, and the name of the reference's place."""
+
+    reference: str
+    relation: str
+    reference_label: str
+
+
+def drawer(crowd: Crowd) -> Draw:
+    """The draw of `crowd`: direction and target slot, other slots, a straight layout, turns."""
+
+    def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
+        shape = SHAPES[level]
+        cells, table = shape.cells, weights(level).ravel()
+        pick = min(int(np.searchsorted(np.cumsum(table), rng.random())), len(table) - 1)
+        direction = list(DIRECTIONS)[pick // len(cells)]
+        target = cells[pick % len(cells)]
+        dx, dy = DIRECTIONS[direction]
+        reference = (target[0] - dx, target[1] - dy)
+        rest = [s for s in cells if s not in (target, reference)]
+        others = [rest[int(i)] for i in rng.permutation(len(rest))]
+        # Three in a corner shape: a diagonal never asks for the corner, so the other directions
+        # have to, in two of three scenes; else a guesser would leave the corner out.
+        if shape.count == 3 and not _in_line(target, others[0]) and rng.random() < 1 / 3:
+            others.reverse()
+        used = [target, reference, *others][: shape.count]
+        used = [used[int(i)] for i in rng.permutation(len(used))]
+        families = crowd.families * len(used)
+        if not crowd.alike:
+            order = rng.permutation(len(crowd.families))[: len(used)]
+            families = tuple(crowd.families[int(i)] for i in order)
+        families = families[: len(used)]
+        params = [draw_params(rng, f.asset) for f in families[: 1 if crowd.alike else None]]
+        params = params * (len(families) if crowd.alike else 1)
+        points, yaws = _lying(workcell, crowd, shape, families, params, used, rng)
+        objects = []
+        for i, (x, y) in enumerate(points):
+            asset = families[i].asset
+            pose = standing((x, y), yaws[i], BLOCK_HALF if asset == "block" else 0.0)
+            objects.append(SceneObject(f"object_{i}", asset, pose, params[i]))
+        facts = Facts(
+            target=f"object_{used.index(target)}",
+            reference=f"object_{used.index(reference)}",
+            relation=direction,
+            reference_label=_label(shape, reference, used),
+        )
+        return SceneSample(tuple(objects), facts)
+
+    return draw
+
+
+def _slots(direction: str, reference: str, level: int, noun: str) -> Slots:
+    """Phrasings for the neighbour in `direction` of the object at the place called `reference`.
+
+    From level 2 on an axis neighbour is "directly" there (official wording); from level 4 on a
+    diagonal neighbour is "immediately" there, because another object may lie further out on the
+    same side.
+    """
+    side = direction.replace("_", "-")
+    how = ""
+    if "-" in side:
+        how = "immediately " if level >= 4 else ""
+    elif level >= 2:
+        how = "directly "
+    label = reference.replace("_", "-")
+    where = label.replace("-", " ")
+    at = {"left": "on the left", "right": "on the right", "center": "in the center"}.get(
+        where, f"at the {where}"
+    )
+    plain = TEXT.phrasings(f"noun.{noun}")[0][0]
+    return TEXT.slots("convention", f"noun.{noun}") | {
+        "relation": TEXT.phrasings("relation", how=how, side=side),
+        "reference": TEXT.phrasings("reference", label=label, at=at, noun=plain),
+    }
+
+
+def crowd_task(crowd: Crowd) -> Task:
+    """The RRR task of `crowd`."""
+
+    def slots(scene: Scene) -> Slots:
+        facts = Facts.of(scene)
+        return _slots(facts.relation, facts.reference_label, scene.level, crowd.noun)
+
+    return Task(
+        name=pick_name(crowd.kind, "Relational"),
+        category="RRR",
+        levels={k: Level(s.count, 1, 150) for k, s in SHAPES.items()},
+        draw=drawer(crowd),
+        goal=lifted(Lift(rise=0.06, closed=True)),
+        plan=pick_target,
+        templates=lambda level: TEXT.templates(level, crowd.wording),
+        slots=slots,
+        summary=f"Pick the one next to a named one among 2 to 9 {crowd.what}, in one of eight "
+        "directions.",
+        success="the target rose by more than 6 cm, carried by a closed gripper",
+    )
+
+
+TEA_BOX = SpacedKind("tea_box", (0.108, 0.090, 0.098))
+CAN = SpacedKind("can", (0.102, 0.088, 0.095))
+SOAP = SpacedKind("soap", (0.096, 0.082, 0.088))
+STAPLER = SpacedKind("stapler", (0.118, 0.092, 0.104))
+TOYCAR = SpacedKind("toycar", (0.098, 0.086, 0.090))
+SEAL = SpacedKind("seal", (0.094, 0.086, 0.088))
+BELL = SpacedKind("bell", (0.090, 0.090, 0.086))
+BLOCK = SpacedKind("block", (0.095, 0.095, 0.095), half_range=0.75)
+CUBE = SpacedKind("rubikscube", (0.094, 0.094, 0.092))
+MOUSE = SpacedKind("mouse", (0.100, 0.082, 0.090))
+CARDS = SpacedKind("playing_cards", (0.090, 0.078, 0.084))
+REMOTE = SpacedKind("remote_control", (0.124, 0.078, 0.104))
+
+CROWDS = (
+    Crowd(
+        kind="Tea_Box",
+        noun="tea_box",
+        families=(TEA_BOX,),
+        pitches=(
+            ((0.0902, 0.185), (0.085, 0.17)),
+            ((0.1054, 0.16), (0.0888, 0.16)),
+            ((0.0969, 0.132), (0.0814, 0.122)),
+        ),
+        what="equal tea boxes",
+    ),
+    Crowd(
+        kind="Cans",
+        noun="can",
+        families=(CAN,),
+        pitches=(
+            ((0.09, 0.185), (0.085, 0.17)),
+            ((0.0998, 0.16), (0.087, 0.16)),
+            ((0.0917, 0.132), (0.0797, 0.122)),
+        ),
+        what="equal cans",
+    ),
+    Crowd(
+        kind="Soaps",
+        noun="soap_bar",
+        families=(SOAP,),
+        pitches=(
+            ((0.09, 0.185), (0.085, 0.17)),
+            ((0.0943, 0.16), (0.082, 0.16)),
+            ((0.0866, 0.132), (0.076, 0.122)),
+        ),
+        what="equal soap bars",
+        wording="soap",
+    ),
+    Crowd(
+        kind="Mixed_Objects_A",
+        noun="object",
+        families=(BLOCK, CAN, SOAP, STAPLER, TEA_BOX, TOYCAR, SEAL, CUBE, BELL),
+        pitches=(
+            ((0.098, 0.185), (0.085, 0.17)),
+            ((0.1146, 0.16), (0.0934, 0.16)),
+            ((0.1055, 0.132), (0.0857, 0.122)),
+        ),
+        what="different objects",
+    ),
+    Crowd(
+        kind="Mixed_Objects_B",
+        noun="object",
+        families=(MOUSE, CARDS, REMOTE, CAN, SOAP, STAPLER, TOYCAR, SEAL, BELL),
+        pitches=(
+            ((0.1027, 0.185), (0.085, 0.17)),
+            ((0.1201, 0.16), (0.0906, 0.16)),
+            ((0.1106, 0.132), (0.0831, 0.122)),
+        ),
+        what="different objects",
+    ),
+)
+
+TASKS = tuple(crowd_task(crowd) for crowd in CROWDS)

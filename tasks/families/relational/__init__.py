@@ -1,1 +1,0 @@
-"""Pick_*_Relational: the object on a named side of another one."""

@@ -1,0 +1,342 @@
+"""Stack_Blocks_Color_Order, Size_Order, Length_Order: a tower in a given order.
+
+Draw: k blocks scattered in front of the robot: equal cubes coloured red, green, blue, yellow,
+purple (the first k); cubes of one random colour and fixed sizes, the largest at the bottom; bars of
+one colour and one cross-section, their lengths clearly different, the longest at the bottom. Level
+1 has a single block, which is brought to the middle of the near edge instead (official).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from robospa.tasks.families.tabletop import (
+    ORDERED,
+    Item,
+    cube,
+    drawn_color,
+    middle_in_view,
+    named,
+    side_of,
+    standing,
+)
+from robospa.tasks.goals.arranging import HEIGHT_TOLERANCE, stack
+from robospa.tasks.goals.checklist import Checklist
+from robospa.tasks.goals.conditions import Region
+from robospa.tasks.goals.placing import bring_alone
+from robospa.tasks.instructions.grammar import Slots
+from robospa.tasks.instructions.text import COMMON, NUMBERS, TaskText, by_count, color_orders
+from robospa.tasks.plan import Pick, Place, Skill
+from robospa.tasks.sampling.places import (
+    Area,
+    Ground,
+    Point,
+    Points,
+    apart,
+    scatter_blocks,
+    scatter_points,
+    spread,
+)
+from robospa.tasks.scene import Scene
+from robospa.tasks.task import Draw, Level, SceneFacts, SceneSample, Task
+from robospa.text import listed
+from robospa.workcell import Workcell
+
+COLOR_TEXT = TaskText.beside(__file__, "stack_blocks_color.toml")
+TEXT = TaskText.beside(__file__, "stack_blocks.toml")
+
+LEVELS = {n: Level(candidates=n, subtasks=n, steps=200 * n) for n in range(1, 6)}
+NEAR_BAND = Region((-0.05, 0.05), (-1.0, -0.08))
+"""Level 1: the block's centre must come here."""
+CLEARANCE = 0.09
+"""The expert's place keeps this far [m] from all blocks where it can: a gripper must fit."""
+LAYER_SHARE = 0.65
+"""Heights may be wrong by at most this share of the thinnest block: a layer is never mistaken."""
+
+
+@dataclass(frozen=True)
+class TowerFacts(SceneFacts):
+    """The blocks from bottom to top, where [m] the expert builds, and the colours if they count."""
+
+    order: tuple[str, ...]
+    place: tuple[float, float]
+    colors: tuple[str, ...] = ()
+
+
+def _sample(
+    level: int,
+    rng: np.random.Generator,
+    items: Sequence[Item],
+    points: Sequence[Point],
+    colors: tuple[str, ...] = (),
+) -> SceneSample:
+    """The blocks from bottom to top, at `points`, and the expert's place."""
+    place = _building_place(level, rng, points)
+    scene_objects, names = named(rng, items)
+    order = tuple(names[item.role] for item in items)
+    return SceneSample(scene_objects, TowerFacts(order, place, colors))
+
+
+def _building_place(level: int, rng: np.random.Generator, blocks: Sequence[Point]) -> Point:
+    """Where the expert builds; not part of the task's rule."""
+    x, y = ((-0.01, 0.01), (-0.20, -0.10)) if level == 1 else ((-0.03, 0.03), (-0.15, -0.11))
+    for _ in range(100):
+        point = (float(rng.uniform(*x)), float(rng.uniform(*y)))
+        if apart(point, blocks, CLEARANCE):
+            return point
+    return (0.0, -0.16)
+
+
+def goal(scene: Scene) -> Checklist:
+    """The blocks as a tower, or at level 1 a block in the near band.
+
+    Heights are looked at finely enough to tell a thin block's layer from the one below.
+    """
+    order = TowerFacts.of(scene).order
+    if scene.level == 1:
+        return bring_alone(order[0], NEAR_BAND)
+    thick = [2 * _half_height(scene, name) for name in order]
+    return stack(order, thick, min(HEIGHT_TOLERANCE, LAYER_SHARE * min(thick)))
+
+
+def plan(scene: Scene) -> tuple[Skill, ...]:
+    """Bottom block to the drawn place, every further block on top of the one before."""
+    order = TowerFacts.of(scene).order
+    x, y = TowerFacts.of(scene).place
+    skills: list[Skill] = []
+    height = 0.0
+    for i, name in enumerate(order):
+        arm = side_of(scene, name)
+        half = _half_height(scene, name)
+        skills.append(Pick(name, lift=0.10 + height, arm=arm))
+        if i == 0:
+            skills.append(Place(name, (x, y, scene.table_top + half), arm=arm))
+        else:
+            skills.append(Place(name, on=order[i - 1], arm=arm))
+        height += 2 * half
+    return tuple(skills)
+
+
+def _half_height(scene: Scene, name: str) -> float:
+    return float(scene.object(name).params["half"][2])
+
+
+def _task(
+    name: str,
+    draw: Draw,
+    text: TaskText,
+    slots: Callable[[Scene], Slots],
+    order: str,
+    below: str,
+) -> Task:
+    return Task(
+        name=f"Stack_Blocks_{name}_Order",
+        category="OCE",
+        levels=LEVELS,
+        draw=draw,
+        goal=goal,
+        plan=plan,
+        templates=text.templates,
+        slots=slots,
+        summary=f"Stack the blocks {order}.",
+        success=(
+            f"Every block rests straight on the {below} and both grippers are open. Level 1: the "
+            "block lies near the robot in the middle."
+        ),
+    )
+
+
+COLOR_HALF = 0.018
+X, Y, DISTANCE, YAW = (-0.28, 0.28), (-0.08, 0.05), 0.10, 0.75
+
+
+def _draw_colors(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
+    """Scattered cubes; at level 1 the only one starts away from the place it must go to."""
+
+    def away(point: Point) -> bool:
+        return abs(point[0]) >= 0.05 and apart(point, [(0.0, -0.10)], 0.10)
+
+    def allowed(point: Point) -> bool:
+        return (level > 1 or away(point)) and middle_in_view(workcell, point, COLOR_HALF)
+
+    points = scatter_points(rng, level, X, Y, DISTANCE, allowed, near_middle=True)
+    items = [
+        Item(
+            color,
+            "block",
+            standing(point, float(rng.uniform(-YAW, YAW)), COLOR_HALF),
+            cube(COLOR_HALF, rgb),
+        )
+        for (color, rgb), point in zip(ORDERED.items(), points, strict=False)
+    ]
+    return _sample(level, rng, items, points, tuple(item.role for item in items))
+
+
+def _color_slots(scene: Scene) -> Slots:
+    """Phrasings for the order of the colours."""
+    colors = TowerFacts.of(scene).colors
+    count = len(colors)
+    if count == 1:
+        middle = COMMON.phrasings("middle.near")
+        return COLOR_TEXT.slots("block", color=colors[0]) | {"middle": middle}
+    onto = list(zip(colors[1:], colors[:-1], strict=True))
+
+    def pairs(joint: str, last: str = " and ") -> str:
+        return listed([f"{a} {joint} {b}" for a, b in onto], last)
+
+    number = f"number.{by_count(count)}"
+    return COLOR_TEXT.slots(number, count=count, word=NUMBERS[count]) | {
+        "order": color_orders(colors),
+        "pairs": (
+            (pairs("on"), pairs("onto", ", then ")),
+            (pairs("over"), pairs("on top of"), pairs("above")),
+        ),
+        "bottom": COLOR_TEXT.phrasings("end", color=colors[0]),
+        "top": COLOR_TEXT.phrasings("end", color=colors[-1]),
+        "middle": COMMON.phrasings("middle.table"),
+    }
+
+
+COLOR = _task(
+    "Color",
+    _draw_colors,
+    COLOR_TEXT,
+    _color_slots,
+    "in the given order of colours",
+    "one before it, in the order red, green, blue, yellow, purple from the bottom,",
+)
+
+
+@dataclass(frozen=True)
+class Scale:
+    """What is compared: its two ends for two blocks and for more, and other words held out."""
+
+    two: tuple[str, str]
+    more: tuple[str, str]
+    held_two: tuple[str, str]
+    held_more: tuple[str, str]
+
+
+SIZES = Scale(
+    ("larger", "smaller"), ("largest", "smallest"), ("bigger", "smaller"), ("biggest", "tiniest")
+)
+LENGTHS = Scale(
+    ("longer", "shorter"), ("longest", "shortest"), ("longer", "shorter"), ("longest", "shortest")
+)
+
+
+def _tower_slots(scale: Scale, scene: Scene) -> Slots:
+    """Phrasings for a tower by size or length, largest or longest at the bottom."""
+    count = len(TowerFacts.of(scene).order)
+    if count == 1:
+        return TEXT.slots("block") | {"middle": COMMON.phrasings("middle.near")}
+    most, least = scale.two if count == 2 else scale.more
+    held_most, held_least = scale.held_two if count == 2 else scale.held_more
+    more, less = (f"{word.removesuffix('st')}r" for word in (most, least))
+    some = by_count(count)
+    order = TEXT.phrasings(
+        f"order.{some}",
+        most=most,
+        least=least,
+        held_most=held_most,
+        held_least=held_least,
+        more=more,
+        less=less,
+    )
+    middle = COMMON.phrasings("middle.table")
+    number = TEXT.slots(f"number.{some}", count=count, word=NUMBERS[count])
+    return number | {"order": order, "middle": middle}
+
+
+HALVES = {
+    2: (0.0165, 0.01275),
+    3: (0.0165, 0.01275, 0.009),
+    4: (0.02025, 0.0165, 0.01275, 0.009),
+    5: (0.024, 0.02025, 0.0165, 0.01275, 0.009),
+}
+"""Half sizes [m] from bottom to top."""
+ONE = (0.015, 0.025)
+"""Level 1: range of the only cube's half size [m]."""
+AREA, MIDDLE = Area((-0.28, 0.28), (-0.08, 0.05), clear_middle=True), (0.0, -0.10)
+
+
+def _draw_sizes(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
+    """Scattered cubes, away from the middle of the near edge."""
+    halves = HALVES.get(level) or (round(float(rng.uniform(*ONE)), 5),)
+    cubes = [(half, half, half) for half in halves]
+    ground = Ground(AREA, 0.05, MIDDLE, 0.10 if level == 1 else 0.15)
+    points = scatter_blocks(rng, workcell, ground, cubes, lambda i, j: DISTANCE)
+    color = drawn_color(rng)
+    items = []
+    for i, (half, point) in enumerate(zip(halves, points, strict=True)):
+        pose = standing(point, float(rng.uniform(-YAW, YAW)), half)
+        items.append(Item(f"block {i}", "block", pose, cube(half, color)))
+    return _sample(level, rng, items, points)
+
+
+SIZE = _task(
+    "Size",
+    _draw_sizes,
+    TEXT,
+    lambda scene: _tower_slots(SIZES, scene),
+    "from the largest at the bottom to the smallest on top",
+    "next larger one",
+)
+
+HALF_LENGTHS = {
+    1: ((0.0240, 0.0250),),
+    2: ((0.0440, 0.0450), (0.0240, 0.0250)),
+    3: ((0.0440, 0.0450), (0.0240, 0.0250), (0.0120, 0.0130)),
+    4: ((0.0440, 0.0450), (0.0330, 0.0340), (0.0240, 0.0250), (0.0120, 0.0130)),
+    5: (
+        *((0.0440, 0.0450), (0.0330, 0.0340), (0.0240, 0.0250)),
+        *((0.0170, 0.0180), (0.0120, 0.0130)),
+    ),
+}
+"""Ranges of the half lengths [m] from bottom to top."""
+SECTION = (0.0155, 0.0165)
+"""Range of half width and half height [m], the same for all bars of a scene."""
+SPANS = {1: (0.0, 0.0), 2: (0.06, 0.0), 3: (0.10, 0.03), 4: (0.15, 0.04), 5: (0.15, 0.04)}
+"""Least spread of the bars in x and y [m]."""
+GROUNDS = {
+    1: Ground(AREA, 0.05, MIDDLE, 0.10),
+    2: Ground(Area((-0.25, 0.25), (-0.15, 0.05), clear_middle=True), 0.02, (0.0, -0.12), 0.1225),
+}
+"""Level 1, and all others."""
+GAP, BAR_YAW = 0.045, 0.20
+
+
+def _draw_lengths(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
+    """Scattered bars, away from the middle of the near edge."""
+    half_y, half_z = (round(float(v), 5) for v in rng.uniform(*SECTION, 2))
+    halves = [(round(float(rng.uniform(*ends)), 5), half_y, half_z) for ends in HALF_LENGTHS[level]]
+    reach = [math.hypot(half[0], half_y) for half in halves]
+
+    def wide(found: Points) -> bool:
+        least_x, least_y = SPANS[level]
+        return spread([p[0] for p in found]) >= least_x and spread([p[1] for p in found]) >= least_y
+
+    def gap(i: int, j: int) -> float:
+        return reach[i] + reach[j] + GAP
+
+    points = scatter_blocks(rng, workcell, GROUNDS[min(level, 2)], halves, gap, wide)
+    color = drawn_color(rng)
+    items = []
+    for i, half in enumerate(halves):
+        pose = standing(points[i], float(rng.uniform(-BAR_YAW, BAR_YAW)), half_z)
+        items.append(Item(f"block {i}", "block", pose, {"half": list(half), "color": color}))
+    return _sample(level, rng, items, points)
+
+
+LENGTH = _task(
+    "Length",
+    _draw_lengths,
+    TEXT,
+    lambda scene: _tower_slots(LENGTHS, scene),
+    "from the longest at the bottom to the shortest on top",
+    "next longer one",
+)

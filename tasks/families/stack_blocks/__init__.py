@@ -1,1 +1,0 @@
-"""Stack_Blocks_Color_Order, Size_Order, Length_Order: a tower in a given order."""

@@ -1,0 +1,133 @@
+"""Click_Bell_Open_Microwave_Place_Object: where things stand, and its loopholes."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from drawn_scenes import at, many
+from snapshots_by_hand import AWAY
+from teleport import Teleport
+
+from robospa.geometry import to_matrix
+from robospa.tasks.catalog import build_scene, task
+from robospa.tasks.events import outcome
+from robospa.tasks.objects import model_of
+from robospa.tasks.plan import Home, Open, Pick, Place, Press
+from robospa.workcell import TABLE_TOP, WORKCELL
+
+NAME = "Click_Bell_Open_Microwave_Place_Object"
+COUNT = 150
+
+
+def trial(level: int) -> Teleport:
+    scene = build_scene(NAME, level, 500_000)
+    return Teleport(scene, task(NAME).goal(scene))
+
+
+def done(run: Teleport) -> list[int]:
+    return [e.index for e in run.events if e.kind == "subtask_done"]
+
+
+@pytest.mark.parametrize("level", range(1, 6))
+def test_scenes_hold_what_the_level_asks_for(level: int) -> None:
+    for scene in many(NAME, level, COUNT):
+        roles = {"bell"} | ({"microwave"} if level > 1 else set())
+        roles |= {"object", "reference"} if level > 3 else set()
+        assert set(scene.facts) == roles and len(scene.objects) == len(roles)
+        fixed = {scene.facts[r] for r in roles & {"bell", "microwave"}}
+        assert {o.name for o in scene.objects if o.fixed} == fixed
+
+
+@pytest.mark.parametrize("level", (4, 5))
+def test_things_are_free_seen_and_out_of_the_doors_way(level: int) -> None:
+    for scene in many(NAME, level, COUNT):
+        microwave = scene.object(scene.facts["microwave"])
+        oven, model = microwave.pose, model_of(microwave)
+        assert model.hinge is not None
+        hinge = oven.apply(model.hinge.point)[:2]
+        things = [scene.object(scene.facts[r]) for r in ("object", "reference")]
+        assert things[0].asset != things[1].asset
+        points, radii = [t.pose.position[:2] for t in things], [model_of(t).radius for t in things]
+        spot = (points[1][0] - 0.12, points[1][1])
+        for point, radius in zip([*points, spot], [*radii, radii[0]], strict=True):
+            assert math.dist(point, hinge) > 0.175 + radius
+            assert math.dist(point, at(scene, "bell")[0]) > 0.06 + radius
+            assert math.dist(point, oven.position[:2]) > 0.18
+        assert math.dist(*points) > 0.19 and abs(points[0][1] - points[1][1]) >= 0.1
+        x, y = np.array(points).T
+        assert WORKCELL.in_view(x, y, np.array(radii), 0.0, (0.0, 0.0)).all()
+        others = [o for o in scene.objects if o is not microwave]
+        for a, b in itertools.combinations(others, 2):
+            gap = math.dist(a.pose.position[:2], b.pose.position[:2])
+            assert gap > model_of(a).radius + model_of(b).radius
+        front = model.frames["handle"].position[1] - 0.0035
+        for o in others:
+            local = oven.inverse() * o.pose
+            turned = np.abs(to_matrix(local.rotation)[:2, :2])
+            reach_x, reach_y = turned @ np.array(model_of(o).size[:2]) / 2
+            aside = abs(local.position[0]) - model.size[0] / 2 - reach_x
+            assert max(aside, front - local.position[1] - reach_y) > 0
+
+
+def test_the_scene_does_not_tell_which_thing_is_moved() -> None:
+    scenes = (*many(NAME, 4, COUNT), *many(NAME, 5, COUNT))
+    left = sum(at(s, "object")[0][0] < at(s, "reference")[0][0] for s in scenes)
+    first = sum(s.facts["object"] < s.facts["reference"] for s in scenes)
+    assert max(abs(left - COUNT), abs(first - COUNT)) < 3.3 * math.sqrt(COUNT / 2)
+    assert len(Counter(s.object(s.facts["object"]).asset for s in scenes)) == 11
+
+
+def test_a_door_that_falls_shut_undoes_the_subtask() -> None:
+    run = trial(3)
+    run.do(Press(run.scene.facts["bell"], arm="left"))
+    run.do(Open(run.scene.facts["microwave"], arm="left"))
+    assert outcome(run.events, 3).done == 2
+    run.hinges[run.scene.facts["microwave"]] = 0.3
+    run.tick(3)
+    assert (outcome(run.events, 3).done, outcome(run.events, 3).best) == (1, 2)
+
+
+def test_opening_first_is_noted_and_counts_and_a_click_of_the_wrong_arm_does_not() -> None:
+    run = trial(2)
+    run.do(Press(run.scene.facts["bell"], arm="right"))
+    assert done(run) == []
+    run.do(Open(run.scene.facts["microwave"], arm="left"))
+    assert done(run) == [1]
+    assert [e.kind for e in run.events if e.kind == "wrong_order"] == ["wrong_order"]
+    run.do(Press(run.scene.facts["bell"], arm="left"))
+    run.do(Home())
+    run.tick(5)
+    assert outcome(run.events, 2).success
+
+
+@pytest.mark.parametrize(
+    ("dx", "dy", "counts"),
+    [(-0.12, 0.0, True), (0.12, 0.0, False), (-0.07, 0.0, False), (-0.21, 0.0, False),
+     (-0.12, 0.06, False), (-0.1, -0.04, True)],
+)  # fmt: skip
+def test_left_of_means_left_near_and_level(dx: float, dy: float, counts: bool) -> None:
+    run = trial(4)
+    facts = run.scene.facts
+    thing, other = run.scene.object(facts["object"]), run.poses[facts["reference"]].position
+    to = (other[0] + dx, other[1] + dy, TABLE_TOP - model_of(thing).bottom)
+    run.do(Pick(thing.name, arm="right"))
+    run.do(Place(thing.name, to, arm="right"))
+    assert (3 in done(run)) is counts
+
+
+def test_a_thing_that_is_held_there_does_not_count() -> None:
+    run = trial(4)
+    facts = run.scene.facts
+    x, y, z = run.poses[facts["reference"]].position
+    run.poses[facts["object"]] = replace(run.poses[facts["object"]], position=(x - 0.12, y, z))
+    run.gripper[1], run.grasp[1] = 0.1, (x - 0.12, y, z + 0.02)
+    run.tick(10)
+    assert done(run) == []
+    run.gripper[1], run.grasp[1] = 1.0, AWAY[1]
+    run.tick(2)
+    assert done(run) == [3]
