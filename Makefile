@@ -44,7 +44,7 @@ test-models: install-dev ## LeRobot: tiny policies served, data sets loaded; in 
 	@[ -n "$$ROBOSPA_MODELS_PYTHON" ] || bash scripts/models.sh
 	$(BIN)/pytest tests/models -m models
 
-test-maniskill: ## ManiSkill: its environments, its replays of our trajectories; in .venv-maniskill
+test-maniskill: ## ManiSkill: its environments; in .venv-maniskill
 	@bash scripts/models.sh maniskill
 	.venv-maniskill/bin/python -m pytest tests/maniskill -m maniskill
 

@@ -1,6 +1,6 @@
 """Policies that fail on purpose, each in one known way: what the failure analysis is measured on.
 
-They are the oracle with another plan (`robospa.harness.demonstrations.mistakes`).
+They are the oracle with another plan (`robospa.harness.demonstrations.changed_plans`).
 
     robospa serve mistakes --arg kind=neighbour
 """
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.baselines.oracle import Oracle
-from robospa.harness.demonstrations.mistakes import KINDS, FailingExpert, wrong_plan
+from robospa.harness.demonstrations.changed_plans import KINDS, FailingExpert, wrong_plan
 from robospa.harness.robots import embodiment
 from robospa.observation import Observation
 from robospa.tasks.snapshot import snapshot_from_json

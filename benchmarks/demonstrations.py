@@ -28,13 +28,11 @@ import numpy as np
 from frame import RESULTS, Figure, Json, Result, gather, main
 
 from robospa.categories import BASIC, CATEGORIES
-from robospa.harness.datasets.episode_maker import EpisodeMaker
-from robospa.harness.datasets.jobs import Job, attempt_job
-from robospa.harness.demonstrations.kinds import replay, show
-from robospa.harness.demonstrations.mistakes import occasions
-from robospa.harness.demonstrations.recorder import FrameRecorder
-from robospa.harness.demonstrations.strides import stride_of
-from robospa.harness.demonstrations.world import DemonstrationWorld
+from robospa.harness.datasets.jobs import EpisodeJob, attempt_job
+from robospa.harness.datasets.maker import EpisodeMaker
+from robospa.harness.demonstrations.changed_plans import occasions
+from robospa.harness.demonstrations.demonstration import DemonstrationWorld, replay, show
+from robospa.harness.demonstrations.recorder import FrameRecorder, frame_steps
 from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.harness.world import SceneUnstable
 from robospa.observation import DEFAULT_CAMERAS
@@ -58,7 +56,7 @@ Variant = tuple[str, int]
 def made(name: str, level: int, seed: int, kind: str = "expert", strength: float = 0.0) -> Json:
     """Make one demonstration and replay it; `off` and `turned` are of each push [mm], [degrees]."""
     key = TrialKey(name, level, seed, split="train")
-    recorder, world = FrameRecorder(stride_of(name)), DemonstrationWorld(render=False)
+    recorder, world = FrameRecorder(frame_steps(name)), DemonstrationWorld(render=False)
     began = time.process_time()
     try:
         shown = show(world, key, recorder, kind, strength=strength)
@@ -219,14 +217,14 @@ def _noise(strength: float, valid: list[Found]) -> Iterator[Figure]:
 def warm_maker() -> EpisodeMaker:
     """A maker that has made an episode, which opened its renderer."""
     maker, key = EpisodeMaker(), TrialKey("Press_Stapler_Repeat", 1, 960_001, split="train")
-    attempt_job(maker, Job(key, DEFAULT_CAMERAS, "h264"))
+    attempt_job(maker, EpisodeJob(key, DEFAULT_CAMERAS, "h264"))
     return maker
 
 
 def collected(name: str, level: int, seed: int) -> Json:
     """One episode: frames, bytes and processor time [s] by purpose."""
     key = TrialKey(name, level, seed, split="train")
-    found = attempt_job(warm_maker(), Job(key, DEFAULT_CAMERAS, "h264"))
+    found = attempt_job(warm_maker(), EpisodeJob(key, DEFAULT_CAMERAS, "h264"))
     times = {purpose: round(spent, 3) for purpose, spent in found.times.items()}
     return {"frames": found.frames, "size": len(found.data), "times": times,
             "reason": found.reason}  # fmt: skip

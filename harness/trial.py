@@ -111,6 +111,17 @@ class TrialState:
     last_joints: NDArray[np.float32] | None = None
     """The joint action that was executed in the place of the last one, if that was of poses."""
 
+    def load(self, split: str) -> None:
+        """Bring the scene to rest, its sentence of `split`; raises SceneUnstable."""
+        world, tracker, scene = self.world, self.parts.tracker, self.parts.scene
+        self.stopwatch.call("loading", world.load, scene, tracker.needs_contacts)
+        if isinstance(world, TellsInstruction):
+            self.parts = replace(self.parts, instruction=world.instruction(split))
+        if tracker.roles:
+            self.grasps = GraspMonitor(tracker.roles, scene, world.contacts)
+        if scene.clutter:
+            self.clutter = ClutterMonitor(scene.clutter, world.snapshot())
+
     def start(self) -> bool:
         """Note what holds before the first action; True if the goal is met or lost already."""
         if self.recorder is not None:
@@ -296,14 +307,8 @@ def open_trial(
     world: World, key: TrialKey, setup: TrialParts, recorder: Recorder | None = None
 ) -> TrialState:
     """The trial `setup` in `world`, its scene at rest; raises SceneUnstable."""
-    run, tracker = TrialState(world, setup, embodiment(key.embodiment), recorder), setup.tracker
-    run.stopwatch.call("loading", world.load, setup.scene, tracker.needs_contacts)
-    if isinstance(world, TellsInstruction):
-        run.parts = replace(setup, instruction=world.instruction(key.split))
-    if tracker.roles:
-        run.grasps = GraspMonitor(tracker.roles, setup.scene, world.contacts)
-    if setup.scene.clutter:
-        run.clutter = ClutterMonitor(setup.scene.clutter, world.snapshot())
+    run = TrialState(world, setup, embodiment(key.embodiment), recorder)
+    run.load(key.split)
     return run
 
 

@@ -13,13 +13,13 @@ import typer
 from robospa.harness.cli.json_output import AsJson, aside, print_json
 from robospa.harness.cli.ranges import TRIALS
 from robospa.harness.cli.settings_flags import with_flags
-from robospa.harness.datasets.jobs import CannotMake
+from robospa.harness.datasets.jobs import MakerError
 from robospa.harness.datasets.settings import Collection
 from robospa.harness.running.atomic_file import StorageError
 from robospa.harness.settings import Compute, SettingsError
 
 if TYPE_CHECKING:
-    from robospa.harness.datasets.collect import Order, Result
+    from robospa.harness.datasets.collect import CollectionResult, Order
 
 T = TypeVar("T")
 
@@ -32,7 +32,7 @@ def collect(
     out: Annotated[Path | None, typer.Option(help="folder of the data set")] = None,
     layout: Annotated[
         str,
-        typer.Option("--format", help="lerobot-v3, lerobot-v2.1, robotwin-hdf5 or maniskill"),
+        typer.Option("--format", help="lerobot-v3, lerobot-v2.1 or robotwin-hdf5"),
     ] = "lerobot-v3",
     resume: Annotated[
         bool, typer.Option("--resume", help="go on with the data set in --out")
@@ -99,7 +99,7 @@ def _make(order: Order, compute: Compute, resume: bool, keep: bool, as_json: boo
     except KeyboardInterrupt:
         print(f"robospa: interrupted; {again}", file=sys.stderr)
         raise typer.Exit(130) from None
-    except (CannotMake, StorageError) as error:
+    except (MakerError, StorageError) as error:
         raise RunAborted(f"the collection stopped: {error}; {again}") from error
     if as_json:
         made = {} if result is None else asdict(result)
@@ -123,14 +123,14 @@ def _group(kind: type[T], given: Mapping[str, object]) -> T:
 
 def _order(settings: Collection, layout: str, out: Path) -> Order:
     from robospa.harness.datasets.collect import Order
-    from robospa.harness.datasets.identity import command_of, versions
+    from robospa.harness.datasets.settings import command_of, versions
 
     return Order(settings, layout, out, command_of(settings, layout), versions())
 
 
 def _collected(
     order: Order, compute: Compute, resume: bool, keep: bool, say: Callable[[str], None]
-) -> Result | None:
+) -> CollectionResult | None:
     from robospa.harness.datasets.collect import collect as make
     from robospa.harness.datasets.open_pool import pool_opener
 

@@ -78,13 +78,12 @@ def _one_trial(
 
 def _recorded(key: TrialKey, policy: str, name: str) -> tuple[Episode, bool]:
     """The trial `key` of a policy as an episode called `name`, and whether it met the goal."""
-    from robospa.harness.demonstrations.recorder import FrameRecorder
-    from robospa.harness.demonstrations.strides import stride_of
+    from robospa.harness.demonstrations.recorder import FrameRecorder, frame_steps
     from robospa.harness.robots import embodiment
     from robospa.harness.sim.motion import ACTION_LIMITS, DEMONSTRATION_LIMITS
     from robospa.harness.sim.sapien_world import SapienWorld
 
-    stride = stride_of(key.task)
+    stride = frame_steps(key.task)
     recorder = FrameRecorder(stride)
     world = SapienWorld(True, limits=DEMONSTRATION_LIMITS if policy == ORACLE else ACTION_LIMITS)
     try:
@@ -98,7 +97,7 @@ def _recorded(key: TrialKey, policy: str, name: str) -> tuple[Episode, bool]:
 
 def _run(world: World, key: TrialKey, policy: str, recorder: Recorder) -> tuple[str, bool]:
     """Instruction of the recorded trial, and whether it met the goal."""
-    from robospa.harness.demonstrations.expert_run import demonstrate
+    from robospa.harness.demonstrations.demonstration import demonstrate
     from robospa.harness.factory import open_policy
     from robospa.harness.trial import run_trial
     from robospa.harness.trial_identity import policy_seed, trial_id

@@ -7,12 +7,11 @@ from dataclasses import fields
 from pathlib import Path
 from typing import TypeVar
 
-from robospa.harness.datasets.collect import Order, Result
+from robospa.harness.datasets.collect import CollectionResult, Order
 from robospa.harness.datasets.collect import collect as make
-from robospa.harness.datasets.identity import command_of, versions
 from robospa.harness.datasets.jobs import MAKER
 from robospa.harness.datasets.open_pool import pool_opener
-from robospa.harness.datasets.settings import Collection
+from robospa.harness.datasets.settings import Collection, command_of, versions
 from robospa.harness.settings import LISTS, Compute, SettingsError
 from robospa.protocol.options import read_options
 from robospa.registry import did_you_mean
@@ -33,7 +32,7 @@ def collect(
     format: str = "lerobot-v3",
     resume: bool = False,
     **settings: object,
-) -> Result | None:
+) -> CollectionResult | None:
     """Collect demonstrations of the expert into `out`, and return what was made.
 
         made = robospa.collect("data/mine", tasks="GAC", levels=1, episodes=10)
@@ -44,7 +43,7 @@ def collect(
         levels: From 1 to 5.
         episodes: Per variant.
         workers: Worker processes; 0 for one a core.
-        format: "lerobot-v3", "lerobot-v2.1", "robotwin-hdf5" or "maniskill".
+        format: "lerobot-v3", "lerobot-v2.1" or "robotwin-hdf5".
         resume: Go on with the data set in `out`.
         settings: Any other setting of `robospa collect`, such as cameras="head" or noise=0.2.
 
@@ -54,7 +53,7 @@ def collect(
     Raises:
         SettingsError: A setting is unknown or impossible; nothing was written.
         RunError: Another process is at it, or `out` holds something else.
-        CannotMake: An episode cannot be made on this machine; StorageError if `out` cannot be
+        MakerError: An episode cannot be made on this machine; StorageError if `out` cannot be
             written. What is done is kept, and `resume` goes on.
     """
     return _collect(
@@ -71,7 +70,7 @@ def _collect(
     layout: str,
     resume: bool = False,
     maker: str = MAKER,
-) -> Result | None:
+) -> CollectionResult | None:
     """`collect` with all settings by name; `maker` makes the episodes."""
     kinds = (Collection, Compute)
     known = [field.name for kind in kinds for field in fields(kind)]

@@ -7,7 +7,7 @@ variants, not of episodes.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -16,12 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.categories import CATEGORY_NAMES
-from robospa.harness.datasets.card_pictures import SheetPicture, draw_lengths, draw_sheet
 from robospa.harness.datasets.episode import DatasetEpisode
-from robospa.harness.datasets.features import Layout, all_pictures
-from robospa.harness.datasets.films import FPS
+from robospa.harness.datasets.features import EpisodeLayout
 from robospa.harness.datasets.manifest import EPISODES, EVENTS, MANIFEST, SUMS, DatasetManifest
-from robospa.harness.demonstrations.labels import LABELS
+from robospa.harness.datasets.pictures import FPS, all_pictures
+from robospa.harness.demonstrations.noise import LABELS
+from robospa.harness.pictures.gallery import PAPER, TEXT, wrapped
+from robospa.results.figures.series import COLOURS, new_figure, plain, styled
 from robospa.text import markdown_table
 
 CARD, SHEET, LENGTHS = "README.md", "episodes.jpg", "lengths.png"
@@ -29,12 +30,6 @@ PICTURED = 24
 """Episodes on the contact sheet, evenly spread over the data set."""
 LICENSE = "mit"
 SIZES = ((1_000, "n<1K"), (10_000, "1K<n<10K"), (100_000, "10K<n<100K"), (10**6, "100K<n<1M"))
-NAMES = {
-    "lerobot-v3": "LeRobot dataset v3.0",
-    "lerobot-v2.1": "LeRobot dataset v2.1",
-    "robotwin-hdf5": "RoboTwin's HDF5",
-    "maniskill": "ManiSkill's trajectories",
-}
 
 
 @dataclass
@@ -42,7 +37,8 @@ class CardFacts:
     """What a card tells: given before, and counted by `add`."""
 
     format: str
-    layout: Layout
+    title: str
+    layout: EpisodeLayout
     manifest: DatasetManifest
     expected: int
     """Number of episodes to come."""
@@ -123,7 +119,7 @@ def _opening(facts: CardFacts) -> str:
     return (
         f"# {facts.episodes:,} demonstrations of RoboSPA tasks by {facts.layout.robot}\n\n"
         f"{facts.episodes:,} episodes, {facts.frames:,} frames, "
-        f"{len(facts.variants)} variants (base task and level), as {NAMES[facts.format]}. "
+        f"{len(facts.variants)} variants (base task and level), as {facts.title}. "
         f"Suite `{made.get('suite', '?')}`, made with robospa {made.get('version', '?')}. "
         f"{joints[0].upper()}{joints[1:]}; cameras: {cameras or 'none'}. "
         f"Every episode was replayed from what is written here: {facts.successes:,} of "
@@ -215,3 +211,117 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     """Rows in Markdown."""
     cells = ([f"{x:,}" if isinstance(x, int | np.integer) else str(x) for x in r] for r in rows)
     return markdown_table(heads, cells)
+
+
+WIDTH, GAP, CAPTION, COLUMNS = 240, 8, 66, 6
+"""Of the sheet: a picture's width, space between pictures, space for a sentence [px]."""
+LETTERS = 11
+MOST_BINS = 40
+
+
+@dataclass(frozen=True)
+class SheetPicture:
+    """A picture, uint8 (height, width, 3) RGB, and what stands below it."""
+
+    image: NDArray[np.uint8]
+    caption: str
+
+
+def draw_sheet(path: Path, pictures: Sequence[SheetPicture]) -> None:
+    """Write the contact sheet as a JPEG."""
+    from PIL import Image, ImageDraw, ImageFont
+
+    tall, wide = pictures[0].image.shape[:2]
+    height = round(WIDTH * tall / wide)
+    columns = min(COLUMNS, len(pictures))
+    lines = -(-len(pictures) // columns)
+    size = (GAP + columns * (WIDTH + GAP), GAP + lines * (height + CAPTION))
+    page = Image.new("RGB", size, PAPER)
+    draw, font = ImageDraw.Draw(page), ImageFont.load_default(LETTERS)
+    for i, picture in enumerate(pictures):
+        left = GAP + (i % columns) * (WIDTH + GAP)
+        top = GAP + (i // columns) * (height + CAPTION)
+        small = Image.fromarray(picture.image).resize((WIDTH, height), Image.Resampling.LANCZOS)
+        page.paste(small, (left, top))
+        text = wrapped(picture.caption, WIDTH, lambda line: draw.textlength(line, font))
+        for k, line in enumerate(text):
+            draw.text((left, top + height + 3 + 14 * k), line, TEXT, font=font)
+    page.save(path, "JPEG", quality=85)
+
+
+def draw_lengths(path: Path, lengths: Mapping[tuple[int, int], int]) -> None:
+    """Write a histogram of episodes by (level, frames) as a PNG."""
+    from matplotlib.ticker import MaxNLocator
+
+    levels = sorted({level for level, _ in lengths})
+    longest = max(frames for _, frames in lengths)
+    edges = np.linspace(0, longest + 1, min(MOST_BINS, longest + 1) + 1)
+    with styled():
+        figure = new_figure(2.1)
+        axis = figure.subplots()
+        below = np.zeros(len(edges) - 1)
+        for level in levels:
+            own = {frames: n for (of, frames), n in lengths.items() if of == level}
+            counts, _ = np.histogram(list(own), edges, weights=list(own.values()))
+            colour = COLOURS[(level - 1) % len(COLOURS)]
+            axis.bar(
+                edges[:-1], counts, np.diff(edges), below, align="edge", color=colour,
+                label=f"L{level}",
+            )  # fmt: skip
+            below += counts
+        axis.set_xlabel("frames of an episode")
+        axis.set_ylabel("episodes")
+        axis.yaxis.set_major_locator(MaxNLocator(integer=True))
+        axis.legend(frameon=False)
+        plain(axis)
+        figure.savefig(path, dpi=200, metadata={"Software": None})
+
+
+MEANS = {
+    "measured_state": "measured joints (commanded ones are there)",
+    "sim_time": f"times: `timestamp` counts frames, {FPS} a second, whatever their real times were",
+    "subtask_index": "what was being done at each frame",
+    "label": "whose command an action is",
+    "embodiment": "the robot: columns are called by arm and number",
+    "success": "whether the goal was met",
+    "failure": "why it was not",
+    "scene_digest": "the scene",
+    "replay_digest": "how it ended",
+    "stride": "how far apart frames are",
+}
+"""What each of the absent features is, in words."""
+
+
+def imported_card(facts: CardFacts) -> str:
+    """The card, in Markdown with a YAML head."""
+    settings = facts.manifest.settings
+    left_out = Counter(row["why"] for row in settings["left_out"])
+    cameras = ", ".join(
+        f"{name} ({c.width}x{c.height}, {c.codec})" for name, c in facts.layout.cameras.items()
+    )
+    rows = sorted((f"{task} L{level}", n) for (task, level), n in facts.variants.items())
+    parts = [
+        head(facts, license="unknown"),
+        f"# {facts.episodes:,} official recordings of RoboSPA tasks\n\n"
+        f"**Official recordings**, converted and not made by robospa {facts.about.get('version')}: "
+        f"{facts.episodes:,} episodes, {facts.frames:,} frames, {len(facts.variants)} variants, as "
+        f"{facts.title}. {facts.layout.space.width} numbers an action; cameras: {cameras}. "
+        "The action of a frame is the command of the next one. Sentences are those of `seen`; "
+        "those of `unseen` are for evaluation and not here.",
+        "## What they do not have\n\n"
+        + "\n".join(f"* `{name}`: {MEANS.get(name, name)}" for name in settings["absent"])
+        + "\n\nNothing was put in their place. Nothing was replayed: the scenes are known to the "
+        "official code alone. `robospa collect --verify DIR` checks every file's hash and all "
+        "counts; `robospa collect --import DATA` plays again what can be played.",
+        *([f"![Pictures from the middle of episodes]({SHEET})"] if facts.pictures else []),
+        f"## How it was made\n\n```\n{facts.manifest.command}\n```\n\nThe hash of each file that "
+        "was read stands with its episode in `meta/robospa_episodes.jsonl`.",
+        "## Episodes\n\n" + table(["variant", "episodes"], rows),
+        table(["configuration", "episodes"], sorted(facts.modes.items())),
+        f"![Frames of an episode by level]({LENGTHS})",
+        f"{left_out.total():,} of {settings['imported']:,} recordings are left out.",
+        *([table(["why", "recordings"], left_out.most_common())] if left_out else []),
+        files_part(),
+        "## License\n\nThat of the data that were read: see where you got them.",
+    ]
+    return "\n\n".join(parts) + "\n"

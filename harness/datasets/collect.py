@@ -1,14 +1,22 @@
 """Collecting a data set: the first good training seeds of every variant, then packing.
 
-First workers make episodes, each a file of its own as soon as it is verified (`store`). Then all of
-them are packed in the order of the data set. So neither a kill nor the number of workers changes
-what comes of it.
+First workers make episodes, each a file of its own as soon as it is verified. Then all of them are
+packed in the order of the data set. So neither a kill nor the number of workers changes what comes
+of it. What is made so far lies below `episodes/` in the folder of the data set:
+
+    episodes/settings.json                       what is being collected, and with which versions
+    episodes/ROBOT/MODE/TASK-Ln/SEED.zip         an episode (`episode`)
+    episodes/ROBOT/MODE/TASK.jsonl               a line for every seed that gave none
+
+Each is written at once or not at all, so a kill at any byte is harmless.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Sequence
+import shutil
+import zipfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import AbstractContextManager
 from dataclasses import asdict, dataclass
@@ -16,16 +24,24 @@ from functools import partial
 from pathlib import Path
 
 from robospa.harness.datasets.collection_progress import CollectionProgress
-from robospa.harness.datasets.disk_use import check_room, expected_bytes, frames_of
-from robospa.harness.datasets.jobs import Job, MadeEpisode
-from robospa.harness.datasets.manifest import MANIFEST, DatasetManifest, Failure, read_made
-from robospa.harness.datasets.pack import FORMATS, check_packages, images_of, pack
-from robospa.harness.datasets.settings import AUTO, KEYFRAMES, Collection, lists_of, trial_of
-from robospa.harness.datasets.store import EPISODES, EpisodeStore, Facts
+from robospa.harness.datasets.jobs import EpisodeAttempt, EpisodeJob
+from robospa.harness.datasets.manifest import MANIFEST, DatasetManifest, SeedFailure, read_record
+from robospa.harness.datasets.pack import FORMATS, check_packages, pack
+from robospa.harness.datasets.settings import (
+    AUTO,
+    KEYFRAMES,
+    Collection,
+    check_room,
+    expected_bytes,
+    frames_of,
+    lists_of,
+    trial_of,
+)
 from robospa.harness.pool import Pool
-from robospa.harness.running.atomic_file import PARTIAL
+from robospa.harness.running.atomic_file import PARTIAL, replace_file, storage_errors
 from robospa.harness.running.run_lock import run_lock
 from robospa.harness.seeds.attempt import Attempt
+from robospa.harness.seeds.evidence import Evidence
 from robospa.harness.seeds.sweep import Search, sweep
 from robospa.harness.settings import SettingsError
 from robospa.registry import did_you_mean
@@ -33,7 +49,85 @@ from robospa.results.records.run_state import LOCK
 from robospa.tasks.seeds import FIRST_TRAINING_SEED, ListKey
 from robospa.trial import path_part
 
-OpenPool = Callable[[int], AbstractContextManager[Pool[Job, Attempt]]]
+EPISODES, SETTINGS = "episodes", "settings.json"
+
+Facts = Mapping[str, Mapping[str, object]]
+"""What makes two collections the same, as JSON values: `settings` and `versions`."""
+
+
+class EpisodeStore:
+    """The episodes in `folder`, one process at a time."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._refused = Evidence(folder)
+
+    @property
+    def begun(self) -> bool:
+        """Whether a collection was begun here."""
+        return (self.folder / SETTINGS).exists()
+
+    def begin(self, facts: Facts) -> None:
+        """Begin a collection, or go on with one; SettingsError if that is of other `facts`."""
+        path = self.folder / SETTINGS
+        if not self.begun:
+            replace_file(path, (json.dumps(facts, indent=1) + "\n").encode())
+            return
+        try:
+            before = json.loads(path.read_text())
+            differ = [
+                f"{name} was {before[part].get(name)!r} and is {value!r}"
+                for part, values in json.loads(json.dumps(facts)).items()
+                for name, value in values.items()
+                if before[part].get(name) != value
+            ]
+        except (OSError, ValueError, LookupError, AttributeError, TypeError) as error:
+            raise SettingsError(f"{path} cannot be read ({error}); collect elsewhere") from error
+        if differ:
+            raise SettingsError(
+                f"{self.folder} cannot be gone on with: {'; '.join(differ)}; "
+                "go on as it was begun, or choose another --out"
+            )
+
+    def path(self, key: ListKey, seed: int) -> Path:
+        """The file of an episode."""
+        return self._place(key) / f"{seed}.zip"
+
+    def _place(self, key: ListKey) -> Path:
+        robot, mode = path_part(key.embodiment), path_part(key.mode)
+        return self.folder / robot / mode / f"{key.task}-L{key.level}"
+
+    def attempts(self, key: ListKey) -> dict[int, Attempt]:
+        """What is known, by seed; the file of an episode that is damaged is removed."""
+        found = self._refused.attempts(key, "")
+        for path in sorted(self._place(key).glob("[0-9]*.zip")):
+            if zipfile.is_zipfile(path):
+                found[int(path.stem)] = Attempt(int(path.stem), True)
+            else:
+                path.unlink()
+        return found
+
+    def add(self, key: ListKey, made: EpisodeAttempt) -> Attempt:
+        """Keep what came of a seed, written when this returns; raises StorageError."""
+        if made.accepted:
+            replace_file(self.path(key, made.seed), made.data)
+            return Attempt(made.seed, True)
+        attempt = Attempt(made.seed, False, made.reason)
+        with storage_errors(self._refused.path(key)):
+            self._refused.add(key, "", attempt)
+        return attempt
+
+    def size(self) -> int:
+        """Bytes of all episodes."""
+        return sum(path.stat().st_size for path in self.folder.rglob("*.zip"))
+
+    def remove(self) -> None:
+        """Remove all of it."""
+        with storage_errors(self.folder):
+            shutil.rmtree(self.folder)
+
+
+OpenPool = Callable[[int], AbstractContextManager[Pool[EpisodeJob, Attempt]]]
 """Opens the workers, at most as many as there are episodes left."""
 
 
@@ -63,12 +157,7 @@ class Order:
                 "robotwin-hdf5 is a format of pictures: name cameras, or collect without pictures "
                 "in the format lerobot-v3"
             )
-        if self.layout == "maniskill" and self.settings.midstates:
-            raise SettingsError(
-                "a trajectory of ManiSkill begins with a reset, so it cannot begin in the midst of "
-                "a task: leave out midstates, or choose another format"
-            )
-        known, wanted = images_of(self.layout), self.settings.images
+        known, wanted = FORMATS[self.layout].images, self.settings.images
         if wanted != AUTO and wanted not in known:
             raise SettingsError(f"{self.layout} holds no {wanted} but {', '.join(known)}")
         return known[0] if wanted == AUTO else wanted
@@ -79,10 +168,10 @@ class Order:
         settings = {**asdict(self.settings), "images": self.images, "format": self.layout}
         return {"settings": settings, "versions": self.versions}
 
-    def job(self, key: ListKey, seed: int) -> Job:
+    def job(self, key: ListKey, seed: int) -> EpisodeJob:
         """The episode of a seed."""
         shares = (self.settings.noise, self.settings.mistakes, self.settings.midstates)
-        return Job(
+        return EpisodeJob(
             trial_of(key, seed),
             self.settings.camera_specs(),
             self.images,
@@ -93,7 +182,7 @@ class Order:
 
 
 @dataclass(frozen=True)
-class Result:
+class CollectionResult:
     """A data set that is finished: its folders, one a robot, and what it lacks, a line each."""
 
     folders: tuple[Path, ...]
@@ -108,7 +197,7 @@ def collect(
     resume: bool = False,
     keep_episodes: bool = False,
     say: Callable[[str], None] = print,
-) -> Result | None:
+) -> CollectionResult | None:
     """Make the data set; None if it was finished before.
 
     Raises SettingsError for what cannot be collected, MissingPackage before anything is made,
@@ -149,7 +238,7 @@ def dataset_folders(out: Path, keys: Sequence[ListKey]) -> dict[str, Path]:
 def _check_finished(order: Order, folders: Sequence[Path], resume: bool) -> None:
     if not resume:
         raise SettingsError(f"{order.out} has a data set already; choose another --out")
-    made = [read_made(folder).settings for folder in folders]
+    made = [read_record(folder).settings for folder in folders]
     wanted = json.loads(json.dumps(order.facts["settings"]))
     if any(settings != wanted for settings in made):
         raise SettingsError(
@@ -215,7 +304,7 @@ def _make(
     )
 
     def note(search: Search, item: Attempt) -> None:
-        assert isinstance(item, MadeEpisode)
+        assert isinstance(item, EpisodeAttempt)
         check()
         search.attempts[item.seed] = store.add(search.key, item)
         progress.add(item, frames(search.key))
@@ -238,7 +327,7 @@ def _pack(
     store: EpisodeStore,
     folders: dict[str, Path],
     say: Callable[[str], None],
-) -> Result:
+) -> CollectionResult:
     """Pack what was made, a data set for each robot that has one."""
     episodes = 0
     for robot, folder in folders.items():
@@ -249,12 +338,12 @@ def _pack(
             continue
         say(f"packing {len(files)} episodes of {robot} into {folder}")
         failures = tuple(
-            Failure(trial_of(s.key, a.seed), a.reason) for s in some for a in s.refused
+            SeedFailure(trial_of(s.key, a.seed), a.reason) for s in some for a in s.refused
         )
         settings = dict(order.facts["settings"])
         manifest = DatasetManifest(order.command, settings, tuple(failures))
         pack(order.layout, folder, files, manifest)
-    return Result(tuple(folders.values()), episodes, tuple(_missing(wanted)))
+    return CollectionResult(tuple(folders.values()), episodes, tuple(_missing(wanted)))
 
 
 def _missing(wanted: Sequence[Search]) -> Iterator[str]:

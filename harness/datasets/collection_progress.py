@@ -12,8 +12,8 @@ from collections import Counter
 from types import TracebackType
 from typing import TYPE_CHECKING, TextIO
 
-from robospa.harness.datasets.disk_use import size_text
-from robospa.harness.datasets.jobs import MadeEpisode
+from robospa.harness.datasets.jobs import EpisodeAttempt
+from robospa.harness.datasets.settings import size_text
 from robospa.harness.running.progress import EVERY
 from robospa.terminal import plain_console
 from robospa.text import clock_text
@@ -71,7 +71,7 @@ class CollectionProgress:
         if self._bar is not None:
             self._bar.stop()
 
-    def add(self, made: MadeEpisode, work: float) -> None:
+    def add(self, made: EpisodeAttempt, work: float) -> None:
         """Count what came of a seed; an episode like it has `work` frames."""
         self.times.update(made.times)
         if made.accepted:

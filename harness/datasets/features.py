@@ -1,35 +1,37 @@
-"""The features of a data set in LeRobot's formats: names, shapes, and an episode's rows.
+"""The features of a data set in LeRobot's formats: names, shapes, an episode's rows as a table.
 
 LeRobot makes every feature whose name begins with `observation` an input of the policy that it
 trains, and every one that begins with `action` an output. So only the pictures, the commanded
 state, the action and, where it was asked for, the environment state begin so; what is there for
-other uses (reward models, hierarchical policies, filtering) does not.
+other uses (reward models, hierarchical policies, filtering) does not. Tables are written with
+pyarrow alone, which writes the same bytes for the same table.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import json
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robospa.action_space import ARMS, ActionSpace
 from robospa.environment_state import NAMES
-from robospa.harness.datasets.episode import DatasetEpisode, Film, Pictures, Stills
-from robospa.harness.datasets.films import FPS, film_frames
-from robospa.harness.datasets.statistics import ColourHistogram, Stats, row_stats
+from robospa.harness.datasets.episode import DatasetEpisode, Pictures, Stills
+from robospa.harness.datasets.pictures import FPS
 
-SAMPLED = 16
-"""Pictures of an episode and camera that go into the statistics. LeRobot takes a hundred and more;
-a data set has thousands of episodes, so these are plenty."""
+if TYPE_CHECKING:
+    import pyarrow as pa
+
 UNSTATED = "unstated"
 """The robot of recordings that do not say theirs."""
 NOTHING = ""
 """The subtask of frames in which nothing in particular is being done; its index is 0."""
 
 
-class LayoutError(Exception):
+class EpisodeMisfit(Exception):
     """An episode does not fit the data set it is to join; the message says how."""
 
 
@@ -48,7 +50,7 @@ class Camera:
 
 
 @dataclass(frozen=True)
-class Layout:
+class EpisodeLayout:
     """What all episodes of a data set have in common."""
 
     robot: str
@@ -72,33 +74,33 @@ class Layout:
         return [name for name, camera in self.cameras.items() if not camera.filmed]
 
     def check(self, episode: DatasetEpisode) -> None:
-        """Raises LayoutError if `episode` is of another robot, or has other pictures."""
+        """Raises EpisodeMisfit if `episode` is of another robot, or has other pictures."""
         if episode.key.embodiment != self.robot or episode.space != self.space:
-            raise LayoutError(
+            raise EpisodeMisfit(
                 f"{episode.key.slug} is of the robot {episode.key.embodiment}, and the data set of "
                 f"{self.robot}: a data set has one robot"
             )
         if bool(episode.environment_state.size) is not self.environment_state:
-            raise LayoutError(
+            raise EpisodeMisfit(
                 f"{episode.key.slug} differs from the data set in whether it has the environment "
                 "state: collect it with the same settings"
             )
         if _absent(episode) != self.absent:
-            raise LayoutError(f"{episode.key.slug} lacks other features than the data set")
+            raise EpisodeMisfit(f"{episode.key.slug} lacks other features than the data set")
         found = _cameras(episode)
         if found != self.cameras:
-            raise LayoutError(
+            raise EpisodeMisfit(
                 f"{episode.key.slug} has pictures {_list(found)}, and the data set "
                 f"{_list(self.cameras)}: collect it with the same cameras and images"
             )
 
 
-def layout_of(episode: DatasetEpisode) -> Layout:
+def layout_of(episode: DatasetEpisode) -> EpisodeLayout:
     """The layout of a data set that begins with `episode`."""
     joints = joint_names(episode.key.embodiment, episode.space)
     objects = bool(episode.environment_state.size)
     robot, cameras = episode.key.embodiment, _cameras(episode)
-    return Layout(robot, episode.space, joints, cameras, objects, _absent(episode))
+    return EpisodeLayout(robot, episode.space, joints, cameras, objects, _absent(episode))
 
 
 def _absent(episode: DatasetEpisode) -> frozenset[str]:
@@ -107,7 +109,7 @@ def _absent(episode: DatasetEpisode) -> frozenset[str]:
 
 def joint_names(robot: str, space: ActionSpace) -> tuple[str, ...]:
     """The columns of a state of `robot`, by its joints' own names: `left_fl_joint1`, ...,
-    `left_gripper`; by arm and number if the robot is UNSTATED. Raises LayoutError if they are not
+    `left_gripper`; by arm and number if the robot is UNSTATED. Raises EpisodeMisfit if they are not
     those of `space`."""
     if robot == UNSTATED:
         counts = zip(ARMS, space.joints, strict=True)
@@ -120,7 +122,7 @@ def joint_names(robot: str, space: ActionSpace) -> tuple[str, ...]:
     for side, arm in zip(ARMS, arms, strict=True):
         names += [f"{side}_{joint.name}" for joint in arm.joints] + [f"{side}_gripper"]
     if len(names) != space.width:
-        raise LayoutError(f"a state of {robot} has {len(names)} numbers, not {space.width}")
+        raise EpisodeMisfit(f"a state of {robot} has {len(names)} numbers, not {space.width}")
     return tuple(names)
 
 
@@ -157,7 +159,7 @@ def picture_key(camera: str) -> str:
     return f"observation.images.{camera}"
 
 
-def vectors(layout: Layout) -> dict[str, tuple[str, ...]]:
+def vectors(layout: EpisodeLayout) -> dict[str, tuple[str, ...]]:
     """The features of several float32 numbers, and what each number is."""
     objects = {ENVIRONMENT: NAMES} if layout.environment_state else {}
     return {
@@ -169,12 +171,12 @@ def vectors(layout: Layout) -> dict[str, tuple[str, ...]]:
     }
 
 
-def singles(layout: Layout) -> dict[str, str]:
+def singles(layout: EpisodeLayout) -> dict[str, str]:
     """The features of one number, and their types."""
     return {name: dtype for name, dtype in ALWAYS.items() if name not in layout.absent}
 
 
-def described(layout: Layout, depth_key: str) -> dict[str, dict[str, object]]:
+def described(layout: EpisodeLayout, depth_key: str) -> dict[str, dict[str, object]]:
     """`features` of LeRobot's meta/info.json; `depth_key` is how its version says "no depth"."""
     found: dict[str, dict[str, object]] = {}
     for name, names in vectors(layout).items():
@@ -201,36 +203,6 @@ def described(layout: Layout, depth_key: str) -> dict[str, dict[str, object]]:
     return found
 
 
-def rows(
-    episode: DatasetEpisode, index: int, first_frame: int, task: int, subtasks: Mapping[str, int]
-) -> dict[str, NDArray[np.generic]]:
-    """The numbers of an episode by feature: (T, D), or (T,) for a feature of one number.
-
-    `index` is the episode's in the data set, `first_frame` that of its first frame, `task` that of
-    its instruction, `subtasks` those of all subtasks' texts.
-    """
-    count = len(episode)
-    texts = np.array([subtasks[NOTHING], *(subtasks[text] for text in episode.subtasks)])
-    frames = np.arange(count)
-    objects = episode.environment_state
-    found: dict[str, NDArray[np.generic]] = {
-        "observation.state": episode.commanded,
-        **({ENVIRONMENT: objects} if objects.size else {}),
-        "action": episode.action,
-        "measured_state": episode.measured,
-        "ee_pose": episode.ee.reshape(count, len(POSES)),
-        "sim_time": episode.sim_time.astype(np.float32),
-        "subtask_index": texts[episode.subtask + 1].astype(np.int64),
-        "label": episode.label.astype(np.int64),
-        "timestamp": (frames / FPS).astype(np.float32),
-        "frame_index": frames,
-        "episode_index": np.full(count, index),
-        "index": first_frame + frames,
-        "task_index": np.full(count, task),
-    }
-    return {name: of for name, of in found.items() if name not in episode.absent}
-
-
 def facts_of(episode: DatasetEpisode) -> dict[str, object]:
     """What the table of episodes of version 3.0 says of one, besides what LeRobot asks for."""
     key = episode.key
@@ -253,7 +225,7 @@ def facts_of(episode: DatasetEpisode) -> dict[str, object]:
     return {name: of for name, of in found.items() if name == "seed" or name not in episode.absent}
 
 
-class Written:
+class NumberedTexts:
     """What a data set holds so far: how many `episodes` and `frames`, and the number of each
     sentence (`tasks`) and subtask, in the order in which they came."""
 
@@ -263,51 +235,73 @@ class Written:
         self.episodes = self.frames = 0
 
     def rows(self, episode: DatasetEpisode) -> dict[str, NDArray[np.generic]]:
-        """The numbers of `episode` as the next one, and its texts among those that are numbered."""
+        """The numbers of `episode` as the next one, by feature, (T, D), or (T,) for a feature of
+        one number; its texts are among those that are numbered."""
         task = self.tasks.setdefault(episode.instructions[0], len(self.tasks))
         for text in episode.subtasks:
             self.subtasks.setdefault(text, len(self.subtasks))
-        return rows(episode, self.episodes, self.frames, task, self.subtasks)
+        texts = np.array([0, *(self.subtasks[text] for text in episode.subtasks)])
+        count, objects = len(episode), episode.environment_state
+        frames = np.arange(count)
+        found: dict[str, NDArray[np.generic]] = {
+            "observation.state": episode.commanded,
+            **({ENVIRONMENT: objects} if objects.size else {}),
+            "action": episode.action,
+            "measured_state": episode.measured,
+            "ee_pose": episode.ee.reshape(count, len(POSES)),
+            "sim_time": episode.sim_time.astype(np.float32),
+            "subtask_index": texts[episode.subtask + 1].astype(np.int64),
+            "label": episode.label.astype(np.int64),
+            "timestamp": (frames / FPS).astype(np.float32),
+            "frame_index": frames,
+            "episode_index": np.full(count, self.episodes),
+            "index": self.frames + frames,
+            "task_index": np.full(count, task),
+        }
+        return {name: of for name, of in found.items() if name not in episode.absent}
 
     def add(self, episode: DatasetEpisode) -> None:
         """Count `episode`, which is written."""
         self.episodes, self.frames = self.episodes + 1, self.frames + len(episode)
 
 
-def number_stats(numbers: Mapping[str, NDArray[np.generic]]) -> dict[str, Stats]:
-    """The statistics of an episode's `rows`, by feature, (D,) or (1,) each."""
-    return {name: row_stats(of.reshape(len(of), -1)) for name, of in numbers.items()}
+def frame_schema(layout: EpisodeLayout) -> pa.Schema:
+    """Columns of a data file: every feature but films."""
+    import pyarrow as pa
+
+    fields = [pa.field(n, pa.list_(pa.float32(), len(of))) for n, of in vectors(layout).items()]
+    image = pa.struct([("bytes", pa.binary()), ("path", pa.string())])
+    fields += [pa.field(picture_key(name), image) for name in layout.stills]
+    fields += [pa.field(name, pa.type_for_alias(dtype)) for name, dtype in singles(layout).items()]
+    images = {picture_key(name): {"_type": "Image"} for name in layout.stills}
+    about = {"huggingface": json.dumps({"info": {"features": images}})} if images else None
+    return pa.schema(fields, metadata=about)
 
 
-def colours(seen: Pictures) -> ColourHistogram:
-    """The colours of about `SAMPLED` evenly spread pictures."""
-    found = ColourHistogram()
-    for picture in _sampled(seen):
-        found.add(picture)
-    return found
+def frame_table(
+    layout: EpisodeLayout,
+    numbers: Mapping[str, NDArray[np.generic]],
+    pictures: Mapping[str, Pictures],
+) -> pa.Table:
+    """The rows of an episode."""
+    import pyarrow as pa
 
-
-def _sampled(seen: Pictures) -> Iterator[NDArray[np.uint8]]:
-    if isinstance(seen, Film):
-        yield from film_frames(seen.data, SAMPLED)
-        return
-    last = len(seen.frames) - 1
-    for t in np.unique(np.linspace(0, last, SAMPLED).round().astype(int)):
-        yield still_picture(seen, int(t))
-
-
-def still_picture(seen: Stills, t: int) -> NDArray[np.uint8]:
-    """Frame `t`, uint8 (height, width, 3) RGB."""
-    import io
-
-    from PIL import Image
-
-    with Image.open(io.BytesIO(seen.frames[t])) as picture:
-        return np.asarray(picture.convert("RGB"))
-
-
-def all_pictures(seen: Pictures) -> Iterator[NDArray[np.uint8]]:
-    """All frames, uint8 (height, width, 3) RGB."""
-    if isinstance(seen, Film):
-        return film_frames(seen.data)
-    return (still_picture(seen, t) for t in range(len(seen.frames)))
+    schema = frame_schema(layout)
+    columns = {}
+    for name, values in numbers.items():
+        kind = schema.field(name).type
+        if values.ndim == 1:
+            columns[name] = pa.array(values, kind)
+        else:
+            flat = pa.array(np.ascontiguousarray(values, np.float32).ravel())
+            columns[name] = pa.FixedSizeListArray.from_arrays(flat, values.shape[1])
+    for camera in layout.stills:
+        seen = pictures[camera]
+        if isinstance(seen, Stills):
+            ending = {"png": "png", "jpeg": "jpg"}[seen.codec]
+            images = [
+                {"bytes": data, "path": f"frame-{t:06d}.{ending}"}
+                for t, data in enumerate(seen.frames)
+            ]
+            columns[picture_key(camera)] = pa.array(images, schema.field(picture_key(camera)).type)
+    return pa.table([columns[name] for name in schema.names], schema=schema)

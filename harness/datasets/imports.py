@@ -30,12 +30,12 @@ from robospa.harness.convention_check.episodes import (
     read_episode,
     text_beside,
 )
-from robospa.harness.datasets.encoding import encode
+from robospa.harness.datasets.card import imported_card
 from robospa.harness.datasets.episode import DatasetEpisode, Pictures
-from robospa.harness.datasets.features import UNSTATED, Layout, LayoutError, layout_of
-from robospa.harness.datasets.imported_card import imported_card
-from robospa.harness.datasets.manifest import MANIFEST, DatasetManifest, Made, file_hash
-from robospa.harness.datasets.pack import FORMATS, Source, Writer, images_of, pack_episodes
+from robospa.harness.datasets.features import UNSTATED, EpisodeLayout, EpisodeMisfit, layout_of
+from robospa.harness.datasets.manifest import MANIFEST, DatasetManifest, DatasetRecord, file_hash
+from robospa.harness.datasets.pack import FORMATS, Source, Writer, pack_episodes
+from robospa.harness.datasets.pictures import encode
 from robospa.harness.datasets.robotwin import RoboTwin
 from robospa.harness.datasets.verify import RECORDINGS
 from robospa.harness.official.recordings import Recording, key_of
@@ -49,8 +49,6 @@ ABSENT = (
     "scene_digest", "replay_digest", "stride",
 )  # fmt: skip
 """Features of our formats, and facts of an episode, that official recordings do not have."""
-LAYOUTS = ("lerobot-v3", "lerobot-v2.1", "robotwin-hdf5")
-"""Formats that can do without what is absent."""
 OFFICIAL = "official"
 """The kind of their episodes."""
 
@@ -60,7 +58,7 @@ class Imported:
     """A finished data set: how much there is of it, and why recordings are not in it, with how many
     each."""
 
-    made: Made
+    made: DatasetRecord
     left_out: Counter[str]
 
 
@@ -74,13 +72,13 @@ def import_recordings(
     Raises SettingsError for a format that does not exist or a folder that is not empty,
     DatasetError if no recording is left, CodecMissing, StorageError.
     """
-    if layout not in LAYOUTS:
+    if layout not in FORMATS:
         raise SettingsError(
-            f"official recordings cannot be had as {layout!r} but as {', '.join(LAYOUTS)}"
+            f"official recordings cannot be had as {layout!r} but as {', '.join(FORMATS)}"
         )
-    codec = images or images_of(layout)[0]
-    if codec not in images_of(layout):
-        raise SettingsError(f"{layout} holds no {codec} but {', '.join(images_of(layout))}")
+    codec = images or FORMATS[layout].images[0]
+    if codec not in FORMATS[layout].images:
+        raise SettingsError(f"{layout} holds no {codec} but {', '.join(FORMATS[layout].images)}")
     if (out / MANIFEST).exists() or (out.is_dir() and any(out.iterdir())):
         raise SettingsError(f"{out} is not empty: choose another --out")
     left_out: list[dict[str, str]] = []
@@ -92,10 +90,10 @@ def import_recordings(
     sources = _sources(recordings, home, "png" if layout == "robotwin-hdf5" else codec, left_out)
     copies = {source(recording, home): recording.path for recording in recordings}
 
-    def writer(folder: Path, of: Layout) -> Writer:
+    def writer(folder: Path, of: EpisodeLayout) -> Writer:
         if layout == "robotwin-hdf5":
             return Copies(folder, of, copies)
-        return FORMATS[layout](folder, of)
+        return FORMATS[layout].writer(folder, of)
 
     made = pack_episodes(
         layout,
@@ -113,14 +111,14 @@ def _sources(
     recordings: Sequence[Recording], home: Path, codec: str, left_out: list[dict[str, str]]
 ) -> Iterator[Source]:
     """The recordings that fit with the first that can be read; the others go to `left_out`."""
-    layout: Layout | None = None
+    layout: EpisodeLayout | None = None
     for recording in recordings:
         name = source(recording, home)
         try:
             episode = to_episode(recording, home, codec)
             layout = layout or layout_of(episode)
             layout.check(episode)
-        except (EpisodeError, LayoutError) as error:
+        except (EpisodeError, EpisodeMisfit) as error:
             left_out.append({"source": name, "why": str(error)})
             continue
         yield name, episode
@@ -207,7 +205,7 @@ class Copies(RoboTwin):
     """Puts the recordings themselves, which are in this layout, below `folder`, each in the folder
     it was in."""
 
-    def __init__(self, folder: Path, layout: Layout, files: dict[str, Path]) -> None:
+    def __init__(self, folder: Path, layout: EpisodeLayout, files: dict[str, Path]) -> None:
         super().__init__(folder, layout)
         self._files = files
 

@@ -6,14 +6,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 
-from robospa.harness.datasets.encoding import CodecMissing
+from robospa.harness.datasets.pictures import CodecMissing
 from robospa.harness.factory import load_function
 from robospa.harness.seeds.attempt import CRASHED, Attempt
 from robospa.harness.world import RenderUnavailable, SceneUnstable
 from robospa.observation import CameraSpec
 from robospa.trial import TrialKey
 
-MAKER = "robospa.harness.datasets.episode_maker:EpisodeMaker"
+MAKER = "robospa.harness.datasets.maker:EpisodeMaker"
 MOST_TEXT = 300
 """Characters of a reason that are kept."""
 PURPOSES = ("expert", "replay", "pictures", "rest")
@@ -21,7 +21,7 @@ PURPOSES = ("expert", "replay", "pictures", "rest")
 
 
 @dataclass(frozen=True)
-class Job:
+class EpisodeJob:
     """An episode to make: its trial, its pictures, and the shares of all episodes that are with
     noise, with a mistake, or from the midst of the task; whether only keyframes are kept, and
     whether the objects are told as numbers."""
@@ -35,7 +35,7 @@ class Job:
 
 
 @dataclass(frozen=True)
-class MadeEpisode(Attempt):
+class EpisodeAttempt(Attempt):
     """What came of a job, with the content of the episode's file if it was accepted, its number of
     frames, and processor time by purpose [s]."""
 
@@ -44,49 +44,49 @@ class MadeEpisode(Attempt):
     times: Mapping[str, float] = field(default_factory=dict)
 
 
-class CannotMake(Exception):
+class MakerError(Exception):
     """No episode can be made on this machine; the message says why and what to do."""
 
 
-class NotGood(Exception):
+class RejectedSeed(Exception):
     """A seed gives no episode; the message says why."""
 
 
-Maker = Callable[[Job], MadeEpisode]
+Maker = Callable[[EpisodeJob], EpisodeAttempt]
 """Makes one episode, or raises what says why there is none."""
 
 
-def attempt_job(maker: Maker, job: Job) -> MadeEpisode:
+def attempt_job(maker: Maker, job: EpisodeJob) -> EpisodeAttempt:
     """What comes of `job`; an error is a reason like another, so that hours of work outlive it.
 
-    Raises CannotMake where no other seed would fare better.
+    Raises MakerError where no other seed would fare better.
     """
     try:
         return maker(job)
-    except (CannotMake, CodecMissing, RenderUnavailable, ModuleNotFoundError) as error:
-        raise CannotMake(str(error)) from error
+    except (MakerError, CodecMissing, RenderUnavailable, ModuleNotFoundError) as error:
+        raise MakerError(str(error)) from error
     except SceneUnstable as error:
         return refused(job.key.seed, f"does not settle: {error}")
-    except NotGood as error:
+    except RejectedSeed as error:
         return refused(job.key.seed, str(error))
     except Exception as error:
         return refused(job.key.seed, f"{type(error).__name__}: {error}")
 
 
-def maker_at(path: str) -> Callable[[Job], Attempt]:
+def maker_at(path: str) -> Callable[[EpisodeJob], Attempt]:
     """What a worker makes episodes with: the maker at `path`, `module:function`."""
     try:
         maker = load_function(path)()
     except Exception as error:
-        raise CannotMake(f"{error}" or type(error).__name__) from error
+        raise MakerError(f"{error}" or type(error).__name__) from error
     return partial(attempt_job, maker)
 
 
-def crashed(job: Job) -> Attempt:
+def crashed(job: EpisodeJob) -> Attempt:
     """What comes of a seed at which several workers died."""
     return refused(job.key.seed, CRASHED)
 
 
-def refused(seed: int, reason: str) -> MadeEpisode:
+def refused(seed: int, reason: str) -> EpisodeAttempt:
     """A seed without an episode."""
-    return MadeEpisode(seed, False, " ".join(reason.split())[:MOST_TEXT])
+    return EpisodeAttempt(seed, False, " ".join(reason.split())[:MOST_TEXT])

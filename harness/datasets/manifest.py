@@ -39,7 +39,7 @@ class DatasetError(Exception):
 
 
 @dataclass(frozen=True)
-class Failure:
+class SeedFailure:
     """A seed that gave no episode."""
 
     key: TrialKey
@@ -54,12 +54,12 @@ class DatasetManifest:
     """The command line that makes it."""
     settings: Mapping[str, Any]
     """What was set in it, as JSON values."""
-    failures: tuple[Failure, ...] = ()
+    failures: tuple[SeedFailure, ...] = ()
     """Seeds that gave no episode."""
 
 
 @dataclass(frozen=True)
-class Made:
+class DatasetRecord:
     """`robospa.json`: the manifest, and what was packed."""
 
     format: Annotated[int, Meta(ge=1)]
@@ -73,7 +73,7 @@ class Made:
     """What made the episodes: `suite` and `version`."""
     command: str
     settings: dict[str, Any]
-    failures: tuple[Failure, ...] = ()
+    failures: tuple[SeedFailure, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -147,12 +147,14 @@ class EpisodeLines:
         """Write the lines of `episode`. An event's `frame_index` is the first frame not before
         it."""
         line = asdict(episode_line(index, episode, file))
-        self._episodes.write(_line({n: of for n, of in line.items() if of or n not in IMPORTED}))
+        self._episodes.write(
+            json_line({n: of for n, of in line.items() if of or n not in IMPORTED})
+        )
         times = np.array([event.time for event in episode.events])
         frames = np.minimum(np.searchsorted(episode.sim_time, times - 1e-9), len(episode) - 1)
         for event, frame in zip(episode.events, frames, strict=True):
             where = {"episode_index": index, "frame_index": int(frame)}
-            self._events.write(_line({**where, **asdict(event)}))
+            self._events.write(json_line({**where, **asdict(event)}))
 
     def close(self) -> None:
         """Finish both files."""
@@ -160,7 +162,8 @@ class EpisodeLines:
         self._events.close()
 
 
-def _line(value: object) -> str:
+def json_line(value: object) -> str:
+    """One line of JSON."""
     return json.dumps(value, ensure_ascii=False) + "\n"
 
 
@@ -205,13 +208,13 @@ def file_hash(path: Path) -> str:
     return digest.hexdigest()
 
 
-def write_made(folder: Path, made: Made) -> None:
+def write_record(folder: Path, made: DatasetRecord) -> None:
     """Write `robospa.json`: from then on the data set is finished."""
     text = json.dumps(asdict(made), indent=1, ensure_ascii=False) + "\n"
     replace_file(folder / MANIFEST, text.encode())
 
 
-def read_made(folder: Path) -> Made:
+def read_record(folder: Path) -> DatasetRecord:
     """What the data set in `folder` says of itself; DatasetError if it is none, or unfinished, or
     of another version."""
     path = folder / MANIFEST
@@ -227,7 +230,7 @@ def read_made(folder: Path) -> Made:
             f"{path} is of version {version!r}, and this version of robospa reads {FORMAT}: verify "
             "the data set with the version that made it"
         )
-    return read(Made, data, str(path), DatasetError)
+    return read(DatasetRecord, data, str(path), DatasetError)
 
 
 def _no_data_set(folder: Path) -> str:

@@ -7,13 +7,14 @@ from contextlib import contextmanager
 from functools import partial
 
 from robospa.harness.datasets.collect import OpenPool
-from robospa.harness.datasets.jobs import MAKER, Job, crashed, maker_at
+from robospa.harness.datasets.jobs import MAKER, EpisodeJob, crashed, maker_at
 from robospa.harness.pool import JobProcess, JobWorker, Pool
 from robospa.harness.running.autoscaling import cores
 from robospa.harness.running.ray_cluster import RaySettings
 from robospa.harness.seeds.attempt import Attempt
 from robospa.harness.settings import Compute
 
+StartWorker = Callable[[], JobWorker[EpisodeJob, Attempt]]
 EPISODE_SECONDS = 3600.0
 """A worker that is still at an episode after this hangs."""
 EPISODES_PER_WORKER = 200
@@ -40,5 +41,7 @@ def pool_opener(compute: Compute, maker: str = MAKER) -> Iterator[OpenPool]:
         yield lambda episodes: _pool(on_node, min(on_node.capacity(), episodes))
 
 
-def _pool(start: Callable[[], JobWorker[Job, Attempt]], workers: int) -> Pool[Job, Attempt]:
+def _pool(
+    start: Callable[[], JobWorker[EpisodeJob, Attempt]], workers: int
+) -> Pool[EpisodeJob, Attempt]:
     return Pool(start, workers, crashed=crashed, jobs_each=EPISODES_PER_WORKER)

@@ -8,31 +8,34 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
 from itertools import chain
 from pathlib import Path
 from typing import Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
 from robospa.extras import need
+from robospa.harness.datasets import lerobot, robotwin
 from robospa.harness.datasets.card import CardFacts, write_card
-from robospa.harness.datasets.episode import DatasetEpisode
-from robospa.harness.datasets.episode_file import read_episode_file
-from robospa.harness.datasets.features import Layout, LayoutError, layout_of
-from robospa.harness.datasets.films import FilmError
-from robospa.harness.datasets.lerobot_v3 import LeRobotV3
-from robospa.harness.datasets.lerobot_v21 import LeRobotV21
+from robospa.harness.datasets.episode import DatasetEpisode, read_episode_file
+from robospa.harness.datasets.features import EpisodeLayout, EpisodeMisfit, layout_of
 from robospa.harness.datasets.manifest import (
     FORMAT,
     MANIFEST,
     SUMS,
     DatasetError,
     DatasetManifest,
+    DatasetRecord,
+    EpisodeLine,
     EpisodeLines,
-    Made,
     read_sums,
-    write_made,
+    write_record,
     write_sums,
 )
-from robospa.harness.datasets.robotwin import RoboTwin
+from robospa.harness.datasets.pictures import EpisodeFilmError
 from robospa.harness.running.atomic_file import storage_errors
 
 PART = ".packing"
@@ -53,38 +56,47 @@ class Writer(Protocol):
 
 Source = tuple[str, DatasetEpisode]
 """An episode with a name for messages."""
-MakeWriter = Callable[[Path, Layout], Writer]
+MakeWriter = Callable[[Path, EpisodeLayout], Writer]
+FILMED, STILL = ("h264", "av1", "png", "jpeg"), ("png", "jpeg", "h264", "av1")
 
 
-def _maniskill(folder: Path, layout: Layout) -> Writer:
-    from robospa.harness.datasets.maniskill import ManiSkill
+@dataclass(frozen=True)
+class DatasetFormat:
+    """One format of data sets: its name in words, the package that writes it, how pictures can be
+    coded (the default first), its writer, and how it is read back.
 
-    return ManiSkill(folder, layout)
+    `commands` gives the commanded joints (T, D) of an episode, `misfits` a sentence for everything
+    in the files that is not as the episodes' lines say.
+    """
+
+    title: str
+    package: str
+    images: tuple[str, ...]
+    writer: MakeWriter
+    commands: Callable[[Path, EpisodeLine], NDArray[np.float32]]
+    misfits: Callable[[Path, Sequence[EpisodeLine]], Iterable[str]]
 
 
-FORMATS: Mapping[str, MakeWriter] = {
-    "lerobot-v3": LeRobotV3,
-    "lerobot-v2.1": LeRobotV21,
-    "robotwin-hdf5": RoboTwin,
-    "maniskill": _maniskill,
+def _lerobot(title: str, writer: type[lerobot.LeRobotWriter]) -> DatasetFormat:
+    misfits = partial(lerobot.misfits, writer.version)
+    return DatasetFormat(title, "pyarrow", FILMED, writer, lerobot.commands, misfits)  # type: ignore[arg-type]
+
+
+FORMATS: Mapping[str, DatasetFormat] = {
+    "lerobot-v3": _lerobot("LeRobot dataset v3.0", lerobot.LeRobotV3),
+    "lerobot-v2.1": _lerobot("LeRobot dataset v2.1", lerobot.LeRobotV21),
+    # RoboTwin's files have JPEGs of their own, made from what is kept until then: PNG loses nothing
+    "robotwin-hdf5": DatasetFormat(
+        "RoboTwin's HDF5", "h5py", STILL, robotwin.RoboTwin, robotwin.commands, robotwin.misfits
+    ),
 }
 
 
 def check_packages(layout: str) -> None:
     """Raises MissingPackage if one that writes a format of `FORMATS`, or its card, is not
     installed."""
-    table = "pyarrow" if layout.startswith("lerobot") else "h5py"
-    for module in (table, "PIL", "matplotlib"):
+    for module in (FORMATS[layout].package, "PIL", "matplotlib"):
         need(module, "demos")
-
-
-def images_of(layout: str) -> tuple[str, ...]:
-    """How pictures can be coded for a format of `FORMATS`; the default first. RoboTwin's files
-    have JPEGs of their own and ManiSkill's bare pixels, both made from what is kept until then: PNG
-    loses nothing."""
-    if layout in ("robotwin-hdf5", "maniskill"):
-        return ("png", "jpeg", "h264", "av1")
-    return ("h264", "av1", "png", "jpeg")
 
 
 def pack(
@@ -93,7 +105,7 @@ def pack(
     files: Sequence[Path],
     manifest: DatasetManifest,
     on_episode: Callable[[int], None] = lambda count: None,
-) -> Made:
+) -> DatasetRecord:
     """Write the episodes in `files`, in their order, to `folder` in a format of `FORMATS`.
 
     What an earlier packing left in `folder` is replaced; anything else stays. `on_episode` is told
@@ -116,13 +128,13 @@ def pack_episodes(
     expected: int,
     writer: MakeWriter | None = None,
     card: Callable[[CardFacts], str] | None = None,
-) -> Made:
+) -> DatasetRecord:
     """As `pack`, from `episodes` with their names, at most `expected` of them.
 
     `writer` makes another one than the format has, `card` another text. What the settings of
     `manifest` say is read after the last episode.
     """
-    make = writer or FORMATS[layout]
+    make = writer or FORMATS[layout].writer
     part = folder / PART
     with storage_errors(folder):
         shutil.rmtree(part, ignore_errors=True)
@@ -132,10 +144,10 @@ def pack_episodes(
             shutil.rmtree(part)
             raise DatasetError(f"there is no episode to write to {folder}{_why(manifest)}")
         first = layout_of(begin[1])
-        facts = CardFacts(layout, first, manifest, expected)
+        facts = CardFacts(layout, FORMATS[layout].title, first, manifest, expected)
         _write(make(part, first), part, chain([begin], episodes), facts, on_episode)
         write_card(part, facts, card)
-        made = Made(
+        made = DatasetRecord(
             FORMAT,
             layout,
             first.robot,
@@ -152,7 +164,7 @@ def pack_episodes(
             _remove(folder / path.name)
             path.rename(folder / path.name)
         part.rmdir()
-        write_made(folder, made)
+        write_record(folder, made)
     return made
 
 
@@ -174,7 +186,7 @@ def _write(
         for index, (name, episode) in enumerate(episodes):
             try:
                 file = writer.add(episode)
-            except (LayoutError, FilmError) as error:
+            except (EpisodeMisfit, EpisodeFilmError) as error:
                 raise DatasetError(f"{name} cannot be packed: {error}") from error
             lines.add(index, episode, file)
             facts.add(episode)

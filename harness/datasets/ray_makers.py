@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from typing import Any
 
-from robospa.harness.datasets.jobs import CannotMake, Job, MadeEpisode
+from robospa.harness.datasets.jobs import EpisodeAttempt, EpisodeJob, MakerError
 from robospa.harness.pool import WorkerDied
 from robospa.harness.running.ray_cluster import NoCluster, RaySettings, error_line, join_cluster
 
@@ -21,7 +21,7 @@ class MakerActor:
         self._path, self._maker = path, None
         self._differences = version_differences(versions)
 
-    def make(self, job: Job) -> MadeEpisode | str:
+    def make(self, job: EpisodeJob) -> EpisodeAttempt | str:
         """What comes of `job`, or why nothing can be made here."""
         from robospa.harness.datasets.jobs import attempt_job
         from robospa.harness.factory import load_function
@@ -41,15 +41,15 @@ class RayMaker:
     def __init__(self, ray: Any, actor: Any) -> None:
         self._ray, self._actor = ray, actor
 
-    def run(self, job: Job) -> MadeEpisode:
-        """What comes of `job`; raises WorkerDied, CannotMake."""
+    def run(self, job: EpisodeJob) -> EpisodeAttempt:
+        """What comes of `job`; raises WorkerDied, MakerError."""
         try:
             answer = self._ray.get(self._actor.make.remote(job))
         except Exception as error:
             raise WorkerDied(error_line(error)) from error
-        if isinstance(answer, MadeEpisode):
+        if isinstance(answer, EpisodeAttempt):
             return answer
-        raise CannotMake(str(answer))
+        raise MakerError(str(answer))
 
     def kill(self) -> None:
         """End it now."""

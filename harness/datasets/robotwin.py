@@ -14,13 +14,17 @@ JPEGs with red and blue exchanged, as official ones are, and are coded here: kee
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
-from robospa.harness.convention_check.episodes import Episode, write_episode
+from robospa.harness.convention_check.episodes import Episode, read_episode, write_episode
 from robospa.harness.datasets.episode import DatasetEpisode
-from robospa.harness.datasets.features import Layout, all_pictures
+from robospa.harness.datasets.features import EpisodeLayout
+from robospa.harness.datasets.manifest import EpisodeLine
+from robospa.harness.datasets.pictures import all_pictures
 from robospa.harness.running.atomic_file import replace_file
 from robospa.trial import TrialKey, path_part
 
@@ -30,12 +34,12 @@ CONFIGURATIONS = {"clean": "demo_clean", "randomized-seen": "demo_randomized"}
 class RoboTwin:
     """Writes demonstrations below `folder`."""
 
-    def __init__(self, folder: Path, layout: Layout) -> None:
+    def __init__(self, folder: Path, layout: EpisodeLayout) -> None:
         self._folder, self._layout = folder, layout
         self._counts: dict[Path, int] = {}
 
     def add(self, episode: DatasetEpisode) -> str:
-        """Write `episode`; its file, below the folder. Raises LayoutError."""
+        """Write `episode`; its file, below the folder. Raises EpisodeMisfit."""
         self._layout.check(episode)
         below = configuration(episode.key)
         number = self._counts.get(below, 0)
@@ -90,3 +94,23 @@ def _more(episode: DatasetEpisode) -> dict[str, str | np.ndarray]:
         "robospa/subtask": episode.subtask,
         "robospa/label": episode.label,
     }
+
+
+def commands(folder: Path, line: EpisodeLine) -> NDArray[np.float32]:
+    """The commanded joints (T, D) of an episode."""
+    return read_episode(folder / line.file).commanded.astype(np.float32)
+
+
+def misfits(folder: Path, lines: Iterable[EpisodeLine]) -> Iterator[str]:
+    """A sentence for everything in the files that is not as the episodes `lines` say."""
+    import h5py
+
+    for line in lines:
+        with h5py.File(folder / line.file) as file:
+            found = {len(file["joint_action/vector"])}
+            found.update(len(of["rgb"]) for of in file["observation"].values())
+        if found != {line.frames}:
+            yield f"{line.file} has {' and '.join(map(str, found))} frames, not {line.frames}"
+        sentences = Path(line.file).parent.parent / "instructions" / f"{Path(line.file).stem}.json"
+        if not json.loads((folder / sentences).read_text())["seen"]:
+            yield f"{sentences} has no sentence"

@@ -1,13 +1,24 @@
-"""What a data set is made of: the settings of `robospa collect`, and the variants they name."""
+"""What a data set is made of: the settings of `robospa collect`, the variants that they name, the
+versions that it depends on besides, the command that makes it, and the disk space that it takes.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import shlex
+import shutil
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, fields
+from functools import cache
+from importlib import metadata
+from pathlib import Path
 from typing import Annotated
 
 from msgspec import Meta
 
-from robospa.harness.datasets.encoding import CODECS
+from robospa.environment_state import WIDTH
+from robospa.harness.datasets.pictures import CODECS
+from robospa.harness.running.code_hash import ROOTS, hash_files, package_files
+from robospa.harness.running.ray_node import versions as packages
 from robospa.harness.selection import (
     parse_embodiments,
     parse_levels,
@@ -17,7 +28,9 @@ from robospa.harness.selection import (
 from robospa.harness.settings import SettingsError, check_values
 from robospa.observation import CAMERAS, CameraSpec
 from robospa.protocol.options import option
+from robospa.tasks.catalog import task
 from robospa.tasks.modes import for_training
+from robospa.tasks.scene import SUITE
 from robospa.tasks.seeds import ListKey
 from robospa.trial import REFERENCE, TrialKey
 
@@ -103,3 +116,85 @@ def lists_of(settings: Collection) -> list[ListKey]:
 def trial_of(key: ListKey, seed: int) -> TrialKey:
     """The trial of a demonstration."""
     return TrialKey(key.task, key.level, seed, key.embodiment, key.mode, "train")
+
+
+MADE_BY = (
+    *ROOTS,
+    "robospa.harness.datasets.maker",
+    "robospa.harness.datasets.pack",
+)
+"""What makes episodes and packs them; code that they import counts too."""
+
+
+@cache
+def versions() -> dict[str, str]:
+    """Suite, packages, and a hash of the code: with other ones, other bytes may come out."""
+    found = {"suite": SUITE, **packages()}
+    found["code"] = hash_files(package_files(), MADE_BY)
+    for package in ("av", "pillow"):
+        try:
+            found[package] = metadata.version(package)
+        except metadata.PackageNotFoundError:
+            found[package] = "missing"
+    return found
+
+
+def command_of(settings: Collection, layout: str) -> str:
+    """The command line that makes the same data set, wherever that is put."""
+    words = ["robospa", "collect"]
+    for field in fields(settings):
+        value = getattr(settings, field.name)
+        flag = "--" + field.name.replace("_", "-")
+        if value != field.default:
+            words += [flag] if value is True else [flag, str(value)]
+    return shlex.join([*words, "--format", layout, "--out", "DIR"])
+
+
+SHARE_OF_LIMIT = 0.48
+"""Frames of a demonstration, as a share of its step limit: mean of the variants
+(`benchmarks/results/demonstrations.csv`)."""
+KEYFRAME_SHARE = 0.06
+"""The same of keyframes, an eighth of those by stride."""
+FRAME_BYTES: Mapping[str, int] = {"h264": 1_500, "av1": 1_500, "jpeg": 9_000, "png": 12_000}
+"""Of a picture of 320 x 240; measured, and rounded up."""
+OTHER_BYTES, ROW_BYTES = 20_000, 400
+"""Of an episode besides its pictures: its header, and numbers for every frame."""
+STATE_BYTES = 4 * WIDTH
+"""Of a frame's environment state."""
+COPIES = 2
+"""An episode's file stays until the data set is packed."""
+
+
+def frames_of(settings: Collection, key: ListKey) -> float:
+    """Frames that an episode of a variant has, about."""
+    share = KEYFRAME_SHARE if settings.frames == KEYFRAMES else SHARE_OF_LIMIT
+    return share * task(key.task).levels[key.level].steps
+
+
+def expected_bytes(settings: Collection, keys: Iterable[ListKey], images: str) -> float:
+    """Bytes of the data set, about."""
+    frame = ROW_BYTES + FRAME_BYTES[images] * len(settings.camera_specs())
+    frame += STATE_BYTES * settings.environment_state
+    return sum(settings.episodes * (OTHER_BYTES + frame * frames_of(settings, key)) for key in keys)
+
+
+def check_room(folder: Path, wanted: float) -> str:
+    """A sentence about the room that `wanted` more bytes take in `folder` until they are packed;
+    SettingsError if there is less."""
+    free = shutil.disk_usage(folder).free
+    need = COPIES * wanted
+    if need > free:
+        raise SettingsError(
+            f"about {size_text(need)} are needed in {folder} and {size_text(free)} are free: make "
+            "room, choose another --out, fewer episodes or cameras, or images that are smaller"
+        )
+    return f"about {size_text(wanted)}, twice that while it is packed; {size_text(free)} are free"
+
+
+def size_text(size: float) -> str:
+    """`1.2 GB`, `35 MB`."""
+    for unit in ("bytes", "kB", "MB", "GB"):
+        if size < 1000:
+            return f"{size:.3g} {unit}"
+        size /= 1000
+    return f"{size:.3g} TB"

@@ -14,19 +14,19 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from robospa.harness.convention_check.episodes import EpisodeError
 from robospa.harness.datasets.manifest import (
     MANIFEST,
     SUMS,
     DatasetError,
+    DatasetRecord,
     EpisodeLine,
-    Made,
     file_hash,
     read_lines,
-    read_made,
+    read_record,
     read_sums,
 )
 from robospa.harness.datasets.pack import FORMATS, PART, files_below
-from robospa.harness.datasets.packed import commands, misfits
 from robospa.tasks.scene import SUITE
 from robospa.tasks.seeds import FIRST_TRAINING_SEED, LAST_TRAINING_SEED
 
@@ -41,19 +41,19 @@ BESIDE = ("episodes", ".lock", PART, MANIFEST, SUMS)
 
 
 @dataclass(frozen=True)
-class Ending:
+class ReplayEnding:
     """How a replay ended: whether the goal was met, and the digest of the simulator's state."""
 
     success: bool
     digest: str
 
 
-Replay = Callable[[EpisodeLine, NDArray[np.float32]], Ending]
+EpisodeReplay = Callable[[EpisodeLine, NDArray[np.float32]], ReplayEnding]
 """Replays an episode from its commanded joints (T, D)."""
 
 
 @dataclass(frozen=True)
-class Verdict:
+class Verification:
     """What was found: `problems`, a sentence each, and `checked`, what was looked at."""
 
     problems: tuple[str, ...]
@@ -68,44 +68,44 @@ class Verdict:
 def verify(
     folder: Path,
     replays: int = REPLAYS,
-    replay: Replay | None = None,
+    replay: EpisodeReplay | None = None,
     on_replay: Callable[[int, int], None] = lambda done, total: None,
-) -> Verdict:
+) -> Verification:
     """Check the data set in `folder`, replaying so many episodes (all, if there are no more).
 
     `replay` runs an episode; without one the simulator does. `on_replay` is told how many of how
     many are done. Raises DatasetError where `folder` is no data set that can be checked.
     """
-    made = read_made(folder)
+    made = read_record(folder)
     if made.layout not in FORMATS:
         raise DatasetError(
             f"{folder} is of the format {made.layout!r}, and this version of robospa knows "
             f"{', '.join(FORMATS)}: verify it with the version that made it"
         )
     if problems := tuple(_hash_problems(folder, made)):
-        return Verdict(problems, ())
+        return Verification(problems, ())
     checked = [f"All {len(read_sums(folder)):,} files have the hashes that {SUMS} names."]
     lines = [_light(line) for line in read_lines(folder)]
-    if problems := (*_line_problems(made, lines), *misfits(folder, made.layout, lines)):
-        return Verdict(problems, tuple(checked))
+    if problems := (*_line_problems(made, lines), *_misfits(folder, made.layout, lines)):
+        return Verification(problems, tuple(checked))
     checked.append(
         f"{len(lines):,} episodes with {made.frames:,} frames: as many, in the same order and with "
         f"the same columns, in {MANIFEST}, the lists of episodes and the data."
     )
     if made.about.get("suite") == RECORDINGS:
         text = "Official recordings: their scenes are not known here, so none was replayed."
-        return Verdict((), (*checked, text))
+        return Verification((), (*checked, text))
     if not replays:
-        return Verdict((), (*checked, "No episode was replayed."))
+        return Verification((), (*checked, "No episode was replayed."))
     if made.about.get("suite") != SUITE:
         suite = made.about.get("suite")
         problem = f"its scenes are of the suite {suite}, and those of this version of {SUITE}"
-        return Verdict((f"no episode can be replayed: {problem}",), tuple(checked))
+        return Verification((f"no episode can be replayed: {problem}",), tuple(checked))
     sample = _sample(folder, len(lines), replays, made.sums)
     problems = tuple(_replay_problems(folder, made, sample, replay or in_simulator(), on_replay))
     if not problems:
         checked.append(replayed_sentence(len(sample), len(lines)))
-    return Verdict(problems, tuple(checked))
+    return Verification(problems, tuple(checked))
 
 
 def replayed_sentence(sample: int, total: int) -> str:
@@ -121,7 +121,7 @@ def replayed_sentence(sample: int, total: int) -> str:
     )
 
 
-def _hash_problems(folder: Path, made: Made) -> Iterator[str]:
+def _hash_problems(folder: Path, made: DatasetRecord) -> Iterator[str]:
     if not (folder / SUMS).exists():
         yield f"{SUMS} is missing"
         return
@@ -143,7 +143,7 @@ def _hash_problems(folder: Path, made: Made) -> Iterator[str]:
             yield f"{below} is not part of the data set: move it away"
 
 
-def _line_problems(made: Made, lines: Sequence[EpisodeLine]) -> Iterator[str]:
+def _line_problems(made: DatasetRecord, lines: Sequence[EpisodeLine]) -> Iterator[str]:
     found = (len(lines), sum(line.frames for line in lines))
     if found != (made.episodes, made.frames):
         yield (
@@ -171,6 +171,14 @@ def _line_problems(made: Made, lines: Sequence[EpisodeLine]) -> Iterator[str]:
             yield f"episode {index} is of the kind {line.kind}, and {ends} its goal"
 
 
+def _misfits(folder: Path, layout: str, lines: Sequence[EpisodeLine]) -> Iterator[str]:
+    """What is wrong in the files of the format."""
+    try:
+        yield from FORMATS[layout].misfits(folder, lines)
+    except (OSError, ValueError, LookupError, TypeError, EpisodeError) as error:
+        yield f"the files in {folder} cannot be read as {layout}: {error}"
+
+
 def _light(line: EpisodeLine) -> EpisodeLine:
     """Without what takes memory: there may be hundreds of thousands."""
     return replace(line, instructions=(), subtasks=(), prefix_action=())
@@ -184,15 +192,15 @@ def _sample(folder: Path, total: int, count: int, seed: str) -> list[EpisodeLine
 
 def _replay_problems(
     folder: Path,
-    made: Made,
+    made: DatasetRecord,
     sample: Sequence[EpisodeLine],
-    replay: Replay,
+    replay: EpisodeReplay,
     on_replay: Callable[[int, int], None],
 ) -> Iterator[str]:
     for number, line in enumerate(sample, 1):
         name = f"episode {line.episode_index} ({line.key.slug})"
         try:
-            ending = replay(line, commands(folder, made.layout, line))
+            ending = replay(line, FORMATS[made.layout].commands(folder, line))
         except Exception as error:  # whatever a simulator or a foreign task says
             yield f"{name} cannot be replayed: {error}"
             continue
@@ -208,16 +216,16 @@ def _replay_problems(
             )
 
 
-def in_simulator() -> Replay:
+def in_simulator() -> EpisodeReplay:
     """Replays episodes in the simulator, one after the other in one world, without pictures."""
-    from robospa.harness.demonstrations.kinds import replay as replayed
+    from robospa.harness.demonstrations.demonstration import replay as replayed
     from robospa.harness.sim.sapien_world import SapienWorld
 
     world = SapienWorld(render=False)
 
-    def run(line: EpisodeLine, commanded: NDArray[np.float32]) -> Ending:
+    def run(line: EpisodeLine, commanded: NDArray[np.float32]) -> ReplayEnding:
         prefix = line.prefix if len(line.prefix) else np.zeros((0, commanded.shape[1]), np.float32)
         record = replayed(world, line.key, commanded, prefix, line.kind)
-        return Ending(record.success, record.digest)
+        return ReplayEnding(record.success, record.digest)
 
     return run

@@ -1,28 +1,129 @@
 """Noise with recovery: pushes off the expert's way, from which it comes back by itself.
 
 As in DART (Laskey et al. 2017) what is executed is disturbed, and what is recorded as the action is
-what the expert would do in the state that the robot is in. Only motions with room around them are
-disturbed, with nothing or a held object in the hand; what is grasped, put down or pressed is never.
-The pushes come from a stream of the trial's own, so an episode follows from its key.
+what the expert would do in the state that the robot is in. Only motions with clearance around them
+are disturbed, with nothing or a held object in the hand; what is grasped, put down or pressed is
+never. The pushes come from a generator of the trial's own, so an episode follows from its key.
+
+A motion goes along a straight joint line, and `progress` is how much of it is done. A push moves
+the beginning of that line, as it were, by a `shift` that grows smoothly from nothing while the push
+lasts and stays as it is from then on; what the arm is off its plan is what of it the rest of the
+line has, `(1 - progress) * shift`. So once the push is over the arm moves straight from where
+it is to the motion's goal, in the time that is left: that is how the expert itself would go on.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.action_space import ARMS
-from robospa.harness.demonstrations.labels import OFF, PushLog
-from robospa.harness.demonstrations.push import Push, push
-from robospa.harness.demonstrations.room import depths, gaps
+from robospa.action_space import ARMS, ActionSpace
+from robospa.harness.demonstrations.clearance import depths, gaps
 from robospa.harness.robots.kinematics import Chain, forward
 from robospa.harness.sim.motion import RATE, Trajectory
 from robospa.harness.skills.workspace import Workspace
 from robospa.harness.world import World
 
 Array = NDArray[np.float64]
+
+ACCELERATION = 4.0
+"""The most [rad/s^2] that a push adds to any joint: as much as a demonstration itself has."""
+TURN = 0.5
+"""The most [rad] that a push shifts any joint."""
+
+
+@dataclass(frozen=True)
+class Push:
+    """`shift` (n, J) [rad] after each of n physics steps of a motion, and the `progress` (n,)."""
+
+    progress: Array
+    shift: Array
+
+    @property
+    def offset(self) -> Array:
+        """(n, J) [rad] off the plan."""
+        found: Array = (1.0 - self.progress)[:, None] * self.shift
+        return found
+
+    def scaled(self, by: float) -> Push:
+        """The same push, `by` times as strong."""
+        return Push(self.progress, by * self.shift)
+
+
+def smooth_step(at: Array) -> Array:
+    """From 0 at 0 to 1 at 1, with speed and acceleration 0 at both ends; constant beyond."""
+    t = np.clip(at, 0.0, 1.0)
+    found: Array = t**3 * (10.0 - 15.0 * t + 6.0 * t**2)
+    return found
+
+
+def push(progress: Array, direction: Array, begin: float, end: float) -> Push:
+    """A push in joint `direction` (J,) [rad] that lasts from the share `begin` of a motion's time
+    to `end`, along a motion of this `progress` (n,), made weaker as the limits ask for."""
+    time = (np.arange(len(progress)) + 1.0) / len(progress)
+    grown = smooth_step((time - begin) / (end - begin))
+    made = Push(progress, grown[:, None] * direction)
+    added = np.abs(np.diff(made.offset, n=2, axis=0)).max(initial=0.0) * RATE**2
+    turned = np.abs(direction).max()
+    return made.scaled(min(1.0, ACCELERATION / max(added, 1e-9), TURN / max(turned, 1e-9)))
+
+
+LABELS = ("expert", "noise", "recovery", "mistake")
+"""The expert's own; one with noise added; the expert's way back from that; a scripted mistake. A
+frame's label counts in this order, which never changes."""
+EXPERT, NOISE, RECOVERY, MISTAKE = range(len(LABELS))
+
+OFF = 1e-3
+"""An arm is off its plan if a joint is by more than this [rad]."""
+PUSHED = 1e-4
+"""A command is pushed if it differs by more than this [rad] from the expert's."""
+
+
+class PushLog:
+    """What was pushed in the motions of one demonstration, physics step by physics step.
+
+    `width` is the number of joints of the arm that has more.
+    """
+
+    def __init__(self, width: int) -> None:
+        self._left: list[Array] = [np.ones((len(ARMS), 1))]
+        self._shift: list[Array] = [np.zeros((len(ARMS), 1, width))]
+
+    def append(self, steps: int, pushes: Mapping[int, Push]) -> None:
+        """A motion of so many physics steps, with the push of every arm that had one."""
+        left = np.ones((len(ARMS), steps))
+        shift = np.zeros((len(ARMS), steps, self._shift[0].shape[2]))
+        for arm, made in pushes.items():
+            left[arm] = 1.0 - made.progress
+            shift[arm, :-1, : made.shift.shape[1]] = made.shift[:-1]
+        self._left.append(left)
+        self._shift.append(shift)
+
+    def annotate(
+        self, space: ActionSpace, commanded: NDArray[np.float32], steps: Sequence[int]
+    ) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+        """Labels (T,) and actions (T, D) of frames with `commanded` (T, D) after `steps` (T,).
+
+        A frame's action is what the expert would command next from the state that the frame shows:
+        the next frame's command without what the push has grown meanwhile. Every end of a motion
+        has to be a frame. The last action repeats the last command.
+        """
+        left, shift = np.concatenate(self._left, axis=1), np.concatenate(self._shift, axis=1)
+        now, then = np.asarray(steps), np.asarray([*steps[1:], steps[-1]])
+        action = np.concatenate([commanded[1:], commanded[-1:]])
+        pushed, off = np.zeros(len(now)), np.zeros(len(now))
+        for a, columns in enumerate(space.arms):
+            grown = left[a, then, None] * (shift[a, then] - shift[a, now])
+            grown[~shift[a, then].any(axis=1)] = 0.0  # that motion has ended
+            action[:, columns.body] -= grown[:, : space.joints[a]].astype(np.float32)
+            pushed = np.maximum(pushed, np.abs(grown).max(axis=1))
+            off = np.maximum(off, np.abs(left[a, now, None] * shift[a, now]).max(axis=1))
+        label = np.where(pushed > PUSHED, NOISE, np.where(off > OFF, RECOVERY, EXPERT))
+        return label.astype(np.uint8), action
+
 
 STRENGTH = 0.04
 """How far [m] the strongest push brings the fingertips off their way."""
@@ -38,13 +139,13 @@ BEGIN, LASTS = (0.05, 0.3), (0.25, 0.4)
 """When a push begins, and how long it lasts, as shares of a motion's time: a third is left in which
 the arm comes back."""
 TRIES = 4
-"""In so many directions room is looked for."""
+"""So many directions are tried."""
 PLACES = 10
-"""In so many places of a disturbed way it is looked for."""
+"""In so many places of a disturbed way clearance is looked at."""
 DEEPER = 0.001
 """A disturbed way may be so much deeper [m] in a margin than the planned one."""
 ARMS_APART = 0.1
-"""Room [m] between the arms, where the planned way has it."""
+"""Clearance [m] between the arms, where the planned way has it."""
 
 
 class Noise:
@@ -81,7 +182,7 @@ class Noise:
         return replace(path, joints=joints, velocities=velocities) if pushes else path
 
     def _pushes(self, path: Trajectory) -> dict[int, Push]:
-        """A push for every arm that moves and has room, by arm."""
+        """A push for every arm that moves with clearance, by arm."""
         self._look()
         found: dict[int, Push] = {}
         for arm in range(len(ARMS)):
@@ -91,7 +192,7 @@ class Noise:
                 continue
             for _ in range(TRIES):
                 made = self._draw(path, arm, turn)
-                if made is not None and self._has_room(path, {**found, arm: made}, arm):
+                if made is not None and self._is_clear(path, {**found, arm: made}, arm):
                     found[arm] = made
                     self.pushes.append(self._off(path, arm, made))
                     break
@@ -143,7 +244,7 @@ class Noise:
         rows = _places(line)
         return deviation(chain, tip, line[rows], (line + made.offset)[rows])
 
-    def _has_room(self, path: Trajectory, pushes: dict[int, Push], arm: int) -> bool:
+    def _is_clear(self, path: Trajectory, pushes: dict[int, Push], arm: int) -> bool:
         """True if the arm is nowhere nearer to anything than as planned, but for margins."""
         seen = self._seen
         rows = _places(path.joints[arm])

@@ -5,6 +5,12 @@ and at the motion's end. So here; a motion is an action. As its end is kept, a r
 frame to frame passes through every corner of the recorded way, and closes the gripper where it was
 closed.
 
+A frame is an action of whoever learns from it, so frames have to fit the task's step limit, with
+slack for a learner that is slower: a task whose demonstrations would take more than three quarters
+of its limit at some level has a longer stride. None is longer than the 50 steps that an action
+takes in which nothing moves, so a replay never waits less than the expert did
+(`benchmarks/demonstrations.py`).
+
 Drawing is nearly all that a recording costs, so nothing is drawn while it is made: a frame keeps a
 still of a few kilobytes, and who wants the recording has the pictures drawn afterwards.
 """
@@ -19,11 +25,26 @@ from numpy.typing import NDArray
 
 from robospa.action_space import ActionSpace
 from robospa.harness.convention_check.episodes import Episode, to_jpeg
-from robospa.harness.demonstrations.strides import KEYFRAMES, STRIDE
 from robospa.harness.sim.motion import RATE
 from robospa.harness.world import StepResult, Still, World
 from robospa.observation import DEFAULT_CAMERAS, CameraSpec
 from robospa.protocol.policy import PolicySpec
+
+STRIDE = 15
+"""Physics steps (of 1/250 s) from one frame to the next: 16.67 Hz, as officially."""
+KEYFRAMES = 0
+"""In the place of a stride: frames only where the expert's own actions begin and end."""
+STRIDES: Mapping[str, int] = {
+    "Press_Stapler_Memory": 20,
+    "Remember_Orientation_Restore": 20,
+}
+"""Of the tasks that need another: physics steps, a multiple of 5 (frames are taken at polls)."""
+
+
+def frame_steps(task: str) -> int:
+    """Physics steps from one frame to the next in recordings of `task`."""
+    return STRIDES.get(task, STRIDE)
+
 
 COMMANDED = PolicySpec("recorder", ())
 MEASURED = PolicySpec("recorder", (), state="measured")
@@ -31,7 +52,7 @@ NOTHING = np.zeros(0, np.float32)
 
 
 @dataclass(frozen=True)
-class Frame:
+class RecordedFrame:
     """One instant: the physics step since the trial's start, `commanded` and `measured` float32
     (D,) and `ee` (2, 8) as in an observation, what it looks like, and the objects as numbers (E,),
     of which there are none unless they were asked for."""
@@ -53,7 +74,7 @@ class FrameRecorder:
     """A `Recorder` (`robospa.harness.trial`) that keeps a frame every `stride` physics steps of an
     action, and at its end.
 
-    A frame less than half a stride before an action's end gives way to that one. `stride` is
+    A frame less than half a stride before an action's end is replaced by that one. `stride` is
     counted in polls: a multiple of 5. With `KEYFRAMES` for it, frames are kept only where actions
     begin and end.
     """
@@ -61,7 +82,7 @@ class FrameRecorder:
     def __init__(self, stride: int = STRIDE, environment_state: bool = False) -> None:
         self.stride = stride
         self._commanded = replace(COMMANDED, environment_state=environment_state)
-        self.frames: list[Frame] = []
+        self.frames: list[RecordedFrame] = []
         """Those until now."""
         self._ended = 0
         """Physics step at which the last action ended."""
@@ -107,7 +128,7 @@ class FrameRecorder:
     def _keep(self, world: World, step: int) -> None:
         seen, measured = world.observe(self._commanded), world.observe(MEASURED)["state"]
         objects = seen.get("environment_state", NOTHING)
-        frame = Frame(step, seen["state"], measured, seen["ee"], world.still(), objects)
+        frame = RecordedFrame(step, seen["state"], measured, seen["ee"], world.still(), objects)
         self.frames.append(frame)
 
     def episode(
@@ -132,7 +153,7 @@ class FrameRecorder:
 
 
 def drawn(
-    frames: Sequence[Frame], cameras: Sequence[CameraSpec]
+    frames: Sequence[RecordedFrame], cameras: Sequence[CameraSpec]
 ) -> Iterator[list[NDArray[np.uint8]]]:
     """The pictures (height, width, 3) of every frame, one a camera; nothing without cameras.
 

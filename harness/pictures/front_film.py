@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.harness.demonstrations.expert_run import demonstrate
+from robospa.harness.demonstrations.demonstration import demonstrate
 from robospa.harness.pictures.robot_films import encode
 from robospa.harness.pictures.video import FilmRecorder
 from robospa.harness.world import World

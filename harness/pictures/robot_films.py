@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.harness.demonstrations.expert_run import demonstrate
+from robospa.harness.demonstrations.demonstration import demonstrate
 from robospa.harness.pictures.variety import ROBOTS
 from robospa.harness.pictures.video import FPS, FilmRecorder
 from robospa.harness.world import World

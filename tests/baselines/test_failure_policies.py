@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from robospa.baselines.failure_policies import FailingOracle, create
-from robospa.harness.demonstrations.mistakes import KINDS
+from robospa.harness.demonstrations.changed_plans import KINDS
 from robospa.results.failures.labels import label
 from robospa.trial import TrialKey
 

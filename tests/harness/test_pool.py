@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from collect_fakes import order
 
-from robospa.harness.datasets.jobs import CannotMake, Job, maker_at
+from robospa.harness.datasets.jobs import EpisodeJob, MakerError, maker_at
 from robospa.harness.datasets.open_pool import pool_opener
 from robospa.harness.pool import MOST_DEATHS, JobProcess, Pool, WorkerDied, WorkerStuck
 from robospa.harness.seeds.attempt import Attempt
@@ -148,8 +148,8 @@ def test_a_collection_replaces_a_process_that_dies(
         assert pool.workers == 1
         assert pool.submit(order(tmp_path).job(KEY, 1_000_001)).result().accepted
     assert (tmp_path / "deaths").exists()
-    start = partial(JobProcess[Job, Attempt], maker_at, "collect_fakes:NoSuchMaker")
-    with Pool(start, 1) as pool, pytest.raises(CannotMake, match="NoSuchMaker"):
+    start = partial(JobProcess[EpisodeJob, Attempt], maker_at, "collect_fakes:NoSuchMaker")
+    with Pool(start, 1) as pool, pytest.raises(MakerError, match="NoSuchMaker"):
         pool.submit(order(tmp_path).job(KEY, 1)).result()
 
 

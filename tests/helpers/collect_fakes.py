@@ -11,8 +11,8 @@ from pathlib import Path
 from dataset_fakes import fake_episode
 
 from robospa.harness.datasets.collect import Order
-from robospa.harness.datasets.episode_file import episode_bytes, read_episode_file
-from robospa.harness.datasets.jobs import Job, MadeEpisode, NotGood, attempt_job
+from robospa.harness.datasets.episode import episode_bytes, read_episode_file
+from robospa.harness.datasets.jobs import EpisodeAttempt, EpisodeJob, RejectedSeed, attempt_job
 from robospa.harness.datasets.manifest import DatasetManifest
 from robospa.harness.datasets.settings import Collection
 from robospa.harness.pool import Pool
@@ -26,26 +26,26 @@ class FakeMaker:
     """Makes an episode of every seed that 4 does not divide; seed 1,000,001 ends the first process
     that tries it, where $FAKE_DEATHS is a file in which that is noted."""
 
-    def __call__(self, job: Job) -> MadeEpisode:
+    def __call__(self, job: EpisodeJob) -> EpisodeAttempt:
         seed = job.key.seed
         deaths = os.environ.get("FAKE_DEATHS")
         if deaths and seed == 1_000_001 and not Path(deaths).exists():
             Path(deaths).touch()
             os._exit(9)
         if seed % 4 == 0:
-            raise NotGood(f"the expert does not\nmeet the goal: seed {seed}")
+            raise RejectedSeed(f"the expert does not\nmeet the goal: seed {seed}")
         data = episode_bytes(fake_episode(job.key, frames=3))
-        return MadeEpisode(seed, True, data=data, frames=3, times={"pictures": 0.5})
+        return EpisodeAttempt(seed, True, data=data, frames=3, times={"pictures": 0.5})
 
 
-class FakePool(Pool[Job, Attempt]):
+class FakePool(Pool[EpisodeJob, Attempt]):
     """Makes every episode at once, in this process."""
 
     def __init__(self, episodes: int, workers: int = 2) -> None:
         super().__init__(lambda: None, 0)  # type: ignore[arg-type, return-value]
         self.workers, self.made = workers, list[int]()
 
-    def submit(self, job: Job) -> Future[Attempt]:
+    def submit(self, job: EpisodeJob) -> Future[Attempt]:
         future: Future[Attempt] = Future()
         self.made.append(job.key.seed)
         future.set_result(attempt_job(FakeMaker(), job))

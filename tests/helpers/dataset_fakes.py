@@ -6,7 +6,7 @@ import numpy as np
 
 from robospa.action_space import ActionSpace
 from robospa.environment_state import WIDTH
-from robospa.harness.datasets.episode import DatasetEpisode, Film, Pictures, Stills
+from robospa.harness.datasets.episode import DatasetEpisode, EpisodeFilm, Pictures, Stills
 from robospa.tasks.events import Event
 from robospa.trial import TrialKey
 
@@ -24,8 +24,8 @@ def fake_episode(
     rng = np.random.default_rng(key.seed)
     commanded = rng.normal(size=(frames, space.width)).astype(np.float32)
     pictures: dict[str, Pictures] = {
-        "head": Film("h264", 8, 6, rng.bytes(200)),
-        "left_wrist": Film("av1", 8, 6, b""),
+        "head": EpisodeFilm("h264", 8, 6, rng.bytes(200)),
+        "left_wrist": EpisodeFilm("av1", 8, 6, b""),
     }
     if stills:
         files = tuple(rng.bytes(20 + t) for t in range(frames))

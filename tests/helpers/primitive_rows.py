@@ -14,9 +14,8 @@ from PIL import Image
 
 from robospa.baselines.learned.maps.lowering import lowered
 from robospa.baselines.learned.maps.primitives import Primitive
-from robospa.harness.datasets.episode import DatasetEpisode, Stills
-from robospa.harness.datasets.episode_file import write_episode_file
-from robospa.harness.demonstrations.strides import KEYFRAMES
+from robospa.harness.datasets.episode import DatasetEpisode, Stills, write_episode_file
+from robospa.harness.demonstrations.recorder import KEYFRAMES
 from robospa.harness.robots import embodiment
 from robospa.trial import TrialKey
 from robospa.workcell import HEIGHT, TABLE_TOP, WIDTH, WORKCELL

@@ -12,11 +12,16 @@ import numpy as np
 from dataset_fakes import fake_episode
 from numpy.typing import NDArray
 
-from robospa.harness.datasets.episode import DatasetEpisode, Film, Pictures, Stills
-from robospa.harness.datasets.episode_file import write_episode_file
-from robospa.harness.datasets.films import FPS
-from robospa.harness.datasets.manifest import DatasetManifest, Failure
+from robospa.harness.datasets.episode import (
+    DatasetEpisode,
+    EpisodeFilm,
+    Pictures,
+    Stills,
+    write_episode_file,
+)
+from robospa.harness.datasets.manifest import DatasetManifest, SeedFailure
 from robospa.harness.datasets.pack import pack
+from robospa.harness.datasets.pictures import FPS
 from robospa.trial import TrialKey
 
 CAMERAS = ("head", "left_wrist", "right_wrist")
@@ -78,7 +83,7 @@ def tiny_episode(number: int, codec: str = "h264", frames: int | None = None) ->
     for i, camera in enumerate(CAMERAS):
         seen = painted(10 * number + i, frames)
         if codec in OPTIONS:
-            pictures[camera] = Film(codec, *SIZE, film_of(seen, codec))
+            pictures[camera] = EpisodeFilm(codec, *SIZE, film_of(seen, codec))
         else:
             pictures[camera] = Stills(codec, *SIZE, stills_of(seen, codec))
     made = fake_episode(key, frames)
@@ -106,7 +111,7 @@ def written(folder: Path, episodes: Sequence[DatasetEpisode]) -> list[Path]:
     return files
 
 
-FAILED = Failure(
+FAILED = SeedFailure(
     TrialKey("Place_Bowls_Plates", 2, 1_000_900, split="train"), "the goal was not met"
 )
 MANIFEST = DatasetManifest("robospa collect --tasks all", {"episodes": 4}, (FAILED,))

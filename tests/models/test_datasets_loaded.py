@@ -15,7 +15,7 @@ import pytest
 from tiny_datasets import CAMERAS, STEP, painted, tiny_dataset
 
 from robospa.harness.datasets.episode import DatasetEpisode
-from robospa.harness.demonstrations.labels import LABELS
+from robospa.harness.demonstrations.noise import LABELS
 
 ROOT = Path(__file__).resolve().parents[2]
 HERE = Path(__file__).resolve().parent

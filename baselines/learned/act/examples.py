@@ -25,7 +25,7 @@ from robospa.baselines.learned.act.poses import WIDTH, from_joints, from_poses
 from robospa.baselines.learned.words import words_of
 from robospa.environment_state import FEATURES, SLOTS
 from robospa.environment_state import WIDTH as ENVIRONMENT_WIDTH
-from robospa.harness.datasets.manifest import SUMS, EpisodeLine, file_hash, read_lines, read_made
+from robospa.harness.datasets.manifest import SUMS, EpisodeLine, file_hash, read_lines, read_record
 from robospa.harness.robots import embodiment
 
 KINDS = ("expert", "midstate")
@@ -123,7 +123,7 @@ def read_examples(folders: Sequence[Path]) -> Examples:
 def _read(folder: Path) -> Examples:
     import pyarrow.parquet as pq
 
-    made = read_made(folder)
+    made = read_record(folder)
     if made.layout != "lerobot-v3":
         raise DataError(f"{folder} is of the format {made.layout}, and lerobot-v3 is what is read")
     columns = [STATE, ENVIRONMENT, EE, "episode_index"]

@@ -21,9 +21,13 @@ from numpy.typing import NDArray
 from robospa.baselines.learned.maps.primitives import DONE, KINDS, Decision, decisions_of
 from robospa.baselines.learned.maps.proprioception import WIDTH, features
 from robospa.baselines.learned.maps.table_map import TableMap
-from robospa.harness.datasets.episode import DatasetEpisode, Film
-from robospa.harness.datasets.episode_file import EpisodeFileError, read_episode_file
-from robospa.harness.demonstrations.strides import KEYFRAMES
+from robospa.harness.datasets.episode import (
+    DatasetEpisode,
+    EpisodeFileError,
+    EpisodeFilm,
+    read_episode_file,
+)
+from robospa.harness.demonstrations.recorder import KEYFRAMES
 from robospa.harness.robots import embodiment
 from robospa.workcell import TABLE_TOP
 
@@ -209,8 +213,8 @@ def _pictures(
         raise DataError(
             f"{path} has no pictures of the head camera: collect it with --cameras head"
         )
-    if isinstance(seen, Film):
-        from robospa.harness.datasets.films import film_frames
+    if isinstance(seen, EpisodeFilm):
+        from robospa.harness.datasets.pictures import film_frames
 
         wanted = [decision.frame for decision in decisions]
         frames = list(islice(film_frames(seen.data), wanted[-1] + 1))

@@ -6,10 +6,8 @@ import pytest
 
 from robospa.baselines.learned.maps.lowered_plan import LoweredPlan
 from robospa.baselines.learned.maps.primitives import decisions_of
-from robospa.harness.demonstrations.expert_run import demonstrate
-from robospa.harness.demonstrations.recorder import FrameRecorder
-from robospa.harness.demonstrations.strides import KEYFRAMES
-from robospa.harness.demonstrations.world import DemonstrationWorld
+from robospa.harness.demonstrations.demonstration import DemonstrationWorld, demonstrate
+from robospa.harness.demonstrations.recorder import KEYFRAMES, FrameRecorder
 from robospa.harness.robots import embodiment
 from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.harness.trial import run_trial

@@ -10,17 +10,19 @@ from command_line import robospa
 from tiny_datasets import tiny_dataset
 
 from robospa.harness.cli import collect
-from robospa.harness.datasets.collect import Result
-from robospa.harness.datasets.verify import Ending
+from robospa.harness.datasets.collect import CollectionResult
+from robospa.harness.datasets.verify import ReplayEnding
 
 
 def test_what_was_made_as_json(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     out, lines = tmp_path / "set", ("too few of Pick_Blocks_Size L1",)
 
-    def made(order: object, compute: object, resume: bool, keep: bool, say: object) -> Result:
+    def made(
+        order: object, compute: object, resume: bool, keep: bool, say: object
+    ) -> CollectionResult:
         assert callable(say)
         say("6 episodes of 2 variants")
-        return Result((out,), 5, lines)
+        return CollectionResult((out,), 5, lines)
 
     monkeypatch.setattr(collect, "_collected", made)
     done = robospa("collect", "--tasks", "Pick_Blocks_Size", "--out", out, "--json")
@@ -33,8 +35,8 @@ def test_what_was_made_as_json(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_what_was_verified_as_json(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (episode,) = tiny_dataset(tmp_path, "maniskill", "png", count=1)
-    ending = Ending(True, episode.replay_digest)
+    (episode,) = tiny_dataset(tmp_path, "robotwin-hdf5", "png", count=1)
+    ending = ReplayEnding(True, episode.replay_digest)
     simulator = "robospa.harness.datasets.verify.in_simulator"
     monkeypatch.setattr(simulator, lambda: lambda line, commanded: ending)
     words = ("collect", "--verify", tmp_path, "--json")

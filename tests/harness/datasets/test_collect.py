@@ -17,11 +17,8 @@ import pytest
 from collect_fakes import FakePool, contents, fake_pack, order
 
 from robospa.harness.datasets import collect as module
-from robospa.harness.datasets.collect import Order, collect
-from robospa.harness.datasets.disk_use import expected_bytes
-from robospa.harness.datasets.identity import command_of
-from robospa.harness.datasets.settings import Collection
-from robospa.harness.datasets.store import EPISODES, EpisodeStore
+from robospa.harness.datasets.collect import EPISODES, EpisodeStore, Order, collect
+from robospa.harness.datasets.settings import Collection, command_of, expected_bytes
 from robospa.harness.running.atomic_file import StorageError
 from robospa.harness.running.run_lock import run_lock
 from robospa.harness.seeds.attempt import Attempt
@@ -35,17 +32,17 @@ FIRST = ListKey("Pick_Blocks_Size", 1)
 
 @pytest.fixture(autouse=True)
 def _without_formats(monkeypatch: pytest.MonkeyPatch) -> None:
-    def read_made(folder: Path) -> SimpleNamespace:
+    def read_record(folder: Path) -> SimpleNamespace:
         return SimpleNamespace(**json.loads((folder / "robospa.json").read_text()))
 
     monkeypatch.setattr(module, "pack", fake_pack)
-    monkeypatch.setattr(module, "read_made", read_made)
+    monkeypatch.setattr(module, "read_record", read_record)
 
 
 def quiet(line: str) -> None: ...
 
 
-def run(wanted: Order, resume: bool = False, keep: bool = False) -> module.Result | None:
+def run(wanted: Order, resume: bool = False, keep: bool = False) -> module.CollectionResult | None:
     return collect(wanted, FakePool, resume=resume, keep_episodes=keep, say=quiet)
 
 
@@ -141,7 +138,7 @@ def test_no_episode_stays_in_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     kept: list[Attempt] = []
     add = EpisodeStore.add
 
-    def watched(store: EpisodeStore, key: ListKey, made: module.MadeEpisode) -> Attempt:
+    def watched(store: EpisodeStore, key: ListKey, made: module.EpisodeAttempt) -> Attempt:
         kept.append(add(store, key, made))
         return kept[-1]
 
@@ -241,8 +238,6 @@ def test_impossible_settings_are_one_sentence(tmp_path: Path) -> None:
     assert "shows nothing of noise" in refusal_of(frames="keyframes", noise=0.1)
     blind = replace(order(tmp_path, cameras="none"), layout="robotwin-hdf5")
     assert "robotwin-hdf5 is a format of pictures: name cameras" in refusal(blind)
-    midst = replace(order(tmp_path, midstates=0.5), layout="maniskill")
-    assert "cannot begin in the midst of a task: leave out midstates" in refusal(midst)
     assert "images 'gif' is not one of" in refusal_of(images="gif")
     assert "more than all" in refusal_of(noise=0.6, mistakes=0.6)
     assert "must be" in refusal_of(episodes=0)

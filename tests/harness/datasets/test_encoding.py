@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from robospa.harness.datasets import encoding
-from robospa.harness.datasets.encoding import CODECS, FPS, CodecMissing, encode, require
-from robospa.harness.datasets.episode import Film, Stills
+from robospa.harness.datasets import pictures as coding
+from robospa.harness.datasets.episode import EpisodeFilm, Stills
+from robospa.harness.datasets.pictures import CODECS, FPS, CodecMissing, encode, require
 from robospa.observation import CameraSpec
 
 CAMERAS = (CameraSpec("head", 64, 48), CameraSpec("front", 32, 32))
@@ -43,7 +43,7 @@ def test_every_frame_is_there_in_its_colours(codec: str) -> None:
             assert np.abs(frame.mean(axis=(0, 1)) - wanted).max() < 12, (codec, t)
 
 
-def decoded(seen: Film | Stills) -> list[NDArray[np.uint8]]:
+def decoded(seen: EpisodeFilm | Stills) -> list[NDArray[np.uint8]]:
     if isinstance(seen, Stills):
         from PIL import Image
 
@@ -59,7 +59,7 @@ def decoded(seen: Film | Stills) -> list[NDArray[np.uint8]]:
 
 
 def test_an_encoder_that_is_missing_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    missing = encoding._Encoder("libnone", {})
-    monkeypatch.setattr(encoding, "ENCODERS", {**encoding.ENCODERS, "av1": missing})
+    missing = coding._Encoder("libnone", {})
+    monkeypatch.setattr(coding, "ENCODERS", {**coding.ENCODERS, "av1": missing})
     with pytest.raises(CodecMissing, match="no encoder libnone here: choose h264 or png or jpeg"):
         require("av1")

@@ -12,10 +12,12 @@ import numpy as np
 import pytest
 from dataset_fakes import fake_episode
 
-from robospa.harness.datasets.episode import ARRAYS, DatasetEpisode, Film
-from robospa.harness.datasets.episode_file import (
+from robospa.harness.datasets.episode import (
+    ARRAYS,
     HEADER,
+    DatasetEpisode,
     EpisodeFileError,
+    EpisodeFilm,
     episode_bytes,
     read_episode_file,
     write_episode_file,
@@ -58,7 +60,7 @@ def test_an_episode_whose_arrays_do_not_fit_is_none() -> None:
         replace(episode, sim_time=episode.sim_time[1:])
     with pytest.raises(ValueError, match="camera head has 4 frames, not 5"):
         head = episode.pictures["head"]
-        assert not isinstance(head, Film)
+        assert not isinstance(head, EpisodeFilm)
         replace(episode, pictures={"head": replace(head, frames=head.frames[1:])})
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from fake_records import trial_record
 
-from robospa.harness.datasets.episode_maker import replay_end
+from robospa.harness.datasets.maker import replay_end
 from robospa.harness.replay import ENDED
 from robospa.trial import TrialKey
 

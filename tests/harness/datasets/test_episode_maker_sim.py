@@ -9,18 +9,15 @@ import pytest
 from numpy.typing import NDArray
 
 from robospa.environment_state import FEATURES, SLOTS
-from robospa.harness.datasets.episode import DatasetEpisode, Film
-from robospa.harness.datasets.episode_file import read_episode_file
-from robospa.harness.datasets.episode_maker import EpisodeMaker
-from robospa.harness.datasets.films import FPS
-from robospa.harness.datasets.jobs import Job, MadeEpisode, attempt_job
+from robospa.harness.datasets.episode import DatasetEpisode, EpisodeFilm, read_episode_file
+from robospa.harness.datasets.jobs import EpisodeAttempt, EpisodeJob, attempt_job
+from robospa.harness.datasets.maker import EpisodeMaker
 from robospa.harness.datasets.manifest import DatasetManifest
 from robospa.harness.datasets.pack import pack
+from robospa.harness.datasets.pictures import FPS
 from robospa.harness.datasets.verify import verify
-from robospa.harness.demonstrations.expert_run import demonstrate
-from robospa.harness.demonstrations.kinds import replay
-from robospa.harness.demonstrations.strides import KEYFRAMES
-from robospa.harness.demonstrations.world import DemonstrationWorld
+from robospa.harness.demonstrations.demonstration import DemonstrationWorld, demonstrate, replay
+from robospa.harness.demonstrations.recorder import KEYFRAMES
 from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.harness.world import StepResult, World
 from robospa.observation import CameraSpec
@@ -34,18 +31,18 @@ KEY = TrialKey("Press_Stapler_Repeat", 1, 1_000_000, split="train")
 
 
 @pytest.fixture(scope="module")
-def made() -> MadeEpisode:
-    return attempt_job(EpisodeMaker(), Job(KEY, TINY, "h264"))
+def made() -> EpisodeAttempt:
+    return attempt_job(EpisodeMaker(), EpisodeJob(KEY, TINY, "h264"))
 
 
 @pytest.fixture
-def episode(made: MadeEpisode, tmp_path: Path) -> DatasetEpisode:
+def episode(made: EpisodeAttempt, tmp_path: Path) -> DatasetEpisode:
     path = tmp_path / "x.zip"
     path.write_bytes(made.data)
     return read_episode_file(path)
 
 
-def test_it_says_what_happened(made: MadeEpisode, episode: DatasetEpisode) -> None:
+def test_it_says_what_happened(made: EpisodeAttempt, episode: DatasetEpisode) -> None:
     assert made.accepted and not made.reason and made.frames == len(episode)
     assert (episode.key, episode.kind, episode.success) == (KEY, "expert", True)
     assert len(set(episode.instructions)) == len(episode.instructions) >= 100
@@ -62,7 +59,7 @@ def test_every_frame_has_a_picture(episode: DatasetEpisode) -> None:
     import av
 
     film = episode.pictures["head"]
-    assert isinstance(film, Film)
+    assert isinstance(film, EpisodeFilm)
     with av.open(io.BytesIO(film.data)) as file:
         times = [frame.time * FPS for frame in file.decode(video=0)]
     assert np.allclose(times, range(len(episode)))
@@ -76,7 +73,7 @@ def test_what_is_written_can_be_replayed(episode: DatasetEpisode) -> None:
     assert record.scene_digest == episode.scene_digest
 
 
-def test_a_packed_data_set_is_verified_by_replay(made: MadeEpisode, tmp_path: Path) -> None:
+def test_a_packed_data_set_is_verified_by_replay(made: EpisodeAttempt, tmp_path: Path) -> None:
     path = tmp_path / "x.zip"
     path.write_bytes(made.data)
     pack("lerobot-v3", tmp_path / "set", [path], DatasetManifest("robospa collect", {}))
@@ -84,18 +81,18 @@ def test_a_packed_data_set_is_verified_by_replay(made: MadeEpisode, tmp_path: Pa
     assert verdict.problems == () and verdict.checked[-1].startswith("All 1 episodes were replayed")
 
 
-def test_another_worker_that_made_another_before_makes_the_same_bytes(made: MadeEpisode) -> None:
+def test_another_worker_that_made_another_before_makes_the_same_bytes(made: EpisodeAttempt) -> None:
     maker = EpisodeMaker()
     other = TrialKey("Pick_Blocks_Size", 1, 1_000_000, "no-robot", split="train")
-    error = attempt_job(maker, Job(other, TINY, "png"))
+    error = attempt_job(maker, EpisodeJob(other, TINY, "png"))
     assert not error.accepted and "no-robot" in error.reason and not error.data
-    assert attempt_job(maker, Job(KEY, TINY, "h264")).data == made.data
+    assert attempt_job(maker, EpisodeJob(KEY, TINY, "h264")).data == made.data
 
 
 def test_keyframes_without_pictures_are_the_actions_that_the_expert_gave(tmp_path: Path) -> None:
     key = TrialKey("Pick_Blocks_Size", 1, 1_000_000, split="train")
     maker = EpisodeMaker()
-    made = attempt_job(maker, Job(key, (), "h264", keyframes=True, environment_state=True))
+    made = attempt_job(maker, EpisodeJob(key, (), "h264", keyframes=True, environment_state=True))
     path = tmp_path / "x.zip"
     path.write_bytes(made.data)
     episode = read_episode_file(path)

@@ -10,8 +10,14 @@ import numpy as np
 import pytest
 from tiny_datasets import film_of, painted
 
-from robospa.harness.datasets.films import FPS, FilmError, JoinedFilm, check_film, film_frames
-from robospa.harness.datasets.numbered_files import FilmFiles
+from robospa.harness.datasets.lerobot import FilmFiles
+from robospa.harness.datasets.pictures import (
+    FPS,
+    EpisodeFilmError,
+    JoinedFilm,
+    check_film,
+    film_frames,
+)
 
 LENGTHS = (5, 1, 8)
 
@@ -40,9 +46,9 @@ def test_a_joined_film_shows_every_frame_at_its_time(tmp_path: Path) -> None:
 def test_films_of_other_encoders_or_lengths_are_refused(tmp_path: Path) -> None:
     film = JoinedFilm(tmp_path / "film.mp4")
     film.append(film_of(painted(0, 4)), 4)
-    with pytest.raises(FilmError, match="other settings"):
+    with pytest.raises(EpisodeFilmError, match="other settings"):
         film.append(film_of(painted(0, 4)[:, :32]), 4)
-    with pytest.raises(FilmError, match="4 frames, and the episode 5"):
+    with pytest.raises(EpisodeFilmError, match="4 frames, and the episode 5"):
         check_film(film_of(painted(0, 4)), 5)
     film.close()
 
@@ -60,8 +66,8 @@ def test_film_files_go_on_in_a_next_file(tmp_path: Path) -> None:
     files = FilmFiles(tmp_path, limit=2.2 * len(data) / 1024**2)
     places = [files.add(data, 5) for _ in range(3)]
     files.close()
-    assert [place[:2] for place in places] == [(0, 0), (0, 0), (0, 1)]
-    assert [round(place[2] * FPS) for place in places] == [0, 5, 0]
+    assert [place for place, _ in places] == [(0, 0), (0, 0), (0, 1)]
+    assert [round(start * FPS) for _, start in places] == [0, 5, 0]
     assert len(list(film_frames((tmp_path / "chunk-000/file-001.mp4").read_bytes()))) == 5
 
 

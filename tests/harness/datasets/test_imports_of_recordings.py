@@ -12,9 +12,9 @@ import pytest
 from robospa.action_space import SIX_JOINT_ARMS, ActionSpace
 from robospa.harness.cli.main import main
 from robospa.harness.convention_check.episodes import Episode, read_episode, to_jpeg, write_episode
-from robospa.harness.datasets.imports import ABSENT, LAYOUTS, import_recordings
-from robospa.harness.datasets.manifest import DatasetError, file_hash, read_lines, read_made
-from robospa.harness.datasets.packed import commands
+from robospa.harness.datasets.imports import ABSENT, import_recordings
+from robospa.harness.datasets.manifest import DatasetError, file_hash, read_lines, read_record
+from robospa.harness.datasets.pack import FORMATS
 from robospa.harness.datasets.verify import RECORDINGS, verify
 from robospa.harness.official.recordings import find_recordings
 from robospa.harness.settings import SettingsError
@@ -68,7 +68,7 @@ def imported(home: Path, layout: str, out: Path) -> list[Any]:
     return list(read_lines(out))
 
 
-@pytest.mark.parametrize("layout", LAYOUTS)
+@pytest.mark.parametrize("layout", FORMATS)
 def test_a_data_set_of_recordings_is_sound_in_every_format(
     layout: str, official: Path, tmp_path: Path
 ) -> None:
@@ -80,13 +80,13 @@ def test_a_data_set_of_recordings_is_sound_in_every_format(
     verdict = verify(out)
     assert verdict.problems == ()
     assert "scenes are not known here, so none was replayed" in verdict.checked[-1]
-    made = read_made(out)
+    made = read_record(out)
     assert (made.episodes, made.robot) == (3, "unstated")
     assert made.about["suite"] == RECORDINGS
     for line in lines:
         path = official / line.source
         assert line.source_sha256 == file_hash(path)
-        found = commands(out, layout, line)
+        found = FORMATS[layout].commands(out, line)
         assert found == pytest.approx(read_episode(path).commanded.astype(np.float32))
         assert line.success is None and line.key.split == "official_seen"
     assert [line.key.seed for line in lines] == [7, 12, 0]
@@ -112,7 +112,7 @@ def test_what_is_missing_is_stated_and_not_invented(official: Path, tmp_path: Pa
     assert all(f"* `{name}`:" in card for name in ABSENT)
     assert "3 of 6 recordings are left out" in card and "no sentence is beside it" in card
     assert "grab it" not in card + (out / "meta" / "robospa_episodes.jsonl").read_text()
-    why = {row["why"] for row in read_made(out).settings["left_out"]}
+    why = {row["why"] for row in read_record(out).settings["left_out"]}
     assert why == {
         "its folder names no task and level, such as Pick_Blocks_Size_5",
         "it is a recording of robospa, no official one",
@@ -155,7 +155,7 @@ def test_nothing_to_import_and_a_full_folder_are_refused(official: Path, tmp_pat
     (tmp_path / "full" / "mine").touch()
     for layout, out, message in (
         ("lerobot-v3", "full", "is not empty"),
-        ("maniskill", "new", "cannot be had as 'maniskill' but as lerobot-v3"),
+        ("zarr", "new", "cannot be had as .zarr. but as lerobot-v3"),
     ):
         with pytest.raises(SettingsError, match=message):
             import_recordings(find_recordings(official), official, layout, tmp_path / out)

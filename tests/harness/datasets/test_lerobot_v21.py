@@ -10,8 +10,8 @@ import pyarrow.parquet as pq
 import pytest
 from tiny_datasets import CAMERAS, tiny_dataset
 
-from robospa.harness.datasets.episode import Film
-from robospa.harness.datasets.films import FPS
+from robospa.harness.datasets.episode import EpisodeFilm
+from robospa.harness.datasets.pictures import FPS
 
 
 def lines(path: Path) -> list[dict[str, object]]:
@@ -31,7 +31,7 @@ def test_an_episode_has_a_file_and_a_film_a_camera(tmp_path: Path) -> None:
     for camera in CAMERAS:
         key = f"observation.images.{camera}"
         film = episodes[1].pictures[camera]
-        assert isinstance(film, Film)
+        assert isinstance(film, EpisodeFilm)
         path = tmp_path / info["video_path"].format(video_key=key, **where)
         assert path.read_bytes() == film.data
 

@@ -14,10 +14,10 @@ from tiny_datasets import CAMERAS, MANIFEST, SIZE, tiny_dataset, written
 
 from robospa.environment_state import NAMES
 from robospa.harness.datasets.episode import DatasetEpisode
-from robospa.harness.datasets.films import FPS, film_frames
+from robospa.harness.datasets.lerobot import TableFiles
 from robospa.harness.datasets.manifest import DatasetError
-from robospa.harness.datasets.numbered_files import TableFiles
 from robospa.harness.datasets.pack import pack
+from robospa.harness.datasets.pictures import FPS, film_frames
 from robospa.harness.datasets.verify import verify
 from robospa.trial import TrialKey
 

@@ -11,16 +11,16 @@ from tiny_datasets import MANIFEST as SETTINGS
 from tiny_datasets import tiny_dataset, tiny_episode, written
 
 from robospa.action_space import ActionSpace
-from robospa.harness.datasets import lerobot_v3
+from robospa.harness.datasets import lerobot
 from robospa.harness.datasets.features import layout_of
 from robospa.harness.datasets.manifest import (
     MANIFEST,
     DatasetError,
     EpisodeLines,
     read_lines,
-    read_made,
+    read_record,
 )
-from robospa.harness.datasets.pack import FORMATS, files_below, images_of, pack
+from robospa.harness.datasets.pack import FORMATS, files_below, pack
 from robospa.harness.running.atomic_file import StorageError
 
 
@@ -30,13 +30,13 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 @pytest.mark.parametrize("layout", FORMATS)
 def test_packing_twice_gives_the_same_bytes(layout: str, tmp_path: Path) -> None:
-    codec = images_of(layout)[0]
+    codec = FORMATS[layout].images[0]
     for name in "ab":
         tiny_dataset(tmp_path / name, layout, codec, count=2)
     first, second = contents(tmp_path / "a"), contents(tmp_path / "b")
     assert first.keys() == second.keys()
     assert [name for name in first if first[name] != second[name]] == []
-    made = read_made(tmp_path / "a")
+    made = read_record(tmp_path / "a")
     assert (made.episodes, made.layout, made.failures) == (2, layout, SETTINGS.failures)
     assert [line.key.seed for line in read_lines(tmp_path / "a")] == [1_000_000, 1_000_001]
 
@@ -95,9 +95,9 @@ def test_memory_does_not_grow_with_the_episodes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Forty episodes more take less than 5 kB each, though each has 25 kB of rows."""
-    monkeypatch.setattr(lerobot_v3, "BUFFERED", 10)
+    monkeypatch.setattr(lerobot, "BUFFERED", 10)
     episode = replace(tiny_episode(0, frames=6), pictures={})
-    writer = lerobot_v3.LeRobotV3(tmp_path, layout_of(episode))
+    writer = lerobot.LeRobotV3(tmp_path, layout_of(episode))
     lines = EpisodeLines(tmp_path)
 
     def add(count: int) -> None:

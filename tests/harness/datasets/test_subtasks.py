@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from robospa.harness.datasets.subtasks import subtask_of_frames, subtask_texts
+from robospa.harness.datasets.maker import subtask_of_frames, subtask_texts
 from robospa.harness.trial import task_parts
 from robospa.tasks.events import Event
 from robospa.trial import TrialKey

@@ -24,8 +24,8 @@ from robospa.harness.datasets.manifest import (
     EpisodeLine,
     file_hash,
 )
-from robospa.harness.datasets.pack import FORMATS, images_of, pack
-from robospa.harness.datasets.verify import REPLAYS, Ending, replayed_sentence, verify
+from robospa.harness.datasets.pack import FORMATS, pack
+from robospa.harness.datasets.verify import REPLAYS, ReplayEnding, replayed_sentence, verify
 
 
 class Replayed:
@@ -34,17 +34,17 @@ class Replayed:
     def __init__(self, episodes: list[DatasetEpisode]) -> None:
         self.episodes, self.seen = episodes, list[int]()
 
-    def __call__(self, line: EpisodeLine, commanded: NDArray[np.float32]) -> Ending:
+    def __call__(self, line: EpisodeLine, commanded: NDArray[np.float32]) -> ReplayEnding:
         episode = self.episodes[line.episode_index]
         self.seen.append(line.episode_index)
         right = np.array_equal(commanded, episode.commanded)
         right &= line.prefix.tolist() == episode.prefix_action.tolist()
-        return Ending(right and episode.success, episode.replay_digest)
+        return ReplayEnding(right and episode.success, episode.replay_digest)
 
 
 @pytest.mark.parametrize("layout", FORMATS)
 def test_a_sound_data_set_of_every_format(layout: str, tmp_path: Path) -> None:
-    episodes = tiny_dataset(tmp_path, layout, images_of(layout)[0], count=4)
+    episodes = tiny_dataset(tmp_path, layout, FORMATS[layout].images[0], count=4)
     simulator = Replayed(episodes)
     verdict = verify(tmp_path, 3, simulator)
     assert verdict.problems == () and verdict.sound
@@ -138,7 +138,7 @@ def test_replays_that_end_otherwise_are_told(tmp_path: Path) -> None:
         episodes[2],
     ]
 
-    def broken(line: EpisodeLine, commanded: NDArray[np.float32]) -> Ending:
+    def broken(line: EpisodeLine, commanded: NDArray[np.float32]) -> ReplayEnding:
         if line.episode_index == 2:
             raise RuntimeError("the scene does not come to rest")
         return Replayed(others)(line, commanded)

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from robospa.harness.demonstrations.expert_run import demonstrate
-from robospa.harness.demonstrations.recorder import FrameRecorder
-from robospa.harness.demonstrations.strides import stride_of
+from robospa.harness.demonstrations.demonstration import demonstrate
+from robospa.harness.demonstrations.recorder import FrameRecorder, frame_steps
 from robospa.harness.replay import replay
 from robospa.harness.robots import embodiment
 from robospa.harness.sim.motion import DEMONSTRATION_LIMITS
@@ -31,7 +30,7 @@ SHARE = 0.85
     ids=lambda key: key.task,
 )
 def test_a_replayed_demonstration_succeeds_within_the_step_limit(key: TrialKey) -> None:
-    recorder = FrameRecorder(stride_of(key.task))
+    recorder = FrameRecorder(frame_steps(key.task))
     made = demonstrate(SapienWorld(render=False, limits=DEMONSTRATION_LIMITS), key, recorder)
     assert made.success and not made.failures
     space = embodiment(key.embodiment).action_space("joint")

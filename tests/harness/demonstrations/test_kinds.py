@@ -7,13 +7,25 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from robospa.harness.demonstrations.kinds import Shares, Shown, kind_of, replay, show
-from robospa.harness.demonstrations.labels import EXPERT, MISTAKE, NOISE, RECOVERY
-from robospa.harness.demonstrations.midstates import Displace, Wander, beginnings, middle_plan
-from robospa.harness.demonstrations.mistakes import GoWrong, marked, occasions
+from robospa.harness.demonstrations.changed_plans import (
+    Displace,
+    GoWrong,
+    Wander,
+    beginnings,
+    marked,
+    middle_plan,
+    occasions,
+)
+from robospa.harness.demonstrations.demonstration import (
+    DemonstrationWorld,
+    ShownEpisode,
+    generator_of,
+    kind_of,
+    replay,
+    show,
+)
+from robospa.harness.demonstrations.noise import EXPERT, MISTAKE, NOISE, RECOVERY
 from robospa.harness.demonstrations.recorder import FrameRecorder
-from robospa.harness.demonstrations.streams import stream
-from robospa.harness.demonstrations.world import DemonstrationWorld
 from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.results.failures.labels import label as failure_type
 from robospa.tasks.catalog import build_scene, task
@@ -21,7 +33,7 @@ from robospa.tasks.plan import Pick, Place, Press
 from robospa.trial import TrialKey
 
 SEED = 930_000
-MIXED = Shares(noise=0.3, mistakes=0.1, midstates=0.2)
+MIXED = (0.3, 0.1, 0.2)
 
 
 def key(name: str, level: int = 2, seed: int = SEED) -> TrialKey:
@@ -30,7 +42,7 @@ def key(name: str, level: int = 2, seed: int = SEED) -> TrialKey:
 
 def test_a_stream_is_its_key_s_own() -> None:
     def first(of: TrialKey, purpose: str = "noise") -> float:
-        return float(stream(of, purpose).uniform())
+        return float(generator_of(of, purpose).uniform())
 
     plain = key("Pick_Blocks_Size")
     assert first(plain) == first(plain)
@@ -48,13 +60,9 @@ def test_shares_are_met_by_any_run_of_seeds(first: int) -> None:
 
 
 def test_without_shares_all_are_the_expert_s() -> None:
-    assert {kind_of(key("Pick_Blocks_Size", seed=s), Shares()) for s in range(30)} == {"expert"}
-
-
-@pytest.mark.parametrize("shares", [(-0.1, 0.0, 0.0), (0.5, 0.4, 0.2)])
-def test_shares_that_make_no_sense_are_refused(shares: tuple[float, float, float]) -> None:
-    with pytest.raises(ValueError, match="whose sum is at most 1"):
-        Shares(*shares)
+    assert {kind_of(key("Pick_Blocks_Size", seed=s), (0.0, 0.0, 0.0)) for s in range(30)} == {
+        "expert"
+    }
 
 
 def test_mistakes_are_those_that_a_scene_gives_occasion_for() -> None:
@@ -64,8 +72,10 @@ def test_mistakes_are_those_that_a_scene_gives_occasion_for() -> None:
 
 def test_what_is_remembered_has_no_midstates() -> None:
     with pytest.raises(ValueError, match="remembered from its beginning"):
-        middle_plan(build_scene("Remember_Color_Cover", 2, SEED), stream(key("x"), "midstate"))
-    assert kind_of(key("Remember_Color_Cover"), Shares(midstates=1.0)) == "expert"
+        middle_plan(
+            build_scene("Remember_Color_Cover", 2, SEED), generator_of(key("x"), "midstate")
+        )
+    assert kind_of(key("Remember_Color_Cover"), (0.0, 0.0, 1.0)) == "expert"
 
 
 @pytest.mark.parametrize(
@@ -109,14 +119,14 @@ def test_a_mistake_is_marked_before_the_step_that_differs() -> None:
     assert marked(scene, (pick, Place(pick.object)))[0] == GoWrong()
 
 
-def shown(kind: str, name: str) -> tuple[Shown, FrameRecorder]:
+def shown(kind: str, name: str) -> tuple[ShownEpisode, FrameRecorder]:
     recorder, world = FrameRecorder(), DemonstrationWorld(render=False)
     made = show(world, key(name), recorder, kind)
     world.close()
     return made, recorder
 
 
-def annotated(made: Shown, recorder: FrameRecorder) -> tuple[np.ndarray, np.ndarray]:
+def annotated(made: ShownEpisode, recorder: FrameRecorder) -> tuple[np.ndarray, np.ndarray]:
     return made.annotate(recorder.commanded, np.array([f.time for f in recorder.frames]))
 
 

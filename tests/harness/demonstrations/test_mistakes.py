@@ -6,7 +6,7 @@ import pytest
 
 from robospa.geometry import Pose
 from robospa.gripper import grasp_points
-from robospa.harness.demonstrations.mistakes import split_steps, wrong_plan
+from robospa.harness.demonstrations.changed_plans import split_steps, wrong_plan
 from robospa.harness.robots import embodiment
 from robospa.harness.skills.workspace import Workspace
 from robospa.tasks.catalog import build_scene, task

@@ -9,8 +9,8 @@ import pytest
 from robot_at_home import at_home
 
 from robospa.geometry import Pose
+from robospa.harness.demonstrations.clearance import depths, gaps
 from robospa.harness.demonstrations.noise import Noise, deviation
-from robospa.harness.demonstrations.room import depths, gaps
 from robospa.harness.sim.motion import DEMONSTRATION_LIMITS, Trajectory, rest_to_rest
 from robospa.harness.skills.grasping import reachable_grasps
 from robospa.harness.skills.workspace import Workspace, moved_back

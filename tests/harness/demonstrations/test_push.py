@@ -6,8 +6,16 @@ import numpy as np
 import pytest
 
 from robospa.action_space import ActionSpace
-from robospa.harness.demonstrations.labels import EXPERT, NOISE, RECOVERY, PushLog
-from robospa.harness.demonstrations.push import ACCELERATION, TURN, push, smooth_step
+from robospa.harness.demonstrations.noise import (
+    ACCELERATION,
+    EXPERT,
+    NOISE,
+    RECOVERY,
+    TURN,
+    PushLog,
+    push,
+    smooth_step,
+)
 from robospa.harness.sim.motion import DEMONSTRATION_LIMITS, RATE, profile
 
 PROGRESS = profile(1.5, DEMONSTRATION_LIMITS)[0]

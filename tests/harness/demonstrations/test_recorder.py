@@ -13,8 +13,13 @@ from numpy.typing import NDArray
 
 from robospa.action_space import ActionSpace
 from robospa.harness.convention_check.episodes import Episode
-from robospa.harness.demonstrations.recorder import FrameRecorder
-from robospa.harness.demonstrations.strides import KEYFRAMES, STRIDE, STRIDES, stride_of
+from robospa.harness.demonstrations.recorder import (
+    KEYFRAMES,
+    STRIDE,
+    STRIDES,
+    FrameRecorder,
+    frame_steps,
+)
 from robospa.harness.sim.motion import HOLD_STEPS, RATE
 from robospa.harness.sim.sapien_world import POLL_STEPS
 from robospa.harness.world import StepResult
@@ -107,7 +112,7 @@ def test_a_rest_is_one_frame_however_long_the_action() -> None:
 
 @pytest.mark.parametrize("task", tasks())
 def test_strides_are_those_of_polls_and_no_wait_gets_shorter(task: str) -> None:
-    assert STRIDE <= stride_of(task) <= HOLD_STEPS and stride_of(task) % POLL_STEPS == 0
+    assert STRIDE <= frame_steps(task) <= HOLD_STEPS and frame_steps(task) % POLL_STEPS == 0
 
 
 def test_strides_are_of_tasks_that_exist() -> None:

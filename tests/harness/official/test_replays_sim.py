@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from robospa.harness.cli.main import main
-from robospa.harness.datasets.episode_file import read_episode_file
+from robospa.harness.datasets.episode import read_episode_file
 from robospa.harness.datasets.features import layout_of
-from robospa.harness.datasets.jobs import Job
+from robospa.harness.datasets.jobs import EpisodeJob
 from robospa.harness.datasets.robotwin import RoboTwin
 from robospa.tasks.catalog import build_scene
 from robospa.tasks.official import official_model
@@ -25,10 +25,10 @@ VIEWERS = {"robot": "back", "opposite": "front", "left": "left", "right": "right
 def test_official_recordings_with_places_meet_their_goal_again(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from robospa.harness.datasets.episode_maker import EpisodeMaker
+    from robospa.harness.datasets.maker import EpisodeMaker
 
     key = TrialKey(TASK, 2, 1_000_001, split="train")
-    made = EpisodeMaker()(Job(key, (), "png"))
+    made = EpisodeMaker()(EpisodeJob(key, (), "png"))
     file = tmp_path / "episode.zip"
     file.write_bytes(made.data)
     episode = read_episode_file(file)

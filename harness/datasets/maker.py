@@ -7,36 +7,36 @@ should. Pictures come last, for good ones alone: they are nearly all that an epi
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from importlib import metadata
 
 import numpy as np
+from numpy.typing import NDArray
 
-from robospa.harness.datasets.encoding import encode, require
-from robospa.harness.datasets.episode import DatasetEpisode
-from robospa.harness.datasets.episode_file import episode_bytes
-from robospa.harness.datasets.jobs import PURPOSES, Job, MadeEpisode, NotGood
-from robospa.harness.datasets.subtasks import subtask_of_frames, subtask_texts
-from robospa.harness.demonstrations.kinds import (
+from robospa.harness.datasets.episode import DatasetEpisode, episode_bytes
+from robospa.harness.datasets.jobs import PURPOSES, EpisodeAttempt, EpisodeJob, RejectedSeed
+from robospa.harness.datasets.pictures import encode, require
+from robospa.harness.demonstrations.demonstration import (
     MISTAKE_PREFIX,
-    Shares,
-    Shown,
+    DemonstrationWorld,
+    ShownEpisode,
     kind_of,
     replay,
     show,
 )
-from robospa.harness.demonstrations.recorder import FrameRecorder, drawn
-from robospa.harness.demonstrations.strides import KEYFRAMES, stride_of
-from robospa.harness.demonstrations.world import DemonstrationWorld
+from robospa.harness.demonstrations.recorder import KEYFRAMES, FrameRecorder, drawn, frame_steps
 from robospa.harness.replay import ENDED
 from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.harness.trial import TrialParts, task_parts
 from robospa.results.failures.labels import label
 from robospa.results.records.trial_record import TrialRecord
-from robospa.tasks.scene import SUITE
+from robospa.tasks.descriptions import describe_objects
+from robospa.tasks.events import Event
+from robospa.tasks.scene import SUITE, Scene
 from robospa.tasks.sentences import sentences
+from robospa.tasks.task import Tracker
 from robospa.trial import TrialKey
 
 
@@ -47,37 +47,33 @@ class EpisodeMaker:
         self._shown = DemonstrationWorld()
         self._replayed = SapienWorld(render=False)
 
-    def __call__(self, job: Job) -> MadeEpisode:
-        """The episode of `job`, verified; raises NotGood and what the worlds raise."""
+    def __call__(self, job: EpisodeJob) -> EpisodeAttempt:
+        """The episode of `job`, verified; raises RejectedSeed and what the worlds raise."""
         if job.cameras:
             require(job.images)
         began, times = time.process_time(), dict.fromkeys(PURPOSES, 0.0)
-        setup, kind = task_parts(job.key), kind_of(job.key, Shares(*job.shares))
-        stride = KEYFRAMES if job.keyframes else stride_of(job.key.task)
+        setup, kind = task_parts(job.key), kind_of(job.key, job.shares)
+        stride = KEYFRAMES if job.keyframes else frame_steps(job.key.task)
         recorder = FrameRecorder(stride, job.environment_state)
         try:
             with timed(times, "expert"):
                 shown = show(self._shown, job.key, recorder, kind, lambda key: setup)
         except ValueError as error:
-            raise NotGood(f"no occasion for {kind}: {error}") from error
+            raise RejectedSeed(f"no occasion for {kind}: {error}") from error
         made = shown.demonstration
         if made.success is kind.startswith(MISTAKE_PREFIX):
             why = "; ".join(made.failures) or "each of its motions went as planned"
-            raise NotGood(f"the expert does not {_wanted(kind)}: {why}")
+            raise RejectedSeed(f"the expert does not {_wanted(kind)}: {why}")
         episode = episode_of(job.key, setup, shown, recorder)
         with timed(times, "replay"):
             record = replay(self._replayed, job.key, episode.commanded, episode.prefix_action, kind)
         if record.success is not made.success:
-            all_sent = ENDED in record.message
-            why = (
-                "all recorded commands were sent" if all_sent else f"{record.end} {record.message}"
-            )
-            raise NotGood(f"its replay does not {_wanted(kind)}: {why}")
+            raise RejectedSeed(f"its replay does not {_wanted(kind)}: {replay_end(record)}")
         with timed(times, "pictures"):
             pictures = encode(drawn(recorder.frames, job.cameras), job.cameras, job.images)
         data = episode_bytes(replace(verified(episode, record), pictures=pictures))
         times["rest"] = time.process_time() - began - sum(times.values())
-        return MadeEpisode(
+        return EpisodeAttempt(
             job.key.seed,
             True,
             digest=record.digest,
@@ -102,7 +98,7 @@ def _wanted(kind: str) -> str:
 
 
 def episode_of(
-    key: TrialKey, setup: TrialParts, shown: Shown, recorder: FrameRecorder
+    key: TrialKey, setup: TrialParts, shown: ShownEpisode, recorder: FrameRecorder
 ) -> DatasetEpisode:
     """What was recorded, before its replay and without pictures."""
     columns = zip(
@@ -156,3 +152,25 @@ def timed(times: dict[str, float], purpose: str) -> Iterator[None]:
         yield
     finally:
         times[purpose] += time.process_time() - began
+
+
+def subtask_of_frames(events: Sequence[Event], sim_time: NDArray[np.float64]) -> NDArray[np.int32]:
+    """The subtask (T,) of frames at `sim_time` (T,) [s], -1 where none is done any more."""
+    done = [event for event in events if event.kind == "subtask_done"]
+    index = np.array([event.index for event in done] + [-1], np.int32)
+    times = [event.time for event in done]
+    found: NDArray[np.int32] = index[np.searchsorted(times, sim_time, side="right")]
+    return found
+
+
+def subtask_texts(tracker: Tracker, scene: Scene) -> tuple[str, ...]:
+    """A text for every subtask: its number, and the objects that it is about."""
+    nouns = describe_objects(scene)
+    objects: dict[int, list[str]] = {}
+    for name, role in tracker.roles.items():
+        for index in role.subtasks:
+            objects.setdefault(index, []).append(nouns.get(name, name))
+    return tuple(
+        f"{i + 1} of {tracker.total}" + (f": {', '.join(objects[i])}" if i in objects else "")
+        for i in range(tracker.total)
+    )

@@ -1,4 +1,4 @@
-"""How much room an arm's way has: to the table, to objects, and to the other arm."""
+"""How far an arm's way is from the table, from objects, and from the other arm."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 MARGIN = 0.01
 """How much larger than they are [m] objects count, besides what the expert's own clearance adds."""
 ABOVE_TABLE = 0.015
-"""Room [m] between the table and what moves."""
+"""Clearance [m] between the table and what moves."""
 
 
 def hand_points(ws: Workspace, arm: int, joints: Array) -> Array:

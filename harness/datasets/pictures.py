@@ -1,0 +1,320 @@
+"""A camera's pictures as they are kept: one film, or a still for every frame.
+
+The bytes follow from the pictures and from the versions of the encoders: one thread, no time of
+day. Frame t of an episode's film lies at t / FPS seconds. Films have two frames a group, as LeRobot
+makes them: a reader that wants one frame decodes at most two. No frame refers to later ones, so
+films are joined by copying the coded pictures and moving their times; all films of a file must
+come from one encoder with one setting.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import Any, Protocol, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robospa.extras import remedy
+from robospa.harness.datasets.episode import (
+    FILM_CODECS,
+    STILL_CODECS,
+    EpisodeFilm,
+    Pictures,
+    Stills,
+)
+from robospa.harness.datasets.statistics import ColourHistogram
+from robospa.observation import CameraSpec
+
+SAMPLED = 16
+"""Pictures of an episode and camera that go into the statistics. LeRobot takes a hundred and more;
+a data set has thousands of episodes, so these are plenty."""
+FPS = 17
+"""Frames per second that a data set names: frames are mostly 15 physics steps of 1/250 s apart,
+which is 16.67 Hz, and LeRobot takes whole numbers only. Motions end between, so frames are not
+equally far apart in any case; `DatasetEpisode.sim_time` has their times."""
+
+
+class EpisodeFilmError(Exception):
+    """A film cannot be joined to others, or is not as long as its episode."""
+
+
+class JoinedFilm:
+    """An MP4 file at `path` that grows episode by episode."""
+
+    def __init__(self, path: Path) -> None:
+        import av
+
+        path.parent.mkdir(parents=True, exist_ok=True)
+        self._file: Any = av.open(str(path), "w", format="mp4", options={"movflags": "faststart"})
+        self._stream: Any = None
+        self._settings: bytes | None = None
+        self.frames, self.size = 0, 0
+
+    @property
+    def seconds(self) -> float:
+        """Its length until now [s]."""
+        return self.frames / FPS
+
+    def append(self, data: bytes, frames: int) -> None:
+        """Add the film `data` of so many `frames`; raises EpisodeFilmError."""
+        with _opened(data) as film:
+            source = film.streams.video[0]
+            settings = bytes(source.codec_context.extradata or b"")
+            if self._stream is None:
+                self._stream = self._file.add_stream_from_template(source, opaque=True)
+                self._stream.time_base = source.time_base
+                self._settings = settings
+            if settings != self._settings:
+                raise EpisodeFilmError(
+                    "its film was encoded with other settings than those before it"
+                )
+            step = Fraction(1, FPS) / source.time_base
+            for packet in _packets(film, frames):
+                packet.pts = packet.dts = int(self.frames * step)
+                packet.duration = int(step)
+                packet.stream = self._stream
+                self.size += packet.size
+                self.frames += 1
+                self._file.mux(packet)
+
+    def close(self) -> None:
+        """Finish the file."""
+        self._file.close()
+
+
+def frame_count(path: Path) -> int:
+    """Number of frames of a film; raises OSError or ValueError if it is none."""
+    import av
+
+    film: Any
+    with av.open(str(path)) as film:
+        return sum(packet.dts is not None for packet in film.demux(film.streams.video[0]))
+
+
+def check_film(data: bytes, frames: int) -> None:
+    """Raises EpisodeFilmError unless the film has so many `frames`, each at its time."""
+    with _opened(data) as film:
+        for _ in _packets(film, frames):
+            pass
+
+
+def _packets(film: Any, frames: int) -> Iterator[Any]:
+    """The coded pictures of a film, which must be `frames` in the order and at the times in which
+    they are shown."""
+    source = film.streams.video[0]
+    step, count = Fraction(1, FPS) / source.time_base, 0
+    for packet in film.demux(source):
+        if packet.dts is None:
+            continue
+        if packet.pts != count * step or packet.dts != packet.pts:
+            raise EpisodeFilmError(f"frame {count} of its film is not shown at {count}/{FPS} s")
+        count += 1
+        yield packet
+    if count != frames:
+        raise EpisodeFilmError(f"its film has {count} frames, and the episode {frames}")
+
+
+def film_frames(data: bytes, wanted: int | None = None) -> Iterator[NDArray[np.uint8]]:
+    """All frames of a film as uint8 (height, width, 3) RGB; or about `wanted` of them, evenly
+    spread, each one that can be decoded without another (a key frame)."""
+    with _opened(data) as film:
+        stream = film.streams.video[0]
+        if wanted is None:
+            for frame in film.decode(stream):
+                yield frame.to_ndarray(format="rgb24")
+            return
+        keys = [packet for packet in film.demux(stream) if packet.is_keyframe and packet.size]
+        for place in np.unique(np.linspace(0, len(keys) - 1, wanted).round().astype(int)):
+            coder = stream.codec_context
+            decoded = [*coder.decode(keys[place]), *coder.decode(None)]
+            coder.flush_buffers()
+            yield decoded[0].to_ndarray(format="rgb24")
+
+
+def _opened(data: bytes) -> Any:
+    import av
+
+    return av.open(io.BytesIO(data))
+
+
+CODECS = (*FILM_CODECS, *STILL_CODECS)
+JPEG_QUALITY = 95
+"""OpenCV's default, which the official recordings have."""
+
+Picture = NDArray[np.uint8]
+
+
+class CodecMissing(Exception):
+    """What would encode the pictures is not installed here; the message says what to do."""
+
+
+@dataclass(frozen=True)
+class _Encoder:
+    """An encoder of PyAV, by its name there, with its options."""
+
+    name: str
+    options: Mapping[str, str]
+
+
+ENCODERS: Mapping[str, _Encoder] = {
+    "h264": _Encoder(
+        "libx264",
+        {"crf": "27", "preset": "veryfast", "g": "2", "bf": "0", "rc-lookahead": "0"},
+    ),
+    "av1": _Encoder(
+        "libsvtav1",
+        {"crf": "30", "preset": "12", "g": "2", "svtav1-params": "lp=1"},
+    ),
+}
+"""AV1 as LeRobot encodes it by default; H.264 as most players and loaders read it fast.
+
+libx264 that looks ahead gives the same pictures other bytes in 1 of 130 films of 30 frames, even on
+one thread; without, in none of 4,000. Quality 27 has then the error that 23 had."""
+
+
+class _Sink(Protocol):
+    """Takes the frames of one camera in their order."""
+
+    def add(self, image: Picture) -> None: ...
+
+    def finish(self) -> Pictures: ...
+
+
+class FilmSink:
+    """An MP4 file of `camera` in memory; frame t is shown at t / FPS seconds."""
+
+    def __init__(self, camera: CameraSpec, codec: str) -> None:
+        import av
+
+        os.environ.setdefault("SVT_LOG", "1")  # else the AV1 encoder prints its settings
+        self._av, self._camera, self._codec = av, camera, codec
+        self._bytes = io.BytesIO()
+        self._file = cast(Any, av.open(self._bytes, "w", format="mp4"))
+        encoder = ENCODERS[codec]
+        self._stream = self._file.add_stream(encoder.name, rate=FPS)
+        self._stream.height, self._stream.width = camera.height, camera.width
+        self._stream.pix_fmt = "yuv420p"
+        self._stream.options = dict(encoder.options)
+        self._stream.codec_context.thread_count = 1
+        self._stream.time_base = Fraction(1, FPS)
+        self._frames = 0
+
+    def add(self, image: Picture) -> None:
+        """Append an RGB picture (height, width, 3)."""
+        packed = np.ascontiguousarray(image)  # the encoder reads it before this returns
+        frame = self._av.VideoFrame.from_numpy_buffer(packed, format="rgb24")
+        frame.pts, frame.time_base = self._frames, Fraction(1, FPS)
+        self._frames += 1
+        self._file.mux(self._stream.encode(frame))
+
+    def finish(self) -> EpisodeFilm:
+        """The whole film."""
+        self._file.mux(self._stream.encode())
+        self._file.close()
+        return EpisodeFilm(
+            self._codec, self._camera.width, self._camera.height, self._bytes.getvalue()
+        )
+
+
+class StillSink:
+    """A file of its own for every frame of `camera`."""
+
+    def __init__(self, camera: CameraSpec, codec: str) -> None:
+        from PIL import Image
+
+        self._image, self._camera, self._codec = Image, camera, codec
+        self._frames: list[bytes] = []
+
+    def add(self, image: Picture) -> None:
+        """Append an RGB picture (height, width, 3)."""
+        stream = io.BytesIO()
+        made = self._image.fromarray(np.ascontiguousarray(image))
+        if self._codec == "png":
+            made.save(stream, "PNG", compress_level=6)
+        else:
+            made.save(stream, "JPEG", quality=JPEG_QUALITY)
+        self._frames.append(stream.getvalue())
+
+    def finish(self) -> Stills:
+        """All of them."""
+        size = (self._camera.width, self._camera.height)
+        return Stills(self._codec, *size, tuple(self._frames))
+
+
+def encode(
+    frames: Iterable[Sequence[Picture]], cameras: Sequence[CameraSpec], codec: str
+) -> dict[str, Pictures]:
+    """The pictures of all `frames`, of which each has one for every camera, by camera.
+
+    Raises CodecMissing.
+    """
+    if not cameras:
+        return {}
+    require(codec)
+    kind = FilmSink if codec in FILM_CODECS else StillSink
+    sinks: list[_Sink] = [kind(camera, codec) for camera in cameras]
+    for images in frames:
+        for sink, image in zip(sinks, images, strict=True):
+            sink.add(image)
+    return {camera.name: sink.finish() for camera, sink in zip(cameras, sinks, strict=True)}
+
+
+def require(codec: str) -> None:
+    """Raises CodecMissing, saying what to install, if pictures cannot be encoded so here."""
+    if codec in STILL_CODECS:
+        try:
+            import PIL  # noqa: F401
+        except ImportError as error:
+            raise CodecMissing(
+                f"{codec} pictures need Pillow, which is not installed; {remedy('PIL')}"
+            ) from error
+        return
+    try:
+        import av
+    except ImportError as error:
+        raise CodecMissing(
+            f"{codec} films need PyAV, which is not installed; {remedy('av')}"
+        ) from error
+    if ENCODERS[codec].name not in av.codecs_available:
+        others = " or ".join(name for name in CODECS if name != codec)
+        raise CodecMissing(
+            f"PyAV {av.__version__} has no encoder {ENCODERS[codec].name} here: choose {others}"
+        )
+
+
+def colours(seen: Pictures) -> ColourHistogram:
+    """The colours of about `SAMPLED` evenly spread pictures."""
+    found = ColourHistogram()
+    for picture in _sampled(seen):
+        found.add(picture)
+    return found
+
+
+def _sampled(seen: Pictures) -> Iterator[NDArray[np.uint8]]:
+    if isinstance(seen, EpisodeFilm):
+        yield from film_frames(seen.data, SAMPLED)
+        return
+    last = len(seen.frames) - 1
+    for t in np.unique(np.linspace(0, last, SAMPLED).round().astype(int)):
+        yield still_picture(seen, int(t))
+
+
+def still_picture(seen: Stills, t: int) -> NDArray[np.uint8]:
+    """Frame `t`, uint8 (height, width, 3) RGB."""
+    from PIL import Image
+
+    with Image.open(io.BytesIO(seen.frames[t])) as picture:
+        return np.asarray(picture.convert("RGB"))
+
+
+def all_pictures(seen: Pictures) -> Iterator[NDArray[np.uint8]]:
+    """All frames, uint8 (height, width, 3) RGB."""
+    if isinstance(seen, EpisodeFilm):
+        return film_frames(seen.data)
+    return (still_picture(seen, t) for t in range(len(seen.frames)))
