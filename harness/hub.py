@@ -11,7 +11,7 @@ from robospa.results.records.manifest import RunError
 from robospa.results.records.run_io import read_run
 from robospa.results.records.run_state import LOCK
 from robospa.results.report.run_view import run_table
-from robospa.results.tables.markdown import to_markdown
+from robospa.results.tables import to_markdown
 
 RUN = "run.json"
 IGNORED = (LOCK, PARTIAL, "logs/*", "wandb/*", "wandb.txt", "episodes/*")

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 from robospa.harness.clock.settings import FIXED_RATE, steps_of
 from robospa.harness.settings import EvaluationSettings, Selection, SettingsError
 from robospa.registry import WORLDS, UnknownName, find, load, names
+from robospa.results.records.manifest import LayoutSettings
 from robospa.trial import TrialKey
 
 if TYPE_CHECKING:
@@ -80,9 +81,9 @@ class WorldKind:
 
         return SPOKEN_PARTS, {"sentences": read_checkout(folder, {key.variant for key in keys})}
 
-    def layout(self, arguments: Mapping[str, object]) -> tuple[dict[str, object], list[str]]:
+    def layout(self, arguments: Mapping[str, object]) -> tuple[LayoutSettings | None, list[str]]:
         """What `arguments` of the parts add to the settings in a manifest, and warnings."""
-        return {}, []
+        return None, []
 
     def open(self, arguments: Mapping[str, object], render: bool | None = None) -> World:
         """A world; `render`, if it is not None, replaces what `arguments` say of drawing."""

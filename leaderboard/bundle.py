@@ -22,11 +22,11 @@ import json
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, TypeGuard
+from typing import TypeGuard
 
-import msgspec
-from msgspec import Struct
+from msgspec import Struct, to_builtins
 
+from robospa.results.records.manifest import RunManifest
 from robospa.schema import Sha256
 
 IN_REPOSITORY = "bundle.zip"
@@ -123,7 +123,7 @@ def canonical(value: object) -> bytes:
         sort_keys=True,
         separators=(",", ":"),
         allow_nan=False,
-        default=msgspec.to_builtins,
+        default=to_builtins,
     )
     return text.encode()
 
@@ -143,12 +143,9 @@ def bundle_hash(manifest: Mapping[str, object]) -> str:
     return sha256(canonical({k: v for k, v in manifest.items() if k != "bundle"}))
 
 
-def inputs_hash(run: Mapping[str, Any], lists: Mapping[str, object]) -> str:
+def inputs_hash(run: RunManifest, lists: Mapping[str, object]) -> str:
     """Hash of what is fixed before the first trial: the chain of rows starts from it."""
-    settings = run["settings"]
-    fixed = ("embodiment", "mode", "split", "run_seed", "step_scale", "policy", "policies")
-    return sha256(
-        canonical(
-            {"suite": run["suite"], "seeds": lists, "settings": {k: settings.get(k) for k in fixed}}
-        )
-    )
+    names = ("embodiment", "mode", "split", "run_seed", "step_scale", "policy", "policies")
+    fixed = {name: getattr(run.settings, name) for name in names}
+    fixed["policies"] = fixed["policies"] or None
+    return sha256(canonical({"suite": run.suite, "seeds": lists, "settings": fixed}))

@@ -16,14 +16,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 from pathlib import Path
-from typing import Any
 
 from msgspec import structs, to_builtins
 
 from robospa.harness.factory import load_function
 from robospa.harness.quantize import STEPS_PER_UNIT, is_quantized
 from robospa.harness.running.action_files import read_actions, read_joints
-from robospa.harness.running.manifest import changed_settings, group_keys, seed_hash
+from robospa.harness.running.manifest import changed_settings
 from robospa.harness.world import World
 from robospa.harness.worlds import open_world
 from robospa.leaderboard import bundle as layout
@@ -33,7 +32,6 @@ from robospa.leaderboard.evidence import announced
 from robospa.leaderboard.rules import (
     Done,
     Reference,
-    Settings,
     check_card_fits,
     check_seeds,
     check_settings,
@@ -51,6 +49,12 @@ from robospa.leaderboard.verify import (
     verify,
 )
 from robospa.results.records.lint import lint_run
+from robospa.results.records.manifest import (
+    PolicySettings,
+    RunAbout,
+    RunSettings,
+    make_manifest,
+)
 from robospa.results.records.run_io import Run, action_path, read_run
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey, path_part
@@ -162,7 +166,7 @@ def merged(runs: Sequence[Run]) -> Run:
     keys: list[TrialKey] = []
     records: dict[TrialKey, TrialRecord] = {}
     categories: dict[str, str] = {}
-    policies: dict[str, Any] = {}
+    policies: dict[str, PolicySettings] = {}
     for run in runs:
         _check_alike(first, run)
         known = set(keys)
@@ -170,39 +174,32 @@ def merged(runs: Sequence[Run]) -> Run:
             raise BundleError(f"two of the runs list the trial {again[0].slug}")
         keys += run.keys
         records.update(run.records)
-        categories.update(run.manifest.get("categories", {}))
-        settings = run.manifest["settings"]
-        own = settings.get("policies") or {}
-        policies.update({k.task: own.get(k.task, settings.get("policy")) for k in run.keys})
-    about = first.manifest.get("about", {})
-    settings = {k: v for k, v in first.manifest["settings"].items() if k != "policies"}
-    if any(policy != settings.get("policy") for policy in policies.values()):
-        settings["policies"] = policies
+        categories.update(run.manifest.categories)
+        own = run.manifest.settings
+        policies.update({k.task: own.policies.get(k.task, own.policy) for k in run.keys})
+    settings = first.manifest.settings
+    differ = any(policy != settings.policy for policy in policies.values())
     keys.sort()
-    manifest = {
-        "format": first.manifest.get("format"),
-        "suite": first.manifest.get("suite"),
-        "settings": settings,
-        "seed_hash": seed_hash(keys),
-        "categories": categories,
-        "trials": group_keys(keys),
-        "about": {name: about[name] for name in ABOUT if name in about},
-    }
+    about = first.manifest.about
+    manifest = make_manifest(
+        structs.replace(settings, policies=policies if differ else {}),
+        keys,
+        RunAbout(**{name: getattr(about, name) for name in ABOUT}),
+        categories,
+        first.manifest.suite,
+    )
     return Run(first.folder, manifest, tuple(keys), records)
 
 
 def _check_alike(first: Run, run: Run) -> None:
     """BundleError if two runs differ in what decides a result, apart from the policy's options."""
-    if not isinstance(run.manifest.get("settings"), Mapping):
-        raise BundleError(f"the run in {run.folder} has no settings")
 
-    def decided(one: Run) -> dict[str, Any]:
-        settings = dict(one.manifest["settings"])
-        about = one.manifest.get("about", {})
-        kept = {k: v for k, v in settings.items() if k not in ("policy", "policies")}
-        world = dict(kept.get("world") or {})
-        kept["world"] = {k: v for k, v in world.items() if k != "render"}
-        return {"suite": one.manifest.get("suite"), **kept, **{k: about.get(k) for k in SAME}}
+    def decided(one: Run) -> dict[str, object]:
+        settings, about = one.manifest.settings, one.manifest.about
+        kept = to_builtins(settings)
+        kept["world"]["arguments"].pop("render", None)
+        del kept["policy"], kept["policies"]
+        return {"suite": one.manifest.suite, **kept, **{k: getattr(about, k) for k in SAME}}
 
     if changes := changed_settings(decided(first), decided(run)):
         raise BundleError(
@@ -211,7 +208,7 @@ def _check_alike(first: Run, run: Run) -> None:
         )
 
 
-def check(run: Run, card: Card, reference: Reference, practice: bool) -> Settings:
+def check(run: Run, card: Card, reference: Reference, practice: bool) -> RunSettings:
     """The settings of `run`; BundleError if `run` cannot enter a leaderboard under `card`."""
     settings = check_settings(run.manifest, reference)
     if run.without_result:
@@ -277,7 +274,7 @@ def write_bundle(
         lines = list(write_rows(_add_actions(writer, run, trace, films), inputs))
         writer.add(layout.RECORDS, b"".join(line + b"\n" for line in lines))
         for name, content in (
-            (layout.RUN, run.manifest),
+            (layout.RUN, run.manifest.to_json()),
             (layout.SEEDS, lists),
             (layout.CARD, card),
             (layout.SCORES, scores_of(run)),
@@ -374,14 +371,14 @@ def parts_of(runs: Sequence[Run], robot: str) -> list[Run]:
 
 
 def _part(run: Run, robot: str) -> Run:
-    settings = {**(run.manifest.get("settings") or {}), "embodiment": [robot]}
     keys = tuple(key for key in run.keys if key.embodiment == robot)
     tasks = {key.task for key in keys}
-    named = {n: c for n, c in run.manifest.get("categories", {}).items() if n in tasks}
-    if settings.get("policies"):
-        settings["policies"] = {n: p for n, p in settings["policies"].items() if n in tasks}
+    manifest = run.manifest
+    policies = {n: p for n, p in manifest.settings.policies.items() if n in tasks}
+    settings = structs.replace(manifest.settings, embodiment=(robot,), policies=policies)
+    named = {n: c for n, c in manifest.categories.items() if n in tasks}
     records = {key: record for key, record in run.records.items() if key.embodiment == robot}
-    manifest = {**run.manifest, "settings": settings, "categories": named}
+    manifest = structs.replace(manifest, settings=settings, categories=named)
     return replace(run, manifest=manifest, keys=keys, records=records)
 
 

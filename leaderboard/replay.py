@@ -8,7 +8,7 @@ state is not, as on another processor or with another build of the simulator; ot
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import as_completed
 from dataclasses import dataclass
 from functools import partial
@@ -20,9 +20,10 @@ from robospa.harness.running.manifest import about_machine, changed_settings
 from robospa.harness.worlds import open_world
 from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.evidence import catches, drawn, least_sample, what_it_catches
-from robospa.leaderboard.rules import Reference
+from robospa.leaderboard.rules import Reference, spec_of
 from robospa.leaderboard.traces import Trace, split_trace
 from robospa.leaderboard.verify import Valid, read_traces
+from robospa.results.records.manifest import RunAbout
 from robospa.results.records.run_io import differences
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
@@ -127,9 +128,8 @@ def replay(
     """
     keys = drawn(challenge, valid.manifest.bundle, valid.keys, count)
     traces = read_traces(valid, keys)
-    jobs = [
-        (valid.run.records[key], traces[key], valid.settings.spec(key.task).action) for key in keys
-    ]
+    spaces = {key: spec_of(valid.settings, key.task).action for key in keys}
+    jobs = [(valid.run.records[key], traces[key], spaces[key]) for key in keys]
     found: dict[TrialKey, Replayed] = {}
     where = (reference.world, reference.parts)
     start = partial(JobProcess, _replayer, where, name="replay")
@@ -144,7 +144,7 @@ def replay(
                 "the simulator does not run here, or crashed: `robospa doctor` says what is missing"
             ) from None
     trials = tuple(found[key] for key in keys)
-    return Replay(trials, len(valid.keys), challenge.strip(), _changed(valid.run.manifest))
+    return Replay(trials, len(valid.keys), challenge.strip(), _changed(valid.run.manifest.about))
 
 
 def judge(claimed: TrialRecord, again: TrialRecord) -> Replayed:
@@ -198,11 +198,11 @@ def _again(world: World, parts: Callable[[TrialKey], TrialParts], job: Job) -> R
     return judge(claimed, again)
 
 
-def _changed(run: Mapping[str, Any]) -> tuple[str, ...]:
+def _changed(about: RunAbout) -> tuple[str, ...]:
     """Versions and code that differ between the run and this installation."""
-    here = about_machine({})
-    kept = ("versions", "code")
-    before, now = ({k: about.get(k) for k in kept} for about in (run["about"], here))
+    before, now = (
+        {"versions": one.versions, "code": one.code} for one in (about, about_machine({}))
+    )
     return tuple(changed_settings(before, now))
 
 

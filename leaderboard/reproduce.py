@@ -299,10 +299,10 @@ def hidden_keys(valid: Valid, block: Block, reference: Reference) -> list[TrialK
 
 def check_policy(valid: Valid, request: Request) -> None:
     """BundleError unless the server says of itself what it said when the bundle was made."""
-    settings = valid.run.manifest["settings"]
+    settings = valid.run.manifest.settings
     for task, policy in probe_policies(request.config, request.keys, request.wait).items():
-        recorded = (settings.get("policies") or {}).get(task) or settings["policy"]
-        before, now = dict(recorded["spec"]), policy.spec.to_json()
+        recorded = settings.policies.get(task, settings.policy)
+        before, now = recorded.spec, policy.spec.to_json()
         if changes := changed_settings(before, now):
             raise BundleError(
                 f"the server for {task} is not the one of the bundle: {'; '.join(changes[:3])}"
@@ -316,7 +316,7 @@ def compare(
 
     Raises BundleError if the run lacks any of them, has others, or was made without the salt.
     """
-    if fresh.info.salt_sha256 != salt_hash(block.salt):
+    if fresh.manifest.settings.salt_sha256 != salt_hash(block.salt):
         raise BundleError("the run was not made on the block's hidden scenes")
     if set(fresh.keys) != set(keys) or fresh.without_result:
         raise BundleError(
@@ -324,7 +324,7 @@ def compare(
             f"{len(keys)} trials are missing; go on with --resume"
         )
     records, claims = with_repeated_failed(fresh.records), claims_of(valid)
-    category_of = valid.run.info.categories
+    category_of = valid.run.manifest.categories
     variants: dict[tuple[str, int], Counts] = {}
     categories: dict[str, list[Counts]] = {}
     for variant in block.seeds:

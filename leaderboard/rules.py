@@ -12,10 +12,9 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
 from itertools import groupby
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
-from msgspec import Meta, Struct
 from numpy.typing import NDArray
 
 from robospa.action_space import KINDS
@@ -25,8 +24,14 @@ from robospa.harness.worlds import SAPIEN_NAME, TASK_PARTS
 from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.card import Card
 from robospa.leaderboard.traces import Trace
+from robospa.results.records.manifest import (
+    PolicySpecification,
+    RunManifest,
+    RunSettings,
+    departures,
+)
 from robospa.results.records.trial_record import TrialRecord
-from robospa.schema import Number, one_of, read
+from robospa.schema import read
 from robospa.tasks.instructions.grammar import SPLITS
 from robospa.tasks.scene import SUITE
 from robospa.trial import REFERENCE, TrialKey
@@ -121,103 +126,37 @@ CONTROLS = ("rest_to_rest",)
 ONE = ("embodiment", "mode", "split")
 
 
-class Spec(Struct, frozen=True):
-    """What a policy said of itself, as far as it is held against the card."""
-
-    name: str
-    action: Annotated[str, one_of(KINDS)]
-    horizon: Annotated[int, Meta(ge=1)] | None = None
-    execute: Annotated[int, Meta(ge=1)] | None = None
-    privileged: bool = False
-    environment_state: bool = False
-    needs_trial_key: bool = False
+VERSIONS = frozenset(("robospa", "python", "numpy", "sapien"))
 
 
-class Policy(Struct, frozen=True):
-    """A policy of the run."""
-
-    spec: Spec
-
-
-class World(Struct, frozen=True):
-    """Where the trials ran."""
-
-    name: str
-    control: str = CONTROLS[0]
+def manifest_of(data: object, what: str = "the run") -> RunManifest:
+    """`data` (a decoded run.json) as a manifest, or BundleError."""
+    return read(RunManifest, data, what, BundleError)
 
 
-class Settings(Struct, frozen=True):
-    """The settings of a run that decide whether it can enter."""
-
-    embodiment: tuple[str, ...]
-    mode: tuple[str, ...]
-    split: tuple[str, ...]
-    run_seed: int
-    privileged: bool
-    world: World
-    policy: Policy | None = None
-    policies: dict[str, Policy] | None = None
-    step_scale: Number = 1.0
-    shuffled_instructions: bool = False
-    salt_sha256: str = ""
-    clock: dict[str, Any] | None = None
-
-    def __post_init__(self) -> None:
-        for name in ONE:
-            if len(getattr(self, name)) != 1:
-                raise ValueError(f"it mixes {name}s or names none; a bundle has one")
-
-    def spec(self, task: str) -> Spec:
-        """The spec of the policy that did `task`; BundleError if the settings hold none."""
-        policy = self.policies.get(task) if self.policies else self.policy
-        if policy is None:
-            raise BundleError(f"the run's settings hold no policy spec for {task}")
-        return policy.spec
+def spec_of(settings: RunSettings, task: str) -> PolicySpecification:
+    """The specification of the policy that did `task`; BundleError if the settings hold none."""
+    policy = settings.policy_of(task)
+    if policy is None:
+        raise BundleError(f"the run's settings hold no policy spec for {task}")
+    return policy.stated
 
 
-class Versions(Struct, frozen=True):
-    """What the run was made with."""
-
-    robospa: str
-    python: str
-    numpy: str
-    sapien: str
-
-
-class About(Struct, frozen=True):
-    """What the run says of its software and machine."""
-
-    versions: Versions
-    code: str
-    git: dict[str, Any] = {}
-    machine: dict[str, Any] = {}
-    world: dict[str, Any] = {}
-
-
-class RunFile(Struct, frozen=True):
-    """`run.json`, as far as the rules need it."""
-
-    suite: str
-    settings: Settings
-    about: About
-    categories: dict[str, str]
-
-
-def check_settings(run: Mapping[str, object], reference: Reference) -> Settings:
-    """The settings of `run` (as in run.json); BundleError if it is one that cannot enter."""
-    found = read(RunFile, run, "the run", BundleError)
-    settings = found.settings
-    if settings.clock is not None:
-        raise BundleError(
-            "the run is in real time; the benchmark's clock stands still while a policy thinks"
-        )
-    if settings.world.control not in CONTROLS:
+def check_settings(run: RunManifest, reference: Reference) -> RunSettings:
+    """The settings of `run`; BundleError if it is one that cannot enter."""
+    settings = run.settings
+    for name in ONE:
+        if len(getattr(settings, name)) != 1:
+            raise BundleError(f"the run mixes {name}s or names none; a bundle has one")
+    if lacking := sorted(VERSIONS - run.about.versions.keys()):
+        raise BundleError(f"the run does not say its version of {lacking[0]}")
+    if settings.world.arguments.get("control", CONTROLS[0]) not in CONTROLS:
         raise BundleError(
             "the run executes actions at a fixed rate; the benchmark moves from rest to rest"
         )
-    if found.suite != reference.suite:
+    if run.suite != reference.suite:
         raise BundleError(
-            f"the run is of the suite {found.suite[:40]!a}; this robospa has "
+            f"the run is of the suite {run.suite[:40]!a}; this robospa has "
             f"{reference.suite!r}: verify it with the version that it was made with"
         )
     for name, known in (
@@ -230,35 +169,29 @@ def check_settings(run: Mapping[str, object], reference: Reference) -> Settings:
                 f"the run's {name} is {value[:60]!a}, which is not known here: there is "
                 f"{', '.join(known)}"
             )
-    if extra := sorted(set(settings.policies or ()) - set(found.categories)):
+    if extra := sorted(set(settings.policies) - set(run.categories)):
         raise BundleError(f"the run has a policy for {extra[0][:60]!a}, but no trials of it")
-    policies = [settings.policy, *(settings.policies or {}).values()]
-    specs = [policy.spec for policy in policies if policy]
-    if settings.privileged or any(spec.privileged or spec.environment_state for spec in specs):
-        raise BundleError("the run's policy is privileged: it saw the exact state, not images")
-    if any(spec.needs_trial_key for spec in specs):
-        raise BundleError(
-            "the run's policy asked for the key of every trial, from which its scene can be rebuilt"
-        )
-    if settings.shuffled_instructions:
-        raise BundleError("the run is an ablation: its trials have the sentences of other scenes")
-    if settings.salt_sha256:
-        raise BundleError("the run is on hidden scenes; a bundle holds the shipped ones")
+    for stated in settings.stated:
+        if stated.action not in KINDS:
+            raise BundleError(
+                f"the run's policy spec: 'action' must be one of {', '.join(KINDS)}, not "
+                f"{stated.action[:40]!a}"
+            )
+    if found := departures(run):
+        raise BundleError(f"the run departs from the benchmark, {found[0]}")
     if settings.run_seed != 0:
         raise BundleError(
             f"the run's seed is {settings.run_seed}; that of a submission is 0, so that nobody "
             "hands in the best of several"
         )
-    if settings.step_scale != 1.0:
-        raise BundleError("the run's step limits are not the official ones")
     if settings.world.name != reference.world:
         raise BundleError("the run was made in another world than the benchmark's simulator")
     return settings
 
 
-def check_card_fits(card: Card, settings: Settings, task: str) -> None:
+def check_card_fits(card: Card, settings: RunSettings, task: str) -> None:
     """BundleError if card and policy spec disagree about the actions of `task`."""
-    spec = settings.spec(task)
+    spec = spec_of(settings, task)
     for name, stated, used in (
         ("space", card.actions.space, spec.action),
         ("chunk", card.actions.chunk, spec.horizon),
@@ -320,9 +253,9 @@ def _listed(reference: Reference, task: str, level: int, robot: str, mode: str) 
         return False
 
 
-def check_categories(run: Mapping[str, object], tasks: Sequence[str], reference: Reference) -> None:
+def check_categories(run: RunManifest, tasks: Sequence[str], reference: Reference) -> None:
     """BundleError unless the run says the category of each of its tasks, and says it right."""
-    if run.get("categories") != {t: reference.facts(t, LEVELS[0]).category for t in tasks}:
+    if run.categories != {t: reference.facts(t, LEVELS[0]).category for t in tasks}:
         raise BundleError("the run's categories are not those of its tasks")
 
 

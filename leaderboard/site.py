@@ -32,15 +32,15 @@ from robospa.leaderboard.entries import (
     page_values,
     rankable,
 )
+from robospa.leaderboard.rules import manifest_of
 from robospa.leaderboard.submission import left_out, read_submissions
 from robospa.leaderboard.verify import paired, results_of
 from robospa.results.failures.labels import KINDS, NAMES, SIMULATED_PER_FILM
+from robospa.results.figures.charts import draw_failures
 from robospa.results.figures.draw import draw
-from robospa.results.figures.failure_bars import draw_failures
 from robospa.results.figures.series import Drawing, Series, save, styled
 from robospa.results.paper.origin import DIFFERENCES, ORIGIN
 from robospa.results.paper.published import load
-from robospa.results.records.manifest import manifest_keys
 from robospa.results.report.method import method_notes
 from robospa.results.report.page import FIGURES, card, figure, own_version, render
 from robospa.results.report.tables import ReportTable, for_page, report_tables
@@ -310,7 +310,7 @@ def write_pairs(pairs: Sequence[Pair], out: Path, note: Callable[[str], None]) -
 def _results(entry: Entry) -> ModelResults:
     kept = entry.submission
     assert kept is not None
-    keys = manifest_keys(kept.run)
+    keys = manifest_of(kept.run).keys
     return results_of(entry.name, kept.outcomes, keys, kept.categories, kept.suite)
 
 

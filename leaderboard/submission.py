@@ -47,10 +47,11 @@ from robospa.leaderboard.card import (
     to_card,
 )
 from robospa.leaderboard.evidence import BADGES, BadgeEvidence, read_evidence
-from robospa.leaderboard.rules import RunFile, Settings
+from robospa.leaderboard.rules import manifest_of
 from robospa.leaderboard.untrusted import BundleArchive, parse_map
 from robospa.leaderboard.verify import Valid
 from robospa.results.failures.labels import NAMES, distribution, failures_of
+from robospa.results.records.manifest import RunSettings
 from robospa.results.records.run_io import Run
 from robospa.results.report.run_card import END_NAMES
 from robospa.results.report.trials import trial_rows
@@ -129,7 +130,7 @@ class Submission:
     card: Card
     run: Mapping[str, object]
     suite: str
-    settings: Settings
+    settings: RunSettings
     categories: Mapping[str, str]
     scores: Mapping[str, object]
     outcomes: Mapping[str, object]
@@ -311,7 +312,7 @@ def read_submission(folder: Path) -> Submission:
         if name != layout.MANIFEST and (not listed or layout.sha256(data[name]) != listed.sha256):
             raise BundleError(f"{where}: {name} is not the bundle's")
     evidence = read_evidence(parts[EVIDENCE], manifest.bundle, where)
-    run = read(RunFile, parts[layout.RUN], f"{where}: the run", BundleError)
+    run = manifest_of(parts[layout.RUN], f"{where}: the run")
     card = to_card(parts[layout.CARD], f"{where}, {layout.CARD}")
     check_checkpoints(card, list(run.categories), f"{where}, {layout.CARD}")
     if evidence.address == IN_REPOSITORY:

@@ -24,9 +24,10 @@ from numpy.typing import NDArray
 from robospa.harness.sim.motion import RATE
 from robospa.harness.trial_identity import policy_seed
 from robospa.leaderboard.bundle import BundleError, is_sha256, sha256
-from robospa.leaderboard.rules import Reference, Settings, Spec, VariantFacts
+from robospa.leaderboard.rules import Reference, VariantFacts, spec_of
 from robospa.leaderboard.traces import Trace, split_trace
 from robospa.leaderboard.untrusted import check_text, parse_row
+from robospa.results.records.manifest import PolicySpecification, RunSettings
 from robospa.results.records.run_io import FIELDS, KEY_FIELDS, finished, from_data
 from robospa.results.records.trial_record import EventRow, TrialRecord
 from robospa.results.scoring.retried import repeats
@@ -128,7 +129,7 @@ CLOCK = 1e-6
 """What two readings of one clock [s] may differ by."""
 
 
-def check_record(record: TrialRecord, reference: Reference, settings: Settings) -> None:
+def check_record(record: TrialRecord, reference: Reference, settings: RunSettings) -> None:
     """BundleError if `record` contradicts its task, its own events, or is no result at all."""
     slug = record.key.slug
     if not finished(record):
@@ -143,7 +144,7 @@ def check_record(record: TrialRecord, reference: Reference, settings: Settings) 
         if found != right:
             raise BundleError(f"{slug}: {name} is {ascii(found)[:40]}, not {right!r}")
     trouble = (
-        _counts(record, facts, settings.spec(record.key.task))
+        _counts(record, facts, spec_of(settings, record.key.task))
         or _attempts(record, facts)
         or _events(record)
         or _end(record)
@@ -153,7 +154,7 @@ def check_record(record: TrialRecord, reference: Reference, settings: Settings) 
         raise BundleError(f"{slug} {trouble}")
 
 
-def _counts(record: TrialRecord, facts: VariantFacts, spec: Spec) -> str:
+def _counts(record: TrialRecord, facts: VariantFacts, spec: PolicySpecification) -> str:
     """What is impossible about actions, queries and physics steps; "" if nothing is."""
     steps, calls, refused = record.steps, record.policy_calls, record.end == "policy_error"
     if steps > facts.steps:

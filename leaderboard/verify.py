@@ -22,7 +22,6 @@ from msgspec import Meta, Struct, to_builtins
 
 from robospa.categories import METRICS
 from robospa.harness.running.autoscaling import cores
-from robospa.harness.running.manifest import seed_hash
 from robospa.leaderboard import bundle as layout
 from robospa.leaderboard.bundle import (
     BundleError,
@@ -36,12 +35,13 @@ from robospa.leaderboard.evidence import Validity, announced
 from robospa.leaderboard.rules import (
     Done,
     Reference,
-    Settings,
     check_card_fits,
     check_categories,
     check_scenes,
     check_seeds,
     check_settings,
+    manifest_of,
+    spec_of,
 )
 from robospa.leaderboard.traces import Trace, decode, most_bytes
 from robospa.leaderboard.trial_rows import check_record, check_trace, read_rows, trace_hash
@@ -50,7 +50,7 @@ from robospa.results.comparison.compare import Difference, compare, over_levels
 from robospa.results.paper.columns import run_column
 from robospa.results.paper.tables import FORMATS
 from robospa.results.records.lint import lint_run
-from robospa.results.records.manifest import RunInfo, TrialGroup, trial_keys
+from robospa.results.records.manifest import RunManifest, RunSettings, seed_hash
 from robospa.results.records.run_io import Run
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.report.tables import report_tables
@@ -78,7 +78,7 @@ class Valid:
     manifest: BundleManifest
     card: Card
     run: Run
-    settings: Settings
+    settings: RunSettings
     traces: Mapping[TrialKey, str]
     evidence: Validity
 
@@ -104,7 +104,7 @@ def verify(
     with BundleArchive(path, limits) as archive:
         manifest = _manifest(archive, reference, practice)
         archive.listed = manifest.files
-        run = archive.read_map(layout.RUN)
+        run = manifest_of(archive.read_map(layout.RUN))
         settings = check_settings(run, reference)
         keys = _keys(run, settings, archive.limits)
         check_seeds(keys, reference, manifest.practice)
@@ -190,14 +190,11 @@ def _check_files(archive: BundleArchive, listed: Mapping[str, FileEntry]) -> Non
             raise BundleError(f"the bundle has no {name}")
 
 
-def _keys(
-    run: Mapping[str, object], settings: Settings, limits: BundleLimits
-) -> tuple[TrialKey, ...]:
+def _keys(run: RunManifest, settings: RunSettings, limits: BundleLimits) -> tuple[TrialKey, ...]:
     """The listed trials, by task, level and seed."""
-    groups = read(list[TrialGroup], run.get("trials"), "the run's list of trials", BundleError)
-    if sum(len(group.seeds) for group in groups) > limits.rows:
+    if sum(len(group.seeds) for group in run.trials) > limits.rows:
         raise BundleError(f"the run lists more than {limits.rows} trials")
-    keys = trial_keys(groups)
+    keys = run.keys
     for name in ("embodiment", "mode", "split"):
         if strange := [k for k in keys if getattr(k, name) != getattr(settings, name)[0]]:
             raise BundleError(f"{strange[0].slug[:120]!a} is not of the run's {name}")
@@ -208,10 +205,10 @@ def _check_lists(
     lists: Mapping[str, object],
     manifest: BundleManifest,
     keys: Sequence[TrialKey],
-    run: Mapping[str, object],
+    run: RunManifest,
 ) -> None:
     """BundleError unless the seed lists are those of the trials and hash to what is claimed."""
-    if run.get("seed_hash") != seed_hash(keys):
+    if run.seed_hash != seed_hash(keys):
         raise BundleError("the run's hash of its list of trials is another")
     if lists != seed_lists(keys):
         raise BundleError("seeds.json does not hold the seeds of the run's trials")
@@ -232,7 +229,7 @@ def seed_lists(keys: Sequence[TrialKey]) -> dict[str, list[int]]:
 def _records(
     archive: BundleArchive,
     manifest: BundleManifest,
-    settings: Settings,
+    settings: RunSettings,
     keys: Sequence[TrialKey],
     reference: Reference,
 ) -> tuple[dict[TrialKey, TrialRecord], dict[TrialKey, str]]:
@@ -275,7 +272,7 @@ def _check_actions(
     records: Mapping[TrialKey, TrialRecord],
     traces: Mapping[TrialKey, str],
     reference: Reference,
-    settings: Settings,
+    settings: RunSettings,
 ) -> None:
     """BundleError unless every stored array has its row's and record's hash.
 
@@ -298,7 +295,7 @@ def _check_variant(
     found: Sequence[TrialRecord],
     traces: Mapping[TrialKey, str],
     reference: Reference,
-    settings: Settings,
+    settings: RunSettings,
 ) -> None:
     name = layout.actions_name(*found[0].key.variant)
     most = most_bytes([record.steps for record in found])
@@ -313,7 +310,7 @@ def _check_variant(
         digest = trace_hash(trace)
         if digest != traces[record.key]:
             raise BundleError(f"{name}: {record.key.slug} has other actions than its row says")
-        check_trace(record, trace, digest, reference, settings.spec(record.key.task).action)
+        check_trace(record, trace, digest, reference, spec_of(settings, record.key.task).action)
 
 
 def read_traces(valid: Valid, wanted: Sequence[TrialKey]) -> dict[TrialKey, Trace]:
@@ -481,7 +478,7 @@ def results_of(
         part = _checked(outcomes[f"{task}/{level}"], len(own), f"{name[:80]!a}, {task} L{level}")
         records |= {k: _record(k, categories[task], part, place) for place, k in enumerate(own)}
     return results_of_records(
-        name, sorted(keys), records, RunInfo(categories=categories, suite=suite)
+        name, sorted(keys), records, RunManifest(categories=dict(categories), suite=suite)
     )
 
 

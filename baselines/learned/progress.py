@@ -86,7 +86,7 @@ def read_losses(folder: Path) -> list[dict[str, float]]:
 def draw_losses(folder: Path) -> Path | None:
     """A picture of the noted losses, beside them; None where Matplotlib is not installed."""
     try:
-        from robospa.results.figures.losses import draw
+        from robospa.results.figures.curves import draw_losses
     except ImportError:
         return None
     rows = read_losses(folder)
@@ -94,7 +94,7 @@ def draw_losses(folder: Path) -> Path | None:
         return None
     path = folder / PICTURE
     try:
-        draw(rows, path)
+        draw_losses(rows, path)
     except ImportError:
         return None
     return path

@@ -60,7 +60,7 @@ def audit(
     findings = list(_load(f"{AUDIT}:faults")(found))
     if reproduction is not None:
         findings.append(_load(f"{AUDIT}:hidden_gap")(found, read_run(reproduction)))
-    if expert and not found.info.salt_sha256:
+    if expert and not found.manifest.settings.salt_sha256:
         world, oracle = SapienWorld(render=False), _load(EXPERT)()
         findings.append(
             _load(f"{AUDIT}:expert_likeness")(

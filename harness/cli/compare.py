@@ -107,7 +107,7 @@ def _print(found: Comparison, variants: bool) -> None:
 
 def _table(title: str, rows: Sequence[Difference], found: Comparison) -> None:
     from robospa.results.comparison.table import difference_table
-    from robospa.results.tables.terminal import show
+    from robospa.results.tables import show
 
     if rows:
         show(difference_table(found, rows, title))

@@ -25,8 +25,7 @@ def failures(
     as_json: Annotated[bool, typer.Option("--json", help="the same as --format json")] = False,
 ) -> None:
     """Print the types of failure in a run; docs/failures.md says how they are decided."""
-    from robospa.results.failures.labels import OURS, label
-    from robospa.results.failures.listing import counts_table, trials_table
+    from robospa.results.failures.labels import OURS, counts_table, label, trials_table
     from robospa.results.records.action_problems import problem_lines
     from robospa.results.records.run_io import read_run
 

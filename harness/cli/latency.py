@@ -89,10 +89,9 @@ def curve_of(folders: list[Path]) -> LatencyCurve:
 def _show(curve: LatencyCurve, out: Path, as_json: bool) -> None:
     """Print the curve; write it beside the runs, as JSON, Markdown and a figure."""
     from robospa.results.comparison.latency_curve import curve_table
-    from robospa.results.figures.latency_curve import draw_latency_curves
+    from robospa.results.figures.curves import draw_latency_curves
     from robospa.results.figures.series import save, styled
-    from robospa.results.tables.markdown import to_markdown
-    from robospa.results.tables.terminal import show
+    from robospa.results.tables import show, to_markdown
 
     data = json.dumps(curve.to_json(), indent=1)
     (out / f"{NAME}.json").write_text(data)

@@ -82,7 +82,7 @@ def curve(
     robospa learn curve 50=runs/act-50 250=runs/act-250 1000=runs/act-1000 --out curve.png
     """
     from robospa.harness.settings import SettingsError
-    from robospa.results.figures.learning_curve import CurvePoint, draw_learning_curve
+    from robospa.results.figures.curves import CurvePoint, draw_learning_curve
     from robospa.results.figures.series import FORMATS, save, styled
     from robospa.results.records.run_io import read_run
     from robospa.results.scoring.scores import score_run

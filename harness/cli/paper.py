@@ -41,7 +41,7 @@ def paper(
     from robospa.results.paper.tables import FORMATS, like_paper, make_tables, write_tables
     from robospa.results.records.run_io import read_run
     from robospa.results.records.settings_of_run import by_setting
-    from robospa.results.tables.terminal import show
+    from robospa.results.tables import show
 
     endings = list(FORMATS) if format == "all" else [format]
     if format != "all" and format not in FORMATS:

@@ -226,7 +226,7 @@ def reproduce(
     seeds = _load("reproduce:read_block")(block, commitment)
     keys = _load("reproduce:hidden_keys")(valid, seeds, reference)
     _load("reproduce:plan")(valid, min(map(len, seeds.seeds.values())), alpha)
-    run_seed = valid.run.manifest["settings"]["run_seed"]
+    run_seed = valid.run.manifest.settings.run_seed
     asked = {"policy": policy, "out": out, "workers": workers, "run_seed": run_seed}
     request = make_request(
         updated(EvaluationSettings(), {**asked, "world": world, "parts": parts}),

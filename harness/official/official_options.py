@@ -15,6 +15,7 @@ from robospa.harness.textures import VARIABLE
 from robospa.harness.worlds import Parts, SapienKind
 from robospa.protocol.options import option, read_options, url_options
 from robospa.registry import UnknownName, load
+from robospa.results.records.manifest import LayoutSettings
 from robospa.tasks import packs
 from robospa.tasks.scene import Scene
 from robospa.trial import TrialKey
@@ -73,11 +74,11 @@ class OfficialLayout:
             return [OWN_SENTENCES]
         return [self.trouble] if self.trouble else []
 
-    def to_json(self) -> dict[str, object]:
+    def manifest_settings(self) -> LayoutSettings:
         """For a run's manifest."""
         names = [switch.name for switch in chosen(self.switches)]
         assets = NAME if self.packed else "builtin"
-        return {"assets": assets, "digest": self.digest, "switches": names}
+        return LayoutSettings(assets, self.digest, names)
 
     def pack(self, scene: Scene) -> Scene:
         """`scene` with the archive's objects, if they are packed."""
@@ -197,11 +198,11 @@ class _OfficialKind(SapienKind):
             check_robots({key.embodiment for key in keys})
         return PARTS, {**arguments, "layout": layout, "episodes": episodes_of(keys)}
 
-    def layout(self, arguments: Mapping[str, object]) -> tuple[dict[str, object], list[str]]:
+    def layout(self, arguments: Mapping[str, object]) -> tuple[LayoutSettings | None, list[str]]:
         """What objects and quirks there are, and what its owner should know of it."""
         layout = arguments["layout"]
         assert isinstance(layout, OfficialLayout)
-        return {"layout": layout.to_json()}, layout.warnings("sentences" in arguments)
+        return layout.manifest_settings(), layout.warnings("sentences" in arguments)
 
 
 OFFICIAL = _OfficialKind(NAME, "robospa.harness.official.official_world:OfficialWorld")

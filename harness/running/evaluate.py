@@ -11,6 +11,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from msgspec import structs, to_builtins
+
 from robospa.harness.clock.clock import timed_suite, timing_warning
 from robospa.harness.factory import is_url
 from robospa.harness.pool import JobProcess, WorkerDied, WorkerStuck
@@ -18,7 +20,7 @@ from robospa.harness.running.atomic_file import replace_file
 from robospa.harness.running.attempts import spent_trials
 from robospa.harness.running.executor import RunAborted
 from robospa.harness.running.films import films_of, finish_films
-from robospa.harness.running.manifest import Manifest, about_machine, check_folder, open_run
+from robospa.harness.running.manifest import about_machine, check_folder, open_run
 from robospa.harness.running.policy_probe import (
     ProbedPolicy,
     check_blind,
@@ -39,6 +41,15 @@ from robospa.harness.settings import EvaluationSettings
 from robospa.harness.settings_file import FILE, to_toml
 from robospa.harness.trial_identity import salt_hash
 from robospa.harness.worlds import SHUFFLED_PARTS, open_world, world_kind
+from robospa.results.records.manifest import (
+    ClockSettings,
+    RunManifest,
+    RunSettings,
+    ServerFacts,
+    ServerIdentity,
+    WorldSettings,
+)
+from robospa.results.records.manifest import make_manifest as new_manifest
 from robospa.results.records.run_io import finished, lost_actions, read_records
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
@@ -113,7 +124,7 @@ def probe_world(config: WorkerConfig, render: bool) -> dict[str, Any]:
         worker.kill()
 
 
-def make_manifest(request: Request, policies: Mapping[str, ProbedPolicy]) -> Manifest:
+def make_manifest(request: Request, policies: Mapping[str, ProbedPolicy]) -> RunManifest:
     """The run's manifest, with the policy of every task; the world is built once to describe it."""
     config = request.config
     if request.in_process:
@@ -123,54 +134,54 @@ def make_manifest(request: Request, policies: Mapping[str, ProbedPolicy]) -> Man
     parts = load_parts(config)
     first = {key.task: key for key in reversed(list(request.keys))}
     found = {task: parts(key) for task, key in first.items()}
-    one = next(iter(policies.values()))
-    settings = {
-        **_shared(request.keys),
-        "policy": one.settings(),
-        "privileged": any(spec.sees_state for spec in specs),
-        "needs_trial_key": any(spec.needs_trial_key for spec in specs),
-        "run_seed": config.run_seed,
-        "step_scale": config.step_scale,
-        "world": {"name": config.world, **config.world_arguments},
-    }
-    if config.parts == SHUFFLED_PARTS:
-        settings["shuffled_instructions"] = True
-    if config.clock is not None:
-        settings["clock"] = config.clock.to_json()
-    if config.salt:
-        settings["salt_sha256"] = salt_hash(config.salt)
-    about = about_machine(world)
-    about["policy"] = _about_policy(one)
-    if config.policies:
-        settings["policies"] = {task: policy.settings() for task, policy in policies.items()}
-        about["policies"] = {task: _about_policy(policy) for task, policy in policies.items()}
-    about["arguments"] = dict(request.arguments)
-    about["seeds"] = [dict(row) for row in request.seeds]
+    one, several = next(iter(policies.values())), bool(config.policies)
     instructions = {task: getattr(part, "instruction", "") for task, part in found.items()}
-    about["warnings"] = warnings_of(policies, instructions, config.step_scale)
+    warnings = warnings_of(policies, instructions, config.step_scale)
+    overlap: dict[str, object] = {}
     if (official := config.parts_arguments.get("sentences")) is not None:
         from robospa.harness.official.overlap import report, sentence_of
 
-        settings["instructions"] = official.digest
-        about["instructions"] = report(official)
-        about["warnings"].append(sentence_of(official))
-    categories = {task: part.task.category for task, part in found.items()}
-    laid, warnings = world_kind(config.world).layout(config.parts_arguments)
-    settings.update(laid)
-    about["warnings"] += warnings
+        overlap = report(official)
+        warnings.append(sentence_of(official))
+    layout, odd = world_kind(config.world).layout(config.parts_arguments)
+    warnings += odd
     steps = world.get("action_steps", config.world_arguments.get("action_steps"))
     suite = timed_suite(next(iter(found.values())).scene.suite, steps)
     if steps is not None:
-        about["warnings"].append(timing_warning(suite, steps, config.clock))
-    return Manifest(settings, tuple(request.keys), about, categories, suite)
+        warnings.append(timing_warning(suite, steps, config.clock))
+    settings = RunSettings(
+        **_shared(request.keys),
+        policy=one.settings(),
+        privileged=any(spec.sees_state for spec in specs),
+        needs_trial_key=any(spec.needs_trial_key for spec in specs),
+        run_seed=config.run_seed,
+        step_scale=config.step_scale,
+        world=WorldSettings(config.world, dict(config.world_arguments)),
+        shuffled_instructions=config.parts == SHUFFLED_PARTS,
+        clock=None if config.clock is None else ClockSettings(**config.clock.to_json()),
+        salt_sha256=salt_hash(config.salt) if config.salt else "",
+        policies={task: p.settings() for task, p in policies.items()} if several else {},
+        instructions="" if official is None else official.digest,
+        layout=layout,
+    )
+    about = structs.replace(
+        about_machine(world),
+        policy=_about_policy(one),
+        policies={task: _about_policy(p) for task, p in policies.items()} if several else {},
+        arguments=dict(request.arguments),
+        seeds=[dict(row) for row in request.seeds],
+        warnings=warnings,
+        instructions=overlap,
+    )
+    categories = {task: part.task.category for task, part in found.items()}
+    return new_manifest(settings, request.keys, about, categories, suite)
 
 
-def _shared(keys: Sequence[TrialKey]) -> dict[str, list[str]]:
+def _shared(keys: Sequence[TrialKey]) -> dict[str, tuple[str, ...]]:
     """What trials have in common; they are compared one by one as well."""
     return {
-        "embodiment": sorted({key.embodiment for key in keys}),
-        "mode": sorted({key.mode for key in keys}),
-        "split": sorted({key.split for key in keys}),
+        name: tuple(sorted({getattr(key, name) for key in keys}))
+        for name in ("embodiment", "mode", "split")
     }
 
 
@@ -179,24 +190,16 @@ def _renders(policies: Mapping[str, ProbedPolicy]) -> bool:
     return any(p.spec.cameras for p in policies.values())
 
 
-def _about_policy(policy: ProbedPolicy) -> dict[str, Any]:
+def _about_policy(policy: ProbedPolicy) -> ServerFacts:
     """Where it is and how it greeted, with its replicas."""
-    about = _about_server(policy)
-    if policy.replicas:
-        about["equals"] = [_about_server(replica) for replica in policy.replicas]
-    return about
-
-
-def _about_server(server: ProbedPolicy) -> dict[str, Any]:
-    """One server; the identity is that of its greeting without what is volatile in it."""
-    identity = server.identity
-    found: dict[str, Any] = {"target": server.target, "hello": server.hello}
-    found["identity"] = {
-        "hash": identity.hash,
-        "checkpoint": identity.checkpoint,
-        "volatile": sorted(identity.volatile),
-    }
-    return found
+    identity = policy.identity
+    volatile = sorted(identity.volatile)
+    return ServerFacts(
+        policy.target,
+        dict(policy.hello),
+        ServerIdentity(identity.hash, identity.checkpoint, volatile),
+        tuple(map(_about_policy, policy.replicas)),
+    )
 
 
 def ready_config(
@@ -243,7 +246,7 @@ def evaluate(request: Request) -> None:
                 f"{text}; copy them back before this run is replayed"
                 for text in lost_actions(folder, known)
             ]
-            for text in [*manifest.about["warnings"], *lost, *loopback_warnings(executor, config)]:
+            for text in [*manifest.about.warnings, *lost, *loopback_warnings(executor, config)]:
                 progress.note(f"warning: {text}")
             attempts = request.options.attempts
             if spent := set(spent_trials(missing, known, attempts)):
@@ -253,7 +256,8 @@ def evaluate(request: Request) -> None:
                     "missing; more --attempts allow more"
                 )
             log = "none" if request.settings is None else request.settings.recording.log
-            tracker = Careful(open_tracker(log, folder, manifest.settings), progress.note)
+            kept = to_builtins(manifest.settings)
+            tracker = Careful(open_tracker(log, folder, kept), progress.note)
             runner = Runner(config, missing, request.options, on_note=progress.note)
             runner.known = known
             runner.executor = executor

@@ -277,15 +277,15 @@ def films_afterwards(run: Run) -> Films:
 def replay_config(run: Run) -> WorkerConfig:
     """With which world and scenes trials of `run` are played again from its folder; raises RunError
     if they cannot be."""
-    settings = run.manifest["settings"]
-    world = dict(settings.get("world") or {})
-    if settings.get("salt_sha256"):
+    settings = run.manifest.settings
+    world, arguments = settings.world.name or SAPIEN_NAME, settings.world.arguments
+    if settings.salt_sha256:
         raise RunError(
             f"the scenes of {run.folder} are hidden: resume it to have it filmed; nothing else can "
             "play its trials again"
         )
     known = {"render", "control", "action_steps"}  # a folder may come from a stranger
-    if world.pop("name", SAPIEN_NAME) != SAPIEN_NAME or world.keys() - known:
+    if world != SAPIEN_NAME or arguments.keys() - known:
         raise RunError(
             f"{run.folder} was run in another world: its own run films its trials, and nothing "
             "else can play them again"
@@ -294,9 +294,9 @@ def replay_config(run: Run) -> WorkerConfig:
         run.folder,
         "",
         world=SAPIEN_NAME,
-        world_arguments=world,
-        parts=UNSPOKEN_PARTS if settings.get("instructions") else TASK_PARTS,
-        step_scale=float(settings.get("step_scale", 1.0)),
+        world_arguments=arguments,
+        parts=UNSPOKEN_PARTS if settings.instructions else TASK_PARTS,
+        step_scale=settings.step_scale,
         cameras=_cameras(run.folder),
     )
 

@@ -1,77 +1,37 @@
-"""`run.json`: what a run is made of, written once at its start and compared on resume.
-
-`settings` decide the result and may not change; `about` describes the machine and is only kept.
-The list of trials is fixed here, before the first one runs.
-"""
+"""Starting a run, and going on with it: its manifest is written once and compared on resume."""
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 import platform
 import subprocess
 import sys
-from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Collection, Mapping
 from fnmatch import fnmatch
 from importlib import metadata
 from pathlib import Path
-from typing import Any
+from typing import TypeVar
+
+from msgspec import structs, to_builtins
 
 from robospa.harness.running.atomic_file import PARTIAL, replace_file
 from robospa.harness.running.code_hash import code_hash
 from robospa.protocol.client import Identity, identity_of
 from robospa.results.records.manifest import (
-    FORMAT,
     MANIFEST,
+    GitState,
+    RunAbout,
     RunError,
-    manifest_keys,
+    RunManifest,
+    RunSettings,
+    ServerFacts,
+    manifest_text,
     read_manifest,
 )
 from robospa.results.records.run_state import LOCK
-from robospa.tasks.scene import SUITE
-from robospa.trial import TrialKey
 
-
-@dataclass(frozen=True)
-class Manifest:
-    """A run's `settings`, its fixed `keys`, what is known `about` where it ran, and the category
-    of each of its tasks."""
-
-    settings: Mapping[str, Any]
-    keys: tuple[TrialKey, ...]
-    about: Mapping[str, Any]
-    categories: Mapping[str, str] = field(default_factory=dict)
-    suite: str = SUITE
-
-    def to_json(self) -> dict[str, Any]:
-        """Plain JSON values."""
-        return {
-            "format": FORMAT,
-            "suite": self.suite,
-            "settings": json.loads(json.dumps(self.settings)),
-            "seed_hash": seed_hash(self.keys),
-            "categories": dict(self.categories),
-            "trials": group_keys(self.keys),
-            "about": json.loads(json.dumps(self.about, default=str)),
-        }
-
-
-def group_keys(keys: Iterable[TrialKey]) -> list[dict[str, Any]]:
-    """The trial list, one row a variant: `{"task", "level", ..., "seeds": [...]}`."""
-    rows: dict[tuple[Any, ...], list[int]] = {}
-    for key in keys:
-        row = (key.task, key.level, key.embodiment, key.mode, key.split)
-        rows.setdefault(row, []).append(key.seed)
-    names = ("task", "level", "embodiment", "mode", "split")
-    return [{**dict(zip(names, row, strict=True)), "seeds": s} for row, s in rows.items()]
-
-
-def seed_hash(keys: Iterable[TrialKey]) -> str:
-    """Hash of the set of trials: equal only if two runs list exactly the same ones."""
-    text = "\n".join(sorted(key.slug for key in keys))
-    return hashlib.sha256(text.encode()).hexdigest()[:16]
+Part = TypeVar("Part", RunSettings, RunAbout)
 
 
 def _version(package: str) -> str:
@@ -81,8 +41,8 @@ def _version(package: str) -> str:
         return "not installed"
 
 
-def git_state(folder: Path) -> dict[str, Any]:
-    """Commit and dirty flag of the checkout that this package's `folder` is part of, or empty."""
+def git_state(folder: Path) -> GitState | None:
+    """The checkout that this package's `folder` is part of, if any."""
 
     def git(*words: str) -> str:
         done = subprocess.run(
@@ -94,30 +54,30 @@ def git_state(folder: Path) -> dict[str, Any]:
         tracked = git("ls-files", "--error-unmatch", str(folder / "manifest.py"))
         commit = git("rev-parse", "HEAD")
         if not commit or not tracked:  # installed inside a checkout of something else
-            return {}
-        return {"commit": commit, "dirty": bool(git("status", "--porcelain"))}
+            return None
+        return GitState(commit, bool(git("status", "--porcelain")))
     except (OSError, subprocess.TimeoutExpired):
-        return {}
+        return None
 
 
-def about_machine(world: Mapping[str, Any]) -> dict[str, Any]:
+def about_machine(world: Mapping[str, object]) -> RunAbout:
     """Versions, checkout and machine, with what the `world` says about itself."""
-    return {
-        "versions": {
+    return RunAbout(
+        versions={
             "robospa": _version("robospa"),
             "python": sys.version.split()[0],
             "numpy": _version("numpy"),
             "sapien": _version("sapien"),
         },
-        "git": git_state(Path(__file__).resolve().parent),
-        "code": code_hash(),
-        "machine": {
+        git=git_state(Path(__file__).resolve().parent),
+        code=code_hash(),
+        machine={
             "system": platform.platform(),
             "processor": platform.machine(),
             "cores": os.cpu_count(),
         },
-        "world": dict(world),
-    }
+        world=dict(world),
+    )
 
 
 def _flatten(value: object, path: str = "") -> dict[str, object]:
@@ -129,9 +89,9 @@ def _flatten(value: object, path: str = "") -> dict[str, object]:
     return {path: value}
 
 
-def changed_settings(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
-    """One phrase per setting that differs: `name: old -> new`."""
-    first, second = _flatten(old), _flatten(new)
+def changed_settings(old: object, new: object) -> list[str]:
+    """One phrase per setting that differs: `name: old -> new`; of maps or structs."""
+    first, second = _flatten(_plain(old)), _flatten(_plain(new))
     names = sorted(set(first) | set(second))
     return [
         f"{name}: {first.get(name, 'unset')!r} -> {second.get(name, 'unset')!r}"
@@ -140,44 +100,41 @@ def changed_settings(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str
     ]
 
 
-def _list_changes(old: Mapping[str, Any], new: Manifest) -> list[str]:
+def _plain(value: object) -> object:
+    """`value` as it is read back from a file."""
+    return json.loads(json.dumps(to_builtins(value), default=str))
+
+
+def _list_changes(old: RunManifest, new: RunManifest) -> list[str]:
     """What differs between the lists of trials."""
-    before, after = set(manifest_keys(old)), set(new.keys)
+    before, after = set(old.keys), set(new.keys)
     if before == after:
         return []
     return [f"trials: {len(after - before)} new and {len(before - after)} gone"]
 
 
-def changed_policies(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
-    """One phrase per policy in `about` of a manifest that is another one in `new`: which, and how
-    it greets otherwise. A server at a new address must be who the first one was."""
-    tasks = {"": (old.get("policy"), new.get("policy"))}
-    before, now = old.get("policies", {}), new.get("policies", {})
-    tasks |= {task: (before.get(task), now.get(task)) for task in now}
+def changed_policies(old: RunAbout, new: RunAbout) -> list[str]:
+    """One phrase per policy that is another one in `new`: which, and how it greets otherwise. A
+    server at a new address must be who the first one was."""
+    pairs = [(old.policy, new.policy)]
+    pairs += [(old.policies.get(task), policy) for task, policy in new.policies.items()]
     found: dict[str, None] = {}
-    for first, second in tasks.values():
-        known = {server["target"]: server for server in _servers(first)}
-        for server in _servers(second):
-            was = known.get(server["target"]) or next(iter(known.values()), server)
+    for first, second in pairs:
+        known = {server.target: server for server in first.servers} if first else {}
+        for server in second.servers if second else ():
+            was = known.get(server.target) or next(iter(known.values()), server)
             if changes := _identity(was).changes(_identity(server)):
-                found[f"the policy at {server['target']}: {'; '.join(changes)}"] = None
+                found[f"the policy at {server.target}: {'; '.join(changes)}"] = None
     return list(found)
 
 
-def _servers(about: Any) -> list[dict[str, Any]]:
-    """A policy of a manifest and its replicas; none if an older version kept no identity."""
-    servers = [about, *about.get("equals", [])] if isinstance(about, Mapping) else []
-    return [s for s in servers if isinstance(s, dict) and "identity" in s and "target" in s]
+def _identity(server: ServerFacts) -> Identity:
+    return identity_of(server.hello, server.identity.volatile if server.identity else ())
 
 
-def _identity(server: Mapping[str, Any]) -> Identity:
-    return identity_of(server["hello"], server["identity"].get("volatile", ()))
-
-
-def write_manifest(folder: Path, manifest: Manifest) -> None:
+def write_manifest(folder: Path, manifest: RunManifest) -> None:
     """Write `run.json` at once or not at all."""
-    text = json.dumps(manifest.to_json(), indent=1)
-    replace_file(folder / MANIFEST, text.encode())
+    replace_file(folder / MANIFEST, manifest_text(manifest).encode())
 
 
 def check_folder(folder: Path, resume: bool) -> None:
@@ -201,31 +158,31 @@ def _is_empty(folder: Path) -> bool:
     return all(fnmatch(name, PARTIAL) for name in names)
 
 
-def _allowed_changes(
-    old: Mapping[str, Any], new: Mapping[str, Any], tasks: Collection[str] | None
-) -> dict[str, Any]:
+def _allowed_changes(old: Part, new: Part, tasks: Collection[str] | None) -> Part:
     """`old` settings, or what is known about policies, with what may be `new`: the policies of
     tasks that have no result yet.
 
     `tasks` are those with a result; None if that is not known, so that nothing may be new.
     """
     if tasks is None:
-        return dict(old)
+        return old
+    before, now = old.policies, new.policies
     if not tasks:
-        names = ("policy", "policies", "privileged")
-        return {**old, **{name: new[name] for name in names if name in new}}
-    before, now = old.get("policies"), new.get("policies")
-    if before is None or now is None:
-        return dict(old)
+        changed = structs.replace(old, policy=new.policy, policies=now or before)
+        if isinstance(new, RunSettings):
+            changed = structs.replace(changed, privileged=new.privileged)
+        return changed
+    if not (before and now):
+        return old
     free = {task: policy for task, policy in now.items() if task in before and task not in tasks}
     # The first task's policy stands for the others where one is enough to describe the run.
-    return {**old, "policy": new["policy"], "policies": {**before, **free}}
+    return structs.replace(old, policy=new.policy, policies={**before, **free})
 
 
 def open_run(
-    folder: Path, manifest: Manifest, resume: bool, tasks: Collection[str] | None = None
+    folder: Path, manifest: RunManifest, resume: bool, tasks: Collection[str] | None = None
 ) -> None:
-    """Start the run in `folder` or take it up again; `tasks` are those with a result.
+    """Start the run in `folder` or go on with it; `tasks` are those with a result.
 
     A policy of a task without a result may change: a wrong option that stopped the run is mended
     so. Raises RunError as `check_folder` does, or if the run was started with other settings or
@@ -236,24 +193,22 @@ def open_run(
         write_manifest(folder, manifest)
         return
     old = read_manifest(folder)
-    new = manifest.to_json()
-    settings = _allowed_changes(old.get("settings", {}), new["settings"], tasks)
-    changes = changed_settings(settings, new["settings"])
-    changes += _list_changes(old, manifest)
+    settings = _allowed_changes(old.settings, manifest.settings, tasks)
+    changes = changed_settings(settings, manifest.settings) + _list_changes(old, manifest)
     for part in ("versions", "code"):
-        before, now = old.get("about", {}).get(part), new["about"].get(part)
+        before, now = getattr(old.about, part), getattr(manifest.about, part)
         changes += changed_settings({part: before}, {part: now})
     if changes:
         raise RunError(
             f"the run in {folder} was started with other settings ({'; '.join(changes)}); "
             "use the same ones to resume it or choose another --out"
         )
-    about = _allowed_changes(old.get("about", {}), new["about"], tasks)
-    if others := changed_policies(about, new["about"]):
+    about = _allowed_changes(old.about, manifest.about, tasks)
+    if others := changed_policies(about, manifest.about):
         raise RunError(
             f"the run in {folder} was started with another policy ({', '.join(others)}); start the "
             "first one again to resume it or choose another --out"
         )
-    mended = changed_policies(old.get("about", {}), new["about"])
-    if mended or settings != old.get("settings", {}):
+    mended = changed_policies(old.about, manifest.about)
+    if mended or changed_settings(old.settings, settings):
         write_manifest(folder, manifest)

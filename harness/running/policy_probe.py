@@ -18,7 +18,7 @@ from robospa.harness.factory import is_url, open_policy
 from robospa.harness.robots import embodiment
 from robospa.protocol.client import Identity, identity_of
 from robospa.protocol.policy import PolicySpec, has
-from robospa.results.records.manifest import RunError
+from robospa.results.records.manifest import PolicySettings, RunError
 from robospa.schema import parse_json
 from robospa.text import some
 from robospa.trial import TrialKey
@@ -49,13 +49,10 @@ class ProbedPolicy:
         """Who it is; the same at every connection."""
         return identity_of({**self.hello, "spec": self.spec.to_json()}, self.volatile)
 
-    def settings(self) -> dict[str, Any]:
-        """What of it decides a result; JSON values."""
-        return {
-            "spec": self.spec.to_json(),
-            "dialect": self.hello.get("dialect"),
-            "options": self.hello.get("options", {}),
-        }
+    def settings(self) -> PolicySettings:
+        """What of it decides a result."""
+        hello = self.hello
+        return PolicySettings(self.spec.to_json(), hello.get("dialect"), hello.get("options", {}))
 
 
 def read_map(file: Path, tasks: Sequence[str], known: Collection[str]) -> dict[str, Targets]:
@@ -165,11 +162,10 @@ def combine_replicas(servers: Sequence[ProbedPolicy], task: str = "") -> ProbedP
     return replace(first, replicas=tuple(others))
 
 
-def _flat(settings: Mapping[str, Any]) -> dict[str, Any]:
+def _flat(settings: PolicySettings) -> dict[str, object]:
     """Settings by dotted name, without what may differ: how many observations one call holds."""
-    parts = {name: value for name, value in settings.items() if name != "spec"}
-    spec = {f"spec.{name}": v for name, v in settings["spec"].items() if name != "batch"}
-    return {**parts, **spec}
+    spec = {f"spec.{name}": v for name, v in settings.spec.items() if name != "batch"}
+    return {"dialect": settings.dialect, "options": settings.options, **spec}
 
 
 def check_fit(policy: ProbedPolicy, keys: Sequence[TrialKey]) -> None:

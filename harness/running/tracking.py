@@ -82,9 +82,9 @@ class WandbTracker:
 
     def finish(self, run: Run) -> None:
         """Log the scores with their intervals and every trial."""
+        from robospa.results.frame import trial_columns
         from robospa.results.records.settings_of_run import by_setting, setting_name
         from robospa.results.scoring.scores import score_run
-        from robospa.results.tables.frame import trial_columns
 
         for part in by_setting(run):
             place = "" if len(by_setting(run)) == 1 else f"{setting_name(part)}/"

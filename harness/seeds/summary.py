@@ -12,7 +12,7 @@ from pathlib import Path
 
 from robospa.harness.running.atomic_file import replace_file
 from robospa.harness.seeds.sweep import Search
-from robospa.results.tables.table import Table, TableCell, TableRow
+from robospa.results.tables import Table, TableCell, TableRow
 from robospa.tasks.catalog import task
 from robospa.tasks.seeds import ListKey
 

@@ -18,7 +18,7 @@ from robospa.results.statistics.intervals import (
     interval_of,
     paired_mean,
 )
-from robospa.results.tables.table import Table, TableCell, TableRow
+from robospa.results.tables import Table, TableCell, TableRow
 
 AXES = {
     "embodiment": "robots",

@@ -35,7 +35,7 @@ from robospa.results.statistics.significance import (
 )
 
 if TYPE_CHECKING:
-    from robospa.results.tables.table import Table
+    from robospa.results.tables import Table
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,7 @@ from robospa.results.statistics.intervals import (
     paired_sample_difference,
 )
 from robospa.results.statistics.significance import p_of_interval
-from robospa.results.tables.table import Table, TableCell, TableRow
+from robospa.results.tables import Table, TableCell, TableRow
 
 ENTRY = "real_time"
 """What records keep of real time, in their diagnostics."""
@@ -93,14 +93,14 @@ def latency_curve(models: Sequence[ModelResults]) -> LatencyCurve:
     if len(models) < 2:
         raise IncomparableError("a curve needs runs at two latencies or more")
     for model in models:
-        if model.info.latency_ms is None:
+        if model.manifest.latency_ms is None:
             raise IncomparableError(
                 f"{model.name} has no constant latency: run it with --clock real:200ms, say"
             )
-    models = sorted(models, key=lambda model: model.info.latency_ms or 0.0)
-    latencies = [model.info.latency_ms or 0.0 for model in models]
-    policies = {model.info.policy for model in models}
-    rules = {model.info.clock.partition(" ")[2] for model in models}
+    models = sorted(models, key=lambda model: model.manifest.latency_ms or 0.0)
+    latencies = [model.manifest.latency_ms or 0.0 for model in models]
+    policies = {model.manifest.policy.name for model in models}
+    rules = {model.manifest.clock.partition(" ")[2] for model in models}
     if len(policies) > 1 or len(rules) > 1 or len(set(latencies)) < len(latencies):
         raise IncomparableError(
             "a curve is of one policy and one way to switch between chunks, with one run a latency"
@@ -120,7 +120,7 @@ def latency_curve(models: Sequence[ModelResults]) -> LatencyCurve:
         for row, (model, latency) in enumerate(zip(models, latencies, strict=True))
     )
     return LatencyCurve(
-        first.info.policy,
+        first.manifest.policy.name,
         next(iter(rules)) or "wait",
         sum(len(found) for found in seeds.values() if found),
         points,

@@ -54,7 +54,7 @@ def notes(
         alone = sum(max(first.listed[v], second.listed[v]) - pairs[v] for v in common)
         if alone:
             found.append(f"{alone} listed trials have no result on one of the sides: left out.")
-        blind = [side.name for side in (first, second) if side.info.seeded is False]
+        blind = [side.name for side in (first, second) if side.manifest.policy.seeded is False]
         if blind:
             found.append(
                 f"{' and '.join(blind)} ignores the policy seed: another run may differ, so the "
@@ -77,7 +77,8 @@ def notes(
 
 
 def _versions(model: ModelResults) -> dict[str, object]:
-    return {} if model.published else {**model.info.versions, "code": model.info.code}
+    about = model.manifest.about
+    return {} if model.published else {**about.versions, "code": about.code}
 
 
 def worst_and_best(first: ModelResults, second: ModelResults, metric: str) -> list[str]:

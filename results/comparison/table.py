@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from robospa.results.comparison.compare import Comparison, Difference
-from robospa.results.tables.table import Table, TableCell, TableRow
+from robospa.results.tables import Table, TableCell, TableRow
 
 HEAD = 18
 """Letters of a side's name over a column."""

@@ -6,12 +6,15 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from robospa.results.failures.labels import KINDS, NAMES
-from robospa.results.figures.failure_bars import draw_failures
-from robospa.results.figures.heat import draw_heat
-from robospa.results.figures.latency import draw_latency, has_latency
-from robospa.results.figures.levels import draw_levels
-from robospa.results.figures.progress import draw_progress
-from robospa.results.figures.radar import draw_radar
+from robospa.results.figures.charts import (
+    draw_failures,
+    draw_heat,
+    draw_latency,
+    draw_levels,
+    draw_progress,
+    draw_radar,
+    has_latency,
+)
 from robospa.results.figures.series import (
     FORMATS,
     Drawing,

@@ -16,6 +16,7 @@ from robospa.categories import BASIC, DIMENSIONS, METRIC_CATEGORIES
 from robospa.results.paper import rounding
 from robospa.results.paper.published import LEVELS, load
 from robospa.results.paper.published_results import published_results
+from robospa.results.records.manifest import Departure, departures
 from robospa.results.records.run_io import Run
 from robospa.results.scoring.model_results import (
     ModelResults,
@@ -29,7 +30,7 @@ from robospa.results.scoring.setting import TABLE, IncomparableError, check_same
 from robospa.results.statistics import onta
 from robospa.results.statistics.bootstrap import Sample, rate
 from robospa.results.statistics.intervals import METHODS, Estimate, interval_of
-from robospa.results.tables.table import MISSING, TableCell
+from robospa.results.tables import MISSING, TableCell
 
 Values = Mapping[str, Mapping[tuple[str, int], float | None]]
 """Percent by metric and (row, level)."""
@@ -47,10 +48,13 @@ class Column:
 
     @property
     def title(self) -> str:
-        """The head of the column."""
-        shuffled = " (shuffled sentences)" * self.shuffled
-        clock = " (real time)" * bool(self.results.info.clock)
-        return self.results.name + " (privileged)" * self.privileged + shuffled + clock
+        """The head of the column, with the run's departures from the benchmark."""
+        return self.results.name + "".join(f" ({one.name})" for one in self.departures)
+
+    @cached_property
+    def departures(self) -> tuple[Departure, ...]:
+        """Those of its run; none of a published model."""
+        return departures(self.results.manifest)
 
     @property
     def scores(self) -> Scores:
@@ -63,20 +67,9 @@ class Column:
         return self.results.published
 
     @property
-    def privileged(self) -> bool:
-        """Whether the policy saw the exact state, or was sent what names the scene."""
-        info = self.results.info
-        return info.privileged or info.needs_trial_key
-
-    @property
-    def shuffled(self) -> bool:
-        """Whether its trials had the sentences of other scenes."""
-        return self.results.info.shuffled_instructions
-
-    @property
-    def apart(self) -> bool:
-        """Whether it is never ranked: an ablation, or a run in real time."""
-        return self.shuffled or bool(self.results.info.clock)
+    def ranked(self) -> bool:
+        """Whether it is marked and ranked among others."""
+        return all(one.ranked for one in self.departures)
 
     @property
     def embodiment(self) -> str:
@@ -244,7 +237,7 @@ def published_column(model: str, name: str = "", ci: str = METHODS[0]) -> Column
 
 def run_column(run: Run, name: str = "", ci: str = METHODS[0]) -> Column:
     """`run` as a column, called `name` or as its policy; see `column_of`."""
-    return column_of(results_of_run(run, name or run.info.policy, ci))
+    return column_of(results_of_run(run, name or run.manifest.policy.name, ci))
 
 
 def column_of(results: ModelResults) -> Column:
@@ -254,7 +247,7 @@ def column_of(results: ModelResults) -> Column:
     if not variants:
         raise IncomparableError(f"{where} lists no trials; there is nothing to show")
     check_same([(where, results.setting)], TABLE)
-    basic = {task for task, category in results.info.categories.items() if category in BASIC}
+    basic = {task for task, category in results.manifest.categories.items() if category in BASIC}
     unknown = sorted(
         f"{task} L{level}"
         for task, level in variants

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from robospa.results.paper.pieces import pieces, pieces_of, told
+from robospa.results.records.manifest import RunSettings
 from robospa.results.scoring.model_results import ModelResults, in_official_world
 from robospa.text import listed
 
-DIFFERENCES = listed(pieces("", {}).other)
+DIFFERENCES = listed(pieces("", RunSettings()).other)
 """How the paper's suite differs from ours."""
 ORIGIN = (
     "Tasks, rules, thresholds, layouts, step limits and the robot are those of the official "

@@ -12,7 +12,7 @@ from robospa.results.paper.origin import printed_note, table_note
 from robospa.results.paper.published import load, row_title, title
 from robospa.results.paper.result_tables import DASH, DIMENSION_NAMES, not_run_note
 from robospa.results.statistics.intervals import interval_of
-from robospa.results.tables.table import MISSING, Table, TableCell, TableRow
+from robospa.results.tables import MISSING, Table, TableCell, TableRow
 
 INTERVAL_METHODS = (("bootstrap", "Stratified bootstrap"), ("wilson", "MOVER on Wilson limits"))
 

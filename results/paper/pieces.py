@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
+from robospa.results.records.manifest import Facts, LayoutSettings, RunSettings
 from robospa.results.scoring.model_results import ModelResults, suite_of
 from robospa.results.scoring.setting import OFFICIAL
 from robospa.text import listed
@@ -24,25 +23,25 @@ class Pieces:
 
 def pieces_of(results: ModelResults) -> Pieces:
     """The pieces of a run."""
-    return pieces(suite_of(results), results.info.settings)
+    return pieces(suite_of(results), results.manifest.settings)
 
 
-def pieces(suite: str, settings: Mapping[str, Any]) -> Pieces:
+def pieces(suite: str, settings: RunSettings) -> Pieces:
     """The pieces of a run of `suite` with the `settings` of its manifest; of what the manifest does
     not say, nothing is official."""
-    said = _hash(settings.get("instructions"))
+    said = _hash(settings.instructions)
     sentences = f"sentences{said}" if said else ""
     if suite == CHECKOUT:
-        return _of_checkout(_map(settings, "world"))
+        return _of_checkout(settings.world.arguments)
     if suite.startswith(OFFICIAL):
-        return _of_world(_map(settings, "layout"), _map(settings, "world"), sentences)
+        return _of_world(settings.layout or LayoutSettings(), settings.world.arguments, sentences)
     official, other = [RULES, "layouts", "the robot"], ["other object meshes", "another renderer"]
     other += ["other seeds"]
     (official if sentences else other).append(sentences or "other sentences")
     return Pieces(tuple(official), tuple(other))
 
 
-def _of_checkout(world: Mapping[str, Any]) -> Pieces:
+def _of_checkout(world: Facts) -> Pieces:
     config = world.get("config") or "the usual one"
     return Pieces(
         (
@@ -57,14 +56,14 @@ def _of_checkout(world: Mapping[str, Any]) -> Pieces:
     )
 
 
-def _of_world(layout: Mapping[str, Any], world: Mapping[str, Any], sentences: str) -> Pieces:
+def _of_world(layout: LayoutSettings, world: Facts, sentences: str) -> Pieces:
     official, other = [RULES, "the robot's joints and cameras"], []
-    if layout.get("assets") == "official":
-        official.append(f"objects{_hash(layout.get('digest'), 'archive')}")
+    if layout.assets == "official":
+        official.append(f"objects{_hash(layout.digest, 'archive')}")
         other.append("boxes, pads, covers and T blocks made here")
     else:
         other.append("other object meshes")
-    if names := [str(name) for name in layout.get("switches", ())]:
+    if names := layout.switches:
         official.append(f"quirks of scenes ({', '.join(names)})")
     (official if sentences else other).append(sentences or "other sentences")
     meshes = str(world.get("robot_assets", "builtin"))
@@ -88,11 +87,6 @@ def told(results: ModelResults) -> str:
         f"{results.name} ({suite_of(results) or 'suite not stated'}) has of the official benchmark "
         f"{listed(found.official)}; it has {listed(found.other)}."
     )
-
-
-def _map(settings: Mapping[str, Any], name: str) -> Mapping[str, Any]:
-    found = settings.get(name)
-    return found if isinstance(found, dict) else {}
 
 
 def _hash(value: object, what: str = "hash") -> str:

@@ -18,7 +18,7 @@ from robospa.results.paper.origin import table_note
 from robospa.results.paper.published import LEVELS, load, row_title, title
 from robospa.results.scoring.model_results import in_official_world
 from robospa.results.statistics.significance import supported_best
-from robospa.results.tables.table import MISSING, PRINTED_OTHERWISE, Table, TableCell, TableRow
+from robospa.results.tables import MISSING, PRINTED_OTHERWISE, Table, TableCell, TableRow
 
 MARKS = ("tied", "highest", "none")
 """Which values are marked as best among the runs (in a table without runs among the published
@@ -140,7 +140,7 @@ def _best(
     if mark not in MARKS:
         raise ValueError(f"no mark is called {mark!r}; there are {', '.join(MARKS)}")
     places = [(row, level) for row in rows for level in levels]
-    rivals = [column for column in _one_suite(columns) if not (column.privileged or column.apart)]
+    rivals = [column for column in _one_suite(columns) if column.ranked]
     if mark == "none" or len(rivals) < 2:
         return {place: set() for place in places}
     find = _supported if mark == "tied" else _highest

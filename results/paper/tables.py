@@ -8,11 +8,7 @@ from pathlib import Path
 from robospa.results.paper import other_tables as given
 from robospa.results.paper.columns import Column, check_worlds
 from robospa.results.paper.result_tables import summary_table, task_table
-from robospa.results.tables.csv import to_csv
-from robospa.results.tables.html import page
-from robospa.results.tables.latex import document, to_latex
-from robospa.results.tables.markdown import to_markdown
-from robospa.results.tables.table import Table
+from robospa.results.tables import Table, html_page, latex_document, to_csv, to_latex, to_markdown
 
 Maker = Callable[[Sequence[Column], str], Table]
 
@@ -36,8 +32,8 @@ TABLES: dict[str, Maker] = {
 
 FORMATS: dict[str, Callable[[Sequence[Table]], str]] = {
     "md": lambda tables: "\n".join(to_markdown(table) for table in tables),
-    "tex": document,
-    "html": lambda tables: page(tables, "RoboSPA: results"),
+    "tex": latex_document,
+    "html": lambda tables: html_page(tables, "RoboSPA: results"),
     "csv": to_csv,
 }
 """Ending -> what writes several tables as one file."""

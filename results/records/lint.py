@@ -24,6 +24,7 @@ from robospa.results.records.action_problems import (
 )
 from robospa.results.records.finding import Finding
 from robospa.results.records.lint_faults import lint_faults
+from robospa.results.records.manifest import LIMITS, REAL_TIME, departures
 from robospa.results.records.run_io import Run, finished, lost_actions
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.statistics.onta import of_percent
@@ -33,6 +34,8 @@ FASTEST_STEP = 4e-6
 """Wall time of a physics step [s] that no machine known to us beats: 1000 times real time. Arms
 that stand still among sleeping objects take 16 us on two cores of 2026."""
 T = TypeVar("T")
+LINTED = {LIMITS: "warning", REAL_TIME: "note"}
+"""Departures that a finding names, with its severity."""
 INFORMATIVE = 3
 """Rows with fewer different numbers above zero may well agree by chance."""
 
@@ -154,7 +157,7 @@ def lint_run(run: Run, variants: Collection[tuple[str, int]] | None = None) -> l
     for (task, level), records in groups.items():
         found += _lint_variant(f"{name}, {task} L{level}", records)
     found += lint_table(run_rows(run, name, groups))
-    return found + list(_repeats(name, groups, run.info.privileged))
+    return found + list(_repeats(name, groups, run.manifest.settings.privileged))
 
 
 def lint_actions(run: Run) -> list[Finding]:
@@ -168,14 +171,14 @@ def lint_runs(runs: Sequence[Run]) -> list[Finding]:
     """Reasons why several runs cannot stand in one table."""
     found: list[Finding] = []
     for title, read in (
-        ("code", lambda r: r.info.code),
-        ("versions", lambda r: r.info.versions),
-        ("list of trials", lambda r: r.info.seed_hash),
+        ("code", lambda r: r.manifest.about.code),
+        ("versions", lambda r: r.manifest.about.versions),
+        ("list of trials", lambda r: r.manifest.seed_hash),
         ("embodiments", lambda r: sorted({k.embodiment for k in r.keys})),
         ("scene modes", lambda r: sorted({k.mode for k in r.keys})),
         ("instruction splits", lambda r: sorted({k.split for k in r.keys})),
-        ("step limits", lambda r: r.info.step_scale),
-        ("clocks", lambda r: r.info.clock),
+        ("step limits", lambda r: r.manifest.settings.step_scale),
+        ("clocks", lambda r: r.manifest.clock),
     ):
         if len({repr(read(run)) for run in runs}) > 1:
             names = ", ".join(run.folder.name for run in runs)
@@ -241,13 +244,11 @@ def _lint_listing(
 
 def _lint_limits(run: Run, name: str) -> Iterator[Finding]:
     """Departures of a run from the benchmark's rules."""
-    if (scale := run.info.step_scale) != 1:
-        text = f"step limits are {scale:g} times the official ones: not the benchmark's numbers"
-        yield Finding("step-limits", "warning", name, text)
-    if run.info.clock:
-        text = f"in real time ({run.info.clock}): not the benchmark's numbers"
-        yield Finding("real-time", "note", name, text)
-    if unknown := [server for server, checkpoint in run.info.servers.items() if checkpoint == ""]:
+    for one in departures(run.manifest):
+        if one.name in LINTED:
+            text = f"{one}: not the benchmark's numbers"
+            yield Finding(one.name.replace(" ", "-"), LINTED[one.name], name, text)
+    if unknown := [server for server, named in run.manifest.servers.items() if not named]:
         text = f"nothing says which checkpoint was served at {some(unknown)}"
         yield Finding("unknown-checkpoint", "note", name, text)
 

@@ -1,13 +1,21 @@
-"""`run.json` read back: the list of trials, and what the rest says of policy, code and machine."""
+"""`run.json`: what a run is made of. One type, written at a run's start and read by everything.
+
+`settings` decide the result and may not change on resume; `about` describes software, machine and
+servers and is only kept. A field without a value is left out of the file, and what the file holds
+besides is ignored, so that a run of another version can be read as far as it says the same.
+"""
 
 from __future__ import annotations
 
+import hashlib
+import json
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Annotated
 
-from msgspec import Struct
+from msgspec import Meta, Struct, to_builtins
 
 from robospa.schema import Count, Name, Number, SettingName, parse_json, read
 from robospa.trial import TrialKey
@@ -16,9 +24,14 @@ MANIFEST = "run.json"
 FORMAT = 1
 """Version of a run's folder. A newer one is refused."""
 MAX_MANIFEST_BYTES = 2**26
+REST_TO_REST = "rest_to_rest"
+"""How the benchmark executes an action."""
+Facts = dict[str, object]
+"""JSON values that are kept as they are: what a server, a world or a machine says of itself."""
 
 
-Map = dict[str, Any]
+class RunError(Exception):
+    """A run's folder cannot be read; the message names file and line."""
 
 
 class TrialGroup(Struct, frozen=True):
@@ -32,149 +45,261 @@ class TrialGroup(Struct, frozen=True):
     seeds: list[Count]
 
 
-class _Spec(Struct, frozen=True):
+class PolicySpecification(Struct, frozen=True):
+    """What readers of a run ask of a policy's specification. `seeded` is None where it does not say
+    whether the policy honours the trial's seed."""
+
     name: str = ""
+    action: str = ""
+    horizon: Annotated[int, Meta(ge=1)] | None = None
+    execute: Annotated[int, Meta(ge=1)] | None = None
+    cameras: list[Facts | str] = []
+    seeded: bool | None = None
+    privileged: bool = False
+    environment_state: bool = False
+    needs_trial_key: bool = False
 
 
-class _Policy(Struct, frozen=True):
-    spec: _Spec = _Spec()
+class PolicySettings(Struct, frozen=True, dict=True):
+    """What of a policy decides a result: all that it said of itself, and the client's options."""
+
+    spec: Facts = {}
+    dialect: str | None = None
+    options: Facts = {}
+
+    def __post_init__(self) -> None:
+        _ = self.stated
+
+    @cached_property
+    def stated(self) -> PolicySpecification:
+        """`spec`, typed."""
+        return read(PolicySpecification, self.spec, "the policy's spec")
 
 
-class _Clock(Struct, frozen=True):
+class WorldSettings(Struct, frozen=True):
+    """The world by name, and the arguments that it was built with."""
+
+    name: str = ""
+    arguments: Facts = {}
+
+
+class ClockSettings(Struct, frozen=True):
+    """A real clock. `latency_ms` is that of a constant latency, `seconds` the most that a trial may
+    take."""
+
     latency: str
-    switching: str = "wait"
     latency_ms: Number | None = None
+    switching: str = "wait"
     action_steps: Count = 0
     seconds: Number | None = None
 
+    @property
+    def text(self) -> str:
+        """The clock in a few words."""
+        limit = f" within {self.seconds:g} s" if self.seconds is not None else ""
+        switching = "" if self.switching == "wait" else f" {self.switching}"
+        return f"real:{self.latency}{switching}{limit}"
 
-class _Settings(Struct, frozen=True):
-    policy: _Policy = _Policy()
-    policies: Map = {}
-    world: Map = {}
-    step_scale: Number = 1.0
+
+class LayoutSettings(Struct, frozen=True):
+    """The official parts of a scene: whose objects (with the archive's hash), which quirks."""
+
+    assets: str = ""
+    digest: str = ""
+    switches: list[str] = []
+
+
+class RunSettings(Struct, frozen=True):
+    """What decides the results of a run.
+
+    `policy` stands for all tasks where there are no `policies` by task. `privileged`: it sees the
+    exact state. `needs_trial_key`: it is sent what names the scenes. `step_scale` multiplies the
+    official step limits. `shuffled_instructions`: every trial has the sentence of another scene.
+    `salt_sha256` is of hidden scenes. `instructions`: hash of official sentences.
+    """
+
+    embodiment: tuple[SettingName, ...] = ()
+    mode: tuple[SettingName, ...] = ()
+    split: tuple[Name, ...] = ()
+    policy: PolicySettings = PolicySettings()
     privileged: bool = False
     needs_trial_key: bool = False
+    run_seed: Count = 0
+    step_scale: Number = 1.0
+    world: WorldSettings = WorldSettings()
     shuffled_instructions: bool = False
+    clock: ClockSettings | None = None
     salt_sha256: str = ""
-    clock: _Clock | None = None
+    policies: dict[str, PolicySettings] = {}
+    instructions: str = ""
+    layout: LayoutSettings | None = None
+
+    @property
+    def stated(self) -> list[PolicySpecification]:
+        """What all policies said of themselves."""
+        return [policy.stated for policy in (self.policy, *self.policies.values())]
+
+    def policy_of(self, task: str) -> PolicySettings | None:
+        """The policy that does `task`; None if there are policies by task, and none for it."""
+        return self.policies.get(task) if self.policies else self.policy
 
 
-class _About(Struct, frozen=True):
-    policy: Map = {}
-    policies: Map = {}
-    versions: Map = {}
-    machine: Map = {}
-    world: Map = {}
-    git: Map = {}
-    arguments: Map = {}
+class ServerIdentity(Struct, frozen=True):
+    """The hash of a server's greeting without what is `volatile` in it, and its checkpoint."""
+
+    hash: str = ""
+    checkpoint: str = ""
+    volatile: list[str] = []
+
+
+class ServerFacts(Struct, frozen=True):
+    """Where a policy was and how it greeted, with its replicas (`equals`)."""
+
+    target: str = ""
+    hello: Facts = {}
+    identity: ServerIdentity | None = None
+    equals: tuple[ServerFacts, ...] = ()
+
+    @property
+    def servers(self) -> tuple[ServerFacts, ...]:
+        """Those that said who they are."""
+        return tuple(one for one in (self, *self.equals) if one.identity is not None)
+
+
+class GitState(Struct, frozen=True):
+    """The commit that a run was made with, and whether the checkout had changes."""
+
+    commit: str = ""
+    dirty: bool = False
+
+
+class RunAbout(Struct, frozen=True):
+    """What made a run: `code` is a hash. `seeds`: where the lists of seeds come from."""
+
+    versions: dict[str, str] = {}
+    git: GitState | None = None
     code: str = ""
-    warnings: list[Any] = []
+    machine: Facts = {}
+    world: Facts = {}
+    policy: ServerFacts | None = None
+    policies: dict[str, ServerFacts] = {}
+    arguments: Facts = {}
+    seeds: list[dict[str, str]] = []
+    warnings: list[str] = []
+    instructions: Facts = {}
 
 
-class _Manifest(Struct, frozen=True):
-    """What is relied on in a manifest; whatever else it holds, and what it lacks, is free."""
+class RunManifest(Struct, frozen=True, dict=True, kw_only=True):
+    """A whole `run.json`, with the list of trials that was fixed before the first one ran."""
 
-    settings: _Settings = _Settings()
-    about: _About = _About()
-    categories: dict[str, str] = {}
+    format: Count = FORMAT
     suite: str = ""
+    settings: RunSettings = RunSettings()
     seed_hash: str = ""
+    categories: dict[str, str] = {}
+    trials: list[TrialGroup] = []
+    about: RunAbout = RunAbout()
 
+    @cached_property
+    def keys(self) -> tuple[TrialKey, ...]:
+        """The listed trials."""
+        return trial_keys(self.trials)
 
-class RunError(Exception):
-    """A run's folder cannot be read; the message names file and line."""
+    @property
+    def policy(self) -> PolicySpecification:
+        """What the (first) policy said of itself."""
+        return self.settings.policy.stated
+
+    @property
+    def clock(self) -> str:
+        """A real clock in a few words; empty for the paused one."""
+        return self.settings.clock.text if self.settings.clock else ""
+
+    @property
+    def latency_ms(self) -> float | None:
+        """Of a run in real time with a constant latency."""
+        return self.settings.clock.latency_ms if self.settings.clock else None
+
+    @property
+    def control(self) -> str:
+        """How actions were executed."""
+        return str(self.about.world.get("control", REST_TO_REST))
+
+    @cached_property
+    def servers(self) -> dict[str, str]:
+        """The checkpoint that each policy server named, by address; empty for one that named
+        none."""
+        policies = (self.about.policy, *self.about.policies.values())
+        return {
+            server.target: server.identity.checkpoint
+            for policy in policies
+            if policy is not None
+            for server in policy.servers
+            if server.identity and "://" in server.target
+        }
+
+    def to_json(self) -> Facts:
+        """Plain JSON values, without what has no value."""
+        data = to_builtins(self)
+        parts: tuple[tuple[Facts, tuple[str, ...]], ...] = (
+            (data["settings"], OPTIONAL_SETTINGS),
+            (data["about"], OPTIONAL_ABOUT),
+        )
+        for part, names in parts:
+            for name in names:
+                if not part[name]:
+                    del part[name]
+        return dict(data)
 
 
 @dataclass(frozen=True)
-class RunInfo:
-    """What a manifest says of a run, with a default for whatever an older version left out.
+class Departure:
+    """Where a run departs from the benchmark: a short `name`, and what that means in `words`. If it
+    is not `ranked`, the run is shown beside others and never marked or ranked among them."""
 
-    `policy` is the name that the policy gave itself, `spec` its whole specification; `seeded` is
-    None where that does not say whether the policy honours the trial's seed. `needs_trial_key`: it
-    was sent what names the scenes. `shuffled_instructions`: every trial had the sentence of another
-    scene. `salt_sha256` is of hidden scenes, else empty. `step_scale`
-    multiplied the official step limits. `clock` is of a run in real time: its latency, and how
-    chunks follow each other; empty under the paused clock. `settings` decide the results;
-    `versions`, `code` (a hash), `git`, `machine` and `world` say what made them.
-    """
+    name: str
+    words: str
+    ranked: bool = False
 
-    policy: str = ""
-    seeded: bool | None = None
-    privileged: bool = False
-    needs_trial_key: bool = False
-    shuffled_instructions: bool = False
-    salt_sha256: str = ""
-    step_scale: float = 1.0
-    clock: str = ""
-    latency_ms: float | None = None
-    """Of a run in real time with a constant latency."""
-    suite: str = ""
-    seed_hash: str = ""
-    categories: Mapping[str, str] = field(default_factory=dict)
-    spec: Mapping[str, Any] = field(default_factory=dict)
-    settings: Mapping[str, Any] = field(default_factory=dict)
-    versions: Mapping[str, Any] = field(default_factory=dict)
-    code: str = ""
-    git: Mapping[str, Any] = field(default_factory=dict)
-    machine: Mapping[str, Any] = field(default_factory=dict)
-    world: Mapping[str, Any] = field(default_factory=dict)
-    servers: Mapping[str, str] = field(default_factory=dict)
-    """The checkpoint that each policy server named, by address; empty for one that named none."""
+    def __str__(self) -> str:
+        return f"{self.name}: {self.words}"
 
 
-def run_info(manifest: Mapping[str, Any]) -> RunInfo:
-    """What `manifest`, checked by `read_manifest`, says."""
-    settings, about = manifest.get("settings", {}), manifest.get("about", {})
-    spec = settings.get("policy", {}).get("spec", {})
-    seeded = spec.get("seeded")
-    return RunInfo(
-        policy=str(spec.get("name", "")),
-        seeded=None if seeded is None else bool(seeded),
-        privileged=bool(settings.get("privileged")),
-        needs_trial_key=bool(settings.get("needs_trial_key")),
-        shuffled_instructions=bool(settings.get("shuffled_instructions")),
-        salt_sha256=str(settings.get("salt_sha256", "")),
-        step_scale=float(settings.get("step_scale", 1.0)),
-        clock=_clock(settings.get("clock")),
-        latency_ms=(settings.get("clock") or {}).get("latency_ms"),
-        suite=str(manifest.get("suite", "")),
-        seed_hash=str(manifest.get("seed_hash", "")),
-        categories=manifest.get("categories", {}),
-        spec=spec,
-        settings=settings,
-        versions=about.get("versions", {}),
-        code=str(about.get("code", "")),
-        git=about.get("git", {}),
-        machine=about.get("machine", {}),
-        world=about.get("world", {}),
-        servers=_servers(about),
-    )
+LIMITS, REAL_TIME = "step limits", "real time"
 
 
-def _clock(declared: Mapping[str, Any] | None) -> str:
-    """A real clock in a few words; empty for the paused one."""
-    if not declared:
-        return ""
-    switching, seconds = declared.get("switching", "wait"), declared.get("seconds")
-    limit = f" within {seconds:g} s" if seconds is not None else ""
-    return f"real:{declared['latency']}{'' if switching == 'wait' else f' {switching}'}{limit}"
+def departures(manifest: RunManifest) -> tuple[Departure, ...]:
+    """All departures of a run; none of one that a leaderboard could take."""
+    settings, found = manifest.settings, []
+    if settings.privileged or any(s.privileged or s.environment_state for s in settings.stated):
+        found.append(Departure("privileged", "sees the exact state"))
+    elif settings.needs_trial_key or any(stated.needs_trial_key for stated in settings.stated):
+        words = "is sent every trial's seed, from which the scene can be rebuilt"
+        found.append(Departure("knows seeds", words))
+    if settings.shuffled_instructions:
+        words = "an ablation, every trial has the sentence of another scene"
+        found.append(Departure("shuffled sentences", words))
+    if manifest.clock:
+        found.append(Departure(REAL_TIME, f"{manifest.clock}, a suite of its own"))
+    if settings.step_scale != 1:
+        found.append(Departure(LIMITS, f"{settings.step_scale:g} times the official ones", True))
+    if settings.salt_sha256:
+        found.append(Departure("hidden scenes", f"salt with sha256 {settings.salt_sha256}", True))
+    return tuple(found)
 
 
-def _servers(about: Mapping[str, Any]) -> dict[str, str]:
-    """The checkpoint of every server in `about`; older versions kept none."""
-    found: dict[str, str] = {}
-    for policy in (about.get("policy", {}), *about.get("policies", {}).values()):
-        equals = policy.get("equals", ()) if isinstance(policy, dict) else ()
-        for server in (policy, *equals):
-            identity = server.get("identity") if isinstance(server, dict) else None
-            target = str(server.get("target", "")) if identity else ""
-            if isinstance(identity, dict) and "://" in target:
-                found[target] = str(identity.get("checkpoint", ""))
-    return found
+OPTIONAL_SETTINGS = (
+    *("shuffled_instructions", "clock", "salt_sha256", "policies", "instructions", "layout"),
+)
+OPTIONAL_ABOUT = ("git", "policy", "policies", "arguments", "seeds", "instructions")
 
 
-def read_manifest(folder: Path) -> dict[str, Any]:
+def manifest_text(manifest: RunManifest) -> str:
+    """What `run.json` holds."""
+    return json.dumps(manifest.to_json(), indent=1, default=str)
+
+
+def read_manifest(folder: Path) -> RunManifest:
     """The run's `run.json`; raises RunError if there is none or it is broken."""
     path = folder / MANIFEST
     if not path.exists():
@@ -191,8 +316,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
             f"{path} has format {str(version)[:20]}, and this robospa reads up to {FORMAT}: "
             "use the version that wrote it or a newer one"
         )
-    read(_Manifest, data, f"the run manifest {path}", RunError)
-    return data
+    return read(RunManifest, data, f"the run manifest {path}", RunError)
 
 
 def read_bytes(path: Path, most: int) -> bytes:
@@ -205,16 +329,44 @@ def read_bytes(path: Path, most: int) -> bytes:
         raise RunError(f"cannot read {path}: {error.strerror}") from error
 
 
-def manifest_keys(manifest: Mapping[str, Any]) -> tuple[TrialKey, ...]:
-    """The trials that a manifest lists; raises RunError if one of them is malformed."""
-    what = "the manifest's list of trials"
-    return trial_keys(read(list[TrialGroup], manifest.get("trials"), what, RunError))
-
-
 def trial_keys(groups: Iterable[TrialGroup]) -> tuple[TrialKey, ...]:
     """The trials of `groups`, in their order."""
     return tuple(
         TrialKey(group.task, group.level, seed, group.embodiment, group.mode, group.split)
         for group in groups
         for seed in group.seeds
+    )
+
+
+def trial_groups(keys: Iterable[TrialKey]) -> list[TrialGroup]:
+    """The list of trials as a manifest has it, a row a variant."""
+    rows: dict[tuple[str, int, str, str, str], list[int]] = {}
+    for key in keys:
+        row = (key.task, key.level, key.embodiment, key.mode, key.split)
+        rows.setdefault(row, []).append(key.seed)
+    return [TrialGroup(*row, seeds) for row, seeds in rows.items()]
+
+
+def seed_hash(keys: Iterable[TrialKey]) -> str:
+    """Hash of the set of trials: equal only if two runs list exactly the same ones."""
+    text = "\n".join(sorted(key.slug for key in keys))
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def make_manifest(
+    settings: RunSettings,
+    keys: Iterable[TrialKey],
+    about: RunAbout | None = None,
+    categories: Mapping[str, str] | None = None,
+    suite: str = "",
+) -> RunManifest:
+    """The manifest of a run of the trials `keys`."""
+    listed = tuple(keys)
+    return RunManifest(
+        suite=suite,
+        settings=settings,
+        seed_hash=seed_hash(listed),
+        categories=dict(categories or {}),
+        trials=trial_groups(listed),
+        about=about or RunAbout(),
     )

@@ -15,17 +15,10 @@ from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from robospa.results.records.films import film_name, films_in
-from robospa.results.records.manifest import (
-    RunError,
-    RunInfo,
-    manifest_keys,
-    read_bytes,
-    read_manifest,
-    run_info,
-)
+from robospa.results.records.manifest import RunError, RunManifest, read_bytes, read_manifest
 from robospa.results.records.run_state import in_progress
 from robospa.results.records.trial_record import TrialRecord
 from robospa.schema import parse_json, read
@@ -35,8 +28,8 @@ from robospa.trial import TrialKey
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-    from robospa.results.failures.listing import FailedTrials
-    from robospa.results.tables.table import Table
+    from robospa.results.failures.labels import FailedTrials
+    from robospa.results.tables import Table
 
 TRIALS = "trials"
 """Folder inside a run that holds the record files."""
@@ -81,7 +74,7 @@ class Run:
 
     folder: Path
     """The run's folder."""
-    manifest: Mapping[str, Any]
+    manifest: RunManifest
     """What `run.json` holds."""
     keys: tuple[TrialKey, ...]
     """The listed trials."""
@@ -93,11 +86,6 @@ class Run:
     """Trials that have more than one result; these agree."""
     in_progress: bool = False
     """Whether a process was running it when it was read."""
-
-    @cached_property
-    def info(self) -> RunInfo:
-        """The manifest, typed."""
-        return run_info(self.manifest)
 
     @cached_property
     def without_result(self) -> tuple[TrialKey, ...]:
@@ -132,17 +120,17 @@ class Run:
     def failures(self) -> FailedTrials:
         """A list of every failed trial with the type of its failure and the evidence for it;
         `print` and a notebook show a line of each."""
-        from robospa.results.failures.listing import failed_trials
+        from robospa.results.failures.labels import failed_trials
 
         return failed_trials(self.records.values())
 
     def to_pandas(self) -> DataFrame:
-        """One row a listed trial, as `robospa.results.tables.frame.trial_columns` has them; of a
+        """One row a listed trial, as `robospa.results.frame.trial_columns` has them; of a
         trial without a result everything but its key and `end` is missing.
 
         Raises MissingPackage without pandas, which the extra `notebook` brings.
         """
-        from robospa.results.tables.frame import to_pandas
+        from robospa.results.frame import to_pandas
 
         return to_pandas(self)
 
@@ -151,7 +139,7 @@ class Run:
 
         Raises MissingPackage without pyarrow, which the extra `notebook` brings.
         """
-        from robospa.results.tables.frame import to_parquet
+        from robospa.results.frame import to_parquet
 
         to_parquet(self, Path(path))
 
@@ -284,9 +272,8 @@ def read_run(folder: str | Path) -> Run:
         torn += [path.name] * was_torn
     counts = Counter(r.key for r in results if not withdraws(records[r.key], r))
     repeated = tuple(key for key, count in counts.items() if count > 1)
-    keys = manifest_keys(manifest)
     records = _with_films(records, films_in(folder))
-    return Run(folder, manifest, keys, records, tuple(torn), repeated, going_on)
+    return Run(folder, manifest, manifest.keys, records, tuple(torn), repeated, going_on)
 
 
 def _with_films(

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+from msgspec import structs
+
 from robospa.results.records.manifest import RunError
 from robospa.results.records.run_io import Run, read_run
 from robospa.results.scoring.setting import OFFICIAL
@@ -30,11 +32,11 @@ def _setting(key: TrialKey) -> tuple[str, str, str]:
 def _part(run: Run, setting: tuple[str, str, str]) -> Run:
     keys = tuple(key for key in run.keys if _setting(key) == setting)
     chosen = set(keys)
-    parts = {name: [value] for name, value in zip(PARTS, setting, strict=True)}
-    settings = {**run.manifest.get("settings", {}), **parts}
+    parts = {name: (value,) for name, value in zip(PARTS, setting, strict=True)}
+    settings = structs.replace(run.manifest.settings, **parts)
     return replace(
         run,
-        manifest={**run.manifest, "settings": settings},
+        manifest=structs.replace(run.manifest, settings=settings),
         keys=keys,
         records={key: record for key, record in run.records.items() if key in chosen},
         repeated=tuple(key for key in run.repeated if key in chosen),
@@ -47,8 +49,8 @@ def setting_name(run: Run) -> str:
     robots = dict.fromkeys(key.embodiment for key in run.keys)
     modes = dict.fromkeys(key.mode for key in run.keys if key.mode != "clean")
     splits = dict.fromkeys(key.split for key in run.keys if key.split != "heldout")
-    official = [run.info.suite] if run.info.suite.startswith(OFFICIAL) else []
-    clock = [run.info.clock] if run.info.clock else []
+    official = [run.manifest.suite] if run.manifest.suite.startswith(OFFICIAL) else []
+    clock = [run.manifest.clock] if run.manifest.clock else []
     return ", ".join((*official, *robots, *modes, *splits, *clock))
 
 

@@ -16,7 +16,7 @@ from robospa.results.report.report import Report, draw_figures
 from robospa.results.report.run_card import about, ends, facts
 from robospa.results.report.tables import write_files
 from robospa.results.scoring.score_json import to_json
-from robospa.results.tables.markdown import escape_markdown, to_markdown
+from robospa.results.tables import escape_markdown, to_markdown
 
 TABLES = "tables"
 

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 from robospa.categories import BASIC, CATEGORY_NAMES
 from robospa.results.failures.labels import NAMES, SIMULATED_PER_FILM
 from robospa.results.figures.series import FORMATS, GRID, INK, Drawing
+from robospa.results.records.manifest import departures
 from robospa.results.records.run_io import Run
 from robospa.results.report.report import Report
 from robospa.results.report.run_card import facts
@@ -130,14 +131,7 @@ def badges(runs: Sequence[Run], names: Sequence[str]) -> list[str]:
     made = []
     for run, name in zip(runs, names, strict=True):
         of = f"{name}: " if len(runs) > 1 else ""
-        if run.info.privileged:
-            made.append(f"{of}privileged, sees the exact state")
-        elif run.info.needs_trial_key:
-            made.append(f"{of}knows every trial's seed, from which the scene can be rebuilt")
-        if run.info.shuffled_instructions:
-            made.append(f"{of}an ablation, every trial had the sentence of another scene")
-        if run.info.clock:
-            made.append(f"{of}in real time ({run.info.clock}), a suite of its own")
+        made += [f"{of}{one}" for one in departures(run.manifest)]
         if run.missing:
             made.append(f"{of}{len(run.missing)} of {len(run.keys)} trials are missing")
     return made

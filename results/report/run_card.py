@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
+from msgspec import to_builtins
+
 from robospa.results.records.action_problems import problem_lines
-from robospa.results.records.manifest import RunInfo
+from robospa.results.records.manifest import RunAbout, departures
 from robospa.results.records.run_io import Run
 from robospa.results.records.settings_of_run import setting_name
 from robospa.results.records.trial_record import PROCESSOR
@@ -27,7 +29,7 @@ ACTIONS = {"action": "", "horizon": "chunks of at most ", "execute": "executed o
 def names_of(runs: Sequence[Run]) -> list[str]:
     """A name for every run: its policy's, where two would be equal with its robot and scene mode
     if these differ, and then with its folder."""
-    names = [run.info.policy or "unknown" for run in runs]
+    names = [run.manifest.policy.name or "unknown" for run in runs]
     for more in (setting_name, lambda run: run.folder.name):
         extra = [more(run) for run in runs]
         names = [
@@ -47,24 +49,22 @@ def _differ(names: Sequence[str], extra: Sequence[str], name: str) -> bool:
 
 def about(run: Run) -> dict[str, object]:
     """The facts of the manifest that a reader needs."""
-    info = run.info
+    manifest, data = run.manifest, run.manifest.to_json()
+    settings, about = manifest.settings, to_builtins(manifest.about)
     return {
-        "policy": info.policy or "unknown",
-        "privileged": info.privileged,
-        "needs_trial_key": info.needs_trial_key,
-        "shuffled_instructions": info.shuffled_instructions,
-        "seeded": bool(info.seeded),
-        "spec": info.spec,
+        "policy": manifest.policy.name or "unknown",
+        "privileged": settings.privileged,
+        "needs_trial_key": settings.needs_trial_key,
+        "shuffled_instructions": settings.shuffled_instructions,
+        "seeded": bool(manifest.policy.seeded),
+        "spec": settings.policy.spec,
         "trials": len(run.keys),
         "results": len(run.keys) - len(run.without_result),
         "missing": len(run.missing),
         "to_run": len(run.waiting),
-        "settings": info.settings,
-        "seed_hash": info.seed_hash,
-        "versions": info.versions,
-        "git": info.git,
-        "machine": info.machine,
-        "world": info.world,
+        "settings": data["settings"],
+        "seed_hash": manifest.seed_hash,
+        **{name: about[name] for name in ("versions", "git", "machine", "world")},
     }
 
 
@@ -112,32 +112,28 @@ def timing(run: Run) -> dict[str, float]:
 
 def facts(run: Run) -> list[tuple[str, str]]:
     """The run's card, as name and text; facts that are not known are left out."""
-    info = run.info
-    settings, spec = info.settings, info.spec
-    seeded = "honours the trial's policy seed" if info.seeded else "ignores the policy seed"
-    cameras = ", ".join(str(c.get("name", c)) if isinstance(c, Mapping) else str(c)
-                      for c in spec.get("cameras") or ()) or "no camera"  # fmt: skip
-    sees = "the exact state (privileged)" if info.privileged else f"observations: {cameras}"
-    sees += "; is sent every trial's seed" if info.needs_trial_key else ""
-    sees += "; sentences of other scenes (ablation)" if info.shuffled_instructions else ""
+    manifest, about = run.manifest, run.manifest.about
+    settings, policy = manifest.settings, manifest.policy
+    spec = settings.policy.spec
+    seeded = "honours the trial's policy seed" if policy.seeded else "ignores the policy seed"
+    cameras = ", ".join(str(c.get("name", c)) if isinstance(c, Mapping) else c
+                        for c in policy.cameras) or "no camera"  # fmt: skip
     found = [
-        ("policy", info.policy or "unknown"),
-        ("sees", sees),
+        ("policy", policy.name or "unknown"),
+        ("sees", f"observations: {cameras}"),
         ("actions", _words(f"{words}{spec[n]}" for n, words in ACTIONS.items() if spec.get(n))),
-        ("seeding", f"{seeded}; seed {settings.get('policy_seed', 0)}" if spec else ""),
+        ("seeding", f"{seeded}; seed {settings.run_seed}" if spec else ""),
         ("trials", _trials(run)),
         ("ends", _words(f"{count} {name}" for name, count in ends(run).items())),
         ("not executed as sent", "; ".join(problem_lines(run.records.values()))),
-        ("setting", _words(_line(settings.get(n)) for n in ("embodiment", "mode", "split")
-                           if settings.get(n))),
-        ("suite", info.suite),
-        ("departure", _step_limits(info.step_scale)),
-        ("clock", info.clock),
-        ("hidden scenes", info.salt_sha256 and f"salt with sha256 {info.salt_sha256}"),
-        ("list of trials", f"hash {info.seed_hash}" if info.seed_hash else ""),
-        ("software", _software(info)),
-        ("machine", _pairs(info.machine)),
-        ("world", _pairs(info.world)),
+        ("setting", _words(" ".join(x) for x in
+                           (settings.embodiment, settings.mode, settings.split) if x)),
+        ("suite", manifest.suite),
+        ("departures", "; ".join(map(str, departures(manifest)))),
+        ("list of trials", f"hash {manifest.seed_hash}" if manifest.seed_hash else ""),
+        ("software", _software(about)),
+        ("machine", _pairs(about.machine)),
+        ("world", _pairs(about.world)),
         ("policy latency", _latency(run)),
         ("time spent on", _words(f"{name} {100 * share:.0f} %" for name, share in
                                  timing(run).items() if share >= 0.005)),
@@ -153,14 +149,10 @@ def _trials(run: Run) -> str:
     return f"{text}, {len(run.waiting)} still to run" if run.waiting else text
 
 
-def _step_limits(scale: float) -> str:
-    return f"step limits are {scale:g} times the official ones" if scale != 1 else ""
-
-
-def _software(info: RunInfo) -> str:
-    parts = [f"{name} {version}" for name, version in info.versions.items()]
-    if commit := str(info.git.get("commit", "")):
-        parts.append(f"commit {commit[:12]}" + " with changes" * bool(info.git.get("dirty")))
+def _software(about: RunAbout) -> str:
+    parts = [f"{name} {version}" for name, version in about.versions.items()]
+    if about.git and about.git.commit:
+        parts.append(f"commit {about.git.commit[:12]}" + " with changes" * about.git.dirty)
     return _words(parts)
 
 

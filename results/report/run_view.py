@@ -14,8 +14,7 @@ from robospa.results.report.faults import policy_error_lines
 from robospa.results.report.run_card import ends
 from robospa.results.report.score_table import score_table
 from robospa.results.scoring.scores import score_run
-from robospa.results.tables.html import fragment
-from robospa.results.tables.table import Table, TableCell, TableRow
+from robospa.results.tables import Table, TableCell, TableRow, html_fragment
 
 
 def run_table(run: Run) -> Table:
@@ -37,7 +36,8 @@ def _scores(run: Run) -> Table:
     for part, table in zip(parts, tables, strict=True):
         rows.append(TableRow(setting_name(part), kind="section"))
         rows += [_spread(row, table.heads, heads) for row in table.rows]
-    return replace(tables[0], title=run.info.policy or "policy", heads=heads, rows=tuple(rows))
+    title = run.manifest.policy.name or "policy"
+    return replace(tables[0], title=title, heads=heads, rows=tuple(rows))
 
 
 def _spread(row: TableRow, heads: tuple[str, ...], wanted: tuple[str, ...]) -> TableRow:
@@ -51,7 +51,7 @@ def run_html(run: Run) -> str:
     counts = ", ".join(f"{count} {name}" for name, count in ends(run).items())
     lines = [f"{len(run.keys)} trials: {counts}", *_lines(run), f"folder: {run.folder}"]
     notes = "<br>".join(escape(line) for line in lines)
-    return f"{fragment(_scores(run))}\n<p>{notes}</p>"
+    return f"{html_fragment(_scores(run))}\n<p>{notes}</p>"
 
 
 def _lines(run: Run) -> list[str]:

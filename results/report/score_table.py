@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from robospa.categories import BASIC, CATEGORIES, CATEGORY_NAMES, DIMENSIONS
 from robospa.results.records.action_problems import problem_lines
+from robospa.results.records.manifest import departures
 from robospa.results.records.run_io import Run
 from robospa.results.records.settings_of_run import setting_name
 from robospa.results.report.faults import policy_error_lines, repeat_lines
@@ -15,8 +16,7 @@ from robospa.results.report.run_card import ends
 from robospa.results.scoring.score_json import level_name
 from robospa.results.scoring.scores import AverageScore, Scores, VariantScore
 from robospa.results.statistics.intervals import Estimate
-from robospa.results.tables.table import MISSING, Table, TableCell, TableRow
-from robospa.results.tables.terminal import show
+from robospa.results.tables import MISSING, Table, TableCell, TableRow, show
 from robospa.terminal import plain_console
 from robospa.trial import REFERENCE
 
@@ -97,17 +97,11 @@ def score_table(run: Run, scores: Scores) -> Table:
         table_rows = [
             row for row in table_rows if row.kind != "category"
         ]  # they would repeat their task
-    knows = ""
-    if run.info.privileged:
-        knows = " (privileged: sees the exact state)"
-    elif run.info.needs_trial_key:
-        knows = " (knows every trial's seed)"
-    knows += " (ablation: sentences of other scenes)" * run.info.shuffled_instructions
-    knows += f" ({run.info.clock})" * bool(run.info.clock)
+    departs = "".join(f" ({one})" for one in departures(run.manifest))
     heads = (*map(level_name, scores.levels), "SR [95 %]", "ONTA", "PS", "trials")
     return Table(
         "scores",
-        f"{run.info.policy or 'policy'}{knows}{_where(run)}",
+        f"{run.manifest.policy.name or 'policy'}{departs}{_where(run)}",
         "",
         heads,
         tuple(_table_row(row) for row in table_rows),

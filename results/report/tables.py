@@ -17,8 +17,7 @@ from robospa.results.paper.columns import Column
 from robospa.results.paper.other_tables import basic_table
 from robospa.results.paper.result_tables import DASH, summary_table, task_table
 from robospa.results.paper.tables import write_tables
-from robospa.results.tables.html import fragment
-from robospa.results.tables.table import Table, TableRow
+from robospa.results.tables import Table, TableRow, html_fragment
 
 if TYPE_CHECKING:
     from markupsafe import Markup
@@ -134,7 +133,7 @@ def for_page(tables: Sequence[ReportTable]) -> list[PageTable]:
         short = replace(
             paper_table, notes=tuple(note for note in paper_table.notes if note not in long)
         )
-        html = Markup(fragment(short))
+        html = Markup(html_fragment(short))
         made.append(PageTable(paper_table.title, html, table.folded, long))
     return made
 

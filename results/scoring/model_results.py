@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from robospa.categories import BASIC, METRIC_CATEGORIES
-from robospa.results.records.manifest import RunInfo
+from robospa.results.records.manifest import REST_TO_REST, RunManifest
 from robospa.results.records.run_io import Run, finished
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.scoring.scores import Scores, score
@@ -37,7 +37,7 @@ class ModelResults:
     name: str
     scores: Scores
     setting: Setting
-    info: RunInfo = field(default_factory=RunInfo)
+    manifest: RunManifest = field(default_factory=RunManifest)
     trials: Mapping[Variant, Mapping[int, TrialRecord]] = field(default_factory=dict)
     published: str = ""
     to_run: int = 0
@@ -91,8 +91,6 @@ def restricted(results: ModelResults, variants: Collection[Variant]) -> ModelRes
     )
 
 
-REST_TO_REST = "rest_to_rest"
-"""How the benchmark executes an action."""
 FREE = ("embodiment", "mode", "split", "clock")
 """Parts of a setting in which runs of one policy may differ and stand beside each other: scenes of
 one seed have the same objects, whatever the robot, the scene mode, the sentence and the clock."""
@@ -100,13 +98,13 @@ one seed have the same objects, whatever the robot, the scene mode, the sentence
 
 def one_policy(models: Sequence[ModelResults]) -> bool:
     """Whether all are runs of one policy."""
-    names = {model.info.policy for model in models}
+    names = {model.manifest.policy.name for model in models}
     return len(names) == 1 and "" not in names and not any(model.published for model in models)
 
 
 def suite_of(results: ModelResults) -> str:
     """The suite; "" where it is not stated."""
-    return results.info.suite or next(iter(results.setting.suite), "")
+    return results.manifest.suite or next(iter(results.setting.suite), "")
 
 
 def in_official_world(results: ModelResults) -> bool:
@@ -135,9 +133,9 @@ def _check_timing(models: Sequence[ModelResults]) -> None:
     """IncomparableError for a run whose actions have a duration of their own, beside published
     models, whose actions go from rest to rest."""
     for model in models:
-        if not model.published and model.info.world.get("control", REST_TO_REST) != REST_TO_REST:
+        if not model.published and model.manifest.control != REST_TO_REST:
             raise IncomparableError(
-                f"{model.name} is of the suite {model.info.suite}, whose actions have a fixed "
+                f"{model.name} is of the suite {model.manifest.suite}, whose actions have a fixed "
                 "duration, and published numbers are of actions from rest to rest: compare it "
                 "with another run at its rate"
             )
@@ -145,8 +143,8 @@ def _check_timing(models: Sequence[ModelResults]) -> None:
 
 def results_of_run(run: Run, name: str = "", ci: str = METHODS[0]) -> ModelResults:
     """The results of `run`, called `name` or as its folder, with intervals by the method `ci`."""
-    found = results_of_records(name or run.folder.name, run.counted, run.records, run.info, ci)
-    setting = setting_of(run.keys, run.info.suite, run.info.step_scale, run.info.clock)
+    found = results_of_records(name or run.folder.name, run.counted, run.records, run.manifest, ci)
+    setting = setting_of(run.keys, run.manifest)
     return replace(found, setting=setting, to_run=len(run.waiting))
 
 
@@ -154,7 +152,7 @@ def results_of_records(
     name: str,
     keys: Sequence[TrialKey],
     records: Mapping[TrialKey, TrialRecord],
-    info: RunInfo,
+    manifest: RunManifest,
     ci: str = METHODS[0],
 ) -> ModelResults:
     """The results of the trials `keys`, of which `records` has some."""
@@ -163,6 +161,5 @@ def results_of_records(
         record = records.get(key)
         if record is not None and finished(record):
             trials.setdefault(key.variant, {})[key.seed] = record
-    setting = setting_of(keys, info.suite, info.step_scale, info.clock)
-    scores = score(keys, records, info.categories, ci)
-    return ModelResults(name, scores, setting, info, trials)
+    scores = score(keys, records, manifest.categories, ci)
+    return ModelResults(name, scores, setting_of(keys, manifest), manifest, trials)

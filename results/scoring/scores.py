@@ -320,4 +320,4 @@ def combine(cells: Mapping[Variant, VariantScore], ci: str = METHODS[0]) -> Scor
 
 def score_run(run: Run, ci: str = METHODS[0]) -> Scores:
     """All scores of `run`, of what has been run so far, with intervals by the method `ci`."""
-    return score(run.counted, run.records, run.info.categories, ci)
+    return score(run.counted, run.records, run.manifest.categories, ci)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from robospa.results.records.manifest import RunManifest
 from robospa.trial import TrialKey
 
 TABLE = ("embodiment", "mode", "suite", "split")
@@ -55,17 +56,15 @@ PAUSED = "paused"
 """The clock of the benchmark: the simulation waits for the policy."""
 
 
-def setting_of(
-    keys: Sequence[TrialKey], suite: str = "", step_scale: float = 1.0, clock: str = ""
-) -> Setting:
-    """The setting of the trials `keys`."""
+def setting_of(keys: Sequence[TrialKey], manifest: RunManifest) -> Setting:
+    """The setting of the trials `keys` of a run."""
     return Setting(
         tuple(sorted({key.embodiment for key in keys})),
         tuple(sorted({key.mode for key in keys})),
         tuple(sorted({key.split for key in keys})),
-        (suite,) if suite else (),
-        (step_scale,),
-        (clock or PAUSED,),
+        (manifest.suite,) if manifest.suite else (),
+        (manifest.settings.step_scale,),
+        (manifest.clock or PAUSED,),
     )
 
 

@@ -56,7 +56,7 @@ def test_it_is_said_wherever_the_results_stand(tmp_path: Path) -> None:
     assert not any("another scene" in text for text in badges([run], ["x"]))
     manifest = {**run.manifest, "settings": {"shuffled_instructions": True}}
     shuffled = replace(run, manifest=manifest)
-    assert shuffled.info.shuffled_instructions
+    assert shuffled.manifest.settings.shuffled_instructions
     assert "every trial had the sentence of another scene" in badges([shuffled], ["x"])[0]
     assert (
         "(ablation: sentences of other scenes)" in score_table(shuffled, score_run(shuffled)).title

@@ -5,16 +5,18 @@ from __future__ import annotations
 import json
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from msgspec import to_builtins
 from run_fakes import LIMIT, FakePolicy, FakeWorld, parts
 
 from robospa.harness.running.action_files import ActionRecorder, write_actions
-from robospa.harness.running.manifest import Manifest, about_machine, write_manifest
+from robospa.harness.running.manifest import about_machine, write_manifest
 from robospa.harness.running.record_store import RecordWriter
 from robospa.harness.sim.motion import RATE
 from robospa.harness.trial import run_trial
@@ -23,8 +25,17 @@ from robospa.harness.world import ActionError, Poll, StepResult
 from robospa.leaderboard import bundle as layout
 from robospa.leaderboard.bundle import BundleError, BundleLimits
 from robospa.leaderboard.card import to_card
-from robospa.leaderboard.rules import Reference, facts_of
+from robospa.leaderboard.rules import Reference, facts_of, manifest_of
 from robospa.leaderboard.verify import seed_lists, verify
+from robospa.results.records.manifest import (
+    RunAbout,
+    RunSettings,
+    make_manifest,
+    seed_hash,
+    trial_groups,
+)
+from robospa.schema import convert
+from robospa.tasks.scene import SUITE
 from robospa.tasks.snapshot import Snapshot
 from robospa.trial import TrialKey
 
@@ -135,21 +146,19 @@ def make_run(
     """A run of `keys` in the fake world, without its last `skip` trials."""
     keys, policy, world = list(keys) or all_keys(), policy or Weak(), World()
     settings: dict[str, Any] = {
-        "embodiment": ["aloha-agilex"],
-        "mode": ["clean"],
-        "split": ["heldout"],
+        "embodiment": ("aloha-agilex",),
+        "mode": ("clean",),
+        "split": ("heldout",),
         "policy": {"spec": policy.spec.to_json(), "dialect": "in process", "options": {}},
-        "privileged": False,
-        "run_seed": 0,
-        "step_scale": 1.0,
         "world": {"name": "bundle_fakes:World"},
     }
-    about = {**about_machine({}), "policy": {"target": "ws://secret:1"}, "arguments": {"token": 1}}
+    about = to_builtins(about_machine({}))
+    about |= {"policy": {"target": "ws://secret:1"}, "arguments": {"token": 1}}
     change(settings, about)
     folder.mkdir(parents=True)
     categories = {key.task: parts(key).task.category for key in keys}
-    write_manifest(folder, Manifest(settings, tuple(keys), about, categories))
-    folder.mkdir(parents=True, exist_ok=True)
+    settled, told = convert(settings, RunSettings), convert(about, RunAbout)
+    write_manifest(folder, make_manifest(settled, keys, told, categories, SUITE))
     writer = RecordWriter(folder)
     for key in keys[: len(keys) - skip]:
         recorder = ActionRecorder()
@@ -206,7 +215,8 @@ def seal(files: Files, **changes: Any) -> Files:
         if name != layout.MANIFEST
     }
     manifest["seeds"] = layout.sha256(layout.canonical(lists))
-    manifest["inputs"] = layout.inputs_hash(run, lists)
+    with suppress(BundleError):  # of a run that is none
+        manifest["inputs"] = layout.inputs_hash(manifest_of(run), lists)
     manifest["chain"] = {"rows": len(lines), "last": layout.sha256(lines[-1]) if lines else ""}
     manifest.update(changes)
     manifest["bundle"] = layout.bundle_hash(manifest)
@@ -216,14 +226,12 @@ def seal(files: Files, **changes: Any) -> Files:
 
 def relist(files: Files, keys: Sequence[TrialKey]) -> None:
     """Say that the run lists `keys`."""
-    from robospa.harness.running.manifest import group_keys, seed_hash
-
     run = json.loads(files[layout.RUN])
-    run["trials"], run["seed_hash"] = group_keys(keys), seed_hash(keys)
+    run["trials"], run["seed_hash"] = to_builtins(trial_groups(keys)), seed_hash(keys)
     files[layout.RUN] = layout.canonical(run)
     files[layout.SEEDS] = layout.canonical(seed_lists(keys))
     manifest = json.loads(files[layout.MANIFEST])
-    manifest["inputs"] = layout.inputs_hash(run, json.loads(files[layout.SEEDS]))
+    manifest["inputs"] = layout.inputs_hash(manifest_of(run), json.loads(files[layout.SEEDS]))
     files[layout.MANIFEST] = layout.canonical(manifest)
 
 

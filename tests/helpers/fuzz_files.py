@@ -32,7 +32,7 @@ import bundle_fakes as fakes
 import numpy as np
 
 from robospa.harness.running.action_files import read_actions, write_actions
-from robospa.harness.running.manifest import changed_settings, seed_hash
+from robospa.harness.running.manifest import changed_settings
 from robospa.harness.running.policy_probe import read_map
 from robospa.harness.running.request import client_options
 from robospa.harness.selection import parse_seeds
@@ -43,7 +43,7 @@ from robospa.leaderboard.packing import pack
 from robospa.leaderboard.traces import decode, encode
 from robospa.leaderboard.untrusted import BundleArchive
 from robospa.leaderboard.verify import verify
-from robospa.results.records.manifest import RunError, manifest_keys, read_manifest
+from robospa.results.records.manifest import RunError, read_manifest, seed_hash
 from robospa.results.records.run_io import finished, from_line, merge, read_file, read_run, to_line
 from robospa.trial import TrialKey
 
@@ -208,8 +208,8 @@ class Readers:
         (self.folder / "m").mkdir(exist_ok=True)
         self._put("manifest", rng, "m/run.json")
         found = read_manifest(self.folder / "m")
-        seed_hash(manifest_keys(found))
-        changed_settings(found.get("settings", {}), self.known["settings"])
+        seed_hash(found.keys)
+        changed_settings(found.settings, self.known.settings)
 
     def _policy_map(self, rng: random.Random) -> None:
         read_map(self._put("policy map", rng, "map.json"), ["Pick_A"], ["Pick_A", "Pick_B"])

@@ -21,6 +21,7 @@ from robospa.leaderboard.audit import (
     path_distance,
     sentence_reaction,
 )
+from robospa.results.records.manifest import RunManifest
 from robospa.results.records.run_io import Run
 from robospa.results.records.trial_record import RetryRow
 from robospa.tasks.catalog import build_scene
@@ -39,7 +40,7 @@ def run_of(good: int, repeated: int = 0) -> Run:
             lost = (RetryRow("connection", "it hung up", 3),)
             record = replace(record, attempts=2, retries=lost)
         records[key] = replace(record, success=n < good)
-    return Run(Path(), {}, tuple(KEYS), records)
+    return Run(Path(), RunManifest(), tuple(KEYS), records)
 
 
 def test_success_far_above_the_hidden_rate() -> None:

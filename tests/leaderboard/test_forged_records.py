@@ -187,8 +187,8 @@ def test_unknown_modes_robots_and_splits_are_refused(
             {PICK: {"spec": {"name": "x", "action": "joint", "horizon": 0}}},
             "must be a whole number >= 1",
         ),
-        ([], "must be a map or null"),
-        ("pi0.5", "must be a map or null"),
+        ([], "must be a map"),
+        ("pi0.5", "must be a map"),
     ],
 )
 def test_odd_policies_are_refused(files: Files, tmp_path: Path, policies: Any, words: str) -> None:

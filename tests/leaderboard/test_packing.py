@@ -103,7 +103,7 @@ def test_a_run_of_several_robots_makes_a_bundle_for_each(whole: Path, tmp_path: 
     )
     keys = [*all_keys((PICK, PRESS)), *(of_pair(key) for key in all_keys())]
     run = make_run(tmp_path / "run", keys, change=two_robots)
-    with pytest.raises(BundleError, match="it mixes embodiments"):
+    with pytest.raises(BundleError, match="mixes embodiments"):
         pack([run], CARD, tmp_path / "mine.zip", both)
     made = pack_robots([run], CARD, tmp_path / "mine.zip", both)
     assert [one.valid.path.name for one in made] == [
@@ -166,13 +166,13 @@ def unversioned(settings: dict[str, Any], about: dict[str, Any]) -> None:
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (privileged, "is privileged"),
-        (shuffled, "is an ablation: its trials have the sentences of other scenes"),
+        (privileged, "privileged"),
+        (shuffled, "ablation"),
         (longer, "step limits"),
         (other_seed, "the run's seed is 7; that of a submission is 0"),
         (elsewhere, "another world"),
         (mixed, "mixes modes"),
-        (unversioned, "versions"),
+        (unversioned, "version"),
     ],
 )
 def test_runs_that_are_not_the_benchmark_are_refused(

@@ -15,9 +15,8 @@ from robospa.leaderboard import bundle as layout
 from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.evidence import sample_size
 from robospa.leaderboard.replay import Replay, replay
-from robospa.leaderboard.rules import Reference
+from robospa.leaderboard.rules import Reference, manifest_of
 from robospa.leaderboard.verify import outcomes_of, scores_of, tables_of, verify
-from robospa.results.records.manifest import manifest_keys
 from robospa.results.records.run_io import Run, from_data
 
 CHALLENGE = "a value nobody knew"
@@ -71,8 +70,8 @@ def forge(files: Files, change: Any) -> Files:
     for row in rows_of(files):
         record = from_data(row["record"])
         records[record.key] = record
-    manifest = json.loads(files[layout.RUN])
-    run = Run(Path("forged"), manifest, manifest_keys(manifest), records)
+    manifest = manifest_of(json.loads(files[layout.RUN]))
+    run = Run(Path("forged"), manifest, manifest.keys, records)
     files[layout.SCORES] = layout.canonical(scores_of(run))
     files[layout.OUTCOMES] = layout.canonical(outcomes_of(run))
     for ending, table in tables_of(run).items():

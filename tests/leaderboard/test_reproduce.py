@@ -25,6 +25,7 @@ from robospa.leaderboard.reproduce import (
     plan,
 )
 from robospa.leaderboard.verify import Valid
+from robospa.results.records.manifest import RunManifest, RunSettings
 from robospa.results.records.run_io import Run
 from robospa.results.records.trial_record import RetryRow
 from robospa.trial import TrialKey
@@ -51,7 +52,7 @@ def large(valid: Valid) -> Valid:
         for level in LEVELS
         for seed in range(100)
     }
-    info: dict[str, Any] = {"categories": {f"Task_{task}": "GAC" for task in range(56)}}
+    info = RunManifest(categories={f"Task_{task}": "GAC" for task in range(56)})
     return replace(valid, run=Run(Path(), info, tuple(records), records))
 
 
@@ -69,7 +70,7 @@ def reproduced(
     for key in keys[:repeated]:
         lost = (RetryRow("connection", "it hung up", 5),)
         records[key] = replace(records[key], attempts=2, retries=lost)
-    manifest = {"settings": {"salt_sha256": salt_hash(salt)} if salt else {}}
+    manifest = RunManifest(settings=RunSettings(salt_sha256=salt_hash(salt) if salt else ""))
     return compare(valid, Run(Path(), manifest, tuple(keys), records), keys, block)
 
 

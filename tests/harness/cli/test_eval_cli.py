@@ -96,8 +96,8 @@ def test_a_server_is_evaluated_and_reported(tmp_path: Path) -> None:
     assert len(found.records) == 8
     assert not found.missing
     assert all(r.success and r.attempts == 1 for r in found.records.values())
-    assert found.manifest["settings"]["policy"]["spec"]["name"] == "fake"
-    assert found.manifest["about"]["policy"]["target"] == server.url
+    assert found.manifest.policy.name == "fake"
+    assert found.manifest.about.policy.target == server.url
     assert [p.name for p in (tmp_path / "run").glob("*.part")] == []
 
 
@@ -256,9 +256,8 @@ def test_a_run_is_repeated_from_the_settings_that_it_keeps(tmp_path: Path) -> No
     assert {key: record.digest for key, record in before.records.items()} == {
         key: record.digest for key, record in after.records.items()
     }
-    assert (
-        before.manifest["about"]["arguments"] | {"out": str(again), "workers": 1}
-        == (after.manifest["about"]["arguments"])
+    assert before.manifest.about.arguments | {"out": str(again), "workers": 1} == (
+        after.manifest.about.arguments
     )
 
 

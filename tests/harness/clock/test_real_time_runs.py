@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 from clock_fakes import TargetWorld
+from msgspec import structs
 from report_runs import make_run, record
 
 from robospa.harness.clock.clock import Clock
@@ -23,14 +24,14 @@ from robospa.harness.running.request import make_request
 from robospa.harness.running.worker import Worker, WorkerConfig
 from robospa.harness.settings import EvaluationSettings, SettingsError, updated
 from robospa.leaderboard.bundle import BundleError
-from robospa.leaderboard.rules import REFERENCE, check_settings
+from robospa.leaderboard.rules import Reference, check_settings
 from robospa.protocol.policy import PolicySpec
 from robospa.results.comparison.by_axis import by_axis
 from robospa.results.comparison.compare import compare
 from robospa.results.paper.columns import column_of
 from robospa.results.paper.published_results import published_results
 from robospa.results.records.lint import lint_run
-from robospa.results.records.manifest import RunError
+from robospa.results.records.manifest import PolicySettings, RunError, WorldSettings
 from robospa.results.records.run_io import Run, differences, read_run
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.report.score_table import score_table
@@ -84,7 +85,10 @@ def test_the_manifest_has_the_latency_itself_and_a_suite_of_its_own(
 def test_the_paused_clock_leaves_no_trace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     made, request = manifest_of(tmp_path, monkeypatch, action_rate=50)
     assert "clock" not in made["settings"]
-    assert made["suite"].endswith("-50hz") and made["settings"]["world"]["action_steps"] == 5
+    assert (
+        made["suite"].endswith("-50hz")
+        and made["settings"]["world"]["arguments"]["action_steps"] == 5
+    )
     assert request.config.clock is None
 
 
@@ -198,31 +202,33 @@ def test_published_numbers_are_of_another_rule(tmp_path: Path) -> None:
 def test_tables_and_lint_say_that_it_is_real_time_and_rank_it_never(tmp_path: Path) -> None:
     run = timed(tmp_path / "a", "200ms", 5)
     results = results_of_run(run)
-    assert "(real:200ms)" in score_table(run, results.scores).title
+    assert "real:200ms" in score_table(run, results.scores).title
     column = column_of(results)
-    assert column.apart and column.title.endswith("(real time)")
+    assert not column.ranked and column.title.endswith("(real time)")
     assert "real-time" in {finding.rule for finding in lint_run(run)}
 
 
 def test_no_bundle_is_made_of_it(tmp_path: Path) -> None:
-    manifest = timed(tmp_path / "a", "200ms", 5).manifest
+    run = timed(tmp_path / "a", "200ms", 5).manifest
     versions = dict.fromkeys(("robospa", "python", "numpy", "sapien"), "1")
-    about = {"versions": versions, "code": "x"}
-    one = {name: ["x"] for name in ("embodiment", "mode", "split")}
-    run = {**manifest, "about": about}
-    run["settings"] = {
-        **manifest["settings"],
-        **one,
-        "run_seed": 0,
-        "world": {"name": "x"},
-        "policy": {"spec": {"name": "x", "action": "joint"}},
-    }
-    with pytest.raises(BundleError, match="in real time"):
-        check_settings(run, REFERENCE)
-    del run["settings"]["clock"]
-    run["settings"]["world"] = {"name": "x", "control": "fixed_rate"}
+    settings = structs.replace(
+        run.settings,
+        **{name: ("x",) for name in ("embodiment", "mode", "split")},
+        policy=PolicySettings({"name": "x", "action": "joint"}),
+        world=WorldSettings("x"),
+    )
+    about = structs.replace(run.about, versions=versions)
+    made = structs.replace(run, suite="x", settings=settings, about=about)
+    unused = lambda *_: ()  # noqa: E731
+    reference = Reference(
+        unused, unused, unused, "x", suite="x", robots=("x",), modes=("x",), splits=("x",)
+    )
+    with pytest.raises(BundleError, match="real time"):
+        check_settings(made, reference)
+    world = WorldSettings("x", {"control": "fixed_rate"})
+    made = structs.replace(made, settings=structs.replace(settings, clock=None, world=world))
     with pytest.raises(BundleError, match="at a fixed rate"):
-        check_settings(run, REFERENCE)
+        check_settings(made, reference)
 
 
 def test_the_mean_of_poses_is_refused_before_the_first_trial() -> None:

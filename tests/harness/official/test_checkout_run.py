@@ -36,7 +36,7 @@ def test_seeds_are_found_and_a_run_is_recorded_in_its_own_suite(
     assert ended.value.code == 0, capsys.readouterr().err
     run = read_run(out)
     assert len(run.records) == 4 and not run.missing
-    assert run.info.suite == "official-checkout"
+    assert run.manifest.suite == "official-checkout"
     assert setting_name(run).startswith("official-checkout, ")
     assert {r.instruction for r in run.records.values() if r.key.level == 1} == {
         "make the golden bell sound"

@@ -64,7 +64,7 @@ def test_objects_are_of_the_archive_where_there_is_one(monkeypatch: pytest.Monke
     monkeypatch.setattr(official_options, "load", load)
     options, layout = parse_official("official")
     assert (options, layout.suite, layout.digest) == (OfficialOptions(), SUITE, "hash of official")
-    assert layout.to_json()["assets"] == "official"
+    assert layout.manifest_settings().assets == "official"
     assert layout.warnings(official_sentences=True) == []
     (said,) = layout.warnings(official_sentences=False)
     assert "add --instructions CHECKOUT" in said
@@ -102,7 +102,7 @@ def test_without_an_archive_it_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(official_options, "load", missing)
     _, layout = parse_official("official?switches=pure-colors")
-    assert layout.suite == BUILTIN_SUITE and layout.to_json()["switches"] == ["pure-colors"]
+    assert layout.suite == BUILTIN_SUITE and layout.manifest_settings().switches == ["pure-colors"]
     (said,) = layout.warnings(official_sentences=False)
     assert said.startswith("objects are built in") and "no archive" in said
     with pytest.raises(SettingsError, match="no official objects: there is no archive"):

@@ -56,7 +56,7 @@ def test_several_servers(tmp_path: Path) -> None:
     with ServerThread(policy_factory=FakePolicy) as a, ServerThread(policy_factory=FakePolicy) as b:
         run = robospa.evaluate([a.url, b.url], workers=2, out=tmp_path, **FAKES)
     check(run, tmp_path)
-    assert run.manifest["about"]["arguments"]["policy"] == [a.url, b.url]
+    assert run.manifest.about.arguments["policy"] == [a.url, b.url]
 
 
 @pytest.mark.parametrize("policy", [FakePolicy, lambda: FakePolicy(), Batched()])
@@ -73,7 +73,7 @@ def test_an_object_serves_one_worker_and_stays_in_this_process(
     assert policy.trial is not None and policy.trial.task == "Pick_Blocks_Size"
     said = " ".join(capfd.readouterr())
     assert "checkpoint" not in said, "the address that it is served at for now is nobody's server"
-    assert run.manifest["about"]["policy"]["target"] == "robospa.evaluate"
+    assert run.manifest.about.policy.target == "robospa.evaluate"
     assert "unknown-checkpoint" not in {finding.rule for finding in lint_run(run)}
     assert robospa.evaluate(policy, out=tmp_path, resume=True, **FAKES).records == run.records
 

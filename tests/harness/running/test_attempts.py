@@ -220,7 +220,7 @@ def test_a_wrong_option_is_mended_while_no_trial_has_a_result(tmp_path: Path) ->
     with ServerThread(policy_factory=lambda: Optional(other)) as server:
         evaluate(request(server.url, tmp_path, resume=True))
     run = read_run(tmp_path)
-    assert not run.missing and run.info.spec["horizon"] == 9
+    assert not run.missing and run.manifest.policy.horizon == 9
     refused = pytest.raises(RunError, match=r"spec\.horizon: 9 -> 4")
     with ServerThread(policy_factory=Optional) as server, refused:
         evaluate(request(server.url, tmp_path, resume=True))

@@ -3,29 +3,50 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
+import time
 from pathlib import Path
+from typing import Any
 
 import pytest
+from msgspec import structs
 
 from robospa.harness.running.manifest import (
-    Manifest,
     about_machine,
     changed_settings,
+    check_folder,
     open_run,
-    seed_hash,
     write_manifest,
 )
-from robospa.results.records.manifest import RunError, manifest_keys, read_manifest
+from robospa.harness.running.runner import Runner, RunOptions
+from robospa.harness.running.worker import WorkerConfig
+from robospa.results.records.manifest import (
+    PolicySettings,
+    RunAbout,
+    RunError,
+    RunSettings,
+    make_manifest,
+    read_manifest,
+    seed_hash,
+)
+from robospa.results.records.run_io import read_records
 from robospa.trial import TrialKey
 
 KEYS = tuple(TrialKey("Pick_Fake", level, seed) for level in (1, 2) for seed in (5, 6))
-MANIFEST = Manifest({"policy": {"name": "fake", "horizon": 4}, "split": "heldout"}, KEYS, {})
+SETTINGS = RunSettings(policy=PolicySettings({"name": "fake", "horizon": 4}), split=("heldout",))
+MANIFEST = make_manifest(SETTINGS, KEYS, RunAbout(code="a", versions={"numpy": "2"}))
 
 
-def test_the_trial_list_survives_the_file(tmp_path: Path) -> None:
+def edit(folder: Path, **changes: Any) -> None:
+    path = folder / "run.json"
+    path.write_text(json.dumps({**json.loads(path.read_text()), **changes}))
+
+
+def test_the_manifest_survives_the_file(tmp_path: Path) -> None:
     write_manifest(tmp_path, MANIFEST)
-    assert manifest_keys(read_manifest(tmp_path)) == KEYS
+    found = read_manifest(tmp_path)
+    assert found == MANIFEST and found.keys == KEYS and found.policy.horizon == 4
+    text = (tmp_path / "run.json").read_text()
+    assert "clock" not in text and "salt" not in text  # what has no value is left out
 
 
 def test_the_seed_hash_ignores_order_and_nothing_else() -> None:
@@ -33,70 +54,112 @@ def test_the_seed_hash_ignores_order_and_nothing_else() -> None:
     assert seed_hash(KEYS) != seed_hash(KEYS[:-1])
 
 
-def test_a_run_is_not_overwritten(tmp_path: Path) -> None:
-    open_run(tmp_path, MANIFEST, resume=False)
-    with pytest.raises(RunError, match="--resume"):
-        open_run(tmp_path, MANIFEST, resume=False)
-
-
 def test_resuming_with_the_same_settings_leaves_the_manifest_alone(tmp_path: Path) -> None:
     open_run(tmp_path, MANIFEST, resume=False)
     before = (tmp_path / "run.json").read_bytes()
-    open_run(tmp_path, replace(MANIFEST, about={"machine": "another"}), resume=True)
+    about = structs.replace(MANIFEST.about, machine={"name": "another"})
+    open_run(tmp_path, structs.replace(MANIFEST, about=about), resume=True)
     assert (tmp_path / "run.json").read_bytes() == before
 
 
-def test_resuming_with_other_settings_names_what_changed(tmp_path: Path) -> None:
-    open_run(tmp_path, MANIFEST, resume=False)
-    settings = {"policy": {"name": "fake", "horizon": 5}, "split": "heldout"}
-    with pytest.raises(RunError, match=r"policy\.horizon: 4 -> 5"):
-        open_run(tmp_path, replace(MANIFEST, settings=settings), resume=True)
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"format": 2}, "reads up to 1"),
+        ({"format": "new"}, "has format new"),
+        ({"about": {"code": "b", "versions": {"numpy": "2"}}}, "code: 'b' -> 'a'"),
+        ({"about": {"code": "a", "versions": {"numpy": "1"}}}, r"versions.numpy: '1' -> '2'"),
+        ({"about": {}}, "code"),
+        ({"settings": {"split": ["heldout"]}}, r"policy\.spec\.horizon: 'unset' -> 4"),
+        ({"settings": {"run_seed": 7}}, "run_seed: 7 -> 0"),
+        ({"settings": [1]}, "'settings' must be a map"),
+        ({"trials": []}, f"trials: {len(KEYS)} new and 0 gone"),
+        ({"trials": 3}, "no list of trials"),
+        ({"trials": [{"task": "A"}]}, "lacks the field 'level'"),
+    ],
+)
+def test_another_run_is_not_gone_on_with(
+    tmp_path: Path, changes: dict[str, Any], words: str
+) -> None:
+    write_manifest(tmp_path, MANIFEST)
+    edit(tmp_path, **changes)
+    with pytest.raises(RunError, match=words):
+        open_run(tmp_path, MANIFEST, resume=True)
 
 
-def test_resuming_with_other_trials_is_refused(tmp_path: Path) -> None:
-    open_run(tmp_path, MANIFEST, resume=False)
-    with pytest.raises(RunError, match="trials: 0 new and 1 gone"):
-        open_run(tmp_path, replace(MANIFEST, keys=KEYS[1:]), resume=True)
-
-
-def test_resuming_with_another_version_is_refused(tmp_path: Path) -> None:
-    about = {"versions": {"robospa": "1"}}
-    open_run(tmp_path, replace(MANIFEST, about=about), resume=False)
-    with pytest.raises(RunError, match=r"versions\.robospa: '1' -> '2'"):
-        open_run(tmp_path, replace(MANIFEST, about={"versions": {"robospa": "2"}}), resume=True)
-
-
-def test_resuming_nothing_is_refused(tmp_path: Path) -> None:
-    for folder in (tmp_path, tmp_path / "none"):
-        with pytest.raises(RunError, match="no run"):
-            open_run(folder, MANIFEST, resume=True)
-
-
-def test_a_folder_of_something_else_is_left_alone(tmp_path: Path) -> None:
-    (tmp_path / "thesis.tex").touch()
-    with pytest.raises(RunError, match="neither empty nor a run"):
-        open_run(tmp_path, MANIFEST, resume=False)
-    with pytest.raises(RunError, match="is a file"):
-        open_run(tmp_path / "thesis.tex", MANIFEST, resume=False)
-
-
-@pytest.mark.parametrize("text", ["{", "[]", '{"trials": 3}'])
-def test_a_broken_manifest_is_named(tmp_path: Path, text: str) -> None:
+@pytest.mark.parametrize(
+    "text", ["", "{", "[]", "[" * 100_000, '{"a": 1, "a": 2}', '{"trials": "\\ud800"}']
+)
+def test_a_manifest_that_is_none_is_named(tmp_path: Path, text: str) -> None:
     (tmp_path / "run.json").write_text(text)
     with pytest.raises(RunError, match=r"run\.json"):
         read_manifest(tmp_path)
 
 
-def test_a_malformed_trial_list_is_named() -> None:
-    with pytest.raises(RunError, match=r"list of trials: .* lacks the field 'level'"):
-        manifest_keys({"trials": [{"task": "x"}]})
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("task", "../../x"),
+        ("task", 3),
+        ("level", "1"),
+        ("seeds", "123"),
+        ("seeds", [1e308]),
+    ],
+)
+def test_names_that_would_be_paths_and_numbers_that_are_none_are_refused(
+    tmp_path: Path, name: str, value: Any
+) -> None:
+    write_manifest(tmp_path, MANIFEST)
+    rows = json.loads((tmp_path / "run.json").read_text())["trials"]
+    rows[0][name] = value
+    edit(tmp_path, trials=rows)
+    with pytest.raises(RunError, match=rf"trials\[0\]\.{name}"):
+        read_manifest(tmp_path)
+
+
+def test_a_folder_that_holds_something_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "thesis.tex").touch()
+    for folder, resume, words in (
+        (tmp_path, False, "neither empty nor a run"),
+        (tmp_path / "thesis.tex", False, "is a file"),
+        (tmp_path, True, "no run"),
+        (tmp_path / "none", True, "no run"),
+    ):
+        with pytest.raises(RunError, match=words):
+            open_run(folder, MANIFEST, resume)
+    open_run(tmp_path / "run", MANIFEST, resume=False)
+    with pytest.raises(RunError, match="--resume"):
+        open_run(tmp_path / "run", MANIFEST, resume=False)
+
+
+def test_a_driver_killed_before_its_first_file_leaves_a_folder_to_start_in(tmp_path: Path) -> None:
+    (tmp_path / ".lock").touch()
+    (tmp_path / ".run.json.123.part").touch()
+    check_folder(tmp_path, resume=False)
 
 
 def test_settings_that_appear_count_as_changed() -> None:
     assert changed_settings({}, {"a": 1}) == ["a: 'unset' -> 1"]
 
 
-def test_the_machine_is_described_in_json() -> None:
-    about = json.loads(json.dumps(about_machine({"simulator": "fake"})))
-    assert about["world"] == {"simulator": "fake"}
-    assert set(about["versions"]) == {"robospa", "python", "numpy", "sapien"}
+def test_the_machine_is_described() -> None:
+    about = about_machine({"simulator": "fake"})
+    assert about.world == {"simulator": "fake"}
+    assert set(about.versions) == {"robospa", "python", "numpy", "sapien"}
+
+
+def test_a_clock_that_goes_backwards_changes_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = [2e9]
+
+    def backwards() -> float:
+        now[0] -= 1000.0
+        return now[0]
+
+    monkeypatch.setattr(time, "time", backwards)
+    config = WorkerConfig(
+        tmp_path, "run_fakes:FakePolicy", world="run_fakes:FakeWorld", parts="run_fakes:parts"
+    )
+    Runner(config, KEYS[:2], RunOptions()).run()
+    assert set(read_records(tmp_path)) == set(KEYS[:2])

@@ -115,9 +115,9 @@ def test_two_servers_share_a_run_and_each_keeps_its_task(tmp_path: Path) -> None
     # Three tasks on two servers: one change of task is needed, each may help out now and then at
     # the end, more often where a worker comes late. Without tasks of their own it would be 15.
     assert first.switches + second.switches <= 6
-    about = found.manifest["about"]["policy"]
-    assert about["target"] == first.url
-    assert [server["target"] for server in about["equals"]] == [second.url]
+    about = found.manifest.about.policy
+    assert about.target == first.url
+    assert [server.target for server in about.equals] == [second.url]
     assert all("queue" in r.latency and r.latency["batch"] == 1 for r in found.records.values())
 
 
@@ -130,9 +130,9 @@ def test_a_map_gives_every_server_its_own_task(tmp_path: Path) -> None:
     assert (len(first.tasks), len(second.tasks) + len(third.tasks)) == (16, 8)
     assert set(second.tasks) | set(third.tasks) == {TASKS[1]}
     assert first.switches <= 3  # one change of task, and each worker may help out at the end
-    about = read_run(tmp_path / "run").manifest["about"]["policies"]
-    assert about[TASKS[1]]["equals"][0]["target"] == third.url
-    assert "equals" not in about[TASKS[0]]
+    about = read_run(tmp_path / "run").manifest.about.policies
+    assert about[TASKS[1]].equals[0].target == third.url
+    assert not about[TASKS[0]].equals
 
 
 def test_a_server_that_dies_leaves_its_trials_to_the_other(tmp_path: Path) -> None:

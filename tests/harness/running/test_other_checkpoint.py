@@ -59,8 +59,8 @@ def test_resuming_with_another_checkpoint_is_refused_and_with_the_same_goes_on(
     with served("step 1000") as server:
         port = int(server.url.rpartition(":")[2])
         evaluate(request(server.url, tmp_path))
-    about = read_run(tmp_path).manifest["about"]["policy"]["identity"]
-    assert about["checkpoint"] == "step 1000" and len(about["hash"]) == 16
+    about = read_run(tmp_path).manifest.about.policy.identity
+    assert about.checkpoint == "step 1000" and len(about.hash) == 16
     with (
         served("step 2000", port) as server,
         pytest.raises(RunError, match=r"checkpoint: 'step 1000' -> 'step 2000'.*another --out"),
@@ -146,6 +146,6 @@ def test_lint_notes_that_nothing_says_which_checkpoint_was_served(tmp_path: Path
             evaluate(request(server.url, tmp_path / name))
         found = {f.rule: f for f in lint_run(read_run(tmp_path / name))}
         assert ("unknown-checkpoint" in found) == (not checkpoint)
-        warnings = read_run(tmp_path / name).manifest["about"]["warnings"]
+        warnings = read_run(tmp_path / name).manifest.about.warnings
         assert ("which checkpoint" in " ".join(warnings)) == (not checkpoint)
     assert found.get("unknown-checkpoint") is None

@@ -32,7 +32,13 @@ from robospa.protocol.errors import TransportError
 from robospa.protocol.policy import TrialInfo
 from robospa.protocol.server import ServerThread
 from robospa.protocol.transport import Timeouts
-from robospa.results.records.manifest import RunError
+from robospa.results.records.manifest import (
+    RunError,
+    RunManifest,
+    RunSettings,
+    WorldSettings,
+    make_manifest,
+)
 from robospa.results.records.run_io import action_path, read_file, read_run
 from robospa.results.scoring.scores import score_run
 from robospa.trial import TrialKey
@@ -161,16 +167,13 @@ def test_4_a_slow_first_call_costs_an_episode(tmp_path: Path) -> None:
 def test_5_a_resume_mixes_configurations(tmp_path: Path, changed: dict[str, Any]) -> None:
     """There: no warning, and the sum states the first configuration for all episodes."""
 
-    def settings(**change: Any) -> manifest.Manifest:
+    def settings(**change: Any) -> RunManifest:
         chosen = updated(EvaluationSettings(), {"policy": "hold", "out": tmp_path, **change})
         asked = make_request(chosen, keys=keys(4))
         config = asked.config
-        found = {
-            "run_seed": config.run_seed,
-            "step_scale": config.step_scale,
-            "world": config.world_arguments,
-        }
-        return manifest.Manifest(found, tuple(asked.keys), {})
+        world = WorldSettings(config.world, dict(config.world_arguments))
+        found = RunSettings(run_seed=config.run_seed, step_scale=config.step_scale, world=world)
+        return make_manifest(found, asked.keys)
 
     manifest.open_run(tmp_path, settings(), resume=False)
     manifest.open_run(tmp_path, settings(), resume=True)

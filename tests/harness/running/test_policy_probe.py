@@ -186,9 +186,9 @@ def test_a_checkpoint_for_every_task(tmp_path: Path) -> None:
         "Pick_Blocks_Size": True,
         "Pick_Blocks_Height": False,
     }
-    settings, about = run.manifest["settings"], run.manifest["about"]
-    assert settings["policies"]["Pick_Blocks_Height"]["spec"]["name"] == "lazy"
-    assert about["policies"]["Pick_Blocks_Size"]["target"] == first.url
+    settings, about = run.manifest.settings, run.manifest.about
+    assert settings.policies["Pick_Blocks_Height"].stated.name == "lazy"
+    assert about.policies["Pick_Blocks_Size"].target == first.url
 
 
 def test_a_task_without_policy_stops_before_the_run(tmp_path: Path) -> None:
@@ -221,10 +221,10 @@ def test_warnings_and_options_are_printed_and_kept(tmp_path: Path) -> None:
     assert err.count("warning: step limits are 3 times the official ones") == 1
     assert err.count("warning: the model reads 4 tokens of an instruction") == 1
     run = read_run(tmp_path / "run")
-    kept = run.manifest["about"]["warnings"]
+    kept = run.manifest.about.warnings
     assert sum("adapt_to_pi" in text for text in kept) == 1
-    assert run.manifest["settings"]["policy"]["options"]["text_budget"] == 4
-    assert run.manifest["settings"]["step_scale"] == 3
+    assert run.manifest.settings.policy.options["text_budget"] == 4
+    assert run.manifest.settings.step_scale == 3
     assert all(r.diagnostics["text_budget"] == 4 for r in run.records.values())
     assert "step-limits" in {finding.rule for finding in lint_run(run)}
 

@@ -17,7 +17,7 @@ from robospa.results.comparison.latency_curve import (
     curve_table,
     latency_curve,
 )
-from robospa.results.figures.latency_curve import draw_latency_curves
+from robospa.results.figures.curves import draw_latency_curves
 from robospa.results.figures.series import styled
 from robospa.results.records.run_io import read_run
 from robospa.results.scoring.model_results import ModelResults, results_of_run

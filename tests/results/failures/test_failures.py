@@ -9,8 +9,14 @@ from typing import Any
 import pytest
 from fake_records import trial_record
 
-from robospa.results.failures.labels import KINDS, NAMES, distribution, label
-from robospa.results.failures.listing import counts_table, trials_table
+from robospa.results.failures.labels import (
+    KINDS,
+    NAMES,
+    counts_table,
+    distribution,
+    label,
+    trials_table,
+)
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 

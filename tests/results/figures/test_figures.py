@@ -11,12 +11,15 @@ import pytest
 from fake_records import trial_record
 
 from robospa.results.failures.labels import KINDS, distribution
+from robospa.results.figures.charts import (
+    FILLS,
+    chance_levels,
+    draw_latency,
+    draw_levels,
+    draw_progress,
+    draw_radar,
+)
 from robospa.results.figures.draw import draw
-from robospa.results.figures.failure_bars import FILLS
-from robospa.results.figures.latency import draw_latency
-from robospa.results.figures.levels import chance_levels, draw_levels
-from robospa.results.figures.progress import draw_progress
-from robospa.results.figures.radar import draw_radar
 from robospa.results.figures.series import FORMATS, GRID, INK, Series, label_of, save, styled
 from robospa.results.paper.columns import published_column
 from robospa.results.records.trial_record import TrialRecord

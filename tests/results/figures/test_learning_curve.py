@@ -8,7 +8,7 @@ import pytest
 from report_runs import make_run, record
 
 from robospa.harness.cli.main import main
-from robospa.results.figures.learning_curve import CurvePoint, draw_learning_curve, value_at
+from robospa.results.figures.curves import CurvePoint, draw_learning_curve, value_at
 from robospa.results.figures.series import styled
 from robospa.results.records.run_io import Run
 from robospa.results.scoring.scores import score_run

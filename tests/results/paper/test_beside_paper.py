@@ -12,26 +12,28 @@ from fake_records import trial_record
 from robospa.results.comparison.compare import compare
 from robospa.results.paper.columns import Column, published_column, run_column
 from robospa.results.paper.origin import ORIGIN, RANKED, banner, origin_of, printed_note
-from robospa.results.paper.pieces import pieces, told
+from robospa.results.paper.pieces import pieces, pieces_of, told
 from robospa.results.paper.published_results import published_results
 from robospa.results.paper.tables import make_tables
+from robospa.results.records.manifest import RunManifest, RunSettings
 from robospa.results.records.run_io import Run
 from robospa.results.report.report import make_report
 from robospa.results.scoring.setting import IncomparableError
-from robospa.results.tables.table import Table
+from robospa.results.tables import Table
+from robospa.schema import read
 from robospa.tasks.scene import SUITE as OURS
 from robospa.trial import TrialKey
 
 ARCHIVE = {
     "layout": {"assets": "official", "digest": "0123456789abcdef", "switches": ["pale-stand"]},
-    "world": {"settle": "official", "robot_assets": "official"},
+    "world": {"arguments": {"settle": "official", "robot_assets": "official"}},
     "instructions": "fedcba9876543210",
 }
 BUILTIN = {
     "layout": {"assets": "builtin", "digest": "", "switches": []},
-    "world": {"settle": "usual"},
+    "world": {"arguments": {"settle": "usual"}},
 }
-CHECKOUT = {"world": {"config": "demo_clean"}}
+CHECKOUT = {"world": {"arguments": {"config": "demo_clean"}}}
 WORLDS = {
     "official-1": ("official-1", ARCHIVE),
     "plain": ("official-1", {**ARCHIVE, "instructions": "", "world": {}}),
@@ -67,7 +69,9 @@ def run_in(world: str, name: str = "mine", successes: int = 3) -> Run:
     records += [trial_record(k, category="RPF", total=2) for k in others]
     said: dict[str, Any] = {"policy": {"spec": {"name": name}}, "privileged": False, **settings}
     manifest = {"settings": said, "suite": suite}
-    return Run(Path(name), manifest, (*keys, *others), {r.key: r for r in records})
+    return Run(
+        Path(name), read(RunManifest, manifest, "it"), (*keys, *others), {r.key: r for r in records}
+    )
 
 
 def column_in(world: str, name: str = "mine", successes: int = 3) -> Column:
@@ -88,7 +92,7 @@ def marked(table: Table) -> set[tuple[str, str]]:
 @pytest.mark.parametrize("world", WORLDS)
 def test_what_is_official_is_said_piece_by_piece(world: str) -> None:
     official, other = SAID[world]
-    found = pieces(*WORLDS[world])
+    found = pieces_of(column_in(world).results)
     assert all(any(text in piece for piece in found.official) for text in official)
     assert all(any(text in piece for piece in found.other) for text in other)
     sentence = told(column_in(world).results)
@@ -96,7 +100,7 @@ def test_what_is_official_is_said_piece_by_piece(world: str) -> None:
 
 
 def test_of_what_a_manifest_does_not_say_nothing_is_official() -> None:
-    found = pieces("official-1", {})
+    found = pieces("official-1", RunSettings())
     assert found.official == (
         "tasks, rules, thresholds, step limits",
         "the robot's joints and cameras",

@@ -15,7 +15,7 @@ from robospa.results.paper.check import Check, checks, errata
 from robospa.results.paper.columns import published_column
 from robospa.results.paper.published import LEVELS, load
 from robospa.results.paper.tables import make_tables
-from robospa.results.tables.csv import to_csv
+from robospa.results.tables import to_csv
 
 FOLDER = Path(published.__file__).parent
 DATA = load()

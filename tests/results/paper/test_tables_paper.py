@@ -8,15 +8,18 @@ from typing import Any
 
 import pytest
 from fake_records import trial_record
+from msgspec import structs
 
 from robospa.results.paper.columns import published_column, run_column
 from robospa.results.paper.published import LEVELS, load
 from robospa.results.paper.result_tables import summary_table, task_table
 from robospa.results.paper.tables import make_tables
+from robospa.results.records.manifest import RunManifest
 from robospa.results.records.run_io import Run
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.scoring.setting import IncomparableError
-from robospa.results.tables.table import Table, TableCell
+from robospa.results.tables import Table, TableCell
+from robospa.schema import read
 from robospa.trial import TrialKey
 
 DATA = load()
@@ -38,7 +41,7 @@ def make_run(records: list[TrialRecord], name: str = "mine", **manifest: Any) ->
     settings = {"policy": {"spec": {"name": name}}, "privileged": False}
     keys = tuple(r.key for r in records)
     content = {"settings": settings, "suite": "robospa-1", **manifest}
-    return Run(Path("run"), content, keys, {r.key: r for r in records})
+    return Run(Path("run"), read(RunManifest, content, "it"), keys, {r.key: r for r in records})
 
 
 def full_run(model: str, trials: int = 100, **key: Any) -> list[TrialRecord]:
@@ -220,8 +223,8 @@ def test_other_mistakes_are_named() -> None:
 
 def test_a_privileged_policy_is_called_so() -> None:
     run = make_run(full_run("RDT", trials=1))
-    settings = {**run.manifest["settings"], "privileged": True}
-    oracle = run_column(replace(run, manifest={"settings": settings}))
+    settings = structs.replace(run.manifest.settings, privileged=True)
+    oracle = run_column(replace(run, manifest=structs.replace(run.manifest, settings=settings)))
     assert oracle.title == "mine (privileged)"
     columns = [published_column("RDT"), oracle, published_column("X-VLA")]
     (table,) = make_tables(columns, ["sr-tasks"], mark="highest")

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from msgspec import structs
 from run_by_hand import outcomes, record, write
 
 from robospa.results.records.lint import (
@@ -80,7 +81,8 @@ def test_shared_actions_are_said_once_and_only_where_scenes_differ(tmp_path: Pat
 def test_a_privileged_policy_may_repeat_itself(tmp_path: Path) -> None:
     alike = [replace(r, actions_digest="a") for r in outcomes(SIZE, 1, [1, 1, 0])]
     run = write(tmp_path / "run", alike)
-    manifest = {**run.manifest, "settings": {"privileged": True}}
+    settings = structs.replace(run.manifest.settings, privileged=True)
+    manifest = structs.replace(run.manifest, settings=settings)
     assert lint_run(replace(run, manifest=manifest)) == []
 
 

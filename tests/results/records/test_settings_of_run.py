@@ -40,7 +40,7 @@ def test_a_run_of_several_robots_is_taken_apart(run: Run) -> None:
         assert (
             {key.embodiment for key in part.keys}
             == {robot}
-            == set(part.info.settings["embodiment"])
+            == set(part.manifest.settings.embodiment)
         )
         assert part.records.keys() == set(part.keys)
     assert by_setting(parts[0]) == [parts[0]]

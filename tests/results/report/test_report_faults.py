@@ -6,6 +6,7 @@ from pathlib import Path
 
 from fake_records import trial_record
 
+from robospa.results.records.manifest import RunManifest
 from robospa.results.records.run_io import Run
 from robospa.results.records.trial_record import RetryRow, TrialRecord
 from robospa.results.report.faults import (
@@ -21,7 +22,9 @@ LOST = RetryRow("connection_lost", "the line went dead")
 
 
 def run_of(*records: TrialRecord) -> Run:
-    return Run(Path("run"), {}, tuple(r.key for r in records), {r.key: r for r in records})
+    return Run(
+        Path("run"), RunManifest(), tuple(r.key for r in records), {r.key: r for r in records}
+    )
 
 
 def key(seed: int, level: int = 1) -> TrialKey:

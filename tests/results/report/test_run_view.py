@@ -10,9 +10,9 @@ import pytest
 from report_runs import make_run, record
 
 from robospa.extras import MissingPackage
-from robospa.results.failures.listing import FailedTrials
+from robospa.results.failures.labels import FailedTrials
+from robospa.results.frame import trial_columns
 from robospa.results.records.run_io import Run
-from robospa.results.tables.frame import trial_columns
 
 GRASP = {"time": 1.5, "kind": "grasped", "object": "object_2", "index": -1, "note": "", "step": 4}
 WRONG = record(

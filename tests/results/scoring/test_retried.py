@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from fake_records import trial_record
 
+from robospa.results.records.manifest import RunManifest
 from robospa.results.records.run_io import Run, from_line, to_line
 from robospa.results.records.trial_record import RetryRow, TrialRecord
 from robospa.results.scoring.retried import FaultRate, fault_rates, was_repeated, worst_case
@@ -21,7 +22,9 @@ def key(seed: int, level: int = 1) -> TrialKey:
 
 
 def made(*records: TrialRecord) -> Run:
-    return Run(Path("run"), {}, tuple(r.key for r in records), {r.key: r for r in records})
+    return Run(
+        Path("run"), RunManifest(), tuple(r.key for r in records), {r.key: r for r in records}
+    )
 
 
 def test_retries_survive_the_file_and_old_lines_have_none() -> None:

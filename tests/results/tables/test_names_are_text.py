@@ -17,15 +17,21 @@ from robospa.harness.cli.main import main
 from robospa.harness.running.progress import Progress
 from robospa.harness.running.server_stats import ServerStats
 from robospa.harness.running.status import Status
-from robospa.results.figures.levels import draw_levels
-from robospa.results.figures.radar import draw_radar
+from robospa.results.figures.charts import draw_levels, draw_radar
 from robospa.results.figures.series import Series, save, styled
 from robospa.results.records.run_io import Run
 from robospa.results.report.page import inline_svg
 from robospa.results.report.score_table import score_table
 from robospa.results.scoring.scores import score_run
-from robospa.results.tables import csv, html, latex, markdown
-from robospa.results.tables.table import Table, TableCell, TableRow
+from robospa.results.tables import (
+    Table,
+    TableCell,
+    TableRow,
+    html_page,
+    to_csv,
+    to_latex,
+    to_markdown,
+)
 from robospa.terminal import plain_console
 
 if TYPE_CHECKING:
@@ -123,19 +129,19 @@ def test_all_formats_of_a_table_hold_the_name(
     table = score_table(run, score_run(run))
     rows = (TableRow(name, (TableCell(name),)), TableRow(name, kind="section"))
     table = Table("t", name, name, (name,), rows, ((name, 1),), (name, table.title), words=True)
-    (line, *_) = csv.to_csv([table]).splitlines()[1:]
+    (line, *_) = to_csv([table]).splitlines()[1:]
     assert not any(re.match(r"[=+@-]", cell) for cell in line.split(",")), line
-    text = markdown.to_markdown(table)
+    text = to_markdown(table)
     assert _unescaped(text).count(name) >= 6
     for row in [r for r in text.splitlines() if r.startswith("|")]:
         assert len(re.findall(r"(?<!\\)\|", row)) == 3, row
-    found = html.page([table], name)
+    found = html_page([table], name)
     assert "<b>x" not in found
-    made = latex.to_latex(table)
+    made = to_latex(table)
     assert not re.search(r"(?<!\\)%", made.replace("{%\n", "")) or "%" not in name
     assert "evil.org" not in name or r"\textless" not in made
     capsys.readouterr()
-    from robospa.results.tables.terminal import show
+    from robospa.results.tables import show
 
     show(table)
     assert capsys.readouterr().out.count(name) >= 6

@@ -15,12 +15,19 @@ import pytest
 from robospa.results.paper.columns import published_column
 from robospa.results.paper.published import load
 from robospa.results.paper.tables import FORMATS, TABLES, make_tables, write_tables
-from robospa.results.tables.csv import to_csv
-from robospa.results.tables.html import fragment, page
-from robospa.results.tables.latex import document, escape_latex, to_latex
-from robospa.results.tables.markdown import to_markdown
-from robospa.results.tables.table import Table, TableCell, TableRow
-from robospa.results.tables.terminal import show
+from robospa.results.tables import (
+    Table,
+    TableCell,
+    TableRow,
+    escape_latex,
+    html_fragment,
+    html_page,
+    latex_document,
+    show,
+    to_csv,
+    to_latex,
+    to_markdown,
+)
 
 EVIL = "=a|b_c & 100% <script>alert(1)</script> \\input{x} $#~^{} “é” 模型"
 SMALL = Table(
@@ -86,7 +93,7 @@ def test_latex_is_balanced_and_every_row_fills_its_columns(tables: list[Table]) 
 
 @pytest.mark.skipif(shutil.which("pdflatex") is None, reason="needs pdflatex")
 def test_latex_compiles(tables: list[Table], tmp_path: Path) -> None:
-    (tmp_path / "all.tex").write_text(document([*tables, SMALL]))
+    (tmp_path / "all.tex").write_text(latex_document([*tables, SMALL]))
     command = ["pdflatex", "-interaction=nonstopmode", "-halt-on-error", "all.tex"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stdout[-2000:]
@@ -136,11 +143,11 @@ class Tags(HTMLParser):
 def test_html_nests_and_takes_nothing_from_outside(tables: list[Table]) -> None:
     for table in (*tables, SMALL):
         reader = Tags()
-        reader.feed(fragment(table))
+        reader.feed(html_fragment(table))
         assert reader.open == []
         assert set(reader.widths) == {len(table.heads) + 1}, table.name
         assert "script" not in reader.seen
-    whole = page([*tables, SMALL], EVIL)
+    whole = html_page([*tables, SMALL], EVIL)
     assert "http" not in whole
     assert 'class="best" title="95 %: 10.0 to 15.0"' in whole
 

@@ -1,0 +1,465 @@
+"""The figures of runs and published models, one function each."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from robospa.categories import CATEGORIES, CATEGORY_NAMES, PROCEDURAL, SPATIAL
+from robospa.results.figures.series import (
+    COLOURS,
+    DASHES,
+    GRID,
+    INK,
+    MARKERS,
+    Series,
+    label_of,
+    legend_below,
+    new_figure,
+    percent_of,
+    plain,
+    series_handles,
+)
+from robospa.results.scoring.scores import Scores
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.collections import PathCollection
+    from matplotlib.figure import Figure
+    from matplotlib.projections.polar import PolarAxes
+
+
+def chance_levels(scores: Scores) -> dict[tuple[str, int], float]:
+    """Success rate of guessing among the candidates, per spatial category and level [%].
+
+    A cell's ONTA is its success rate rescaled so that chance is 0, which gives chance back.
+    """
+    found: dict[tuple[str, int], list[float]] = {}
+    for cell in scores.cells.values():
+        sr, onta = cell.values.get("sr"), cell.values.get("onta")
+        if sr is not None and onta is not None and onta.value < 1:
+            chance = (sr.value - onta.value) / (1 - onta.value)
+            found.setdefault((cell.category, cell.level), []).append(100 * chance)
+    return {place: sum(v) / len(v) for place, v in found.items()}
+
+
+def draw_levels(all_series: Sequence[Series]) -> Figure:
+    """The figure; categories that no series has get no panel."""
+    present = {c for s in all_series for (c, _) in s.scores.categories}
+    columns = [[c for c in group if c in present] for group in (SPATIAL, PROCEDURAL)]
+    columns = [group for group in columns if group] or [[]]
+    lines = max(1, *(len(group) for group in columns))
+    figure = new_figure(1.06 * lines + 0.45)
+    axes = figure.subplots(lines, len(columns), squeeze=False, sharex=True, sharey=True)
+    levels = sorted({n for s in all_series for n in s.scores.levels}) or [1]
+    guessed: dict[tuple[str, int], float] = {}
+    for series in all_series:
+        guessed |= chance_levels(series.scores)
+    for column, group in enumerate(columns):
+        for line in range(lines):
+            axis = axes[line][column]
+            if line >= len(group):
+                axis.set_axis_off()
+                continue
+            _level_panel(axis, all_series, group[line], levels, guessed)
+            if line == len(group) - 1:
+                axis.tick_params(labelbottom=True)
+            if column == 0:
+                axis.set_ylabel("SR [%]")
+    handles = series_handles(all_series)
+    if guessed:
+        from matplotlib.lines import Line2D
+
+        handles.append(Line2D([], [], color=INK, lw=0.8, ls=(0, (1, 2)), label="chance"))
+    legend_below(figure, handles)
+    return figure
+
+
+def _level_panel(
+    axis: Axes,
+    all_series: Sequence[Series],
+    category: str,
+    levels: Sequence[int],
+    guessed: dict[tuple[str, int], float],
+) -> None:
+    chance = [(n, guessed[category, n]) for n in levels if (category, n) in guessed]
+    if chance:
+        axis.plot(*zip(*chance, strict=True), ls=(0, (1, 2)), color=INK, lw=0.8)
+    for index, series in enumerate(all_series):
+        points = [
+            (n, e)
+            for n in levels
+            if (a := series.scores.categories.get((category, n))) and (e := a.values.get("sr"))
+        ]
+        if not points:
+            continue
+        aside = (index - (len(all_series) - 1) / 2) * min(0.09, 0.4 / len(all_series))
+        down = [max(0.0, 100 * (e.value - e.low)) for _, e in points]
+        up = [max(0.0, 100 * (e.high - e.value)) for _, e in points]
+        axis.errorbar(
+            [n + aside for n, _ in points],
+            [100 * e.value for _, e in points],
+            yerr=[down, up],
+            color=COLOURS[index % len(COLOURS)],
+            marker=MARKERS[index % len(MARKERS)],
+            ls=DASHES[index % len(DASHES)],
+            ms=2.6,
+            elinewidth=0.6,
+            capsize=1.2,
+        )
+    axis.set_title(CATEGORY_NAMES[category], fontsize=6.2, pad=3)
+    axis.text(0.99, 0.98, category, transform=axis.transAxes, ha="right", va="top", weight="bold")
+    axis.set_ylim(-6, 132)  # room for the code
+    axis.set_yticks((0, 50, 100))
+    axis.set_xlim(min(levels) - 0.4, max(levels) + 0.4)
+    axis.set_xticks(list(levels), [f"L{n}" for n in levels])
+    plain(axis)
+
+
+MOST_OUTLINES = 3
+FEWEST_SPOKES = 3
+
+
+def draw_radar(all_series: Sequence[Series]) -> Figure:
+    """The figure; a category without a result leaves a gap in its series' outline."""
+    present = {place for series in all_series for place in series.scores.categories}
+    there = sorted({level for _, level in present if level})  # 0 is all of them together
+    levels = sorted({there[0], there[-1]}) if there else [1]
+    if len(all_series) > MOST_OUTLINES or len({c for c, _ in present}) < FEWEST_SPOKES:
+        return draw_dots(all_series, levels)
+    figure = new_figure(2.2)
+    kind = {"projection": "polar"}
+    axes = figure.subplots(1, len(levels), subplot_kw=kind, squeeze=False)[0]
+    top = _top(all_series, levels)
+    for axis, level in zip(axes, levels, strict=True):
+        _radar(axis, all_series, level, top)
+    legend_below(figure, series_handles(all_series))
+    return figure
+
+
+def _top(all_series: Sequence[Series], levels: Sequence[int]) -> float:
+    """The outer ring [%]: the next 20 above the largest value, the same for all radars."""
+    values = [
+        percent_of(s.scores.categories.get((c, n)), "sr")
+        for s in all_series
+        for c in CATEGORIES
+        for n in levels
+    ]
+    largest = max((v for v in values if v is not None), default=100.0)
+    return float(min(100, max(20, 20 * math.ceil(largest / 20))))
+
+
+def _radar(axis: PolarAxes, all_series: Sequence[Series], level: int, top: float) -> None:
+    angles = [2 * math.pi * i / len(CATEGORIES) for i in range(len(CATEGORIES))]
+    for index, series in enumerate(all_series):
+        values = [percent_of(series.scores.categories.get((c, level)), "sr") for c in CATEGORIES]
+        known = [math.nan if v is None else v for v in values]
+        colour = COLOURS[index % len(COLOURS)]
+        axis.plot(
+            [*angles, 0.0],
+            [*known, known[0]],
+            color=colour,
+            ls=DASHES[index % len(DASHES)],
+            marker=MARKERS[index % len(MARKERS)],
+            ms=2.4,
+            lw=1.0,
+            clip_on=False,
+        )
+        if None not in values:
+            axis.fill(angles, known, color=colour, alpha=0.07, lw=0)
+    axis.set_theta_zero_location("N")
+    axis.set_theta_direction(-1)
+    axis.set_xticks(angles, CATEGORIES)
+    axis.tick_params(axis="x", pad=-2)
+    axis.set_ylim(0, top)
+    rings = [top * k / 4 for k in (1, 2, 3, 4)] if top > 20 else [10.0, 20.0]
+    axis.set_yticks(rings, [*(f"{r:g}" for r in rings[:-1]), ""], fontsize=5)
+    axis.set_rlabel_position(18)
+    axis.spines["polar"].set_color(GRID)
+    axis.set_title(f"L{level}", loc="left", x=-0.12, y=1.06, weight="bold")
+    axis.set_xlabel(f"SR, outer ring {top:g} %", fontsize=6)
+
+
+LINE = 0.05
+"""Height that a series takes of a category's line [inch]."""
+LEAST = 1.1
+"""Height of a figure whose few lines leave no room for its axes and legend [inch]."""
+
+
+def draw_dots(all_series: Sequence[Series], levels: Sequence[int]) -> Figure:
+    """The figure, with a panel for each of `levels`; categories that no series has get no line."""
+    present = {c for s in all_series for (c, level) in s.scores.categories if level in levels}
+    shown = [c for c in CATEGORIES if c in present] or list(CATEGORIES)
+    figure = new_figure(max(LEAST, len(shown) * (LINE * len(all_series) + 0.04) + 0.6))
+    axes = figure.subplots(1, len(levels), sharey=True, squeeze=False)[0]
+    for axis, level in zip(axes, levels, strict=True):
+        for index, series in enumerate(all_series):
+            _dots(axis, series, index, len(all_series), shown, level)
+        axis.set_title(f"L{level}", loc="left", weight="bold")
+        axis.set_xlim(-3, 103)
+        axis.set_xlabel("SR [%]")
+        plain(axis, "x")
+        axis.tick_params(axis="y", length=0)
+        for line in range(1, len(shown)):
+            axis.axhline(line - 0.5, color="#8888884d", lw=0.4)
+    axes[0].set_ylim(len(shown) - 0.5, -0.5)
+    axes[0].set_yticks(range(len(shown)), shown)
+    legend_below(figure, series_handles(all_series))
+    return figure
+
+
+def _dots(
+    axis: Axes, series: Series, index: int, count: int, shown: Sequence[str], level: int
+) -> None:
+    """The values of one series, which has its own height within every line."""
+    height = (index + 0.5) / count * 0.8 - 0.4
+    for line, category in enumerate(shown):
+        average = series.scores.categories.get((category, level))
+        estimate = None if average is None else average.values.get("sr")
+        if estimate is None:
+            continue
+        value, low, high = (100 * x for x in (estimate.value, estimate.low, estimate.high))
+        axis.errorbar(
+            [value],
+            [line + height],
+            xerr=[[max(0.0, value - low)], [max(0.0, high - value)]],
+            color=COLOURS[index % len(COLOURS)],
+            marker=MARKERS[index % len(MARKERS)],
+            ms=2.4,
+            elinewidth=0.6,
+            capsize=0,
+        )
+
+
+def draw_progress(all_series: Sequence[Series]) -> Figure:
+    """The figure: a point a variant; of a single series coloured by level."""
+    figure = new_figure(2.9)
+    axis = figure.subplots()
+    axis.plot([0, 100], [0, 100], color=INK, lw=0.7, ls=(0, (1, 2)))
+    groups = _by_level(all_series[0]) if len(all_series) == 1 else _by_series(all_series)
+    handles = [_scatter(axis, i, name, points) for i, (name, points) in enumerate(groups) if points]
+    axis.set_xlim(-3, 103)
+    axis.set_ylim(-3, 103)
+    axis.set_xlabel("success rate [%]")
+    axis.set_ylabel("progress score [%]")
+    axis.text(84, 78, "PS = SR", ha="left", va="top", fontsize=6)
+    plain(axis, "both")
+    legend_below(figure, handles, 5 if len(all_series) == 1 else 3)
+    return figure
+
+
+def _points(series: Series, level: int = 0) -> list[tuple[float, float]]:
+    found = []
+    for cell in series.scores.cells.values():
+        success, progress = percent_of(cell, "sr"), percent_of(cell, "ps")
+        if success is not None and progress is not None and level in (0, cell.level):
+            found.append((success, progress))
+    return found
+
+
+def _by_level(series: Series) -> list[tuple[str, list[tuple[float, float]]]]:
+    return [(f"L{n}", _points(series, n)) for n in series.scores.levels]
+
+
+def _by_series(all_series: Sequence[Series]) -> list[tuple[str, list[tuple[float, float]]]]:
+    return [(label_of(s.name), _points(s)) for s in all_series]
+
+
+def _scatter(
+    axis: Axes, index: int, name: str, points: Sequence[tuple[float, float]]
+) -> PathCollection:
+    return axis.scatter(
+        [success for success, _ in points],
+        [progress for _, progress in points],
+        s=11,
+        marker=MARKERS[index % len(MARKERS)],
+        facecolor=COLOURS[index % len(COLOURS)] + "99",
+        edgecolor=COLOURS[index % len(COLOURS)],
+        lw=0.5,
+        label=name,
+    )
+
+
+HEAT_LINE = 0.125
+"""Height of a task's line [inch]."""
+BAR_GAP = 0.06
+"""Between the last line and the colour bar [inch]."""
+
+
+def draw_heat(series: Series) -> Figure:
+    """The figure; a hatched cell has no result."""
+    import numpy as np
+
+    scores = series.scores
+    tasks = scores.tasks_by_category
+    levels = list(scores.levels)
+    values = np.full((len(tasks), len(levels)), np.nan)
+    for line, task in enumerate(tasks):
+        for column, level in enumerate(levels):
+            found = percent_of(scores.cells.get((task, level)), "sr")
+            values[line, column] = np.nan if found is None else found
+    height = HEAT_LINE * len(tasks)
+    figure = new_figure(height + 0.85)
+    axis = figure.subplots()
+    image = axis.imshow(values, cmap="cividis", vmin=0, vmax=100, aspect="auto")
+    axis.set_facecolor("none")
+    for line in range(len(tasks)):
+        for column in range(len(levels)):
+            _heat_number(axis, line, column, float(values[line, column]))
+    axis.set_yticks(
+        range(len(tasks)), [label_of(t.replace("_", " "), 40) for t in tasks], fontsize=5.5
+    )
+    axis.set_xticks(range(len(levels)), [f"L{n}" for n in levels])
+    _cell_borders(axis, len(tasks), len(levels))
+    axis.tick_params(which="both", length=0)
+    axis.xaxis.tick_top()
+    axis.spines[:].set_visible(False)
+    _categories(axis, [scores.category_of[t] for t in tasks])
+    bar = figure.colorbar(
+        image, ax=axis, location="bottom", aspect=40, shrink=0.9, pad=BAR_GAP / height
+    )
+    bar.set_label("SR [%]")
+    bar.outline.set_visible(False)
+    return figure
+
+
+def _cell_borders(axis: Axes, lines: int, columns: int) -> None:
+    """Thin lines between the cells, so that equal ones do not run together."""
+    axis.set_yticks([n + 0.5 for n in range(lines - 1)], minor=True)
+    axis.set_xticks([n + 0.5 for n in range(columns - 1)], minor=True)
+    axis.grid(which="minor", color=GRID, lw=0.5)
+
+
+def _heat_number(axis: Axes, line: int, column: int, value: float) -> None:
+    if value != value:  # no result: not a number
+        from matplotlib.patches import Rectangle
+
+        corner = (column - 0.5, line - 0.5)
+        axis.add_patch(Rectangle(corner, 1, 1, fill=False, hatch="////", lw=0, ec="#9aa0a8"))
+        return
+    text = f"{value:.0f}" if abs(value - round(value)) < 0.05 else f"{value:.1f}"
+    colour = "#ffffff" if value < 55 else "#101010"
+    axis.text(column, line, text, ha="center", va="center", fontsize=5, color=colour)
+
+
+def _categories(axis: Axes, of_line: list[str]) -> None:
+    """A line between categories and their codes at the right."""
+    start = 0
+    for line in range(1, len(of_line) + 1):
+        if line == len(of_line) or of_line[line] != of_line[start]:
+            if line < len(of_line):
+                axis.axhline(line - 0.5, color="#ffffff", lw=1.4)
+            middle = (start + line - 1) / 2
+            axis.text(
+                1.02,
+                middle,
+                of_line[start],
+                transform=axis.get_yaxis_transform(),
+                va="center",
+                fontsize=6,
+            )
+            start = line
+
+
+FAILURE_LINE = 0.13
+"""Height of a task's bar [inch]."""
+FILLS = (
+    ("#332288", ""),
+    ("#88ccee", ""),
+    ("#117733", ""),
+    ("#ddcc77", ""),
+    ("#cc6677", ""),
+    ("#aa4499", "////"),
+    ("#44aa99", "...."),
+    ("#d0d4da", ""),
+    ("#7f7f7f", "xxxx"),
+)
+"""Colour (Tol's muted palette) and hatching of every type, in the order of the types."""
+
+
+def draw_failures(
+    counts: Mapping[str, Mapping[str, int]], kinds: Sequence[str], names: Mapping[str, str]
+) -> Figure:
+    """The figure of `counts` (task -> type -> failed trials), types in the order of `kinds`."""
+    from matplotlib.patches import Patch
+
+    tasks = [task for task in counts if sum(counts[task].values())]
+    present = [k for k in kinds if any(counts[t].get(k) for t in tasks)]
+    figure = new_figure(FAILURE_LINE * len(tasks) + 0.6 + 0.14 * -(-len(present) // 2))
+    axis = figure.subplots()
+    left = [0.0] * len(tasks)
+    for kind in present:
+        colour, hatch = FILLS[list(kinds).index(kind) % len(FILLS)]
+        shares = [100 * counts[t].get(kind, 0) / sum(counts[t].values()) for t in tasks]
+        axis.barh(
+            range(len(tasks)),
+            shares,
+            left=left,
+            color=colour,
+            hatch=hatch,
+            edgecolor="#ffffff",
+            lw=0.4,
+            height=0.8,
+        )
+        left = [a + b for a, b in zip(left, shares, strict=True)]
+    for line, task in enumerate(tasks):
+        text = str(sum(counts[task].values()))
+        axis.text(101.5, line, text, va="center", fontsize=5.5, color=INK)
+    axis.text(101.5, -1.0, "failed", va="center", fontsize=5.5, color=INK)
+    axis.set_yticks(
+        range(len(tasks)), [label_of(t.replace("_", " "), 40) for t in tasks], fontsize=5.5
+    )
+    axis.set_ylim(len(tasks) - 0.4, -1.4)
+    axis.set_xlim(0, 100)
+    axis.set_xlabel("share of failed trials [%]")
+    plain(axis, "x")
+    axis.tick_params(axis="y", length=0)
+    handles = []
+    for kind in present:
+        colour, hatch = FILLS[list(kinds).index(kind) % len(FILLS)]
+        label = names.get(kind, kind)
+        handles.append(Patch(fc=colour, hatch=hatch, ec="#ffffff", lw=0.4, label=label))
+    if handles:
+        figure.legend(handles=handles, loc="outside lower center", ncols=2, columnspacing=1.2)
+    return figure
+
+
+MEASURES = (("p50", "-"), ("p95", "--"), ("p99", ":"))
+
+
+def has_latency(series: Series) -> bool:
+    """Whether any trial measured its policy's latency."""
+    return any(r.latency.get("p50", 0) > 0 for r in series.records)
+
+
+def draw_latency(all_series: Sequence[Series]) -> Figure:
+    """The figure: for every run the distribution over trials of their p50, p95 and p99."""
+    from matplotlib.lines import Line2D
+
+    figure = new_figure(2.1)
+    axis = figure.subplots()
+    handles = [Line2D([], [], color=INK, ls=dash, label=name) for name, dash in MEASURES]
+    for index, series in enumerate(all_series):
+        colour = COLOURS[index % len(COLOURS)]
+        handles.append(Line2D([], [], color=colour, lw=2.4, label=label_of(series.name)))
+        for name, dash in MEASURES:
+            values = sorted(r.latency[name] for r in series.records if r.latency.get(name, 0) > 0)
+            if values:
+                shares = [100 * (i + 1) / len(values) for i in range(len(values))]
+                axis.step([values[0], *values], [0.0, *shares], where="post", color=colour, ls=dash)
+    axis.set_xscale("log")
+    axis.xaxis.set_major_formatter(_milliseconds)
+    low, high = axis.get_xlim()
+    if high < 10 * low:  # no two powers of ten: the ticks between need numbers
+        axis.xaxis.set_minor_formatter(_milliseconds)
+    axis.set_ylim(0, 102)
+    axis.set_xlabel("latency of an answer [ms]")
+    axis.set_ylabel("share of trials [%]")
+    plain(axis, "both")
+    legend_below(figure, handles, 4)
+    return figure
+
+
+def _milliseconds(value: float, _: object) -> str:
+    return f"{value:g}"
