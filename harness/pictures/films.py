@@ -1,0 +1,140 @@
+"""The animated pictures of the documentation: the expert at three tasks, and with each robot.
+
+`python -m robospa.harness.pictures.films FOLDER` writes FOLDER/trials.webp, each task with its
+sentence below, and FOLDER/ROBOT.webp for the robots of the paper. Pages show WebP without a player.
+Needs a device that draws.
+"""
+
+from __future__ import annotations
+
+import io
+import sys
+import textwrap
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robospa.harness.demonstrations.demonstration import demonstrate
+from robospa.harness.pictures.video import FPS, FilmRecorder
+from robospa.harness.world import World
+from robospa.observation import CameraSpec
+from robospa.tasks.catalog import build_scene
+from robospa.tasks.sentences import instruction
+from robospa.trial import REFERENCE, TrialKey
+
+if TYPE_CHECKING:
+    from PIL import Image
+
+SHOWN = (
+    ("Pick_Mixed_Objects_Distance_B", 5, 100_000),
+    ("Stack_Blocks_Color_Order", 3, 100_000),
+    ("Click_Can_Place_Items", 3, 100_000),
+)
+"""Task, level and seed: one of spatial understanding, and two of several steps."""
+ROBOTS = (REFERENCE, "franka-panda", "ur5-wsg", "piper", "ARX-X5")
+ROBOTS_TASK, FIRST_SEED, TRIES = ("Stack_Blocks_Color_Order", 3), 100_000, 10
+"""What every robot does: three blocks, both arms; the first of so many scenes that it solves."""
+CAMERA = CameraSpec("third", 960, 720)
+CUT, SIZE = (48, 90, 912, 606), (576, 344)
+"""Left, top, right and bottom of what is shown of it [px]: the arms and most of the table; and its
+width and height in the film. Of the robots:"""
+ROBOT_CUT, ROBOT_SIZE = (96, 0, 864, 576), (384, 288)
+STRIP, TEXT, MOST_LETTERS = 52, 15, 72
+"""Height of the strip with the sentence, size of its letters [px], and how many are a line."""
+EVERY = 2
+"""One of so many frames of the tasks is kept: four times real time."""
+QUALITY = (85, 70, 55, 40, 25)
+"""Of WebP: the best of these that is small enough."""
+MOST_BYTES, ROBOT_BYTES = 1_500_000, 900_000
+DARK, LIGHT = (24, 28, 34), (236, 239, 243)
+
+
+class Animation:
+    """Keeps one of `every` frames of a film as `drawn` makes a page of it."""
+
+    def __init__(self, drawn: Callable[[Image.Image], Image.Image], every: int = 1) -> None:
+        self._drawn, self._every, self._count = drawn, every, 0
+        self.frames: list[Image.Image] = []
+
+    def add(self, image: NDArray[np.uint8]) -> None:
+        """Take one RGB frame, uint8 (height, width, 3)."""
+        from PIL import Image
+
+        if self._count % self._every == 0:
+            self.frames.append(self._drawn(Image.fromarray(image)))
+        self._count += 1
+
+    def finish(self) -> bytes:
+        """Nothing: who made it has the frames."""
+        return b""
+
+
+def encode(frames: list[Image.Image], most_bytes: int) -> bytes:
+    """An animated WebP of ten `frames` a second, in the best quality below `most_bytes`."""
+    for quality in QUALITY:
+        data = io.BytesIO()
+        frames[0].save(
+            data, "webp", save_all=True, append_images=frames[1:], duration=1000 // FPS, loop=0,
+            quality=quality, method=4,
+        )  # fmt: skip
+        if data.tell() <= most_bytes:
+            break
+    return data.getvalue()
+
+
+def captioned(image: Image.Image, sentence: str) -> Image.Image:
+    """The part of `image` that is shown, and `sentence` below it."""
+    from PIL import Image, ImageDraw, ImageFont
+
+    page = Image.new("RGB", (SIZE[0], SIZE[1] + STRIP), DARK)
+    page.paste(image.crop(CUT).resize(SIZE, Image.Resampling.LANCZOS), (0, 0))
+    draw, font = ImageDraw.Draw(page), ImageFont.load_default(TEXT)
+    middle = (SIZE[0] / 2, SIZE[1] + STRIP / 2)
+    text = "\n".join(textwrap.wrap(sentence, MOST_LETTERS))
+    draw.multiline_text(middle, text, font=font, fill=LIGHT, anchor="mm", align="center")
+    return page
+
+
+def tasks_film(world: World) -> bytes:
+    """The expert at all tasks of SHOWN, one after the other; RuntimeError if it fails at one."""
+    frames: list[Image.Image] = []
+    for task, level, seed in SHOWN:
+        sentence = instruction(build_scene(task, level, seed), "heldout")
+        video = Animation(partial(captioned, sentence=sentence), EVERY)
+        recorder = FilmRecorder([CAMERA], video)
+        if not demonstrate(world, TrialKey(task, level, seed), recorder).success:
+            raise RuntimeError(f"the expert does not solve {task} level {level} seed {seed}")
+        frames += video.frames
+    return encode(frames, MOST_BYTES)
+
+
+def robot_film(world: World, robot: str) -> bytes:
+    """The expert with `robot` in the first scene that it solves; RuntimeError for none."""
+    for seed in range(FIRST_SEED, FIRST_SEED + TRIES):
+        video = Animation(lambda image: image.crop(ROBOT_CUT).resize(ROBOT_SIZE))
+        key = TrialKey(*ROBOTS_TASK, seed, robot)
+        if demonstrate(world, key, FilmRecorder([CAMERA], video)).success:
+            return encode(video.frames, ROBOT_BYTES)
+    raise RuntimeError(f"{robot} solves none of {TRIES} scenes")
+
+
+def main(folder: Path) -> None:
+    """Write all films into `folder`."""
+    from robospa.harness.sim.motion import DEMONSTRATION_LIMITS
+    from robospa.harness.sim.sapien_world import SapienWorld
+
+    world = SapienWorld(render=True, limits=DEMONSTRATION_LIMITS)
+    (folder / "trials.webp").write_bytes(tasks_film(world))
+    for robot in ROBOTS:
+        (folder / f"{robot}.webp").write_bytes(robot_film(world, robot))
+    world.close()
+
+
+if __name__ == "__main__":
+    if len(sys.argv) != 2:
+        sys.exit("usage: python -m robospa.harness.pictures.films FOLDER")
+    main(Path(sys.argv[1]))
