@@ -10,8 +10,7 @@ import pytest
 from PIL import Image
 
 from robospa.harness import textures
-from robospa.harness.textures import MadeTextures, source
-from robospa.harness.textures.catalog import KINDS, combinations
+from robospa.harness.textures import KINDS, MadeTextures, combinations, source
 from robospa.harness.textures.field import SIZE, Draw, Field, cell, noise, wave
 from robospa.harness.textures.folder import TextureFolder
 from robospa.tasks.scene import SEEN, UNSEEN, Texture
@@ -62,7 +61,7 @@ def test_textures_of_a_split_differ() -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.make.__name__)
-def test_every_kind_paints_a_picture(kind: textures.catalog.Kind) -> None:
+def test_every_kind_paints_a_picture(kind: textures.Material) -> None:
     for style in (0, kind.styles - 1):
         picture = kind.make(Draw(3, style), kind.colors[0], style)
         assert picture.shape == (SIZE, SIZE, 3)
