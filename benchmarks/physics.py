@@ -20,8 +20,8 @@ from frame import Figure, Result, main
 from numpy.typing import NDArray
 
 from robospa.geometry import Pose
-from robospa.harness.sim.drives import Setter
 from robospa.harness.sim.motion import RATE, rest_to_rest
+from robospa.harness.sim.physics import Setter
 from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.snapshot import Snapshot

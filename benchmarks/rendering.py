@@ -25,8 +25,8 @@ from physics import table_of_blocks
 
 from robospa.geometry import Pose
 from robospa.harness.robots import embodiment
-from robospa.harness.sim.abreast import FAR
 from robospa.harness.sim.bodies import to_sapien
+from robospa.harness.sim.cameras import FAR
 from robospa.harness.sim.renderer import camera_view
 from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.observation import DEFAULT_CAMERAS

@@ -25,7 +25,7 @@ from robospa.harness.quantize import STEPS_PER_UNIT, nearest, quantize
 from robospa.harness.robots.embodiment import Embodiment
 from robospa.harness.robots.fixed_order import (
     FixedChain,
-    Frame,
+    FixedPose,
     end_frame,
     fixed_chain,
     frame_of,
@@ -170,7 +170,7 @@ class ActionDecoder:
 
     def _goal(
         self, values: Array, arm: ArmColumns, kind: str, chain: FixedChain, now: list[float]
-    ) -> Frame:
+    ) -> FixedPose:
         """The world frame that one arm's numbers ask for; ActionError for a null quaternion."""
         w, i, j, k = values[arm.quaternion].tolist()
         length = math.sqrt(w * w + i * i + j * j + k * k)
@@ -185,7 +185,7 @@ class ActionDecoder:
 
 
 def reaching(
-    chain: Chain, fixed: FixedChain, goal: Frame, now: list[float]
+    chain: Chain, fixed: FixedChain, goal: FixedPose, now: list[float]
 ) -> tuple[float, ...] | None:
     """Joints [rad] that bring the end-effector frame to `goal`, whole numbers of steps within the
     limits; None if they cannot. A joint that moves less than half a step stays at `now`."""
@@ -204,7 +204,7 @@ def reaching(
     )
 
 
-def _describe(goal: Frame) -> str:
+def _describe(goal: FixedPose) -> str:
     """A pose for a message."""
     place = ", ".join(f"{v:.3f}" for v in goal.at)
     turn = ", ".join(f"{v:.2f}" for v in from_matrix(np.array(goal.turn)))

@@ -65,8 +65,8 @@ FROM_MEASURED = ("ee", JOINTS_OF_EE)
 """Actions that begin where the arms are."""
 
 
-class Still(Protocol):
-    """What an instant of a world looks like; equal stills have equal images."""
+class RenderableState(Protocol):
+    """What an instant of a world looks like; equal ones have equal images."""
 
     def render(self, camera: CameraSpec) -> NDArray[np.uint8]:
         """Its image, uint8 (height, width, 3), while the world has the same scene loaded; raises
@@ -114,7 +114,7 @@ class World(Protocol):
         """One RGB image, uint8 of shape (height, width, 3); raises RenderUnavailable."""
         ...
 
-    def still(self) -> Still:
+    def still(self) -> RenderableState:
         """This instant, to be drawn later or never: as cheap as drawing is expensive."""
         ...
 

@@ -27,7 +27,7 @@ T = TypeVar("T")
 
 
 @dataclass(frozen=True)
-class Row:
+class OptionRow:
     """An option for people: its name, default, choices (or type) and help."""
 
     name: str
@@ -119,7 +119,7 @@ def _plain(value: Any) -> Any:
     return str(value) if isinstance(value, Path) else value
 
 
-def option_table(cls: type[Any]) -> list[Row]:
+def option_table(cls: type[Any]) -> list[OptionRow]:
     """All options, one row each, for documents and help."""
     hints = typing.get_type_hints(cls)
     rows = []
@@ -127,7 +127,7 @@ def option_table(cls: type[Any]) -> list[Row]:
         choices = field.metadata.get("choices", ())
         values = ", ".join(choices) if choices else _type_name(hints[field.name])
         shown = "none" if field.default is None else str(field.default).lower()
-        rows.append(Row(field.name, shown, values, field.metadata.get("help", "")))
+        rows.append(OptionRow(field.name, shown, values, field.metadata.get("help", "")))
     return rows
 
 

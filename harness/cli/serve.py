@@ -18,7 +18,7 @@ from robospa.harness.cli.ranges import PORT
 if TYPE_CHECKING:
     from ssl import SSLContext
 
-    from robospa.protocol.options import Row
+    from robospa.protocol.options import OptionRow
 
 
 MACHINE = ("device", "t5_device", "batch", "code")
@@ -196,7 +196,7 @@ def _show_options(policy: str, make: Callable[..., object]) -> None:
     print_options(option_table(kind))
 
 
-def print_options(rows: Sequence[Row]) -> None:
+def print_options(rows: Sequence[OptionRow]) -> None:
     """Print a table of options, one per line."""
     width = max(len(row.name) for row in rows)
     for row in rows:

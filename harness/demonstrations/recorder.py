@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from robospa.action_space import ActionSpace
 from robospa.harness.convention_check.episodes import Episode, to_jpeg
 from robospa.harness.sim.motion import RATE
-from robospa.harness.world import StepResult, Still, World
+from robospa.harness.world import RenderableState, StepResult, World
 from robospa.observation import DEFAULT_CAMERAS, CameraSpec
 from robospa.protocol.policy import PolicySpec
 
@@ -61,7 +61,7 @@ class RecordedFrame:
     commanded: NDArray[np.float32]
     measured: NDArray[np.float32]
     ee: NDArray[np.float32]
-    still: Still
+    still: RenderableState
     environment_state: NDArray[np.float32]
 
     @property
@@ -162,7 +162,7 @@ def drawn(
     """
     if not cameras:
         return
-    last: Still | None = None
+    last: RenderableState | None = None
     images: list[NDArray[np.uint8]] = []
     for frame in frames:
         if frame.still != last:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from robospa.harness.replay import replay_record
 from robospa.harness.trial import TrialParts, task_parts
-from robospa.harness.world import StepResult, Still, World
+from robospa.harness.world import RenderableState, StepResult, World
 from robospa.observation import CameraSpec
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
@@ -84,7 +84,7 @@ class FilmRecorder:
     ) -> None:
         self._cameras = tuple(cameras)
         self._video = video if video is not None else VideoBuffer()
-        self._drawn: Still | None = None
+        self._drawn: RenderableState | None = None
         self._image = np.zeros((0, 0, 3), np.uint8)
         self._due = EVERY
 

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import math
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import cache
 
-from robospa.harness.robots.embodiment import Embodiment
-from robospa.harness.robots.pairs import paired
+from robospa.geometry import Pose
+from robospa.harness.robots.embodiment import Arm, Embodiment
 from robospa.registry import ROBOTS, UnknownName, find, names
+from robospa.workcell import FixedCamera
 
 
 def embodiments() -> tuple[str, ...]:
@@ -16,7 +21,7 @@ def embodiments() -> tuple[str, ...]:
 
 @cache
 def embodiment(name: str) -> Embodiment:
-    """The robot called `name`, an installed one or made of such (`robospa.harness.robots.pairs`).
+    """The robot called `name`, an installed one or made of such (`robospa.harness.robots`).
 
     Equal robots have one name: `embodiment(name).name`. ValueError, which says what exists or how
     names are written, if there is none.
@@ -33,3 +38,64 @@ def _installed(name: str) -> Embodiment:
     if not isinstance(found, Embodiment) or found.name != name:
         raise ValueError(f"entry point {name!r} of {ROBOTS} leads to no Embodiment of that name")
     return found
+
+
+NAME = re.compile(r"(?P<left>[^+:]+)(?:\+(?P<right>[^+:]+))?(?::(?P<distance>[^+:]+))?")
+NEAREST, FARTHEST = 0.3, 1.2
+"""Distances between two bases [m] that the table lets stand."""
+
+
+def paired(name: str, robot: Callable[[str], Embodiment]) -> Embodiment:
+    """The robot called `name`, made of robots that `robot` finds by their own names.
+
+    Its own name has the distance only if that is not the usual one, and each kind of arm once.
+    Raises ValueError for a name that is not of the forms above, for a distance out of range, and
+    for an arm that stands on a stand together with another one.
+    """
+    match = NAME.fullmatch(name)
+    if match is None:
+        raise ValueError(f"{name!r} names no robot; write NAME, NAME:METRES or LEFT+RIGHT:METRES")
+    left = robot(match["left"])
+    right = robot(match["right"] or match["left"])
+    if match["distance"] is None:
+        if right is left:
+            return left
+        raise ValueError(f"how far apart the arms of {name!r} stand is missing; write {name}:0.6")
+    distance = _distance(name, match["distance"])
+    if right is left and distance == left.distance:
+        return left
+    for part in (left, right):
+        if part.distance is None:
+            raise ValueError(f"the arms of {part.name} stand together; {name!r} cannot part them")
+    kinds = left.name if right is left else f"{left.name}+{right.name}"
+    return Embodiment(
+        name=f"{kinds}:{distance:g}",
+        arms=(_at(left.arms[0], -distance / 2), _at(right.arms[1], distance / 2)),
+        cameras=_shared(left.cameras, right.cameras),
+        distance=distance,
+        travel_height=max(left.travel_height, right.travel_height),
+        highest=min(left.highest, right.highest),
+    )
+
+
+def _distance(name: str, text: str) -> float:
+    try:
+        found = float(text)
+    except ValueError:
+        found = math.nan
+    if not NEAREST <= found <= FARTHEST:
+        raise ValueError(
+            f"the distance of {name!r} is {text!r}; it has to be from {NEAREST} to {FARTHEST} m"
+        )
+    return found
+
+
+def _at(arm: Arm, x: float) -> Arm:
+    _, y, z = arm.base.position
+    return replace(arm, base=Pose((x, y, z), arm.base.rotation))
+
+
+def _shared(
+    left: Mapping[str, FixedCamera], right: Mapping[str, FixedCamera]
+) -> dict[str, FixedCamera]:
+    return {name: camera for name, camera in left.items() if name in right}

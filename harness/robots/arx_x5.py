@@ -10,10 +10,23 @@ import math
 from dataclasses import replace
 
 from robospa.geometry import Pose, axis_rotation, yaw_rotation
-from robospa.harness.robots import arx, arx_x5_shapes
-from robospa.harness.robots.cameras import SINGLE_ARM_CAMERAS
+from robospa.harness.robots import aloha_agilex as same_arm
+from robospa.harness.robots import arx
 from robospa.harness.robots.embodiment import Arm, Embodiment
-from robospa.harness.robots.serial import Row, link_names, revolute_joints, sliding_fingers
+from robospa.harness.robots.links import SINGLE_ARM_CAMERAS, Row, box, serial_chain
+from robospa.tasks.shapes import Shape
+
+LINK_SHAPES: tuple[tuple[Shape, ...], ...] = (
+    (
+        *same_arm.LINK_SHAPES[0],
+        box((0.0, 0.0, -0.022), (0.05, 0.05, 0.022), same_arm.STEEL),
+        box((-0.045, 0.0, -0.392), (0.04, 0.05, 0.392), same_arm.DARK),
+    ),
+    *same_arm.LINK_SHAPES[1:],
+)
+"""Base link and links 1 to 6."""
+FINGER_SHAPES = same_arm.FINGER_SHAPES
+
 
 DISTANCE = 0.6
 OPEN = (-10.0, 10.0)
@@ -36,17 +49,13 @@ GRIPPER = replace(arx.GRIPPER, fingertip=0.0375)
 
 
 def _arm(name: str, x: float) -> Arm:
-    links, fingers = (
-        link_names(CHAIN),
-        sliding_fingers("link6", TOOL.rotation, FINGERS, (0.0, 0.044)),
-    )
-    shapes = (*arx_x5_shapes.LINKS, *arx_x5_shapes.FINGERS)
-    names = (*links, *(finger.child for finger in fingers))
+    shapes = (*LINK_SHAPES, *FINGER_SHAPES)
+    joints, fingers, named = serial_chain(CHAIN, TOOL.rotation, FINGERS, (0.0, 0.044), shapes)
     return Arm(
         name=name,
         base=Pose((x, -0.35, 0.784), yaw_rotation(math.pi / 2)),
-        base_link=links[0],
-        joints=revolute_joints(CHAIN),
+        base_link=joints[0].parent,
+        joints=joints,
         fingers=fingers,
         travel=(-0.01, 0.045),
         gripper=GRIPPER,
@@ -54,7 +63,7 @@ def _arm(name: str, x: float) -> Arm:
         home=(0.0,) * 6,
         seeds=arx.SEEDS,
         working=arx.WORKING,
-        shapes=dict(zip(names, shapes, strict=True)),
+        shapes=named,
         camera=Pose((0.0845, 0.0, 0.05), axis_rotation((0, 1, 0), 0.349)),
         geometry="arx",
     )

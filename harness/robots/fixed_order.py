@@ -29,13 +29,13 @@ COSINE = tuple((-1.0) ** k / factorial(2 * k) for k in range(1, 9))
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class FixedPose:
     """A rigid transform: rotation matrix `turn` (rows) and position `at` [m]."""
 
     turn: Rows
     at: Vector
 
-    def __mul__(self, other: Frame) -> Frame:
+    def __mul__(self, other: FixedPose) -> FixedPose:
         """The frame `other`, given in this one, in the frame that this one is in."""
         (a, b, c), (p, q, r), (u, v, w) = self.turn
         (d, e, f), (g, h, i), (j, k, m) = other.turn
@@ -45,7 +45,7 @@ class Frame:
             (p * d + q * g + r * j, p * e + q * h + r * k, p * f + q * i + r * m),
             (u * d + v * g + w * j, u * e + v * h + w * k, u * f + v * i + w * m),
         )
-        return Frame(turn, (x, y, z))
+        return FixedPose(turn, (x, y, z))
 
     def turned(self, vector: Vector) -> Vector:
         """`vector` of this frame in the parent's directions."""
@@ -63,10 +63,10 @@ class Frame:
 class FixedChain:
     """A `Chain` as plain numbers, ending in the end-effector frame; limits in rad."""
 
-    base: Frame
-    origins: tuple[Frame, ...]
+    base: FixedPose
+    origins: tuple[FixedPose, ...]
     axes: tuple[Vector, ...]
-    tool: Frame
+    tool: FixedPose
     lower: tuple[float, ...]
     upper: tuple[float, ...]
 
@@ -74,9 +74,9 @@ class FixedChain:
 def fixed_chain(chain: Chain) -> FixedChain:
     """The numbers of `chain`."""
 
-    def frame(rows: Sequence[Sequence[float]]) -> Frame:
+    def frame(rows: Sequence[Sequence[float]]) -> FixedPose:
         turn = tuple((row[0], row[1], row[2]) for row in rows[:3])
-        return Frame(cast(Rows, turn), (rows[0][3], rows[1][3], rows[2][3]))
+        return FixedPose(cast(Rows, turn), (rows[0][3], rows[1][3], rows[2][3]))
 
     return FixedChain(
         base=frame(chain.base.tolist()),
@@ -88,17 +88,17 @@ def fixed_chain(chain: Chain) -> FixedChain:
     )
 
 
-def frame_of(pose: Pose) -> Frame:
+def frame_of(pose: Pose) -> FixedPose:
     """`pose` with its rotation as a matrix."""
-    return Frame(cast(Rows, matrix_rows(*pose.rotation)), pose.position)
+    return FixedPose(cast(Rows, matrix_rows(*pose.rotation)), pose.position)
 
 
-def end_frame(chain: FixedChain, joints: Sequence[float]) -> Frame:
+def end_frame(chain: FixedChain, joints: Sequence[float]) -> FixedPose:
     """The end-effector frame in the world at `joints` [rad]."""
     return _forward(chain, joints)[0]
 
 
-def refined(chain: FixedChain, joints: Sequence[float], goal: Frame, count: int) -> list[float]:
+def refined(chain: FixedChain, joints: Sequence[float], goal: FixedPose, count: int) -> list[float]:
     """`joints` [rad] that almost reach `goal`, brought onto it by `count` Gauss-Newton steps within
     the joint limits."""
     now = list(joints)
@@ -130,7 +130,7 @@ def sine_cosine(angle: float) -> tuple[float, float]:
     return turned[quarter % 4]
 
 
-def _about(axis: Vector, angle: float) -> Frame:
+def _about(axis: Vector, angle: float) -> FixedPose:
     """The rotation by `angle` [rad] about a unit axis."""
     x, y, z = axis
     s, c = sine_cosine(angle)
@@ -140,10 +140,12 @@ def _about(axis: Vector, angle: float) -> Frame:
         (t * x * y + s * z, c + t * y * y, t * y * z - s * x),
         (t * x * z - s * y, t * y * z + s * x, c + t * z * z),
     )
-    return Frame(turn, (0.0, 0.0, 0.0))
+    return FixedPose(turn, (0.0, 0.0, 0.0))
 
 
-def _forward(chain: FixedChain, joints: Sequence[float]) -> tuple[Frame, list[tuple[float, ...]]]:
+def _forward(
+    chain: FixedChain, joints: Sequence[float]
+) -> tuple[FixedPose, list[tuple[float, ...]]]:
     """The end-effector frame, and the column of each joint in the geometric Jacobian (6)."""
     frame = chain.base
     hinges: list[tuple[Vector, Vector]] = []
@@ -159,10 +161,10 @@ def _forward(chain: FixedChain, joints: Sequence[float]) -> tuple[Frame, list[tu
     return end, columns
 
 
-def _error(end: Frame, goal: Frame) -> tuple[float, ...]:
+def _error(end: FixedPose, goal: FixedPose) -> tuple[float, ...]:
     """Position and rotation (6) still to go: the axis times the sine of the angle."""
-    back = Frame(cast(Rows, tuple(zip(*end.turn, strict=True))), (0.0, 0.0, 0.0))
-    (_, b, c), (p, _, r), (u, v, _) = (Frame(goal.turn, (0.0, 0.0, 0.0)) * back).turn
+    back = FixedPose(cast(Rows, tuple(zip(*end.turn, strict=True))), (0.0, 0.0, 0.0))
+    (_, b, c), (p, _, r), (u, v, _) = (FixedPose(goal.turn, (0.0, 0.0, 0.0)) * back).turn
     x, y, z = (g - e for g, e in zip(goal.at, end.at, strict=True))
     return (x, y, z, (v - r) / 2, (c - u) / 2, (p - b) / 2)
 

@@ -8,12 +8,120 @@ from __future__ import annotations
 
 import math
 
-from robospa.geometry import Pose, look_rotation, yaw_rotation
+from robospa.geometry import Pose, Vec3, look_rotation, yaw_rotation
 from robospa.gripper import Gripper
-from robospa.harness.robots import franka_panda_shapes
-from robospa.harness.robots.cameras import SINGLE_ARM_CAMERAS
 from robospa.harness.robots.embodiment import Arm, Embodiment
-from robospa.harness.robots.serial import Row, link_names, revolute_joints, sliding_fingers
+from robospa.harness.robots.links import (
+    SINGLE_ARM_CAMERAS,
+    Row,
+    block,
+    box,
+    capped,
+    drawn,
+    rod,
+    serial_chain,
+    shell,
+)
+from robospa.tasks.objects.meshes import loft, rounded_rectangle
+from robospa.tasks.shapes import Box, Color, Shape
+
+WHITE: Color = (0.80, 0.81, 0.82)
+CAP: Color = (0.52, 0.54, 0.56)
+DARK: Color = (0.05, 0.05, 0.055)
+STEEL: Color = (0.36, 0.37, 0.39)
+
+HAND = look_rotation((0, 0, 1), (-1, -1, 0))
+"""Rotation of the hand in link 7: x approaches, y is the closing direction."""
+
+
+def _housing(start: Vec3, end: Vec3, radius: float) -> tuple[Shape, ...]:
+    """A joint seen from its ends: white, with a light cap in a dark ring."""
+    return capped(start, end, radius, WHITE, CAP, DARK)
+
+
+def _seam(x: float, y: float, z: float, radius: float) -> Shape:
+    """The dark ring where a link turns about the z axis on the one before it."""
+    return rod((x, y, z), (x, y, z + 0.014), radius, DARK)
+
+
+def _hand_body() -> Shape:
+    """The hand's white body: as wide as a forearm is thick, narrower where it meets the flange."""
+    sides = ((-0.033, 0.060, 0.028), (-0.012, 0.100, 0.0315), (0.033, 0.102, 0.0315))
+    outlines = [(x, rounded_rectangle(wide, deep, 0.022)) for x, wide, deep in sides]
+    rings = [[(y, z, x) for y, z in outline] for x, outline in outlines]
+    upright = Pose((0.0, 0.0, 0.14), HAND) * Pose(rotation=TO_APPROACH)
+    return drawn(Shape(loft(rings), upright, WHITE))
+
+
+TO_APPROACH = look_rotation((0, 1, 0), (0, 0, 1))
+"""Brings x, y, z to y, z, x."""
+
+LINK_SHAPES: tuple[tuple[Shape, ...], ...] = (
+    (
+        shell((-0.10, 0.0, 0.03), (0.07, 0.0, 0.03), 0.075, WHITE, 0.8),
+        box((-0.05, 0.0, 0.02), (0.10, 0.085, 0.02), WHITE),
+        shell((0.0, 0.0, 0.0), (0.0, 0.0, 0.14), 0.068, WHITE),
+        box((-0.04, 0.0, -0.375), (0.13, 0.12, 0.375), STEEL),
+    ),
+    (
+        _seam(0.0, 0.0, -0.197, 0.0585),
+        shell((0.0, 0.0, -0.185), (0.0, 0.0, 0.02), 0.056, WHITE),
+        *_housing((0.0, -0.129, 0.0), (0.0, 0.055, 0.0), 0.056),
+    ),
+    (
+        shell((0.0, 0.0, -0.055), (0.0, 0.0, 0.1295), 0.054, WHITE),
+        shell((0.0, 0.03, 0.0), (0.0, -0.18, 0.0), 0.055, WHITE),
+        rod((0.0, -0.182, 0.0), (0.0, -0.196, 0.0), 0.057, DARK),
+    ),
+    (
+        shell((0.0, 0.0, -0.121), (0.0, 0.0, 0.03), 0.0545, WHITE),
+        shell((0.0, 0.025, 0.0), (0.0825, 0.025, 0.0), 0.05, WHITE),
+        *_housing((0.0825, -0.055, 0.0), (0.0825, 0.111, 0.0), 0.056),
+    ),
+    (
+        shell((0.0, 0.0, -0.055), (0.0, 0.0, 0.111), 0.054, WHITE),
+        shell((0.0, 0.025, 0.0), (-0.0825, 0.025, 0.0), 0.05, WHITE),
+        shell((-0.0825, -0.03, 0.0), (-0.0825, 0.112, 0.0), 0.0545, WHITE),
+        rod((-0.0825, 0.112, 0.0), (-0.0825, 0.126, 0.0), 0.057, DARK),
+    ),
+    (
+        shell((0.0, 0.0, -0.2646), (0.0, 0.0, -0.11), 0.054, WHITE),
+        shell((0.0, 0.03, -0.20), (0.0, 0.075, 0.02), 0.042, WHITE, 1.0),
+        *_housing((0.0, -0.05, 0.0), (0.0, 0.13, 0.0), 0.049),
+        block(Pose((0.0, 0.03, -0.12)), (0.05, 0.06, 0.14)),
+    ),
+    (
+        shell((0.0, 0.0, -0.044), (0.0, 0.0, 0.056), 0.048, WHITE),
+        shell((-0.02, 0.0, 0.0), (0.11, 0.0, 0.0), 0.042, WHITE, 0.9),
+        *_housing((0.088, -0.05, 0.0), (0.088, 0.082, 0.0), 0.044),
+        rod((0.088, -0.060, 0.0), (0.088, -0.047, 0.0), 0.0455, DARK),
+        block(Pose((0.045, 0.015, 0.0)), (0.085, 0.06, 0.045)),
+    ),
+    (
+        shell((0.0, 0.0, 0.045), (0.0, 0.0, 0.092), 0.043, WHITE),
+        rod((0.0, 0.0, 0.090), (0.0, 0.0, 0.109), 0.032, DARK),
+        _hand_body(),
+        drawn(Shape(Box((0.004, 0.09, 0.012)), Pose((0.0, 0.0, 0.171), HAND), DARK)),
+        # housing of the wrist camera, behind its optical centre
+        drawn(Shape(Box((0.012, 0.03, 0.012)), Pose((0.011, -0.039, 0.112), HAND), DARK)),
+        block(Pose((0.0, 0.0, 0.14), HAND), (0.033, 0.102, 0.0315)),
+    ),
+)
+"""Base link and links 1 to 7."""
+
+
+def _finger(side: float) -> tuple[Shape, ...]:
+    """A finger in a frame whose x approaches; its inner face is at y = 0, it lies to `side` y."""
+    pose = Pose((0.027, side * 0.0075, 0.0))
+    return (
+        Shape(Box((0.027, 0.0075, 0.0105)), pose, visual=False),
+        drawn(Shape(Box((0.018, 0.011, 0.009)), Pose((0.013, side * 0.013, 0.0)), STEEL)),
+        drawn(Shape(Box((0.014, 0.006, 0.0105)), Pose((0.040, side * 0.0065, 0.0)), DARK)),
+    )
+
+
+FINGER_SHAPES: tuple[tuple[Shape, ...], tuple[Shape, ...]] = (_finger(-1.0), _finger(1.0))
+
 
 DISTANCE = 0.8
 QUARTER = math.pi / 2
@@ -62,24 +170,20 @@ SEEDS = (
 
 
 def _arm(name: str, x: float) -> Arm:
-    links, fingers = (
-        link_names(CHAIN),
-        sliding_fingers("link7", TOOL.rotation, FINGERS, (0.0, 0.04)),
-    )
-    shapes = (*franka_panda_shapes.LINKS, *franka_panda_shapes.FINGERS)
-    names = (*links, *(finger.child for finger in fingers))
+    shapes = (*LINK_SHAPES, *FINGER_SHAPES)
+    joints, fingers, named = serial_chain(CHAIN, TOOL.rotation, FINGERS, (0.0, 0.04), shapes)
     return Arm(
         name=name,
         base=Pose((x, -0.65, 0.75), yaw_rotation(math.pi / 2)),
-        base_link=links[0],
-        joints=revolute_joints(CHAIN),
+        base_link=joints[0].parent,
+        joints=joints,
         fingers=fingers,
         travel=(-0.01, 0.05),
         gripper=GRIPPER,
         tool=TOOL,
         home=(0.0, 0.19635, 0.0, -2.61799, 0.0, 2.94159, 0.785398),
         seeds=SEEDS,
-        shapes=dict(zip(names, shapes, strict=True)),
+        shapes=named,
         camera=Pose((0.00707, -0.04243, 0.124), look_rotation((0, 0, 1), (-1, -1, 0))),
     )
 

@@ -8,12 +8,93 @@ from __future__ import annotations
 
 import math
 
-from robospa.geometry import Pose, look_rotation, yaw_rotation
+from robospa.geometry import Pose, Vec3, look_rotation, yaw_rotation
 from robospa.gripper import Gripper
-from robospa.harness.robots import piper_shapes
-from robospa.harness.robots.cameras import SINGLE_ARM_CAMERAS
 from robospa.harness.robots.embodiment import Arm, Embodiment
-from robospa.harness.robots.serial import Row, link_names, revolute_joints, sliding_fingers
+from robospa.harness.robots.links import (
+    SINGLE_ARM_CAMERAS,
+    Row,
+    block,
+    box,
+    capped,
+    drawn,
+    rod,
+    serial_chain,
+    shell,
+)
+from robospa.tasks.shapes import Box, Color, Shape
+
+WHITE: Color = (0.78, 0.79, 0.80)
+DARK: Color = (0.05, 0.05, 0.055)
+STEEL: Color = (0.36, 0.37, 0.39)
+
+UPPER_END = (0.28358, 0.028726, 0.0)
+FORE_END = (-0.24221, 0.068514, 0.0)
+ALONG_UPPER = ((0.20, 0.02026, 0.0), (0.212, 0.02148, 0.0))
+ALONG_FORE = ((-0.160, 0.04526, 0.0), (-0.178, 0.05035, 0.0))
+"""Where bands lie around the upper arm and the forearm."""
+FORE_HEADING = 2.8659
+"""Direction [rad] of the forearm in the x-y plane of its link."""
+
+
+def _joint(start: Vec3, end: Vec3, radius: float) -> tuple[Shape, ...]:
+    """A joint across the arm: dark, with white lids."""
+    return capped(start, end, radius, DARK, WHITE, STEEL)
+
+
+LINK_SHAPES: tuple[tuple[Shape, ...], ...] = (
+    (
+        box((-0.009, 0.0, 0.008), (0.058, 0.05, 0.008), DARK),
+        shell((-0.009, 0.0, 0.0), (-0.009, 0.0, 0.082), 0.043, WHITE, 0.4),
+        box((-0.050, 0.0, 0.035), (0.012, 0.028, 0.024), WHITE),
+        rod((0.0, 0.0, 0.080), (0.0, 0.0, 0.088), 0.037, DARK),
+        box((-0.009, 0.0, -0.375), (0.05, 0.06, 0.375), STEEL),
+    ),
+    (
+        shell((0.0, 0.0, -0.036), (0.0, 0.0, 0.030), 0.036, WHITE, 0.6),
+        *_joint((0.0, -0.040, 0.0), (0.0, 0.040, 0.0), 0.030),
+    ),
+    (
+        *_joint((0.0, 0.0, -0.045), (0.0, 0.0, 0.045), 0.035),
+        shell((0.0, 0.0, 0.0), UPPER_END, 0.030, WHITE),
+        rod(ALONG_UPPER[0], ALONG_UPPER[1], 0.0312, STEEL),
+    ),
+    (
+        *_joint((0.0, 0.0, -0.040), (0.0, 0.0, 0.040), 0.032),
+        shell((0.0, 0.0, 0.0), FORE_END, 0.028, WHITE),
+        rod(ALONG_FORE[0], ALONG_FORE[1], 0.0290, DARK),
+        block(Pose((-0.12, 0.034, 0.0), yaw_rotation(FORE_HEADING)), (0.12, 0.028, 0.03)),
+    ),
+    _joint((0.0, 0.0, -0.036), (0.0, 0.0, 0.0285), 0.031),
+    (
+        shell((0.0, -0.02, 0.0), (0.0, 0.078, 0.0), 0.029, WHITE),
+        rod((0.0, 0.076, 0.0), (0.0, 0.091, 0.0), 0.030, DARK),
+        block(Pose((0.0, 0.035, 0.0)), (0.028, 0.052, 0.028)),
+    ),
+    (
+        rod((0.0, 0.0, 0.0), (0.0, 0.0, 0.02), 0.03, DARK),
+        box((0.0, 0.0, 0.040), (0.026, 0.072, 0.022), WHITE),
+        box((0.0, 0.0, 0.062), (0.018, 0.068, 0.004), DARK),
+        box((0.0, 0.0, 0.034), (0.0275, 0.030, 0.012), STEEL),
+        # housing of the wrist camera, behind its optical centre
+        box((-0.05, 0.02, 0.028), (0.012, 0.042, 0.01), DARK, 0.46),
+        block(Pose((0.0, 0.0, 0.0335)), (0.03, 0.0725, 0.0335)),
+    ),
+)
+"""Base link and links 1 to 6."""
+
+
+def _finger(side: float) -> tuple[Shape, ...]:
+    """A finger in a frame whose x approaches; its inner face is at y = 0, it lies to `side` y."""
+    return (
+        Shape(Box((0.0383, 0.006, 0.011)), Pose((-0.0333, side * 0.006, 0.0)), visual=False),
+        drawn(Shape(Box((0.0383, 0.006, 0.011)), Pose((-0.0333, side * 0.006, 0.0)), DARK)),
+        drawn(Shape(Box((0.012, 0.012, 0.02)), Pose((-0.058, side * 0.0125, 0.0)), STEEL)),
+    )
+
+
+FINGER_SHAPES: tuple[tuple[Shape, ...], tuple[Shape, ...]] = (_finger(-1.0), _finger(1.0))
+
 
 DISTANCE = 0.6
 Z = (0.0, 0.0, 1.0)
@@ -55,24 +136,20 @@ SEEDS = (
 
 
 def _arm(name: str, x: float) -> Arm:
-    links, fingers = (
-        link_names(CHAIN),
-        sliding_fingers("link6", TOOL.rotation, FINGERS, (0.0, 0.04)),
-    )
-    shapes = (*piper_shapes.LINKS, *piper_shapes.FINGERS)
-    names = (*links, *(finger.child for finger in fingers))
+    shapes = (*LINK_SHAPES, *FINGER_SHAPES)
+    joints, fingers, named = serial_chain(CHAIN, TOOL.rotation, FINGERS, (0.0, 0.04), shapes)
     return Arm(
         name=name,
         base=Pose((x, -0.45, 0.75), yaw_rotation(math.pi / 2)),
-        base_link=links[0],
-        joints=revolute_joints(CHAIN),
+        base_link=joints[0].parent,
+        joints=joints,
         fingers=fingers,
         travel=(-0.01, 0.04),
         gripper=GRIPPER,
         tool=TOOL,
         home=(0.0,) * 6,
         seeds=SEEDS,
-        shapes=dict(zip(names, shapes, strict=True)),
+        shapes=named,
         camera=Pose(
             (-0.055, 0.032, 0.038), look_rotation((0.44314, 0.0, 0.89645), (0.0, 1.0, 0.0))
         ),

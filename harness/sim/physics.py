@@ -8,7 +8,10 @@ bodies are created in an order that follows from the trial alone.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 import sapien
@@ -17,14 +20,18 @@ from sapien import physx
 
 from robospa.action_space import ARMS
 from robospa.geometry import Pose, Vec3
-from robospa.harness.robots.embodiment import Embodiment
-from robospa.harness.sim import bodies
-from robospa.harness.sim import room as furniture
-from robospa.harness.sim.lazy_snapshot import NO_HINGES, unpack
-from robospa.harness.sim.motion import RATE
+from robospa.harness.robots.embodiment import Arm, Embodiment
+from robospa.harness.sim import bodies, furniture
+from robospa.harness.sim.lazy_snapshot import FLOATS, NO_HINGES, unpack
+from robospa.harness.sim.motion import RATE, Trajectory
+from robospa.harness.world import SceneUnstable
+from robospa.rotations import angle_between
 from robospa.tasks.shapes import Hinge, ObjectModel
 from robospa.tasks.snapshot import Contact
 from robospa.workcell import WORKCELL
+
+if TYPE_CHECKING:
+    from sapien import physx
 
 Array = NDArray[np.float64]
 
@@ -154,3 +161,207 @@ class Physics:
         self.scene.clear()
         self.arms, self.components, self._moving = [], {}, {}
         self._hinged = {}
+
+
+WINDOW = 25
+WINDOWS = 10
+"""At most this many windows of WINDOW physics steps: 1 s of simulated time."""
+QUIET_WINDOWS = 2
+REST_DISTANCE = 2e-4  # [m] in one window
+REST_ANGLE = math.radians(0.2)  # in one window
+FALLEN = 0.5  # [m] an object whose origin is below this is not on the table
+
+
+def settle(physics: Physics, where: str) -> None:
+    """Step until nothing moves: no object moved or turned by more than can be seen in a tenth of a
+    second, twice in a row (velocities chatter in contacts).
+
+    SceneUnstable, naming `where` and the object, if one still moves after WINDOWS or has left
+    the table.
+    """
+    names = list(physics.moving())
+    if not names:
+        return
+    before = _state(physics, names)
+    quiet, restless = 0, ""
+    for _ in range(WINDOWS):
+        for _ in range(WINDOW):
+            physics.step()
+        after = _state(physics, names)
+        moved = mover(names, before, after)
+        restless = moved or restless
+        quiet = 0 if moved else quiet + 1
+        before = after
+        if quiet == QUIET_WINDOWS:
+            break
+    else:
+        raise SceneUnstable(
+            f"object {restless!r} of {where} still moves after {WINDOWS * WINDOW / RATE:g} s; "
+            f"this seed is not valid"
+        )
+    fallen = [name for name, row in zip(names, before, strict=True) if row[6] < FALLEN]
+    if fallen:
+        raise SceneUnstable(
+            f"object {fallen[0]!r} of {where} fell off the table while the scene settled; "
+            f"this seed is not valid"
+        )
+
+
+def _state(physics: Physics, names: list[str]) -> Array:
+    """Packed poses (N, 7: rotation, position) of the named objects."""
+    poses = np.frombuffer(physics.packed(), dtype=np.float32).reshape(-1, FLOATS)
+    return poses[[physics.rows[name] for name in names]].astype(np.float64)
+
+
+def mover(names: list[str], before: Array, after: Array) -> str:
+    """The object that moved most between two packed states, or "" if all are at rest."""
+    shift = np.linalg.norm(after[:, 4:] - before[:, 4:], axis=1)
+    turn = angle_between(before[:, :4], after[:, :4])
+    unrest = np.maximum(shift / REST_DISTANCE, turn / REST_ANGLE)
+    worst = int(np.argmax(unrest))
+    return names[worst] if unrest[worst] > 1.0 else ""
+
+
+Opening = TypeVar("Opening", float, Array)
+Setter = Callable[[float], None]
+Pair = tuple[tuple[float, ...], tuple[float, ...]]
+
+
+@dataclass(frozen=True)
+class _ArmDrives:
+    """SAPIEN's setters of one arm's drives, and where its joints are in qpos."""
+
+    articulation: physx.PhysxArticulation
+    position: list[Setter]
+    velocity: list[Setter]
+    fingers: list[Setter]
+    columns: list[int]
+    finger_columns: list[int]
+
+
+class Drives:
+    """The drives of a loaded robot; `now` is the trajectory that they follow and the row reached.
+
+    `joints` (2, J) [rad] and `gripper` (2,) are as commanded; `opening` (2,) is the grippers' drive
+    target, which may lag an opening gripper's command. J is the joint count of the arm that has
+    more; the other's row ends in zeros.
+
+    Grippers get position targets only (official), so they follow with a time constant of
+    damping / stiffness = 0.2 s; arm joints get position and velocity targets.
+    """
+
+    def __init__(
+        self, embodiment: Embodiment, articulations: list[physx.PhysxArticulation]
+    ) -> None:
+        self._embodiment = embodiment
+        self._arms = [
+            _bind(arm, articulation)
+            for arm, articulation in zip(embodiment.arms, articulations, strict=True)
+        ]
+        home = np.zeros((2, 1, max(len(arm.joints) for arm in embodiment.arms)))
+        for a, side in enumerate(embodiment.arms):
+            home[a, 0, : len(side.joints)] = side.home
+        opened = np.ones((2, 1))
+        self.now = (Trajectory(home, np.zeros_like(home), opened, opened), 0)
+        self._go_home()
+
+    @property
+    def joints(self) -> Array:
+        """Commanded joints (2, J) [rad]."""
+        path, row = self.now
+        return path.joints[:, row]
+
+    @property
+    def gripper(self) -> Array:
+        """Commanded grippers (2,)."""
+        path, row = self.now
+        return path.commanded[:, row]
+
+    @property
+    def opening(self) -> Array:
+        """Drive targets of the grippers (2,)."""
+        path, row = self.now
+        return path.gripper[:, row]
+
+    def _go_home(self) -> None:
+        """Joints at home, grippers open, at rest, and every target where its joint is."""
+        for a, arm in enumerate(self._arms):
+            qpos = np.zeros(arm.articulation.dof, dtype=np.float32)
+            side = self._embodiment.arms[a]
+            qpos[arm.columns] = side.home
+            upper = [finger.upper for finger in side.fingers]
+            qpos[arm.finger_columns] = np.minimum(self._travel(a, 1.0), upper)
+            arm.articulation.qpos = qpos
+            arm.articulation.qvel = np.zeros_like(qpos)
+            for joint, value in zip(arm.articulation.active_joints, qpos.tolist(), strict=True):
+                joint.set_drive_target(value)
+                joint.set_drive_velocity_target(0.0)
+
+    def _travel(self, arm: int, opening: Opening) -> Opening:
+        """Finger travel [m] of gripper values 0..1."""
+        closed, opened = self._embodiment.arms[arm].travel
+        return closed + opening * (opened - closed)
+
+    def schedule(self, path: Trajectory) -> tuple[list[Setter], Array]:
+        """Setters to call in every physics step of `path`, and their values (n, setters)."""
+        joints, opening = self.joints, self.opening
+        calls: list[Setter] = []
+        columns: list[Array] = []
+        for a, arm in enumerate(self._arms):
+            # along a straight line a joint moves all the way or not at all
+            moves = (path.joints[a, -1] != joints[a]) | (path.joints[a, 0] != joints[a])
+            for j in np.flatnonzero(moves).tolist():
+                calls += [arm.position[j], arm.velocity[j]]
+                columns += [path.joints[a, :, j], path.velocities[a, :, j]]
+            if path.gripper[a, 0] != opening[a] or path.gripper[a, -1] != opening[a]:
+                calls += arm.fingers
+                columns += [self._travel(a, path.gripper[a])] * len(arm.fingers)
+        table = np.empty((len(path), len(calls)))
+        for i, column in enumerate(columns):
+            table[:, i] = column
+        return calls, table
+
+    def stop(self) -> None:
+        """Set all velocity targets to zero."""
+        for arm in self._arms:
+            for write in arm.velocity:
+                write(0.0)
+
+    def measured(self) -> Pair:
+        """Measured joints [rad] of left and right."""
+        left, right = (
+            tuple([qpos[c] for c in arm.columns])
+            for arm, qpos in ((arm, arm.articulation.qpos.tolist()) for arm in self._arms)
+        )
+        return left, right
+
+    def state(self, measured: bool) -> NDArray[np.float32]:
+        """Joints [rad] and gripper 0..1 of left and right (D,): as commanded, or as they are."""
+        parts: list[float] = []
+        gripper = self.gripper
+        joints: Sequence[Sequence[float]]
+        joints = self.measured() if measured else self.joints.tolist()
+        for a, arm in enumerate(self._arms):
+            opening = float(gripper[a])
+            if measured:
+                closed, opened = self._embodiment.arms[a].travel
+                travel = float(arm.articulation.qpos[arm.finger_columns].mean())
+                opening = min(1.0, max(0.0, (travel - closed) / (opened - closed)))
+            parts += [*joints[a][: len(arm.columns)], opening]
+        return np.array(parts, dtype=np.float32)
+
+
+def _bind(arm: Arm, articulation: physx.PhysxArticulation) -> _ArmDrives:
+    """Look up the joints of `arm` once."""
+    active = articulation.active_joints
+    column = {joint.name: i for i, joint in enumerate(active)}
+    joints = [column[joint.name] for joint in arm.joints]
+    fingers = [column[finger.name] for finger in arm.fingers]
+    return _ArmDrives(
+        articulation=articulation,
+        position=[active[c].set_drive_target for c in joints],
+        velocity=[active[c].set_drive_velocity_target for c in joints],
+        fingers=[active[c].set_drive_target for c in fingers],
+        columns=joints,
+        finger_columns=fingers,
+    )

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
@@ -18,12 +18,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.action_space import ARMS
-from robospa.geometry import Pose
+from robospa.geometry import Pose, Vec3
 from robospa.harness.robots.embodiment import Embodiment
-from robospa.harness.sim.abreast import FAR, MOST, Abreast, CameraView, add_copies, rows, visibility
-from robospa.harness.sim.cameras import new_camera, pixels
-from robospa.harness.sim.drawn_room import DrawnRoom
-from robospa.harness.sim.in_frame import View, in_frame
+from robospa.harness.sim.cameras import (
+    FAR,
+    MOST,
+    CameraView,
+    TiledRenderer,
+    add_copies,
+    new_camera,
+    pixels,
+    rows,
+    visibility,
+)
+from robospa.harness.sim.furniture import DrawnFurniture
 from robospa.harness.world import RenderUnavailable
 from robospa.observation import CameraSpec
 from robospa.tasks.scene import Scene
@@ -33,6 +41,42 @@ if TYPE_CHECKING:
     import sapien
 
     from robospa.harness.packs.robot_skins import RobotSkins
+
+SHADOW = 1.6
+"""How far shadows fall beside a thing on the table, by its height: the further lamp's slope."""
+
+
+@dataclass(frozen=True)
+class Frustum:
+    """A camera's pose (x forward, y left), and tangents of half its view across and upright."""
+
+    pose: Pose
+    across: float
+    upright: float
+
+    @staticmethod
+    def of(pose: Pose, fov: float, width: int, height: int) -> Frustum:
+        """The view of a camera with this vertical field of view [rad] and picture size [px]."""
+        upright = math.tan(fov / 2)
+        return Frustum(pose, upright * width / height, upright)
+
+    def may_show(self, point: Vec3, radius: float) -> bool:
+        """Whether a ball around `point` [m, world] reaches into the picture; never wrongly no."""
+        ahead, left, up = self.pose.inverse().apply(point)
+        return (
+            ahead > -radius
+            and abs(left) - self.across * ahead <= radius * math.hypot(1.0, self.across)
+            and abs(up) - self.upright * ahead <= radius * math.hypot(1.0, self.upright)
+        )
+
+
+def in_frame(views: Sequence[Frustum], model: ObjectModel, pose: Pose) -> bool:
+    """Whether one of the views may show the model at `pose`, or its shadow."""
+    height = model.size[2]
+    reach = math.hypot(model.radius, height) + SHADOW * height
+    middle = pose.apply((0.0, 0.0, model.bottom))
+    return any(view.may_show(middle, reach) for view in views)
+
 
 Links = Sequence[Mapping[str, Pose]]
 """World pose of every link of the left and of the right arm."""
@@ -77,8 +121,8 @@ class Renderer:
         self._loaded: Scene | None = None
         self._embodiment: Embodiment | None = None
         self._stand: sapien.Entity | None = None
-        self._room = DrawnRoom(self._scene, self._copies)
-        self._abreast = Abreast(self._scene)
+        self._room = DrawnFurniture(self._scene, self._copies)
+        self._abreast = TiledRenderer(self._scene)
         self._grew = False
 
     def _draw(
@@ -200,7 +244,7 @@ class Renderer:
         if not clutter:
             return
         seen = [
-            View.of(view.pose, view.fov, camera.width, camera.height)
+            Frustum.of(view.pose, view.fov, camera.width, camera.height)
             for view, camera in zip(views, cameras, strict=True)
         ]
         for item in clutter:

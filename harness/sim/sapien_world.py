@@ -20,7 +20,6 @@ from robospa.geometry import Pose
 from robospa.harness.action_decoder import ActionDecoder
 from robospa.harness.robots import embodiment as embodiment_named
 from robospa.harness.sim.bodies import DENSITY
-from robospa.harness.sim.drives import Drives
 from robospa.harness.sim.lazy_snapshot import LazySnapshot, Pair, PoseTable, StateLayout, unpack
 from robospa.harness.sim.motion import (
     ACTION_LIMITS,
@@ -30,8 +29,7 @@ from robospa.harness.sim.motion import (
     fixed_rate,
     rest_to_rest,
 )
-from robospa.harness.sim.physics import Physics
-from robospa.harness.sim.settling import settle
+from robospa.harness.sim.physics import Drives, Physics, settle
 from robospa.harness.world import (
     FROM_MEASURED,
     ROBOT_ASSETS,
@@ -287,19 +285,19 @@ class SapienWorld:
         """One RGB image (height, width, 3); RenderUnavailable where nothing can be drawn."""
         return self.still().render(camera)
 
-    def still(self) -> SapienStill:
+    def still(self) -> SapienState:
         """This instant, to be drawn while its scene is loaded."""
         physics = self._loaded()
         hinges = tuple(physics.hinges().items())
         lights = self._scene.surroundings.lights
         # Only flickering lights know the time: elsewhere two instants at rest look the same.
         rows, step = physics.rows, self._steps if lights.flicker is not None else 0
-        return SapienStill(physics.packed(), rows, hinges, step, self, self._scene)
+        return SapienState(physics.packed(), rows, hinges, step, self, self._scene)
 
     def _pictures(self, cameras: Sequence[CameraSpec]) -> list[NDArray[np.uint8]]:
         return self.draw(self.still(), cameras) if cameras else []
 
-    def draw(self, still: SapienStill, cameras: Sequence[CameraSpec]) -> list[NDArray[np.uint8]]:
+    def draw(self, still: SapienState, cameras: Sequence[CameraSpec]) -> list[NDArray[np.uint8]]:
         """Images of a still of the loaded scene; RuntimeError for that of another one."""
         physics = self._loaded()
         if still.scene is not self._scene:
@@ -373,9 +371,9 @@ class SapienWorld:
 
 
 @dataclass(frozen=True)
-class SapienStill:
-    """A `robospa.harness.world.Still`: packed poses of all bodies, the rows of objects and, where
-    lights flicker, the physics step."""
+class SapienState:
+    """A `RenderableState`: packed poses of all bodies, the rows of objects and,
+    where lights flicker, the physics step."""
 
     packed: bytes
     rows: Mapping[str, int]

@@ -57,10 +57,10 @@ class DrawnBody:
 
 def drawn_bodies(scene: Scene, robot: Embodiment) -> list[DrawnBody]:
     """Everything that is seen of `scene`: table, robot, objects with their doors and lids."""
-    from robospa.harness.sim import room
+    from robospa.harness.sim import furniture
     from robospa.workcell import WORKCELL
 
-    found = [DrawnBody(TABLE, meshes(room.table(WORKCELL.table)), Pose(scene.table_at))]
+    found = [DrawnBody(TABLE, meshes(furniture.table(WORKCELL.table)), Pose(scene.table_at))]
     found.append(DrawnBody(STAND, meshes(robot.body), Pose()))
     for side, arm in zip(ARMS, robot.arms, strict=True):
         found += [DrawnBody(f"{side} {link}", meshes(arm.shapes[link])) for link in arm.links]
@@ -106,7 +106,7 @@ def _merged(shapes: Sequence[Shape], color: Color) -> Mesh:
 
 def _skinned(skin: Skin) -> Mesh:
     """The mesh in the file of `skin`, with its picture's colours at its vertices."""
-    from robospa.harness.sim.skins import tinted
+    from robospa.harness.sim.render_bodies import tinted
 
     with np.load(skin.file, allow_pickle=False) as file:
         vertices, faces, uvs = file["vertices"], file["triangles"], file["uvs"]

@@ -10,7 +10,7 @@ import pytest
 from robospa.geometry import Pose, axis_rotation
 from robospa.harness.robots import embodiment
 from robospa.harness.robots.fixed_order import (
-    Frame,
+    FixedPose,
     end_frame,
     fixed_chain,
     frame_of,
@@ -61,7 +61,7 @@ def test_refining_reaches_the_goal() -> None:
 
 
 def test_refining_stays_within_the_limits() -> None:
-    far = Frame(((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), (5.0, 5.0, 5.0))
+    far = FixedPose(((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), (5.0, 5.0, 5.0))
     for joints in POSTURES[:20].tolist():
         found = refined(FIXED, joints, far, 5)
         assert all(

@@ -8,7 +8,7 @@ import pytest
 from robospa.geometry import Pose, look_rotation
 from robospa.harness.sim.bodies import to_sapien
 from robospa.harness.sim.cameras import new_camera, pixels
-from robospa.harness.sim.drawn_room import SHADOW_CENTRE, SHADOW_HALF, SUN_DIRECTION, DrawnRoom
+from robospa.harness.sim.furniture import SHADOW_CENTRE, SHADOW_HALF, SUN_DIRECTION, DrawnFurniture
 from robospa.harness.sim.render_bodies import render_body
 from robospa.harness.sim.renderer import open_render_system
 from robospa.harness.world import RenderUnavailable
@@ -30,7 +30,7 @@ def test_pictures_are_bytes_with_sky_outside_the_room_and_shadows_of_sun_and_lam
         scene = sapien.Scene([open_render_system()])
     except RenderUnavailable as error:
         pytest.fail(f"nothing can be drawn here, see `robospa doctor`: {error}")
-    room = DrawnRoom(scene)
+    room = DrawnFurniture(scene)
     camera = new_camera(scene, 32, 24)
 
     def taken(pose: Pose) -> np.ndarray:

@@ -7,11 +7,11 @@ import math
 import numpy as np
 
 from robospa.geometry import Pose, yaw_rotation
-from robospa.harness.sim.in_frame import View, in_frame
+from robospa.harness.sim.renderer import Frustum, in_frame
 from robospa.tasks.objects import object_model
 from robospa.workcell import HEIGHT, WIDTH, WORKCELL
 
-HEAD = View.of(WORKCELL.head.pose, WORKCELL.head.fov, WIDTH, HEIGHT)
+HEAD = Frustum.of(WORKCELL.head.pose, WORKCELL.head.fov, WIDTH, HEIGHT)
 
 
 def test_nothing_that_the_head_camera_sees_is_left_out() -> None:
@@ -31,7 +31,7 @@ def test_a_thing_behind_the_camera_is_not_drawn_and_one_before_it_is() -> None:
     x, y, z = WORKCELL.head.position
     assert in_frame([HEAD], model, Pose((0.0, 0.0, 0.74)))
     assert not in_frame([HEAD], model, Pose((x, y - 1.0, z)))
-    turned = View.of(Pose((0.0, 0.0, 1.0), yaw_rotation(math.pi / 2)), 0.6, 320, 240)
+    turned = Frustum.of(Pose((0.0, 0.0, 1.0), yaw_rotation(math.pi / 2)), 0.6, 320, 240)
     assert in_frame([turned], model, Pose((0.0, 2.0, 1.0)))
     assert not in_frame([turned], model, Pose((2.0, 0.0, 1.0)))
     assert in_frame([HEAD, turned], model, Pose((0.0, 2.0, 1.0)))

@@ -1,6 +1,6 @@
-"""The room as it is drawn: table, wall, floor and lights, plain or as a scene has them.
+"""Table, wall and floor: as data, and drawn with the lights, plain or as a scene has them.
 
-Wall and table top have a second, textured look each, made once; a new scene uploads its image into
+Wall and table top have a second, textured form each, made once; a new scene uploads its image into
 it. Nothing here holds state of a trial: `dress` sets all that a scene can change.
 """
 
@@ -14,14 +14,50 @@ from numpy.typing import NDArray
 
 from robospa.geometry import Pose, look_rotation
 from robospa.harness import textures
-from robospa.harness.sim import room
-from robospa.harness.sim.abreast import add_copies
+from robospa.harness.sim.cameras import add_copies
+from robospa.tasks.colors import TABLE_COLOR
 from robospa.tasks.scene import Lights, Surroundings, Texture
-from robospa.tasks.shapes import Shape
-from robospa.workcell import WORKCELL
+from robospa.tasks.shapes import Box, Color, Shape
+from robospa.workcell import WORKCELL, TableGeometry
 
 if TYPE_CHECKING:
     import sapien
+
+LEGS: Color = (0.86, 0.86, 0.85)
+WALL: Color = (1.0, 0.9, 0.9)
+FLOOR: Color = (0.42, 0.42, 0.44)
+
+LEG = 0.05
+"""Side of the square legs, and how far they stand in from the edge [m]."""
+
+
+def table(dimensions: TableGeometry) -> tuple[Shape, ...]:
+    """Top and four legs; the frame's origin is on the floor below the table's centre."""
+    width, depth = dimensions.size
+    under = dimensions.top - dimensions.thickness
+    top = Shape(
+        Box((width / 2, depth / 2, dimensions.thickness / 2)),
+        Pose((0.0, 0.0, dimensions.top - dimensions.thickness / 2)),
+        TABLE_COLOR,
+    )
+    x, y = width / 2 - LEG - LEG / 2, depth / 2 - LEG - LEG / 2
+    legs = tuple(
+        Shape(Box((LEG / 2, LEG / 2, under / 2)), Pose((a * x, b * y, under / 2)), LEGS)
+        for a in (-1, 1)
+        for b in (-1, 1)
+    )
+    return (top, *legs)
+
+
+def wall() -> tuple[Shape, ...]:
+    """Behind the table, its front at y = 0.4."""
+    return (Shape(Box((3.0, 0.6, 1.5)), Pose((0.0, 1.0, 1.5)), WALL),)
+
+
+def floor() -> tuple[Shape, ...]:
+    """A slab below z = 0, only drawn."""
+    return (Shape(Box((4.0, 4.0, 0.01)), Pose((0.0, 0.0, -0.01)), FLOOR, collision=False),)
+
 
 AMBIENT = 0.5
 SUN_DIRECTION = (0.0, 0.5, -1.0)
@@ -65,8 +101,7 @@ class Surface:
             self._shown = wanted
 
     def _with(self, image: NDArray[np.uint8]) -> sapien.Entity:
-        from robospa.harness.sim.render_bodies import textured_body
-        from robospa.harness.sim.skins import image_texture
+        from robospa.harness.sim.render_bodies import image_texture, textured_body
 
         pixels = np.dstack([image, np.full(image.shape[:2], 255, np.uint8)])
         if self._image is None:
@@ -90,7 +125,7 @@ class Surface:
                 entity.pose = to_sapien(pose)
 
 
-class DrawnRoom:
+class DrawnFurniture:
     """Table, wall, floor and lights of a drawn scene.
 
     ValueError if the user's folder of textures is not as it should be.
@@ -101,9 +136,9 @@ class DrawnRoom:
 
         self.textures = textures.source()
         self._scene = scene
-        self._wall = Surface(scene, room.wall(), "wall", copies)
-        self._table = Surface(scene, room.table(WORKCELL.table), "table", copies)
-        self._floor = Surface(scene, room.floor(), "floor", copies)
+        self._wall = Surface(scene, wall(), "wall", copies)
+        self._table = Surface(scene, table(WORKCELL.table), "table", copies)
+        self._floor = Surface(scene, floor(), "floor", copies)
         usual = Lights()
         self._sun = scene.add_directional_light(
             SUN_DIRECTION,

@@ -1,13 +1,16 @@
-"""Pieces of which links are made: what collides and is not drawn, and what is drawn alone."""
+"""Of what robots are made: shapes of links, joints as descriptions write them, fixed cameras."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from robospa.geometry import Pose, Vec3, axis_rotation, look_rotation
+from robospa.geometry import Pose, Quat, Vec3, axis_rotation, look_rotation, multiply, yaw_rotation
+from robospa.harness.robots.embodiment import Joint
 from robospa.tasks.objects.meshes import lathe
 from robospa.tasks.shapes import Box, Color, Cylinder, Mesh, Shape
+from robospa.workcell import WORKCELL, FixedCamera
 
 ALONG_Y = axis_rotation((1, 0, 0), math.pi / 2)
 ALONG_X = axis_rotation((0, 1, 0), math.pi / 2)
@@ -118,3 +121,55 @@ def _along(start: Vec3, end: Vec3) -> tuple[Pose, float]:
 def block(pose: Pose, half: Vec3) -> Shape:
     """A box anywhere in the link that collides and is not drawn."""
     return Shape(Box(half), pose, visual=False)
+
+
+Row = tuple[str, Vec3, Vec3, Vec3, tuple[float, float]]
+"""Name, origin xyz [m] and rpy [rad] in the link before, axis, lower and upper limit [rad]."""
+
+
+def rpy_rotation(roll: float, pitch: float, yaw: float) -> Quat:
+    """The rotation by `roll` about x, then `pitch` about y, then `yaw` about z, all fixed [rad]."""
+    about_y = axis_rotation((0, 1, 0), pitch)
+    return multiply(yaw_rotation(yaw), multiply(about_y, axis_rotation((1, 0, 0), roll)))
+
+
+def serial_chain(
+    rows: Sequence[Row],
+    tool: Quat,
+    fingers: Sequence[tuple[str, Vec3, float]],
+    limits: tuple[float, float],
+    shapes: Sequence[tuple[Shape, ...]],
+) -> tuple[tuple[Joint, ...], tuple[Joint, ...], dict[str, tuple[Shape, ...]]]:
+    """Joints, fingers and shapes of an arm whose links are link0, the base, to link6 or link7.
+
+    `fingers` are name, origin [m] in the last link and side: they slide away from the middle, by
+    `limits` [m], and their frames are turned like the end-effector frame, `tool` in the last link:
+    x approaches; a finger of side 1.0 slides along y, one of -1.0 against it.
+    """
+    joints = tuple(
+        Joint(name, f"link{i}", f"link{i + 1}", Pose(xyz, rpy_rotation(*rpy)), axis, low, high)
+        for i, (name, xyz, rpy, axis, (low, high)) in enumerate(rows)
+    )
+    sliding = tuple(
+        Joint(
+            name,
+            joints[-1].child,
+            f"finger{i}",
+            Pose(origin, tool),
+            (0.0, math.copysign(1.0, side), 0.0),
+            *limits,
+            "prismatic",
+        )
+        for i, (name, origin, side) in enumerate(fingers, 1)
+    )
+    names = (joints[0].parent, *(joint.child for joint in (*joints, *sliding)))
+    return joints, sliding, dict(zip(names, shapes, strict=True))
+
+
+FRONT = FixedCamera((0.0, -0.45, 0.85), (0, 1, -0.1), (-1, 0, 0), math.radians(37))
+"""Low above the table's near edge; officially only a robot with both arms in one model has it."""
+THIRD = FixedCamera((0.0, 0.23, 1.33), (0, -1, -1.02), (1, 0, 0), math.radians(93))
+"""Looks back at the robot, for films: no camera of the official benchmark."""
+
+SINGLE_ARM_CAMERAS: Mapping[str, FixedCamera] = {"head": WORKCELL.head, "third": THIRD}
+"""Of a robot made of two single arms."""
