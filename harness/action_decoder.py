@@ -32,7 +32,7 @@ from robospa.harness.robots.fixed_order import (
     refined,
 )
 from robospa.harness.robots.kinematics import Chain, chain_of, inverse
-from robospa.harness.world import JOINTS_OF_EE, ActionError, ActionProblem
+from robospa.harness.world import JOINTS_FROM_EE, ActionError, ActionProblem
 from robospa.results.records.action_problems import CLIPPED_GRIPPERS, CLIPPED_JOINTS, UNREACHABLE
 
 Array = NDArray[np.float64]
@@ -67,7 +67,7 @@ class ActionDecoder:
         self._fixed = tuple(fixed_chain(chain) for chain in self.chains)
         self._spaces = {kind: embodiment.action_space(kind) for kind in KINDS}
         # The arm with fewer joints has zeros in the columns that it lacks: limits 0 give 0.
-        joints = self._spaces[JOINTS_OF_EE] = self._spaces["joint"]
+        joints = self._spaces[JOINTS_FROM_EE] = self._spaces["joint"]
         self._columns = np.zeros((2, max(joints.joints)), dtype=int)
         self._lower, self._upper = np.zeros((2, *self._columns.shape))
         self._real = np.zeros(self._columns.shape, dtype=bool)
@@ -123,7 +123,7 @@ class ActionDecoder:
         values, space = self.check(action, kind)
         gripper = np.clip(values[space.grippers], 0.0, 1.0)
         problems = self._clipped_grippers(values, space)
-        if kind in ("joint", JOINTS_OF_EE):
+        if kind in ("joint", JOINTS_FROM_EE):
             asked = np.where(self._real, values[self._columns], 0.0)
             joints = np.clip(asked, self._lower, self._upper)
             problems = self._clipped_joints(asked, joints, space) + problems

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from robospa.harness.running.action_files import read_actions, read_joints
 from robospa.harness.trial import Recorder, TrialParts, run_trial, task_parts
-from robospa.harness.world import JOINTS_OF_EE, ActionError, Poll, StepResult, World
+from robospa.harness.world import JOINTS_FROM_EE, ActionError, Poll, StepResult, World
 from robospa.observation import Observation
 from robospa.protocol.errors import PolicyAnswerError
 from robospa.protocol.policy import PolicySpec, TrialInfo
@@ -74,7 +74,7 @@ class _Following:
         recorded = next(self._joints, None)
         if recorded is None:
             raise ActionError("the recorded joint actions end here")
-        kind = JOINTS_OF_EE if space == "ee" else "joint"
+        kind = JOINTS_FROM_EE if space == "ee" else "joint"
         return replace(self._world.step(recorded, kind, poll), joints=recorded)
 
 

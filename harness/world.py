@@ -58,10 +58,10 @@ class StepResult:
     joints: NDArray[np.float32] | None = None
 
 
-JOINTS_OF_EE = "joint_of_ee"
+JOINTS_FROM_EE = "joint_of_ee"
 """Joint actions that were executed in the place of `ee` actions, to be played again: like those,
 and unlike a policy's joint actions, they begin where the arms are, not where they should be."""
-FROM_MEASURED = ("ee", JOINTS_OF_EE)
+FROM_MEASURED = ("ee", JOINTS_FROM_EE)
 """Actions that begin where the arms are."""
 
 
@@ -99,7 +99,7 @@ class World(Protocol):
 
     def step(self, action: NDArray[np.float32], space: str, poll: Poll) -> StepResult:
         """Execute one policy action of `space` "joint", "ee" or "delta_ee", or when a trial is
-        played again JOINTS_OF_EE; raises ActionError.
+        played again JOINTS_FROM_EE; raises ActionError.
 
         `poll` is called whenever simulated time passes a multiple of 1/50 s. After a refused
         action (ActionError) nothing has moved.
