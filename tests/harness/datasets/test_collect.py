@@ -6,28 +6,43 @@ import contextlib
 import json
 import os
 import random
+import re
 import shutil
 import signal
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from collect_fakes import FakePool, contents, fake_pack, order
 
+import robospa
+from robospa.harness.datasets import api
 from robospa.harness.datasets import collect as module
-from robospa.harness.datasets.collect import EPISODES, EpisodeStore, Order, collect
-from robospa.harness.datasets.settings import Collection, command_of, expected_bytes
+from robospa.harness.datasets.collect import EPISODES, CollectionResult, EpisodeStore, Order
+from robospa.harness.datasets.settings import (
+    Collection,
+    command_of,
+    expected_bytes,
+    lists_of,
+    trial_of,
+)
 from robospa.harness.running.atomic_file import StorageError
 from robospa.harness.running.run_lock import run_lock
 from robospa.harness.seeds.attempt import Attempt
-from robospa.harness.settings import SettingsError
+from robospa.harness.settings import Compute, SettingsError
+from robospa.leaderboard.reproduce import FIRST as FIRST_HIDDEN
 from robospa.results.records.manifest import RunError
-from robospa.tasks.seeds import ListKey
+from robospa.tasks.seeds import FIRST_TRAINING_SEED, LAST_TRAINING_SEED, ListKey
 
 KILLS = 30
 FIRST = ListKey("Pick_Blocks_Size", 1)
+ROOT = Path(__file__).resolve().parents[3]
+TRAINING = range(FIRST_TRAINING_SEED, LAST_TRAINING_SEED + 1)
 
 
 @pytest.fixture(autouse=True)
@@ -39,11 +54,10 @@ def _without_formats(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "read_record", read_record)
 
 
-def quiet(line: str) -> None: ...
-
-
-def run(wanted: Order, resume: bool = False, keep: bool = False) -> module.CollectionResult | None:
-    return collect(wanted, FakePool, resume=resume, keep_episodes=keep, say=quiet)
+def run(wanted: Order, resume: bool = False, keep: bool = False) -> CollectionResult | None:
+    return module.collect(
+        wanted, FakePool, resume=resume, keep_episodes=keep, say=lambda line: None
+    )
 
 
 def test_the_first_good_seeds_are_kept_and_the_others_named(tmp_path: Path) -> None:
@@ -58,12 +72,7 @@ def test_the_first_good_seeds_are_kept_and_the_others_named(tmp_path: Path) -> N
     assert made["settings"]["images"] == "h264" and made["settings"]["format"] == "lerobot-v3"
 
 
-def test_nothing_stays_beside_the_data_set(tmp_path: Path) -> None:
-    run(order(tmp_path))
-    assert set(contents(tmp_path)) == {"all.txt", "robospa.json"}
-
-
-def test_several_robots_have_a_data_set_each(tmp_path: Path) -> None:
+def test_several_robots_have_a_data_set_each_and_nothing_stays_beside(tmp_path: Path) -> None:
     run(order(tmp_path, embodiment="aloha-agilex,piper", mode="clean,randomized"))
     assert set(contents(tmp_path)) == {
         f"{robot}/{name}" for robot in ("aloha-agilex", "piper") for name in
@@ -79,7 +88,7 @@ def test_kills_at_any_moment_change_nothing(tmp_path: Path) -> None:
     began = time.perf_counter()
     run(order(whole, tasks=FIRST.task))
     lasts = time.perf_counter() - began
-    rng, finished = random.Random(1), 0
+    rng = random.Random(1)
     for _ in range(KILLS):
         child = os.fork()
         if not child:
@@ -93,15 +102,13 @@ def test_kills_at_any_moment_change_nothing(tmp_path: Path) -> None:
             run(order(out, tasks=FIRST.task), resume=True)
             assert contents(out) == contents(whole)
             shutil.rmtree(out)
-            finished += 1
     run(order(out, tasks=FIRST.task), resume=True)
     assert contents(out) == contents(whole)
-    assert finished < KILLS
 
 
 def test_neither_the_number_of_workers_nor_their_order_matters(tmp_path: Path) -> None:
     run(order(tmp_path / "a"))
-    collect(order(tmp_path / "b"), lambda episodes: FakePool(episodes, 7), say=quiet)
+    module.collect(order(tmp_path / "b"), lambda n: FakePool(n, 7), say=lambda line: None)
     assert contents(tmp_path / "a") == contents(tmp_path / "b")
 
 
@@ -116,7 +123,9 @@ def test_what_is_there_is_not_made_again(tmp_path: Path) -> None:
         pools.append(FakePool(episodes))
         return pools[0]
 
-    collect(order(tmp_path / "b"), open_pool, resume=True, keep_episodes=True, say=quiet)
+    module.collect(
+        order(tmp_path / "b"), open_pool, resume=True, keep_episodes=True, say=lambda line: None
+    )
     assert pools[0].made == [1_000_002]
     assert contents(tmp_path / "a") == contents(tmp_path / "b")
 
@@ -128,21 +137,11 @@ def test_a_variant_that_the_expert_does_not_solve_is_named(
     result = run(order(tmp_path, tasks="Pick_Blocks_Size"))
     assert result is not None and result.episodes == 0
     (line,) = result.missing
-    assert line == (
-        "Pick_Blocks_Size level 1: 0 of 3 episodes; 21 seeds gave none, such as: "
-        "ZeroDivisionError: division by zero"
-    )
+    assert line.startswith("Pick_Blocks_Size level 1: 0 of 3 episodes; 21 seeds")
+    assert "ZeroDivisionError" in line
 
 
 def test_no_episode_stays_in_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    kept: list[Attempt] = []
-    add = EpisodeStore.add
-
-    def watched(store: EpisodeStore, key: ListKey, made: module.EpisodeAttempt) -> Attempt:
-        kept.append(add(store, key, made))
-        return kept[-1]
-
-    monkeypatch.setattr(EpisodeStore, "add", watched)
     searches: list[module.Search] = []
     sweep = module.sweep
     monkeypatch.setattr(
@@ -151,102 +150,98 @@ def test_no_episode_stays_in_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPa
         lambda submit, n, some, note: (searches.extend(some), sweep(submit, n, some, note))[1],
     )
     run(order(tmp_path))
-    assert kept and all(type(item) is Attempt for item in kept)
-    assert {id(a) for s in searches for a in s.attempts.values()} == {id(a) for a in kept}
+    kept = [attempt for search in searches for attempt in search.attempts.values()]
+    assert len(kept) > 6 and {type(attempt) for attempt in kept} == {Attempt}
 
 
-def refusal(wanted: Order, resume: bool = False) -> str:
-    with pytest.raises((SettingsError, RunError)) as error:
+def refused(wanted: Order, match: str, resume: bool = False) -> None:
+    with pytest.raises((SettingsError, RunError), match=match) as error:
         run(wanted, resume)
     assert "\n" not in str(error.value)
-    return str(error.value)
 
 
 def test_a_finished_data_set_is_not_written_again(tmp_path: Path) -> None:
     run(order(tmp_path))
     before = contents(tmp_path)
-    assert "has a data set already; choose another --out" in refusal(order(tmp_path))
-    assert "is of other settings" in refusal(order(tmp_path, episodes=4), resume=True)
+    refused(order(tmp_path), "already")
+    refused(order(tmp_path, episodes=4), "other settings", resume=True)
     assert run(order(tmp_path), resume=True) is None
     assert {k: v for k, v in contents(tmp_path).items() if k != ".lock"} == before
 
 
 def test_one_that_is_not_finished_wants_resume_and_the_same_settings(tmp_path: Path) -> None:
     EpisodeStore(tmp_path / EPISODES).begin(order(tmp_path).facts)
-    assert "add --resume" in refusal(order(tmp_path))
-    text = refusal(order(tmp_path, episodes=4, images="png"), resume=True)
-    assert "episodes was 3 and is 4; images was 'h264' and is 'png'" in text
+    refused(order(tmp_path), "--resume")
+    text = "episodes was 3 and is 4; images was 'h264' and is 'png'"
+    refused(order(tmp_path, episodes=4, images="png"), text, resume=True)
     other = Order(Collection(), "lerobot-v3", tmp_path, "", {"suite": "other"})
-    assert "suite was 's' and is 'other'" in refusal(other, resume=True)
+    refused(other, "suite was 's'", resume=True)
     (tmp_path / EPISODES / "settings.json").write_text("[]")
-    assert "cannot be read" in refusal(order(tmp_path), resume=True)
+    refused(order(tmp_path), "cannot be read", resume=True)
 
 
-def test_a_folder_with_other_files_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "thesis.tex").touch()
-    assert "has other files, such as thesis.tex" in refusal(order(tmp_path))
-    assert sorted(p.name for p in tmp_path.iterdir()) == [".lock", "thesis.tex"]
-
-
-def test_two_collections_do_not_share_a_folder(tmp_path: Path) -> None:
-    with run_lock(tmp_path):
-        assert "another process" in refusal(order(tmp_path), resume=True)
-
-
-def test_a_folder_that_cannot_be_made_is_one_sentence(tmp_path: Path) -> None:
-    (tmp_path / "file").touch()
-    assert "cannot write" in refusal(order(tmp_path / "file/out"))
+def test_folders_that_cannot_be_used_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "a").mkdir()
+    (tmp_path / "a/thesis.tex").touch()
+    refused(order(tmp_path / "a"), "thesis.tex")
+    assert sorted(p.name for p in (tmp_path / "a").iterdir()) == [".lock", "thesis.tex"]
+    with run_lock(tmp_path / "b"):
+        refused(order(tmp_path / "b"), "another process", resume=True)
+    refused(order(tmp_path / "a/thesis.tex/out"), "cannot write")
+    monkeypatch.setattr(shutil, "disk_usage", lambda path: SimpleNamespace(free=1000))
+    refused(order(tmp_path / "c"), "1 kB are free: make room")
 
 
 def test_a_full_disk_is_one_sentence_and_nothing_is_lost(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     run(order(tmp_path / "a"))
-    synced = os.fsync
+    with monkeypatch.context() as patch:
+        synced = os.fsync
 
-    def full(handle: int) -> None:
-        if len(list((tmp_path / "b").rglob("*.zip"))) == 4:
-            raise OSError(28, "No space left on device")
-        synced(handle)
+        def full(handle: int) -> None:
+            if len(list((tmp_path / "b").rglob("*.zip"))) == 4:
+                raise OSError(28, "No space left on device")
+            synced(handle)
 
-    monkeypatch.setattr(os, "fsync", full)
-    with pytest.raises(StorageError, match=r"No space left on device \(.* free in .*make room"):
-        run(order(tmp_path / "b"))
-    monkeypatch.undo()
-    _without_formats.__wrapped__(monkeypatch)  # type: ignore[attr-defined]
+        patch.setattr(os, "fsync", full)
+        with pytest.raises(StorageError, match=r"No space left on device \(.* free in .*make room"):
+            run(order(tmp_path / "b"))
     run(order(tmp_path / "b"), resume=True)
     assert contents(tmp_path / "a") == contents(tmp_path / "b")
 
 
-def test_the_room_that_it_takes_is_said_and_compared_with_what_is_free(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_space_that_it_takes_is_said(tmp_path: Path) -> None:
     lines: list[str] = []
-    collect(order(tmp_path / "a"), FakePool, say=lines.append)
+    module.collect(order(tmp_path / "a"), FakePool, say=lines.append)
     assert lines[0].startswith("6 episodes of 2 variants: about ")
-    assert "twice that while it is packed" in lines[0]
-    monkeypatch.setattr(shutil, "disk_usage", lambda path: SimpleNamespace(free=1000))
-    text = refusal(order(tmp_path / "b"))
-    assert "are needed" in text and "1 kB are free: make room" in text
+    few, many = (
+        expected_bytes(Collection(episodes=10, frames=frames), [FIRST], "h264")
+        for frames in ("keyframes", "stride")
+    )
+    assert few < many / 2
 
 
-def test_impossible_settings_are_one_sentence(tmp_path: Path) -> None:
-    unknown = replace(order(tmp_path), layout="lerobot")
-    assert "no format 'lerobot'; did you mean lerobot-v3? known are" in refusal(unknown)
-    assert "no camera 'top'" in refusal(order(tmp_path, cameras="head,top"))
-    assert "frames 'all' is not one of" in refusal_of(frames="all")
-    assert "shows nothing of noise" in refusal_of(frames="keyframes", noise=0.1)
-    blind = replace(order(tmp_path, cameras="none"), layout="robotwin-hdf5")
-    assert "robotwin-hdf5 is a format of pictures: name cameras" in refusal(blind)
-    assert "images 'gif' is not one of" in refusal_of(images="gif")
-    assert "more than all" in refusal_of(noise=0.6, mistakes=0.6)
-    assert "must be" in refusal_of(episodes=0)
-
-
-def refusal_of(**changes: object) -> str:
-    with pytest.raises(SettingsError) as error:
-        Collection(**changes)  # type: ignore[arg-type]
-    return str(error.value)
+@pytest.mark.parametrize(
+    ("layout", "changes", "match"),
+    [
+        ("lerobot", {}, "did you mean lerobot-v3"),
+        ("lerobot-v3", {"cameras": "head,top"}, "no camera 'top'"),
+        ("robotwin-hdf5", {"cameras": "none"}, "name cameras"),
+        ("lerobot-v3", {"frames": "all"}, "frames 'all'"),
+        ("lerobot-v3", {"frames": "keyframes", "noise": 0.1}, "nothing of noise"),
+        ("lerobot-v3", {"images": "gif"}, "images 'gif'"),
+        ("lerobot-v3", {"noise": 0.6, "mistakes": 0.6}, "more than all"),
+        ("lerobot-v3", {"episodes": 0}, "must be"),
+    ],
+)
+def test_impossible_settings_are_refused(
+    layout: str, changes: dict[str, object], match: str, tmp_path: Path
+) -> None:
+    with pytest.raises(SettingsError, match=match):
+        run(replace(order(tmp_path, **changes), layout=layout))
 
 
 def test_a_job_says_which_frames_and_pictures_are_kept(tmp_path: Path) -> None:
@@ -257,17 +252,67 @@ def test_a_job_says_which_frames_and_pictures_are_kept(tmp_path: Path) -> None:
     assert (job.cameras, job.keyframes, job.environment_state) == ((), True, True)
 
 
-def test_keyframes_take_less_room() -> None:
-    few, many = (
-        expected_bytes(Collection(episodes=10, frames=frames), [FIRST], "h264")
-        for frames in ("keyframes", "stride")
-    )
-    assert few < many / 2
-
-
 def test_the_command_of_a_data_set_is_what_would_be_typed() -> None:
     settings = Collection(tasks="GAC", episodes=3, cameras="none", environment_state=True)
     assert command_of(settings, "lerobot-v3") == (
         "robospa collect --tasks GAC --episodes 3 --cameras none --environment-state "
         "--format lerobot-v3 --out DIR"
     )
+
+
+@pytest.fixture
+def asked(monkeypatch: pytest.MonkeyPatch) -> list[Compute]:
+    """The machines that `robospa.collect` asks for; episodes are made in this process."""
+    found: list[Compute] = []
+
+    @contextmanager
+    def opener(compute: Compute, maker: str) -> Iterator[type[FakePool]]:
+        found.append(compute)
+        yield FakePool
+
+    monkeypatch.setattr(api, "pool_opener", opener)
+    monkeypatch.setattr(api, "versions", dict)
+    return found
+
+
+def test_lists_are_what_the_command_takes_as_text(tmp_path: Path, asked: list[Compute]) -> None:
+    tasks = ["Pick_Blocks_Size", "Press_Stapler_Repeat"]
+    made = robospa.collect(
+        tmp_path / "a", tasks=tasks, levels=[1, 2], episodes=1, workers=3, cameras=["head"]
+    )
+    assert made is not None and made.episodes == 4 and made.folders == (tmp_path / "a",)
+    assert asked == [Compute(workers=3)]
+
+
+@pytest.mark.parametrize(
+    ("given", "match"),
+    [
+        ({"episode": 3}, "did you mean episodes"),
+        ({"tasks": "Pick_Blocks_Siz"}, "did you mean Pick_Blocks_Size"),
+        ({"format": "lerobot"}, "no format 'lerobot'"),
+        ({"noise": 2.0}, "noise"),
+    ],
+)
+def test_what_cannot_be_is_refused(
+    given: dict[str, Any], match: str, tmp_path: Path, asked: list[Compute]
+) -> None:
+    with pytest.raises(SettingsError, match=match):
+        robospa.collect(tmp_path / "b", **given)
+    assert not (tmp_path / "b").exists()
+
+
+def test_no_evaluation_and_no_measurement_has_a_training_seed() -> None:
+    files = sorted((ROOT / "tasks/seeds").rglob("*.json"))
+    lists = [seeds for path in files for seeds in json.loads(path.read_text()).values()]
+    assert len(lists) >= 355 and TRAINING.stop <= FIRST_HIDDEN
+    assert all(TRAINING.stop <= min(seeds) or max(seeds) < TRAINING.start for seeds in lists)
+    for path in (*ROOT.glob("benchmarks/*.py"), *ROOT.glob("tools/*.py")):
+        starts = re.findall(r"(?:FIRST\w*|first|start).{0,40}?(\d[\d_]{4,})", path.read_text())
+        assert not [number for number in starts if int(number) in TRAINING], path.name
+
+
+def test_an_episode_is_a_training_trial_with_textures_of_training() -> None:
+    (key,) = lists_of(Collection("Pick_Blocks_Size", "2", embodiment="piper", mode="randomized"))
+    trial = trial_of(key, FIRST_TRAINING_SEED)
+    assert (trial.seed, trial.split, trial.mode) == (1_000_000, "train", "randomized-seen")
+    assert (trial.task, trial.level, trial.embodiment) == ("Pick_Blocks_Size", 2, "piper")

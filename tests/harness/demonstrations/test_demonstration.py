@@ -1,4 +1,4 @@
-"""Kinds of demonstrations: which a seed is of, where each is refused, and what it leads to."""
+"""Demonstrations of every kind: which a seed is of, where each is refused, what it leads to."""
 
 from __future__ import annotations
 
@@ -19,13 +19,17 @@ from robospa.harness.demonstrations.changed_plans import (
 from robospa.harness.demonstrations.demonstration import (
     DemonstrationWorld,
     ShownEpisode,
+    demonstrate,
     generator_of,
     kind_of,
     replay,
     show,
 )
 from robospa.harness.demonstrations.noise import EXPERT, MISTAKE, NOISE, RECOVERY
-from robospa.harness.demonstrations.recorder import FrameRecorder
+from robospa.harness.demonstrations.recorder import FrameRecorder, frame_steps
+from robospa.harness.replay import replay as play
+from robospa.harness.robots import embodiment
+from robospa.harness.sim.motion import DEMONSTRATION_LIMITS
 from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.results.failures.labels import label as failure_type
 from robospa.tasks.catalog import build_scene, task
@@ -184,3 +188,30 @@ def _homes() -> list[tuple[float, ...]]:
     from robospa.harness.robots import embodiment
 
     return [arm.home for arm in embodiment("aloha-agilex").arms]
+
+
+SHARE = 0.85
+"""Of the step limit that a demonstration may take."""
+
+
+@pytest.mark.sim
+@pytest.mark.parametrize(
+    "key",
+    [
+        TrialKey("Pick_Breads_Multi_View", 2, 950_001),
+        TrialKey("Lift_Pot_Repeat", 1, 950_001),
+        TrialKey("Press_Stapler_Repeat", 3, 950_001),
+    ],
+    ids=lambda key: key.task,
+)
+def test_a_replayed_demonstration_succeeds_within_the_step_limit(key: TrialKey) -> None:
+    recorder = FrameRecorder(frame_steps(key.task))
+    made = demonstrate(SapienWorld(render=False, limits=DEMONSTRATION_LIMITS), key, recorder)
+    assert made.success and not made.failures
+    space = embodiment(key.embodiment).action_space("joint")
+    actions = recorder.episode("x", made.instruction, {}, space, ()).actions
+    limit = task(key.task).levels[key.level].steps
+    done = play(SapienWorld(render=False), key, actions, "joint")
+    assert done.success and done.end == "success"
+    assert done.steps < len(actions) <= SHARE * limit  # it goes on where the replay has succeeded
+    assert np.array_equal(actions[-1], actions[-2])  # and comes to rest

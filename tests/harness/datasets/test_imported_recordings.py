@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from command_line import robospa
 
 from robospa.action_space import SIX_JOINT_ARMS, ActionSpace
-from robospa.harness.cli.main import main
 from robospa.harness.convention_check.episodes import Episode, read_episode, to_jpeg, write_episode
 from robospa.harness.datasets.imports import ABSENT, import_recordings
 from robospa.harness.datasets.manifest import DatasetError, file_hash, read_lines, read_record
@@ -161,31 +161,14 @@ def test_nothing_to_import_and_a_full_folder_are_refused(official: Path, tmp_pat
             import_recordings(find_recordings(official), official, layout, tmp_path / out)
 
 
-def test_the_command_makes_it_and_says_what_is_not_there(
-    official: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    out = str(tmp_path / "set")
-    with pytest.raises(SystemExit) as ended:
-        main(["collect", "--import", str(official), "--out", out, "--format", "robotwin-hdf5"])
-    said = capsys.readouterr()
-    assert ended.value.code == 0 and "3 official recordings; they do not have" in said.out
-    assert "1 recordings are left out: it is a recording of robospa" in said.err
-    with pytest.raises(SystemExit):
-        main(
-            [
-                "collect",
-                "--import",
-                str(official),
-                "--out",
-                f"{out}2",
-                "--json",
-                "--format",
-                "robotwin-hdf5",
-            ]
-        )
-    told = json.loads(capsys.readouterr().out)
+def test_the_command_makes_it_and_says_what_is_not_there(official: Path, tmp_path: Path) -> None:
+    out = tmp_path / "set"
+    words = ("collect", "--import", official, "--format", "robotwin-hdf5", "--out")
+    done = robospa(*words, out)
+    assert done.code == 0 and "3 official recordings" in done.out
+    assert "1 recordings are left out" in done.err
+    told = json.loads(robospa(*words, f"{out}2", "--json").out)
     assert told["episodes"] == 3 and sum(told["left_out"].values()) == 3
     assert told["absent"] == list(ABSENT)
-    with pytest.raises(SystemExit) as verified:
-        main(["collect", "--verify", out])
-    assert verified.value.code == 0 and "none was replayed" in capsys.readouterr().out
+    done = robospa("collect", "--verify", out)
+    assert done.code == 0 and "none was replayed" in done.out
