@@ -69,7 +69,7 @@ def rollouts(
             return
         except Exception as error:  # the machine's, not the server's
             reason = f"{type(error).__name__}: {error}"
-            yield CheckResult(name, None, f"could not be run here ({reason}); see robospa doctor")
+            yield CheckResult(name, None, f"could not be run here ({reason}); see robospa check")
             return
         records.append(record)
         yield _result(name, records, spec)

@@ -197,8 +197,8 @@ class Recording:
 
     video: str = option(
         "none",
-        "which trials to film: none, failures, first (of each task), all; films are made beside "
-        "the run and after it, and without a GPU may take ten times as long as their trials",
+        "which trials to film, beside the run and after it: none, failures, first (of each task), "
+        "all",
         VIDEO,
     )
     video_cameras: str = option("head", f"what films show side by side, of {', '.join(CAMERAS)}")

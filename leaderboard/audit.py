@@ -1,4 +1,4 @@
-"""What a maintainer looks at before believing numbers: `robospa audit`.
+"""What a maintainer looks at before believing numbers: `robospa report RUN --audit`.
 
 Each check gives one `Finding`, a sentence with its numbers. `suspicious` is no proof, and nothing
 suspicious is none either: an honest model may be near the expert it learned from, and a cheat may
@@ -8,15 +8,27 @@ add noise. Refuses nothing.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import islice
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.harness.trial import TrialParts, task_parts
+from robospa.harness.factory import load_function, open_policy
+from robospa.harness.running.action_files import ActionRecorder, read_actions, read_joints
+from robospa.harness.sim.sapien_world import SapienWorld
+from robospa.harness.trial import TrialParts, run_trial, task_parts
+from robospa.harness.trial_identity import policy_seed, trial_id
+from robospa.harness.world import World
 from robospa.leaderboard.agreement import Counts, agreement
-from robospa.results.records.run_io import Run, finished
+from robospa.leaderboard.rules import shipped
+from robospa.leaderboard.traces import Trace, joint_path, with_joints
+from robospa.leaderboard.verify import read_traces, verify
+from robospa.protocol.policy import Policy
+from robospa.results.records.run_io import Run, action_path, finished, read_run
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.scoring.retried import fault_rates
 from robospa.tasks.seeds import accepted
@@ -29,10 +41,10 @@ NEAR = 0.01
 that learned from demonstrations is some hundredths off, on scenes that it has never seen."""
 POINTS = 200
 """Places at which two paths are compared."""
+EXPERT = "robospa.baselines.oracle:create"
 STILL = 0.8
 """Share of the successes that may not remain when the sentences are another trial's."""
 
-Trace = NDArray[np.float32]
 Parts = Callable[[TrialKey], TrialParts]
 
 
@@ -43,6 +55,77 @@ class AuditFinding:
     check: str
     sentence: str
     suspicious: bool
+
+
+def audit(
+    path: Path,
+    reproduction: Path | None = None,
+    policy: str | None = None,
+    samples: int = 10,
+    token: str | None = None,
+) -> list[AuditFinding]:
+    """All findings on the run or the bundle at `path`; `reproduction` is the folder of the same
+    policy's run on hidden scenes, `policy` the URL of its server.
+
+    `samples` of its successful trials are held against the expert's, and the policy is asked for so
+    many with exchanged sentences.
+    """
+    run, traces = _read(path, samples)
+    findings = faults(run)
+    if reproduction is not None:
+        findings.append(hidden_gap(run, read_run(reproduction)))
+    if samples and not run.info.salt_sha256:
+        with closing(SapienWorld(render=False)) as world:
+            expert = partial(expert_actions, world, load_function(EXPERT)())
+            findings.append(expert_likeness(traces, expert))
+    if policy is not None and samples:
+        with closing(SapienWorld()) as world:
+            play = partial(rehearse, world, open_policy(policy, {"token": token}))
+            findings.append(sentence_reaction(play, _spread(list(run.keys), samples)))
+    return findings
+
+
+def _read(path: Path, count: int) -> tuple[Run, dict[TrialKey, Trace]]:
+    """The run, and the joint actions that `count` of its successful trials executed; trials whose
+    traces lack them are left out."""
+    bundle = verify(path, shipped(), practice=True) if path.is_file() else None
+    run = bundle.run if bundle else read_run(path)
+    good = [key for key in run.keys if key in run.records and run.records[key].success]
+    chosen = _spread(good, count)
+    if bundle:
+        traces = read_traces(bundle, chosen)
+        spaces = {key: bundle.settings.spec(key.task).action for key in chosen}
+    else:
+        files = {key: action_path(path, key) for key in chosen}
+        read = {key: read_actions(file) for key, file in files.items()}
+        spaces = {key: space for key, (_, space) in read.items()}
+        traces = {key: with_joints(read[key][0], read_joints(file)) for key, file in files.items()}
+    paths = {key: joint_path(traces[key], key.embodiment, spaces[key]) for key in chosen}
+    return run, {key: trace for key, trace in paths.items() if trace is not None}
+
+
+def _spread(keys: list[TrialKey], count: int) -> list[TrialKey]:
+    """`count` of `keys`, spread over the list."""
+    return keys[:: max(1, len(keys) // count)][:count] if count else []
+
+
+def expert_actions(world: World, expert: Policy, key: TrialKey) -> Trace:
+    """What the expert does in the scene of `key`, float32 (T, D)."""
+    recorder = ActionRecorder()
+    run_trial(world, expert, key, policy_seed=0, recorder=recorder)
+    return recorder.actions
+
+
+def rehearse(world: World, policy: Policy, key: TrialKey, setup: TrialParts) -> TrialRecord:
+    """The record of `key` with this scene, goal and instruction, which serve for one trial."""
+    return run_trial(
+        world,
+        policy,
+        key,
+        policy_seed=policy_seed(key),
+        trial_id=trial_id(key),
+        parts=lambda _: setup,
+    )
 
 
 def hidden_gap(public: Run, hidden: Run) -> AuditFinding:

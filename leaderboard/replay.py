@@ -141,7 +141,7 @@ def replay(
                 on_trial(trial)
         except WorkerDied:
             raise BundleError(
-                "the simulator does not run here, or crashed: `robospa doctor` says what is missing"
+                "the simulator does not run here, or crashed: `robospa check` says what is missing"
             ) from None
     trials = tuple(found[key] for key in keys)
     return Replay(trials, len(valid.keys), challenge.strip(), _changed(valid.run.manifest.about))

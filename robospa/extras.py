@@ -26,7 +26,6 @@ EXTRAS = {
     "pygame": "gym",
     "mani_skill": "maniskill",
     "wandb": "wandb",
-    "huggingface_hub": "hub",
     "viser": "view",
 }
 """Module -> the extra that brings it."""

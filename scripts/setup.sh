@@ -207,7 +207,7 @@ ensure_vulkan() {
         [ "$dry_run" = 0 ] || return 0
         vulkan_usable && return 0
     fi
-    say "going on without pictures: only physics will run. \`robospa doctor\` says what is missing."
+    say "going on without pictures: only physics will run. \`robospa check\` says what is missing."
 }
 
 main() {

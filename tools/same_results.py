@@ -171,8 +171,8 @@ def write_tables(folder: Path, run: Path) -> None:
     _robospa("report", str(run), "--with-published", "--out", str(tables / "published"))
     for name, words in {
         "compare.txt": ("compare", str(run), "pi0.5"),
-        "failures.txt": ("failures", str(run)),
-        "lint.txt": ("lint", str(run)),
+        "failures.txt": ("report", str(run), "--failures"),
+        "lint.txt": ("report", str(run), "--lint"),
     }.items():
         (tables / name).write_text(_robospa(*words, codes=(0, 1)))
 

@@ -1,6 +1,7 @@
-"""`robospa check URL`: is this policy server fit to be evaluated?
+"""`robospa check`: can this machine simulate and render? `robospa check URL`: is this policy server
+fit to be evaluated?
 
-Four parts: the protocol (`robospa.protocol.conformance`), the first actions
+Of a server there are four parts: the protocol (`robospa.protocol.conformance`), the first actions
 (`robospa.harness.convention_check.initial_actions`), a real trial run twice
 (`robospa.harness.conformance_rollout`), and with --demo the replay of a demonstration
 (`robospa.harness.convention_check.check`). Exit code 1 if a check of the protocol or a real trial
@@ -9,7 +10,6 @@ failed, or if the replay names a mistake; hints, and a replay that does not fit,
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
@@ -18,8 +18,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from robospa.harness.cli.ranges import DAYS, TRIALS, between
-from robospa.harness.cli.settings_flags import Token
+from robospa.harness.cli.options import DAYS, SECONDS, TRIALS, AsJson, Token, print_json
 from robospa.harness.clock.latency import latency_json
 from robospa.terminal import plain_console
 
@@ -40,52 +39,62 @@ MARKS = {True: ("ok", "green"), False: ("FAILED", "red"), None: ("n/a", "dim")}
 """Mark of a check that passed, failed or does not apply, and its style."""
 HINT = ("look", "yellow")
 FIRST_ACTIONS = "first actions"
-SECONDS = 120.0
+ANSWER_SECONDS = 120.0
 LOAD_SECONDS = 5.0
 SHOWN = 6
 """Mistakes in the table of the replay, beside the policy as it is."""
 
 
 def check(
-    url: Annotated[str, typer.Argument(help="Policy server, such as ws://localhost:8000.")],
+    url: Annotated[
+        str | None,
+        typer.Argument(
+            help="a policy server, such as ws://localhost:8000; without it, this machine"
+        ),
+    ] = None,
     token: Token = None,
     wait: Annotated[
-        float, typer.Option(callback=DAYS, help="Seconds to wait until it listens.")
+        float, typer.Option(callback=DAYS, help="seconds to wait until it listens")
     ] = 0.0,
     timeout: Annotated[
-        float,
-        typer.Option(callback=between(1e-3, 604800), help="Seconds that any one answer may take."),
-    ] = SECONDS,
+        float, typer.Option(callback=SECONDS, help="seconds that any one answer may take")
+    ] = ANSWER_SECONDS,
     client: Annotated[
         Path | None,
-        typer.Option(help="JSON file with options of the server's dialect; those in the URL win."),
+        typer.Option(help="JSON file with options of the server's dialect; those in the URL win"),
     ] = None,
     demo: Annotated[
         Path | None,
-        typer.Option(help="Recorded demonstration (HDF5) to compare its answers with."),
+        typer.Option(help="recorded demonstration (HDF5) to compare its answers with"),
     ] = None,
     instruction: Annotated[
-        str | None, typer.Option(help="What to tell it in the demonstration, if the file does not.")
+        str | None, typer.Option(help="what to tell it in the demonstration, if the file does not")
     ] = None,
     points: Annotated[
-        int, typer.Option(callback=TRIALS, help="Frames of the demonstration to ask it at.")
+        int, typer.Option(callback=TRIALS, help="frames of the demonstration to ask it at")
     ] = 8,
     trials: Annotated[
-        int, typer.Option(min=0, help="How often to run a real trial, if there is a simulator.")
+        int, typer.Option(min=0, help="how often to run a real trial, if there is a simulator")
     ] = 2,
     load_seconds: Annotated[
         float,
         typer.Option(
             callback=DAYS,
-            help="Seconds of load by 1, by 4 and by 8 clients, to measure its latency; 0 for none.",
+            help="seconds of load by 1, by 4 and by 8 clients, to measure its latency; 0 for none",
         ),
     ] = LOAD_SECONDS,
-    as_json: Annotated[bool, typer.Option("--json", help="print JSON")] = False,
+    as_json: AsJson = False,
 ) -> None:
-    """Test a policy server: protocol, shapes, timing, first actions, real trials, and latency."""
+    """Test a policy server: protocol, shapes, timing, first actions, real trials, and latency.
 
-    episode = None if demo is None else _episode(demo, instruction)  # before the server is asked
+    Without a URL, check this machine: the simulator, the Vulkan device, a picture and a second of
+    physics, with a fix for each failure.
+    """
     console = plain_console(quiet=as_json)
+    if url is None:
+        _check_machine(console, as_json)
+        return
+    episode = None if demo is None else _episode(demo, instruction)  # before the server is asked
     target = target_of(url, token, timeout, wait, client)
     found = examine(console, target, trials, episode, points)
     if demo is not None and episode is not None and trials:
@@ -93,8 +102,27 @@ def check(
     if found.passed and load_seconds > 0.0:
         found = replace(found, loads=measured(console, target, load_seconds))
     if as_json:
-        print(json.dumps(found.to_json(), indent=1))
+        print_json(found.to_json())
     if not found.passed:
+        raise typer.Exit(1)
+
+
+def _check_machine(console: Console, as_json: bool) -> None:
+    """Print what this machine lacks to simulate and to draw; ends with 1 if it lacks anything."""
+    from rich.table import Table
+    from rich.text import Text
+
+    from robospa.harness.machine_check import run_checks
+
+    found = list(run_checks())
+    table = Table("", "check", "found", "what to do", box=None, pad_edge=False)
+    for one in found:
+        mark = Text("ok", "green") if one.ok else Text("no", "red")
+        table.add_row(mark, one.name, one.detail, one.fix)
+    console.print(table)
+    if as_json:
+        print_json({"checks": found})
+    if not all(one.ok for one in found):
         raise typer.Exit(1)
 
 
@@ -209,7 +237,7 @@ class Target:
 def target_of(
     url: str,
     token: str | None = None,
-    timeout: float = SECONDS,
+    timeout: float = ANSWER_SECONDS,
     wait: float = 0.0,
     client: Path | None = None,
 ) -> Target:

@@ -1,4 +1,5 @@
-"""`robospa collect`: a data set of the expert's demonstrations; `--verify` checks one."""
+"""`robospa collect`: a data set of the expert's demonstrations, or one recording; `--verify` checks
+a data set."""
 
 from __future__ import annotations
 
@@ -10,24 +11,26 @@ from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import typer
 
-from robospa.harness.cli.json_output import AsJson, aside, print_json
-from robospa.harness.cli.ranges import TRIALS
-from robospa.harness.cli.settings_flags import with_flags
+from robospa.harness.cli.options import SEED, TRIALS, AsJson, aside, print_json, with_flags
 from robospa.harness.datasets.jobs import MakerError
 from robospa.harness.datasets.settings import Collection
 from robospa.harness.running.atomic_file import StorageError
 from robospa.harness.settings import Compute, SettingsError
 
 if TYPE_CHECKING:
+    from robospa.harness.convention_check.episodes import Episode
     from robospa.harness.datasets.collect import CollectionResult, Order
+    from robospa.trial import TrialKey
 
 T = TypeVar("T")
 
 REPLAYS = 59
 """The fewest that find, in 95 of 100 cases, a bad episode where a twentieth are bad."""
+FIRST = ("tasks", "levels", "episodes", "embodiment", "mode", "images", "cameras", "workers")
+"""Settings that stand in the help."""
 
 
-@with_flags([Collection, Compute])
+@with_flags([Collection, Compute], first=FIRST)
 def collect(
     out: Annotated[Path | None, typer.Option(help="folder of the data set")] = None,
     layout: Annotated[
@@ -61,6 +64,17 @@ def collect(
     world: Annotated[
         str | None, typer.Option(help="with --import: checkout:DIR, which has official scenes")
     ] = None,
+    record: Annotated[
+        str | None,
+        typer.Option(
+            metavar="TASK",
+            help="only record one demonstration, at --levels (default 1), to the file --out",
+        ),
+    ] = None,
+    seed: Annotated[
+        int | None,
+        typer.Option(callback=SEED, help="with --record: the scene; default: first accepted one"),
+    ] = None,
     as_json: AsJson = False,
     **given: object,
 ) -> None:
@@ -73,6 +87,9 @@ def collect(
     """
     if verify is not None:
         _verify(verify, replays, as_json)
+        return
+    if record is not None:
+        _record(record, _group(Collection, given), seed, out, as_json)
         return
     if imported is not None:
         if out is None:
@@ -88,7 +105,7 @@ def collect(
 
 def _make(order: Order, compute: Compute, resume: bool, keep: bool, as_json: bool) -> None:
     """Make the data set of `order`, or go on with it, and say what came of it."""
-    from robospa.harness.cli.running import terminable
+    from robospa.harness.cli.eval import terminable
     from robospa.harness.running.executor import RunAborted
 
     out = order.out
@@ -207,3 +224,66 @@ def _verify(out: Path, replays: int, as_json: bool) -> None:
         print_json({"sound": sound, "folders": verdicts})
     if not sound:
         raise typer.Exit(1)
+
+
+# -- one recording ------------------------------------------------------------------------------
+
+
+def _record(
+    task: str, settings: Collection, seed: int | None, out: Path | None, as_json: bool
+) -> None:
+    """Record a demonstration of the expert, in RoboTwin's HDF5 layout: frames, commanded and
+    measured joints, poses.
+
+    It goes on to the end of the expert's plan, as fast as official demonstrations; frames are as
+    many physics steps apart as fits the task's step limit (15 to 50).
+    """
+    from robospa.harness.convention_check.episodes import require, write_episode
+
+    require()
+    key = _one_trial(task, settings, seed)
+    path = out or Path(f"{key.task}-L{key.level}-{key.seed}.hdf5")
+    if path.exists():
+        raise SettingsError(f"{path} exists already; choose another --out")
+    episode, success = _recorded(key, path.name)
+    write_episode(path, episode)
+    if as_json:
+        about = {"frames": len(episode), "success": success, "instruction": episode.instruction}
+        print_json({"out": path, **about})
+        return
+    how = "success" if success else "no success"
+    print(f"{path}: {len(episode)} frames, {how}; instruction {episode.instruction!r}")
+
+
+def _one_trial(task: str, settings: Collection, seed: int | None) -> TrialKey:
+    """The training trial of the demonstration; SettingsError unless there is just one."""
+    from robospa.harness.selection import list_trials
+    from robospa.harness.settings import Selection
+    from robospa.tasks.modes import for_training
+
+    level = settings.levels if settings.levels.isdecimal() else "1"
+    seeds = None if seed is None else str(seed)
+    mode, robot = for_training(settings.mode), settings.embodiment
+    trials = list_trials(Selection(task, level, 1, seeds, "train", robot, mode))
+    if len(trials) != 1:
+        raise SettingsError("record one task with one robot in one scene mode at a time")
+    return trials[0]
+
+
+def _recorded(key: TrialKey, name: str) -> tuple[Episode, bool]:
+    """The trial `key` of the expert as an episode called `name`, and whether it met the goal."""
+    from contextlib import closing
+
+    from robospa.harness.demonstrations.demonstration import demonstrate
+    from robospa.harness.demonstrations.recorder import FrameRecorder, frame_steps
+    from robospa.harness.robots import embodiment
+    from robospa.harness.sim.motion import DEMONSTRATION_LIMITS
+    from robospa.harness.sim.sapien_world import SapienWorld
+
+    stride = frame_steps(key.task)
+    recorder = FrameRecorder(stride)
+    with closing(SapienWorld(True, limits=DEMONSTRATION_LIMITS)) as world:
+        made = demonstrate(world, key, recorder)
+    space = embodiment(key.embodiment).action_space("joint")
+    about = {**asdict(key), "stride": stride}
+    return recorder.episode(name, made.instruction, about, space), made.success

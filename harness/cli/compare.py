@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from robospa.harness.cli.json_output import AsJson, print_json
-from robospa.harness.cli.ranges import SHARE
+from robospa.harness.cli.options import SHARE, AsJson, print_json
 
 if TYPE_CHECKING:
     from robospa.results.comparison.compare import Comparison, Difference

@@ -18,7 +18,7 @@ from typing import IO, TYPE_CHECKING, Annotated
 
 import typer
 
-from robospa.harness.cli.ranges import PROCESSES, SECONDS, TRIALS
+from robospa.harness.cli.options import PROCESSES, SECONDS, TRIALS
 
 if TYPE_CHECKING:
     from robospa.harness.settings import Selection
@@ -81,7 +81,7 @@ def _select(names: Sequence[str], levels: str, trials: int) -> Selection:
 
 def _evaluate(policy: str, chosen: Selection, folder: Path, workers: int, video: str) -> Path:
     """Serve `policy`, evaluate it over the wire, print its table; returns the report's page."""
-    from robospa.harness.cli.running import run_and_show
+    from robospa.harness.cli.eval import run_and_show
     from robospa.harness.running.request import make_request
     from robospa.harness.settings import Compute, Connection, EvaluationSettings, Recording
     from robospa.results.records.run_io import read_run

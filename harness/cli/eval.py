@@ -1,18 +1,35 @@
-"""`robospa eval`: evaluate the policy behind a URL, on a fixed list of trials."""
+"""`robospa eval`: evaluate the policy behind a URL, on a fixed list of trials; or in real time at
+several latencies."""
 
 from __future__ import annotations
 
+import signal
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from robospa.harness.cli.settings_flags import MoreServers, Token, given_flags, with_flags
-from robospa.harness.settings import GROUPS, EvaluationSettings, updated
+from robospa.harness.cli.options import AsJson, Token, given_flags, print_json, with_flags
+from robospa.harness.running.evaluate import Request, RunAborted
+from robospa.harness.running.evaluate import evaluate as run_request
+from robospa.harness.running.films import FilmsInterrupted
+from robospa.harness.settings import GROUPS, EvaluationSettings, SettingsError, updated
 from robospa.harness.settings_file import read_settings
 
+if TYPE_CHECKING:
+    from robospa.results.records.run_io import Run
 
-@with_flags([EvaluationSettings, *GROUPS.values()], without=["policy"], hidden=["parts"])
+CURVE = "success-latency"
+"""Name of the files of a curve, beside its runs."""
+FIRST = ("out", "tasks", "levels", "trials", "split", "embodiment", "mode", "workers", "video")
+"""Settings that stand in the help."""
+
+
+@with_flags([EvaluationSettings, *GROUPS.values()], without=["policy"], first=FIRST)
 def evaluate(
     context: typer.Context,
     policy: Annotated[
@@ -22,18 +39,26 @@ def evaluate(
             "name or module:Class"
         ),
     ] = None,
-    more: MoreServers = None,
+    more: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--policy", metavar="URL", help="another server of the same policy; may be repeated"
+        ),
+    ] = None,
     config: Annotated[
         Path | None,
-        typer.Option(
-            help="TOML or JSON file of settings, such as RUN/settings.toml; flags win over it"
-        ),
+        typer.Option(help="file of settings, such as RUN/settings.toml; flags win over it"),
     ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="go on with the run in --out")] = False,
     token: Token = None,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="print the scores as JSON, not as a table")
-    ] = False,
+    latency: Annotated[
+        str | None,
+        typer.Option(
+            metavar="MS,MS,...",
+            help="in real time: a run for each of these latencies, in --out, and their curve",
+        ),
+    ] = None,
+    as_json: AsJson = False,
     **given: object,
 ) -> None:
     """Evaluate a policy on a fixed list of seeded trials; afterwards, see `robospa report`.
@@ -41,7 +66,6 @@ def evaluate(
     A trial that cannot be run is retried and, if that does not help, reported as missing: it never
     counts as a failure. After Ctrl-C, the same command with --resume continues.
     """
-    from robospa.harness.cli.running import run_and_show
     from robospa.harness.running.request import make_request
 
     settings = EvaluationSettings() if config is None else read_settings(config)
@@ -51,6 +75,170 @@ def evaluate(
         changes |= {"policy": servers, "policy_map": given["policy_map"]}
     elif "policy_map" in changes:
         changes["policy"] = ()
-    run_and_show(
-        make_request(updated(settings, changes), token=token, resume=resume), as_json=as_json
-    )
+    settings = updated(settings, changes)
+    if latency is not None:
+        _curve(settings, _milliseconds(latency), token, resume, as_json)
+        return
+    run_and_show(make_request(settings, token=token, resume=resume), as_json=as_json)
+
+
+def run_and_show(request: Request, *, as_json: bool = False) -> None:
+    """Evaluate, print the scores, and end with 1 if trials are missing or at least half of them
+    ended in a policy error, with 130 on Ctrl-C: with the scores if only films were missing.
+
+    Scores are a table, or as JSON one object on standard output.
+    """
+    from robospa.results.records.run_io import read_run
+    from robospa.results.records.settings_of_run import by_setting
+    from robospa.results.report.faults import many_policy_errors
+    from robospa.results.report.score_table import print_scores
+    from robospa.results.scoring.scores import score_run
+
+    folder = request.config.folder
+    again = f"the same command with --out {folder} --resume goes on from here"
+    unfilmed = ""
+    try:
+        with terminable():
+            run_request(request)
+    except FilmsInterrupted as error:
+        unfilmed = f"robospa: interrupted after the last trial; {error}"
+    except KeyboardInterrupt:
+        print(f"robospa: interrupted; {again}", file=sys.stderr)
+        raise typer.Exit(130) from None
+    except RunAborted as error:
+        raise RunAborted(f"the run stopped: {error}; {again}") from error
+    run = read_run(folder)
+    if as_json:
+        print_json({"folder": folder, **run_data(run)})
+    else:
+        for part in by_setting(run):
+            print_scores(part, score_run(part))
+    if run.missing:
+        print(
+            f"robospa: {len(run.missing)} of {len(run.keys)} trials could not be run and are "
+            f"missing from these numbers; {again}",
+            file=sys.stderr,
+        )
+        raise typer.Exit(1)
+    if text := many_policy_errors(run):
+        hint = f"look at the reasons above, or at `robospa report {folder} --failures`"
+        print(f"robospa: {text}; {hint}", file=sys.stderr)
+        raise typer.Exit(1)
+    if unfilmed:
+        print(unfilmed, file=sys.stderr)
+        raise typer.Exit(130)
+    if not as_json:
+        print(f"Run: {folder}   Report: robospa report {folder}")
+
+
+def run_data(run: Run) -> dict[str, object]:
+    """Counts of a run's trials by end, and its scores, as JSON values; rates are fractions.
+
+    Of several robots or scene modes there are `parts` instead, by their names.
+    """
+    from robospa.results.records.action_problems import problem_data
+    from robospa.results.records.settings_of_run import by_setting, setting_name
+    from robospa.results.report.run_card import ends
+    from robospa.results.scoring.score_json import to_json
+    from robospa.results.scoring.scores import score_run
+
+    if len(parts := by_setting(run)) > 1:
+        return {"parts": {setting_name(part): run_data(part) for part in parts}}
+    counts = {"trials": len(run.keys), "missing": len(run.missing), "ends": ends(run)}
+    problems = {"problems": problem_data(run.records.values())}
+    return {**counts, **problems, **to_json(score_run(run))}
+
+
+@contextmanager
+def terminable() -> Iterator[None]:
+    """Treat SIGTERM like Ctrl-C while a run is going on."""
+
+    def interrupt(number: int, frame: object) -> None:
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+# -- success against latency --------------------------------------------------------------------
+
+
+def _milliseconds(text: str) -> list[float]:
+    """The latencies; SettingsError unless these are two growing numbers or more."""
+    try:
+        found = [float(word) for word in text.split(",")]
+    except ValueError:
+        found = []
+    if len(found) < 2 or found != sorted(set(found)) or found[0] < 0:
+        raise SettingsError(
+            f"latencies {text!r} are no growing milliseconds, two or more, such as 0,100,200"
+        )
+    return found
+
+
+def _curve(
+    settings: EvaluationSettings,
+    latencies: list[float],
+    token: str | None,
+    resume: bool,
+    as_json: bool,
+) -> None:
+    """Evaluate at every latency [ms], the same trials; write the curve beside the runs."""
+    from robospa.harness.running.request import make_request
+    from robospa.results.comparison.latency_curve import curve_table, latency_curve
+    from robospa.results.figures.latency_curve import draw_latency_curves
+    from robospa.results.figures.series import save, styled
+    from robospa.results.records.run_io import read_run
+    from robospa.results.scoring.model_results import results_of_run
+    from robospa.results.tables.markdown import to_markdown
+    from robospa.results.tables.terminal import show
+
+    if settings.out is None:
+        raise SettingsError("a curve is several runs: name a folder for them with --out")
+    results = []
+    for latency in latencies:
+        folder = settings.out / f"{latency:g}ms"
+        asked = replace(
+            settings, out=folder, timing=replace(settings.timing, clock=f"real:{latency:g}ms")
+        )
+        going = resume and (folder / "run.json").exists()
+        _run_one(make_request(asked, token=token, resume=going), f"{latency:g} ms")
+        results.append(results_of_run(read_run(folder)))
+    curve = latency_curve(results)
+    import json
+
+    (settings.out / f"{CURVE}.json").write_text(json.dumps(curve.to_json(), indent=1))
+    (settings.out / f"{CURVE}.md").write_text(to_markdown(curve_table(curve)))
+    with styled():
+        save(draw_latency_curves([curve]), settings.out, CURVE)
+    if as_json:
+        print_json(curve.to_json())
+        return
+    show(curve_table(curve))
+    print(f"Runs and figure: {settings.out}")
+
+
+def _run_one(request: Request, what: str) -> None:
+    """Evaluate one of several runs, called `what`; its scores are shown later.
+
+    Ends with 130 on Ctrl-C; raises RunAborted, also if trials are missing.
+    """
+    from robospa.results.records.run_io import read_run
+
+    again = "the same command with --resume goes on from here"
+    print(f"{what}:", file=sys.stderr)
+    try:
+        with terminable():
+            run_request(request)
+    except KeyboardInterrupt as error:
+        about = f" after the last trial of {what}; {error}" if str(error) else ""
+        print(f"robospa: interrupted{about}; {again}", file=sys.stderr)
+        raise typer.Exit(130) from None
+    except RunAborted as error:
+        raise RunAborted(f"the run at {what} stopped: {error}; {again}") from error
+    run = read_run(request.config.folder)
+    if run.missing:
+        raise RunAborted(f"{len(run.missing)} trials at {what} could not be run; {again}")

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 
 import typer
 
-from robospa.harness.cli.json_output import AsJson, aside, print_json
+from robospa.harness.cli.options import AsJson, aside, print_json
 
 SUBMISSIONS = Path("leaderboard/submissions")
 MOST = 16 * 1024 * 1024

@@ -10,52 +10,52 @@ import importlib
 import os
 import sys
 from collections.abc import Mapping, Sequence
+from typing import Any
+
+import typer
+from typer.core import TyperCommand, TyperGroup
 
 SECTIONS = {
     "Evaluate a policy": {
         "demo": "Run a small evaluation from server to report.",
-        "doctor": "Check that this machine can simulate and render.",
         "serve": "Serve a policy by name or module:function.",
-        "check": "Test a policy server against the protocol.",
+        "check": "Test this machine, or a policy server against the protocol.",
         "eval": "Evaluate a policy on a fixed list of trials.",
-        "latency": "Evaluate a policy in real time: success against latency.",
     },
     "Read the results": {
-        "report": "Write tables, figures and a page with every trial and its video.",
+        "report": "Write tables, figures and a page; list failures or what is implausible.",
         "view": "Show a run in the browser, live while it goes on; or a trial in 3-D.",
-        "failures": "List the type of every failed trial, with its evidence.",
         "compare": "Compare two runs, or a run and published numbers; plan sample sizes.",
-        "lint": "Flag implausible results, in runs or in the paper.",
         "paper": "Recompute the paper's tables and list their inconsistencies.",
     },
     "Publish": {
         "submit": "Pack a run as a bundle; verify or reproduce a bundle.",
-        "audit": "Look for reasons to doubt a run, for maintainers.",
         "leaderboard": "Collect verified bundles; build the leaderboard's pages.",
-        "push": "Upload a run or a data set to the Hugging Face hub.",
     },
     "Train": {
-        "collect": "Collect a data set of demonstrations to train with; verify one.",
+        "collect": "Collect demonstrations to train with; record one; verify a data set.",
         "learn": "Train a policy of our own on such a data set.",
-        "record": "Record a demonstration of the oracle, to check servers with.",
     },
     "The benchmark": {
         "tasks": "List the tasks; show, draw or collect their scenes.",
-        "instructions": "Check the sentences of a RoboSPA checkout: which fit, which are trained "
-        "on.",
-        "assets": "Name a folder of official assets; list what it holds.",
+        "official": "Use the official assets, sentences or simulator of your own copy.",
         "seeds": "Generate the lists of accepted seeds, or measure the expert.",
-        "checkout": "Check a RoboSPA checkout as a world; find its valid seeds.",
     },
 }
 """Subcommands by the sections of `robospa --help`."""
-
 COMMANDS = {name: text for part in SECTIONS.values() for name, text in part.items()}
 """Subcommand -> summary; each is a function, or a group of commands, of that name in
 `robospa.harness.cli.<name>`."""
-
 NAMES = {"eval": "evaluate"}
 """Functions that cannot be called like their subcommand."""
+CONTEXT = {"max_content_width": 120}
+"""Settings of every command; without them help ends at 80 columns on any terminal."""
+COMPLETION = "_ROBOSPA_COMPLETE"
+"""Set by the shell's completion script while a line is being typed."""
+
+
+class TooOld(Exception):
+    """This Python runs only a part of the commands."""
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -75,26 +75,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         sys.exit(1)
 
 
-COMPLETION = "_ROBOSPA_COMPLETE"
-"""Set by the shell's completion script while a line is being typed."""
-
-
-class TooOld(Exception):
-    """This Python runs only a part of the commands."""
-
-
 def _run(words: list[str]) -> None:
-    import typer
-
-    from robospa.harness.cli.defaults import PREFIX, command_defaults, taken_file
-    from robospa.harness.cli.help import (
-        CONTEXT,
-        SectionedCommand,
-        SectionedGroup,
-        name_variables,
-    )
-
-    words, file = taken_file(words, os.environ)
     typed = completed_line(os.environ) if COMPLETION in os.environ else words
     chosen = next((w for w in typed if not w.startswith("-")), "")
     if "--version" in words[:1]:
@@ -114,25 +95,20 @@ def _run(words: list[str]) -> None:
         context_settings=CONTEXT,
         pretty_exceptions_enable=False,
         rich_markup_mode=None,  # plain help: importing the fancy one takes longer than all the rest
-        epilog="--version prints the version, --debug shows where an error came from. Every flag "
-        "has a variable, such as ROBOSPA_EVAL_TRIALS, and --config FILE before the command, or "
-        "ROBOSPA_CONFIG, names a file of defaults: docs/runs.md.",
+        epilog="--version prints the version, --debug shows where an error came from.",
     )
     for name, summary in COMMANDS.items():
-        if name == chosen:
-            module = importlib.import_module(f"robospa.harness.cli.{name}")
-            found = getattr(module, NAMES.get(name, name))
-            if isinstance(found, typer.Typer):
-                app.add_typer(found, name=name)
-            else:
-                app.command(name, cls=SectionedCommand, context_settings=CONTEXT)(found)
-        else:
+        if name != chosen:
             app.command(name, short_help=summary)(_unloaded)
-    command = typer.main.get_command(app)
-    if (found := command.commands.get(chosen)) is not None:  # type: ignore[attr-defined]
-        name_variables(found, f"{PREFIX}_{chosen.upper()}")
-    defaults = {} if file is None or found is None else {chosen: command_defaults(file, found)}
-    command.main(words, prog_name="robospa", default_map=defaults)
+            continue
+        found = getattr(
+            importlib.import_module(f"robospa.harness.cli.{name}"), NAMES.get(name, name)
+        )
+        if isinstance(found, typer.Typer):
+            app.add_typer(found, name=name)
+        else:
+            app.command(name, cls=SectionedCommand, context_settings=CONTEXT)(found)
+    typer.main.get_command(app).main(words, prog_name="robospa")
 
 
 def completed_line(environment: Mapping[str, str]) -> list[str]:
@@ -159,6 +135,43 @@ def sentence(error: BaseException) -> str:
     if text and (ours or isinstance(error, (KeyError, ValueError, OSError))):
         return text
     return f"{type(error).__name__}: {text} (add --debug to see where)"
+
+
+# -- help ---------------------------------------------------------------------------------------
+
+
+class SectionedCommand(TyperCommand):
+    """A command whose options stand under the titles that they were given as `rich_help_panel`,
+    once all of them are shown."""
+
+    def format_options(self, ctx: Any, formatter: Any) -> None:
+        """Write a section for the arguments and for every title, in their order."""
+        sections: dict[str, list[tuple[str, str]]] = {}
+        complete = not any(getattr(one, "hidden", False) for one in self.params)
+        for parameter in self.get_params(ctx):
+            argument = parameter.param_type_name == "argument"
+            title = getattr(parameter, "rich_help_panel", None) if complete else None
+            title = title or ("Arguments" if argument else "Options")
+            if record := parameter.get_help_record(ctx):
+                sections.setdefault(title, []).append(record)
+        for title, records in sections.items():
+            with formatter.section(title):
+                formatter.write_dl(records)
+
+
+class SectionedGroup(TyperGroup):
+    """The list of commands, in sections."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write a section for every title, in their order."""
+        for title, names in SECTIONS.items():
+            rows = [
+                (name, command.get_short_help_str(limit=300))
+                for name in names
+                if (command := self.get_command(ctx, name)) is not None
+            ]
+            with formatter.section(title):
+                formatter.write_dl(rows)
 
 
 if __name__ == "__main__":

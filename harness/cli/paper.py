@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from robospa.harness.cli.json_output import AsJson, print_json
+from robospa.harness.cli.options import AsJson, print_json
 
 if TYPE_CHECKING:
     from robospa.results.paper.check import Check

@@ -1,11 +1,24 @@
-"""`robospa report`: runs as tables, figures and a page with every trial and its video."""
+"""`robospa report`: runs as tables, figures and a page with every trial and its video; or only
+their failures, what is implausible in them, or reasons to doubt them.
+
+What the audit does lies in `robospa.leaderboard`, which is reached by name: the harness is below it
+and imports nothing of it.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+from robospa.harness.cli.options import AsJson, Token, aside, between, print_json
+
+if TYPE_CHECKING:
+    from robospa.results.records.run_io import Run
+
+PAPER = "paper"
 
 
 def report(
@@ -22,11 +35,70 @@ def report(
             "--out", "--output", help="where to write; default RUN/report; several runs need it"
         ),
     ] = None,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="print the scores as JSON, not as tables")
+    failures: Annotated[
+        bool, typer.Option("--failures", help="only count the types of failure in one run")
     ] = False,
+    by: Annotated[
+        str, typer.Option(help="with --failures: count by task, category or variant")
+    ] = "task",
+    trials: Annotated[
+        bool, typer.Option("--trials", help="with --failures: list each, with its evidence")
+    ] = False,
+    film: Annotated[
+        bool, typer.Option("--film", help="first make the videos that failed trials lack")
+    ] = False,
+    lint: Annotated[
+        bool,
+        typer.Option(
+            "--lint", help='only flag implausible results in the runs, or in "paper"; 1 if errors'
+        ),
+    ] = False,
+    audit: Annotated[
+        bool,
+        typer.Option(
+            "--audit", help="only look for signs that a run or bundle is not what it says; 1 if any"
+        ),
+    ] = False,
+    reproduction: Annotated[
+        Path | None, typer.Option(help="with --audit: the same policy's run on hidden scenes")
+    ] = None,
+    policy: Annotated[
+        str | None,
+        typer.Option(help="with --audit: URL of the server, to be asked with exchanged sentences"),
+    ] = None,
+    samples: Annotated[
+        int,
+        typer.Option(
+            callback=between(0, 10_000),
+            help="with --audit: trials to hold against the expert's, and to ask --policy for",
+        ),
+    ] = 10,
+    token: Token = None,
+    as_json: AsJson = False,
 ) -> None:
     """Write report.html, report.md, report.json, tables and figures of one or several runs."""
+    if lint:
+        _lint(run, as_json)
+    elif audit:
+        _audit(_one(run), reproduction, policy, samples, token, as_json)
+    elif failures:
+        _failures(_one(run), by, trials, film, as_json)
+    else:
+        if film:
+            _make_films(_one(run))
+        _report(run, with_published, ci, out, as_json)
+
+
+def _one(runs: Sequence[Path]) -> Path:
+    """The only one of `runs`; ValueError if there are more."""
+    if len(runs) > 1:
+        raise ValueError("--failures, --audit and --film are of one run")
+    return runs[0]
+
+
+def _report(
+    folders: Sequence[Path], with_published: bool, ci: str, out: Path | None, as_json: bool
+) -> None:
     from robospa.results.paper.published import load
     from robospa.results.records.run_io import read_run
     from robospa.results.report.files import write_report
@@ -36,20 +108,103 @@ def report(
 
     if ci not in METHODS:
         raise ValueError(f"no interval is called {ci!r}; there are {', '.join(METHODS)}")
-    if len(run) > 1 and out is None:
+    if len(folders) > 1 and out is None:
         raise ValueError("a report of several runs belongs to none of them; say where with --out")
-    found = [read_run(folder) for folder in run]
+    found = [read_run(folder) for folder in folders]
     published = list(load().models) if with_published else []
     made = make_report(found, published, ci)
-    folder = write_report(made, out or run[0] / "report")
+    folder = write_report(made, out or folders[0] / "report")
     if as_json:
-        import json
-
-        from robospa.harness.cli.running import run_data
+        from robospa.harness.cli.eval import run_data
 
         runs = {str(one.folder): run_data(one) for one in found}
-        print(json.dumps({"report": str(folder / "report.html"), "runs": runs}, indent=1))
+        print_json({"report": folder / "report.html", "runs": runs})
         return
     for one, model in zip(made.runs, made.models, strict=False):
         print_scores(one, model.scores)
     print(f"Report: {folder / 'report.html'}")
+
+
+def _failures(folder: Path, by: str, trials: bool, film: bool, as_json: bool) -> None:
+    """Print the types of failure in a run; docs/failures.md says how they are decided."""
+    from robospa.results.failures.labels import OURS, label
+    from robospa.results.failures.listing import counts_table, trials_table
+    from robospa.results.records.action_problems import problem_lines
+    from robospa.results.records.run_io import read_run
+
+    found = _make_films(folder) if film else read_run(folder)
+    records = list(found.records.values())
+    layout = "json" if as_json else "markdown"
+    if trials:
+        print(trials_table(records, layout))
+        return
+    print(counts_table(records, by, layout))
+    if as_json:
+        return
+    types = [failure for record in records if (failure := label(record)) is not None]
+    print(f"\n{len(types)} failed trials of {len(found.keys)}, {len(found.missing)} missing")
+    if any(failure.kind in OURS for failure in types):
+        print("* not one of the paper's types")
+    for line in problem_lines(records):
+        print(line)
+
+
+def _make_films(folder: Path) -> Run:
+    """The run in `folder`, with the films that it lacked; ends the program with 130 on Ctrl-C."""
+    from robospa.harness.running.films import FilmsInterrupted, film_now
+    from robospa.results.records.run_io import read_run
+
+    try:
+        for text in film_now(read_run(folder)):
+            aside(text)
+    except FilmsInterrupted as error:
+        aside(f"robospa: interrupted; {error}")
+        raise typer.Exit(130) from None
+    return read_run(folder)
+
+
+def _lint(folders: Sequence[Path], as_json: bool) -> None:
+    """Print what is implausible in the runs, or in the paper's tables; of several runs, also what
+    keeps them out of one table."""
+    from robospa.results.records.finding import SEVERITIES
+    from robospa.results.records.lint import lint_actions, lint_published, lint_run, lint_runs
+    from robospa.results.records.run_io import read_run
+    from robospa.tasks.catalog import tasks
+
+    known = {(name, level) for name in tasks() for level in range(1, 6)}
+    found = lint_published() if Path(PAPER) in folders else []
+    read = [read_run(folder) for folder in folders if folder != Path(PAPER)]
+    for run in read:
+        found += lint_run(run, known) + lint_actions(run)
+    if len(read) > 1:
+        found += lint_runs(read)
+    found.sort(key=lambda f: SEVERITIES.index(f.severity))
+    counts = {f"{kind}s": sum(f.severity == kind for f in found) for kind in SEVERITIES}
+    if as_json:
+        print_json({**counts, "findings": found})
+    else:
+        shown = {name: n for name, n in counts.items() if n or name != "notes"}
+        print(*found, ", ".join(f"{n} {name}" for name, n in shown.items()), sep="\n")
+    if counts["errors"]:
+        raise typer.Exit(1)
+
+
+def _audit(
+    run: Path,
+    reproduction: Path | None,
+    policy: str | None,
+    samples: int,
+    token: str | None,
+    as_json: bool,
+) -> None:
+    """Print what speaks against a run, a sentence for each check; ends with 1 if anything does."""
+    from robospa.harness.factory import load_function
+
+    check = load_function("robospa.leaderboard.audit:audit")
+    findings = check(run, reproduction, policy, samples, token)
+    if as_json:
+        print_json(findings)
+    for one in [] if as_json else findings:
+        print(f"{'SUSPICIOUS' if one.suspicious else 'ok':10} {one.check}: {one.sentence}")
+    if any(one.suspicious for one in findings):
+        raise typer.Exit(1)

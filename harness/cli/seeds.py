@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from robospa.harness.cli.ranges import PROCESSES, SEED, TRIALS
+from robospa.harness.cli.options import PROCESSES, SEED, TRIALS
 from robospa.terminal import plain_console
 from robospa.trial import REFERENCE
 

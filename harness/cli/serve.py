@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from robospa.harness.cli.ranges import PORT
+from robospa.harness.cli.options import PORT
 
 if TYPE_CHECKING:
     from ssl import SSLContext

@@ -12,9 +12,7 @@ from typing import Annotated, Any
 
 import typer
 
-from robospa.harness.cli.json_output import AsJson, aside, print_json
-from robospa.harness.cli.ranges import PROCESSES, SHARE, TRIALS
-from robospa.harness.cli.settings_flags import Token
+from robospa.harness.cli.options import PROCESSES, SHARE, TRIALS, AsJson, Token, aside, print_json
 
 LEADERBOARD = "robospa.leaderboard"
 submit = typer.Typer(

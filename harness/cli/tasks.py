@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable, Mapping
-from dataclasses import fields
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, fields
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from robospa.harness.cli.ranges import DAYS, PORT, SEED
+from robospa.harness.cli.options import DAYS, PORT, SEED, AsJson, print_json
 from robospa.terminal import plain_console
 
 if TYPE_CHECKING:
@@ -45,7 +44,7 @@ def tasks(
     out: Annotated[Path | None, typer.Option(help="PNG file (or JPEG with --gallery)")] = None,
     frame: Annotated[bool, typer.Option(help="render the scene's first frame")] = True,
     gallery: Annotated[bool, typer.Option("--gallery", help="one picture of all levels")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="print JSON; draws nothing")] = False,
+    as_json: AsJson = False,
     view: Annotated[
         bool, typer.Option("--view", help="show the scene in 3-D, solved by the expert")
     ] = False,
@@ -62,11 +61,11 @@ def tasks(
     if world is not None and (as_json or view):
         raise typer.BadParameter("--world goes with pictures: leave out --json and --view")
     if as_json:
-        from robospa.harness.cli.task_json import listing, scene_json
-
         splits = SPLITS if split is None else (split,)
-        found = listing() if name is None else scene_json(_scene(name, level, seed), splits)
-        print(json.dumps(found, indent=1))
+        found: object = (
+            _list_json() if name is None else _scene_json(_scene(name, level, seed), splits)
+        )
+        print_json(found)
     elif gallery:
         _gallery(console, name, seed, split or "heldout", world, out or GALLERY)
     elif name is None:
@@ -333,3 +332,37 @@ def _gallery(
     finally:
         simulator.close()
     console.print(f"{count} variants in {path} ({size / 1000:.0f} kB)", soft_wrap=True)
+
+
+# -- JSON ---------------------------------------------------------------------------------------
+
+
+def _list_json() -> list[dict[str, object]]:
+    """All tasks: name, category, dimension, and by level n, T and the step limit [actions]."""
+    from robospa.tasks.catalog import tasks
+
+    return [
+        {
+            "name": task.name,
+            "category": task.category,
+            "dimension": task.dimension,
+            "summary": task.summary,
+            "success": task.success,
+            "levels": {str(number): asdict(level) for number, level in task.levels.items()},
+        }
+        for task in tasks().values()
+    ]
+
+
+def _scene_json(scene: Scene, splits: Sequence[str]) -> dict[str, object]:
+    """A scene as `Scene.to_json`, with its digest, its instructions and the expert's plan."""
+    from robospa.tasks.catalog import task
+    from robospa.tasks.sentences import instruction
+
+    plan = [{"skill": type(call).__name__, **asdict(call)} for call in task(scene.task).plan(scene)]
+    return {
+        "scene": scene.to_json(),
+        "digest": scene.digest,
+        "instructions": {split: instruction(scene, split) for split in splits},
+        "plan": plan,
+    }

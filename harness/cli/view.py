@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from robospa.harness.cli.ranges import DAYS, PORT
+from robospa.harness.cli.options import DAYS, PORT
 
 
 def view(

@@ -144,7 +144,7 @@ class Episode:
             if use is None:
                 raise EpisodeError(
                     f"the policy wants measured joints, and {self.name} has commanded ones only: "
-                    "use one made with `robospa record`"
+                    "use one made with `robospa collect --record`"
                 )
             view["state"] = use[t].astype(np.float32)
         return view

@@ -87,8 +87,8 @@ def _selection(settings: EvaluationSettings) -> Selection:
         (selection.instructions, "a checkout has its own sentences: leave instructions out"),
         (
             selection.seeds is None,
-            "a checkout's valid seeds are not ours: find some with `robospa checkout DIR --find "
-            "FILE` and name the file with seeds",
+            "a checkout's valid seeds are not ours: find some with `robospa official "
+            "checkout DIR --find FILE` and name the file with seeds",
         ),
         (
             settings.recording.video != "none",

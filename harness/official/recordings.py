@@ -4,8 +4,8 @@
     <Task>_<level>/<configuration>/scene_info.json          of each episode: slots, sometimes layout
     <Task>_<level>/<configuration>/seed.txt                 the seeds, in the order of the episodes
 
-Files of `robospa record` and `robospa collect` have their trial's key instead. The pickles beside
-official files are not read.
+Files of `robospa collect` have their trial's key instead. The pickles beside official files are not
+read.
 """
 
 from __future__ import annotations

@@ -106,12 +106,12 @@ class Archive:
 
 
 def noted() -> Path:
-    """The file in which `robospa assets add` notes the folder."""
+    """The file in which `robospa official assets --add` notes the folder."""
     return user_cache() / "assets_folder"
 
 
 def open_archive(path: Path | str | None = None) -> Archive:
-    """The archive at `path`, or in ROBOSPA_ASSETS, or as `robospa assets add` noted it.
+    """The archive at `path`, or in ROBOSPA_ASSETS, or as `robospa official assets --add` noted it.
 
     A folder whose `assets` folder holds the parts, such as a RoboTwin checkout, will do as well.
     ArchiveError, saying what to do, if none is named or it holds none of the parts.
@@ -119,8 +119,8 @@ def open_archive(path: Path | str | None = None) -> Archive:
     named = path or os.environ.get(VARIABLE) or _note()
     if not named:
         raise ArchiveError(
-            f"no folder of official assets is known; name it with `robospa assets add DIR` or "
-            f"{VARIABLE}"
+            "no folder of official assets is known; name it with `robospa official assets DIR "
+            f"--add` or {VARIABLE}"
         )
     folder = Path(named).expanduser()
     try:

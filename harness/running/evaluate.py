@@ -111,7 +111,7 @@ def probe_world(config: WorkerConfig, render: bool) -> dict[str, Any]:
     """
     asked = (config.world, config.world_arguments, True if render else None)
     worker = JobProcess(world_info, asked, seconds=PROBE_SECONDS, name="world")
-    advice = "`robospa doctor` says what is missing"
+    advice = "`robospa check` says what is missing"
     try:
         return worker.run(None)
     except WorkerStuck:

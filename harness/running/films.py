@@ -249,7 +249,7 @@ def film_lines(films: Films, seconds: float = 0.0) -> list[str]:
 
 def how_to_film(folder: Path) -> str:
     """What makes the films that a run lacks."""
-    return f"`robospa failures {folder} --film` makes them"
+    return f"`robospa report {folder} --film` makes them"
 
 
 def unfilmed(run: Run) -> list[TrialRecord]:

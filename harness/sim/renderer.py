@@ -88,7 +88,7 @@ LARGEST = 4096
 """[px] of an image's width or height."""
 SOFTWARE = "llvmpipe"
 """How the name of Mesa's software device begins, which draws pictures side by side."""
-ADVICE = "run `robospa doctor` to see what is missing"
+ADVICE = "run `robospa check` to see what is missing"
 
 
 def open_render_system() -> sapien.render.RenderSystem:

@@ -2,7 +2,7 @@
 
 SAPIEN does not tell a driver's version, and the version decides: software rendering needs Mesa 24.3
 or newer. So the loader is asked directly (ctypes, a handful of calls). Asking can end the process
-if a driver is broken; `robospa.harness.doctor` asks from a child process.
+if a driver is broken; `robospa.harness.machine_check` asks from a child process.
 """
 
 from __future__ import annotations

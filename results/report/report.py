@@ -154,7 +154,7 @@ def draw_figures(
 
 
 def findings(runs: Sequence[Run]) -> list[str]:
-    """Findings of `robospa lint` in the runs."""
+    """Findings of `robospa report --lint` in the runs."""
     found = [f for run in runs for f in lint_run(run)]
     found += lint_runs(runs) if len(runs) > 1 else []
     return [str(f) for f in found]

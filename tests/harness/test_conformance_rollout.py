@@ -1,4 +1,4 @@
-"""`robospa check` runs a real trial twice, and `robospa doctor --policy` does what check does."""
+"""`robospa check` runs a real trial twice."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from run_fakes import SPEC, FakePolicy, FakeWorld, NanPolicy, parts
 
-from robospa.harness import doctor
 from robospa.harness.cli.main import main
 from robospa.harness.conformance_rollout import rollouts, trial_for
 from robospa.protocol.client import connect
@@ -88,7 +87,7 @@ def test_a_machine_that_cannot_simulate_is_not_the_servers_fault() -> None:
 
     assert [row.passed for row in results(FakePolicy, missing)] == [None]
     (row,) = results(FakePolicy, lambda: Unhappy())
-    assert row.passed is None and "robospa doctor" in row.detail
+    assert row.passed is None and "robospa check" in row.detail
 
 
 class Unhappy(FakeWorld):
@@ -122,27 +121,6 @@ def test_the_command_counts_them(
         main(["check", server.url, "--load-seconds", "0"])
     assert (end.value.code or 0) == code
     assert f"real trial {len(verdicts)}" in capsys.readouterr().out
-
-
-@pytest.mark.parametrize(
-    ("machine", "bad", "code"), [(True, False, 0), (False, False, 1), (True, True, 1)]
-)
-def test_the_doctor_checks_the_policy_too(
-    machine: bool,
-    bad: bool,
-    code: int,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    found = [doctor.SystemCheck("simulator", machine, "seen", "" if machine else "install it")]
-    monkeypatch.setattr(doctor, "run_checks", lambda: iter(found))
-    monkeypatch.setattr("robospa.harness.conformance_rollout.rollouts", rows(True, True))
-    make = NanPolicy if bad else FakePolicy
-    with ServerThread(policy_factory=make) as server, pytest.raises(SystemExit) as end:
-        main(["doctor", "--policy", server.url])
-    out = capsys.readouterr().out
-    assert end.value.code == code
-    assert "handshake" in out and ("real trial" in out) is (machine and not bad)
 
 
 @pytest.mark.sim

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from run_fakes import FakePolicy, FakeWorld, parts
 
-from robospa.harness.rehearsal import rehearse
 from robospa.harness.trial import run_trial
 from robospa.leaderboard.audit import (
     expert_likeness,
@@ -19,6 +18,7 @@ from robospa.leaderboard.audit import (
     hidden_gap,
     other_sentence,
     path_distance,
+    rehearse,
     sentence_reaction,
 )
 from robospa.results.records.manifest import RunManifest

@@ -1,4 +1,4 @@
-"""`robospa audit` from the command line: what it prints."""
+"""`robospa report --audit` from the command line: what it prints."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from robospa.trial import TrialKey
 
 def test_findings_as_json(tmp_path: Path) -> None:
     make_run(tmp_path / "run", [TrialKey(PICK, 1, seed) for seed in SEEDS])
-    done = robospa("audit", tmp_path / "run", "--expert", "0", "--json")
+    done = robospa("report", tmp_path / "run", "--audit", "--samples", 0, "--json")
     found = json.loads(done.out)
     assert done.code == 0 and found and all(one["sentence"] for one in found)
     assert not any(one["suspicious"] for one in found)
-    plain = robospa("audit", tmp_path / "run", "--expert", "0").out.splitlines()
+    plain = robospa("report", tmp_path / "run", "--audit", "--samples", 0).out.splitlines()
     assert plain == [f"{'ok':10} {one['check']}: {one['sentence']}" for one in found]

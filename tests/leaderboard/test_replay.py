@@ -55,7 +55,7 @@ def test_another_physics_does_not_hold(honest: Path) -> None:
 
 def test_a_world_that_does_not_start_is_one_sentence(honest: Path) -> None:
     other = replace(REFERENCE, world="run_fakes:Broken")
-    with pytest.raises(BundleError, match="robospa doctor"):
+    with pytest.raises(BundleError, match="robospa check"):
         replayed(honest, 2, other)
 
 

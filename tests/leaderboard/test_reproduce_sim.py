@@ -17,15 +17,16 @@ from shadow import HORIZON, Shadow, Thief, ids
 
 from robospa.baselines.oracle import Oracle
 from robospa.baselines.random import Random
-from robospa.harness.rehearsal import expert_actions, rehearse
 from robospa.harness.running.action_files import read_actions
 from robospa.harness.running.evaluate import Request, evaluate
 from robospa.harness.running.request import make_request
 from robospa.harness.settings import EvaluationSettings, updated
 from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.leaderboard.audit import (
+    expert_actions,
     expert_likeness,
     hidden_gap,
+    rehearse,
     sentence_reaction,
 )
 from robospa.leaderboard.card import to_card

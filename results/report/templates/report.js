@@ -2,7 +2,7 @@
 const PAGE = 100;
 const FIRST_FRAME = "#t=0.05"; // shown before it is played; without it a video is black
 const FILM_TEXTS = { follows: "The video of this trial follows.",
-  owed: "The video of this trial is still to be made: robospa failures RUN --film makes it." };
+  owed: "The video of this trial is still to be made: robospa report RUN --film makes it." };
 
 const failureName = (trial) => (trial.failure ? data.kinds[trial.failure] || trial.failure : "");
 

@@ -1,4 +1,4 @@
-"""`robospa assets`: what a folder of official assets holds."""
+"""`robospa official assets`: what a folder of official assets holds."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from robospa.harness.cli.main import main
 
 
 def run(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[str, str, int]:
-    """What `robospa assets` prints, on stdout and stderr, and its exit code."""
+    """What `robospa official assets` prints, on stdout and stderr, and its exit code."""
     with pytest.raises(SystemExit) as end:
-        main(["assets", *words])
+        main(["official", "assets", *words])
     out, err = capsys.readouterr()
     return out, err, int(end.value.code or 0)
 
@@ -28,7 +28,7 @@ def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_folder_is_added_and_listed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     root = make_archive(tmp_path / "assets", ["can"], ("objects", "background_texture"))
     before = sorted(root.rglob("*"))
-    out, _, code = run(capsys, "add", str(root))
+    out, _, code = run(capsys, str(root), "--add")
     assert code == 0 and "tasks can run with this folder" in out
     assert sorted(root.rglob("*")) == before
     listed, _, code = run(capsys)
@@ -44,7 +44,7 @@ def test_a_torn_file_is_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixtu
     root = make_archive(tmp_path / "assets", ["can"])
     torn = root / "objects" / "071_can" / "visual" / "base3.glb"
     torn.write_bytes(torn.read_bytes()[:500])
-    out, _, _ = run(capsys, "--assets", str(root), "--json")
+    out, _, _ = run(capsys, str(root), "--json")
     data = json.loads(out)
     assert "unpack the archive again" in data["faults"]["071_can/base3"]
     assert data["missing"]["Pick_Cans_Relational"] == ["071_can"]
@@ -52,4 +52,4 @@ def test_a_torn_file_is_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixtu
 
 def test_without_a_folder_it_says_how_to_name_one(capsys: pytest.CaptureFixture[str]) -> None:
     _, err, code = run(capsys)
-    assert code == 1 and "`robospa assets add DIR`" in err
+    assert code == 1 and "`robospa official assets DIR --add`" in err

@@ -1,4 +1,4 @@
-"""`robospa compare` and `robospa lint` from the command line."""
+"""`robospa compare` and `robospa report --lint` from the command line."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def test_sample_sizes(capsys: pytest.CaptureFixture[str]) -> None:
             "there is no folder nowhere, and no published model is called",
         ),
         (["compare", "pi06", "RDT"], "did you mean pi0.5? there are RDT, GO-1, pi0.5, X-VLA"),
-        (["lint", "nowhere"], "nowhere is not a run"),
+        (["report", "nowhere", "--lint"], "nowhere is not a run"),
     ],
 )
 def test_mistakes_are_one_sentence(
@@ -100,6 +100,6 @@ def test_mistakes_are_one_sentence(
 
 
 def test_lint_of_the_paper_fails_with_its_findings(capsys: pytest.CaptureFixture[str]) -> None:
-    code, text, _ = run(capsys, "lint", "paper")
+    code, text, _ = run(capsys, "report", "paper", "--lint")
     assert code == 1
     assert "10 errors, 0 warnings" in text

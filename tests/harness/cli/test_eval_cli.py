@@ -219,7 +219,7 @@ def test_a_torn_line_is_owed_again(tmp_path: Path) -> None:
         (["run_fakes:FakePolicy", "--config", "no.toml"], "no.toml: it cannot be read"),
         (["run_fakes:FakePolicy", "--video", "some"], "not one of none, failures, first, all"),
         (["run_fakes:FakePolicy", "--split", "test"], "not one of heldout, train"),
-        (["run_fakes:FakePolicy", "--world", "run_fakes:Broken"], "robospa doctor"),
+        (["run_fakes:FakePolicy", "--world", "run_fakes:Broken"], "robospa check"),
         (["run_fakes:FakePolicy", "--embodiment", "nao"], "no embodiment 'nao'; known are"),
         (["run_fakes:FakePolicy", "--mode", "cleen"], "did you mean clean?"),
         (["run_fakes:picky"], "drives only-me, not aloha-agilex"),

@@ -1,4 +1,4 @@
-"""`robospa failures`: counts, evidence, and what is refused."""
+"""`robospa report --failures`: counts, evidence, and what is refused."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def folder(tmp_path: Path) -> Path:
 
 def printed(capsys: pytest.CaptureFixture[str], *words: str) -> str:
     with pytest.raises(SystemExit) as end:
-        main(["failures", *words])
+        main(["report", *words, "--failures"])
     out, err = capsys.readouterr()
     return out if end.value.code == 0 else err
 
@@ -58,7 +58,7 @@ def test_counts(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
 def test_every_failed_trial_with_its_evidence(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (row,) = json.loads(printed(capsys, str(folder), "--trials", "--format", "json"))
+    (row,) = json.loads(printed(capsys, str(folder), "--trials", "--json"))
     assert (row["seed"], row["type"], row["step"]) == (1, "target grounding", 4)
     assert (row["time"], row["video_seconds"]) == (3.0, 1.5)
     assert "took b" in row["evidence"]

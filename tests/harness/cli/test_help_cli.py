@@ -7,7 +7,7 @@ import json
 import pytest
 from run_fakes import FakePolicy
 
-from robospa.harness import doctor
+from robospa.harness import machine_check
 from robospa.harness.cli.main import COMMANDS, main
 from robospa.protocol.server import ServerThread
 from robospa.tasks.catalog import build_scene, tasks
@@ -42,12 +42,12 @@ def test_the_list_of_commands_is_not_cut(
 def test_options_of_eval_stand_in_the_groups_of_its_settings(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    text = output(capsys, "eval", "--help")
+    text = output(capsys, "eval", "--help-all")
     sections = {
         part.splitlines()[0].rstrip(":"): part for part in text.split("\n\n") if ":\n" in part
     }
-    assert list(sections)[-8:] == [
-        "Selection", "Plan", "Simulation", "Timing", "Connection", "Retries", "Compute", "Recording"
+    assert list(sections)[-7:] == [
+        "Selection", "Simulation", "Timing", "Connection", "Retries", "Compute", "Recording"
     ]  # fmt: skip
     assert "--embodiment" in sections["Selection"] and "--video" in sections["Recording"]
     assert "--resume" in sections["Options"] and "--tasks" not in sections["Options"]
@@ -98,7 +98,7 @@ def test_tasks_as_json(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_lint_as_json(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
-        main(["lint", "paper", "--json"])
+        main(["report", "paper", "--lint", "--json"])
     found = json.loads(capsys.readouterr().out)
     assert found["errors"] == sum(f["severity"] == "error" for f in found["findings"]) > 0
 
@@ -107,13 +107,15 @@ def test_a_server_s_checks_as_json(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
-        doctor, "run_checks", lambda: iter([doctor.SystemCheck("simulator", True, "fine")])
+        machine_check,
+        "run_checks",
+        lambda: iter([machine_check.SystemCheck("simulator", True, "fine")]),
     )
     with ServerThread(policy_factory=FakePolicy) as server:
         found = json.loads(
             output(capsys, "check", server.url, "--trials", "0", "--load-seconds", "0", "--json")
         )
-        machine = json.loads(output(capsys, "doctor", "--json"))
+        machine = json.loads(output(capsys, "check", "--json"))
     assert found["url"] == server.url and found["passed"]
     assert {"name", "passed", "detail"} == set(found["checks"][0])
     assert machine["checks"] == [{"name": "simulator", "ok": True, "detail": "fine", "fix": ""}]

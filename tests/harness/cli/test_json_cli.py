@@ -16,43 +16,36 @@ from run_by_hand import outcomes, write
 
 from robospa.harness.cli.main import COMMANDS, NAMES
 
+TASK = "Pick_Blocks_Size"
 SILENT = {
     "demo": "shows how the others look",
     "serve": "runs until it is stopped",
     "view": "opens a browser",
-    "push": "prints an address",
-    "record": "prints the file",
     "learn train": "prints the folder",
     "learn curve": "prints the figure",
     "submit template": "prints a TOML file",
-    "assets add": "prints what assets --json lists",
 }
 """Commands that report nothing to a program, and why."""
 ELSEWHERE = {
-    "doctor": "test_help_cli",
     "check": "test_help_cli",
     "eval": "test_eval_cli",
-    "latency": "test_latency_cli",
     "seeds": "test_seeds_cli",
     "collect": "test_collect_cli",
-    "assets": "test_assets_cli",
-    "checkout": "test_checkout_cli",
+    "official assets": "test_assets_cli",
+    "official checkout": "test_checkout_cli",
     "submit pack": "test_submit_cli",
     "submit verify": "test_submit_cli",
     "submit block": "test_submit_cli",
     "submit reproduce": "test_submit_cli",
     "leaderboard add": "test_leaderboard_cli",
-    "audit": "test_audit_cli",
 }
 """Commands that need more than a run on disk, and the file of the test that parses their JSON."""
 HERE = {
     "report": "report {run}",
-    "failures": "failures {run}",
     "compare": "compare {run} {other}",
-    "lint": "lint {run}",
     "paper": "paper --out {tmp}/paper --table basic",
     "tasks": "tasks Pick_Blocks_Size",
-    "instructions": "instructions {tmp}/checkout --tasks Pick_Blocks_Size --levels 2",
+    "official instructions": "official instructions {tmp}/checkout --levels 2 --tasks {task}",
     "leaderboard build": "leaderboard build --submissions {tmp}/none --out {tmp}/site",
 }
 
@@ -90,6 +83,8 @@ def test_standard_output_is_one_json_value(line: str, tmp_path: Path) -> None:
     for name, found in (("one", [1, 1, 0]), ("two", [1, 0, 0])):
         write(tmp_path / name, outcomes("Pick_Blocks_Size", 1, found))
     write_checkout(tmp_path / "checkout")
-    words = line.format(run=tmp_path / "one", other=tmp_path / "two", tmp=tmp_path).split()
+    words = line.format(
+        run=tmp_path / "one", other=tmp_path / "two", tmp=tmp_path, task=TASK
+    ).split()
     done = robospa(*words, "--json")
     assert json.loads(done.out) and "Traceback" not in done.err

@@ -1,4 +1,4 @@
-"""`robospa latency`: a run for every latency, then one table and one figure."""
+"""`robospa eval --latency`: a run for every latency, then one table and one figure."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from robospa.harness.running.record_store import RecordWriter
 from robospa.harness.running.worker import Worker
 
 WORDS = [
-    "latency",
+    "eval",
     "clock_fakes:walker",
     *("--world", "clock_fakes:TargetWorld", "--parts", "run_fakes:parts"),
     *("--tasks", "Pick_Blocks_Size", "--levels", "1", "--seeds", "100000-100011"),
@@ -69,7 +69,7 @@ def run(words: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, str,
 def test_one_command_gives_runs_a_table_and_a_figure(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    words = ["--latencies", "0,120,240,480", "--out", str(tmp_path)]
+    words = ["--latency", "0,120,240,480", "--out", str(tmp_path)]
     code, out, err = run(words, capsys)
     assert code == 0, err
     assert "success against latency" in out and "alf of the success is gone at" in out
@@ -89,10 +89,10 @@ def test_one_command_gives_runs_a_table_and_a_figure(
 def test_latencies_that_make_no_curve_are_refused(
     latencies: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    code, _, err = run([f"--latencies={latencies}", "--out", str(tmp_path)], capsys)
+    code, _, err = run([f"--latency={latencies}", "--out", str(tmp_path)], capsys)
     assert code == 1 and "no growing milliseconds" in err
 
 
 def test_a_folder_is_needed(capsys: pytest.CaptureFixture[str]) -> None:
-    code, _, err = run([], capsys)
+    code, _, err = run(["--latency", "0,100"], capsys)
     assert code == 1 and "--out" in err

@@ -64,5 +64,5 @@ def test_a_collection_names_its_extra_before_it_makes_anything(
 
 
 def test_a_folder_in_place_of_a_checkout(tmp_path: Path) -> None:
-    done = robospa("checkout", tmp_path)
+    done = robospa("official", "checkout", tmp_path)
     assert f"the checkout cannot be used: {tmp_path} has no folder envs" in done.err

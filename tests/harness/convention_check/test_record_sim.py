@@ -1,4 +1,4 @@
-"""What `robospa record` writes is a demonstration that can be replayed."""
+"""What `robospa collect --record` writes is a demonstration that can be replayed."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def test_a_recorded_trial_is_a_demonstration(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file = tmp_path / "demo.hdf5"
-    words = ["record", "Pick_Blocks_Size", "--out", str(file)]
+    words = ["collect", "--record", "Pick_Blocks_Size", "--out", str(file)]
     with pytest.raises(SystemExit) as end:
         main(words)
     assert end.value.code == 0 and "success" in capsys.readouterr().out

@@ -215,7 +215,7 @@ def test_every_frame_is_asked_in_a_trial_of_its_own() -> None:
         ({"privileged": True}, "exact state"),
         ({"environment_state": True}, "exact state"),
         ({"action_dim": 16}, "numbers an action"),
-        ({"state": "measured"}, "robospa record"),
+        ({"state": "measured"}, "robospa collect --record"),
     ],
 )
 def test_what_cannot_be_compared_is_one_sentence(change: dict[str, Any], told: str) -> None:

@@ -24,7 +24,7 @@ def test_seeds_are_found_and_a_run_is_recorded_in_its_own_suite(
     seeds, out = tmp_path / "seeds.json", tmp_path / "run"
     what = ["--tasks", "Click_Bell_Repeat", "--levels", "1,2"]
     with pytest.raises(SystemExit) as found:
-        main(["checkout", world, "--find", str(seeds), *what, "--trials", "2"])
+        main(["official", "checkout", world, "--find", str(seeds), *what, "--trials", "2"])
     assert found.value.code == 0
     listed = {"1": [100000, 100004], "2": [100000, 100004]}
     assert json.loads(seeds.read_text()) == {"Click_Bell_Repeat": listed}

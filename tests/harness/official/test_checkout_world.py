@@ -237,7 +237,7 @@ def test_a_run_in_a_checkout_has_its_world_splits_and_episodes(checkout: Path) -
 @pytest.mark.parametrize(
     ("more", "sentence"),
     [
-        ({"seeds": None}, "robospa checkout DIR --find"),
+        ({"seeds": None}, "robospa official checkout DIR --find"),
         ({"video": "all"}, "leave video out"),
         ({"instructions": "x"}, "leave instructions out"),
         ({"control": "fixed_rate"}, "leave control out"),

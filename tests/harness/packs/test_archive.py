@@ -47,7 +47,7 @@ def archive_with(root: Path, *files: str) -> Archive:
 
 
 def test_without_a_folder_the_user_is_told_how_to_name_one() -> None:
-    with pytest.raises(ArchiveError, match="`robospa assets add DIR` or ROBOSPA_ASSETS"):
+    with pytest.raises(ArchiveError, match="`robospa official assets DIR --add` or ROBOSPA_ASSETS"):
         open_archive()
 
 

@@ -178,7 +178,7 @@ def without_meshes(root: Path) -> None:
 def test_a_harmed_urdf_file_is_known_before_anything_is_made(
     tmp_path: Path, harm: Change, sentence: str
 ) -> None:
-    """By `robospa assets`, and by a run, which refuses the tasks that need it."""
+    """By `robospa official assets`, and by a run, which refuses the tasks that need it."""
     root = make_archive(tmp_path, ["microwave"])
     model = official_models("microwave")[0]
     assert not fault(open_archive(root), model)

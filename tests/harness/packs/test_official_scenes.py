@@ -75,7 +75,7 @@ def test_objects_are_drawn_with_their_pictures() -> None:
     try:
         world = SapienWorld(render=True)
     except RenderUnavailable as error:
-        pytest.fail(f"nothing can be drawn here, see `robospa doctor`: {error}")
+        pytest.fail(f"nothing can be drawn here, see `robospa check`: {error}")
     red = []
     for name in ("builtin", "official"):
         world.load(with_pack(scene, name))

@@ -35,7 +35,7 @@ def test_robots_are_told_apart_by_their_colors() -> None:
     try:
         world = SapienWorld(render=True)
     except RenderUnavailable as error:
-        pytest.fail(f"nothing can be drawn here, see `robospa doctor`: {error}")
+        pytest.fail(f"nothing can be drawn here, see `robospa check`: {error}")
     white, blue, dark = {}, {}, {}
     for name in ROBOTS:
         world.load(build_scene("Basic_Color_Blocks", 1, 100003, name))

@@ -19,7 +19,7 @@ from report_runs import RECORDS, make_run
 from run_fakes import FakePolicy, FakeStill, FakeWorld, NanPolicy
 
 from robospa.harness.cli import running
-from robospa.harness.cli.failures import failures
+from robospa.harness.cli.report import report
 from robospa.harness.pool import WorkerDied, WorkerStuck
 from robospa.harness.running import films as module
 from robospa.harness.running.evaluate import Request, evaluate
@@ -131,7 +131,7 @@ def test_what_every_film_would_meet_ends_the_filming_and_the_rest_stays_wanted(
     films.close()
     assert not filmers.alive
     (line,) = [text for text in module.film_lines(films) if stopped in text]
-    assert line.endswith(f"`robospa failures {films.config.folder} --film` makes them")
+    assert line.endswith(f"`robospa report {films.config.folder} --film` makes them")
 
 
 def test_ctrl_c_leaves_what_is_not_made_for_later(
@@ -400,9 +400,9 @@ def test_the_command_makes_missing_films_before_it_counts(
     monkeypatch.setattr(module, "SAPIEN_NAME", "run_fakes:FakeWorld")
     monkeypatch.setattr(module, "TASK_PARTS", "run_fakes:parts")
     capsys.readouterr()
-    failures(tmp_path, by="task", trials=True, film=True, layout="json")
+    report([tmp_path], failures=True, trials=True, film=True, as_json=True)
     out, err = capsys.readouterr()
     assert [row["video"] for row in json.loads(out)] == [film_name(key) for key in KEYS[:2]]
     assert err.splitlines()[-1] == "2 films made"
-    failures(tmp_path, by="task", trials=True, film=True, layout="json")
+    report([tmp_path], failures=True, trials=True, film=True, as_json=True)
     assert capsys.readouterr().err == "no film is missing\n"

@@ -41,10 +41,10 @@ def test_every_command_says_that_actions_are_out_of_reach(
     assert f"(99 %) {SHARE}: {HINT} First: Pick_Blocks_Size-L1-" in seen
     assert "action 2: the left arm cannot reach position (-0.250, 0.000, 0.200)" in seen
 
-    seen = printed("failures", run, "--trials")
+    seen = printed("report", run, "--failures", "--trials")
     assert "no attempt | no gripper came near anything that was asked for; 149 of 150" in seen
-    assert SHARE in printed("failures", run)
-    assert "[unreachable-actions]" in printed("lint", run)
+    assert SHARE in printed("report", run, "--failures")
+    assert "[unreachable-actions]" in printed("report", run, "--lint")
 
     printed("report", run)
     report = tmp_path / "run" / "report"

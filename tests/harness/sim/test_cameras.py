@@ -29,7 +29,7 @@ def test_pictures_are_bytes_with_sky_outside_the_room_and_shadows_of_sun_and_lam
     try:
         scene = sapien.Scene([open_render_system()])
     except RenderUnavailable as error:
-        pytest.fail(f"nothing can be drawn here, see `robospa doctor`: {error}")
+        pytest.fail(f"nothing can be drawn here, see `robospa check`: {error}")
     room = DrawnFurniture(scene)
     camera = new_camera(scene, 32, 24)
 

@@ -42,7 +42,7 @@ def renderer() -> Renderer:
     try:
         made = Renderer()
     except RenderUnavailable as error:
-        pytest.fail(f"nothing can be drawn here, see `robospa doctor`: {error}")
+        pytest.fail(f"nothing can be drawn here, see `robospa check`: {error}")
     made.sync(BARE, ROBOT, object_model)
     return made
 

@@ -27,7 +27,7 @@ def world() -> SapienWorld:
     try:
         return SapienWorld(render=True)
     except RenderUnavailable as error:
-        pytest.fail(f"nothing can be drawn here, see `robospa doctor`: {error}")
+        pytest.fail(f"nothing can be drawn here, see `robospa check`: {error}")
 
 
 def seen(world: SapienWorld, around: Surroundings, camera: CameraSpec = HEAD) -> NDArray[np.int16]:

@@ -45,7 +45,7 @@ def drawn(world: SapienWorld, mode: str) -> NDArray[np.uint8]:
     try:
         return np.hstack(world.still().draw(CAMERAS))
     except RenderUnavailable as error:
-        pytest.fail(f"nothing can be drawn here, see `robospa doctor`: {error}")
+        pytest.fail(f"nothing can be drawn here, see `robospa check`: {error}")
 
 
 def psnr(a: NDArray[np.uint8], b: NDArray[np.uint8]) -> float:

@@ -33,7 +33,7 @@ def renderer() -> Renderer:
     try:
         made = Renderer()
     except RenderUnavailable as error:
-        pytest.fail(f"nothing can be drawn here, see `robospa doctor`: {error}")
+        pytest.fail(f"nothing can be drawn here, see `robospa check`: {error}")
     made.sync(Scene("Test_Bodies", 1, 100000, ROBOT.name, "clean", (), {}), ROBOT, object_model)
     return made
 

@@ -41,7 +41,7 @@ def world() -> SapienWorld:
     try:
         return SapienWorld(render=True)
     except RenderUnavailable as error:
-        pytest.fail(f"nothing can be drawn here, see `robospa doctor`: {error}")
+        pytest.fail(f"nothing can be drawn here, see `robospa check`: {error}")
 
 
 def test_observe_draws_exactly_the_cameras_asked_for(world: SapienWorld) -> None:
@@ -191,4 +191,4 @@ def test_without_a_device_physics_runs_and_drawing_says_what_to_do() -> None:
         timeout=120,
     )
     assert done.stdout.startswith("RenderUnavailable"), done.stderr
-    assert "robospa doctor" in done.stdout
+    assert "robospa check" in done.stdout

@@ -110,7 +110,7 @@ def test_lint_warns_above_a_share(tmp_path: Path, diagnostics: dict[str, Any], r
 
 def test_report_and_failures_say_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = write(tmp_path / "run", [trial(0, **BELOW), trial(1, text_budget=50)]).folder
-    command("failures", str(folder))
+    command("report", str(folder), "--failures")
     printed = capsys.readouterr().out
     assert "98 of 200 actions (49 %) ask for a pose out of reach" in printed
     assert "1 of 2 trials (50 %) have an instruction that is longer" in printed

@@ -95,9 +95,9 @@ def test_every_command_prints_names_as_they_are(
     named(other, "plain")
     assert name in output(capsys, "report", run)
     assert run.name in output(capsys, "compare", run, other, "--variants", "--drops")
-    output(capsys, "lint", run, other)
-    output(capsys, "failures", run)
-    assert _unescaped(name) in _unescaped(output(capsys, "failures", run, "--trials"))
+    output(capsys, "report", run, other, "--lint")
+    output(capsys, "report", run, "--failures")
+    assert _unescaped(name) in _unescaped(output(capsys, "report", run, "--failures", "--trials"))
     page = (run / "report" / "report.html").read_text()
     assert "<b>x" not in page and 'evil.org"' not in page
 

@@ -1,7 +1,7 @@
 """Checks of what a machine needs to simulate and to draw, each with the one thing to do.
 
 Every check runs in a process of its own with a time limit: a broken driver may end or hang the
-process that asks it, and the doctor is there to say so.
+process that asks it, and this is here to say so.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def run_checks() -> Iterator[SystemCheck]:
 
 def _run(name: str, function: str, fix: str) -> SystemCheck:
     """One check function of this module, in a child process."""
-    code = f"from robospa.harness import doctor; doctor.report(doctor.{function})"
+    code = f"from robospa.harness import machine_check as m; m.report(m.{function})"
     command = [sys.executable, "-W", "ignore", "-c", code]
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=TIME_LIMIT)

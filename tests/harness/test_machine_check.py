@@ -1,15 +1,15 @@
-"""The doctor's findings, with healthy and with broken checks."""
+"""What a machine lacks, with healthy and with broken checks."""
 
 from __future__ import annotations
 
 import pytest
 
-from robospa.harness import doctor
+from robospa.harness import machine_check
 from robospa.harness.sim.vulkan import Device
 
 
 def test_a_passing_check_needs_nothing_done(capsys: pytest.CaptureFixture[str]) -> None:
-    doctor.report(lambda: "fine")
+    machine_check.report(lambda: "fine")
     assert capsys.readouterr().out == '{"ok": true, "detail": "fine"}\n'
 
 
@@ -17,12 +17,12 @@ def test_a_failing_check_says_why(capsys: pytest.CaptureFixture[str]) -> None:
     def broken() -> str:
         raise RuntimeError("no device")
 
-    doctor.report(broken)
+    machine_check.report(broken)
     assert '"detail": "RuntimeError: no device"' in capsys.readouterr().out
 
 
 def test_a_check_whose_process_dies_is_a_finding() -> None:
-    check = doctor._run("driver", "no_such_check", "install one")
+    check = machine_check._run("driver", "no_such_check", "install one")
     assert not check.ok
     assert check.fix == "install one"
     assert "AttributeError" in check.detail
@@ -47,6 +47,6 @@ def test_a_gpu_driver_is_never_too_old() -> None:
 
 @pytest.mark.sim
 def test_all_checks_of_this_machine_are_named_and_have_a_fix_if_they_fail() -> None:
-    checks = list(doctor.run_checks())
+    checks = list(machine_check.run_checks())
     assert [c.name for c in checks][:3] == ["simulator", "physics", "vulkan device"]
     assert all(bool(c.fix) is not c.ok for c in checks)
