@@ -18,7 +18,7 @@ from film_fakes import KEYS, Filmers, config, recorded
 from report_runs import RECORDS, make_run
 from run_fakes import FakePolicy, FakeStill, FakeWorld, NanPolicy
 
-from robospa.harness.cli import running
+from robospa.harness.cli import eval as command
 from robospa.harness.cli.report import report
 from robospa.harness.pool import WorkerDied, WorkerStuck
 from robospa.harness.running import films as module
@@ -324,9 +324,9 @@ def test_scores_are_shown_although_films_are_missing(
     def interrupted(asked: Request) -> None:
         raise FilmsInterrupted("3 films are still to be made")
 
-    monkeypatch.setattr(running, "evaluate", interrupted)
+    monkeypatch.setattr(command, "run_request", interrupted)
     with pytest.raises(typer.Exit) as ended:
-        running.run_and_show(request(tmp_path))
+        command.run_and_show(request(tmp_path))
     out, err = capsys.readouterr()
     assert ended.value.exit_code == 130 and "Pick It" in out
     assert err == "robospa: interrupted after the last trial; 3 films are still to be made\n"
