@@ -10,8 +10,8 @@ import pytest
 from bundle_fakes import PICK, SEEDS, make_run
 from fake_records import trial_record
 
-from robospa.harness.cli.audit import _read as read_for_audit
 from robospa.harness.running.action_files import write_actions
+from robospa.leaderboard.audit import _read as read_for_audit
 from robospa.leaderboard.audit import expert_likeness
 from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.rules import Reference, shipped
