@@ -24,7 +24,7 @@ from robospa.harness.trial import TrialParts, run_trial, task_parts
 from robospa.harness.trial_identity import policy_seed, trial_id
 from robospa.harness.world import World
 from robospa.leaderboard.agreement import Counts, agreement
-from robospa.leaderboard.rules import shipped
+from robospa.leaderboard.rules import shipped, spec_of
 from robospa.leaderboard.traces import Trace, joint_path, with_joints
 from robospa.leaderboard.verify import read_traces, verify
 from robospa.protocol.policy import Policy
@@ -74,7 +74,7 @@ def audit(
     findings = faults(run)
     if reproduction is not None:
         findings.append(hidden_gap(run, read_run(reproduction)))
-    if samples and not run.info.salt_sha256:
+    if samples and not run.manifest.settings.salt_sha256:
         with closing(SapienWorld(render=False)) as world:
             expert = partial(expert_actions, world, load_function(EXPERT)())
             findings.append(expert_likeness(traces, expert))
@@ -94,7 +94,7 @@ def _read(path: Path, count: int) -> tuple[Run, dict[TrialKey, Trace]]:
     chosen = _spread(good, count)
     if bundle:
         traces = read_traces(bundle, chosen)
-        spaces = {key: bundle.settings.spec(key.task).action for key in chosen}
+        spaces = {key: spec_of(bundle.settings, key.task).action for key in chosen}
     else:
         files = {key: action_path(path, key) for key in chosen}
         read = {key: read_actions(file) for key, file in files.items()}

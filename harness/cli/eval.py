@@ -189,12 +189,11 @@ def _curve(
     """Evaluate at every latency [ms], the same trials; write the curve beside the runs."""
     from robospa.harness.running.request import make_request
     from robospa.results.comparison.latency_curve import curve_table, latency_curve
-    from robospa.results.figures.latency_curve import draw_latency_curves
+    from robospa.results.figures.curves import draw_latency_curves
     from robospa.results.figures.series import save, styled
     from robospa.results.records.run_io import read_run
     from robospa.results.scoring.model_results import results_of_run
-    from robospa.results.tables.markdown import to_markdown
-    from robospa.results.tables.terminal import show
+    from robospa.results.tables import show, to_markdown
 
     if settings.out is None:
         raise SettingsError("a curve is several runs: name a folder for them with --out")

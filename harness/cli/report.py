@@ -127,8 +127,7 @@ def _report(
 
 def _failures(folder: Path, by: str, trials: bool, film: bool, as_json: bool) -> None:
     """Print the types of failure in a run; docs/failures.md says how they are decided."""
-    from robospa.results.failures.labels import OURS, label
-    from robospa.results.failures.listing import counts_table, trials_table
+    from robospa.results.failures.labels import OURS, counts_table, label, trials_table
     from robospa.results.records.action_problems import problem_lines
     from robospa.results.records.run_io import read_run
 
