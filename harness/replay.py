@@ -13,12 +13,13 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.harness.running.action_files import read_actions, read_joints
+from robospa.harness.running.action_files import ActionRecorder, read_actions, read_joints
 from robospa.harness.trial import Recorder, TrialParts, run_trial, task_parts
+from robospa.harness.trial_identity import policy_seed, trial_id
 from robospa.harness.world import JOINTS_FROM_EE, ActionError, Poll, StepResult, World
 from robospa.observation import Observation
 from robospa.protocol.errors import PolicyAnswerError
-from robospa.protocol.policy import PolicySpec, TrialInfo
+from robospa.protocol.policy import Policy, PolicySpec, TrialInfo
 from robospa.results.records.run_io import action_path
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
@@ -145,3 +146,22 @@ def replay_record(
             f"{key.slug} played again ends in another state: the run is not repeatable on this "
             "machine"
         )
+
+
+def expert_actions(world: World, expert: Policy, key: TrialKey) -> NDArray[np.float32]:
+    """What the expert does in the scene of `key`, float32 (T, D)."""
+    recorder = ActionRecorder()
+    run_trial(world, expert, key, policy_seed=0, recorder=recorder)
+    return recorder.actions
+
+
+def rehearse(world: World, policy: Policy, key: TrialKey, setup: TrialParts) -> TrialRecord:
+    """The record of `key` with this scene, goal and instruction, which serve for one trial."""
+    return run_trial(
+        world,
+        policy,
+        key,
+        policy_seed=policy_seed(key),
+        trial_id=trial_id(key),
+        parts=lambda _: setup,
+    )

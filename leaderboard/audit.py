@@ -18,16 +18,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.harness.factory import load_function, open_policy
-from robospa.harness.running.action_files import ActionRecorder, read_actions, read_joints
+from robospa.harness.replay import expert_actions, rehearse
+from robospa.harness.running.action_files import read_actions, read_joints
 from robospa.harness.sim.sapien_world import SapienWorld
-from robospa.harness.trial import TrialParts, run_trial, task_parts
-from robospa.harness.trial_identity import policy_seed, trial_id
-from robospa.harness.world import World
+from robospa.harness.trial import TrialParts, task_parts
 from robospa.leaderboard.agreement import Counts, agreement
 from robospa.leaderboard.rules import shipped, spec_of
 from robospa.leaderboard.traces import Trace, joint_path, with_joints
 from robospa.leaderboard.verify import read_traces, verify
-from robospa.protocol.policy import Policy
 from robospa.results.records.run_io import Run, action_path, finished, read_run
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.scoring.retried import fault_rates
@@ -107,25 +105,6 @@ def _read(path: Path, count: int) -> tuple[Run, dict[TrialKey, Trace]]:
 def _spread(keys: list[TrialKey], count: int) -> list[TrialKey]:
     """`count` of `keys`, spread over the list."""
     return keys[:: max(1, len(keys) // count)][:count] if count else []
-
-
-def expert_actions(world: World, expert: Policy, key: TrialKey) -> Trace:
-    """What the expert does in the scene of `key`, float32 (T, D)."""
-    recorder = ActionRecorder()
-    run_trial(world, expert, key, policy_seed=0, recorder=recorder)
-    return recorder.actions
-
-
-def rehearse(world: World, policy: Policy, key: TrialKey, setup: TrialParts) -> TrialRecord:
-    """The record of `key` with this scene, goal and instruction, which serve for one trial."""
-    return run_trial(
-        world,
-        policy,
-        key,
-        policy_seed=policy_seed(key),
-        trial_id=trial_id(key),
-        parts=lambda _: setup,
-    )
 
 
 def hidden_gap(public: Run, hidden: Run) -> AuditFinding:
