@@ -52,7 +52,7 @@ Value = bool | int | float | str | list[str] | None
 G = TypeVar("G")
 
 
-LISTS = ("tasks", "levels", "seeds", "embodiment", "mode", "split")
+LISTS = ("tasks", "levels", "seeds", "embodiment", "mode", "split", "cameras")
 """Texts that may also be given as lists: ["GAC", "RPF"] is "GAC,RPF"."""
 
 
@@ -275,12 +275,12 @@ def updated(settings: EvaluationSettings, given: Mapping[str, object]) -> Evalua
     for group, kind in GROUPS.items():
         inside = {name: value for name, value in given.items() if groups[name] == group}
         if inside:
-            changes[group] = _changed(getattr(settings, group), kind, inside)
+            changes[group] = changed(getattr(settings, group), kind, inside)
     top = {name: value for name, value in given.items() if not groups[name]}
-    return replace(_changed(settings, EvaluationSettings, top), **changes)  # type: ignore[arg-type]
+    return replace(changed(settings, EvaluationSettings, top), **changes)  # type: ignore[arg-type]
 
 
-def _changed(old: G, kind: type[G], given: Mapping[str, object]) -> G:
+def changed(old: G, kind: type[G], given: Mapping[str, object]) -> G:
     """`old` with the values in `given`, each read as its field's type."""
     texts = {name: _text(name, value) for name, value in given.items()}
     # Each entry of a list is one of the choices, not all of it: the group itself checks that.

@@ -148,8 +148,8 @@ def _order(settings: Collection, layout: str, out: Path) -> Order:
 def _collected(
     order: Order, compute: Compute, resume: bool, keep: bool, say: Callable[[str], None]
 ) -> CollectionResult | None:
+    from robospa.harness.datasets.api import pool_opener
     from robospa.harness.datasets.collect import collect as make
-    from robospa.harness.datasets.open_pool import pool_opener
 
     with pool_opener(compute) as open_pool:
         return make(order, open_pool, resume=resume, keep_episodes=keep, say=say)

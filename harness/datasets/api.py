@@ -1,25 +1,39 @@
-"""`robospa.collect`: a data set of demonstrations as one call, with every setting as a keyword."""
+"""`robospa.collect`: a data set of demonstrations as one call, with every setting as a keyword; and
+the workers of a collection, processes here or actors on a Ray cluster."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import fields
+from functools import partial
 from pathlib import Path
-from typing import TypeVar
+from typing import Any
 
-from robospa.harness.datasets.collect import CollectionResult, Order
+from robospa.harness.datasets.collect import CollectionResult, OpenPool, Order
 from robospa.harness.datasets.collect import collect as make
-from robospa.harness.datasets.jobs import MAKER
-from robospa.harness.datasets.open_pool import pool_opener
+from robospa.harness.datasets.jobs import (
+    MAKER,
+    EpisodeAttempt,
+    EpisodeJob,
+    MakerError,
+    crashed,
+    maker_at,
+)
 from robospa.harness.datasets.settings import Collection, command_of, versions
-from robospa.harness.settings import LISTS, Compute, SettingsError
-from robospa.protocol.options import read_options
+from robospa.harness.pool import JobProcess, JobWorker, Pool, WorkerDied
+from robospa.harness.running.autoscaling import cores
+from robospa.harness.running.ray_cluster import NoCluster, RaySettings, error_line, join_cluster
+from robospa.harness.seeds.attempt import Attempt
+from robospa.harness.settings import Compute, SettingsError, changed
 from robospa.registry import did_you_mean
 
-T = TypeVar("T")
-
-TEXTS = (*LISTS, "cameras")
-"""Settings that may be given as lists: ["GAC", "RPF"] is "GAC,RPF"."""
+StartWorker = Callable[[], JobWorker[EpisodeJob, Attempt]]
+EPISODE_SECONDS = 3600.0
+"""A worker that is still at an episode after this hangs."""
+EPISODES_PER_WORKER = 200
+"""A worker is replaced after so many: whatever a simulator and a driver of graphics keep of each
+scene, memory stays bounded. Starting one costs what one short episode does."""
 
 
 def collect(
@@ -56,12 +70,8 @@ def collect(
         MakerError: An episode cannot be made on this machine; StorageError if `out` cannot be
             written. What is done is kept, and `resume` goes on.
     """
-    return _collect(
-        out,
-        {"tasks": tasks, "levels": levels, "episodes": episodes, "workers": workers, **settings},
-        format,
-        resume,
-    )
+    named = {"tasks": tasks, "levels": levels, "episodes": episodes, "workers": workers}
+    return _collect(out, {**named, **settings}, format, resume)
 
 
 def _collect(
@@ -78,25 +88,113 @@ def _collect(
         near = did_you_mean(unknown, known)
         listed = ", ".join(known)
         raise SettingsError(f"there is no setting {unknown!r}; {near}known are {listed}")
-    collection, compute = _settings(Collection, given), _settings(Compute, given)
+    names = {field.name for field in fields(Compute)}
+    compute = changed(Compute(), Compute, {k: v for k, v in given.items() if k in names})
+    own = {name: value for name, value in given.items() if name not in names}
+    collection = changed(Collection(), Collection, own)
     order = Order(collection, layout, Path(out), command_of(collection, layout), versions())
     with pool_opener(compute, maker) as open_pool:
         return make(order, open_pool, resume=resume)
 
 
-def _settings(kind: type[T], given: Mapping[str, object]) -> T:
-    """One group of settings, of those that are `given`."""
-    names = [field.name for field in fields(kind) if field.name in given]  # type: ignore[arg-type]
+@contextmanager
+def pool_opener(compute: Compute, maker: str = MAKER) -> Iterator[OpenPool]:
+    """What opens the workers that `compute` asks for; `maker` is `module:function`.
+
+    Raises NoCluster. A cluster is left at the end.
+    """
+    if compute.executor == "local":
+        start = partial(JobProcess, maker_at, maker, seconds=EPISODE_SECONDS, name="maker")
+        yield lambda episodes: _pool(start, min(compute.workers or cores(), episodes))
+        return
+    settings = RaySettings(
+        compute.address or "auto", compute.workers, compute.cpus_per_worker, compute.gpus_per_worker
+    )
+    with ray_makers(settings, maker) as on_node:
+        yield lambda episodes: _pool(on_node, min(on_node.capacity(), episodes))
+
+
+def _pool(start: StartWorker, workers: int) -> Pool[EpisodeJob, Attempt]:
+    return Pool(start, workers, crashed=crashed, jobs_each=EPISODES_PER_WORKER)
+
+
+class MakerActor:
+    """What runs on a node: the maker at `path`, `module:function`, once the node has shown that it
+    has the driver's `versions`."""
+
+    def __init__(self, versions: Mapping[str, str], path: str) -> None:
+        from robospa.harness.running.ray_node import version_differences
+
+        self._path, self._maker = path, None
+        self._differences = version_differences(versions)
+
+    def make(self, job: EpisodeJob) -> EpisodeAttempt | str:
+        """What comes of `job`, or why nothing can be made here."""
+        from robospa.harness.datasets.jobs import attempt_job
+        from robospa.harness.factory import load_function
+
+        if self._differences:
+            return f"a Ray node cannot be used: {self._differences}; install there what is here"
+        try:
+            self._maker = self._maker or load_function(self._path)()
+            return attempt_job(self._maker, job)  # type: ignore[arg-type]
+        except Exception as error:
+            return f"{error}" or type(error).__name__
+
+
+class RayMaker:
+    """One actor, as the driver sees it."""
+
+    def __init__(self, ray: Any, actor: Any) -> None:
+        self._ray, self._actor = ray, actor
+
+    def run(self, job: EpisodeJob) -> EpisodeAttempt:
+        """What comes of `job`; raises WorkerDied, MakerError."""
+        try:
+            answer = self._ray.get(self._actor.make.remote(job))
+        except Exception as error:
+            raise WorkerDied(error_line(error)) from error
+        if isinstance(answer, EpisodeAttempt):
+            return answer
+        raise MakerError(str(answer))
+
+    def kill(self) -> None:
+        """End it now."""
+        with suppress(Exception):  # it may be gone already
+            self._ray.kill(self._actor)
+
+
+class RayMakers:
+    """Starts makers on a cluster."""
+
+    def __init__(self, ray: Any, settings: RaySettings, path: str) -> None:
+        from robospa.harness.running.ray_node import versions
+
+        self._ray, self._settings, self._path = ray, settings, path
+        self._versions = versions()
+
+    def capacity(self) -> int:
+        """How many workers fit into the cluster; raises NoCluster if none does."""
+        free = self._ray.cluster_resources()
+        fitting = int(free.get("CPU", 0.0) / self._settings.cpus + 1e-6)
+        if self._settings.gpus:
+            fitting = min(fitting, int(free.get("GPU", 0.0) / self._settings.gpus + 1e-6))
+        if not fitting:
+            raise NoCluster("the Ray cluster has no room for a worker; lower --cpus-per-worker")
+        return min(fitting, self._settings.workers or fitting)
+
+    def __call__(self) -> RayMaker:
+        """One more, where there is room."""
+        needs = {"num_cpus": self._settings.cpus, "num_gpus": self._settings.gpus}
+        actor = self._ray.remote(MakerActor).options(**needs).remote(self._versions, self._path)
+        return RayMaker(self._ray, actor)
+
+
+@contextmanager
+def ray_makers(settings: RaySettings, path: str) -> Iterator[RayMakers]:
+    """The makers of the cluster of `settings`, which is left afterwards; raises NoCluster."""
+    ray = join_cluster(settings.address)
     try:
-        return read_options(kind, {name: _text(name, given[name]) for name in names})
-    except SettingsError:
-        raise
-    except ValueError as error:
-        raise SettingsError(str(error)) from error
-
-
-def _text(name: str, value: object) -> object:
-    """`value`, but one text for a list, where TEXTS allow that."""
-    if name not in TEXTS or isinstance(value, str):
-        return value
-    return ",".join(map(str, value)) if isinstance(value, Sequence) else str(value)
+        yield RayMakers(ray, settings, path)
+    finally:
+        ray.shutdown()

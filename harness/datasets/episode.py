@@ -19,9 +19,9 @@ import struct
 import zipfile
 import zlib
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
-from typing import Annotated, TypeVar
+from typing import Annotated, Any
 
 import msgspec
 import numpy as np
@@ -167,8 +167,6 @@ ARRAYS: Mapping[str, type[np.generic]] = {
 """The arrays of an episode and what their numbers are."""
 
 
-G = TypeVar("G", bound=np.generic)
-
 FORMAT = 2
 """Version of this file's layout; another is refused."""
 HEADER = "episode.json"
@@ -211,15 +209,25 @@ class _Header:
     about: dict[str, str]
 
 
+SAME = [field.name for field in fields(_Header) if field.name not in ("format", "cameras", "about")]
+"""What an episode and its header have alike."""
+
+
 def episode_bytes(episode: DatasetEpisode) -> bytes:
     """The content of the file of `episode`."""
+    cameras = {
+        camera: _Camera(seen.codec, seen.width, seen.height, len(episode))
+        for camera, seen in episode.pictures.items()
+    }
+    same = {name: getattr(episode, name) for name in SAME}
+    header = _Header(FORMAT, **same, cameras=cameras, about=dict(episode.about))
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w", zipfile.ZIP_STORED) as file:
 
         def put(name: str, data: bytes) -> None:
             file.writestr(zipfile.ZipInfo(name, TIME), data)
 
-        put(HEADER, msgspec.json.format(msgspec.json.encode(asdict(_header(episode))), indent=1))
+        put(HEADER, msgspec.json.format(msgspec.json.encode(asdict(header)), indent=1))
         for name, dtype in ARRAYS.items():
             put(f"{name}.npy", _npy(np.asarray(getattr(episode, name), dtype)))
         for camera, seen in episode.pictures.items():
@@ -256,28 +264,6 @@ def read_episode_file(path: Path, pictures: bool = True) -> DatasetEpisode:
         raise EpisodeFileError(f"{path} cannot be read as an episode: {error}") from error
 
 
-def _header(episode: DatasetEpisode) -> _Header:
-    return _Header(
-        FORMAT,
-        episode.key,
-        episode.kind,
-        episode.success,
-        episode.instructions,
-        episode.space,
-        episode.stride,
-        episode.subtasks,
-        episode.events,
-        episode.scene_digest,
-        episode.replay_digest,
-        episode.failure,
-        {
-            camera: _Camera(seen.codec, seen.width, seen.height, len(episode))
-            for camera, seen in episode.pictures.items()
-        },
-        dict(episode.about),
-    )
-
-
 def _read(file: zipfile.ZipFile, pictures: bool) -> DatasetEpisode:
     data = parse_json(file.read(HEADER).decode())
     version = data.get("format") if isinstance(data, dict) else None
@@ -287,30 +273,10 @@ def _read(file: zipfile.ZipFile, pictures: bool) -> DatasetEpisode:
             "version that wrote it, or collect it again"
         )
     header = read(_Header, data, HEADER, EpisodeFileError)
-    return DatasetEpisode(
-        header.key,
-        header.kind,
-        header.success,
-        header.instructions,
-        header.space,
-        header.stride,
-        _array(file, "commanded", np.float32),
-        _array(file, "measured", np.float32),
-        _array(file, "action", np.float32),
-        _array(file, "ee", np.float32),
-        _array(file, "sim_time", np.float64),
-        _array(file, "subtask", np.int32),
-        _array(file, "label", np.uint8),
-        _array(file, "environment_state", np.float32),
-        _array(file, "prefix_action", np.float32),
-        subtasks=header.subtasks,
-        events=header.events,
-        scene_digest=header.scene_digest,
-        replay_digest=header.replay_digest,
-        failure=header.failure,
-        pictures=_pictures(file, header.cameras) if pictures else {},
-        about=header.about,
-    )
+    same = {name: getattr(header, name) for name in SAME}
+    same |= {name: _array(file, name, dtype) for name, dtype in ARRAYS.items()}
+    found = _pictures(file, header.cameras) if pictures else {}
+    return DatasetEpisode(**same, pictures=found, about=header.about)
 
 
 def _pictures(file: zipfile.ZipFile, cameras: Mapping[str, _Camera]) -> dict[str, Pictures]:
@@ -336,12 +302,12 @@ def _npy(array: NDArray[np.generic]) -> bytes:
     return stream.getvalue()
 
 
-def _array(file: zipfile.ZipFile, name: str, dtype: type[G]) -> NDArray[G]:
+def _array(file: zipfile.ZipFile, name: str, dtype: type[np.generic]) -> NDArray[Any]:
     data = io.BytesIO(file.read(f"{name}.npy"))
     found = np.lib.format.read_array(data, allow_pickle=False)
     if found.dtype != dtype:
         raise EpisodeFileError(f"has {name} of {found.dtype}, not {np.dtype(dtype)}")
     if not np.isfinite(found).all():
         raise EpisodeFileError(f"has numbers in {name} that are not finite")
-    array: NDArray[G] = found
+    array: NDArray[Any] = found
     return array

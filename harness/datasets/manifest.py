@@ -109,25 +109,22 @@ class EpisodeLine:
         return rows if len(rows) else np.zeros((0, 0), np.float32)
 
 
+SAME = (
+    "key", "kind", "stride", "scene_digest", "replay_digest", "instructions", "subtasks", "failure",
+    "absent", "source", "source_sha256",
+)  # fmt: skip
+"""What an episode and its line have alike."""
+
+
 def episode_line(index: int, episode: DatasetEpisode, file: str = "") -> EpisodeLine:
     """The line of `episode`, number `index`."""
     return EpisodeLine(
-        index,
-        episode.key,
-        episode.kind,
-        None if "success" in episode.absent else episode.success,
-        len(episode),
-        episode.stride,
-        episode.scene_digest,
-        episode.replay_digest,
-        episode.instructions,
-        episode.subtasks,
-        episode.failure,
-        file,
-        tuple(tuple(row) for row in episode.prefix_action.tolist()),
-        episode.absent,
-        episode.source,
-        episode.source_sha256,
+        episode_index=index,
+        success=None if "success" in episode.absent else episode.success,
+        frames=len(episode),
+        file=file,
+        prefix_action=tuple(tuple(row) for row in episode.prefix_action.tolist()),
+        **{name: getattr(episode, name) for name in SAME},
     )
 
 

@@ -18,8 +18,8 @@ from collect_fakes import FakePool, contents, fake_pack, order
 from ray_helpers import QUIET, SIZE, cluster, kill_node
 
 from robospa.harness.datasets import collect as collecting
+from robospa.harness.datasets.api import pool_opener
 from robospa.harness.datasets.collect import collect
-from robospa.harness.datasets.open_pool import pool_opener
 from robospa.harness.running.ray_cluster import NoCluster, RaySettings, check_address
 from robospa.harness.running.ray_executor import RayExecutor, ray_executor
 from robospa.harness.running.runner import Runner, RunOptions
