@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.baselines.oracle import Oracle
-from robospa.harness.demonstrations.changed_plans import KINDS, FailingExpert, wrong_plan
+from robospa.harness.demonstrations.changed_plans import KINDS, ChangedExpert, wrong_plan
 from robospa.harness.robots import embodiment
 from robospa.observation import Observation
 from robospa.tasks.snapshot import snapshot_from_json
@@ -38,13 +38,13 @@ class FailingOracle(Oracle):
             observation["privileged"], embodiment(self._scene.embodiment).grippers
         )
         if self._expert is None:
-            expert = FailingExpert(self._scene, snapshot, ())
+            expert = ChangedExpert(self._scene, snapshot, ())
             try:
                 plan = wrong_plan(self.kind, self._scene, expert.workspace)
                 self.applies = True
             except ValueError:
                 plan, self.applies = (), False
-            self._expert = FailingExpert(self._scene, snapshot, plan)
+            self._expert = ChangedExpert(self._scene, snapshot, plan)
         return self._expert.next(snapshot)
 
 

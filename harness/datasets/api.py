@@ -10,16 +10,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from robospa.harness.datasets import jobs
 from robospa.harness.datasets.collect import CollectionResult, OpenPool, Order
 from robospa.harness.datasets.collect import collect as make
-from robospa.harness.datasets.jobs import (
-    MAKER,
-    EpisodeAttempt,
-    EpisodeJob,
-    MakerError,
-    crashed,
-    maker_at,
-)
 from robospa.harness.datasets.settings import Collection, command_of, versions
 from robospa.harness.pool import JobProcess, JobWorker, Pool, WorkerDied
 from robospa.harness.running.autoscaling import cores
@@ -28,7 +21,7 @@ from robospa.harness.seeds.attempt import Attempt
 from robospa.harness.settings import Compute, SettingsError, changed
 from robospa.registry import did_you_mean
 
-StartWorker = Callable[[], JobWorker[EpisodeJob, Attempt]]
+StartWorker = Callable[[], JobWorker[jobs.EpisodeJob, Attempt]]
 EPISODE_SECONDS = 3600.0
 """A worker that is still at an episode after this hangs."""
 EPISODES_PER_WORKER = 200
@@ -79,7 +72,7 @@ def _collect(
     given: dict[str, object],
     layout: str,
     resume: bool = False,
-    maker: str = MAKER,
+    maker: str = jobs.MAKER,
 ) -> CollectionResult | None:
     """`collect` with all settings by name; `maker` makes the episodes."""
     kinds = (Collection, Compute)
@@ -98,13 +91,13 @@ def _collect(
 
 
 @contextmanager
-def pool_opener(compute: Compute, maker: str = MAKER) -> Iterator[OpenPool]:
+def pool_opener(compute: Compute, maker: str = jobs.MAKER) -> Iterator[OpenPool]:
     """What opens the workers that `compute` asks for; `maker` is `module:function`.
 
     Raises NoCluster. A cluster is left at the end.
     """
     if compute.executor == "local":
-        start = partial(JobProcess, maker_at, maker, seconds=EPISODE_SECONDS, name="maker")
+        start = partial(JobProcess, jobs.maker_at, maker, seconds=EPISODE_SECONDS, name="maker")
         yield lambda episodes: _pool(start, min(compute.workers or cores(), episodes))
         return
     settings = RaySettings(
@@ -114,8 +107,8 @@ def pool_opener(compute: Compute, maker: str = MAKER) -> Iterator[OpenPool]:
         yield lambda episodes: _pool(on_node, min(on_node.capacity(), episodes))
 
 
-def _pool(start: StartWorker, workers: int) -> Pool[EpisodeJob, Attempt]:
-    return Pool(start, workers, crashed=crashed, jobs_each=EPISODES_PER_WORKER)
+def _pool(start: StartWorker, workers: int) -> Pool[jobs.EpisodeJob, Attempt]:
+    return Pool(start, workers, crashed=jobs.crashed, jobs_each=EPISODES_PER_WORKER)
 
 
 class MakerActor:
@@ -128,7 +121,7 @@ class MakerActor:
         self._path, self._maker = path, None
         self._differences = version_differences(versions)
 
-    def make(self, job: EpisodeJob) -> EpisodeAttempt | str:
+    def make(self, job: jobs.EpisodeJob) -> jobs.EpisodeAttempt | str:
         """What comes of `job`, or why nothing can be made here."""
         from robospa.harness.datasets.jobs import attempt_job
         from robospa.harness.factory import load_function
@@ -148,15 +141,15 @@ class RayMaker:
     def __init__(self, ray: Any, actor: Any) -> None:
         self._ray, self._actor = ray, actor
 
-    def run(self, job: EpisodeJob) -> EpisodeAttempt:
+    def run(self, job: jobs.EpisodeJob) -> jobs.EpisodeAttempt:
         """What comes of `job`; raises WorkerDied, MakerError."""
         try:
             answer = self._ray.get(self._actor.make.remote(job))
         except Exception as error:
             raise WorkerDied(error_line(error)) from error
-        if isinstance(answer, EpisodeAttempt):
+        if isinstance(answer, jobs.EpisodeAttempt):
             return answer
-        raise MakerError(str(answer))
+        raise jobs.MakerError(str(answer))
 
     def kill(self) -> None:
         """End it now."""

@@ -75,17 +75,48 @@ PRESS_BESIDE = 0.06
 
 @dataclass(frozen=True)
 class ActBeside:
-    """Do `call` as if its object lay shifted by `by` [m] in the plane."""
+    """Do `call` once as if its object lay shifted by `by` [m] in the plane."""
 
     call: Pick | Press
     by: tuple[float, float]
 
+    def steps(self, ws: Workspace) -> Steps:
+        """One attempt at a place that is off."""
+        name, seen = self.call.object, ws.snapshot
+        x, y, z = seen.poses[name].position
+        shifted = Pose((x + self.by[0], y + self.by[1], z), seen.poses[name].rotation)
+        ws.snapshot = replace(seen, poses={**seen.poses, name: shifted})
+        steps = pick(ws, self.call) if isinstance(self.call, Pick) else press(ws, self.call)
+        try:
+            rows = next(steps)
+        finally:
+            ws.snapshot = seen
+        steps.close()
+        ws.update_state((yield rows))
+        if isinstance(self.call, Pick):
+            for arm in (0, 1):
+                if ws.gripper[arm] < 0.5:
+                    ws.add(arm, gripper=1.0)
+            yield from ws.flush()
+
 
 @dataclass(frozen=True)
 class Hover:
-    """Reach for `object` with open gripper and stay there."""
+    """Reach for `object` with open gripper, up to where a pick would close, and stay there."""
 
     object: str
+
+    def steps(self, ws: Workspace) -> Steps:
+        """The way in; then nothing for ever, for going home would be another mistake."""
+        steps = pick(ws, Pick(self.object))
+        rows = next(steps)
+        steps.close()
+        grippers = ws.robot.action_space("joint").grippers
+        closed = [i for i, row in enumerate(rows) if row[grippers].min() < 0.05]
+        ws.update_state((yield rows[: closed[0]] if closed else rows))
+        while True:
+            ws.add(0)
+            yield from ws.flush()
 
 
 @dataclass(frozen=True)
@@ -94,81 +125,71 @@ class ReleaseAnywhere:
 
     object: str
 
+    def steps(self, ws: Workspace) -> Steps:
+        """Open."""
+        arm = arm_holding(ws, self.object)
+        ws.add(arm, gripper=1.0)
+        ws.add(arm)
+        ws.held[arm] = None
+        yield from ws.flush()
+
 
 @dataclass(frozen=True)
 class GoWrong:
     """From here on the plan is not the task's; this itself takes no time."""
 
 
+@dataclass(frozen=True)
+class Wander:
+    """The free arms go anywhere; then the episode begins."""
+
+
+@dataclass(frozen=True)
+class Displace:
+    """`object` is put down beside its place; then the episode begins."""
+
+    object: str
+
+
 Call = Skill | ActBeside | Hover | ReleaseAnywhere | GoWrong
 
 
-class FailingExpert(Expert):
-    """An expert that also knows how to go wrong; `failures` lists what it did not bring about."""
+class ChangedExpert(Expert):
+    """An expert whose plan may have these calls; `failures` lists what it did not bring about.
+
+    A plan with a `Wander` or a `Displace` needs `rng`.
+    """
 
     went_wrong = False
     """True from the plan's `GoWrong` on."""
+    begun = False
+    """True from the episode's beginning on, in a plan with a `Wander` or a `Displace`."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        snapshot: Snapshot,
+        plan: Sequence[object],
+        rng: np.random.Generator | None = None,
+    ) -> None:
+        super().__init__(scene, snapshot, plan)
+        self._rng = rng
 
     def _single(self, call: object) -> Steps:
         ws = self.workspace
         if isinstance(call, GoWrong):
             self.went_wrong = True
-        elif isinstance(call, ActBeside):
-            yield from act_beside(ws, call)
-        elif isinstance(call, Hover):
-            yield from hover(ws, call)
-        elif isinstance(call, ReleaseAnywhere):
-            arm = arm_holding(ws, call.object)
-            ws.add(arm, gripper=1.0)
-            ws.add(arm)
-            ws.held[arm] = None
+        elif isinstance(call, ActBeside | Hover | ReleaseAnywhere):
+            yield from call.steps(ws)
+        elif self._rng is not None and isinstance(call, Displace):
+            yield from displace(ws, call.object, self._rng)
+            self.begun = True
+        elif self._rng is not None and isinstance(call, Wander):
+            wander(ws, self._rng)
             yield from ws.flush()
+            self.begun = True
         else:
             yield from super()._single(call)
-
-
-def act_beside(ws: Workspace, call: ActBeside) -> Steps:
-    """One attempt at a place that is off by `call.by`."""
-    name, seen = call.call.object, ws.snapshot
-    pose = seen.poses[name]
-    x, y, z = pose.position
-    shifted = Pose((x + call.by[0], y + call.by[1], z), pose.rotation)
-    ws.snapshot = Snapshot(
-        seen.time,
-        {**seen.poses, name: shifted},
-        seen.gripper,
-        seen.end_effector,
-        seen.joints,
-        seen.measured,
-        seen.contacts,
-        seen.hinges,
-        grasp_points=seen.grasp_points,
-    )
-    steps = pick(ws, call.call) if isinstance(call.call, Pick) else press(ws, call.call)
-    try:
-        rows = next(steps)
-    finally:
-        ws.snapshot = seen
-    steps.close()
-    ws.update_state((yield rows))
-    if isinstance(call.call, Pick):
-        for arm in (0, 1):
-            if ws.gripper[arm] < 0.5:
-                ws.add(arm, gripper=1.0)
-        yield from ws.flush()
-
-
-def hover(ws: Workspace, call: Hover) -> Steps:
-    """The way in of a pick, up to where it would close."""
-    steps = pick(ws, Pick(call.object))
-    rows = next(steps)
-    steps.close()
-    grippers = ws.robot.action_space("joint").grippers
-    closed = [i for i, row in enumerate(rows) if row[grippers].min() < 0.05]
-    ws.update_state((yield rows[: closed[0]] if closed else rows))
-    while True:  # going home would be another mistake
-        ws.add(0)
-        yield from ws.flush()
 
 
 def free_side(scene: Scene, ws: Workspace, name: str) -> tuple[float, float]:
@@ -368,18 +389,6 @@ ASIDE = (0.02, 0.05)
 """How far beside its place it is put down [m]."""
 
 
-@dataclass(frozen=True)
-class Wander:
-    """The free arms go anywhere; then the episode begins."""
-
-
-@dataclass(frozen=True)
-class Displace:
-    """`object` is put down beside its place; then the episode begins."""
-
-    object: str
-
-
 def middle_plan(scene: Scene, rng: np.random.Generator) -> tuple[object, ...]:
     """The task's plan with a `Wander` or a `Displace` where the episode begins.
 
@@ -401,35 +410,6 @@ def beginnings(plan: Sequence[Skill]) -> list[int]:
     """The calls before which nothing is held, and all that is done can be seen."""
     last = next((i for i, call in enumerate(plan) if isinstance(call, TRACELESS)), len(plan) - 1)
     return [i for i in range(last + 1) if not isinstance(plan[i], CARRIES)]
-
-
-class MidstateExpert(Expert):
-    """An expert whose plan has a `Wander` or a `Displace`."""
-
-    begun = False
-    """True from the episode's beginning on."""
-
-    def __init__(
-        self,
-        scene: Scene,
-        snapshot: Snapshot,
-        plan: Sequence[object],
-        rng: np.random.Generator,
-    ) -> None:
-        super().__init__(scene, snapshot, plan)
-        self._rng = rng
-
-    def _single(self, call: object) -> Steps:
-        if not isinstance(call, Wander | Displace):
-            yield from super()._single(call)
-            return
-        ws = self.workspace
-        if isinstance(call, Displace):
-            yield from displace(ws, call.object, self._rng)
-        else:
-            wander(ws, self._rng)
-            yield from ws.flush()
-        self.begun = True
 
 
 def wander(ws: Workspace, rng: np.random.Generator) -> None:

@@ -274,9 +274,9 @@ def show(
 def _go_wrong(run: DemonstrationRun, name: str) -> tuple[Demonstration, float]:
     """The mistake `name`, and the time [s] from which on it is made; at its end nothing moves."""
     scene, start = run.parts.scene, run.world.snapshot()
-    workspace = changed_plans.FailingExpert(scene, start, ()).workspace
+    workspace = changed_plans.ChangedExpert(scene, start, ()).workspace
     plan = changed_plans.wrong_plan(name, scene, workspace)
-    expert = changed_plans.FailingExpert(scene, start, changed_plans.marked(scene, plan))
+    expert = changed_plans.ChangedExpert(scene, start, changed_plans.marked(scene, plan))
     wrong_from: float | None = None
     still = 0
     while not run.has("failed") and still < STILL:
@@ -294,7 +294,7 @@ def _from_the_middle(
 ) -> Demonstration:
     """A demonstration that `recorder` sees from the middle of `plan` on."""
     world, rng = run.world, generator_of(key, "before")
-    expert = changed_plans.MidstateExpert(run.parts.scene, world.snapshot(), plan, rng)
+    expert = changed_plans.ChangedExpert(run.parts.scene, world.snapshot(), plan, rng)
     while not (expert.finished or expert.begun or run.has("failed")):
         rows = expert.next(world.snapshot())
         if expert.begun:
