@@ -27,13 +27,10 @@ from dataclasses import replace
 from pathlib import Path
 
 from robospa.harness.robots import embodiments
-from robospa.harness.seeds.attempt import expert_pool
-from robospa.harness.seeds.confirm import confirm
-from robospa.harness.seeds.evidence import Evidence
-from robospa.harness.seeds.inputs import inputs
-from robospa.harness.seeds.lists import read_levels, save
-from robospa.harness.seeds.progress import searches, sweep_with_bar
+from robospa.harness.seeds.attempt import Evidence, expert_pool
+from robospa.harness.seeds.lists import inputs, read_levels, save
 from robospa.harness.seeds.summary import expert_table, read_rows, row_of, write_rows
+from robospa.harness.seeds.sweep import confirm, searches, sweep_with_bar
 from robospa.harness.selection import (
     canonical_mode,
     parse_embodiments,

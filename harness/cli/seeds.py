@@ -89,9 +89,9 @@ def _sweep(
     as_json: bool,
 ) -> bool:
     """Make the lists, or only `check`; whether the expert solves all of `keys` often enough."""
-    from robospa.harness.seeds.evidence import Evidence
+    from robospa.harness.seeds.attempt import Evidence
     from robospa.harness.seeds.lists import local_file, local_folder, save
-    from robospa.harness.seeds.progress import searches, sweep_with_bar
+    from robospa.harness.seeds.sweep import searches, sweep_with_bar
 
     console, solved = plain_console(quiet=as_json), True
     rows: list[dict[str, object]] = []

@@ -17,7 +17,7 @@ from msgspec import Meta
 
 from robospa.environment_state import WIDTH
 from robospa.harness.datasets.pictures import CODECS
-from robospa.harness.running.code_hash import ROOTS, hash_files, package_files
+from robospa.harness.running.code_hash import FOLDERS, code_hash
 from robospa.harness.running.ray_node import versions as packages
 from robospa.harness.selection import (
     parse_embodiments,
@@ -119,18 +119,18 @@ def trial_of(key: ListKey, seed: int) -> TrialKey:
 
 
 MADE_BY = (
-    *ROOTS,
-    "robospa.harness.datasets.maker",
-    "robospa.harness.datasets.pack",
+    *FOLDERS,
+    "harness/datasets/",
+    "harness/demonstrations/",
 )
-"""What makes episodes and packs them; code that they import counts too."""
+"""What makes episodes and packs them."""
 
 
 @cache
 def versions() -> dict[str, str]:
     """Suite, packages, and a hash of the code: with other ones, other bytes may come out."""
     found = {"suite": SUITE, **packages()}
-    found["code"] = hash_files(package_files(), MADE_BY)
+    found["code"] = code_hash(MADE_BY)
     for package in ("av", "pillow"):
         try:
             found[package] = metadata.version(package)

@@ -2,10 +2,8 @@
 
 | module | |
 |---|---|
-| `attempt` | the expert's trial of one seed, and the processes that run them |
-| `sweep` | the first accepted seeds of many variants, all processes busy |
-| `evidence` | finished attempts on disk: a sweep goes on where it stopped |
-| `inputs` | one hash of all that can change whether a seed is accepted |
-| `lists` | where lists are: shipped with the package, or made by this user |
+| `attempt` | the expert's trial of one seed, the processes that run them, finished ones on disk |
+| `sweep` | the first accepted seeds of many variants, all processes busy; old lists confirmed |
+| `lists` | where lists are: shipped with the package, or made by this user; what they depend on |
 | `summary` | attempts in figures, and the table of the expert |
 """

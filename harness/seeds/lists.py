@@ -7,13 +7,19 @@ runs, whose manifest says that it was made there. A ranking knows the shipped li
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
+from importlib import metadata
+from importlib.util import find_spec
 from pathlib import Path
 
 from robospa.harness.running.atomic_file import replace_file
-from robospa.harness.seeds.inputs import inputs
+from robospa.harness.running.code_hash import FOLDERS, LENGTH, code_hash
+from robospa.registry import ROBOTS, SCENE_MODES, module_of
+from robospa.tasks.catalog import home_of
 from robospa.tasks.modes import tangible
 from robospa.tasks.scene import SUITE
 from robospa.tasks.seeds import ListKey, NoSeedList, accepted
@@ -71,3 +77,39 @@ def save(path: Path, level: int, seeds: Sequence[int]) -> None:
     rows = ",\n".join(f'"{k}": {json.dumps(list(lists[k]))}' for k in sorted(lists) if lists[k])
     path.parent.mkdir(parents=True, exist_ok=True)
     replace_file(path, ("{\n" + rows + "\n}\n").encode())
+
+
+NOT_EXECUTED = (
+    "tasks/seeds/",
+    "tasks/families/",
+    "tasks/instructions/",
+    "tasks/sentences.py",
+    "protocol/",
+    "clients/",
+    "harness/clock/",
+)
+
+
+def inputs(key: ListKey) -> str:
+    """16 hexadecimal digits that are equal while every attempt at `key` ends alike: those of the
+    suite, the simulator, and the code and data that the expert's trials of one task execute. Other
+    families of tasks do not count, nor robots and modes of other packages that `key` does not name.
+    """
+    robots = key.embodiment.partition(":")[0].split("+")
+    mode = key.mode.partition(":")[0]
+    modules = [home_of(key.task), *(module_of(ROBOTS, r) for r in robots)]
+    return _hash(*modules, module_of(SCENE_MODES, mode))
+
+
+@cache
+def _hash(task: str, *modules: str) -> str:
+    family = task.removeprefix("robospa.").rpartition(".")[0].replace(".", "/")
+    folders = [FOLDERS, ("baselines/*", "tasks/families/*")]
+    if task.startswith("robospa."):
+        folders.append((f"{family}/",))
+    hashes = [code_hash(folders[0], NOT_EXECUTED), *map(code_hash, folders[1:])]
+    digest = hashlib.sha256(f"{SUITE} {metadata.version('sapien')} {hashes}".encode())
+    for name in (task, *modules):
+        if not name.startswith("robospa.") and (spec := find_spec(name or " ")) and spec.origin:
+            digest.update(name.encode() + Path(spec.origin).read_bytes())
+    return digest.hexdigest()[:LENGTH]

@@ -7,12 +7,16 @@ the last one of the list.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass, field
 
-from robospa.harness.seeds.attempt import Attempt
+from robospa.harness.seeds.attempt import Attempt, Evidence, expert_pool
+from robospa.harness.seeds.lists import inputs
 from robospa.tasks.seeds import ListKey
+from robospa.terminal import plain_console
+from robospa.text import duration_text
 
 Submit = Callable[[ListKey, int], Future[Attempt]]
 """Has a seed tried, in a while."""
@@ -131,3 +135,108 @@ def _take_done(opened: list[Search]) -> Iterator[Search]:
     for search in [s for s in opened if s.done]:
         opened.remove(search)
         yield search
+
+
+@dataclass(frozen=True)
+class Confirmed:
+    """What came of a list: `differs` names the seeds that end otherwise now; `tried` how many were
+    run again, none if there is no record of them."""
+
+    key: ListKey
+    tried: int
+    differs: tuple[int, ...]
+
+    @property
+    def holds(self) -> bool:
+        """Whether all that was run again ended as before."""
+        return self.tried > 0 and not self.differs
+
+
+def confirm(
+    submit: Submit, lists: Mapping[ListKey, str], evidence: Evidence, count: int
+) -> Iterator[Confirmed]:
+    """Run the first `count` accepted and the first refused trial of every list again.
+
+    `lists` says with which inputs each was made.
+    """
+    known = {key: _sample(evidence.attempts(key, made), count) for key, made in lists.items()}
+    running = {key: [submit(key, a.seed) for a in some] for key, some in known.items()}
+    for key, before in known.items():
+        now = [future.result() for future in running[key]]
+        pairs = zip(before, now, strict=True)
+        yield Confirmed(key, len(now), tuple(a.seed for a, b in pairs if _end(a) != _end(b)))
+
+
+def _sample(attempts: Mapping[int, Attempt], count: int) -> Sequence[Attempt]:
+    found = [attempts[seed] for seed in sorted(attempts)]
+    refused = [item for item in found if not item.accepted]
+    return [item for item in found if item.accepted][:count] + refused[:1]
+
+
+def _end(item: Attempt) -> tuple[object, ...]:
+    return item.accepted, item.digest, item.physics_steps, item.steps
+
+
+def searches(
+    keys: Sequence[ListKey],
+    start: int,
+    count: int,
+    evidence: Evidence,
+    *,
+    measure: bool = False,
+    fresh: bool = False,
+) -> list[Search]:
+    """A search for each of `keys`, with what `evidence` knows unless all is made `fresh`."""
+
+    def known(key: ListKey) -> dict[int, Attempt]:
+        return {} if fresh else evidence.attempts(key, inputs(key))
+
+    return [Search(key, start, count, measure, known(key)) for key in keys]
+
+
+def sweep_with_bar(
+    wanted: Sequence[Search],
+    workers: int,
+    evidence: Evidence,
+    stop: Callable[[], bool] = lambda: False,
+) -> Iterator[Search]:
+    """Every search of `wanted` once it is done; each attempt is kept as it finishes.
+
+    Once `stop` says so, no more trials are begun, and what is not done is left out.
+    """
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+    columns = (
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[speed]}", markup=False),
+    )
+    total = sum(search.count for search in wanted)
+    known = sum(_got(search) for search in wanted)
+    begun, tried = time.monotonic(), 0
+    with Progress(*columns, console=plain_console()) as bar, expert_pool(workers) as pool:
+        row = bar.add_task("seeds", total=total, completed=known, speed="")
+
+        def note(search: Search, item: Attempt) -> None:
+            nonlocal tried
+            evidence.add(search.key, inputs(search.key), item)
+            tried += 1
+            rate = tried / (time.monotonic() - begun)
+            bar.update(row, description=str(search.key))
+            if item.accepted or search.measures:
+                bar.advance(row)
+            left = bar.tasks[0].remaining or 0
+            bar.update(row, speed=f"{rate:.2f} trials/s, {duration_text(left / rate)} left")
+
+        def submit(key: ListKey, seed: int) -> Future[Attempt]:
+            return pool.submit((key, seed))
+
+        for search in sweep(submit, workers, wanted, note, stop):
+            bar.advance(row, search.count - _got(search))  # of one that was given up
+            yield search
+
+
+def _got(search: Search) -> int:
+    """How much of what it looks for it has."""
+    return len(search.row() if search.measures else search.accepted)

@@ -5,9 +5,8 @@ from __future__ import annotations
 from concurrent.futures import Future
 from pathlib import Path
 
-from robospa.harness.seeds.attempt import Attempt
-from robospa.harness.seeds.confirm import confirm
-from robospa.harness.seeds.evidence import Evidence
+from robospa.harness.seeds.attempt import Attempt, Evidence
+from robospa.harness.seeds.sweep import confirm
 from robospa.tasks.seeds import ListKey
 
 SAME, CHANGED, UNKNOWN = ListKey("Same", 1), ListKey("Changed", 1), ListKey("Unknown", 1)

@@ -6,11 +6,17 @@ from pathlib import Path
 
 import pytest
 
-from robospa.harness.seeds import inputs as module
-from robospa.harness.seeds.attempt import Attempt
-from robospa.harness.seeds.evidence import Evidence
-from robospa.harness.seeds.inputs import inputs
-from robospa.harness.seeds.lists import LOCAL, SHIPPED, find_list, local_file, read_levels, save
+from robospa.harness.seeds import lists as module
+from robospa.harness.seeds.attempt import Attempt, Evidence
+from robospa.harness.seeds.lists import (
+    LOCAL,
+    SHIPPED,
+    find_list,
+    inputs,
+    local_file,
+    read_levels,
+    save,
+)
 from robospa.harness.seeds.summary import expert_table, read_rows, row_of, write_rows
 from robospa.harness.seeds.sweep import Search
 from robospa.harness.selection import list_trials, parse_embodiments, parse_modes, seed_sources
