@@ -27,10 +27,9 @@ from frame import Figure, Result, main
 from numpy.typing import NDArray
 from step import IdleWorld, endless_trial
 
-from robospa.harness.running.autoscaling import cores, most_workers
 from robospa.harness.running.request import HELD
 from robospa.harness.running.runner import Runner, RunOptions
-from robospa.harness.running.status import Status
+from robospa.harness.running.status import Status, cores, most_workers
 from robospa.harness.running.worker import WorkerConfig
 from robospa.harness.trial import TrialParts
 from robospa.harness.world import Poll, StepResult

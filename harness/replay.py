@@ -13,7 +13,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.harness.running.action_files import ActionRecorder, read_actions, read_joints
+from robospa.harness.running.record_store import ActionRecorder, read_actions, read_joints
 from robospa.harness.trial import Recorder, TrialParts, run_trial, task_parts
 from robospa.harness.trial_identity import policy_seed, trial_id
 from robospa.harness.world import JOINTS_FROM_EE, ActionError, Poll, StepResult, World

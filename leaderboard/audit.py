@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from robospa.harness.factory import load_function, open_policy
 from robospa.harness.replay import expert_actions, rehearse
-from robospa.harness.running.action_files import read_actions, read_joints
+from robospa.harness.running.record_store import read_actions, read_joints
 from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.harness.trial import TrialParts, task_parts
 from robospa.leaderboard.agreement import Counts, agreement

@@ -21,8 +21,8 @@ from msgspec import structs, to_builtins
 
 from robospa.harness.factory import load_function
 from robospa.harness.quantize import STEPS_PER_UNIT, is_quantized
-from robospa.harness.running.action_files import read_actions, read_joints
 from robospa.harness.running.manifest import changed_settings
+from robospa.harness.running.record_store import read_actions, read_joints
 from robospa.harness.world import World
 from robospa.harness.worlds import open_world
 from robospa.leaderboard import bundle as layout

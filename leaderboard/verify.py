@@ -21,7 +21,7 @@ from typing import Annotated
 from msgspec import Meta, Struct, to_builtins
 
 from robospa.categories import METRICS
-from robospa.harness.running.autoscaling import cores
+from robospa.harness.running.status import cores
 from robospa.leaderboard import bundle as layout
 from robospa.leaderboard.bundle import (
     BundleError,

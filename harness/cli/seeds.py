@@ -45,7 +45,7 @@ def seeds(
     `robospa eval` finds the lists. Each finished trial is kept: the same command goes on where it
     was stopped.
     """
-    from robospa.harness.running.autoscaling import cores
+    from robospa.harness.running.status import cores
     from robospa.harness.selection import (
         canonical_mode,
         parse_embodiments,

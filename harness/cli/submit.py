@@ -171,7 +171,7 @@ def block(
     parts: Hidden = None,
 ) -> None:
     """Draw hidden scenes that the expert solves, and print the commitment to publish beforehand."""
-    from robospa.harness.running.autoscaling import cores
+    from robospa.harness.running.status import cores
 
     valid = _load("verify:verify")(bundle, _load("rules:shipped")(world, parts), practice)
     count = _load("reproduce:plan")(valid, trials, alpha)
@@ -274,8 +274,8 @@ def scene_progress() -> Callable[[int, int], None]:
 
 def _replay(valid: Any, challenge: str, fraction: float, workers: int, reference: Any) -> Any:
     """Replay a sample of the trials, with a progress bar."""
-    from robospa.harness.running.autoscaling import cores
-    from robospa.harness.running.progress import Progress
+    from robospa.harness.progress import Progress
+    from robospa.harness.running.status import cores
 
     count = _load("evidence:sample_size")(fraction, len(valid.keys))
     with Progress(count) as progress:

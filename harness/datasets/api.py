@@ -15,8 +15,8 @@ from robospa.harness.datasets.collect import CollectionResult, OpenPool, Order
 from robospa.harness.datasets.collect import collect as make
 from robospa.harness.datasets.settings import Collection, command_of, versions
 from robospa.harness.pool import JobProcess, JobWorker, Pool, WorkerDied
-from robospa.harness.running.autoscaling import cores
-from robospa.harness.running.ray_cluster import NoCluster, RaySettings, error_line, join_cluster
+from robospa.harness.running.ray_executor import NoCluster, RaySettings, error_line, join_cluster
+from robospa.harness.running.status import cores
 from robospa.harness.seeds.attempt import Attempt
 from robospa.harness.settings import Compute, SettingsError, changed
 from robospa.registry import did_you_mean
@@ -116,7 +116,7 @@ class MakerActor:
     has the driver's `versions`."""
 
     def __init__(self, versions: Mapping[str, str], path: str) -> None:
-        from robospa.harness.running.ray_node import version_differences
+        from robospa.harness.running.ray_executor import version_differences
 
         self._path, self._maker = path, None
         self._differences = version_differences(versions)
@@ -161,7 +161,7 @@ class RayMakers:
     """Starts makers on a cluster."""
 
     def __init__(self, ray: Any, settings: RaySettings, path: str) -> None:
-        from robospa.harness.running.ray_node import versions
+        from robospa.harness.running.ray_executor import versions
 
         self._ray, self._settings, self._path = ray, settings, path
         self._versions = versions()

@@ -38,10 +38,8 @@ from robospa.harness.datasets.settings import (
     trial_of,
 )
 from robospa.harness.pool import Pool
-from robospa.harness.running.atomic_file import PARTIAL, replace_file, storage_errors
-from robospa.harness.running.run_lock import run_lock
-from robospa.harness.seeds.attempt import Attempt
-from robospa.harness.seeds.evidence import Evidence
+from robospa.harness.running.atomic_file import PARTIAL, replace_file, run_lock, storage_errors
+from robospa.harness.seeds.attempt import Attempt, Evidence
 from robospa.harness.seeds.sweep import Search, sweep
 from robospa.harness.settings import SettingsError
 from robospa.registry import did_you_mean

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, TextIO
 
 from robospa.harness.datasets.jobs import EpisodeAttempt
 from robospa.harness.datasets.settings import size_text
-from robospa.harness.running.progress import EVERY
+from robospa.harness.progress import EVERY
 from robospa.terminal import plain_console
 from robospa.text import clock_text
 

@@ -18,7 +18,7 @@ from msgspec import Meta
 from robospa.environment_state import WIDTH
 from robospa.harness.datasets.pictures import CODECS
 from robospa.harness.running.code_hash import FOLDERS, code_hash
-from robospa.harness.running.ray_node import versions as packages
+from robospa.harness.running.ray_executor import versions as packages
 from robospa.harness.selection import (
     parse_embodiments,
     parse_levels,

@@ -4,12 +4,18 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import faulthandler
+import fcntl
 import os
+import socket
+import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from robospa.results.records.manifest import RunError
+from robospa.results.records.run_state import LOCK
 
 PARTIAL = ".*.part"
 """What a file is called while it is being written."""
@@ -100,3 +106,60 @@ def replace_file(path: Path, data: bytes, parents: bool = True) -> None:
         finally:
             with contextlib.suppress(OSError):
                 part.unlink(missing_ok=True)
+
+
+LOGS = "logs"
+"""Folder inside a run that holds what its processes printed."""
+
+
+def log_to(path: Path) -> None:
+    """Send whatever libraries print, and the stack of a crash, to a file instead of the screen."""
+    with storage_errors(path):
+        path.parent.mkdir(exist_ok=True)
+        file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
+    os.dup2(file, sys.stdout.fileno())
+    os.dup2(file, sys.stderr.fileno())
+    faulthandler.enable()
+
+
+NAME_BYTES = 160
+TRIES, PAUSE = 5, 0.02
+"""A reader that looks whether the run is in progress holds the lock for less than this [s]."""
+
+
+@contextmanager
+def run_lock(folder: Path) -> Iterator[OpenFile]:
+    """Hold the run in `folder` for this process; raises RunError if another one holds it.
+
+    What it gives tells whether the folder is still the one that was locked.
+    """
+    path = folder / LOCK
+    with storage_errors(path):
+        folder.mkdir(parents=True, exist_ok=True)
+        file = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+    try:
+        try:
+            _lock(file)
+        except BlockingIOError as error:
+            holder = os.pread(file, NAME_BYTES, 0).decode(errors="replace").strip()
+            name = f" ({holder})" if holder.isprintable() and holder else ""
+            raise RunError(f"another process{name} is running the run in {folder}") from error
+        except OSError:
+            pass  # a file system without locks
+        name = f"process {os.getpid()} on {socket.gethostname()}"
+        with storage_errors(path):
+            os.pwrite(file, name.encode()[:NAME_BYTES].ljust(NAME_BYTES), 0)
+        yield OpenFile(path, file)
+    finally:
+        os.close(file)
+
+
+def _lock(file: int) -> None:
+    """Lock `file`; raises BlockingIOError if another process keeps holding it."""
+    for left in reversed(range(TRIES)):
+        try:
+            return fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            if not left:
+                raise
+            time.sleep(PAUSE)

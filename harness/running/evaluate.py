@@ -16,7 +16,8 @@ from msgspec import structs, to_builtins
 from robospa.harness.clock.clock import timed_suite, timing_warning
 from robospa.harness.factory import is_url
 from robospa.harness.pool import JobProcess, WorkerDied, WorkerStuck
-from robospa.harness.running.atomic_file import replace_file
+from robospa.harness.progress import Progress, summary
+from robospa.harness.running.atomic_file import replace_file, run_lock
 from robospa.harness.running.attempts import spent_trials
 from robospa.harness.running.executor import RunAborted
 from robospa.harness.running.films import films_of, finish_films
@@ -28,11 +29,8 @@ from robospa.harness.running.policy_probe import (
     probe_policies,
     warnings_of,
 )
-from robospa.harness.running.progress import Progress, summary
-from robospa.harness.running.ray_cluster import RaySettings
-from robospa.harness.running.ray_executor import loopback_warnings, ray_executor
+from robospa.harness.running.ray_executor import RaySettings, loopback_warnings, ray_executor
 from robospa.harness.running.record_store import recover_folder, remove_partial_files
-from robospa.harness.running.run_lock import run_lock
 from robospa.harness.running.runner import Runner, RunOptions
 from robospa.harness.running.status import Status
 from robospa.harness.running.tracking import Careful, open_tracker

@@ -1,18 +1,17 @@
-"""Where workers live, as the driver of a run sees it: a handle for each, and what starts them;
-those that are processes of this machine.
+"""Where workers live, as the driver of a run sees it: a handle for each, and what starts them.
 
-What a worker is sent and what it answers is the same everywhere, see `harness.running.messages`.
+What a worker is sent and what it answers is the same everywhere, see below.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from multiprocessing.connection import Connection, wait
-from typing import Protocol
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal, Protocol
 
-from robospa.harness import pool
-from robospa.harness.running.messages import Command, Message, Stop
-from robospa.harness.running.worker import WorkerConfig, main
+from robospa.results.records.trial_record import RetryRow, TrialRecord
+from robospa.trial import TrialKey
 
 
 class RunAborted(Exception):
@@ -72,83 +71,78 @@ class Executor(Protocol):
         """End everything that this executor started; all of its workers have ended."""
 
 
-class LocalWorker:
-    """One worker process and the pipe of one trial that it may hold; `spare` are those of more."""
+Activity = Literal["simulating", "waiting", "in_policy"]
+"""In the simulator; waiting for a policy server; inside a policy of the worker's own process."""
 
-    def __init__(
-        self, process: pool.Child, pipe: Connection, name: str, spare: Sequence[Connection] = ()
-    ) -> None:
-        self.process, self.pipe, self.name = process, pipe, name
-        self._spare = list(spare)
-
-    def another(self) -> LocalWorker | None:
-        """A place for one more trial; None if there is none."""
-        return LocalWorker(self.process, self._spare.pop(), self.name) if self._spare else None
-
-    def send(self, command: Command) -> None:
-        """Send it a command; nothing happens if it has ended. To stop it stops unused places."""
-        for pipe in [self.pipe, *(self._spare if isinstance(command, Stop) else ())]:
-            try:
-                pipe.send(command)
-            except OSError:
-                return  # it has just died, which `exit_status` reports
-
-    def messages(self) -> list[Message]:
-        """What it has sent since the last call; also after it has ended."""
-        received: list[Message] = []
-        try:
-            while self.pipe.poll():
-                received.append(self.pipe.recv())
-        except (EOFError, OSError):
-            self.process.join(0.1)  # closed: it is dying
-        return received
-
-    def exit_status(self) -> str | None:
-        """How it ended; None while it runs."""
-        return self.process.exit_status()
-
-    def pending(self) -> bool:
-        """Never: a process starts at once."""
-        return False
-
-    def kill(self) -> None:
-        """End it now."""
-        self.process.kill()
-
-    def join(self, seconds: float) -> None:
-        """Wait until it has ended, `seconds` at most."""
-        self.process.join(seconds)
-
-    def close(self) -> None:
-        """Free what is left of it."""
-        self.process.close()
+Fault = Literal["", "unreachable", "disconnected", "incompatible"]
+"""What is wrong with a policy server: nothing; nobody listens; the connection broke within a trial;
+it is another server than the one that the run began with."""
 
 
-class LocalExecutor:
-    """At most `workers` processes on this machine, which hold up to `held` trials each."""
+@dataclass(frozen=True)
+class RunTrial:
+    """To a worker: run this trial with the policy at `target`, a URL or a name, after the attempts
+    `retries` that did not count."""
 
-    def __init__(self, config: WorkerConfig, workers: int, held: int = 1) -> None:
-        self._config = config
-        self.workers = workers
-        self._held = held
+    key: TrialKey
+    target: str
+    retries: tuple[RetryRow, ...] = ()
 
-    def capacity(self) -> int:
-        """As many as were asked for."""
-        return self.workers
 
-    def start(self, name: str) -> LocalWorker:
-        """Start one more process."""
-        process = pool.Child(main, (self._config, name), name, pipes=self._held)
-        first, *spare = process.pipes
-        return LocalWorker(process, first, name, spare)
+@dataclass(frozen=True)
+class Stop:
+    """To a worker: close the connection to the policy and end."""
 
-    def wait(self, workers: Sequence[WorkerHandle], seconds: float) -> None:
-        """Return as soon as one of `workers` has sent something or ended, or after `seconds`."""
-        wait([worker.pipe for worker in workers if isinstance(worker, LocalWorker)], seconds)
 
-    def notes(self) -> list[str]:
-        """None: nothing ever happens to one machine."""
-        return []
+Command = RunTrial | Stop
 
-    def close(self) -> None:
-        """Nothing is left once the workers have ended."""
+
+@dataclass(frozen=True)
+class Ready:
+    """The worker takes trials and writes to the file `records`; None if the driver writes them."""
+
+    records: Path | None
+
+
+@dataclass(frozen=True)
+class Heartbeat:
+    """Sent about once a second; `progress` counts what has advanced (scenes, actions, answers).
+
+    `answers`: of policies, since the worker's start; the last one took `answer_ms` [ms].
+    """
+
+    progress: int
+    activity: Activity
+    answers: int = 0
+    answer_ms: float = 0.0
+
+
+@dataclass(frozen=True)
+class TrialDone:
+    """A trial has its record, which is on disk."""
+
+    record: TrialRecord
+
+
+@dataclass(frozen=True)
+class TrialLost:
+    """An attempt at a trial did not count.
+
+    `retry`: whether another may help. `row`: what a record keeps of this one. `fault`: what is
+    wrong with the policy's server."""
+
+    key: TrialKey
+    row: RetryRow
+    retry: bool = True
+    fault: Fault = ""
+
+
+@dataclass(frozen=True)
+class Fatal:
+    """No trial could ever be run."""
+
+    message: str
+
+
+Message = Ready | Heartbeat | TrialDone | TrialLost | Fatal
+"""From a worker."""

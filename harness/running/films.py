@@ -19,10 +19,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from robospa.harness.pool import LOWEST_PRIORITY, JobProcess, JobWorker, Pool, WorkerDied
-from robospa.harness.running.atomic_file import StorageError, replace_file, storage_errors
-from robospa.harness.running.autoscaling import cores
-from robospa.harness.running.log_file import LOGS, log_to
-from robospa.harness.running.progress import Progress
+from robospa.harness.progress import Progress
+from robospa.harness.running.atomic_file import (
+    LOGS,
+    StorageError,
+    log_to,
+    replace_file,
+    storage_errors,
+)
+from robospa.harness.running.status import cores
 from robospa.harness.running.worker import WorkerConfig, describe, load_parts
 from robospa.harness.settings import Recording, SettingsError
 from robospa.harness.settings_file import FILE, read_settings

@@ -22,8 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.harness.factory import is_url
-from robospa.harness.running.messages import Activity, Heartbeat
-from robospa.harness.running.turn import Turn
+from robospa.harness.running.executor import Activity, Heartbeat
 from robospa.observation import Observation
 from robospa.protocol.errors import (
     PolicyAnswerError,
@@ -227,3 +226,38 @@ class HeartbeatMonitor:
     def deadline(self) -> float:
         """When it is too late; infinite inside a policy of the worker's own."""
         return float("inf") if self._activity == "in_policy" else self._since + self.seconds
+
+
+class Turn:
+    """A trial's access to its process; `lock` is the same for all trials there."""
+
+    def __init__(self, lock: threading.Lock) -> None:
+        self._lock = lock
+        self._seconds = 0.0
+        self._since: float | None = None
+
+    def __enter__(self) -> Turn:
+        self._lock.acquire()
+        self._since = time.process_time()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._seconds, self._since = self.processor(), None
+        self._lock.release()
+
+    def processor(self) -> float:
+        """Processor time so far [s]: that of the process during its turns, threads of the renderer
+        included, and else that of its own thread."""
+        now = 0.0 if self._since is None else time.process_time() - self._since
+        return self._seconds + now
+
+    @contextmanager
+    def given_away(self) -> Iterator[None]:
+        """Let other trials compute meanwhile; only for who has the turn."""
+        self.__exit__()
+        own = time.thread_time()
+        try:
+            yield
+        finally:
+            self._seconds += time.thread_time() - own
+            self.__enter__()

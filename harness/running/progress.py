@@ -11,8 +11,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, TextIO
 
 from robospa.harness.running.screens import NotebookScreen, Screen, TerminalScreen, in_notebook
-from robospa.harness.running.server_stats import ServerStats
-from robospa.harness.running.status import Status, server_text, shares_text
+from robospa.harness.running.status import ServerStats, Status, server_text, shares_text
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.statistics.intervals import wilson
 from robospa.text import clock_text, percent_text

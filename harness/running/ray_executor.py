@@ -6,31 +6,41 @@ once wherever it ran. What a worker sends after it was killed is dropped.
 
 from __future__ import annotations
 
+import importlib
+import importlib.util
+import logging
+import os
 import pickle
+import signal
+import socket
 import sys
+import tempfile
 import time
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import replace
-from importlib import import_module
+from dataclasses import dataclass, field, replace
+from importlib import import_module, metadata
+from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
-from robospa.harness.running.atomic_file import replace_file
-from robospa.harness.running.executor import RunAborted, WorkerHandle
-from robospa.harness.running.log_file import LOGS
-from robospa.harness.running.messages import Command, Message, Ready, TrialDone
-from robospa.harness.running.ray_cluster import (
-    NoCluster,
-    RaySettings,
-    error_line,
-    join_cluster,
-    unreachable,
+from robospa.extras import remedy
+from robospa.harness.pool import sigint_blocked
+from robospa.harness.running.atomic_file import LOGS, replace_file
+from robospa.harness.running.code_hash import code_hash
+from robospa.harness.running.executor import (
+    Command,
+    Heartbeat,
+    Message,
+    Ready,
+    RunAborted,
+    TrialDone,
+    WorkerHandle,
 )
-from robospa.harness.running.ray_node import Report, WorkerActor, versions
 from robospa.harness.running.record_store import RecordWriter
-from robospa.harness.running.worker import WorkerConfig
+from robospa.harness.running.worker import LocalExecutor, WorkerConfig
+from robospa.results.records.run_io import ACTIONS
 
 NODES_SECONDS = 1.0
 """How often the nodes are counted."""
@@ -348,3 +358,219 @@ def loopback_warnings(executor: RayExecutor | None, config: WorkerConfig) -> lis
         for url in config.expects
         if urlsplit(url).hostname in here
     ]
+
+
+PROBE_SECONDS = 5.0
+NONE_HERE = (
+    "no Ray cluster runs on this machine; `ray start --head` starts one, "
+    "--address local makes one for this run only"
+)
+
+
+class NoCluster(Exception):
+    """There is no Ray, or no Ray cluster that can be used."""
+
+
+@dataclass(frozen=True)
+class RaySettings:
+    """Where the cluster is and what a worker takes of it: `address` is auto, local, host:port or
+    ray://host:port; at most `workers` workers, 0 for as many as fit."""
+
+    address: str = "auto"
+    workers: int = 0
+    cpus: float = 1.0
+    gpus: float = 0.0
+
+
+def join_cluster(address: str) -> Any:
+    """The module `ray`, connected to the cluster at `address` or having started one.
+
+    Raises NoCluster. Ray logs nothing into a run's progress, and signals act as before.
+    """
+    check_address(address)
+    os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
+    ray: Any = importlib.import_module("ray")
+    options: dict[str, Any] = {"log_to_driver": False, "configure_logging": False}
+    if address == "local":
+        options.update(
+            num_cpus=len(os.sched_getaffinity(0)),
+            include_dashboard=False,
+            object_store_memory=128 * 2**20,
+            _node_ip_address="127.0.0.1",
+        )
+    elif address.startswith("ray://"):
+        options = {"log_to_driver": False}
+    logging.getLogger("ray").setLevel(logging.CRITICAL)
+    on_sigterm = signal.getsignal(signal.SIGTERM)
+    try:
+        with sigint_blocked():
+            ray.init(address=address, **options)
+    except Exception as error:
+        text = f"cannot join the Ray cluster at {address}: {error_line(error)}"
+        raise NoCluster(_with_advice(text)) from error
+    finally:
+        with suppress(ValueError):  # not the main thread: then Ray has set none
+            signal.signal(signal.SIGTERM, on_sigterm)
+    return ray
+
+
+def check_address(address: str) -> None:
+    """Raises NoCluster if Ray is not installed or nothing listens at `address`.
+
+    Ray itself would try for minutes.
+    """
+    if importlib.util.find_spec("ray") is None:
+        raise NoCluster(f"Ray is not installed; {remedy('ray')}")
+    if address == "local":
+        return
+    if address == "auto":
+        last = _last_cluster()
+        if reason := unreachable(last):
+            raise NoCluster(f"{NONE_HERE} (the last one was at {last}: {reason})")
+        return
+    host, _, port = address.removeprefix("ray://").rpartition(":")
+    if not host or not port.isdigit():
+        raise NoCluster(
+            f"--address {address!r} is not one of auto, local, HOST:PORT and ray://HOST:PORT"
+        )
+    if reason := unreachable(address):
+        raise NoCluster(
+            f"no Ray cluster answers at {address} ({reason}); `ray start --head` starts one"
+        )
+
+
+def _last_cluster() -> str:
+    """Where `auto` looks; empty if Ray has not written it down here."""
+    written = Path(os.environ.get("RAY_TMPDIR", "/tmp")) / "ray" / "ray_current_cluster"
+    try:
+        return os.environ.get("RAY_ADDRESS") or written.read_text().strip()
+    except OSError:
+        return ""
+
+
+def unreachable(address: str) -> str:
+    """Why nothing can be reached at `address`; empty if something listens, or it is no address."""
+    host, _, port = address.removeprefix("ray://").rpartition(":")
+    if not host or not port.isdigit():
+        return ""
+    try:
+        socket.create_connection((host, int(port)), timeout=PROBE_SECONDS).close()
+    except (OSError, OverflowError) as error:
+        return str(error)
+    return ""
+
+
+def error_line(error: BaseException) -> str:
+    """What was raised on the node, or the first sentence or so of what Ray says."""
+    cause = getattr(error, "cause", None)
+    text = " ".join((f"{type(cause).__name__}: {cause}" if cause else str(error)).split())
+    return text if len(text) <= 300 else f"{text[:300]} ..."
+
+
+def _with_advice(text: str) -> str:
+    """What Ray says, with what helps."""
+    if "Could not find any running Ray instance" in text:
+        return NONE_HERE
+    if any(hint in text for hint in ("uthenticat", "Failed to connect", "connection timeout")):
+        text += "; if the cluster asks for a token, set RAY_AUTH_MODE=token here"
+    return text
+
+
+LOG_BYTES = 64_000
+"""Most of a worker's output that travels at once."""
+
+
+@dataclass(frozen=True)
+class Report:
+    """What one worker sent since its last report, the `files` of a trial that is done (by path
+    within the run's folder), its `output`, and how it ended (None while it runs)."""
+
+    messages: tuple[Message, ...] = ()
+    files: Mapping[str, bytes] = field(default_factory=dict)
+    output: bytes = b""
+    exit_status: str | None = None
+
+
+def versions() -> dict[str, str]:
+    """What has to be the same on every node for records to be the same."""
+    found = {"python": sys.version.split()[0], "code": code_hash()}
+    for package in ("robospa", "numpy", "sapien"):
+        try:
+            found[package] = metadata.version(package)
+        except metadata.PackageNotFoundError:
+            found[package] = "missing"
+    return found
+
+
+def version_differences(driver: Mapping[str, str]) -> str:
+    """Why this node cannot take part in a run whose driver has the versions `driver`, or empty."""
+    here = versions()
+    differ = [
+        f"{name} {here.get(name)} instead of {version}"
+        for name, version in driver.items()
+        if here.get(name) != version
+    ]
+    return f"it has {', '.join(differ)}" if differ else ""
+
+
+class WorkerActor:
+    """The actor: one worker process and its folder."""
+
+    def start(self, driver: Mapping[str, str], config: bytes, name: str) -> str:
+        """Start the worker; returns why this node cannot be used, or nothing.
+
+        `driver` holds the driver's versions; `config` is a pickled WorkerConfig, which another
+        version could not read.
+        """
+        if differences := version_differences(driver):
+            return differences
+        unpickled: WorkerConfig = pickle.loads(config)
+        self._folder = tempfile.TemporaryDirectory(prefix="robospa-", ignore_cleanup_errors=True)
+        self._path = Path(self._folder.name)
+        self._log = self._path / LOGS / f"{name}.log"
+        self._read = 0
+        self._executor = LocalExecutor(replace(unpickled, folder=self._path), 1)
+        self._worker = self._executor.start(name)
+        return ""
+
+    def send(self, command: Command) -> None:
+        """Pass `command` on to the worker."""
+        self._worker.send(command)
+
+    def report(self, seconds: float) -> Report:
+        """Wait until the worker sends more than heartbeats or ends, `seconds` at most."""
+        until = time.monotonic() + seconds
+        beats: list[Message] = []
+        others: list[Message] = []
+        exit_status: str | None = None
+        while exit_status is None and not others and time.monotonic() < until:
+            self._executor.wait([self._worker], until - time.monotonic())
+            exit_status = self._worker.exit_status()
+            for message in self._worker.messages():
+                (beats if isinstance(message, Heartbeat) else others).append(message)
+        files = self._take_files() if any(isinstance(m, TrialDone) for m in others) else {}
+        others = [Ready(None) if isinstance(m, Ready) else m for m in others]
+        return Report((*beats[-1:], *others), files, self._new_output(), exit_status)
+
+    def close(self) -> None:
+        """End the worker and remove its folder."""
+        self._worker.kill()
+        self._folder.cleanup()
+
+    def _take_files(self) -> dict[str, bytes]:
+        """What the trial left beside its record, which is then removed here."""
+        found: dict[str, bytes] = {}
+        for path in sorted((self._path / ACTIONS).glob("[!.]*")):
+            found[f"{ACTIONS}/{path.name}"] = path.read_bytes()
+            path.unlink()
+        return found
+
+    def _new_output(self) -> bytes:
+        try:
+            with self._log.open("rb") as file:
+                file.seek(self._read)
+                text = file.read(LOG_BYTES)
+        except OSError:
+            return b""
+        self._read += len(text)
+        return text

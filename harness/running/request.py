@@ -12,10 +12,10 @@ from robospa.extras import need
 from robospa.harness.clock.clock import Clock, ClockError
 from robospa.harness.clock.settings import frozen_timing, real_clock
 from robospa.harness.factory import is_url
-from robospa.harness.running.autoscaling import cores, most_workers
 from robospa.harness.running.evaluate import Request
 from robospa.harness.running.policy_probe import read_map
 from robospa.harness.running.runner import RunOptions
+from robospa.harness.running.status import cores, most_workers
 from robospa.harness.running.worker import Targets, WorkerConfig
 from robospa.harness.selection import list_trials, seed_sources
 from robospa.harness.settings import (
@@ -30,7 +30,7 @@ from robospa.registry import UnknownName
 from robospa.trial import TrialKey
 
 if TYPE_CHECKING:
-    from robospa.harness.running.ray_cluster import RaySettings
+    from robospa.harness.running.ray_executor import RaySettings
 
 HELD = 3
 """Trials that a worker holds at once: with two, where model and cores are equally slow, either
@@ -266,7 +266,7 @@ def _on_ray(compute: Compute) -> RaySettings | None:
     """How the workers are placed on a Ray cluster; None if they run on this machine."""
     if compute.executor != "ray":
         return None
-    from robospa.harness.running.ray_cluster import RaySettings
+    from robospa.harness.running.ray_executor import RaySettings
 
     return RaySettings(
         compute.address or "auto", compute.workers, compute.cpus_per_worker, compute.gpus_per_worker

@@ -16,28 +16,26 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from robospa.harness.factory import is_url
-from robospa.harness.running.atomic_file import StorageError, storage_errors
+from robospa.harness.running.atomic_file import LOGS, StorageError, storage_errors
 from robospa.harness.running.attempts import (
+    ErrorWatch,
     LossWriter,
+    ProblemWatch,
     attempts_spent,
     earlier_retries,
 )
-from robospa.harness.running.autoscaling import Autoscaler
-from robospa.harness.running.error_watch import ErrorWatch
-from robospa.harness.running.executor import Executor, LocalExecutor, RunAborted
-from robospa.harness.running.log_file import LOGS
-from robospa.harness.running.messages import (
+from robospa.harness.running.executor import (
+    Executor,
     Fatal,
     Heartbeat,
     Message,
     Ready,
+    RunAborted,
     Stop,
     TrialDone,
     TrialLost,
 )
-from robospa.harness.running.problem_watch import ProblemWatch
-from robospa.harness.running.queue import TrialQueue
-from robospa.harness.running.scheduler import Job, Scheduler
+from robospa.harness.running.scheduler import Job, Scheduler, TrialQueue
 from robospa.harness.running.slot import (
     START_SECONDS,
     Slot,
@@ -49,8 +47,8 @@ from robospa.harness.running.slot import (
     sendable,
     stop_all,
 )
-from robospa.harness.running.status import Status, TimeBreakdown
-from robospa.harness.running.worker import WorkerConfig, task_finder
+from robospa.harness.running.status import Autoscaler, Status, TimeBreakdown
+from robospa.harness.running.worker import LocalExecutor, WorkerConfig, task_finder
 from robospa.results.records.trial_record import RetryRow, TrialRecord
 from robospa.results.scoring.retried import reached_policy
 from robospa.trial import TrialKey

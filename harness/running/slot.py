@@ -11,13 +11,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from robospa.harness.running.executor import WorkerHandle
+from robospa.harness.running.executor import RunTrial, Stop, WorkerHandle
 from robospa.harness.running.heartbeat import HeartbeatMonitor
-from robospa.harness.running.messages import RunTrial, Stop
-from robospa.harness.running.queue import TrialQueue
-from robospa.harness.running.scheduler import Job
-from robospa.harness.running.server_stats import ServerStats
-from robospa.harness.running.status import Status, time_left
+from robospa.harness.running.scheduler import Job, TrialQueue
+from robospa.harness.running.status import ServerStats, Status, time_left
 from robospa.results.records.run_io import read_file
 from robospa.results.records.trial_record import TrialRecord
 

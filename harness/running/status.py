@@ -6,14 +6,15 @@ The driver makes a `Status` from what it knows; `harness.progress` shows it.
 
 from __future__ import annotations
 
+import os
 from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from robospa.harness.factory import is_url
-from robospa.harness.running.autoscaling import FULL
-from robospa.harness.running.server_stats import ServerStats
-from robospa.results.records.trial_record import TrialRecord
+from robospa.harness.running.executor import Fault
+from robospa.results.records.trial_record import PROCESSOR, TrialRecord
 
 RECENT = 200
 """Trials whose shares of time are shown while a run goes on."""
@@ -184,3 +185,211 @@ def _ms(value: float) -> str:
 
 def _s(value: float) -> str:
     return f"{value / 1000:.0f} s"
+
+
+SMOOTHING = 0.3  # weight of the newest trial in the running means
+HALF_LIFE = 30.0  # [s] in which the estimated wait at a server without workers halves
+LONGEST_PAUSE = 30.0  # [s] between two attempts at a server that cannot be reached
+MEASURES = ("p50", "queue", "infer", "batch")
+"""What of a record's `latency` is averaged per server; the last three only if the server
+reports them."""
+
+
+@dataclass
+class ServerStats:
+    """One policy server (or a policy in process), by its `target`. `batch`: the most that one call
+    of its model holds."""
+
+    target: str
+    tasks: frozenset[str]
+    batch: int = 1
+    running: int = 0
+    task: str = ""
+    """Base task of the trial that was last sent there."""
+    trials: int = 0
+    switches: int = 0
+    """How often the base task changed from one trial to the next."""
+    failures: int = 0
+    failing_since: float = 0.0
+    """When the first of the present failures was."""
+    retry_at: float = 0.0
+    excluded: str = ""
+    """Why it is used no more."""
+    wait_per_worker: float | None = None
+    idle_since: float = 0.0
+    """When a trial there last ended."""
+    means: dict[str, float] = field(default_factory=dict)
+    answers: int = 0
+    """Answers so far, those of trials in progress included."""
+    answer_ms: float | None = None
+    """Running mean of what some of these took, for as long as no trial has ended."""
+    fastest: float = float("inf")
+    """Smallest median answer time of a trial [ms]."""
+
+    def available(self, now: float) -> bool:
+        """Whether a worker may go there: one at a time as long as it is not known to be back."""
+        if self.excluded:
+            return False
+        return not self.failures or (now >= self.retry_at and self.running == 0)
+
+    @property
+    def up(self) -> bool:
+        """Whether it answered when it was last asked."""
+        return not self.failures and not self.excluded
+
+    def start_trial(self, task: str, now: float) -> None:
+        """A trial of `task` is sent there."""
+        self.wait_per_worker = self.wait(now)
+        self.switches += self.task not in ("", task)
+        self.task = task
+        self.running += 1
+
+    def add_answers(self, count: int, ms: float) -> None:
+        """`count` more answers have come, the last after `ms`."""
+        self.answers += count
+        self.answer_ms = update_mean(self.answer_ms, ms)
+
+    def finish_trial(self, record: TrialRecord, now: float) -> None:
+        """A trial there has its record."""
+        sharing, self.idle_since = max(1, self.running), now
+        self.running -= 1
+        self.trials += 1
+        self.failures = 0
+        if not record.latency:
+            return
+        self.means = update_means(self.means, record.latency)
+        middle = record.latency["p50"]
+        self.fastest = min(self.fastest, middle)
+        self.wait_per_worker = update_mean(self.wait_per_worker, middle / sharing)
+
+    def wait(self, now: float) -> float | None:
+        """What one worker adds to the wait there [ms], decayed while no worker is there."""
+        if self.wait_per_worker is None or self.running:
+            return self.wait_per_worker
+        return float(self.wait_per_worker * 0.5 ** ((now - self.idle_since) / HALF_LIFE))
+
+    def fail(self, now: float, pause: float) -> None:
+        """It cannot be reached or its connection broke; `pause` is the first pause [s]."""
+        if self.failures and now < self.retry_at:
+            return  # the other workers there fail with it
+        if not self.failures:
+            self.failing_since = now
+        self.failures += 1
+        self.retry_at = now + min(LONGEST_PAUSE, pause * 2.0 ** (self.failures - 1))
+
+    @property
+    def saturated(self) -> bool:
+        """Whether more workers would only wait longer.
+
+        A request that waits longer than a whole call of the model takes finds others before it; so
+        does one that waits for half a call where calls are full. A server that reports no times is
+        taken for full when it answers 1.5 times slower than its best.
+        """
+        if not self.means:
+            return False
+        if "queue" in self.means and "infer" in self.means:
+            full = self.batch > 1 and self.means.get("batch", 0.0) > 0.9 * self.batch
+            return self.means["queue"] > self.means["infer"] * (0.5 if full else 1.0)
+        return self.means["p50"] > 1.5 * self.fastest
+
+
+def update_mean(old: float | None, new: float) -> float:
+    """The running mean `old` after `new`."""
+    return new if old is None else old + SMOOTHING * (new - old)
+
+
+def update_means(old: Mapping[str, float], latency: Mapping[str, float]) -> dict[str, float]:
+    """Running means of MEASURES after one more record's `latency`."""
+    return {name: update_mean(old.get(name), latency[name]) for name in MEASURES if name in latency}
+
+
+def connection_fault(error: BaseException, in_trial: bool) -> Fault:
+    """Which fault of a server `error` reports; empty if its connection is not to blame.
+
+    `in_trial`: the server had been sent the trial, so it was reached.
+    """
+    from robospa.protocol.errors import ConnectFailed, HandshakeError, WireError
+
+    if isinstance(error, HandshakeError):
+        return "incompatible"
+    if isinstance(error, ConnectFailed) and not in_trial:
+        return "unreachable"
+    return "disconnected" if isinstance(error, WireError) else ""
+
+
+def retry_cause(error: BaseException, in_trial: bool) -> str:
+    """The cause of `RETRY_CAUSES` that `error` of an attempt is. `in_trial`: as above."""
+    from robospa.protocol.errors import (
+        CallTimeout,
+        HandshakeError,
+        ProtocolViolation,
+        TransportError,
+        WireError,
+    )
+
+    if isinstance(error, WireError) and not in_trial:
+        return "unreachable"
+    if isinstance(error, CallTimeout):
+        return "deadline"
+    if isinstance(error, ProtocolViolation):
+        return "unreadable_answer"
+    lost = isinstance(error, (TransportError, HandshakeError))
+    return "connection_lost" if lost else "harness_error"
+
+
+PER_CORE = 8
+"""Most workers for a core."""
+MEMORY = 0.75e9
+"""Bytes that a worker may need: simulator, renderer and one batch of images."""
+FULL = 0.9
+"""Share of the cores that counts as all of them."""
+
+
+def cores() -> int:
+    """Processor cores that this process may use."""
+    return len(os.sched_getaffinity(0))
+
+
+def most_workers() -> int:
+    """What cores and free memory allow; at least one per core."""
+    try:
+        lines = Path("/proc/meminfo").read_text().splitlines()
+        free = next(int(x.split()[1]) * 1024 for x in lines if x.startswith("MemAvailable:"))
+    except (OSError, StopIteration, ValueError):
+        return cores()
+    return max(cores(), min(PER_CORE * cores(), int(free / MEMORY)))
+
+
+@dataclass
+class Autoscaler:
+    """How many workers there should be: `target` now, `maximum` ever, for `cores` cores. Each holds
+    `held` trials at once."""
+
+    target: int
+    maximum: int
+    cores: int = field(default_factory=cores)
+    held: int = 1
+    _seconds: float = 0.0
+    _busy: float = 0.0
+    _trials: int = 0
+
+    def add(self, record: TrialRecord) -> None:
+        """Count one trial that was run."""
+        self._seconds += record.wall_time
+        self._busy += record.timing.get(PROCESSOR, 0.0)
+        self._trials += 1
+
+    def scale_up(self, saturated: bool) -> int:
+        """How many more workers to start now. `saturated`: no server has room for more."""
+        at_once = self.target * self.held
+        if self.target >= self.maximum or self._trials < at_once or self._seconds <= 0:
+            return 0
+        busy = at_once * self._busy / self._seconds
+        self._seconds = self._busy = 0.0
+        self._trials = 0
+        if saturated or busy >= FULL * self.cores:
+            return 0
+        fitting = round(self.target * self.cores / max(busy, 1e-9))
+        before = self.target
+        self.target = min(self.maximum, 2 * before, max(before + 1, fitting))
+        return self.target - before

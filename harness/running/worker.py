@@ -18,17 +18,15 @@ import traceback
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from multiprocessing.connection import Connection
+from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from robospa.harness.clock.clock import Clock
 from robospa.harness.factory import is_url, load_function, open_policy
-from robospa.harness.running.action_files import ActionRecorder, write_actions
-from robospa.harness.running.atomic_file import StorageError
-from robospa.harness.running.heartbeat import HeartbeatSender, MonitoredPolicy
-from robospa.harness.running.log_file import LOGS, log_to
-from robospa.harness.running.messages import (
+from robospa.harness.pool import Child
+from robospa.harness.running.atomic_file import LOGS, StorageError, log_to
+from robospa.harness.running.executor import (
     Command,
     Fatal,
     Message,
@@ -37,10 +35,11 @@ from robospa.harness.running.messages import (
     Stop,
     TrialDone,
     TrialLost,
+    WorkerHandle,
 )
+from robospa.harness.running.heartbeat import HeartbeatSender, MonitoredPolicy, Turn
 from robospa.harness.running.policy_probe import over_budget
-from robospa.harness.running.record_store import RecordWriter
-from robospa.harness.running.turn import Turn
+from robospa.harness.running.record_store import ActionRecorder, RecordWriter, write_actions
 from robospa.harness.worlds import SAPIEN_NAME, TASK_PARTS, open_world
 from robospa.protocol.client import Identity
 from robospa.protocol.errors import printable
@@ -269,7 +268,7 @@ def describe(error: BaseException) -> str:
 
 def _attempt(worker: Worker, command: RunTrial) -> Message:
     """How this attempt went. Errors are sorted here, once."""
-    from robospa.harness.running.server_stats import connection_fault, retry_cause
+    from robospa.harness.running.status import connection_fault, retry_cause
     from robospa.harness.world import SceneUnstable
     from robospa.registry import UnknownName
     from robospa.tasks.packs import PackError
@@ -357,3 +356,85 @@ def main(pipes: Sequence[Connection], argument: tuple[WorkerConfig, str]) -> Non
             thread.join()
     finally:
         writer.close()
+
+
+class LocalWorker:
+    """One worker process and the pipe of one trial that it may hold; `spare` are those of more."""
+
+    def __init__(
+        self, process: Child, pipe: Connection, name: str, spare: Sequence[Connection] = ()
+    ) -> None:
+        self.process, self.pipe, self.name = process, pipe, name
+        self._spare = list(spare)
+
+    def another(self) -> LocalWorker | None:
+        """A place for one more trial; None if there is none."""
+        return LocalWorker(self.process, self._spare.pop(), self.name) if self._spare else None
+
+    def send(self, command: Command) -> None:
+        """Send it a command; nothing happens if it has ended. To stop it stops unused places."""
+        for pipe in [self.pipe, *(self._spare if isinstance(command, Stop) else ())]:
+            try:
+                pipe.send(command)
+            except OSError:
+                return  # it has just died, which `exit_status` reports
+
+    def messages(self) -> list[Message]:
+        """What it has sent since the last call; also after it has ended."""
+        received: list[Message] = []
+        try:
+            while self.pipe.poll():
+                received.append(self.pipe.recv())
+        except (EOFError, OSError):
+            self.process.join(0.1)  # closed: it is dying
+        return received
+
+    def exit_status(self) -> str | None:
+        """How it ended; None while it runs."""
+        return self.process.exit_status()
+
+    def pending(self) -> bool:
+        """Never: a process starts at once."""
+        return False
+
+    def kill(self) -> None:
+        """End it now."""
+        self.process.kill()
+
+    def join(self, seconds: float) -> None:
+        """Wait until it has ended, `seconds` at most."""
+        self.process.join(seconds)
+
+    def close(self) -> None:
+        """Free what is left of it."""
+        self.process.close()
+
+
+class LocalExecutor:
+    """At most `workers` processes on this machine, which hold up to `held` trials each."""
+
+    def __init__(self, config: WorkerConfig, workers: int, held: int = 1) -> None:
+        self._config = config
+        self.workers = workers
+        self._held = held
+
+    def capacity(self) -> int:
+        """As many as were asked for."""
+        return self.workers
+
+    def start(self, name: str) -> LocalWorker:
+        """Start one more process."""
+        process = Child(main, (self._config, name), name, pipes=self._held)
+        first, *spare = process.pipes
+        return LocalWorker(process, first, name, spare)
+
+    def wait(self, workers: Sequence[WorkerHandle], seconds: float) -> None:
+        """Return as soon as one of `workers` has sent something or ended, or after `seconds`."""
+        wait([worker.pipe for worker in workers if isinstance(worker, LocalWorker)], seconds)
+
+    def notes(self) -> list[str]:
+        """None: nothing ever happens to one machine."""
+        return []
+
+    def close(self) -> None:
+        """Nothing is left once the workers have ended."""

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from robospa.baselines import hold, random, replay
-from robospa.harness.running.action_files import write_actions
+from robospa.harness.running.record_store import write_actions
 from robospa.protocol.policy import TrialInfo
 from robospa.trial import TrialKey
 

@@ -155,7 +155,7 @@ def test_a_collection_replaces_a_process_that_dies(
 
 USES = {
     "evaluation": """
-from robospa.harness.running.executor import LocalExecutor
+from robospa.harness.running.worker import LocalExecutor
 from robospa.harness.running.worker import WorkerConfig
 worker = LocalExecutor(WorkerConfig(out, "hold"), 1).start("worker-000")""",
     "films": """
@@ -248,7 +248,7 @@ def test_no_process_outlives_its_parent(tmp_path: Path, use: str, after: float) 
 STOPPED = """
 import os, signal, sys, time
 from pathlib import Path
-from robospa.harness.running.executor import LocalExecutor
+from robospa.harness.running.worker import LocalExecutor
 
 class Slow:
     def __reduce__(self):

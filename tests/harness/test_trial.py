@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from run_fakes import LIMIT, SPEC, FakePolicy, FakeWorld, NanPolicy, parts
 
-from robospa.harness.running.action_files import ActionRecorder
+from robospa.harness.running.record_store import ActionRecorder
 from robospa.harness.trial import run_trial
 from robospa.harness.trial_identity import policy_seed
 from robospa.harness.world import ActionProblem, Poll, SceneUnstable, StepResult

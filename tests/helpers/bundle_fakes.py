@@ -15,9 +15,8 @@ import pytest
 from msgspec import to_builtins
 from run_fakes import LIMIT, FakePolicy, FakeWorld, parts
 
-from robospa.harness.running.action_files import ActionRecorder, write_actions
 from robospa.harness.running.manifest import about_machine, write_manifest
-from robospa.harness.running.record_store import RecordWriter
+from robospa.harness.running.record_store import ActionRecorder, RecordWriter, write_actions
 from robospa.harness.sim.motion import RATE
 from robospa.harness.trial import run_trial
 from robospa.harness.trial_identity import policy_seed

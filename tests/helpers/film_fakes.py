@@ -9,8 +9,8 @@ from pathlib import Path
 from run_fakes import FakePolicy, FakeWorld, parts
 
 from robospa.harness.pool import WorkerDied
-from robospa.harness.running.action_files import ActionRecorder, write_actions
 from robospa.harness.running.films import FilmDone
+from robospa.harness.running.record_store import ActionRecorder, write_actions
 from robospa.harness.running.worker import WorkerConfig
 from robospa.harness.trial import run_trial
 from robospa.results.records.films import film_name

@@ -15,15 +15,15 @@ from fake_records import trial_record
 from numpy.typing import NDArray
 from run_fakes import FakeWorld
 
-from robospa.harness.running.messages import (
+from robospa.harness.running.executor import (
     Command,
     Message,
     Ready,
     RunTrial,
     TrialDone,
 )
+from robospa.harness.running.heartbeat import Turn
 from robospa.harness.running.record_store import RecordWriter
-from robospa.harness.running.turn import Turn
 from robospa.harness.running.worker import WorkerConfig, _hold
 from robospa.harness.world import Poll, StepResult
 from robospa.trial import TrialKey

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from robospa.baselines.oracle import Oracle
-from robospa.harness.running.action_files import ActionRecorder
+from robospa.harness.running.record_store import ActionRecorder
 from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.harness.trial import run_trial, task_parts
 from robospa.harness.trial_identity import policy_seed, trial_id

@@ -14,8 +14,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from robospa.harness.running.action_files import read_actions
 from robospa.harness.running.atomic_file import PARTIAL
+from robospa.harness.running.record_store import read_actions
 from robospa.harness.trial import actions_digest
 from robospa.results.records.run_io import (
     ACTIONS,

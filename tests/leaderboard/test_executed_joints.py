@@ -10,7 +10,7 @@ import pytest
 from bundle_fakes import PICK, SEEDS, make_run
 from fake_records import trial_record
 
-from robospa.harness.running.action_files import write_actions
+from robospa.harness.running.record_store import write_actions
 from robospa.leaderboard.audit import _read as read_for_audit
 from robospa.leaderboard.audit import expert_likeness
 from robospa.leaderboard.bundle import BundleError

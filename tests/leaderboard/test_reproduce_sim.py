@@ -17,8 +17,8 @@ from shadow import HORIZON, Shadow, Thief, ids
 
 from robospa.baselines.oracle import Oracle
 from robospa.baselines.random import Random
-from robospa.harness.running.action_files import read_actions
 from robospa.harness.running.evaluate import Request, evaluate
+from robospa.harness.running.record_store import read_actions
 from robospa.harness.running.request import make_request
 from robospa.harness.settings import EvaluationSettings, updated
 from robospa.harness.sim.sapien_world import SapienWorld

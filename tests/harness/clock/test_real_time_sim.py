@@ -12,7 +12,7 @@ from robospa.harness.clock.latency import parse_latency
 from robospa.harness.clock.motion_log import ENTRY
 from robospa.harness.clock.switching import parse_switching
 from robospa.harness.replay import replay
-from robospa.harness.running.action_files import ActionRecorder
+from robospa.harness.running.record_store import ActionRecorder
 from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.harness.trial import run_trial
 from robospa.results.records.run_io import differences

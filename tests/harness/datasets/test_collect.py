@@ -31,8 +31,7 @@ from robospa.harness.datasets.settings import (
     lists_of,
     trial_of,
 )
-from robospa.harness.running.atomic_file import StorageError
-from robospa.harness.running.run_lock import run_lock
+from robospa.harness.running.atomic_file import StorageError, run_lock
 from robospa.harness.seeds.attempt import Attempt
 from robospa.harness.settings import Compute, SettingsError
 from robospa.leaderboard.reproduce import FIRST as FIRST_HIDDEN

@@ -10,7 +10,7 @@ import pytest
 
 from robospa.baselines.random import create
 from robospa.harness.pictures.video import FilmRecorder, VideoBuffer, film
-from robospa.harness.running.action_files import ActionRecorder, write_actions
+from robospa.harness.running.record_store import ActionRecorder, write_actions
 from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.harness.trial import run_trial
 from robospa.trial import TrialKey

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from run_fakes import FakePolicy
 
 from robospa.harness.running import manifest
-from robospa.harness.running.error_watch import FIRST
+from robospa.harness.running.attempts import FIRST
 from robospa.harness.running.evaluate import Request, RunAborted, evaluate
 from robospa.harness.running.runner import Runner, RunOptions
 from robospa.harness.running.worker import WorkerConfig

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from fake_records import trial_record
 
-from robospa.harness.running.autoscaling import Autoscaler, most_workers
+from robospa.harness.running.status import Autoscaler, most_workers
 from robospa.trial import TrialKey
 
 KEY = TrialKey("Pick_Fake", 1, 1)
@@ -57,7 +57,7 @@ def test_a_review_takes_a_whole_round() -> None:
 
 
 def test_memory_and_cores_bound_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("robospa.harness.running.autoscaling.cores", lambda: 4)
+    monkeypatch.setattr("robospa.harness.running.status.cores", lambda: 4)
     monkeypatch.setattr("pathlib.Path.read_text", lambda self: "MemAvailable: 8000000 kB\n")
     assert most_workers() == 10
     monkeypatch.setattr("pathlib.Path.read_text", lambda self: "MemAvailable: 900000000 kB\n")

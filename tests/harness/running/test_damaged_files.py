@@ -23,9 +23,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robospa.harness.running.action_files import read_actions, write_actions
 from robospa.harness.running.manifest import changed_settings
 from robospa.harness.running.policy_probe import read_map
+from robospa.harness.running.record_store import read_actions, write_actions
 from robospa.harness.running.request import client_options
 from robospa.harness.selection import parse_seeds
 from robospa.harness.settings import SettingsError

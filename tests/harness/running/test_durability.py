@@ -9,9 +9,8 @@ from pathlib import Path
 import pytest
 from fake_records import KEY, RECORD, other
 
-from robospa.harness.running.action_files import read_actions
 from robospa.harness.running.atomic_file import StorageError, replace_file
-from robospa.harness.running.record_store import RecordWriter, recover_folder
+from robospa.harness.running.record_store import RecordWriter, read_actions, recover_folder
 from robospa.harness.running.worker import Worker, WorkerConfig
 from robospa.results.records.manifest import RunError
 from robospa.results.records.run_io import action_path, read_file, read_records

@@ -12,8 +12,8 @@ import pytest
 from numpy.typing import NDArray
 from run_fakes import FakePolicy, KeyedPolicy
 
+from robospa.harness.running.executor import Activity, Heartbeat
 from robospa.harness.running.heartbeat import HeartbeatMonitor, HeartbeatSender, MonitoredPolicy
-from robospa.harness.running.messages import Activity, Heartbeat
 from robospa.harness.running.runner import Runner, RunOptions
 from robospa.harness.running.worker import WorkerConfig
 from robospa.protocol.errors import PolicyError

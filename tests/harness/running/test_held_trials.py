@@ -15,10 +15,9 @@ from held_fakes import ScriptedExecutor, ThreadExecutor
 from numpy.typing import NDArray
 from run_fakes import SPEC, FakePolicy, FakeWorld, parts
 
-from robospa.harness.running.autoscaling import Autoscaler
-from robospa.harness.running.heartbeat import HeartbeatSender, MonitoredPolicy
+from robospa.harness.running.heartbeat import HeartbeatSender, MonitoredPolicy, Turn
 from robospa.harness.running.runner import Runner, RunOptions
-from robospa.harness.running.turn import Turn
+from robospa.harness.running.status import Autoscaler
 from robospa.harness.running.worker import WorkerConfig
 from robospa.harness.trial import run_trial
 from robospa.harness.trial_times import Stopwatch

@@ -20,9 +20,8 @@ from run_fakes import SPEC, FakePolicy, FakeWorld, KeyedPolicy, parts
 
 from robospa.clients import connect
 from robospa.harness.running import manifest
-from robospa.harness.running.action_files import read_actions
 from robospa.harness.running.evaluate import Request, evaluate
-from robospa.harness.running.record_store import RecordWriter
+from robospa.harness.running.record_store import RecordWriter, read_actions
 from robospa.harness.running.request import make_request
 from robospa.harness.running.runner import RunOptions
 from robospa.harness.running.worker import Worker, WorkerConfig

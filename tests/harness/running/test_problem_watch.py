@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from run_by_hand import record
 
-from robospa.harness.running.problem_watch import ProblemWatch
+from robospa.harness.running.attempts import ProblemWatch
 
 
 def watched(actions: int, end: str = "step_limit") -> list[list[str]]:

@@ -9,9 +9,8 @@ import types
 import pytest
 from fake_records import trial_record
 
-from robospa.harness.running.progress import ROWS, Progress, Tally, details, summary
-from robospa.harness.running.server_stats import ServerStats
-from robospa.harness.running.status import Status
+from robospa.harness.progress import ROWS, Progress, Tally, details, summary
+from robospa.harness.running.status import ServerStats, Status
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 from run_fakes import LIMIT, fake_task_of
 
-from robospa.harness.running.queue import Pending, TrialQueue
+from robospa.harness.running.scheduler import Pending, TrialQueue
 from robospa.harness.running.worker import task_finder
 from robospa.harness.worlds import TASK_PARTS
 from robospa.trial import TrialKey

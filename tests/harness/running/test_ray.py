@@ -20,8 +20,13 @@ from ray_helpers import QUIET, SIZE, cluster, kill_node
 from robospa.harness.datasets import collect as collecting
 from robospa.harness.datasets.api import pool_opener
 from robospa.harness.datasets.collect import collect
-from robospa.harness.running.ray_cluster import NoCluster, RaySettings, check_address
-from robospa.harness.running.ray_executor import RayExecutor, ray_executor
+from robospa.harness.running.ray_executor import (
+    NoCluster,
+    RayExecutor,
+    RaySettings,
+    check_address,
+    ray_executor,
+)
 from robospa.harness.running.runner import Runner, RunOptions
 from robospa.harness.running.worker import WorkerConfig
 from robospa.harness.settings import Compute

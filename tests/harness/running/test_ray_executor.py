@@ -8,11 +8,8 @@ from typing import Any
 import pytest
 
 from robospa.harness.running import ray_executor
-from robospa.harness.running.executor import RunAborted
-from robospa.harness.running.messages import Ready
-from robospa.harness.running.ray_cluster import NoCluster, RaySettings
-from robospa.harness.running.ray_executor import RayExecutor
-from robospa.harness.running.ray_node import Report
+from robospa.harness.running.executor import Ready, RunAborted
+from robospa.harness.running.ray_executor import NoCluster, RayExecutor, RaySettings, Report
 from robospa.harness.running.worker import WorkerConfig
 
 pytest.importorskip("ray")

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from robospa.harness.running import ray_node
-from robospa.harness.running.messages import Heartbeat, Message, Ready, RunTrial, Stop, TrialDone
-from robospa.harness.running.ray_node import WorkerActor, version_differences, versions
+from robospa.harness.running import ray_executor as ray_node
+from robospa.harness.running.executor import Heartbeat, Message, Ready, RunTrial, Stop, TrialDone
+from robospa.harness.running.ray_executor import WorkerActor, version_differences, versions
 from robospa.harness.running.worker import WorkerConfig
 from robospa.results.records.trial_record import RetryRow
 from robospa.trial import TrialKey

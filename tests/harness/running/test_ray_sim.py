@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from robospa.harness.running.ray_cluster import RaySettings
-from robospa.harness.running.ray_executor import ray_executor
+from robospa.harness.running.ray_executor import RaySettings, ray_executor
 from robospa.harness.running.runner import Runner, RunOptions
 from robospa.harness.running.worker import WorkerConfig
 from robospa.results.records.films import VIDEOS, owed_films

@@ -11,9 +11,13 @@ import numpy as np
 import pytest
 from fake_records import KEY, RECORD, other
 
-from robospa.harness.running.action_files import read_actions, read_joints, write_actions
 from robospa.harness.running.atomic_file import StorageError, replace_file
-from robospa.harness.running.record_store import RecordWriter
+from robospa.harness.running.record_store import (
+    RecordWriter,
+    read_actions,
+    read_joints,
+    write_actions,
+)
 from robospa.results.records.manifest import RunError
 from robospa.results.records.run_io import (
     RepeatabilityError,

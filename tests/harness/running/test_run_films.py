@@ -21,11 +21,11 @@ from run_fakes import FakePolicy, FakeStill, FakeWorld, NanPolicy
 from robospa.harness.cli import eval as command
 from robospa.harness.cli.report import report
 from robospa.harness.pool import WorkerDied, WorkerStuck
+from robospa.harness.progress import Progress
 from robospa.harness.running import films as module
+from robospa.harness.running.atomic_file import run_lock
 from robospa.harness.running.evaluate import Request, evaluate
 from robospa.harness.running.films import FilmDone, FilmMaker, Films, FilmsInterrupted
-from robospa.harness.running.progress import Progress
-from robospa.harness.running.run_lock import run_lock
 from robospa.harness.running.runner import RunOptions
 from robospa.harness.running.worker import WorkerConfig
 from robospa.harness.world import RenderUnavailable

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from robospa.harness.running.run_lock import run_lock
+from robospa.harness.running.atomic_file import run_lock
 from robospa.results.records.manifest import RunError
 from robospa.results.records.run_state import LOCK
 
@@ -29,7 +29,7 @@ def test_a_second_driver_is_told_who_holds_the_run(tmp_path: Path) -> None:
 def test_a_killed_driver_holds_nothing(tmp_path: Path) -> None:
     code = f"""
 import os, pathlib
-from robospa.harness.running.run_lock import run_lock
+from robospa.harness.running.atomic_file import run_lock
 with run_lock(pathlib.Path({str(tmp_path)!r})):
     os.kill(os.getpid(), 9)
 """

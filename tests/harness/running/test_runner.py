@@ -132,7 +132,7 @@ DRIVER = """
 import sys
 from pathlib import Path
 from robospa.harness.running.runner import Runner, RunOptions
-from robospa.harness.running.run_lock import run_lock
+from robospa.harness.running.atomic_file import run_lock
 from robospa.harness.running.worker import WorkerConfig
 from robospa.results.records.run_io import finished, read_records
 from robospa.results.records.trial_record import TrialKey

@@ -12,8 +12,7 @@ import pytest
 from fake_records import trial_record
 from run_fakes import fake_task_of
 
-from robospa.harness.running.queue import TrialQueue
-from robospa.harness.running.scheduler import Job, Scheduler
+from robospa.harness.running.scheduler import Job, Scheduler, TrialQueue
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 

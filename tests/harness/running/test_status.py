@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 from fake_records import trial_record
 
-from robospa.harness.running.server_stats import ServerStats
 from robospa.harness.running.status import (
+    ServerStats,
     Status,
     TimeBreakdown,
     server_text,

@@ -13,13 +13,11 @@ from fake_records import KEY, RECORD, other
 from run_by_hand import outcomes, write
 from run_fakes import FakePolicy
 
-from robospa.harness.running.action_files import write_actions
-from robospa.harness.running.atomic_file import StorageError
+from robospa.harness.running.atomic_file import StorageError, run_lock
 from robospa.harness.running.evaluate import Request, evaluate
 from robospa.harness.running.executor import RunAborted
-from robospa.harness.running.record_store import RecordWriter
+from robospa.harness.running.record_store import RecordWriter, write_actions
 from robospa.harness.running.request import make_request
-from robospa.harness.running.run_lock import run_lock
 from robospa.harness.settings import EvaluationSettings, updated
 from robospa.protocol.policy import TrialInfo
 from robospa.protocol.server import ServerThread

@@ -10,7 +10,7 @@ from unequal_arms import READY, unequal_arms
 from robospa.harness import action_decoder
 from robospa.harness.quantize import is_quantized
 from robospa.harness.replay import replay
-from robospa.harness.running.action_files import ActionRecorder
+from robospa.harness.running.record_store import ActionRecorder
 from robospa.harness.sim import sapien_world
 from robospa.harness.trial import run_trial
 from robospa.protocol.policy import PolicySpec

@@ -14,9 +14,8 @@ import pytest
 from run_by_hand import outcomes, write
 
 from robospa.harness.cli.main import main
-from robospa.harness.running.progress import Progress
-from robospa.harness.running.server_stats import ServerStats
-from robospa.harness.running.status import Status
+from robospa.harness.progress import Progress
+from robospa.harness.running.status import ServerStats, Status
 from robospa.results.figures.charts import draw_levels, draw_radar
 from robospa.results.figures.series import Series, save, styled
 from robospa.results.records.run_io import Run
