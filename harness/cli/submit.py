@@ -285,7 +285,7 @@ def _replay(valid: Any, challenge: str, fraction: float, workers: int, reference
                 reason = trial.trouble or "other " + ", ".join(trial.differs)
                 progress.note(f"{trial.key.slug}: {reason}")
             progress.add(trial.record or valid.run.records[trial.key])
-            progress.show()
+            progress.update()
 
         return _load("replay:replay")(valid, challenge, count, reference, workers or cores(), show)
 

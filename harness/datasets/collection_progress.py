@@ -1,4 +1,4 @@
-"""What the user sees while episodes are made: a bar on a terminal, a line now and then elsewhere.
+"""What the user sees while episodes are made.
 
 Episodes of one task take twenty times as long as those of another, so the time left follows from
 frames, not from episodes.
@@ -6,25 +6,19 @@ frames, not from episodes.
 
 from __future__ import annotations
 
-import sys
 import time
 from collections import Counter
-from types import TracebackType
-from typing import TYPE_CHECKING, TextIO
+from typing import TextIO
 
 from robospa.harness.datasets.jobs import EpisodeAttempt
 from robospa.harness.datasets.settings import size_text
-from robospa.harness.progress import EVERY
-from robospa.terminal import plain_console
+from robospa.harness.progress import Bar
 from robospa.text import clock_text
 
-if TYPE_CHECKING:
-    from rich.progress import Progress, TaskID
 
-
-class CollectionProgress:
-    """Counts what comes in and shows it; a context manager. `work` is that of all episodes and
-    `done_work` what was done before, in frames; so are `total` and `done` in episodes."""
+class CollectionProgress(Bar):
+    """Counts what comes in and shows it. `work` is that of all episodes and `done_work` what was
+    done before, in frames; so are `total` and `done` in episodes."""
 
     def __init__(
         self,
@@ -34,42 +28,12 @@ class CollectionProgress:
         done_work: float,
         stream: TextIO | None = None,
     ) -> None:
-        self.total, self.done = total, done
-        self.replaced = 0
-        self.frames = 0
-        self.bytes = 0
-        self.made = 0
+        super().__init__("episodes", total, done, stream)
+        self.replaced = self.frames = self.bytes = self.made = 0
         self.times: Counter[str] = Counter()
         self._left = work - done_work
         self._worked = 0.0
-        self._stream = stream or sys.stderr
-        self._began = self._shown = time.monotonic()
-        self._bar: Progress | None = None
-        self._row: TaskID | None = None
-
-    def __enter__(self) -> CollectionProgress:
-        if self._stream.isatty():
-            from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
-
-            self._bar = Progress(
-                TextColumn("episodes"),
-                BarColumn(),
-                MofNCompleteColumn(),
-                TextColumn("{task.description}", markup=False),
-                console=plain_console(file=self._stream),
-            )
-            self._row = self._bar.add_task("", total=self.total, completed=self.done)
-            self._bar.start()
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        if self._bar is not None:
-            self._bar.stop()
+        self._began = time.monotonic()
 
     def add(self, made: EpisodeAttempt, work: float) -> None:
         """Count what came of a seed; an episode like it has `work` frames."""
@@ -82,7 +46,7 @@ class CollectionProgress:
             self._worked += work
         else:
             self.replaced += 1
-        self._show()
+        self.show(self.text())
 
     def give_up(self, episodes: int, work: float) -> None:
         """Expect so many episodes less, of `work` frames together."""
@@ -111,15 +75,3 @@ class CollectionProgress:
             f"{total / self.made:.1f} s of processor time and {size_text(self.bytes / self.made)} "
             f"an episode of {self.frames / self.made:.0f} frames: {', '.join(parts)}"
         )
-
-    def _show(self) -> None:
-        if self._bar is not None and self._row is not None:
-            self._bar.update(
-                self._row, completed=self.done, total=self.total, description=self.text()
-            )
-            return
-        now = time.monotonic()
-        if now - self._shown >= EVERY or self.done == self.total:
-            self._shown = now
-            line = f"{self.done}/{self.total} episodes, {self.text()}"
-            print(line, file=self._stream, flush=True)

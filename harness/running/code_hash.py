@@ -26,8 +26,8 @@ FOLDERS = (
     "harness/skills/",
     "harness/textures/",
 )
-"""What a trial executes: whole folders, or with a star their own files alone. `robospa/` stands for
-the files that lie beside the folders."""
+"""What a trial executes: whole folders, or with a star their own files alone; single files too.
+`robospa/` stands for the files that lie beside the folders."""
 LEFT_OUT = ("tasks/seeds/",)
 NO_CODE = (".pyc", ".pyi", ".typed", ".md")
 LENGTH = 16
@@ -38,27 +38,30 @@ LENGTH = 16
 def code_hash(folders: Sequence[str] = FOLDERS, left_out: tuple[str, ...] = LEFT_OUT) -> str:
     """The hash of the files of `folders` in the installed package, but for those `left_out`."""
     root = Path(import_module("robospa").__path__[0])
-    return hash_files(root, folders, left_out)
-
-
-def hash_files(root: Path, folders: Sequence[str], left_out: tuple[str, ...] = ()) -> str:
-    """The hash of the files of `folders` below `root`; FileNotFoundError for one that is empty."""
     digest = hashlib.sha256()
+    for name in files_of(root, folders, left_out):
+        data = (root / name).read_bytes()
+        digest.update(f"{name} {len(data)}\0".encode() + data)
+    return digest.hexdigest()[:LENGTH]
+
+
+def files_of(root: Path, folders: Sequence[str], left_out: tuple[str, ...] = ()) -> list[str]:
+    """The files of `folders` below `root` that count; FileNotFoundError for a folder without."""
+    counted: list[str] = []
     for folder in folders:
         found = sorted(_files(root, folder))
         if not found:
             raise FileNotFoundError(f"{root} has no files in {folder}")
-        for name in found:
-            if not name.startswith(left_out) and not name.endswith(NO_CODE):
-                data = (root / name).read_bytes()
-                digest.update(f"{name} {len(data)}\0".encode() + data)
-    return digest.hexdigest()[:LENGTH]
+        counted += [n for n in found if not n.startswith(left_out) and not n.endswith(NO_CODE)]
+    return counted
 
 
 def _files(root: Path, folder: str) -> Iterator[str]:
     """Names below `root`, but for those that Python or an editor made."""
     whole = folder.endswith("/") and folder != "robospa/"
     start = root if folder == "robospa/" else root / folder.rstrip("*")
+    if start.is_file():
+        yield folder
     for place, folders, names in os.walk(start):
         folders[:] = [n for n in folders if whole and not n.startswith((".", "__"))]
         for name in names:

@@ -269,7 +269,7 @@ def evaluate(request: Request) -> None:
             def show(status: Status) -> None:
                 lock.check(folder)
                 films.poll()
-                progress.show(replace(status, films=films.pending))
+                progress.update(replace(status, films=films.pending))
 
             runner.on_record, runner.on_status = add, show
             try:

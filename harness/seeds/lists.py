@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -79,6 +80,7 @@ def save(path: Path, level: int, seeds: Sequence[int]) -> None:
     replace_file(path, ("{\n" + rows + "\n}\n").encode())
 
 
+FAMILIES = "robospa.tasks.families."
 NOT_EXECUTED = (
     "tasks/seeds/",
     "tasks/families/",
@@ -93,7 +95,7 @@ NOT_EXECUTED = (
 def inputs(key: ListKey) -> str:
     """16 hexadecimal digits that are equal while every attempt at `key` ends alike: those of the
     suite, the simulator, and the code and data that the expert's trials of one task execute. Other
-    families of tasks do not count, nor robots and modes of other packages that `key` does not name.
+    tasks do not count, nor robots and modes of other packages that `key` does not name.
     """
     robots = key.embodiment.partition(":")[0].split("+")
     mode = key.mode.partition(":")[0]
@@ -103,13 +105,22 @@ def inputs(key: ListKey) -> str:
 
 @cache
 def _hash(task: str, *modules: str) -> str:
-    family = task.removeprefix("robospa.").rpartition(".")[0].replace(".", "/")
-    folders = [FOLDERS, ("baselines/*", "tasks/families/*")]
-    if task.startswith("robospa."):
-        folders.append((f"{family}/",))
-    hashes = [code_hash(folders[0], NOT_EXECUTED), *map(code_hash, folders[1:])]
+    hashes = [code_hash(FOLDERS, NOT_EXECUTED), code_hash(("baselines/oracle.py",))]
+    if task.startswith(FAMILIES):
+        hashes.append(code_hash(tuple(sorted(_family(task)))))
     digest = hashlib.sha256(f"{SUITE} {metadata.version('sapien')} {hashes}".encode())
     for name in (task, *modules):
         if not name.startswith("robospa.") and (spec := find_spec(name or " ")) and spec.origin:
             digest.update(name.encode() + Path(spec.origin).read_bytes())
     return digest.hexdigest()[:LENGTH]
+
+
+def _family(module: str) -> set[str]:
+    """The files of a family's module and of those that it builds on."""
+    spec = find_spec(module)
+    assert spec is not None and spec.origin is not None
+    source = Path(spec.origin).read_text()
+    found = {module.removeprefix("robospa.").replace(".", "/") + ".py"}
+    for name in set(re.findall(rf"from {FAMILIES[:-1]}(?:\.| import )(\w+)", source)):
+        found |= _family(FAMILIES + name)
+    return found

@@ -12,10 +12,10 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass, field
 
+from robospa.harness.progress import Bar
 from robospa.harness.seeds.attempt import Attempt, Evidence, expert_pool
 from robospa.harness.seeds.lists import inputs
 from robospa.tasks.seeds import ListKey
-from robospa.terminal import plain_console
 from robospa.text import duration_text
 
 Submit = Callable[[ListKey, int], Future[Attempt]]
@@ -204,36 +204,24 @@ def sweep_with_bar(
 
     Once `stop` says so, no more trials are begun, and what is not done is left out.
     """
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
-
-    columns = (
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("{task.fields[speed]}", markup=False),
-    )
-    total = sum(search.count for search in wanted)
-    known = sum(_got(search) for search in wanted)
+    total, known = sum(search.count for search in wanted), sum(map(_got, wanted))
     begun, tried = time.monotonic(), 0
-    with Progress(*columns, console=plain_console()) as bar, expert_pool(workers) as pool:
-        row = bar.add_task("seeds", total=total, completed=known, speed="")
+    with Bar("seeds", total, known) as bar, expert_pool(workers) as pool:
 
         def note(search: Search, item: Attempt) -> None:
             nonlocal tried
             evidence.add(search.key, inputs(search.key), item)
             tried += 1
             rate = tried / (time.monotonic() - begun)
-            bar.update(row, description=str(search.key))
-            if item.accepted or search.measures:
-                bar.advance(row)
-            left = bar.tasks[0].remaining or 0
-            bar.update(row, speed=f"{rate:.2f} trials/s, {duration_text(left / rate)} left")
+            bar.done += item.accepted or search.measures
+            left = duration_text((total - bar.done) / rate)
+            bar.show(f"{search.key}: {rate:.2f} trials/s, {left} left")
 
         def submit(key: ListKey, seed: int) -> Future[Attempt]:
             return pool.submit((key, seed))
 
         for search in sweep(submit, workers, wanted, note, stop):
-            bar.advance(row, search.count - _got(search))  # of one that was given up
+            bar.done += search.count - _got(search)  # of one that was given up
             yield search
 
 

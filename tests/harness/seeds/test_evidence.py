@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+import robospa
+from robospa.harness.running.code_hash import files_of
 from robospa.harness.seeds import lists as module
 from robospa.harness.seeds.attempt import Attempt, Evidence
 from robospa.harness.seeds.lists import (
@@ -42,34 +44,29 @@ def test_finished_attempts_survive_a_torn_line_and_other_inputs_do_not_count(
     assert kept.attempts(ListKey("Other", 1), "a") == {}
 
 
-def test_inputs_are_of_a_task_a_robot_and_a_mode(monkeypatch: pytest.MonkeyPatch) -> None:
-    keys = [
-        KEY,
-        ListKey("Press_Stapler_Repeat", 1),
-        KEY._replace(mode="randomized:light"),
-    ]
-    before = [inputs(key) for key in keys]
-    assert inputs(KEY._replace(level=5)) == before[0] == inputs(KEY)
-    files = dict(module._files())
+def test_inputs_are_of_what_a_task_executes(monkeypatch: pytest.MonkeyPatch) -> None:
+    root = Path(robospa.__path__[0])
+    counted: list[str] = []
 
-    def after(path: str, extra: bytes = b"\nMORE = 1\n") -> list[bool]:
-        assert path in files
-        changed = {**files, path: files[path] + extra}
-        monkeypatch.setattr(module, "_files", lambda: changed)
-        module._hash.cache_clear()
-        return [inputs(key) != old for key, old in zip(keys, before, strict=True)]
+    def hashed(folders: tuple[str, ...], left_out: tuple[str, ...] = ()) -> str:
+        counted.extend(files_of(root, folders, left_out))
+        return ""
 
-    try:
-        assert after("harness/skills/pick.py") == [True, True, True]
-        assert after("tasks/objects/blocks.py") == [True, True, True]
-        assert after("harness/robots/aloha_agilex.py") == [True, True, True]
-        assert after("tasks/families/block_measures.py") == [True, False, True]
-        assert after("tasks/families/repeat.py") == [False, True, False]
-        assert after("tasks/modes/randomized.py") == [False, False, True]
-        assert after("tasks/instructions/grammar.py") == [False, False, False]
-        assert after("harness/running/runner.py") == [False, False, False]
-    finally:
-        module._hash.cache_clear()
+    monkeypatch.setattr(module, "code_hash", hashed)
+    module._hash.cache_clear()
+    first = inputs(KEY)
+    module._hash.cache_clear()
+    for path in ("harness/skills/pick.py", "tasks/objects/blocks.py", "harness/robots/piper.py",
+                 "tasks/families/block_measures.py", "baselines/oracle.py"):  # fmt: skip
+        assert path in counted
+    for path in ("tasks/families/repeat.py", "tasks/instructions/grammar.py",
+                 "harness/running/runner.py", "protocol/server.py"):  # fmt: skip
+        assert (root / path).exists() and path not in counted
+    assert inputs(KEY._replace(level=5)) == first
+    other = KEY._replace(mode="own:light")
+    monkeypatch.setattr(module, "module_of", lambda group, name: "numpy" * (name == "own"))
+    assert inputs(other) != first
+    module._hash.cache_clear()
 
 
 def test_a_list_made_here_is_found_by_evaluations_until_its_inputs_change(

@@ -158,7 +158,7 @@ def test_the_live_view_prints_names_as_they_are(name: str) -> None:
     with Progress(3, stream=stream) as progress:
         progress.note(name)
         progress._shown = float("-inf")
-        progress.show(status)
+        progress.update(status)
     plain = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", stream.getvalue())
     assert plain.count(name[:20]) >= 2, "as a note and as a server"
     assert "\x1b]8" not in stream.getvalue(), "a link"

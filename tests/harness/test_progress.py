@@ -9,7 +9,7 @@ import types
 import pytest
 from fake_records import trial_record
 
-from robospa.harness.progress import ROWS, Progress, Tally, details, summary
+from robospa.harness.progress import ROWS, Progress, details, summary
 from robospa.harness.running.status import ServerStats, Status
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
@@ -23,18 +23,19 @@ def record(key: TrialKey, end: str = "success") -> TrialRecord:
 
 
 def test_lost_trials_are_no_failures() -> None:
-    tally = Tally(2, 0)
-    tally.add(record(LONG))
-    tally.add(record(SHORT, "infrastructure"))
-    assert "success 100.0 %" in tally.text()
-    assert "1 lost" in tally.text()
+    stream = io.StringIO()
+    with Progress(2, 0, stream) as progress:
+        progress.add(record(LONG))
+        progress.add(record(SHORT, "infrastructure"))
+        progress.update()
+    assert "success 100.0 %" in stream.getvalue() and "1 lost" in stream.getvalue()
 
 
 def test_plain_lines_where_there_is_no_terminal() -> None:
     stream = io.StringIO()
     with Progress(1, 0, stream) as progress:
         progress.add(record(SHORT, "step_limit"))
-        progress.show(Status(0.0, 1, 1, 1))
+        progress.update(Status(0.0, 1, 1, 1))
     first, last = stream.getvalue().splitlines()
     assert first == "1 trials to run, 0 already done"
     assert last.startswith("1/1 trials, success 0.0 %")
@@ -44,7 +45,7 @@ def test_films_are_counted_beside_the_trials_and_after_them() -> None:
     stream = io.StringIO()
     with Progress(1, 0, stream) as progress:
         progress.add(record(SHORT, "step_limit"))
-        progress.show(Status(0.0, 1, 1, 1, films=3))
+        progress.update(Status(0.0, 1, 1, 1, films=3))
         progress._line = float("-inf")
         progress.show_films(0, 3)
         progress.show_films(1, 2)  # too soon for another line
@@ -84,7 +85,7 @@ def test_the_live_view_shows_speed_servers_and_who_is_slow() -> None:
     stream = Terminal()
     with Progress(3, 1, stream) as progress:
         progress.add(record(LONG))
-        progress.show(status(server("ws://a", queue=300.0, infer=100.0, batch=7.5)))
+        progress.update(status(server("ws://a", queue=300.0, infer=100.0, batch=7.5)))
         progress.note("[news] about ws://a")
     shown = stream.getvalue()
     for text in (
@@ -104,17 +105,17 @@ def test_of_many_servers_the_live_view_lists_some() -> None:
     stream = Terminal()
     with Progress(3, 1, stream) as progress:
         progress.add(record(LONG))
-        progress.show(status(*(server(f"ws://{n}") for n in range(20))))
+        progress.update(status(*(server(f"ws://{n}") for n in range(20))))
     assert f"and {20 - ROWS} more" in stream.getvalue()
 
 
 def test_a_picture_is_not_drawn_more_often_than_it_can_be_read() -> None:
     stream = Terminal()
     with Progress(9, 0, stream) as progress:
-        progress.show(status(server("ws://a")))
+        progress.update(status(server("ws://a")))
         before = len(stream.getvalue())
         for _ in range(50):
-            progress.show(status(server("ws://a")))
+            progress.update(status(server("ws://a")))
         assert len(stream.getvalue()) == before
 
 
@@ -129,7 +130,7 @@ def test_plain_lines_tell_the_same_now_and_then() -> None:
     with Progress(9, 0, stream) as progress:
         progress.add(record(SHORT))
         for _ in range(5):
-            progress.show(status(server("ws://a")))
+            progress.update(status(server("ws://a")))
     assert len(stream.getvalue().splitlines()) == 2
 
 
@@ -145,8 +146,8 @@ def test_before_the_first_trial_has_ended_answers_are_counted() -> None:
     server = ServerStats("ws://a", frozenset({"Long"}))
     server.add_answers(7, 100.0)
     with Progress(24, 0, stream) as progress:
-        progress._began -= 60.0
-        progress.show(Status(0.0, 2, 2, 2, (server,)))
+        progress._line -= 60.0
+        progress.update(Status(0.0, 2, 2, 2, (server,)))
     assert stream.getvalue().splitlines()[1] == (
         "0/24 trials, first trials under way, 7 answers of the policy so far"
     )
@@ -173,7 +174,7 @@ def test_a_notebook_shows_one_picture_that_changes(monkeypatch: pytest.MonkeyPat
         progress.note("warning: <b>")
         progress.add(record(SHORT))
         progress.add(record(LONG))
-        progress.show()
+        progress.update()
     assert stream.getvalue() == ""
     assert "0/2" in shown[0] and "2/2" in shown[-1] and "success 100.0 %" in shown[-1]
     assert all("warning: &lt;b&gt;" in html for html in shown[1:])
