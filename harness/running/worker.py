@@ -316,7 +316,7 @@ def _hold(pipe: Connection, config: WorkerConfig, writer: RecordWriter, turn: Tu
     try:
         send(Ready(writer.path))
         _serve(pipe, send, worker)
-    except (EOFError, BrokenPipeError):
+    except (EOFError, ConnectionError):
         return
     finally:
         with worker.heartbeat.computing():
