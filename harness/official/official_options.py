@@ -150,7 +150,7 @@ def parse_official(
 def check_robots(names: Collection[str]) -> None:
     """Raises SettingsError if the archive lacks the meshes of one of these robots."""
     from robospa.harness.packs.archive import open_archive
-    from robospa.harness.packs.robot_skins import check_robot
+    from robospa.harness.packs.visuals import check_robot
     from robospa.harness.robots import embodiment
 
     try:

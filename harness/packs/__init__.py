@@ -2,10 +2,10 @@
 
 A pack (`robospa.tasks.packs.Pack`) gives models for assets. `official` reads the official archive:
 
-    archive   the folder, its parts, files that are read and files that are missing
-    model_data, glb, urdf   what the archive's files say, and what of them is refused
-    mesh_files, decimate, pieces   a mesh file as a drawing and as convex pieces
-    cache     what was made of a file, kept by the file's content
-    placing, holding   the archive's frames and points as ours, and grasps from them
-    official  the pack
+    archive     the folder, its parts, missing files, and the cache of what was made of files
+    mesh_files, urdf   what the archive's files say, and what of them is refused
+    visuals, convex    a mesh as a drawing, also of robots' links, and as convex pieces
+    placing     the archive's frames and points as ours, and grasps from them
+    index       what a folder holds, and which tasks can run with it
+    official    the pack
 """

@@ -1,19 +1,30 @@
-"""The user's copy of the official assets: where it is, and which of its files belong to a model.
+"""The user's copy of the official assets: where it is, which of its files belong to a model, and
+what was made of them, kept in this user's cache by their content.
 
 Nothing of it is in this package, and nothing is ever written into it. A file that lies outside,
-however its path is written, is refused.
+however its path is written, is refused. Entries of the cache are whole or not there: they are
+written under another name and then moved.
 """
 
 from __future__ import annotations
 
+import contextlib
+import hashlib
 import os
+import zipfile
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from robospa.tasks.official import OfficialModel
 from robospa.tasks.packs import PackError
 from robospa.user_cache import user_cache
 
+Arrays = Mapping[str, NDArray[Any]]
 VARIABLE = "ROBOSPA_ASSETS"
 """Environment variable that names the folder."""
 PARTS = ("objects", "embodiments", "background_texture")
@@ -145,3 +156,60 @@ def note(archive: Archive) -> None:
     """Use `archive` from now on, where nothing else is named."""
     noted().parent.mkdir(parents=True, exist_ok=True)
     noted().write_text(f"{archive.root}\n", "utf-8")
+
+
+CACHE_VERSION = 2
+"""Raised whenever the same file gives something else."""
+
+
+def cache_folder() -> Path:
+    """Where entries are."""
+    return user_cache() / "packs"
+
+
+def content_hash(path: Path) -> str:
+    """SHA-256 of the file, taken once as long as its size and time of change stay the same."""
+    state = path.stat()
+    seen = f"{path}\n{state.st_size}\n{state.st_mtime_ns}".encode()
+    noted_hash = cache_folder() / "hashes" / hashlib.sha256(seen).hexdigest()[:32]
+    with contextlib.suppress(OSError):
+        if len(kept := noted_hash.read_text("ascii")) == 64:
+            return kept
+    with path.open("rb") as file:
+        found = hashlib.file_digest(file, "sha256").hexdigest()
+    _write(noted_hash, lambda path: path.write_text(found, "ascii"))
+    return found
+
+
+def cached(files: tuple[Path, ...], how: str, make: Callable[[], Arrays]) -> Path:
+    """The .npz file of the arrays that `make` makes of `files`; `how` says in which way."""
+    text = "\n".join([str(CACHE_VERSION), how, *map(content_hash, files)])
+    entry = cache_folder() / f"{hashlib.sha256(text.encode()).hexdigest()[:40]}.npz"
+    if not entry.exists():
+        made = make()
+        _write(entry, lambda path: _save(path, made))
+    return entry
+
+
+def load_arrays(entry: Path, *names: str) -> Arrays:
+    """The arrays of an entry, or those called `names`.
+
+    ValueError, after throwing it away, if it is damaged."""
+    try:
+        with np.load(entry, allow_pickle=False) as file:
+            return {name: file[name] for name in names or file.files}
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+        entry.unlink(missing_ok=True)
+        raise ValueError(f"the cache entry {str(entry)!r} was damaged: start again") from error
+
+
+def _save(path: Path, arrays: Arrays) -> None:
+    with path.open("wb") as file:
+        np.savez(file, **arrays)  # type: ignore[arg-type]
+
+
+def _write(path: Path, fill: Callable[[Path], object]) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_name(f"{path.name}.{os.getpid()}.part")
+    fill(partial)
+    partial.replace(path)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import hashlib
+import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from robospa.harness.packs.archive import Archive, ArchiveError, ModelFiles
-from robospa.harness.packs.glb import check_glb
-from robospa.harness.packs.hollows import is_filled
-from robospa.harness.packs.model_data import LARGEST_FILE, ModelData, read_model_data
-from robospa.harness.packs.objaverse import files_text, things
+from robospa.harness.packs.convex import is_filled
+from robospa.harness.packs.mesh_files import check_glb
+from robospa.harness.packs.placing import LARGEST_DATA, ModelData, read_model_data
 from robospa.harness.packs.urdf import check_uses, read_urdf
 from robospa.harness.robots import embodiments
 from robospa.tasks.official import (
@@ -22,6 +22,11 @@ from robospa.tasks.official import (
 )
 
 TEXTURE_ENDING = "*.png"
+THING = "objaverse"
+"""The folder of things that only lie about, and what such a thing is called as the asset of an
+object; its parameter "thing" is "category/id"."""
+LIST = "list.json"
+LARGEST_LIST = 4 << 20
 
 
 @dataclass(frozen=True)
@@ -101,7 +106,7 @@ def index(archive: Archive) -> Index:
         },
         robots=tuple(name for name in embodiments() if archive.embodiment(name) is not None),
         textures={split: _pictures(archive, split) for split in ("seen", "unseen")},
-        clutter=sum(map(len, things(archive).values())),
+        clutter=sum(map(len, clutter_things(archive).values())),
         digest=digest_of(archive),
     )
 
@@ -166,7 +171,7 @@ def digest_of(archive: Archive) -> str:
                 files = archive.files(model)
                 sizes = _sizes(files)
                 with files.data.open("rb") as file:
-                    said = file.read(LARGEST_FILE)
+                    said = file.read(LARGEST_DATA)
             except (ArchiveError, OSError):
                 found.update(f"{model.name} missing\n".encode())
                 continue
@@ -179,3 +184,48 @@ def digest_of(archive: Archive) -> str:
 def _sizes(files: ModelFiles) -> str:
     present = (file for file in (files.visual, files.collision, files.urdf) if file is not None)
     return " ".join(str(file.stat().st_size) for file in present)
+
+
+def clutter_things(archive: Archive) -> Mapping[str, tuple[str, ...]]:
+    """The ids of each category that are in the archive and in its list, sorted.
+
+    ArchiveError for a list that cannot be read.
+    """
+    found: dict[str, list[str]] = {}
+    listed = _listed(archive)
+    for name in archive.clutter():
+        category, _, number = name.partition("/")
+        if listed is None or number in listed.get(category, ()):
+            found.setdefault(category, []).append(number)
+    return {category: tuple(numbers) for category, numbers in found.items()}
+
+
+def files_text(archive: Archive) -> str:
+    """Names and sizes of all files of the things, for a hash."""
+    folder = archive.root / "objects" / THING
+    rows = []
+    for category, numbers in clutter_things(archive).items():
+        for number in numbers:
+            files = sorted((folder / category / number).iterdir())
+            sizes = " ".join(f"{f.name} {f.stat().st_size}" for f in files if f.is_file())
+            rows.append(f"{category}/{number} {sizes}\n")
+    return "".join(rows)
+
+
+def _listed(archive: Archive) -> Mapping[str, frozenset[str]] | None:
+    """The ids of each category in the list; None without one."""
+    path = archive.root / "objects" / THING / LIST
+    if not path.is_file():
+        return None
+    path = archive.inside(path)
+    try:
+        if path.stat().st_size > LARGEST_LIST:
+            raise ArchiveError(f"{str(path)!r} is larger than {LARGEST_LIST >> 20} MB")
+        rows = json.loads(path.read_bytes())["list_of_items"]
+        return {str(name): frozenset(map(str, ids)) for name, ids in rows.items()}
+    except ArchiveError:
+        raise
+    except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
+        raise ArchiveError(
+            f"{str(path)!r} is no JSON file whose list_of_items has the ids of each category"
+        ) from error

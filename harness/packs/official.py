@@ -1,35 +1,49 @@
 """The pack of the official archive: models made of a user's own copy of the official assets.
 
 What tasks ask of an object beyond its shape (which way it faces, where it is pressed, what it is
-called) is taken from its built-in likeness and from the archive's points.
+called) is taken from its built-in likeness and from the archive's points. Things of
+`objects/objaverse`, a URDF file each, only lie about: officially they are fixed, collide as one
+hull, and stand upright as their files have them; which there are says `list.json` beside them,
+without it all that are found.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Collection, Sequence
+import re
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from robospa.harness.packs.archive import Archive, ArchiveError, open_archive
-from robospa.harness.packs.assembly import Parts, Piece, parts_of
-from robospa.harness.packs.holding import grasps
-from robospa.harness.packs.index import digest_of, task_faults
-from robospa.harness.packs.model_data import read_model_data
-from robospa.harness.packs.objaverse import ASSET as THING
-from robospa.harness.packs.objaverse import kinds, make_thing
-from robospa.harness.packs.placing import Likeness, Placing, frames, place
-from robospa.harness.packs.solids import solids, vector
+from robospa.harness.packs.archive import (
+    Archive,
+    ArchiveError,
+    ModelFiles,
+    load_arrays,
+    open_archive,
+)
+from robospa.harness.packs.convex import colliding_pieces, convex_shapes, vector
+from robospa.harness.packs.index import THING, clutter_things, digest_of, task_faults
+from robospa.harness.packs.mesh_files import Floats, Piece
+from robospa.harness.packs.placing import (
+    Likeness,
+    Placing,
+    frames,
+    grasp_points,
+    place,
+    read_model_data,
+)
+from robospa.harness.packs.urdf import MeshUse, Urdf, UrdfJoint, read_urdf
+from robospa.harness.packs.visuals import skin_of
 from robospa.tasks.colors import NAMED
-from robospa.tasks.modes.clutter import ClutterKind, own_kinds
+from robospa.tasks.modes.clutter import ClutterKind, colors_asked, own_kinds, taken_kinds
 from robospa.tasks.objects import object_model
-from robospa.tasks.official import OfficialModel, official_model
+from robospa.tasks.official import OfficialModel, clutter_alike, official_model
 from robospa.tasks.scene import Scene
 from robospa.tasks.shapes import Color, Hinge, ObjectModel, Params, Skin
-
-Floats = NDArray[np.float64]
 
 
 class OfficialPack:
@@ -61,7 +75,7 @@ class OfficialPack:
     def clutter(self, scene: Scene) -> tuple[ClutterKind, ...]:
         """What may lie about in `scene`: our kinds, as the archive's models where it has those, and
         its things of Objaverse; none if it has no such things."""
-        theirs = kinds(self.archive, self.name, scene)
+        theirs = clutter_kinds(self.archive, self.name, scene)
         return (*map(self._packed, own_kinds(scene)), *theirs) if theirs else ()
 
     def _packed(self, kind: ClutterKind) -> ClutterKind:
@@ -103,7 +117,7 @@ def make_model(
     what = f"the official model {chosen.name}"
     files = archive.files(chosen)
     data = read_model_data(files.data)
-    parts = parts_of(archive, files, chosen.hinge, what)
+    parts = bodies_of(archive, files, chosen.hinge, what)
     data = data.in_root(parts.links)
     pieces = [*parts.body.pieces, *(parts.door.pieces if parts.door else ())]
     points = np.concatenate([corners for corners, _ in pieces])
@@ -113,10 +127,10 @@ def make_model(
     low, high = placing.low, placing.high
     size = (high - low).tolist()
     placed_points = placing.points(points)
-    held = grasps(placed, builtin, likeness, placing, data, chosen)
+    held = grasp_points(placed, builtin, likeness, placing, data, chosen)
     return ObjectModel(
         asset=builtin.asset,
-        shapes=solids(placed),
+        shapes=convex_shapes(placed),
         size=(size[0], size[1], size[2]),
         radius=float(np.hypot(placed_points[:, 0], placed_points[:, 1]).max()),
         noun=builtin.noun,
@@ -131,7 +145,7 @@ def make_model(
     )
 
 
-def _box(parts: Parts) -> Floats:
+def _box(parts: Bodies) -> Floats:
     """Corners (2, 3) of the box around all that is drawn."""
     boxes = [parts.body.box, *([parts.door.box] if parts.door else [])]
     corners = np.concatenate(boxes)
@@ -144,7 +158,7 @@ def _placed(pieces: Sequence[Piece], placing: Placing) -> list[Piece]:
 
 
 def _hinge(
-    parts: Parts, placing: Placing, builtin: ObjectModel, what: str, tint: Color | None
+    parts: Bodies, placing: Placing, builtin: ObjectModel, what: str, tint: Color | None
 ) -> Hinge | None:
     """The door: it turns from 0 as drawn to its joint's limit, whichever way that is."""
     if parts.door is None or parts.joint is None:
@@ -160,7 +174,7 @@ def _hinge(
     axis = axis / length
     at = placing.points(frame[None, :3, 3])[0]
     return Hinge(
-        shapes=solids(_placed(parts.door.pieces, placing)),
+        shapes=convex_shapes(_placed(parts.door.pieces, placing)),
         point=vector(at),
         axis=vector(axis),
         upper=max(upper, -lower),
@@ -168,4 +182,137 @@ def _hinge(
         damping=builtin.hinge.damping,
         mass=builtin.hinge.mass,
         skin=Skin(str(parts.door.skin), placing.scale, placing.pose, tint),
+    )
+
+
+# -- the files of a model as bodies ------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Body:
+    """`skin` is a file as `robospa.tasks.shapes.Skin` wants it, `box` (2, 3) the corners around
+    all of it; `pieces` are convex."""
+
+    skin: Path
+    box: Floats
+    pieces: tuple[Piece, ...]
+
+
+@dataclass(frozen=True)
+class Bodies:
+    """The bodies of a model: `door` turns about `joint`. `links` are the links' frames (4, 4) in
+    the root's by their names; a rigid model has none."""
+
+    body: Body
+    door: Body | None = None
+    joint: UrdfJoint | None = None
+    links: Mapping[str, Floats] = field(default_factory=dict)
+
+
+def bodies_of(archive: Archive, files: ModelFiles, hinge: bool, what: str) -> Bodies:
+    """Read the model's files, or what was made of them before. ArchiveError, naming `what`."""
+    if files.urdf is None:
+        assert files.visual is not None and files.collision is not None
+        drawn, solid = (MeshUse(file, np.eye(4)) for file in (files.visual, files.collision))
+        return Bodies(_body(archive, [drawn], [solid]))
+    robot = read_urdf(files.urdf, archive.inside)
+    joint = door_joint(robot, what) if hinge else None
+    moved = robot.moved_by(joint.child) if joint is not None else frozenset()
+    body = _of_links(archive, robot, [link for link in robot.visuals if link not in moved], what)
+    links = {link: robot.in_root(link) for link in robot.visuals}
+    door = None if joint is None else _of_links(archive, robot, sorted(moved), what)
+    return Bodies(body, door, joint, links)
+
+
+def door_joint(robot: Urdf, what: str) -> UrdfJoint:
+    """The joint that turns most of the model's meshes: its door. ArchiveError if none turns."""
+    turning = [j for j in robot.joints.values() if j.kind in ("revolute", "continuous")]
+    with_limits = [j for j in turning if j.limits[0] < j.limits[1]]
+    if not with_limits:
+        raise ArchiveError(f"{what} has no joint that turns, which its door needs")
+
+    def size(joint: UrdfJoint) -> int:
+        files = (use.file for link in robot.moved_by(joint.child) for use in robot.visuals[link])
+        return sum(file.stat().st_size for file in files if file.is_file())
+
+    return max(with_limits, key=size)
+
+
+def _of_links(
+    archive: Archive, robot: Urdf, links: Sequence[str], what: str, whole: bool = False
+) -> Body:
+    """Links of a URDF file as one body in the root's frame, all joints at 0."""
+
+    def uses(of: dict[str, tuple[MeshUse, ...]]) -> list[MeshUse]:
+        return [
+            MeshUse(use.file, robot.in_root(link) @ use.transform)
+            for link in links
+            for use in of[link]
+        ]
+
+    drawn, solid = uses(dict(robot.visuals)), uses(dict(robot.collisions))
+    if not drawn and not solid:
+        raise ArchiveError(f"{what} has no meshes where its parts should be")
+    return _body(archive, drawn or solid, solid or drawn, whole)
+
+
+def hull_of(archive: Archive, robot: Urdf, what: str) -> Body:
+    """A URDF file as one body that collides as a hull around each of its meshes."""
+    return _of_links(archive, robot, list(robot.visuals), what, whole=True)
+
+
+def _body(
+    archive: Archive, drawn: Sequence[MeshUse], solid: Sequence[MeshUse], whole: bool = False
+) -> Body:
+    skin = skin_of(archive, drawn)
+    return Body(skin, load_arrays(skin, "box")["box"], colliding_pieces(archive, solid, whole))
+
+
+# -- things that lie about ---------------------------------------------------------------------
+
+SIZES = (0.005, 0.6)
+"""Lengths [m] that a thing on a table may have along its longest side."""
+_NAME = re.compile(r"[A-Za-z0-9_-]{1,64}")
+
+
+def clutter_kinds(archive: Archive, pack: str, scene: Scene) -> tuple[ClutterKind, ...]:
+    """The categories that may lie about in `scene`: nothing that it could mean by its words. Of
+    their colours nothing is known, so there are none where it names things by colour."""
+    if colors_asked(scene):
+        return ()
+    taken, alike = taken_kinds(scene), clutter_alike()
+    return tuple(
+        ClutterKind(
+            THING, tuple({"thing": f"{category}/{n}", "pack": pack} for n in numbers), fixed=True
+        )
+        for category, numbers in clutter_things(archive).items()
+        if category in alike and not taken & alike[category]
+    )
+
+
+def make_thing(archive: Archive, name: object) -> ObjectModel:
+    """The thing called "category/id". ArchiveError if it is not there or cannot be used."""
+    category, _, number = str(name).partition("/")
+    if not (_NAME.fullmatch(category) and _NAME.fullmatch(number)):
+        raise ArchiveError(f"{str(name)[:80]!r} is no thing of the archive, such as 'bottle/3'")
+    path = archive.root / "objects" / THING / category / number / "model.urdf"
+    if not path.is_file():
+        raise ArchiveError(f"the thing {name!r} is missing in the assets' folder")
+    what = f"the thing {name!r} of the assets' folder"
+    body = hull_of(archive, read_urdf(path, archive.inside), what)
+    points = np.concatenate([corners for corners, _ in body.pieces])
+    low, high = points.min(axis=0), points.max(axis=0)
+    if not SIZES[0] <= float(np.ptp(points, axis=0).max()) <= SIZES[1]:
+        size = " x ".join(f"{length:.3g}" for length in high - low)
+        raise ArchiveError(f"{what} is {size} m large, and none can be: its files are wrong")
+    noun = category.replace("_", " ")
+    return ObjectModel(
+        asset=THING,
+        shapes=convex_shapes(body.pieces),
+        size=vector(high - low),
+        radius=float(np.hypot(points[:, 0], points[:, 1]).max()),
+        noun=noun,
+        phrases=(noun,),
+        bottom=float(low[2]),
+        skin=Skin(str(body.skin)),
     )

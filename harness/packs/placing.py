@@ -1,26 +1,174 @@
-"""From a model's frame in the archive to ours: z up, standing on z = 0, the front towards -y.
+"""From a model's frame in the archive to ours: its file of points, where it stands and how it is
+held.
 
 Official models have y up and their origin near the middle of the underside; those with joints have
-z up. Which way one looks differs from model to model: `robospa/tasks/official/models.toml` says how
-each is turned.
+z up. Ours have z up, stand on z = 0 and look towards -y. Which way an official one looks differs
+from model to model: `robospa/tasks/official/models.toml` says how each is turned. At a contact
+point the z axis is the direction in which the gripper advances, the x axis that in which the
+fingers close; how wide a part is there is measured on the convex pieces.
 """
 
 from __future__ import annotations
 
+import json
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from robospa.geometry import Pose, Vec3, from_matrix
 from robospa.harness.packs.archive import ArchiveError
-from robospa.harness.packs.model_data import ModelData
-from robospa.tasks.objects.build import points_of
+from robospa.harness.packs.convex import planes
+from robospa.harness.packs.mesh_files import Floats, Piece
+from robospa.tasks.objects.build import MAX_WIDTH, points_of
 from robospa.tasks.official import OfficialModel, official_size
-from robospa.tasks.shapes import ObjectModel
+from robospa.tasks.shapes import Grasp, ObjectModel
 
-Floats = NDArray[np.float64]
+# -- the file of a model's points --------------------------------------------------------------
+
+LARGEST_DATA = 4 << 20
+"""Bytes that such a file may have; the largest official one has some tens of kilobytes."""
+MOST_POINTS = 256
+KEYS = {
+    "contact": ("contact_points_pose", "contact_points", "contact_pose"),
+    "functional": ("functional_matrix", "functional_points"),
+}
+"""Names of the lists of points, newest first: 48 official files have older ones."""
+SCALES = (1e-4, 1e4)
+LARGEST, LONGEST = 1e6, 1e12
+"""What no place of such a file reaches, and no other number: JSON may hold NaN, and whole numbers
+of any length."""
+
+
+@dataclass(frozen=True)
+class ModelData:
+    """`scale` of mesh and points along the model's axes; (n, 4, 4) frames of its points, in the
+    model's frame before scaling; extents before scaling; mass [kg], None if not given."""
+
+    scale: Vec3
+    contact: Floats
+    functional: Floats
+    extents: Vec3 | None = None
+    mass: float | None = None
+    links: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    """For models with joints, the link in whose frame each point of a kind is; "" if not said."""
+
+    def in_root(self, frames: Mapping[str, Floats]) -> ModelData:
+        """The same with all points in the root's frame; `frames` (4, 4) are the links' there,
+        unscaled."""
+
+        def moved(kind: str, points: Floats) -> Floats:
+            named = self.links.get(kind, ("",) * len(points))
+            rows = [frames.get(n, np.eye(4)) @ p for n, p in zip(named, points, strict=True)]
+            return np.array(rows).reshape(-1, 4, 4)
+
+        return replace(
+            self,
+            contact=moved("contact", self.contact),
+            functional=moved("functional", self.functional),
+        )
+
+    def point(self, name: str) -> Vec3 | None:
+        """Where "contact 2" or "functional 0" lies in the model's frame, scaled; None if the model
+        has no such point."""
+        kind, _, number = name.partition(" ")
+        frames = self.contact if kind == "contact" else self.functional
+        if int(number) >= len(frames):
+            return None
+        x, y, z = (frames[int(number), :3, 3] * self.scale).tolist()
+        return (x, y, z)
+
+
+def read_model_data(path: Path) -> ModelData:
+    """What `path` says. ArchiveError, in one sentence, if it is not such a file."""
+    try:
+        if path.stat().st_size > LARGEST_DATA:
+            raise ArchiveError(f"{str(path)!r} is larger than {LARGEST_DATA >> 20} MB")
+        data = json.loads(path.read_bytes())
+    except (OSError, ValueError, RecursionError) as error:
+        if isinstance(error, ArchiveError):
+            raise
+        raise ArchiveError(f"{str(path)!r} is no readable JSON file: {error}") from error
+    if not isinstance(data, dict):
+        raise ArchiveError(f"{str(path)!r} must hold a JSON object with a scale and points")
+    scale = _three(data.get("scale", (1.0, 1.0, 1.0)), path, "scale")
+    if not all(SCALES[0] <= s <= SCALES[1] for s in scale):
+        raise ArchiveError(f"{str(path)!r} has the scale {list(scale)}, which no model can have")
+    extents = data.get("extents")
+    return ModelData(
+        scale,
+        _frames(data, "contact", path),
+        _frames(data, "functional", path),
+        None if extents is None else _three(extents, path, "extents"),
+        _mass(data.get("mass"), path),
+        {kind: tuple(_link(row) for row in _listed(data, kind)) for kind in KEYS},
+    )
+
+
+def _mass(value: object, path: Path) -> float | None:
+    """A body's mass [kg]; None where it is not given, or given link by link."""
+    if value is None or isinstance(value, dict | list):
+        return None
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < 1e3:
+        raise ArchiveError(
+            f"{str(path)!r} gives the mass {repr(value)[:80]}, which no object can have"
+        )
+    return float(value)
+
+
+def _three(value: object, path: Path, what: str) -> Vec3:
+    """Three numbers; one number counts for all three axes."""
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        value = [value] * 3
+    if (
+        not isinstance(value, list | tuple)
+        or len(value) != 3
+        or not all(isinstance(v, int | float) and abs(v) < LONGEST for v in value)
+    ):
+        raise ArchiveError(
+            f"{str(path)!r} must give three numbers as {what}, not {repr(value)[:80]}"
+        )
+    return (float(value[0]), float(value[1]), float(value[2]))
+
+
+def _frames(data: dict[str, Any], kind: str, path: Path) -> Floats:
+    """(n, 4, 4) frames of a list of points, (0, 4, 4) if there is none."""
+    listed = _listed(data, kind)
+    if not isinstance(listed, list) or len(listed) > MOST_POINTS:
+        raise ArchiveError(
+            f"{str(path)!r} must list its {kind} points, {MOST_POINTS} of them at most"
+        )
+    rows = [_matrix(row) for row in listed]
+    try:
+        found = np.array(rows, dtype=float).reshape(-1, 4, 4)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise ArchiveError(f"{str(path)!r} has {kind} points that are no 4x4 frames") from error
+    if not np.isfinite(found).all() or np.abs(found).max(initial=0.0) > LARGEST:
+        raise ArchiveError(f"{str(path)!r} has {kind} points at places that no object can have")
+    return found
+
+
+def _listed(data: dict[str, Any], kind: str) -> Any:
+    return next((data[key] for key in KEYS[kind] if data.get(key)), [])
+
+
+def _link(row: object) -> str:
+    """The link in whose frame a point is; "" if that is not said."""
+    values = row.values() if isinstance(row, dict) else ()
+    return next((value for value in values if isinstance(value, str)), "")
+
+
+def _matrix(row: object) -> object:
+    """The frame of a point; models with joints also name the link that it belongs to."""
+    if isinstance(row, dict):
+        return next((value for value in row.values() if isinstance(value, list)), row)
+    return row
+
+
+# -- where it stands ---------------------------------------------------------------------------
 
 Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 """Turns the archive's y axis up; its z axis, the front, goes to -y."""
@@ -179,3 +327,86 @@ def frames(
         x, y, z = placing.scaled_points(np.array([place]))[0].tolist()
         found[name] = replace(builtin.frames[name], position=(x, y, z))
     return found
+
+
+# -- where it can be held ----------------------------------------------------------------------
+
+UPWARDS = -0.2
+"""A gripper comes from above: its approach's z is no larger."""
+DEPTHS = (-0.004, 0.0, 0.004)
+"""Along the approach, where a width is measured [m]."""
+REACH = 0.012
+"""How far from the line between the fingertips a part may begin [m]."""
+TILT = 0.4
+"""How far an approach at a contact point may be turned about the closing direction [rad]."""
+
+
+def grasp_points(
+    pieces: Sequence[Piece],
+    builtin: ObjectModel,
+    likeness: Likeness,
+    placing: Placing,
+    data: ModelData,
+    model: OfficialModel,
+) -> tuple[Grasp, ...]:
+    """All that fingers fit around; `pieces` are in the body frame [m]."""
+    faces = [planes(*piece) for piece in pieces]
+    found = []
+    for grasp in builtin.grasps:
+        found.append((likeness.point(grasp.point), grasp.approach, grasp.closing, grasp.tilt))
+    used = {point for point in model.points.values() if point.startswith("contact")}
+    for number, frame in enumerate(data.contact):
+        if f"contact {number}" in used:
+            continue
+        x, y, z = placing.points(frame[None, :3, 3])[0].tolist()
+        closing, approach = (_unit(placing.turn @ frame[:3, k]) for k in (0, 2))
+        if approach[2] <= UPWARDS:
+            found.append(((x, y, z), approach, closing, TILT))
+    made = []
+    for point, approach, closing, tilt in found:
+        held = _between(faces, np.array(point), np.array(approach), np.array(closing))
+        if held is None or not 1e-3 < held[1] <= MAX_WIDTH:
+            continue
+        x, y, z = (np.array(point) + held[0] * np.array(closing)).tolist()
+        made.append(Grasp((x, y, z), approach, closing, held[1], tilt))
+    return tuple(dict.fromkeys(made))
+
+
+def _unit(vector: Floats) -> Vec3:
+    x, y, z = (vector / max(float(np.linalg.norm(vector)), 1e-9)).tolist()
+    return (x, y, z)
+
+
+def _between(
+    faces: Sequence[tuple[Floats, Floats]], point: Floats, approach: Floats, closing: Floats
+) -> tuple[float, float] | None:
+    """Middle and width [m], along `closing` from `point`, of the part between the fingertips.
+
+    None if there is nothing. Parts that touch or overlap along the line are one.
+    """
+    spans = []
+    for depth in DEPTHS:
+        start = point + depth * approach
+        for normals, offsets in faces:
+            slope = normals @ closing
+            room = offsets - normals @ start
+            if (room[np.abs(slope) < 1e-9] < 0).any():
+                continue
+            with np.errstate(divide="ignore", invalid="ignore"):
+                at = room / slope
+            low = at[slope < -1e-9].max(initial=-np.inf)
+            high = at[slope > 1e-9].min(initial=np.inf)
+            if low < high:
+                spans.append((float(low), float(high)))
+    low, high = 0.0, 0.0
+    near = sorted(span for span in spans if span[0] < REACH and span[1] > -REACH)
+    if not near:
+        return None
+    low, high = min(near, key=lambda span: max(span[0], -span[1], 0.0))
+    grown = True
+    while grown:
+        grown = False
+        for a, b in near:
+            if a <= high + 1e-4 and b >= low - 1e-4 and (a < low or b > high):
+                low, high, grown = min(a, low), max(b, high), True
+    return (low + high) / 2, high - low

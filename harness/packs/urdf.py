@@ -10,17 +10,15 @@ from __future__ import annotations
 import math
 import os
 import xml.etree.ElementTree as ET
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from robospa.geometry import Vec3
 from robospa.harness.packs.archive import ArchiveError
-
-Floats = NDArray[np.float64]
+from robospa.harness.packs.mesh_files import Floats
 
 LARGEST_FILE = 16 << 20
 MOST_PARTS = 4096
@@ -37,7 +35,7 @@ class MeshUse:
 
 
 @dataclass(frozen=True)
-class Joint:
+class UrdfJoint:
     """`origin` (4, 4) [m] of the child in the parent at 0; `axis` in the child's frame; limits
     [rad] or [m]."""
 
@@ -51,12 +49,12 @@ class Joint:
 
 
 @dataclass(frozen=True)
-class Robot:
+class Urdf:
     """A URDF file: meshes of each link by its name, joints by the name of their child."""
 
     visuals: Mapping[str, tuple[MeshUse, ...]]
     collisions: Mapping[str, tuple[MeshUse, ...]]
-    joints: Mapping[str, Joint] = field(default_factory=dict)
+    joints: Mapping[str, UrdfJoint] = field(default_factory=dict)
 
     def in_root(self, link: str) -> Floats:
         """(4, 4) frame of `link` in the root's, all joints at 0."""
@@ -79,7 +77,7 @@ class Robot:
         return found
 
 
-def read_urdf(path: Path, inside: Callable[[Path], Path]) -> Robot:
+def read_urdf(path: Path, inside: Callable[[Path], Path]) -> Urdf:
     """What `path` says; `inside` refuses files that are not the archive's.
 
     ArchiveError, in one sentence, for one that cannot be read safely.
@@ -103,7 +101,7 @@ def read_urdf(path: Path, inside: Callable[[Path], Path]) -> Robot:
         ) from error
 
 
-def check_uses(robot: Robot) -> None:
+def check_uses(robot: Urdf) -> None:
     """ArchiveError, naming the first, if a mesh that `robot` names is not there."""
     for uses in (*robot.visuals.values(), *robot.collisions.values()):
         check_files(use.file for use in uses)
@@ -118,7 +116,15 @@ def check_files(files: Iterable[Path]) -> None:
             raise ArchiveError(f"the mesh {str(file)!r} may not be read by this user")
 
 
-def _robot(root: ET.Element, path: Path, inside: Callable[[Path], Path]) -> Robot:
+def key_of(uses: Sequence[MeshUse]) -> tuple[tuple[Path, ...], str]:
+    """The files, which have to be there, and where they are used as text: what is made of them
+    depends on nothing else."""
+    files = tuple(use.file for use in uses)
+    check_files(files)
+    return files, " ".join(np.array2string(use.transform.ravel(), precision=9) for use in uses)
+
+
+def _robot(root: ET.Element, path: Path, inside: Callable[[Path], Path]) -> Urdf:
     joints = {joint.child: joint for joint in map(_joint, root.findall("joint"))}
     for child in joints:
         seen, link = {child}, child
@@ -142,7 +148,7 @@ def _robot(root: ET.Element, path: Path, inside: Callable[[Path], Path]) -> Robo
             for link in links
         }
 
-    return Robot(meshes("visual"), meshes("collision"), joints)
+    return Urdf(meshes("visual"), meshes("collision"), joints)
 
 
 def _uses(part: ET.Element, path: Path, inside: Callable[[Path], Path]) -> list[MeshUse]:
@@ -160,7 +166,7 @@ def _uses(part: ET.Element, path: Path, inside: Callable[[Path], Path]) -> list[
     return [MeshUse(inside(path.parent / name), _origin(part) @ scale)]
 
 
-def _joint(element: ET.Element) -> Joint:
+def _joint(element: ET.Element) -> UrdfJoint:
     axis, limit = element.find("axis"), element.find("limit")
     x, y, z = _numbers(axis.get("xyz", "1 0 0") if axis is not None else "1 0 0")
     lower, upper = (
@@ -168,7 +174,7 @@ def _joint(element: ET.Element) -> Joint:
     )
     if not (math.isfinite(lower) and math.isfinite(upper)):
         raise ValueError(f"limits {lower} and {upper} of joint {element.get('name')!r}")
-    return Joint(
+    return UrdfJoint(
         name=element.attrib["name"],
         kind=element.attrib["type"],
         parent=element.findall("parent")[0].attrib["link"],

@@ -40,7 +40,7 @@ from robospa.tasks.shapes import Hinge, ObjectModel, Params, Shape, Skin
 if TYPE_CHECKING:
     import sapien
 
-    from robospa.harness.packs.robot_skins import RobotSkins
+    from robospa.harness.packs.visuals import RobotSkins
 
 SHADOW = 1.6
 """How far shadows fall beside a thing on the table, by its height: the further lamp's slope."""

@@ -320,7 +320,7 @@ class SapienWorld:
             self._renderer = Renderer()
             return self._renderer
         from robospa.harness.packs.archive import open_archive
-        from robospa.harness.packs.robot_skins import robot_skins
+        from robospa.harness.packs.visuals import robot_skins
 
         full = self._robot_assets == "official-full"
         self._renderer = Renderer(partial(robot_skins, open_archive(), full=full))

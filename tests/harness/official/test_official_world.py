@@ -24,7 +24,6 @@ from robospa.harness.official.official_options import (
 from robospa.harness.official.official_parts import official_world_parts
 from robospa.harness.official.sentences import SEEN, UNSEEN
 from robospa.harness.running import evaluate
-from robospa.harness.running.films import films_of
 from robospa.harness.running.policy_probe import ProbedPolicy
 from robospa.harness.running.request import make_request
 from robospa.harness.running.worker import load_parts
@@ -156,9 +155,6 @@ def test_a_run_is_of_its_own_suite_and_says_what_is_switched(
     assert manifest["suite"] == BUILTIN_SUITE
     assert manifest["settings"]["layout"]["assets"] == "builtin"
     assert "gap-under-wall" in manifest["settings"]["layout"]["switches"]
-    films = films_of(made.config, {}, 1)
-    film = films._config
-    assert film.parts == made.config.parts and film.parts_arguments == made.config.parts_arguments
     with pytest.raises(SettingsError, match="leave it out"):
         request(tmp_path, parts="run_fakes:parts")
 

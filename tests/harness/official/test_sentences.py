@@ -190,7 +190,7 @@ def test_a_run_has_official_splits_sentences_and_their_hash(
     monkeypatch.setattr(evaluate, "probe_world", lambda *_: {})
     policy = ProbedPolicy("hold", PolicySpec(name="hold", cameras=()), {}, {})
     manifest = evaluate.make_manifest(made, {"Rank_Blocks_Color": policy}).to_json()
-    assert manifest["settings"]["split"] == [SEEN, UNSEEN]
+    assert list(manifest["settings"]["split"]) == [SEEN, UNSEEN]
     assert manifest["settings"]["instructions"] == manifest["about"]["instructions"]["hash"]
     assert any("0 stand in training" in text for text in manifest["about"]["warnings"])
 

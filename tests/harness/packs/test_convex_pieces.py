@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from robospa.harness.packs.archive import ArchiveError
-from robospa.harness.packs.decimate import shaded, thinned
+from robospa.harness.packs.convex import CORNERS, connected_parts, convex_pieces
 from robospa.harness.packs.mesh_files import RawMesh
-from robospa.harness.packs.pieces import CORNERS, connected_parts, convex_pieces
+from robospa.harness.packs.visuals import shaded, thinned
 from robospa.tasks.objects import meshes as m
 from robospa.tasks.shapes import Mesh
 

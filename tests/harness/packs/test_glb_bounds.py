@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from mesh_writers import Piece, glb, glb_bytes
 
-from robospa.harness.packs import glb as checks
+from robospa.harness.packs import mesh_files as checks
 from robospa.harness.packs.archive import ArchiveError
-from robospa.harness.packs.glb import check_glb
+from robospa.harness.packs.mesh_files import check_glb
 
 TRIANGLE = Piece(np.eye(3), np.array([[0, 1, 2]]))
 

@@ -13,8 +13,8 @@ from pack_fixtures import READS_MESHES, official_pack_in
 from sapien import physx
 
 from robospa.geometry import Pose
+from robospa.harness.packs.convex import convex_pieces
 from robospa.harness.packs.mesh_files import read_shapes
-from robospa.harness.packs.pieces import convex_pieces
 from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.tasks.objects import object_model
 from robospa.tasks.official import official_model, official_size

@@ -9,11 +9,11 @@ from made_archive import make_archive
 from mesh_writers import Piece, hollow_staves, merged, write_glb
 from pack_fixtures import READS_MESHES
 
-from robospa.harness.packs import hollows
+from robospa.harness.packs import convex
 from robospa.harness.packs.archive import open_archive
+from robospa.harness.packs.convex import convex_pieces
 from robospa.harness.packs.index import index
 from robospa.harness.packs.mesh_files import read_shapes
-from robospa.harness.packs.pieces import convex_pieces
 from robospa.tasks.official import official_assets, official_models
 
 pytestmark = READS_MESHES
@@ -40,9 +40,9 @@ def test_depth_is_that_of_the_floor(height: float, share: float) -> None:
     """Of staves about y, their floor a tenth of their height thick."""
     staves = hollow_staves(0.05, 0.04, height, 12)
     pieces = convex_pieces([(vertices[:, [1, 2, 0]], faces) for vertices, faces in staves])
-    assert hollows.depth(pieces) == pytest.approx(share, abs=0.01)
+    assert convex.depth(pieces) == pytest.approx(share, abs=0.01)
     vertices, faces = merged(staves)
-    assert hollows.depth(convex_pieces([(vertices[:, [1, 2, 0]], faces)])) < 0.01
+    assert convex.depth(convex_pieces([(vertices[:, [1, 2, 0]], faces)])) < 0.01
 
 
 def test_models_in_pieces_are_hollow(root: Path) -> None:
@@ -66,6 +66,6 @@ def test_a_model_in_one_node_is_named_with_its_tasks(root: Path) -> None:
 
 
 def test_without_the_library_nothing_is_said(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(hollows, "reads_meshes", lambda: False)
-    monkeypatch.setattr(hollows, "solid_pieces", None)
+    monkeypatch.setattr(convex, "reads_meshes", lambda: False)
+    monkeypatch.setattr(convex, "colliding_pieces", None)
     assert not index(open_archive(root)).filled

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from robospa.harness.packs.archive import ArchiveError
-from robospa.harness.packs.model_data import LARGEST_FILE, ModelData, read_model_data
+from robospa.harness.packs.placing import LARGEST_DATA, ModelData, read_model_data
 
 FRAME = [[1, 0, 0, 2], [0, 1, 0, 4], [0, 0, 1, 6], [0, 0, 0, 1]]
 
@@ -72,6 +72,6 @@ def test_what_is_no_json_object_is_refused(tmp_path: Path, text: str) -> None:
 def test_a_huge_file_is_not_read(tmp_path: Path) -> None:
     path = tmp_path / "model_data0.json"
     with path.open("wb") as file:
-        file.truncate(LARGEST_FILE + 1)
+        file.truncate(LARGEST_DATA + 1)
     with pytest.raises(ArchiveError, match="larger than 4 MB"):
         read_model_data(path)

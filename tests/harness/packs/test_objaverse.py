@@ -14,8 +14,7 @@ from pack_fixtures import READS_MESHES, official_pack_in
 from robospa.harness.official.official_options import OfficialLayout
 from robospa.harness.official.official_parts import official_world_parts
 from robospa.harness.packs.archive import ArchiveError, open_archive
-from robospa.harness.packs.index import digest_of, index
-from robospa.harness.packs.objaverse import ASSET, things
+from robospa.harness.packs.index import THING, clutter_things, digest_of, index
 from robospa.harness.packs.official import OfficialPack
 from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.harness.trial import task_parts
@@ -53,29 +52,29 @@ def official(key: TrialKey) -> Scene:
 
 
 def things_in(scene: Scene) -> list[str]:
-    return [str(item.params["thing"]) for item in scene.clutter if item.asset == ASSET]
+    return [str(item.params["thing"]) for item in scene.clutter if item.asset == THING]
 
 
 def categories(pack: OfficialPack, scene: Scene) -> set[str]:
-    looks = [look for kind in pack.clutter(scene) if kind.asset == ASSET for look in kind.looks]
+    looks = [look for kind in pack.clutter(scene) if kind.asset == THING for look in kind.looks]
     return {str(look["thing"]).partition("/")[0] for look in looks}
 
 
 def test_the_list_says_which_there_are_and_without_it_all_are(
     pack: OfficialPack, tmp_path: Path
 ) -> None:
-    found = things(pack.archive)
+    found = clutter_things(pack.archive)
     assert found["toothbrush"] == ("0", "12") and {*found} == {
         "bottle", "marker", "plush", "toothbrush"
     }  # fmt: skip
     assert index(pack.archive).clutter == 5
     archive = open_archive(make_archive(tmp_path, [], ("clutter",)))
-    (tmp_path / "objects" / ASSET / "list.json").unlink()
-    assert things(archive)["toothbrush"] == ("0", "12", "3")
+    (tmp_path / "objects" / THING / "list.json").unlink()
+    assert clutter_things(archive)["toothbrush"] == ("0", "12", "3")
 
 
 def test_a_thing_collides_as_its_hull_and_stands_where_its_file_has_it(pack: OfficialPack) -> None:
-    made = object_model(ASSET, {"thing": "marker/0", "pack": "official"})
+    made = object_model(THING, {"thing": "marker/0", "pack": "official"})
     assert len(made.shapes) == 1 and made.size == pytest.approx((0.06, 0.04, 0.06))
     assert made.bottom == pytest.approx(-0.03)
     assert made.radius == pytest.approx(math.hypot(0.03, 0.02))
@@ -108,7 +107,7 @@ def test_they_lie_in_randomised_scenes_by_the_rules_of_all_clutter(pack: Officia
             x, y, z = item.pose.position
             assert z + model.bottom == pytest.approx(scene.table_top)
             assert taken.free(np.array([x]), np.array([y]), model, scene.table_top)[0]
-            assert item.fixed == (item.asset == ASSET)
+            assert item.fixed == (item.asset == THING)
             assert item.asset not in taken_kinds(scene)
     assert official(KEY) == official(KEY)
 
@@ -125,7 +124,7 @@ def test_no_other_scene_has_them(pack: OfficialPack) -> None:
 def test_without_such_things_the_clutter_is_that_of_the_library(
     pack: OfficialPack, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("robospa.harness.packs.official.kinds", lambda *_: ())
+    monkeypatch.setattr("robospa.harness.packs.official.clutter_kinds", lambda *_: ())
     plain = packs.with_pack(task_parts(KEY).scene, "official")
     assert official(KEY).clutter == plain.clutter
 
@@ -146,26 +145,26 @@ def test_scenes_of_our_own_suite_are_what_they_were_to_the_bit() -> None:
 )
 def test_a_broken_list_is_refused_in_a_sentence(tmp_path: Path, text: str, message: str) -> None:
     archive = open_archive(make_archive(tmp_path, [], ("clutter",)))
-    (tmp_path / "objects" / ASSET / "list.json").write_text(text)
+    (tmp_path / "objects" / THING / "list.json").write_text(text)
     with pytest.raises(ArchiveError, match=message):
-        things(archive)
+        clutter_things(archive)
 
 
 @pytest.mark.parametrize("thing", ["../../secret/0", "bottle", "bottle/../0", "bottle/9", 3, None])
 def test_what_is_no_thing_of_the_archive_is_refused(pack: OfficialPack, thing: object) -> None:
     with pytest.raises(ArchiveError, match=r"is no thing of the archive|is missing"):
-        pack.model(ASSET, {"thing": thing})
+        pack.model(THING, {"thing": thing})
 
 
 def test_a_thing_in_the_wrong_unit_is_refused_and_its_files_are_hashed(tmp_path: Path) -> None:
     root = make_archive(tmp_path, [], ("clutter",))
     archive = open_archive(root)
     before = digest_of(archive)
-    urdf = root / "objects" / ASSET / "marker" / "0" / "model.urdf"
+    urdf = root / "objects" / THING / "marker" / "0" / "model.urdf"
     urdf.write_text(urdf.read_text().replace("<mesh ", '<mesh scale="100 100 100" '))
     assert digest_of(archive) != before
     with pytest.raises(ArchiveError, match="'marker/0' of the assets' folder is 6 x 4 x 6 m large"):
-        OfficialPack(archive).model(ASSET, {"thing": "marker/0"})
+        OfficialPack(archive).model(THING, {"thing": "marker/0"})
 
 
 @pytest.mark.sim

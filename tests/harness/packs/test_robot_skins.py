@@ -10,9 +10,9 @@ from made_robots import MOVED, make_robot
 from pack_fixtures import READS_MESHES
 
 from robospa.harness.official.official_options import check_robots
-from robospa.harness.packs import cache
+from robospa.harness.packs import archive as cache
 from robospa.harness.packs.archive import ArchiveError, open_archive
-from robospa.harness.packs.robot_skins import RobotSkins, robot_skins
+from robospa.harness.packs.visuals import RobotSkins, robot_skins
 from robospa.harness.robots import embodiment
 from robospa.harness.robots.embodiment import Arm
 from robospa.harness.settings import SettingsError
@@ -29,7 +29,7 @@ def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def corners(skin: Skin) -> np.ndarray:
     """The corners (2, 3) of the box around a skin."""
-    found: np.ndarray = cache.load(Path(skin.file), "box")["box"]
+    found: np.ndarray = cache.load_arrays(Path(skin.file), "box")["box"]
     return found
 
 
@@ -64,7 +64,7 @@ def test_every_link_is_drawn_in_its_own_frame(tmp_path: Path, robot: str) -> Non
 def test_meshes_are_thinned_or_full(tmp_path: Path) -> None:
     thin, full = (
         sum(
-            len(cache.load(Path(skin.file), "triangles")["triangles"])
+            len(cache.load_arrays(Path(skin.file), "triangles")["triangles"])
             for skin in made(tmp_path, "piper", full, rounds=2).arms[0].values()
         )
         for full in (False, True)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from robospa.harness.packs.archive import Archive, ArchiveError
-from robospa.harness.packs.urdf import LARGEST_FILE, Robot, read_urdf
+from robospa.harness.packs.urdf import LARGEST_FILE, Urdf, read_urdf
 
 TWO_LINKS = """<robot name="r">
 <link name="base"/>
@@ -21,7 +21,7 @@ TWO_LINKS = """<robot name="r">
 </robot>"""
 
 
-def read(folder: Path, text: str | bytes) -> Robot:
+def read(folder: Path, text: str | bytes) -> Urdf:
     path = folder / "objects" / "x" / "mobility.urdf"
     path.parent.mkdir(parents=True)
     path.write_bytes(text if isinstance(text, bytes) else text.encode())
