@@ -1,7 +1,4 @@
-"""What a server or its line does wrong ends in the same way in every dialect.
-
-`docs/faults.md` repeats the table.
-"""
+"""What a server or its line does wrong ends in the same way in every dialect."""
 
 from __future__ import annotations
 
@@ -9,7 +6,6 @@ import itertools
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -27,7 +23,6 @@ from robospa.protocol.errors import (
 )
 from robospa.protocol.transport import Timeouts
 
-PAGE = Path(__file__).parents[2] / "docs" / "faults.md"
 SERVERS: dict[str, tuple[Callable[[Any], Any], str, str]] = {
     "openpi": (OpenPi, "socket", ""),
     "go1": (Go1, "http", ""),
@@ -203,14 +198,3 @@ def test_a_door_that_closes_later_is_not_taken_for_another_dialect(name: str) ->
             policy.reset(TRIAL)
             policy.infer(observation())
         assert "looks like" not in str(caught.value)
-
-
-def table() -> str:
-    rows = ["| A server that ... | its trial is |", "|---|---|"]
-    return "\n".join([*rows, *(f"| {case.told} | {case.end} |" for case in CASES.values())])
-
-
-def test_the_page_says_the_same() -> None:
-    begin, end = "<!-- dialects -->\n", "\n<!-- end of dialects -->"
-    found = PAGE.read_text().partition(begin)[2].partition(end)[0]
-    assert found == table(), f"docs/faults.md must have this table:\n{table()}"
