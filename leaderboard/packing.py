@@ -48,14 +48,14 @@ from robospa.leaderboard.verify import (
     tables_of,
     verify,
 )
-from robospa.results.records.lint import lint_run
+from robospa.results.lint import lint_run
 from robospa.results.records.manifest import (
     PolicySettings,
     RunAbout,
     RunSettings,
     make_manifest,
 )
-from robospa.results.records.run_io import Run, action_path, read_run
+from robospa.results.records.runs import Run, action_path, read_run
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey, path_part
 

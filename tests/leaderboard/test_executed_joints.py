@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bundle_fakes import PICK, SEEDS, make_run
-from fake_records import trial_record
+from fake_runs import trial_record
 
 from robospa.harness.running.record_store import write_actions
 from robospa.leaderboard.audit import _read as read_for_audit
