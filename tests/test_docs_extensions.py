@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from command_line import robospa
 from installed import EXAMPLES, installed
-from standin_base import QUICK, STATE, TRIAL, observation
+from standins import QUICK, STATE, TRIAL, observation
 
 from robospa.clients import check_options, connect
 from robospa.clients.dialect import dialects

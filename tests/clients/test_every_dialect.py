@@ -8,8 +8,19 @@ from typing import Any
 
 import numpy as np
 import pytest
-from standin_base import QUICK, TRIAL, joint_chunk, observation
-from standins import Go1, OpenPi, RoboTwin, Status, VlaEval, XPolicyLab, XVla
+from standins import (
+    QUICK,
+    TRIAL,
+    Go1,
+    OpenPi,
+    RoboTwin,
+    Status,
+    VlaEval,
+    XPolicyLab,
+    XVla,
+    joint_chunk,
+    observation,
+)
 
 from robospa.clients import connect, detect
 from robospa.clients.dialect import dialects

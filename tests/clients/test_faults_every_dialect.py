@@ -11,8 +11,17 @@ from typing import Any
 import numpy as np
 import pytest
 from bad_line import BadLine, moment
-from standin_base import TRIAL, joint_chunk, observation
-from standins import Go1, OpenPi, RoboTwin, VlaEval, XPolicyLab, XVla
+from standins import (
+    TRIAL,
+    Go1,
+    OpenPi,
+    RoboTwin,
+    VlaEval,
+    XPolicyLab,
+    XVla,
+    joint_chunk,
+    observation,
+)
 
 from robospa.clients import connect
 from robospa.protocol.client import RemotePolicy

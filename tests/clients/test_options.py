@@ -3,13 +3,30 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
+from dataclasses import fields
 from pathlib import Path
 
+import numpy as np
 import pytest
+from numpy.typing import NDArray
 
-from robospa.clients import check_options, find_endpoint
+from robospa.action_space import ActionSpace
+from robospa.clients import check_options, connect, find_endpoint
+from robospa.clients.chunks import (
+    RobotOption,
+    as_chunk,
+    budget_warning,
+    invert_grippers,
+    least_tokens,
+)
 from robospa.clients.dialect import Dialect, dialects
+from robospa.clients.robotwin import robotwin_observation
+from robospa.clients.xpolicylab import XPolicyLabClientOptions, decode, robot_state
+from robospa.observation import Observation
 from robospa.protocol.options import option_table, plain_options, read_options, url_options
+from robospa.protocol.policy import PolicySpec, TrialInfo
+from robospa.protocol.server import ServerThread
 
 DIALECTS = dialects()
 ROOT = Path(__file__).resolve().parents[2]
@@ -113,3 +130,124 @@ def test_the_page_lists_every_dialect() -> None:
         )
         for dialect in DIALECTS
     )
+
+
+class Zeros:
+    spec = PolicySpec("zeros", cameras=(), state="none")
+
+    def reset(self, trial: TrialInfo) -> None:
+        return None
+
+    def infer(self, observation: Observation) -> NDArray[np.float32]:
+        return np.zeros((1, 14), np.float32)
+
+
+@pytest.fixture
+def url() -> Iterator[str]:
+    with ServerThread(policy_factory=Zeros) as server:
+        yield server.url
+
+
+def test_ws_offers_our_protocol(url: str) -> None:
+    with connect(url) as policy:
+        assert policy.dialect == "robospa.v1"
+        assert policy.spec == Zeros.spec
+
+
+def test_openpi_forces_openpis_dialect(url: str) -> None:
+    with connect(url.replace("ws://", "openpi://")) as policy:
+        assert policy.dialect == "openpi"
+        assert policy.spec.horizon is None
+        assert policy.spec.text_budget == 150
+        assert [camera.name for camera in policy.spec.cameras] == [
+            "head",
+            "left_wrist",
+            "right_wrist",
+        ]
+
+
+@pytest.mark.parametrize("url", ["http://localhost:8000", "localhost:8000", "oracle", ""])
+def test_unknown_schemes_are_told_what_exists(url: str) -> None:
+    with pytest.raises(ValueError, match="no address of a policy server") as caught:
+        connect(url)
+    known = [scheme for dialect in dialects() for scheme in dialect.schemes]
+    assert all(f"{scheme}://" in str(caught.value) for scheme in known)
+
+
+def test_a_url_without_host() -> None:
+    with pytest.raises(ValueError, match="names no host"):
+        connect("ws://")
+
+
+@pytest.mark.parametrize(
+    "value", [None, "x", {}, [[1], [2, 3]], [["a"]], [[10**400]], [["1.5"]], [[True]]]
+)
+def test_what_is_no_chunk_stays_what_it_is(value: object) -> None:
+    found = as_chunk(value)
+    assert found is value
+
+
+def test_grippers_are_turned_and_nothing_else() -> None:
+    chunk = np.arange(28, dtype=np.float32).reshape(2, 14)
+    change = invert_grippers(chunk, ActionSpace("joint")) - chunk
+    assert np.flatnonzero(change.any(axis=0)).tolist() == [6, 13]
+    wrong = np.zeros((1, 3), np.float32)
+    assert invert_grippers(wrong, ActionSpace("joint")) is wrong
+
+
+@pytest.mark.parametrize(
+    ("text", "count"),
+    [("", 2), ("pick", 3), ("pick the red, small block.", 9), ("3 blocks (left)", 7)],
+)
+def test_tokens_are_counted_from_below(text: str, count: int) -> None:
+    assert least_tokens(text) == count
+
+
+def test_a_budget_is_warned_about_only_when_it_is_broken() -> None:
+    assert budget_warning(None, {"A": "word " * 500}) is None
+    assert budget_warning(50, {"A": "word " * 48}) is None
+    warning = budget_warning(50, {"A": "word " * 49, "B": "word", "C": "word " * 70})
+    assert warning is not None
+    assert "2 of 3 tasks" in warning and "C: at least 72" in warning
+
+
+JOINTS = (6, 7)
+STATE = np.arange(15, dtype=np.float32) / 15
+POSES = np.tile(np.array([0.1, 0, 1, 1, 0, 0, 0, 0.5], np.float32), (2, 1))
+
+
+def seen() -> Observation:
+    image = np.zeros((240, 320, 3), np.uint8)
+    cameras = ("head", "left_wrist", "right_wrist", "front")
+    return {"state": STATE, "ee": POSES, "images": dict.fromkeys(cameras, image), "step": 0}
+
+
+def test_every_dialect_says_which_robot_its_servers_drive() -> None:
+    for dialect in dialects():
+        default = {f.name: f.default for f in fields(dialect.options)}.get("embodiment")
+        assert default == "aloha-agilex", dialect.scheme
+
+
+def test_columns_are_declared_for_the_robot_that_is_known() -> None:
+    assert RobotOption().columns("joint") == 14
+    other = RobotOption("franka-panda")
+    assert (other.columns("joint"), other.columns("ee")) == (None, 16)
+
+
+def test_arms_of_six_and_seven_joints_are_sent_one_by_one() -> None:
+    sent = robotwin_observation(seen(), JOINTS)["joint_action"]
+    assert isinstance(sent, dict)
+    assert (len(sent["left_arm"]), len(sent["right_arm"])) == JOINTS
+    assert (sent["left_gripper"], sent["right_gripper"]) == pytest.approx((STATE[6], STATE[14]))
+    state = robot_state(seen(), JOINTS)
+    assert len(state["right_arm_joint_state"]) == 7
+    assert state["right_ee_joint_state"] == pytest.approx(STATE[14:])
+
+
+def test_closed_grippers_of_such_arms_are_turned_round() -> None:
+    options = XPolicyLabClientOptions(grippers="closed")
+    answer = {"actions": np.zeros((2, 15), np.float32)}
+    chunk = decode(answer, seen(), options, JOINTS)
+    grippers = ActionSpace("joint", JOINTS).grippers
+    assert isinstance(chunk, np.ndarray)
+    assert np.flatnonzero(chunk[0]).tolist() == grippers == [6, 14]

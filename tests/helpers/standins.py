@@ -1,40 +1,172 @@
-"""Servers of every dialect, written from what is known of the originals and not from our clients.
-
-Each is a context manager that gives its URL. `requests` are what came in, arrays decoded. `model`
-turns a request into the chunk that the server answers in its own way; what it raises becomes the
-server's own kind of error. `extra` stands beside the actions in answers that are maps. `instead`
-is sent in place of any answer: bytes as they are, a str as a text frame where there is such a
-thing.
-"""
+"""What every stand-in server shares, and the observation that each of them is shown."""
 
 from __future__ import annotations
 
+import base64
 import contextlib
 import json
 import socketserver
 import struct
+import threading
 import traceback
+from collections.abc import Callable
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any, ClassVar
 
 import msgpack
 import numpy as np
-from standin_base import QUICK, TRIAL, StandIn, observation
-from standin_codecs import (
-    framed_in,
-    framed_out,
-    json_numpy,
-    named_in,
-    named_out,
-    nd_in,
-    nd_out,
-    openpi_in,
-    openpi_out,
-)
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.server import serve
 
 from robospa.clients import connect
+from robospa.protocol.policy import TrialInfo
+from robospa.protocol.transport import Timeouts
+
+QUICK = Timeouts(connect=10, hello=10, reset=10, first_infer=10, infer=10, end=10, close=0.2)
+TRIAL = TrialInfo("Pick_Blocks_Size", "aloha-agilex", "pick the red block", 7, "5eed")
+HEAD, LEFT, RIGHT = "head", "left_wrist", "right_wrist"
+
+
+def image(name: str) -> Any:
+    """An image whose every axis and colour can be told apart, another one for each camera."""
+    rows, columns = np.indices((240, 320))
+    offset = {HEAD: 0, LEFT: 80, RIGHT: 160}[name]
+    colors = [rows % 80 + offset, columns % 80 + offset, np.full((240, 320), offset + 79)]
+    return np.stack(colors, axis=-1).astype(np.uint8)
+
+
+STATE = np.array(
+    [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.25, -0.1, -0.2, -0.3, -0.4, -0.5, -0.6, 0.75], np.float32
+)
+EE = np.array(
+    [
+        [-0.3, -0.2, 0.9, 0.5, 0.5, -0.5, 0.5, 0.25],
+        [0.31, 0.11, 1.1, np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5), 0.75],
+    ],
+    np.float32,
+)
+
+
+def observation(step: int = 0, **changes: Any) -> dict[str, Any]:
+    """What a world shows; every number is found once only."""
+    seen = {
+        "images": {name: image(name) for name in (HEAD, LEFT, RIGHT)},
+        "state": STATE.copy(),
+        "ee": EE.copy(),
+        "instruction": "pick the red block",
+        "step": step,
+    }
+    return {**seen, **changes}
+
+
+def joint_chunk(length: int = 3) -> Any:
+    """(T, 14) in which every number is another one."""
+    return np.arange(length * 14, dtype=np.float64).reshape(length, 14) / 1000
+
+
+class StandIn:
+    """What all of them have; subclasses say how to listen."""
+
+    scheme = ""
+
+    def __init__(self, model: Callable[[Any], Any] | None = None, instead: Any = None) -> None:
+        self.model = model or (lambda request: joint_chunk())
+        self.instead = instead
+        self.extra: dict[str, Any] = {}
+        self.requests: list[Any] = []
+        self.port = 0
+        self._stop: list[Callable[[], Any]] = []
+
+    def _run(self, server: Any) -> None:
+        thread = threading.Thread(target=server.serve_forever, daemon=True)
+        thread.start()
+        self._stop = [server.shutdown, lambda: thread.join(5)]
+        if hasattr(server, "server_close"):
+            self._stop.append(server.server_close)
+
+    def __enter__(self) -> str:
+        self.listen()
+        return f"{self.scheme}://127.0.0.1:{self.port}"
+
+    def __exit__(self, *_: object) -> None:
+        for stop in self._stop:
+            stop()
+
+    def listen(self) -> None:
+        raise NotImplementedError
+
+
+def json_numpy(value: Any) -> Any:
+    """json_numpy's reading: an object with `__numpy__` is an array."""
+    if isinstance(value, dict) and "__numpy__" in value:
+        data = base64.b64decode(value["__numpy__"])
+        return np.frombuffer(data, np.dtype(value["dtype"])).reshape(value["shape"])
+    return value
+
+
+def openpi_in(value: dict[Any, Any]) -> Any:
+    if b"__ndarray__" in value:
+        return np.frombuffer(value[b"data"], np.dtype(value[b"dtype"])).reshape(value[b"shape"])
+    return value
+
+
+def openpi_out(value: Any) -> Any:
+    return {
+        b"__ndarray__": True,
+        b"data": value.tobytes(),
+        b"dtype": value.dtype.str,
+        b"shape": list(value.shape),
+    }
+
+
+def nd_in(value: dict[Any, Any]) -> Any:
+    """msgpack-numpy's reading."""
+    if value.get(b"nd") is True:
+        return np.frombuffer(value[b"data"], np.dtype(value[b"type"])).reshape(value[b"shape"])
+    return value
+
+
+def nd_out(value: Any) -> Any:
+    return {
+        b"nd": True,
+        b"type": value.dtype.str,
+        b"kind": b"",
+        b"shape": value.shape,
+        b"data": value.tobytes(),
+    }
+
+
+def named_in(value: dict[Any, Any]) -> Any:
+    if "__ndarray__" in value:
+        return np.frombuffer(value["data"], np.dtype(value["dtype"])).reshape(value["shape"])
+    return value
+
+
+def named_out(value: Any) -> Any:
+    return {
+        "__ndarray__": True,
+        "data": value.tobytes(),
+        "dtype": value.dtype.str,
+        "shape": list(value.shape),
+    }
+
+
+def framed_in(value: dict[str, Any]) -> Any:
+    if "__numpy_array__" in value:
+        data = base64.b64decode(value["data"])
+        return np.frombuffer(data, value["dtype"]).reshape(value["shape"])
+    return value
+
+
+def framed_out(value: Any) -> Any:
+    data = base64.b64encode(value.tobytes()).decode()
+    return {
+        "__numpy_array__": True,
+        "data": data,
+        "dtype": str(value.dtype),
+        "shape": list(value.shape),
+    }
+
 
 # ---------------------------------------------------------------- HTTP
 

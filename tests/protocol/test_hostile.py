@@ -23,7 +23,7 @@ from robospa.protocol.client import connect
 from robospa.protocol.codec import encode
 from robospa.protocol.connection_limits import FRAMES, ServerOptions
 from robospa.protocol.errors import ConnectionLost, TransportError
-from robospa.protocol.messages import Error, Infer, Ready, Reset, pack
+from robospa.protocol.messages import Error, Infer, Reset, pack
 from robospa.protocol.server import ServerThread
 
 KEY = base64.b64encode(b"0123456789abcdef").decode()
@@ -333,19 +333,6 @@ def test_a_model_that_hangs_does_not_keep_the_places_of_those_who_left(start: An
     until(lambda: server.load.sessions == 0)
     hung.set()
     assert served(server)
-
-
-def test_a_policy_that_wants_to_exit_does_not(start: Any) -> None:
-    class Exits(Recall):
-        def infer(self, seen: Any) -> Any:
-            raise SystemExit("out of memory")
-
-    transport = raw(start(Exits()).url)
-    assert isinstance(ask(transport, pack(Reset(1, TRIAL))), Ready)
-    answer = ask(transport, pack(Infer(2, observation())))
-    assert isinstance(answer, Error) and "SystemExit: out of memory" in answer.message
-    assert isinstance(ask(transport, pack(Reset(3, TRIAL))), Ready)
-    transport.close()
 
 
 @pytest.mark.parametrize(

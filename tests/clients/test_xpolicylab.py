@@ -8,8 +8,19 @@ from typing import Any
 import msgpack
 import numpy as np
 import pytest
-from standin_base import EE, HEAD, LEFT, QUICK, RIGHT, STATE, TRIAL, image, joint_chunk, observation
-from standins import XPolicyLab
+from standins import (
+    EE,
+    HEAD,
+    LEFT,
+    QUICK,
+    RIGHT,
+    STATE,
+    TRIAL,
+    XPolicyLab,
+    image,
+    joint_chunk,
+    observation,
+)
 
 from robospa.clients import connect
 from robospa.protocol.errors import (

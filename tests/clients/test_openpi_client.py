@@ -1,0 +1,425 @@
+"""A server of openpi's form, and our client."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import msgpack
+import numpy as np
+import pytest
+from model_fakes import COLORS, install, seen, trial
+from standins import (
+    HEAD,
+    LEFT,
+    QUICK,
+    RIGHT,
+    STATE,
+    TRIAL,
+    OpenPi,
+    image,
+    joint_chunk,
+    observation,
+    openpi_out,
+)
+
+from robospa.action_space import ActionSpace
+from robospa.clients import connect
+from robospa.clients.openpi import finetune, serve
+from robospa.clients.openpi import serve as openpi
+from robospa.clients.openpi.client import OpenPiClientOptions
+from robospa.protocol.errors import (
+    ConnectionLost,
+    EncodeError,
+    PolicyAnswerError,
+    ProtocolViolation,
+    ServerError,
+)
+from robospa.protocol.openpi import CAMERA_NAMES, to_openpi
+
+
+def reply(actions: Any) -> bytes:
+    """An answer whose time is a numpy scalar, as openpi sends it."""
+    timing = {"infer_ms": {b"__npgeneric__": True, b"data": 2.5, b"dtype": "<f8"}}
+    message = {"actions": np.asarray(actions), "server_timing": timing}
+    packed: bytes = msgpack.packb(message, default=openpi_out)
+    return packed
+
+
+def test_a_server_that_does_not_select_our_protocol_is_spoken_to_in_openpis() -> None:
+    server = OpenPi(None, reply(np.full((4, 14), 0.5)))
+    with server as url, connect(url.replace("openpi://", "ws://"), timeouts=QUICK) as policy:
+        assert policy.dialect == "openpi"
+        assert policy.hello["metadata"] == {"reset_pose": [0, -1.5, 1.5, 0, 0, 0]}
+        policy.reset(TRIAL)
+        chunk = policy.infer(observation(2))
+        policy.end()
+        assert policy.last_timing["infer_ms"] == 2.5
+    assert chunk.dtype == np.float32
+    assert chunk.tolist() == [[0.5] * 14] * 4
+    assert server.requests[0].keys() == {"images", "state", "prompt"}
+
+
+def test_openpi_is_sent_what_its_server_reads() -> None:
+    server = OpenPi()
+    with server as url, connect(url, timeouts=QUICK) as policy:
+        policy.reset(TRIAL)
+        chunk = policy.infer(observation())
+        assert policy.hello["metadata"] == {"reset_pose": [0, -1.5, 1.5, 0, 0, 0]}
+        assert policy.last_timing["infer_ms"] == 12.5
+        assert any("adapt_to_pi" in text for text in policy.hello["warnings"])
+    sent = server.requests[0]
+    assert sent.keys() == {"images", "state", "prompt"}
+    names = {"cam_high": HEAD, "cam_left_wrist": LEFT, "cam_right_wrist": RIGHT}
+    assert sent["images"].keys() == names.keys()
+    for theirs, ours in names.items():
+        assert sent["images"][theirs].dtype == np.uint8
+        assert sent["images"][theirs].shape == (3, 240, 320)
+        assert np.array_equal(np.moveaxis(sent["images"][theirs], 0, -1), image(ours))
+    assert sent["state"].dtype == np.float64
+    assert np.array_equal(sent["state"], STATE)
+    assert sent["prompt"] == "pick the red block"
+    assert np.array_equal(chunk, joint_chunk().astype(np.float32))
+
+
+def test_metadata_that_openpis_own_client_reads_is_read() -> None:
+    server = OpenPi()
+    server.metadata = {
+        "names": np.array(["left", "right"]),
+        "gains": np.array([1.5, 2], ">f4"),
+        "when": np.datetime64("2026-01-01"),
+        b"stats": {b"mean": np.float32(0.5)},
+    }
+    with server as url, connect(url, timeouts=QUICK) as policy:
+        assert policy.hello["metadata"]["gains"] == [1.5, 2]
+        assert policy.hello["metadata"]["names"] == "array of <U5 [2]"
+        assert policy.infer(observation()).shape == (3, 14)
+
+
+@pytest.mark.parametrize(
+    "actions", [[[1] * 14] * 2, np.ones((2, 14), np.int64), np.ones((2, 14), ">f8")], ids=type
+)
+def test_actions_that_openpis_own_client_takes_are_taken(actions: Any) -> None:
+    answer = msgpack.packb({"actions": actions}, default=openpi_out)
+    with OpenPi(None, answer) as url, connect(url, timeouts=QUICK) as policy:
+        assert policy.infer(observation()).tolist() == [[1] * 14] * 2
+
+
+def test_openpi_texts_are_no_actions() -> None:
+    answer = msgpack.packb({"actions": np.array([["1"] * 14])}, default=openpi_out)
+    with (
+        OpenPi(None, answer) as url,
+        connect(url, timeouts=QUICK) as policy,
+        pytest.raises(PolicyAnswerError, match="the policy answered str"),
+    ):
+        policy.infer(observation())
+
+
+def test_openpis_key_is_sent_as_its_client_sends_it() -> None:
+    server = OpenPi()
+    with server as url:
+        connect(url, token="s3cret", timeouts=QUICK).close()
+        assert server.authorization == "Api-Key s3cret"
+        connect(url.replace("openpi://", "ws://"), token="s3cret", timeouts=QUICK).close()
+        assert server.authorization == "Bearer s3cret"
+
+
+def test_openpi_other_cameras_names_and_keys() -> None:
+    server = OpenPi()
+    query = '?cameras=head&names=head:cam_high&extra={"seed":3}&horizon=3&execute=2'
+    with server as url, connect(url + query, timeouts=QUICK) as policy:
+        assert [camera.name for camera in policy.spec.cameras] == ["head"]
+        policy.infer(observation(images={"head": image(HEAD)}))
+        assert (policy.spec.horizon, policy.spec.execute) == (3, 2)
+    assert server.requests[0]["images"].keys() == {"cam_high"}
+    assert server.requests[0]["seed"] == 3
+
+
+def test_committed_actions_go_under_the_names_of_the_server() -> None:
+    options = OpenPiClientOptions(committed="prev_chunk_left_over,inference_delay")
+    assert options.spec.committed_actions and not OpenPiClientOptions().spec.committed_actions
+    rows = np.ones((3, 14), np.float32)
+    seen: Any = {"instruction": "go", "committed": rows, "delay": 2}
+    sent = to_openpi(seen, {}, {}, options.committed_names)
+    assert sent["inference_delay"] == 2
+    assert np.array_equal(np.asarray(sent["prev_chunk_left_over"]), rows)
+    assert set(to_openpi(seen, {}, {})) == {"images", "prompt"}
+    with pytest.raises(ValueError, match="is not two names"):
+        OpenPiClientOptions(committed="prefix")
+
+
+def test_openpi_complains_in_a_text_frame() -> None:
+    with OpenPi() as url, connect(url + "?names=head:cam_top", timeouts=QUICK) as policy:
+        with pytest.raises(ServerError, match="Expected images to contain") as caught:
+            policy.infer(observation())
+        assert "Traceback" in caught.value.__notes__[0]
+
+
+def test_openpis_own_codec_reads_and_is_read() -> None:
+    original = pytest.importorskip("openpi_client.msgpack_numpy")
+    answer = {"actions": joint_chunk(), "server_timing": {"infer_ms": np.float64(3.5)}}
+    server = OpenPi(None, original.packb(answer))
+    with server as url, connect(url, timeouts=QUICK) as policy:
+        chunk = policy.infer(observation())
+        assert policy.last_timing["infer_ms"] == 3.5
+    assert np.array_equal(chunk, joint_chunk().astype(np.float32))
+    seen = original.unpackb(server.raw[0])
+    assert np.array_equal(np.moveaxis(seen["images"]["cam_left_wrist"], 0, -1), image(LEFT))
+    assert np.array_equal(seen["state"], STATE)
+    assert seen["prompt"] == "pick the red block"
+
+
+def test_after_a_text_frame_the_connection_is_gone() -> None:
+    trace = 'Traceback (most recent call last):\n  File "policy.py"\nKeyError: "cam_high"\n'
+    with OpenPi(None, trace) as url, connect(url, timeouts=QUICK) as policy:
+        with pytest.raises(ServerError, match=r'KeyError: "cam_high"$') as caught:
+            policy.infer(observation())
+        assert caught.value.retriable
+        with pytest.raises(ConnectionLost):
+            policy.infer(observation())
+
+
+@pytest.mark.parametrize("frame", [b"\xc1", msgpack.packb([1])])
+def test_an_unreadable_answer(frame: bytes) -> None:
+    with (
+        OpenPi(None, frame) as url,
+        connect(url, timeouts=QUICK) as policy,
+        pytest.raises(ProtocolViolation),
+    ):
+        policy.infer(observation())
+
+
+def test_an_answer_without_actions() -> None:
+    with (
+        OpenPi(None, msgpack.packb({"a": 1})) as url,
+        connect(url, timeouts=QUICK) as policy,
+        pytest.raises(PolicyAnswerError),
+    ):
+        policy.infer(observation())
+
+
+def test_a_camera_without_openpi_name_is_named() -> None:
+    seen = observation(images={"third": np.zeros((6, 8, 3), np.uint8)})
+    with (
+        OpenPi() as url,
+        connect(url, timeouts=QUICK) as policy,
+        pytest.raises(EncodeError, match="'third'"),
+    ):
+        policy.infer(seen)
+
+
+class OfficialPolicy:
+    """Answers its noise, cut to 14 columns."""
+
+    def __init__(self) -> None:
+        self.calls: list[dict[str, Any]] = []
+
+    def infer(self, obs: dict[str, Any], *, noise: Any = None) -> dict[str, Any]:
+        self.calls.append(obs)
+        return {"actions": noise[:, :14].astype(np.float64), "policy_timing": {"infer_ms": 1.0}}
+
+
+class BatchingPolicy(OfficialPolicy):
+    """A version of the class that takes several."""
+
+    def infer_batch(self, obs_batch: list[Any], *, noise: Any = None) -> dict[str, Any]:
+        self.calls.append({"together": len(obs_batch)})
+        return {"actions": noise[:, :, :14].astype(np.float64)}
+
+
+def served(policy: Any) -> openpi.OpenPi:
+    return openpi.OpenPi(policy, 50, 32, openpi.OpenPiServerOptions(config="c", checkpoint="x"))
+
+
+def test_the_observation_is_openpis() -> None:
+    policy = served(OfficialPolicy())
+    policy.reset(trial())
+    observation = seen(policy.spec)
+    chunk = policy.infer(observation)
+    asked = policy.policy.calls[0]
+    assert set(asked) == {"state", "images", "prompt"}
+    assert asked["state"].shape == (14,) and asked["prompt"] == trial().instruction
+    assert np.array_equal(asked["state"], observation["state"])
+    names = {
+        "cam_high": "head",
+        "cam_left_wrist": "left_wrist",
+        "cam_right_wrist": "right_wrist",
+    }
+    assert set(asked["images"]) == set(names)
+    for theirs, ours in names.items():
+        image = asked["images"][theirs]
+        assert image.shape == (3, 240, 320) and image.dtype == np.uint8
+        assert tuple(image[:, 0, 0]) == COLORS[ours]
+    assert chunk.shape == (50, 14) and chunk.dtype == np.float32
+
+
+def test_noise_is_given_and_follows_from_the_seed() -> None:
+    policy, chunks = served(OfficialPolicy()), []
+    for seed in (1, 1, 2):
+        policy.reset(trial(seed))
+        chunks.append(policy.infer(seen(policy.spec)))
+    assert np.array_equal(chunks[0], chunks[1])
+    assert not np.array_equal(chunks[0], chunks[2])
+
+
+def test_several_are_one_call_where_the_class_allows() -> None:
+    one, many = served(OfficialPolicy()), served(BatchingPolicy())
+    assert (one.spec.batch, many.spec.batch) == (1, 8)
+    chunks = []
+    for policy in (one, many):
+        for session in (1, 2):
+            policy.reset_session(session, trial(session))
+        chunks.append(policy.infer_batch([seen(policy.spec)] * 2, [1, 2]))
+    np.testing.assert_array_equal(chunks[0], chunks[1])
+    assert many.policy.calls == [{"together": 2}]
+
+
+def test_adapt_to_pi_is_refused_unless_accepted(monkeypatch: pytest.MonkeyPatch) -> None:
+    configure(monkeypatch, adapt_to_pi=True)
+    with pytest.raises(ValueError, match="adapt_to_pi on"):
+        openpi.create(openpi.OpenPiServerOptions(config="c", checkpoint="x"))
+    accepted = openpi.create(
+        openpi.OpenPiServerOptions(config="c", checkpoint="x", adapt_to_pi="accept")
+    )
+    assert accepted.spec.horizon == 50
+
+
+def test_a_configuration_of_robotwin_is_served(monkeypatch: pytest.MonkeyPatch) -> None:
+    configure(monkeypatch, adapt_to_pi=False)
+    policy = openpi.create(openpi.OpenPiServerOptions(config="c", checkpoint="x", execute=25))
+    assert (policy.spec.name, policy.spec.execute, policy.shape) == ("openpi:c", 25, (50, 32))
+    assert policy.spec.text_budget == 150
+
+
+def configure(monkeypatch: pytest.MonkeyPatch, adapt_to_pi: bool) -> None:
+    """openpi with one configuration."""
+    config = SimpleNamespace(
+        data=SimpleNamespace(adapt_to_pi=adapt_to_pi),
+        model=SimpleNamespace(
+            action_horizon=50, action_dim=32, max_token_len=200, discrete_state_input=True
+        ),
+    )
+    install(monkeypatch, "openpi.training.config", get_config=lambda name: config)
+    install(
+        monkeypatch,
+        "openpi.policies.policy_config",
+        create_trained_policy=lambda config, folder: OfficialPolicy(),
+    )
+
+
+def kept(kind: str) -> Any:
+    """A stand-in of one of openpi's dataclasses: keeps its fields."""
+    return lambda *args, **fields: SimpleNamespace(kind=kind, args=args, **fields)
+
+
+@pytest.fixture
+def configs(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
+    """openpi without weights; its list of configurations."""
+    known: dict[str, Any] = {}
+
+    def model(**fields: Any) -> Any:
+        sizes = {"action_horizon": 50, "action_dim": 32, "max_token_len": 200}
+        return SimpleNamespace(
+            discrete_state_input=True,
+            get_freeze_filter=lambda: sorted(fields),
+            fields=fields,
+            **sizes,
+        )
+
+    install(
+        monkeypatch,
+        "openpi.training.config",
+        _CONFIGS_DICT=known,
+        get_config=known.__getitem__,
+        TrainConfig=kept("train"),
+        LeRobotAlohaDataConfig=kept("aloha"),
+        DataConfig=kept("data"),
+    )
+    install(monkeypatch, "openpi.models.pi0_config", Pi0Config=model)
+    install(
+        monkeypatch,
+        "openpi.transforms",
+        Group=kept("group"),
+        RepackTransform=kept("repack"),
+    )
+    install(
+        monkeypatch,
+        "openpi.training.weight_loaders",
+        CheckpointWeightLoader=kept("weights"),
+    )
+    return known
+
+
+def test_the_configuration_is_the_papers(configs: dict[str, Any]) -> None:
+    made = finetune.train_config("pi05_robospa_Pick_Blocks_Size")
+    assert made.name == "pi05_robospa_Pick_Blocks_Size"
+    assert (made.num_train_steps, made.batch_size) == (20_000, 16)
+    assert made.model.fields == {"pi05": True}
+    assert made.weight_loader.args == ("gs://openpi-assets/checkpoints/pi05_base/params",)
+    data = made.data
+    assert data.kind == "aloha" and data.repo_id == "robospa/Pick_Blocks_Size"
+    assert (data.adapt_to_pi, data.use_delta_joint_actions) == (False, True)
+    assert data.base_config.prompt_from_task is True
+    assert not hasattr(made, "freeze_filter")
+
+
+def test_the_names_read_at_training_are_those_sent_at_evaluation(configs: dict[str, Any]) -> None:
+    made = finetune.train_config("pi05_robospa_x")
+    (repacked,) = made.data.repack_transforms.inputs
+    (structure,) = repacked.args
+    observation: Any = {
+        "images": {name: np.zeros((2, 2, 3), np.uint8) for name in finetune.CAMERAS.values()},
+        "state": np.zeros(ActionSpace("joint").width),
+        "instruction": "Go.",
+    }
+    sent = to_openpi(observation, CAMERA_NAMES, {})
+    assert set(structure) == {*sent, "actions"}
+    assert set(structure["images"]) == set(sent["images"])  # type: ignore[call-overload]
+    assert structure["images"]["cam_left_wrist"] == "observation.images.left_wrist"
+    assert {CAMERA_NAMES[ours]: ours for ours in finetune.CAMERAS.values()} == finetune.CAMERAS
+
+
+def test_low_memory_freezes_what_openpi_freezes(configs: dict[str, Any]) -> None:
+    made = finetune.train_config("pi05_lora_robospa_x")
+    variants = ["action_expert_variant", "paligemma_variant", "pi05"]
+    assert sorted(made.model.fields) == variants == made.freeze_filter
+    assert made.ema_decay is None and made.data.repo_id == "robospa/x"
+
+
+@pytest.mark.parametrize("name", ["pi05_robospa_", "pi05_aloha", "pi05_robospa_a/b", "x"])
+def test_another_name_is_refused(name: str, configs: dict[str, Any]) -> None:
+    with pytest.raises(ValueError, match="no configuration of ours"):
+        finetune.train_config(name)
+
+
+def test_a_script_of_openpi_finds_the_configurations_that_it_is_given(
+    configs: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    script = tmp_path / "train.py"
+    script.write_text(
+        "import importlib, pathlib, sys\n"
+        "c = importlib.import_module('openpi.training.config')\n"
+        "pathlib.Path(sys.argv[-1]).write_text(' '.join([__name__, *sorted(c._CONFIGS_DICT)]))\n"
+    )
+    monkeypatch.setattr(sys, "argv", ["before"])
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    out = tmp_path / "out"
+    finetune.main([str(script), "pi05_robospa_a", "--policy.config=pi05_lora_robospa_b", str(out)])
+    assert out.read_text() == "__main__ pi05_lora_robospa_b pi05_robospa_a"
+
+
+def test_our_server_finds_the_configuration_of_a_dataset(
+    configs: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    given: list[Any] = []
+    install(
+        monkeypatch,
+        "openpi.policies.policy_config",
+        create_trained_policy=lambda config, folder: given.append(config) or SimpleNamespace(),
+    )
+    options = serve.OpenPiServerOptions(config="pi05_robospa_x", checkpoint="19999")
+    policy = serve.create(options)
+    assert given == [configs["pi05_robospa_x"]]
+    assert (policy.spec.name, policy.spec.horizon) == ("openpi:pi05_robospa_x", 50)
