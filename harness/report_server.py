@@ -17,8 +17,8 @@ from socket import socket
 from urllib.parse import unquote
 
 from robospa.harness.live_report import LiveReport
+from robospa.results.records.films import VIDEOS
 from robospa.results.records.manifest import RunError
-from robospa.results.records.runs import VIDEOS
 
 CONNECTIONS = 16
 BLOCK_BYTES = 1 << 18

@@ -1,8 +1,7 @@
 """What a maintainer looks at before believing numbers: `robospa report RUN --audit`.
 
-Each check gives one `Finding`, a sentence with its numbers. `suspicious` is no proof, and nothing
-suspicious is none either: an honest model may be near the expert it learned from, and a cheat may
-add noise. Refuses nothing.
+Each check gives one sentence with its numbers. `suspicious` is no proof, and nothing suspicious is
+none either: an honest model may be near the expert it learned from, and a cheat may add noise.
 """
 
 from __future__ import annotations
@@ -26,9 +25,9 @@ from robospa.leaderboard.agreement import Counts, agreement
 from robospa.leaderboard.rules import shipped, spec_of
 from robospa.leaderboard.traces import Trace, joint_path, with_joints
 from robospa.leaderboard.verify import read_traces, verify
-from robospa.results.records.runs import Run, action_path, finished, read_run
+from robospa.results.records.run_io import Run, action_path, finished, read_run
 from robospa.results.records.trial_record import TrialRecord
-from robospa.results.scoring.repeats import fault_rates
+from robospa.results.scoring.retried import fault_rates
 from robospa.tasks.seeds import accepted
 from robospa.tasks.sentences import sentences
 from robospa.trial import TrialKey
@@ -68,7 +67,7 @@ def audit(
     `samples` of its successful trials are held against the expert's, and the policy is asked for so
     many with exchanged sentences.
     """
-    run, traces = _read(path, samples)
+    run, traces = executed_paths(path, samples)
     findings = faults(run)
     if reproduction is not None:
         findings.append(hidden_gap(run, read_run(reproduction)))
@@ -83,7 +82,7 @@ def audit(
     return findings
 
 
-def _read(path: Path, count: int) -> tuple[Run, dict[TrialKey, Trace]]:
+def executed_paths(path: Path, count: int) -> tuple[Run, dict[TrialKey, Trace]]:
     """The run, and the joint actions that `count` of its successful trials executed; trials whose
     traces lack them are left out."""
     bundle = verify(path, shipped(), practice=True) if path.is_file() else None

@@ -28,6 +28,7 @@ from msgspec import Struct, to_builtins
 
 from robospa.results.records.manifest import RunManifest
 from robospa.schema import Sha256
+from robospa.trial import TrialKey
 
 IN_REPOSITORY = "bundle.zip"
 """Name of a bundle in its submission's folder, and its address in `bundle.txt`."""
@@ -113,6 +114,11 @@ def most_bytes(name: str) -> int | None:
 def actions_name(task: str, level: int) -> str:
     """Where the actions of a variant lie."""
     return f"actions/{task}-L{level}.bin"
+
+
+def video_name(key: TrialKey) -> str:
+    """Where the film of a trial lies."""
+    return f"videos/{key.slug}.mp4"
 
 
 def canonical(value: object) -> bytes:

@@ -29,6 +29,7 @@ FORGED = 0.05
 MISSED = 0.001
 INVENTED = (0.05, 0.02, 0.01)
 """The shares of invented outcomes for which the chance is stated."""
+CATCHES = ("catches_5_percent", "catches_2_percent", "catches_1_percent")
 
 
 def announced(suite: str, keys: Iterable[TrialKey]) -> list[TrialKey]:
@@ -136,50 +137,103 @@ class Validity(Struct, frozen=True):
     warnings: tuple[str, ...] = ()
 
 
-class ReplayEvidence(Struct, frozen=True):
-    """Level 2: how many of the sampled trials came again identically, alike, or differently."""
+class ReplayEvidence(Struct, frozen=True, kw_only=True):
+    """Level 2: how many of the sampled trials came again identically, alike, or differently, what
+    such a sample catches, and versions that are others than the run's."""
 
+    bundle: str
+    challenge: str
     sampled: Count
     trials: Count
     identical: Count
     agrees: Count
     different: Count
-    challenge: str
-    bundle: str
+    least: Count = 0
+    catches_5_percent: Number = 0.0
+    catches_2_percent: Number = 0.0
+    catches_1_percent: Number = 0.0
+    changed_versions: tuple[str, ...] = ()
+    different_trials: tuple[str, ...] = ()
+
+    @property
+    def holds(self) -> bool:
+        """Whether every outcome came again."""
+        return self.different == 0
+
+    @property
+    def exact(self) -> bool:
+        """Whether every final state came again to the bit."""
+        return self.identical == self.sampled
 
 
 class OverallTest(Struct, frozen=True):
     """The test over all hidden trials: `fresh` successes where `expected` agree with the claim."""
 
-    p: Number
     fresh: Count
     expected: Number
+    p: Number
 
 
-class CategoryTest(Struct, frozen=True):
-    """The test of a category; its p-value is corrected after Holm."""
+class CategoryTest(Struct, frozen=True, kw_only=True):
+    """The test of a category; `p_holm` is corrected after Holm."""
 
+    fresh: Count = 0
+    expected: Number = 0.0
+    p: Number = 1.0
     p_holm: Number
 
 
-class Reproduction(Struct, frozen=True):
+class Reproduction(Struct, frozen=True, kw_only=True):
     """Level 3: how `trials` on hidden scenes agree with the claims of the bundle with this hash,
-    tested at the level `alpha`. `power` is the chance to notice rates that are lower everywhere, by
-    how much; `repeated` trials count as failures."""
+    tested at the level `alpha`. `repeated` ones count as failures. `variants` are claimed and fresh
+    counts; `power` is the chance to notice rates that are lower everywhere, by how much."""
 
     bundle: str
+    commitment: str = ""
+    trials: Count
+    repeated: Count = 0
     alpha: Number
     overall: OverallTest
     categories: dict[str, CategoryTest]
-    trials: Count
+    variants: dict[str, tuple[Count, Count, Count, Count]] = {}
     power: dict[str, Number]
-    repeated: Count = 0
-    commitment: str = ""
 
     @property
     def notices(self) -> float:
         """The chance to notice a lie of five points."""
         return self.power.get(f"{LIE:g}", 0.0)
+
+    @property
+    def enough(self) -> bool:
+        """Whether a lie of five points would have been noticed."""
+        return self.trials > 0 and self.notices >= LEAST_POWER
+
+    @property
+    def holds(self) -> bool:
+        """Whether neither the whole nor a category contradicts the claim at level `alpha`."""
+        least = min([self.overall.p, *(test.p_holm for test in self.categories.values())])
+        return least >= self.alpha
+
+    def sentences(self) -> list[str]:
+        """What this shows and what it does not, for people."""
+        counts = self.variants.values()
+        claimed = sum(good / trials * fresh for good, trials, _, fresh in counts)
+        said = [
+            f"{self.overall.fresh} of {self.trials} fresh trials succeeded where the claim leads "
+            f"one to expect {claimed:.1f} (exact test over {len(self.variants)} variants, "
+            f"two-sided p = {self.overall.p:.3g})."
+        ]
+        for category, test in self.categories.items():
+            if test.p_holm < self.alpha:
+                said.append(f"{category} contradicts the claim (p = {test.p_holm:.3g} after Holm).")
+        power = {float(drop): 100 * chance for drop, chance in self.power.items()}
+        chances = ", ".join(f"{100 * drop:g} points {p:.0f} %" for drop, p in power.items())
+        said.append(f"Chance to notice rates that are lower everywhere by: {chances}.")
+        if self.repeated:
+            said.append(f"{self.repeated} trials were repeated and count as failures.")
+        if not self.enough:
+            said.append(f"A badge needs {100 * LEAST_POWER:g} % for {100 * LIE:g} points.")
+        return said
 
 
 class BadgeEvidence(Struct, frozen=True):
@@ -200,8 +254,7 @@ class BadgeEvidence(Struct, frozen=True):
         """The badges that the evidence carries, weakest first."""
         made = ["valid"]
         if self.replayed:
-            exact = self.replayed.identical == self.replayed.sampled
-            made.append("replayed" if exact else "outcomes")
+            made.append("replayed" if self.replayed.exact else "outcomes")
         if self.reproduced:
             made.append("reproduced")
         return tuple(made)
@@ -224,26 +277,19 @@ def read_evidence(data: object, bundle: str, where: str) -> BadgeEvidence:
             f"{where}: not all trials were replayed, as those of a bundle in the repository are: "
             "robospa submit verify --challenge VALUE --fraction 1"
         )
-    if fresh:
-        _check_power(fresh, where)
-        least = min([fresh.overall.p, *(test.p_holm for test in fresh.categories.values())])
-        if least < fresh.alpha:
-            raise BundleError(f"{where}: hidden seeds contradict what the bundle claims")
-    return evidence
-
-
-def _check_power(fresh: Reproduction, where: str) -> None:
-    """BundleError unless the reproduction would have noticed a lie."""
-    if fresh.trials < 1 or fresh.notices < LEAST_POWER:
+    if fresh and not fresh.enough:
         raise BundleError(
             f"{where}: {fresh.trials} trials on hidden scenes notice a lie of {100 * LIE:g} points "
             f"with {100 * fresh.notices:.0f} %; a badge needs {100 * LEAST_POWER:g} %"
         )
+    if fresh and not fresh.holds:
+        raise BundleError(f"{where}: hidden seeds contradict what the bundle claims")
+    return evidence
 
 
 def _check_replay(again: ReplayEvidence, trials: int, where: str) -> None:
     """BundleError unless a large enough sample of the bundle's `trials` came again."""
-    if again.different:
+    if not again.holds:
         raise BundleError(f"{where}: the replay found other outcomes than the bundle has")
     if again.trials != trials or again.identical + again.agrees != again.sampled:
         raise BundleError(f"{where}: the replay's counts are not those of the bundle")

@@ -1,8 +1,7 @@
-"""From runs to a bundle. What cannot enter a leaderboard is refused here, with the reason.
+"""From runs to a bundle: what may not enter is refused, the rest written, verified and named.
 
-Refused: privileged policies, trials missing or lost, runs made with different versions, code or
-settings, a world or step limits that are not the benchmark's, and whatever our lint calls an error.
-What is packed is then verified like anybody's bundle, so nothing leaves that would not pass.
+The rules are those of verifying (`verify.check_run`); besides, runs that were made with different
+versions, code or settings are no bundle, and trials have to be complete.
 
 The announced trials are filmed by playing their recorded actions again; a film that the run has
 already is taken as it is. Addresses and command lines stay at home.
@@ -27,20 +26,14 @@ from robospa.harness.world import World
 from robospa.harness.worlds import open_world
 from robospa.leaderboard import bundle as layout
 from robospa.leaderboard.bundle import BundleError, BundleManifest, FileEntry, RowChain
-from robospa.leaderboard.card import Card, check_checkpoints
+from robospa.leaderboard.card import Card
 from robospa.leaderboard.evidence import announced
-from robospa.leaderboard.rules import (
-    Done,
-    Reference,
-    check_card_fits,
-    check_seeds,
-    check_settings,
-)
+from robospa.leaderboard.rules import Done, Reference
 from robospa.leaderboard.traces import Trace, encode, with_joints
-from robospa.leaderboard.trial_rows import TrialRow, check_record, trace_hash, write_rows
+from robospa.leaderboard.trial_rows import TrialRow, trace_hash, write_rows
 from robospa.leaderboard.verify import (
-    LISTING,
     Valid,
+    check_run,
     outcomes_of,
     own_version,
     scores_of,
@@ -48,14 +41,9 @@ from robospa.leaderboard.verify import (
     tables_of,
     verify,
 )
-from robospa.results.lint import lint_run
-from robospa.results.records.manifest import (
-    PolicySettings,
-    RunAbout,
-    RunSettings,
-    make_manifest,
-)
-from robospa.results.records.runs import Run, action_path, read_run
+from robospa.results.records.manifest import PolicySettings, RunAbout, make_manifest
+from robospa.results.records.run_io import Run, action_path, read_run
+from robospa.results.records.settings_of_run import by_setting
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey, path_part
 
@@ -90,74 +78,70 @@ class Packing:
 
 def pack(
     folders: Sequence[Path], card: Card, out: Path, reference: Reference, how: Packing = Packing()
-) -> Packed:
-    """Write the bundle of the runs in `folders` to `out`, whole or not at all, and verify it.
-
-    A file that is there is kept unless `how.replace_old`, and also then until the new one holds.
-    Raises BundleError, also for runs of several robots, and RunError.
-    """
-    _check_order([out], how)
-    return _pack([read_run(folder) for folder in folders], card, out, reference, how)
-
-
-def pack_robots(
-    folders: Sequence[Path], card: Card, out: Path, reference: Reference, how: Packing = Packing()
 ) -> list[Packed]:
-    """Write a bundle for each robot that the runs in `folders` are of.
+    """Write a bundle for each robot that the runs in `folders` are of, whole or not at all, and
+    verify it.
 
     Of one robot it is `out`, of several NAME-ROBOT.zip where `out` is NAME.zip. None is written
-    before all are found fit to enter. Raises BundleError and RunError.
+    before all are found fit to enter. A file that is there is kept unless `how.replace_old`, and
+    also then until the new one holds. Raises BundleError and RunError.
     """
-    runs = [read_run(folder) for folder in folders]
-    robots = robots_of(runs)
-    if len(robots) < 2:
-        _check_order([out], how)
-        return [_pack(runs, card, out, reference, how)]
-    outs = {robot: path_of(out, robot) for robot in robots}
-    _check_order(list(outs.values()), how)
-    parts = {robot: parts_of(runs, robot) for robot in robots}
-    for some in parts.values():
-        check(merged(some), card, reference, how.practice)
-    return [_pack(parts[r], card, outs[r], reference, how) for r in robots]
-
-
-def _check_order(outs: Sequence[Path], how: Packing) -> None:
-    for out in outs:
-        if out.exists() and not how.replace_old:
+    parts = _by_robot([read_run(folder) for folder in folders], out)
+    for path in parts:
+        if path.exists() and not how.replace_old:
             raise BundleError(
-                f"{out} is already there; choose another name, or --force to replace it"
+                f"{path} is already there; choose another name, or --force to replace it"
             )
     if not how.videos and not how.practice:
         raise BundleError("videos can be left out of a bundle for practice only")
+    whole = {path: merged(runs) for path, runs in parts.items()}
+    for run in whole.values():
+        check_run(run, card, reference, how.practice)
+    return [_pack(parts[path], run, card, path, reference, how) for path, run in whole.items()]
 
 
-def _pack(runs: Sequence[Run], card: Card, out: Path, reference: Reference, how: Packing) -> Packed:
-    run = merged(runs)
-    check(run, card, reference, how.practice)
+def _by_robot(runs: Sequence[Run], out: Path) -> dict[Path, list[Run]]:
+    """The runs of each bundle, by its path."""
+    robots = dict.fromkeys(key.embodiment for run in runs for key in run.keys)
+    if len(robots) < 2:
+        return {out: list(runs)}
+    parts = [part for run in runs for part in by_setting(run)]
+    return {
+        out.with_name(f"{out.stem}-{path_part(robot)}{out.suffix}"): [
+            part for part in parts if part.keys[0].embodiment == robot
+        ]
+        for robot in robots
+    }
+
+
+def _pack(
+    runs: Sequence[Run], run: Run, card: Card, out: Path, reference: Reference, how: Packing
+) -> Packed:
+    """Write, verify and rename the bundle of `run`, which `runs` make up."""
     homes = {key: one.folder for one in runs for key in one.keys}
     part = out.with_name(f".{out.name}.{os.getpid()}.part")
+
+    def trace(key: TrialKey) -> Trace:
+        path = action_path(homes[key], key)
+        actions = with_joints(read_actions(path)[0], read_joints(path))
+        if not is_quantized(actions):
+            raise BundleError(
+                f"{key.slug} has actions finer than 1/{STEPS_PER_UNIT}, as runs of older "
+                "versions have: run it again with this one"
+            )
+        return actions
+
     try:
         chosen = announced(reference.suite, run.keys) if how.videos else []
         films = _films(run, chosen, reference, homes, how.note)
         how.note("writing the bundle")
-
-        def trace(key: TrialKey) -> Trace:
-            path = action_path(homes[key], key)
-            actions = with_joints(read_actions(path)[0], read_joints(path))
-            if not is_quantized(actions):
-                raise BundleError(
-                    f"{key.slug} has actions finer than 1/{STEPS_PER_UNIT}, as runs of older "
-                    "versions have: run it again with this one"
-                )
-            return actions
-
         write_bundle(part, run, card, reference.suite, trace, films, how.practice)
         how.note("verifying what was packed")
         valid = verify(part, reference, how.practice, done=how.done)
         part.replace(out)
     finally:
         part.unlink(missing_ok=True)
-    return Packed(replace(valid, path=out), out.stat().st_size, sizes_of(out))
+    return Packed(replace(valid, path=out), out.stat().st_size, _sizes(out))
 
 
 def merged(runs: Sequence[Run]) -> Run:
@@ -174,13 +158,13 @@ def merged(runs: Sequence[Run]) -> Run:
             raise BundleError(f"two of the runs list the trial {again[0].slug}")
         keys += run.keys
         records.update(run.records)
-        categories.update(run.manifest.categories)
-        own = run.manifest.settings
-        policies.update({k.task: own.policies.get(k.task, own.policy) for k in run.keys})
-    settings = first.manifest.settings
+        named, own = run.manifest.categories, run.manifest.settings
+        tasks = dict.fromkeys(key.task for key in run.keys)
+        categories.update({task: named[task] for task in tasks if task in named})
+        policies.update({task: own.policies.get(task, own.policy) for task in tasks})
+    settings, about = first.manifest.settings, first.manifest.about
     differ = any(policy != settings.policy for policy in policies.values())
     keys.sort()
-    about = first.manifest.about
     manifest = make_manifest(
         structs.replace(settings, policies=policies if differ else {}),
         keys,
@@ -206,33 +190,6 @@ def _check_alike(first: Run, run: Run) -> None:
             f"{first.folder} and {run.folder} were not made alike ({'; '.join(changes[:3])}): "
             "a bundle has one version of everything"
         )
-
-
-def check(run: Run, card: Card, reference: Reference, practice: bool) -> RunSettings:
-    """The settings of `run`; BundleError if `run` cannot enter a leaderboard under `card`."""
-    settings = check_settings(run.manifest, reference)
-    if run.without_result:
-        raise BundleError(
-            f"the run is incomplete: {len(run.without_result)} of {len(run.keys)} trials have no "
-            f"result, such as {run.without_result[0].slug}; finish it with robospa eval ... "
-            "--resume"
-        )
-    for finding in lint_run(run):
-        if finding.severity == "error" and finding.rule not in LISTING:
-            raise BundleError(f"lint: {finding.where}: {finding.text} [{finding.rule}]")
-    check_seeds(run.keys, reference, practice)
-    tasks = list(dict.fromkeys(key.task for key in run.keys))
-    check_checkpoints(card, tasks)
-    for task in tasks:
-        check_card_fits(card, settings, task)
-    for key in run.keys:
-        check_record(run.records[key], reference, settings)
-    return settings
-
-
-def inputs_of(run: Run) -> str:
-    """Hash of what was fixed before the first trial of `run`."""
-    return layout.inputs_hash(run.manifest, seed_lists(run.keys))
 
 
 class _Writer:
@@ -266,7 +223,8 @@ def write_bundle(
 ) -> None:
     """Write the bundle of `run` to `path` without looking at it; `trace` finds a trial's actions,
     `films` has the videos by name."""
-    lists, inputs = seed_lists(run.keys), inputs_of(run)
+    lists = seed_lists(run.keys)
+    inputs = layout.inputs_hash(run.manifest, lists)
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=6) as archive:
         writer = _Writer(archive)
         for name, film in films.items():
@@ -303,11 +261,10 @@ def _add_actions(
     """Write the actions of every variant; the rows of their trials."""
     rows = []
     for variant, group in groupby(run.keys, key=lambda key: key.variant):
-        keys = list(group)
-        traces = [trace(key) for key in keys]
-        writer.add(layout.actions_name(*variant), encode(traces))
-        for key, actions in zip(keys, traces, strict=True):
-            film = f"videos/{key.slug}.mp4"
+        traces = {key: trace(key) for key in group}
+        writer.add(layout.actions_name(*variant), encode(list(traces.values())))
+        for key, actions in traces.items():
+            film = layout.video_name(key)
             record = replace(run.records[key], video=film if film in films else "")
             rows.append(TrialRow(record, trace_hash(actions)))
     return rows
@@ -329,7 +286,7 @@ def _films(
     world: World | None = None
     try:
         for number, key in enumerate(chosen, 1):
-            name = f"videos/{key.slug}.mp4"
+            name = layout.video_name(key)
             there = homes[key] / name
             if run.records[key].video and there.is_file():
                 films[name] = there.read_bytes()
@@ -349,7 +306,7 @@ def _films(
     return films
 
 
-def sizes_of(path: Path) -> dict[str, int]:
+def _sizes(path: Path) -> dict[str, int]:
     """Bytes in the zip file by kind of file, most first."""
     found: dict[str, int] = {}
     with zipfile.ZipFile(path) as archive:
@@ -357,31 +314,3 @@ def sizes_of(path: Path) -> dict[str, int]:
             kind = entry.filename.partition("/")[0]
             found[kind] = found.get(kind, 0) + entry.compress_size
     return dict(sorted(found.items(), key=lambda pair: -pair[1]))
-
-
-def robots_of(runs: Sequence[Run]) -> tuple[str, ...]:
-    """The robots of all trials that `runs` list."""
-    return tuple(dict.fromkeys(key.embodiment for run in runs for key in run.keys))
-
-
-def parts_of(runs: Sequence[Run], robot: str) -> list[Run]:
-    """What `runs` have of `robot`, as if they had been asked for nothing else."""
-    found = [_part(run, robot) for run in runs]
-    return [run for run in found if run.keys]
-
-
-def _part(run: Run, robot: str) -> Run:
-    keys = tuple(key for key in run.keys if key.embodiment == robot)
-    tasks = {key.task for key in keys}
-    manifest = run.manifest
-    policies = {n: p for n, p in manifest.settings.policies.items() if n in tasks}
-    settings = structs.replace(manifest.settings, embodiment=(robot,), policies=policies)
-    named = {n: c for n, c in manifest.categories.items() if n in tasks}
-    records = {key: record for key, record in run.records.items() if key.embodiment == robot}
-    manifest = structs.replace(manifest, settings=settings, categories=named)
-    return replace(run, manifest=manifest, keys=keys, records=records)
-
-
-def path_of(out: Path, robot: str) -> Path:
-    """Where the bundle of `robot` goes if `out` was asked for."""
-    return out.with_name(f"{out.stem}-{path_part(robot)}{out.suffix}")

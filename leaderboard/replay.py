@@ -8,23 +8,31 @@ state is not, as on another processor or with another build of the simulator; ot
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections import Counter
+from collections.abc import Callable
 from concurrent.futures import as_completed
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from robospa.harness.factory import load_function
 from robospa.harness.pool import JobProcess, Pool, WorkerDied
 from robospa.harness.running.manifest import about_machine, changed_settings
 from robospa.harness.worlds import open_world
 from robospa.leaderboard.bundle import BundleError
-from robospa.leaderboard.evidence import catches, drawn, least_sample, what_it_catches
+from robospa.leaderboard.evidence import (
+    CATCHES,
+    ReplayEvidence,
+    catches,
+    drawn,
+    least_sample,
+    what_it_catches,
+)
 from robospa.leaderboard.rules import Reference, spec_of
 from robospa.leaderboard.traces import Trace, split_trace
 from robospa.leaderboard.verify import Valid, read_traces
 from robospa.results.records.manifest import RunAbout
-from robospa.results.records.runs import differences
+from robospa.results.records.run_io import differences
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
@@ -49,68 +57,34 @@ class Replayed:
 
 
 @dataclass(frozen=True)
-class Replay:
-    """The replayed sample of a bundle. `changed` says which versions are others than the run's."""
+class SampleReplay:
+    """The replayed sample of a bundle, and the evidence for the badge."""
 
     trials: tuple[Replayed, ...]
-    listed: int
-    challenge: str
-    changed: tuple[str, ...]
-
-    def count(self, kind: str) -> int:
-        """How many trials are of this `kind`."""
-        return sum(trial.kind == kind for trial in self.trials)
-
-    @property
-    def holds(self) -> bool:
-        """Whether every outcome came again."""
-        return self.count(DIFFERENT) == 0
-
-    @property
-    def exact(self) -> bool:
-        """Whether every final state came again to the bit."""
-        return self.count(IDENTICAL) == len(self.trials)
+    evidence: ReplayEvidence
 
     def sentences(self) -> list[str]:
         """What this shows and what it does not, for people."""
-        count = len(self.trials)
+        found = self.evidence
         said = [
-            f"{count} of {self.listed} trials were played again: {self.count(IDENTICAL)} identical "
-            f"to the bit, {self.count(AGREES)} with the same outcome and another final state, "
-            f"{self.count(DIFFERENT)} with another outcome.",
-            what_it_catches(self.listed, count),
+            f"{found.sampled} of {found.trials} trials were played again: {found.identical} "
+            f"identical to the bit, {found.agrees} with the same outcome and another final state, "
+            f"{found.different} with another outcome.",
+            what_it_catches(found.trials, found.sampled),
         ]
-        if not self.exact and self.holds:
+        why = "versions are those of the run, so processor or library build differ, or the run"
+        if found.changed_versions:
+            why = "other versions: " + "; ".join(found.changed_versions)
+        if not found.holds:
+            first = next(trial for trial in self.trials if trial.kind == DIFFERENT)
+            what = first.trouble or "other " + ", ".join(first.differs)
+            said.append(f"First difference: {first.key.slug}: {what} ({why}).")
+        elif not found.exact:
             said.append(
                 "Outcomes agree but final states do not: the simulator rounds differently here "
-                f"({self._why()})."
+                f"({why})."
             )
-        if not self.holds:
-            first = next(trial for trial in self.trials if trial.kind == DIFFERENT)
-            why = first.trouble or "other " + ", ".join(first.differs)
-            said.append(f"First difference: {first.key.slug}: {why} ({self._why()}).")
         return said
-
-    def _why(self) -> str:
-        if self.changed:
-            return "other versions: " + "; ".join(self.changed)
-        return "versions are those of the run, so processor or library build differ, or the run"
-
-    def to_json(self) -> dict[str, Any]:
-        """The evidence for the badge."""
-        return {
-            "challenge": self.challenge,
-            "sampled": len(self.trials),
-            "trials": self.listed,
-            **{kind: self.count(kind) for kind in (IDENTICAL, AGREES, DIFFERENT)},
-            "least": least_sample(self.listed),
-            **{
-                f"catches_{100 * share:g}_percent": chance
-                for share, chance in catches(self.listed, len(self.trials)).items()
-            },
-            "changed_versions": list(self.changed),
-            "different_trials": [t.key.slug for t in self.trials if t.kind == DIFFERENT],
-        }
 
 
 def replay(
@@ -120,7 +94,7 @@ def replay(
     reference: Reference,
     workers: int = 1,
     on_trial: Callable[[Replayed], None] = lambda trial: None,
-) -> Replay:
+) -> SampleReplay:
     """Play `count` trials of a valid bundle again, chosen by `challenge`, in `workers` processes.
 
     `on_trial` hears of each as it ends. Raises BundleError if the challenge is too short or the
@@ -144,7 +118,22 @@ def replay(
                 "the simulator does not run here, or crashed: `robospa check` says what is missing"
             ) from None
     trials = tuple(found[key] for key in keys)
-    return Replay(trials, len(valid.keys), challenge.strip(), _changed(valid.run.manifest.about))
+    kinds = Counter(trial.kind for trial in trials)
+    listed, five_two_one = len(valid.keys), catches(len(valid.keys), len(trials)).values()
+    evidence = ReplayEvidence(
+        bundle=valid.manifest.bundle,
+        challenge=challenge.strip(),
+        sampled=len(trials),
+        trials=listed,
+        identical=kinds[IDENTICAL],
+        agrees=kinds[AGREES],
+        different=kinds[DIFFERENT],
+        least=least_sample(listed),
+        **dict(zip(CATCHES, five_two_one, strict=True)),
+        changed_versions=_changed(valid.run.manifest.about),
+        different_trials=tuple(trial.key.slug for trial in trials if trial.kind == DIFFERENT),
+    )
+    return SampleReplay(trials, evidence)
 
 
 def judge(claimed: TrialRecord, again: TrialRecord) -> Replayed:
@@ -204,8 +193,3 @@ def _changed(about: RunAbout) -> tuple[str, ...]:
         {"versions": one.versions, "code": one.code} for one in (about, about_machine({}))
     )
     return tuple(changed_settings(before, now))
-
-
-def order_of(trials: Sequence[Replayed]) -> list[Replayed]:
-    """Different ones first."""
-    return sorted(trials, key=lambda t: (t.kind != DIFFERENT, t.kind != AGREES, t.key))

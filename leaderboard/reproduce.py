@@ -19,10 +19,9 @@ from __future__ import annotations
 import json
 import re
 import secrets
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import astuple, dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from robospa.harness.running.atomic_file import replace_file
 from robospa.harness.running.evaluate import Request
@@ -33,7 +32,6 @@ from robospa.harness.trial_identity import salt_hash
 from robospa.leaderboard.agreement import (
     LEAST_POWER,
     LIE,
-    Agreement,
     Counts,
     agreement,
     holm,
@@ -41,11 +39,12 @@ from robospa.leaderboard.agreement import (
     trials_needed,
 )
 from robospa.leaderboard.bundle import MEGA, BundleError, canonical, sha256
+from robospa.leaderboard.evidence import CategoryTest, OverallTest, Reproduction
 from robospa.leaderboard.rules import Reference
 from robospa.leaderboard.untrusted import parse_map
 from robospa.leaderboard.verify import Valid
-from robospa.results.records.runs import Run
-from robospa.results.scoring.repeats import was_repeated, with_repeated_failed
+from robospa.results.records.run_io import Run
+from robospa.results.scoring.retried import was_repeated, with_repeated_failed
 from robospa.tasks.scene import SUITE
 from robospa.tasks.seeds import ListKey
 from robospa.trial import REFERENCE, TrialKey
@@ -174,79 +173,6 @@ DROPS = (0.02, LIE, 0.1)
 """Losses of success for which the power is stated."""
 
 
-@dataclass(frozen=True)
-class Reproduction:
-    """Fresh trials against claimed ones: by variant, over all, and by category with Holm's p."""
-
-    variants: Mapping[tuple[str, int], Counts]
-    overall: Agreement
-    categories: Mapping[str, tuple[Agreement, float]]
-    alpha: float
-    commitment: str
-    noticed: Mapping[float, float]
-    bundle: str
-    repeated: int
-    """Fresh trials that were repeated and count as failures."""
-
-    @property
-    def trials(self) -> int:
-        """How many fresh trials there are."""
-        return sum(c.fresh_trials for c in self.variants.values())
-
-    @property
-    def enough(self) -> bool:
-        """Whether a lie of five points would have been noticed."""
-        return self.noticed[LIE] >= LEAST_POWER
-
-    @property
-    def holds(self) -> bool:
-        """Whether neither the whole nor a category contradicts the claim at level `alpha`."""
-        least = min((p for _, p in self.categories.values()), default=1.0)
-        return self.overall.p >= self.alpha and least >= self.alpha
-
-    def sentences(self) -> list[str]:
-        """What this shows and what it does not, for people."""
-        claimed = sum(c.claimed / c.claimed_trials * c.fresh_trials for c in self.variants.values())
-        said = [
-            f"{self.overall.fresh} of {self.trials} fresh trials succeeded where the claim leads "
-            f"one to expect {claimed:.1f} (exact test over {len(self.variants)} variants, "
-            f"two-sided p = {self.overall.p:.3g})."
-        ]
-        for category, (_, p) in self.categories.items():
-            if p < self.alpha:
-                said.append(f"{category} contradicts the claim (p = {p:.3g} after Holm).")
-        chances = ", ".join(f"{100 * d:g} points {100 * p:.0f} %" for d, p in self.noticed.items())
-        said.append(f"Chance to notice rates that are lower everywhere by: {chances}.")
-        if self.repeated:
-            said.append(f"{self.repeated} trials were repeated and count as failures.")
-        if not self.enough:
-            said.append(f"A badge needs {100 * LEAST_POWER:g} % for {100 * LIE:g} points.")
-        return said
-
-    def to_json(self) -> dict[str, Any]:
-        """The evidence for the badge."""
-
-        def test(found: Agreement) -> dict[str, float]:
-            return {"fresh": found.fresh, "expected": found.expected, "p": found.p}
-
-        return {
-            "bundle": self.bundle,
-            "commitment": self.commitment,
-            "trials": self.trials,
-            "repeated": self.repeated,
-            "alpha": self.alpha,
-            "overall": test(self.overall),
-            "categories": {
-                name: {**test(found), "p_holm": p} for name, (found, p) in self.categories.items()
-            },
-            "variants": {
-                f"{task}/{level}": [c.claimed, c.claimed_trials, c.fresh, c.fresh_trials]
-                for (task, level), c in self.variants.items()
-            },
-            "power": {f"{drop:g}": chance for drop, chance in self.noticed.items()},
-        }
-
-
 def claims_of(valid: Valid) -> dict[tuple[str, int], Counts]:
     """What the bundle claims of each of its variants, without fresh trials."""
     found: dict[tuple[str, int], list[bool]] = {}
@@ -333,15 +259,20 @@ def compare(
         variants[variant] = counts
         categories.setdefault(category_of[variant[0]], []).append(counts)
     tests = {name: agreement(found) for name, found in categories.items()}
-    corrected = dict(zip(tests, holm([found.p for found in tests.values()]), strict=True))
+    corrected = holm([found.p for found in tests.values()])
     everything = list(variants.values())
+    overall = agreement(everything)
     return Reproduction(
-        variants,
-        agreement(everything),
-        {name: (found, corrected[name]) for name, found in tests.items()},
-        alpha,
-        block.commitment,
-        {drop: power(everything, drop, alpha) for drop in DROPS},
-        valid.manifest.bundle,
-        sum(was_repeated(records[key]) for key in keys),
+        bundle=valid.manifest.bundle,
+        commitment=block.commitment,
+        trials=len(keys),
+        repeated=sum(was_repeated(records[key]) for key in keys),
+        alpha=alpha,
+        overall=OverallTest(overall.fresh, overall.expected, overall.p),
+        categories={
+            name: CategoryTest(fresh=found.fresh, expected=found.expected, p=found.p, p_holm=p)
+            for (name, found), p in zip(tests.items(), corrected, strict=True)
+        },
+        variants={f"{task}/{level}": astuple(c) for (task, level), c in variants.items()},
+        power={f"{drop:g}": power(everything, drop, alpha) for drop in DROPS},
     )

@@ -11,6 +11,7 @@ from __future__ import annotations
 import gc
 import hashlib
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -33,6 +34,7 @@ from robospa.leaderboard.bundle import (
 from robospa.leaderboard.card import Card, check_checkpoints, to_card
 from robospa.leaderboard.evidence import Validity, announced
 from robospa.leaderboard.rules import (
+    ONE,
     Done,
     Reference,
     check_card_fits,
@@ -45,23 +47,28 @@ from robospa.leaderboard.rules import (
 )
 from robospa.leaderboard.traces import Trace, decode, most_bytes
 from robospa.leaderboard.trial_rows import check_record, check_trace, read_rows, trace_hash
-from robospa.leaderboard.untrusted import BundleArchive, parse
-from robospa.results.comparison.compare import Difference, compare_results, over_levels
-from robospa.results.lint import lint_run
+from robospa.leaderboard.untrusted import BundleArchive, check_text, parse
+from robospa.results.comparison.compare import Difference, compare, over_levels
 from robospa.results.paper.columns import run_column
-from robospa.results.paper.tables import FILE_FORMATS
+from robospa.results.paper.tables import FORMATS
+from robospa.results.records.lint import lint_run
 from robospa.results.records.manifest import RunManifest, RunSettings, seed_hash
-from robospa.results.records.runs import Run
+from robospa.results.records.run_io import Run
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.report.tables import report_tables
-from robospa.results.scoring.models import IncomparableError, ModelResults, results_of_records
-from robospa.results.scoring.scores import ScoresData, Variant, score_run, to_json
+from robospa.results.scoring.model_results import ModelResults, results_of_records
+from robospa.results.scoring.score_json import ScoresData, to_json
+from robospa.results.scoring.scores import score_run
+from robospa.results.scoring.setting import IncomparableError
+from robospa.results.scoring.weights import Variant
 from robospa.schema import pattern, read
 from robospa.trial import TrialKey
 
 LISTING = ("unequal-trials", "missing")
 """Lint rules about how many trials there are, which `check_seeds` decides."""
 MOVIE = b"ftyp"
+TABLES = tuple(layout.TABLES.items())
+NUMBER = re.compile(r"-?[0-9]+(?:[.][0-9]+)?")
 THREADS = 4
 """Action files that are looked at together; decoding takes seven times the bytes of each."""
 
@@ -75,7 +82,6 @@ class Valid:
     manifest: BundleManifest
     card: Card
     run: Run
-    settings: RunSettings
     traces: Mapping[TrialKey, str]
     evidence: Validity
 
@@ -83,6 +89,11 @@ class Valid:
     def keys(self) -> tuple[TrialKey, ...]:
         """All trials, in the order of the rows."""
         return self.run.keys
+
+    @property
+    def settings(self) -> RunSettings:
+        """Those of the run."""
+        return self.run.manifest.settings
 
 
 def verify(
@@ -101,23 +112,17 @@ def verify(
     with BundleArchive(path, limits) as archive:
         manifest = _manifest(archive, reference, practice)
         archive.listed = manifest.files
-        run = manifest_of(archive.read_map(layout.RUN))
-        settings = check_settings(run, reference)
-        keys = _keys(run, settings, archive.limits)
-        check_seeds(keys, reference, manifest.practice)
-        _check_lists(archive.read_map(layout.SEEDS), manifest, keys, run)
+        claimed = manifest_of(archive.read_map(layout.RUN))
+        keys = _keys(claimed, archive.limits)
+        _check_lists(archive.read_map(layout.SEEDS), manifest, keys, claimed)
         card = to_card(archive.read_map(layout.CARD))
-        tasks = list(dict.fromkeys(key.task for key in keys))
-        check_checkpoints(card, tasks)
-        check_categories(run, tasks, reference)
-        for task in tasks:
-            check_card_fits(card, settings, task)
+        check_listed(claimed, keys, card, reference, manifest.practice)
         with _no_collection():
-            records, traces = _records(archive, manifest, settings, keys, reference)
-        _check_actions(archive, records, traces, reference, settings)
-        found = Run(path, run, keys, records)
-        warnings = _lints(found)
-        compared = _check_scores(archive, found, manifest)
+            records, traces = _records(archive, manifest, keys)
+        run = Run(path, claimed, keys, records)
+        warnings = check_records(run, reference)
+        _check_actions(archive, run, traces, reference)
+        compared = _check_derived(archive, run, manifest)
         _check_videos(archive, manifest, records)
         archive.all_used()
     check_scenes(records, reference.parts, workers or cores(), done)
@@ -130,7 +135,51 @@ def verify(
         tables_compared=compared,
         warnings=tuple(warnings),
     )
-    return Valid(path, manifest, card, found, settings, traces, evidence)
+    return Valid(path, manifest, card, run, traces, evidence)
+
+
+def check_run(run: Run, card: Card, reference: Reference, practice: bool) -> list[str]:
+    """Warnings of our lint; BundleError unless a run may enter a leaderboard under `card`."""
+    check_listed(run.manifest, run.keys, card, reference, practice)
+    if missing := run.without_result:
+        raise BundleError(
+            f"the run is incomplete: {len(missing)} of {len(run.keys)} trials have no result, such "
+            f"as {missing[0].slug}; finish it with robospa eval ... --resume"
+        )
+    return check_records(run, reference)
+
+
+def check_listed(
+    run: RunManifest, keys: Sequence[TrialKey], card: Card, reference: Reference, practice: bool
+) -> None:
+    """BundleError unless settings, card and the listed trials `keys` fit the benchmark and each
+    other."""
+    settings = check_settings(run, reference)
+    for name in ONE:
+        if strange := [k for k in keys if getattr(k, name) != getattr(settings, name)[0]]:
+            raise BundleError(f"{strange[0].slug[:120]!a} is not of the run's {name}")
+    check_seeds(keys, reference, practice)
+    tasks = list(dict.fromkeys(key.task for key in keys))
+    check_checkpoints(card, tasks)
+    check_categories(run, tasks, reference)
+    for task in tasks:
+        check_card_fits(card, settings, task)
+
+
+def check_records(run: Run, reference: Reference) -> list[str]:
+    """Warnings of our lint; BundleError for a record that cannot be, and the lint's first error."""
+    for record in run.records.values():
+        check_record(record, reference, run.manifest.settings)
+    warnings = []
+    for finding in lint_run(run):
+        if finding.rule in LISTING:
+            continue
+        where = finding.where.removeprefix(run.folder.name).lstrip(", ")
+        text = f"{where}: {finding.text} [{finding.rule}]".removeprefix(": ")
+        if finding.severity == "error":
+            raise BundleError(f"lint: {text}")
+        warnings.append(f"warning: {text}")
+    return warnings
 
 
 @contextmanager
@@ -187,15 +236,11 @@ def _check_files(archive: BundleArchive, listed: Mapping[str, FileEntry]) -> Non
             raise BundleError(f"the bundle has no {name}")
 
 
-def _keys(run: RunManifest, settings: RunSettings, limits: BundleLimits) -> tuple[TrialKey, ...]:
+def _keys(run: RunManifest, limits: BundleLimits) -> tuple[TrialKey, ...]:
     """The listed trials, by task, level and seed."""
     if sum(len(group.seeds) for group in run.trials) > limits.rows:
         raise BundleError(f"the run lists more than {limits.rows} trials")
-    keys = run.keys
-    for name in ("embodiment", "mode", "split"):
-        if strange := [k for k in keys if getattr(k, name) != getattr(settings, name)[0]]:
-            raise BundleError(f"{strange[0].slug[:120]!a} is not of the run's {name}")
-    return tuple(sorted(keys))
+    return tuple(sorted(run.keys))
 
 
 def _check_lists(
@@ -224,11 +269,7 @@ def seed_lists(keys: Sequence[TrialKey]) -> dict[str, list[int]]:
 
 
 def _records(
-    archive: BundleArchive,
-    manifest: BundleManifest,
-    settings: RunSettings,
-    keys: Sequence[TrialKey],
-    reference: Reference,
+    archive: BundleArchive, manifest: BundleManifest, keys: Sequence[TrialKey]
 ) -> tuple[dict[TrialKey, TrialRecord], dict[TrialKey, str]]:
     """Every record and the hash of its actions, from the chain of rows."""
     records: dict[TrialKey, TrialRecord] = {}
@@ -246,7 +287,6 @@ def _records(
                 f"{keys[place].slug if place < len(keys) else 'the end'}: rows are the listed "
                 "trials by task, level and seed"
             )
-        check_record(row.record, reference, settings)
         records[key], traces[key] = row.record, row.trace
     if len(records) < len(keys):
         raise BundleError(f"the rows end before {keys[len(records)].slug}: trials are missing")
@@ -265,11 +305,7 @@ def _variants(records: Mapping[TrialKey, TrialRecord]) -> Iterator[list[TrialRec
 
 
 def _check_actions(
-    archive: BundleArchive,
-    records: Mapping[TrialKey, TrialRecord],
-    traces: Mapping[TrialKey, str],
-    reference: Reference,
-    settings: RunSettings,
+    archive: BundleArchive, run: Run, traces: Mapping[TrialKey, str], reference: Reference
 ) -> None:
     """BundleError unless every stored array has its row's and record's hash.
 
@@ -277,11 +313,12 @@ def _check_actions(
     """
 
     def check(found: Sequence[TrialRecord]) -> None:
-        _check_variant(archive, found, traces, reference, settings)
+        space = spec_of(run.manifest.settings, found[0].key.task).action
+        _check_variant(archive, found, traces, reference, space)
 
     pool = ThreadPoolExecutor(THREADS)
     try:
-        for _ in pool.map(check, _variants(records)):
+        for _ in pool.map(check, _variants(run.records)):
             pass  # the first that fails, in their order, raises here
     finally:
         pool.shutdown(cancel_futures=True)
@@ -292,14 +329,12 @@ def _check_variant(
     found: Sequence[TrialRecord],
     traces: Mapping[TrialKey, str],
     reference: Reference,
-    settings: RunSettings,
+    space: str,
 ) -> None:
     name = layout.actions_name(*found[0].key.variant)
-    most = most_bytes([record.steps for record in found])
-    if archive.sizes.get(name, 0) > most:
-        raise BundleError(
-            f"{name} unpacks to {archive.sizes.get(name, 0)} bytes; its trials have {most} at most"
-        )
+    size, most = archive.sizes.get(name, 0), most_bytes([record.steps for record in found])
+    if size > most:
+        raise BundleError(f"{name} unpacks to {size} bytes; its trials have {most} at most")
     stored = decode(archive.read(name), name)
     if len(stored) != len(found):
         raise BundleError(f"{name} holds {len(stored)} trials, not {len(found)}")
@@ -307,7 +342,7 @@ def _check_variant(
         digest = trace_hash(trace)
         if digest != traces[record.key]:
             raise BundleError(f"{name}: {record.key.slug} has other actions than its row says")
-        check_trace(record, trace, digest, reference, spec_of(settings, record.key.task).action)
+        check_trace(record, trace, digest, reference, space)
 
 
 def read_traces(valid: Valid, wanted: Sequence[TrialKey]) -> dict[TrialKey, Trace]:
@@ -327,37 +362,31 @@ def read_traces(valid: Valid, wanted: Sequence[TrialKey]) -> dict[TrialKey, Trac
     return found
 
 
-def _lints(run: Run) -> list[str]:
-    """Warnings of our lint; BundleError for its first error."""
-    warnings = []
-    for finding in lint_run(run):
-        where = finding.where.removeprefix(run.folder.name).lstrip(", ")
-        text = f"{where}: {finding.text} [{finding.rule}]".removeprefix(": ")
-        if finding.severity == "error":
-            raise BundleError(f"lint: {text}")
-        if finding.rule not in LISTING:
-            warnings.append(f"warning: {text}")
-    return warnings
+def _check_derived(archive: BundleArchive, run: Run, manifest: BundleManifest) -> bool:
+    """Whether the tables were compared, too; BundleError if a number is not what follows.
 
-
-def _check_scores(archive: BundleArchive, run: Run, manifest: BundleManifest) -> bool:
-    """Whether the tables' text was compared too; BundleError if a number is not what follows.
-
-    Another version may write its tables otherwise, but not have other numbers in them.
+    Words of tables may be others, and another version may have other tables.
     """
     given = parse(archive.read(layout.SCORES), layout.SCORES)
-    where = compare_scores(scores_of(run), given)
-    if where:
+    if where := compare_scores(scores_of(run), given):
         raise BundleError(f"{layout.SCORES} is not what the records give: {where}")
     if archive.read_map(layout.OUTCOMES) != to_builtins(outcomes_of(run)):
         raise BundleError(f"{layout.OUTCOMES} is not what the records give")
-    texts = {ending: archive.read(name) for ending, name in layout.TABLES.items()}
+    texts = {ending: archive.read(name).decode("utf-8", "replace") for ending, name in TABLES}
+    for ending, name in TABLES:
+        check_text(texts[ending], name)
     if manifest.robospa != own_version():
         return False
-    for ending, text in tables_of(run).items():
-        if text != texts[ending]:
+    for ending, table in tables_of(run).items():
+        if compare_scores(_cells(ending, table.decode()), _cells(ending, texts[ending])):
             raise BundleError(f"{layout.TABLES[ending]} is not what the records give")
     return True
+
+
+def _cells(ending: str, text: str) -> list[list[float]]:
+    """The numbers in every row of the tables in a file, without its titles and notes."""
+    rows = [row for row in text.splitlines() if ending == "csv" or row.startswith("|")]
+    return [[float(number) for number in NUMBER.findall(row)] for row in rows]
 
 
 def own_version() -> str:
@@ -371,7 +400,7 @@ def _check_videos(
     archive: BundleArchive, manifest: BundleManifest, records: Mapping[TrialKey, TrialRecord]
 ) -> None:
     """BundleError unless the announced trials, and only they, have a video."""
-    chosen = {f"videos/{key.slug}.mp4": key for key in announced(manifest.suite, records)}
+    chosen = {layout.video_name(key): key for key in announced(manifest.suite, records)}
     for name, key in chosen.items():
         if name not in manifest.files:
             if manifest.practice:
@@ -401,7 +430,7 @@ def tables_of(run: Run) -> dict[str, bytes]:
         tables = [shown.table for shown in report_tables([run_column(run, "model")])]
     except IncomparableError:
         tables = []  # of variants that no table has
-    return {ending: FILE_FORMATS[ending](tables).encode() for ending in ("csv", "md")}
+    return {ending: FORMATS[ending](tables).encode() for ending in ("csv", "md")}
 
 
 def compare_scores(right: object, given: object, where: str = "") -> str:
@@ -506,7 +535,7 @@ def paired(first: ModelResults, second: ModelResults) -> dict[str, Rows]:
     made: dict[str, Rows] = {}
     for metric in METRICS:
         try:
-            found = compare_results(first, second, metric)
+            found = compare(first, second, metric)
             rows = [*found.cells, *found.groups, *over_levels(first, second, metric)]
         except IncomparableError:
             continue

@@ -34,23 +34,18 @@ def paper(
     Prints the first of them (the main one) and all printed values that cannot be reproduced.
     """
     from robospa.results.paper.check import checks, errata
-    from robospa.results.paper.columns import (
-        Column,
-        published_results,
-        results_beside_runs,
-        run_column,
-    )
+    from robospa.results.paper.columns import Column, run_column
     from robospa.results.paper.origin import banner
     from robospa.results.paper.published import load
-    from robospa.results.paper.tables import FILE_FORMATS, like_paper, make_tables, write_tables
-    from robospa.results.records.runs import by_setting, read_run
+    from robospa.results.paper.published_results import published_results, results_beside_runs
+    from robospa.results.paper.tables import FORMATS, like_paper, make_tables, write_tables
+    from robospa.results.records.run_io import read_run
+    from robospa.results.records.settings_of_run import by_setting
     from robospa.results.tables import show
 
-    endings = list(FILE_FORMATS) if format == "all" else [format]
-    if format != "all" and format not in FILE_FORMATS:
-        raise ValueError(
-            f"no format is called {format!r}; there are {', '.join(FILE_FORMATS)} and all"
-        )
+    endings = list(FORMATS) if format == "all" else [format]
+    if format != "all" and format not in FORMATS:
+        raise ValueError(f"no format is called {format!r}; there are {', '.join(FORMATS)} and all")
     runs = [part for folder in run or [] for part in by_setting(read_run(folder))]
     added = [run_column(one) for one in runs]
     of_model = results_beside_runs if runs else published_results

@@ -70,7 +70,7 @@ def pack(
         done=scene_progress(),
     )
     bundles = []
-    for packed in _load("packing:pack_robots")(run, card, out, reference, how):
+    for packed in _load("packing:pack")(run, card, out, reference, how):
         evidence = packed.valid.evidence
         if as_json:
             about = {"path": packed.valid.path, "bytes": packed.size, "parts": packed.parts}
@@ -138,9 +138,9 @@ def verify(
     holds = True
     if challenge is not None:
         replayed = _replay(valid, challenge, fraction, workers, reference)
-        found["replayed"] = {"bundle": valid.manifest.bundle, **replayed.to_json()}
-        holds = replayed.holds
-        exact = "replayed" if replayed.exact else "replayed, outcomes only"
+        found["replayed"] = to_builtins(replayed.evidence)
+        holds = replayed.evidence.holds
+        exact = "replayed" if replayed.evidence.exact else "replayed, outcomes only"
         say(f"{exact if holds else 'NOT REPLAYED'}: " + " ".join(replayed.sentences()))
     say(f"bundle {valid.manifest.bundle}")
     if as_json:
@@ -214,10 +214,12 @@ def reproduce(
     parts: Hidden = None,
 ) -> None:
     """Run hidden scenes on the submitter's server and test exactly whether they agree."""
+    from msgspec import to_builtins
+
     from robospa.harness.running.evaluate import evaluate
     from robospa.harness.running.request import make_request
     from robospa.harness.settings import EvaluationSettings, updated
-    from robospa.results.records.runs import read_run
+    from robospa.results.records.run_io import read_run
 
     reference = _load("rules:shipped")(world, parts)
     valid = _load("verify:verify")(bundle, reference, practice)
@@ -241,11 +243,11 @@ def reproduce(
     verdict = earned if compared.holds else "NOT REPRODUCED"
     if as_json:
         held = {"holds": compared.holds, "badge": compared.holds and compared.enough}
-        print_json({**held, "reproduced": compared.to_json()})
+        print_json({**held, "reproduced": to_builtins(compared)})
     else:
         print(f"{verdict}: " + " ".join(compared.sentences()))
     if evidence is not None:
-        _write(evidence, {"reproduced": compared.to_json()})
+        _write(evidence, {"reproduced": to_builtins(compared)})
     if not compared.holds:
         raise typer.Exit(1)
 

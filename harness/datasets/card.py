@@ -34,7 +34,7 @@ SIZES = ((1_000, "n<1K"), (10_000, "1K<n<10K"), (100_000, "10K<n<100K"), (10**6,
 
 @dataclass
 class CardFacts:
-    """What stands on a card: given before, and counted by `add`."""
+    """What a card tells: given before, and counted by `add`."""
 
     format: str
     title: str

@@ -137,7 +137,7 @@ def _list(cameras: Mapping[str, Camera]) -> str:
 
 
 ENVIRONMENT = "observation.environment_state"
-"""As LeRobot calls what a policy knows of its surroundings besides pictures."""
+"""As LeRobot calls what a policy is told of its surroundings besides pictures."""
 POSES = tuple(
     f"{side}_{part}" for side in ARMS for part in ("x", "y", "z", "qw", "qx", "qy", "qz", "gripper")
 )

@@ -24,7 +24,7 @@ PURPOSES = ("expert", "replay", "pictures", "rest")
 class EpisodeJob:
     """An episode to make: its trial, its pictures, and the shares of all episodes that are with
     noise, with a mistake, or from the midst of the task; whether only keyframes are kept, and
-    whether frames have the objects as numbers."""
+    whether the objects are told as numbers."""
 
     key: TrialKey
     cameras: tuple[CameraSpec, ...]

@@ -100,18 +100,22 @@ def check_packages(layout: str) -> None:
 
 
 def pack(
-    layout: str, folder: Path, files: Sequence[Path], manifest: DatasetManifest
+    layout: str,
+    folder: Path,
+    files: Sequence[Path],
+    manifest: DatasetManifest,
+    on_episode: Callable[[int], None] = lambda count: None,
 ) -> DatasetRecord:
     """Write the episodes in `files`, in their order, to `folder` in a format of `FORMATS`.
 
-    What an earlier packing left in `folder` is replaced; anything else stays. Raises DatasetError
-    if there are none or one does not fit the others, EpisodeFileError for a file that cannot be
-    read, StorageError if `folder` cannot be written.
+    What an earlier packing left in `folder` is replaced; anything else stays. `on_episode` is told
+    how many are written. Raises DatasetError if there are none or one does not fit the others,
+    EpisodeFileError for a file that cannot be read, StorageError if `folder` cannot be written.
     """
     if not files:
         raise DatasetError(f"there is no episode to write to {folder}")
     read = ((str(path), read_episode_file(path)) for path in files)
-    return pack_episodes(layout, folder, read, manifest, expected=len(files))
+    return pack_episodes(layout, folder, read, manifest, on_episode, expected=len(files))
 
 
 def pack_episodes(
@@ -119,6 +123,7 @@ def pack_episodes(
     folder: Path,
     episodes: Iterator[Source],
     manifest: DatasetManifest,
+    on_episode: Callable[[int], None] = lambda count: None,
     *,
     expected: int,
     writer: MakeWriter | None = None,
@@ -140,7 +145,7 @@ def pack_episodes(
             raise DatasetError(f"there is no episode to write to {folder}{_why(manifest)}")
         first = layout_of(begin[1])
         facts = CardFacts(layout, FORMATS[layout].title, first, manifest, expected)
-        _write(make(part, first), part, chain([begin], episodes), facts)
+        _write(make(part, first), part, chain([begin], episodes), facts, on_episode)
         write_card(part, facts, card)
         made = DatasetRecord(
             FORMAT,
@@ -174,6 +179,7 @@ def _write(
     folder: Path,
     episodes: Iterable[Source],
     facts: CardFacts,
+    on_episode: Callable[[int], None],
 ) -> None:
     lines = EpisodeLines(folder)
     try:
@@ -184,6 +190,7 @@ def _write(
                 raise DatasetError(f"{name} cannot be packed: {error}") from error
             lines.add(index, episode, file)
             facts.add(episode)
+            on_episode(index + 1)
     finally:
         lines.close()
     writer.close()

@@ -1,7 +1,7 @@
 """Is a data set what was collected? Hashes, counts, schema, and replays of a sample.
 
 Everything that is wrong is one sentence. What a file holds is looked into only where its hash is
-right, and episodes are replayed only where all of that is: the first cause is reported.
+right, and episodes are replayed only where all of that is: the first cause is what is told.
 """
 
 from __future__ import annotations
@@ -69,11 +69,12 @@ def verify(
     folder: Path,
     replays: int = REPLAYS,
     replay: EpisodeReplay | None = None,
+    on_replay: Callable[[int, int], None] = lambda done, total: None,
 ) -> Verification:
     """Check the data set in `folder`, replaying so many episodes (all, if there are no more).
 
-    `replay` runs an episode; without one the simulator does. Raises DatasetError where `folder` is
-    no data set that can be checked.
+    `replay` runs an episode; without one the simulator does. `on_replay` is told how many of how
+    many are done. Raises DatasetError where `folder` is no data set that can be checked.
     """
     made = read_record(folder)
     if made.layout not in FORMATS:
@@ -101,7 +102,7 @@ def verify(
         problem = f"its scenes are of the suite {suite}, and those of this version of {SUITE}"
         return Verification((f"no episode can be replayed: {problem}",), tuple(checked))
     sample = _sample(folder, len(lines), replays, made.sums)
-    problems = tuple(_replay_problems(folder, made, sample, replay or in_simulator()))
+    problems = tuple(_replay_problems(folder, made, sample, replay or in_simulator(), on_replay))
     if not problems:
         checked.append(replayed_sentence(len(sample), len(lines)))
     return Verification(problems, tuple(checked))
@@ -194,14 +195,17 @@ def _replay_problems(
     made: DatasetRecord,
     sample: Sequence[EpisodeLine],
     replay: EpisodeReplay,
+    on_replay: Callable[[int, int], None],
 ) -> Iterator[str]:
-    for line in sample:
+    for number, line in enumerate(sample, 1):
         name = f"episode {line.episode_index} ({line.key.slug})"
         try:
             ending = replay(line, FORMATS[made.layout].commands(folder, line))
         except Exception as error:  # whatever a simulator or a foreign task says
             yield f"{name} cannot be replayed: {error}"
             continue
+        finally:
+            on_replay(number, len(sample))
         if ending.success is not line.success:
             was, now = ("succeeded", "fails") if line.success else ("failed", "succeeds")
             yield f"{name} {was} when it was collected, and {now} when replayed"

@@ -22,7 +22,7 @@ import numpy as np
 from robospa.action_space import ARMS
 from robospa.geometry import Pose, Vec3, axis_rotation, look_rotation, rotate
 from robospa.gripper import grasp_points
-from robospa.harness.demonstrations.noise import depths, gaps
+from robospa.harness.demonstrations.clearance import depths, gaps
 from robospa.harness.robots import embodiment
 from robospa.harness.robots.kinematics import chain_of, end_effector
 from robospa.harness.skills import Expert, SkillFailed

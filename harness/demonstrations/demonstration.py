@@ -312,7 +312,7 @@ def replay(
     """The record of a trial that executes what `commanded` (T, D) says, after `prefix_action`.
 
     The step limit counts from the first frame on. The trial of a mistake ends where its actions do,
-    as at a step limit, so that its type of failure can be found; any other has to meet the goal
+    as at a step limit, so that its type of failure can be told; any other has to meet the goal
     within the limit.
     """
     executed = np.concatenate([prefix_action, commanded[1:], commanded[-1:]])

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from robospa.geometry import Pose
 from robospa.results.failures.labels import NAMES, label
-from robospa.results.records.action_problems import with_names
+from robospa.results.records.object_names import with_names
 from robospa.results.records.trial_record import EventRow, TrialRecord
 from robospa.results.report.run_card import END_NAMES
 

@@ -11,7 +11,7 @@ from robospa.extras import need
 from robospa.harness.viewer.drawing import DrawnBody, drawn_bodies
 from robospa.harness.viewer.playback import Playback
 from robospa.results.records.manifest import RunError
-from robospa.results.records.runs import Run, finished, read_run
+from robospa.results.records.run_io import Run, finished, read_run
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 

@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 
 from robospa.results.comparison.pairs import check_comparable, common_seeds, paired_variants
 from robospa.results.records.trial_record import TrialRecord
-from robospa.results.scoring.models import IncomparableError, ModelResults
-from robospa.results.scoring.scores import Variant, weights_of
+from robospa.results.scoring.model_results import ModelResults
+from robospa.results.scoring.setting import IncomparableError
+from robospa.results.scoring.weights import Variant, weights_of
 from robospa.results.statistics.intervals import (
     Estimate,
     interval_of,

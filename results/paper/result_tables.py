@@ -16,7 +16,7 @@ from robospa.results.paper.check import Check, errata
 from robospa.results.paper.columns import Column, check_columns
 from robospa.results.paper.origin import table_note
 from robospa.results.paper.published import LEVELS, load, row_title, title
-from robospa.results.scoring.models import in_official_world
+from robospa.results.scoring.model_results import in_official_world
 from robospa.results.statistics.significance import supported_best
 from robospa.results.tables import MISSING, PRINTED_OTHERWISE, Table, TableCell, TableRow
 

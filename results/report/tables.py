@@ -2,7 +2,8 @@
 
 Rows of tasks that no run of the report has are left out, so that a run of ten tasks is no page of
 dashes; the notes below a table say how much was not run. Averages over tasks that were not run stay
-open and are shown as dashes."""
+open and are shown as dashes.
+"""
 
 from __future__ import annotations
 
@@ -11,43 +12,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from robospa.categories import BASIC, METRIC_CATEGORIES
+from robospa.categories import METRIC_CATEGORIES
 from robospa.results.paper.columns import Column
+from robospa.results.paper.other_tables import basic_table
 from robospa.results.paper.result_tables import DASH, summary_table, task_table
-from robospa.results.paper.tables import basic_table, write_tables
-from robospa.results.scoring.models import ModelResults, restricted
-from robospa.results.scoring.scores import Variant
+from robospa.results.paper.tables import write_tables
 from robospa.results.tables import Table, TableRow, html_fragment
 
 if TYPE_CHECKING:
     from markupsafe import Markup
-
-
-def shared_variants(models: Sequence[ModelResults]) -> set[Variant]:
-    """The variants that all `models` have results of; published ones do not restrict the basic
-    grounding tasks, of which the paper prints no model's results."""
-    basic = {v for m in models for v, cell in m.scores.cells.items() if cell.category in BASIC}
-    found = [with_results(m) | (basic if m.published else set()) for m in models]
-    return set.intersection(*found) if found else set()
-
-
-def with_results(model: ModelResults) -> set[Variant]:
-    """The variants that `model` has any result of."""
-    return {variant for variant, cell in model.scores.cells.items() if cell.trials}
-
-
-def over_shared(models: Sequence[ModelResults]) -> list[ModelResults]:
-    """`models` as if each had run the shared variants only; as they are if there is one alone, or
-    if they share nothing. Runs in progress have only what they have results of."""
-    begun = [restricted(m, with_results(m)) if m.to_run else m for m in models]
-    shared = shared_variants(models) if len(models) > 1 else set()
-    return [restricted(model, shared) for model in begun] if shared else begun
-
-
-def beside_runs(published: ModelResults, runs: Sequence[ModelResults]) -> ModelResults:
-    """`published` over the variants that any of `runs` has results of."""
-    return restricted(published, set().union(*map(with_results, runs)))
-
 
 FEW = 2
 """So many columns are shown with all their levels; more of them as in the paper."""
@@ -169,41 +142,3 @@ def write_files(tables: Sequence[ReportTable], folder: Path) -> None:
     """The same tables for papers and programs: LaTeX and CSV."""
     if tables:
         write_tables([t.table for t in tables], folder, ("tex", "csv"))
-
-
-AVERAGES = (
-    "Values in percent. A category is the mean of its tasks; dimensions and the overall value are "
-    "means of categories. ONTA is 0 for guessing among the candidates."
-)
-SINGLE = {"wilson": "Wilson's", "exact": "Clopper and Pearson's exact", "jeffreys": "Jeffreys'"}
-"""Methods for the success rate of one variant, by the name of `intervals.METHODS`."""
-BOOTSTRAP = "95 % intervals are the paper's: a bootstrap over the trials within each variant."
-PROGRESS = "Intervals of progress are a bootstrap over trials."
-PRINTED = (
-    "Of published progress only the mean is known: its interval is rather too wide than too narrow."
-)
-
-
-def method_notes(columns: Sequence[Column]) -> list[str]:
-    """The sentences for a report of `columns`; none if there are none."""
-    if not columns:
-        return []
-    cells = [
-        (c, estimate) for c in columns for cell in c.scores.cells.values()
-        if (estimate := cell.values.get("ps")) is not None
-    ]  # fmt: skip
-    printed = any(column.published for column, _ in cells)
-    ci = columns[0].scores.ci
-    if ci == "bootstrap":
-        return [AVERAGES, BOOTSTRAP, *([PRINTED] if printed else [])]
-    rates = (
-        f"95 % intervals are over trials on other seeds: {SINGLE[ci]} for the rate of one variant; "
-        "for an average MOVER, which combines the intervals of the variants below it."
-    )
-    resampled = any(not column.published for column, _ in cells)
-    return [
-        AVERAGES,
-        rates,
-        *([PROGRESS] if resampled else []),
-        *([PRINTED] if printed else []),
-    ]

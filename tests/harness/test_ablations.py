@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from fake_runs import KNOWN, make_run
+from report_runs import KNOWN, make_run
 
 from robospa.harness.ablations import other_seed, shuffled_parts
 from robospa.harness.running.request import make_request

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from pathlib import Path
 
@@ -57,6 +57,7 @@ def fake_pack(
     folder: Path,
     files: Sequence[Path],
     manifest: DatasetManifest,
+    on_episode: Callable[[int], None] = lambda count: None,
 ) -> None:
     """One file with what counts of every episode, then the manifest."""
     folder.mkdir(exist_ok=True)

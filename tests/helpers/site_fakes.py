@@ -20,8 +20,9 @@ from robospa.leaderboard.verify import Valid
 from robospa.results.paper.columns import Column
 from robospa.results.paper.published import LEVELS, load
 from robospa.results.records.trial_record import TrialRecord
-from robospa.results.scoring.models import ModelResults, Setting
+from robospa.results.scoring.model_results import ModelResults
 from robospa.results.scoring.scores import combine, score_cell
+from robospa.results.scoring.setting import Setting
 from robospa.trial import TrialKey
 
 REPLAYED: dict[str, Any] = {
@@ -45,7 +46,7 @@ REPRODUCED: dict[str, Any] = {
 def make_valid(folder: Path, policy: FakePolicy | None = None, **card: Any) -> Valid:
     """A valid bundle in `folder` of what `policy` did, its card changed by `card`."""
     run = make_run(folder / "run", policy=policy)
-    return pack([run], to_card({**CARD_DATA, **card}), folder / "bundle.zip", REFERENCE).valid
+    return pack([run], to_card({**CARD_DATA, **card}), folder / "bundle.zip", REFERENCE)[0].valid
 
 
 def make_submission(folder: Path, home: Path, *evidence: dict[str, Any], **card: Any) -> Path:

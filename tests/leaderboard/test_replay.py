@@ -8,48 +8,47 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from bundle_fakes import PRESS, REFERENCE, Files, put_rows, rows_of, seal, zip_up
+from bundle_fakes import PRESS, REFERENCE, Files, put_rows, rows_of, seal, success_event, zip_up
 
-from robospa.harness.sim.motion import RATE
 from robospa.leaderboard import bundle as layout
 from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.evidence import sample_size
-from robospa.leaderboard.replay import Replay, replay
+from robospa.leaderboard.replay import SampleReplay, replay
 from robospa.leaderboard.rules import Reference, manifest_of
 from robospa.leaderboard.verify import outcomes_of, scores_of, tables_of, verify
-from robospa.results.records.runs import Run, from_data
+from robospa.results.records.run_io import Run, from_data
 
 CHALLENGE = "a value nobody knew"
 
 
-def replayed(path: Path, count: int, reference: Reference = REFERENCE) -> Replay:
+def replayed(path: Path, count: int, reference: Reference = REFERENCE) -> SampleReplay:
     return replay(verify(path, REFERENCE), CHALLENGE, count, reference)
 
 
 def test_an_honest_bundle_replays_to_the_bit(honest: Path) -> None:
     made = replayed(honest, 40)
-    assert made.holds and made.exact
+    assert made.evidence.holds and made.evidence.exact
     assert {t.record.end for t in made.trials if t.record} == {
         "success",
         "step_limit",
         "policy_error",
     }
     assert "40 of 40 trials were played again: 40 identical" in made.sentences()[0]
-    assert json.loads(json.dumps(made.to_json()))["identical"] == 40
+    assert made.evidence.identical == 40
 
 
 def test_another_build_with_the_same_outcomes_is_said_to_be_that(honest: Path) -> None:
     other = replace(REFERENCE, world="bundle_fakes:OtherBuild")
     made = replayed(honest, 5, other)
-    assert made.holds and not made.exact
-    assert made.count("agrees") == 5
+    assert made.evidence.holds and not made.evidence.exact
+    assert made.evidence.agrees == 5
     assert "Outcomes agree but final states do not" in made.sentences()[2]
 
 
 def test_another_physics_does_not_hold(honest: Path) -> None:
     other = replace(REFERENCE, world="bundle_fakes:OtherPhysics")
     made = replayed(honest, 40, other)
-    assert not made.holds
+    assert not made.evidence.holds
     assert "First difference" in made.sentences()[-1]
 
 
@@ -84,15 +83,14 @@ def claim_success(row: Any) -> None:
     if record["end"] == "policy_error":
         return
     record.update(success=True, end="success", done=2, best=2)
-    end = {"time": record["physics_steps"] / RATE, "kind": "success"}
-    record["events"] = [{**end, "object": "", "index": -1, "note": ""}]
+    record["events"] = [success_event(record)]
 
 
 def test_outcomes_forged_with_all_hashes_are_caught(files: Files, tmp_path: Path) -> None:
     path = zip_up(tmp_path / "b.zip", forge(files, claim_success))
     made = replayed(path, 40)
-    assert not made.holds
-    assert made.count("different") == 8
+    assert not made.evidence.holds
+    assert made.evidence.different == 8
     assert set(made.trials[0].differs) <= {"success", "done", "best", "end"}
 
 
@@ -110,7 +108,7 @@ def test_five_percent_of_invented_outcomes_are_caught(files: Files, tmp_path: Pa
     assert count == 39
     for number in range(3):
         made = replay(valid, f"a challenge that nobody knew, {number}", count, REFERENCE)
-        assert made.count("different") in (1, 2) and not made.holds
+        assert made.evidence.different in (1, 2) and not made.evidence.holds
 
 
 def test_actions_of_another_task_forged_with_all_hashes_are_caught(
@@ -133,5 +131,5 @@ def test_actions_of_another_task_forged_with_all_hashes_are_caught(
         row["record"]["actions_digest"] = actions_digest(list(trace))
     put_rows(files, rows)
     made = replayed(zip_up(tmp_path / "b.zip", seal(files)), 40)
-    assert not made.holds
+    assert not made.evidence.holds
     assert {t.key.variant for t in made.trials if t.kind == "different"} == {(PRESS, 1)}

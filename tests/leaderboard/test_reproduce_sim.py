@@ -42,7 +42,7 @@ from robospa.leaderboard.reproduce import (
 from robospa.leaderboard.rules import shipped
 from robospa.leaderboard.verify import Valid
 from robospa.protocol.server import ServerThread
-from robospa.results.records.runs import Run, action_path, read_run
+from robospa.results.records.run_io import Run, action_path, read_run
 from robospa.tasks.seeds import accepted
 from robospa.trial import TrialKey
 
@@ -80,7 +80,7 @@ def valid(tmp_path_factory: pytest.TempPathFactory, stolen: Run) -> Valid:
     card["actions"]["chunk"] = HORIZON
     assert sum(r.success for r in stolen.records.values()) == TRIALS
     out = tmp_path_factory.mktemp("bundle") / "b.zip"
-    made = pack(
+    (made,) = pack(
         [stolen.folder], to_card(card), out, shipped(), Packing(practice=True, videos=False)
     )
     return made.valid

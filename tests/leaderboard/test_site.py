@@ -267,7 +267,9 @@ def test_another_card_than_the_bundles_is_refused(tmp_path: Path) -> None:
 
 def test_a_bundle_for_practice_is_no_submission(tmp_path: Path) -> None:
     run = make_run(tmp_path / "run", [TrialKey(PICK, 1, s) for s in SEEDS])
-    packed = pack([run], CARD, tmp_path / "b.zip", REFERENCE, Packing(practice=True, videos=False))
+    (packed,) = pack(
+        [run], CARD, tmp_path / "b.zip", REFERENCE, Packing(practice=True, videos=False)
+    )
     with pytest.raises(BundleError, match="enters no leaderboard"):
         add(packed.valid, [], tmp_path / "home")
 

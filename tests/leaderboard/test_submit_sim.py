@@ -38,4 +38,4 @@ def test_a_real_run_replays_to_the_bit(tmp_path: Path) -> None:
     valid = verify(tmp_path / "b.zip", reference, practice=True)
     assert [name for name in valid.manifest.files if name.startswith("videos/")]
     made = replay(valid, "a value nobody knew", 2, reference, workers=2)
-    assert made.exact, made.sentences()
+    assert made.evidence.exact, made.sentences()

@@ -7,16 +7,16 @@ from pathlib import Path
 
 import pytest
 from expert_table import COUNTS, ENOUGH, PAGE, Variant, below, counted, merged, read, table, write
-from fake_runs import make_run, shown
+from report_runs import make_run, record
 
 TEXT = PAGE.read_text("utf-8")
 
 
 def test_of_a_trial_that_two_runs_hold_the_last_counts(tmp_path: Path) -> None:
     task, robot = "Pick_Blocks_Size", "aloha-agilex"
-    first = [shown(task, 1, seed, seed > 7) for seed in (7, 8, 9)]
+    first = [record(task, 1, seed, seed > 7) for seed in (7, 8, 9)]
     make_run(tmp_path / "a", first)
-    make_run(tmp_path / "b", [shown(task, 1, 7, True)])
+    make_run(tmp_path / "b", [record(task, 1, 7, True)])
     (made,) = counted([tmp_path / "a"])
     assert made == Variant(robot, task, 1, 2, 3, (7,))
     (made,) = counted([tmp_path / "a", tmp_path / "b"])

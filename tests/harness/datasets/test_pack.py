@@ -6,7 +6,6 @@ import json
 import tracemalloc
 from dataclasses import replace
 from pathlib import Path
-from unittest.mock import Mock
 
 import h5py
 import numpy as np
@@ -17,7 +16,6 @@ from tiny_datasets import SIZE, painted, tiny_dataset, tiny_episode, written
 from robospa.action_space import ActionSpace
 from robospa.harness.convention_check.episodes import read_episode
 from robospa.harness.datasets import lerobot
-from robospa.harness.datasets.card import CardFacts
 from robospa.harness.datasets.features import layout_of
 from robospa.harness.datasets.manifest import (
     MANIFEST,
@@ -67,9 +65,11 @@ def test_what_was_cut_short_is_no_data_set(tmp_path: Path, monkeypatch: pytest.M
     folder = tmp_path / "set"
     files = written(tmp_path / "episodes", [tiny_episode(0), tiny_episode(1)])
 
-    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
-        patch.setattr(CardFacts, "add", Mock(side_effect=KeyboardInterrupt))
-        pack("lerobot-v3", folder, files, SETTINGS)
+    def stop(count: int) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        pack("lerobot-v3", folder, files, SETTINGS, stop)
     assert not (folder / MANIFEST).exists() and not (folder / "meta").exists()
     pack("lerobot-v3", folder, files, SETTINGS)
     tiny_dataset(tmp_path / "other", count=2)

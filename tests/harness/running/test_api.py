@@ -15,8 +15,8 @@ import robospa
 from robospa.harness.settings import SettingsError
 from robospa.harness.settings_file import FILE
 from robospa.protocol.server import ServerThread
-from robospa.results.lint import lint_run
-from robospa.results.records.runs import Run
+from robospa.results.records.lint import lint_run
+from robospa.results.records.run_io import Run
 
 pytestmark = pytest.mark.usefixtures("world_asked_here")
 

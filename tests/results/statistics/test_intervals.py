@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from robospa.results.statistics.bootstrap import Sample, rate
 from robospa.results.statistics.intervals import (
     METHODS,
     Estimate,
@@ -26,7 +27,6 @@ from robospa.results.statistics.intervals import (
     paired_sample_difference,
     wilson,
 )
-from robospa.results.statistics.samples import Sample, rate
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ import pytest
 
 from robospa.results.paper.columns import published_column
 from robospa.results.paper.published import load
-from robospa.results.paper.tables import FILE_FORMATS, TABLES, make_tables, write_tables
+from robospa.results.paper.tables import FORMATS, TABLES, make_tables, write_tables
 from robospa.results.tables import (
     Table,
     TableCell,
@@ -181,9 +181,9 @@ def test_tables_of_the_wrong_shape_are_refused() -> None:
 
 
 def test_every_format_is_written(tmp_path: Path, tables: list[Table]) -> None:
-    written = write_tables(tables[:2], tmp_path / "out", list(FILE_FORMATS))
+    written = write_tables(tables[:2], tmp_path / "out", list(FORMATS))
     assert {path.name for path in written} == {
-        *(f"tables.{ending}" for ending in FILE_FORMATS),
+        *(f"tables.{ending}" for ending in FORMATS),
         "main.tex",
         "onta.tex",
     }

@@ -1,0 +1,440 @@
+"""Bundles made to harm their reader or to pass for others: each is refused in one sentence.
+
+Every forger here knows our code: where that makes sense, all hashes and the chain are made to hold
+again after the change, so that the rule in question is what catches it.
+"""
+
+from __future__ import annotations
+
+import json
+import stat
+import struct
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from bundle_fakes import (
+    ACTIONS,
+    PICK,
+    PRESS,
+    REFERENCE,
+    Files,
+    edit,
+    edit_row,
+    put_rows,
+    refused,
+    relist,
+    rows_of,
+    seal,
+    success_event,
+    unzip,
+    zip_up,
+)
+
+from robospa.leaderboard import bundle as layout
+from robospa.leaderboard.bundle import BundleError, BundleLimits
+from robospa.leaderboard.traces import HEAD, MAGIC, decode, encode
+from robospa.leaderboard.trial_rows import trace_hash
+from robospa.leaderboard.untrusted import BundleArchive
+from robospa.leaderboard.verify import verify
+from robospa.trial import TrialKey
+
+Forgery = Callable[[Files], object]
+OTHER_ACTIONS = layout.actions_name(PRESS, 1)
+
+
+def put(name: str, data: bytes) -> Forgery:
+    """The file `name` is `data`."""
+    return lambda files: files.update({name: data})
+
+
+def field(file: str, /, *path: str, **values: Any) -> Forgery:
+    """Fields of the JSON file `file`, inside of `path`, have other values."""
+
+    def change(data: Any) -> None:
+        for step in path:
+            data = data[step]
+        data.update(values)
+
+    return lambda files: edit(files, file, change)
+
+
+def record(**values: Any) -> Forgery:
+    """The first record has other values."""
+    return lambda files: edit_row(files, 0, lambda row: row["record"].update(values))
+
+
+def first_failure(change: Callable[[Any], None]) -> Forgery:
+    def forge(files: Files) -> None:
+        rows = rows_of(files)
+        edit_row(files, [row["record"]["success"] for row in rows].index(False), change)
+
+    return forge
+
+
+def rows(change: Callable[[list[Any]], list[Any]], listed: bool = False) -> Forgery:
+    """The rows are what `change` makes of them; `listed`: the run lists just these trials."""
+
+    def forge(files: Files) -> None:
+        made = change(rows_of(files))
+        if listed:
+            relist(files, [TrialKey(**row["record"]["key"]) for row in made])
+        put_rows(files, made)
+
+    return forge
+
+
+def keyed(change: Callable[[Any], Any]) -> Callable[[list[Any]], list[Any]]:
+    """Every row with another key."""
+
+    def forge(made: list[Any]) -> list[Any]:
+        for row in made:
+            row["record"]["key"].update(change(row["record"]["key"]))
+        return made
+
+    return forge
+
+
+def swap(first: str, second: str) -> Forgery:
+    def forge(files: Files) -> None:
+        files[first], files[second] = files[second], files[first]
+
+    return forge
+
+
+def hashes_to_match(files: Files) -> None:
+    """Another task's actions, whose hashes the rows have."""
+    files[ACTIONS] = files[OTHER_ACTIONS]
+    made = rows_of(files)
+    for row, trace in zip(made, decode(files[ACTIONS], ""), strict=False):
+        row["trace"] = trace_hash(trace)
+    put_rows(files, made)
+
+
+def other_start(files: Files) -> None:
+    lines = files[layout.RECORDS].splitlines()
+    first = json.dumps({**json.loads(lines[0]), "previous": "1" * 64}).encode()
+    files[layout.RECORDS] = b"\n".join([first, *lines[1:], b""])
+
+
+def claim_success(row: Any) -> None:
+    row["record"].update(success=True, end="success", done=2, best=2, message="")
+    row["record"]["events"] = [success_event(row["record"])]
+
+
+def number(text: str) -> Forgery:
+    """A wall time that is no number."""
+
+    def forge(files: Files) -> None:
+        line, rest = files[layout.RECORDS].split(b"\n", 1)
+        start = line.index(b'"wall_time":') + 12
+        line = line[:start] + text.encode() + line[line.index(b",", start) :]
+        files[layout.RECORDS] = line + b"\n" + rest
+
+    return forge
+
+
+def replaced(name: str, old: bytes, new: bytes) -> Forgery:
+    return lambda files: files.update({name: files[name].replace(old, new, 1)})
+
+
+def film(files: Files) -> str:
+    return next(name for name in files if name.startswith("videos/"))
+
+
+def other_film(files: Files) -> None:
+    old = film(files)
+    level = 3 if f"{PICK}-L1-" in old else 1
+    files[f"videos/{PICK}-L{level}-100001-aloha-agilex-clean-heldout.mp4"] = files.pop(old)
+
+
+SPEC = (layout.RUN, "settings", "policy", "spec")
+BIGGEST = np.full((4, 14), 0xFFFFFFFE, ">u4").reshape(-1).view(np.uint8)  # zigzag of 2^31 - 1
+FORGERIES: list[tuple[Forgery, str]] = [
+    # sizes
+    (put(ACTIONS, bytes(65 * layout.MEGA)), "unpacks to 68157440 bytes"),
+    (record(message="x" * 300_000), "longer than"),
+    (record(diagnostics={"x": [[]] * 500}), "more times or diagnostics"),
+    (record(diagnostics={str(n): 0 for n in range(500)}), "more times or diagnostics"),
+    (record(diagnostics={"x": [[[]] * 30] * 30}), "more times or diagnostics"),
+    (record(timing={str(n): 0.0 for n in range(50)}), "more times or diagnostics"),
+    (rows(lambda made: [*made, made[-1]]), "is there twice"),
+    # arrays
+    *(
+        (put(ACTIONS, HEAD.pack(MAGIC, trials, width) + bytes(64)), "more than it can hold")
+        for trials, width in ((2**32 - 1, 14), (4, 2**31), (4, 65))
+    ),
+    (
+        put(ACTIONS, HEAD.pack(MAGIC, 4, 14) + struct.pack("<4I", *[2**32 - 1] * 4) + bytes(64)),
+        "announces 17179869180 actions",
+    ),
+    (
+        put(
+            ACTIONS,
+            HEAD.pack(MAGIC, 4, 14)
+            + struct.pack("<4I", *[1] * 4)
+            + BIGGEST.reshape(-1, 4).T.tobytes(),
+        ),
+        "a number beyond",
+    ),
+    (swap(ACTIONS, OTHER_ACTIONS), "other actions than its row says"),
+    (hashes_to_match, "not those of its record"),
+    (lambda files: files.pop(ACTIONS), f"has no {ACTIONS}"),
+    # JSON
+    *((number(text), "row 1") for text in ("NaN", "-Infinity", "1e999", "9" * 5000)),
+    (record(message=3), "'message' must be text, not 3"),
+    (put(layout.CARD, b"[" * 100_000 + b"]" * 100_000), "nested"),
+    (
+        lambda files: files.update({layout.CARD: files[layout.CARD][:-1] + b',"name":"Another"}'}),
+        "there twice",
+    ),
+    # the chain, rows and seeds
+    (replaced(layout.RECORDS, b'"message":""', b'"message":"x"'), "does not follow the row"),
+    (other_start, "does not follow"),
+    (rows(lambda made: [made[1], made[0], *made[2:]]), "row 1 is"),
+    (rows(lambda made: made[:-1]), "trials are missing"),
+    (rows(lambda made: [*made[:3], made[2], *made[4:]]), "is there twice"),
+    (rows(lambda made: [*made[:3], made[2], *made[4:]], listed=True), "more than once|twice"),
+    (rows(keyed(lambda key: {"seed": key["seed"] - 10**5}), listed=True), "not in the shipped"),
+    (rows(lambda made: made[1:], listed=True), "incomplete: 1 of its 4 listed seeds"),
+    (rows(lambda made: [r for r in made if r["record"]["key"]["level"] < 5], listed=True), "L5"),
+    (rows(keyed(lambda key: {"task": "Easy_" + key["task"]}), listed=True), "no variant with"),
+    # what follows from the records
+    (first_failure(lambda row: row["record"].update(success=True, end="success")), "say False"),
+    (first_failure(claim_success), "is not what the records give"),
+    (field(layout.OUTCOMES, f"{PICK}/1", success="1111"), "outcomes.json is not what"),
+    (replaced(layout.TABLES["csv"], b"75", b"99"), "tables.csv is not what the records give"),
+    (replaced(layout.TABLES["md"], b"75", b"99"), "tables.md is not what the records give"),
+    (other_film, "video"),
+    (lambda files: files.update({film(files): b"<html>" * 9}), "is not an MP4 video"),
+    # text
+    *(
+        (field(layout.CARD, name=text), "model")
+        for text in (
+            *("<script>alert(1)</script>", "<img src=x onerror=alert(1)>", "javascript:alert(1)"),
+            *("a\u202eb", "a\u0000b", "a\u200bb", '" onload="alert(1)', "x" * 81, ""),
+        )
+    ),
+    *(
+        (field(layout.CARD, link=link), "model")
+        for link in ("javascript:alert(1)", "http://x.org", 'https://x.org/"><b>')
+    ),
+    *(
+        (record(**{name: text}), "markup")
+        for name in ("instruction", "message", "digest")
+        for text in ("<script>", "</td>", "<svg/onload=x>")
+    ),
+    (replaced(layout.RECORDS, b'"message":""', b'"message":"\\u003cscript>"'), "follow|markup"),
+    (field(*SPEC, name="<script>"), "markup"),
+    (lambda files: files.update({layout.TABLES["md"]: b"<script>"}), "markup"),
+    # other versions, and settings that do not count
+    (field(layout.CARD, onload="x"), "unknown field 'onload'"),
+    (record(reward=1.0), "newer version"),
+    (field(*SPEC, privileged=True), "privileged"),
+    (field(*SPEC, environment_state=True), "privileged"),
+    (field(layout.RUN, "settings", "world", name="os:getcwd"), "another world"),
+]
+
+
+@pytest.mark.parametrize(("forge", "words"), FORGERIES, ids=[w for _, w in FORGERIES])
+def test_a_sealed_forgery(files: Files, tmp_path: Path, forge: Forgery, words: str) -> None:
+    forge(files)
+    assert_refused(zip_up(tmp_path / "b.zip", seal(files)), words)
+
+
+def assert_refused(path: Path, words: str, limits: BundleLimits | None = None) -> None:
+    text = refused(path, limits)
+    assert any(word in text for word in words.split("|")), text
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"chain": {"rows": 40, "last": "0" * 64}}, "does not end as the manifest says"),
+        ({"format": 2}, "format 2, this robospa reads up to 1"),
+        ({"suite": "robospa-99"}, "robospa-99"),
+    ],
+)
+def test_a_sealed_manifest(
+    files: Files, tmp_path: Path, changes: dict[str, Any], words: str
+) -> None:
+    assert_refused(zip_up(tmp_path / "b.zip", seal(files, **changes)), words)
+
+
+@pytest.mark.parametrize(
+    ("limits", "words"),
+    [
+        (BundleLimits(unpacked=10_000), "the bundle unpacks to"),
+        (BundleLimits(entries=5), "5 is the most"),
+        (BundleLimits(packed=100), "more than the 100 allowed"),
+        (BundleLimits(rows=39), "lists more than 39 trials"),
+    ],
+)
+def test_more_than_a_bundle_can_have(honest: Path, limits: BundleLimits, words: str) -> None:
+    assert_refused(honest, words, limits)
+
+
+def test_more_rows_than_the_reader_takes(honest: Path) -> None:
+    import hashlib
+
+    with (
+        BundleArchive(honest, BundleLimits(rows=3)) as archive,
+        pytest.raises(BundleError, match="has more than 3 rows"),
+    ):
+        list(archive.rows(layout.RECORDS, hashlib.sha256()))
+
+
+def test_actions_that_unpack_to_more_than_their_trials_have(
+    files: Files, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A valid file of four long trials, for four records of at most 20 actions: refused unread."""
+    files[ACTIONS] = encode([np.zeros((20_000, 14), np.float32)] * 4)
+    monkeypatch.setattr("robospa.leaderboard.verify.decode", lambda data, name: pytest.fail("read"))
+    assert_refused(zip_up(tmp_path / "b.zip", seal(files)), f"{ACTIONS} unpacks to")
+
+
+@pytest.mark.parametrize("name", [layout.RUN, layout.SEEDS, layout.SCORES])
+def test_json_that_takes_many_times_its_size_in_memory(
+    files: Files, tmp_path: Path, name: str
+) -> None:
+    files[name] = b'{"x":[' + b"[]," * layout.MEGA + b"[]]}"
+    assert_refused(zip_up(tmp_path / "b.zip", files), f"'{name}' unpacks to")
+
+
+@pytest.mark.parametrize("name", [layout.CARD, layout.RUN, layout.SEEDS, layout.SCORES])
+def test_a_file_changed_behind_the_manifest(files: Files, tmp_path: Path, name: str) -> None:
+    same_size = files[name].replace(b":", b";", 1)
+    for data in (files[name][:-1] + b" }", same_size):
+        assert_refused(zip_up(tmp_path / "b.zip", {**files, name: data}), f"{name} was changed")
+
+
+def test_a_manifest_changed_behind_its_hash(files: Files, tmp_path: Path) -> None:
+    field(layout.MANIFEST, robospa="9.9")(files)
+    assert_refused(zip_up(tmp_path / "b.zip", files), "the manifest was changed")
+    del files[ACTIONS]
+    assert_refused(zip_up(tmp_path / "c.zip", files), "lacks|the manifest was changed")
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("../../outside.txt", "leads out of the bundle"),
+        ("/etc/passwd", "leads out of the bundle"),
+        ("actions/../../x.bin", "leads out of the bundle"),
+        ("..\\outside.txt", "leads out of the bundle"),
+        ("C:evil.txt", "leads out of the bundle"),
+        ("setup.py", "none of the files"),
+        ("actions/<img src=x>-L1.bin", "none of the files"),
+        ("videos/x.html", "none of the files"),
+        ("actions/", "none of the files"),
+        (f"actions/{PICK}-L1.bin\n", "none of the files"),
+        ("manifest.json\0.txt", "none of the files"),
+        ("model.json", "is there twice"),
+    ],
+)
+@pytest.mark.filterwarnings("ignore:Duplicate name")
+def test_names_of_entries(files: Files, tmp_path: Path, name: str, words: str) -> None:
+    path = zip_up(tmp_path / "b.zip", files)
+    placeholder = name.replace("\0", "#")  # our own zip library cuts such a name
+    with zipfile.ZipFile(path, "a") as archive:
+        archive.writestr(placeholder, b"x")
+    if placeholder != name:
+        path.write_bytes(path.read_bytes().replace(placeholder.encode(), name.encode()))
+    assert_refused(path, words)
+
+
+def test_a_link(files: Files, tmp_path: Path) -> None:
+    del files["model.json"]
+    path = zip_up(tmp_path / "b.zip", files)
+    with zipfile.ZipFile(path, "a") as archive:
+        link = zipfile.ZipInfo("model.json")
+        link.external_attr = (stat.S_IFLNK | 0o777) << 16
+        archive.writestr(link, "/etc/passwd")
+    assert_refused(path, "is a link")
+
+
+JUNK = b"#!/bin/sh\nexit\n"
+
+
+def junk_between(whole: bytes) -> bytes:
+    start = struct.unpack("<I", whole[-6:-2])[0]
+    end = struct.pack("<I", start + len(JUNK)) + whole[-2:]
+    return whole[:start] + JUNK + whole[start:-6] + end
+
+
+def with_comment(whole: bytes) -> bytes:
+    return whole[:-2] + struct.pack("<H", len(JUNK)) + JUNK
+
+
+def shared_bytes(whole: bytes) -> bytes:
+    central = whole.find(b"PK\x01\x02")
+    second = whole.find(b"PK\x01\x02", central + 4)
+    return whole[: second + 42] + whole[central + 42 : central + 46] + whole[second + 46 :]
+
+
+def encrypted(whole: bytes) -> bytes:
+    place = whole.find(b"PK\x01\x02") + 8
+    return whole[:place] + bytes([whole[place] | 1]) + whole[place + 1 :]
+
+
+def lied_about_its_size(whole: bytes) -> bytes:
+    data = bytearray(whole)
+    name = layout.RECORDS.encode()
+    for at, place in ((data.find(name) - 30, 22), (data.rfind(name) - 46, 24)):
+        assert data[at : at + 2] == b"PK"
+        data[at + place : at + place + 4] = struct.pack("<I", 100)
+    return bytes(data)
+
+
+def damaged(whole: bytes) -> bytes:
+    place = whole.find(layout.RECORDS.encode()) + 200
+    return whole[:place] + bytes([whole[place] ^ 0xFF]) + whole[place + 1 :]
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda whole: JUNK + whole, "zip file"),
+        (lambda whole: whole + JUNK, "zip file"),
+        (junk_between, "zip file"),
+        (with_comment, "zip file"),
+        (shared_bytes, "shares bytes"),
+        (encrypted, "encrypted"),
+        (lied_about_its_size, ""),
+        (damaged, ""),
+    ],
+)
+def test_bytes_of_the_zip_file(
+    honest: Path, tmp_path: Path, change: Callable[[bytes], bytes], words: str
+) -> None:
+    (tmp_path / "b.zip").write_bytes(change(honest.read_bytes()))
+    assert_refused(tmp_path / "b.zip", words)
+
+
+def test_an_unusual_compression(files: Files, tmp_path: Path) -> None:
+    assert_refused(zip_up(tmp_path / "b.zip", files, zipfile.ZIP_LZMA), "unusual")
+
+
+def test_nothing_is_written_and_an_honest_bundle_passes(
+    honest: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import builtins
+    import io
+
+    written: list[object] = []
+    real = io.open
+
+    def watched(file: Any, mode: str = "r", *more: Any, **named: Any) -> Any:
+        if set(mode) & set("wax+"):
+            written.append(file)
+        return real(file, mode, *more, **named)
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(builtins, "open", watched)
+    monkeypatch.setattr(io, "open", watched)
+    assert verify(honest, REFERENCE).evidence.trials == 40
+    assert written == [] and list(tmp_path.iterdir()) == []
+    assert all(layout.most_bytes(name) for name in unzip(honest))
