@@ -22,8 +22,7 @@ import numpy as np
 from frame import Figure, Result, main
 
 from robospa.harness.factory import policy_factory
-from robospa.harness.official.official_options import ASSETS, OfficialLayout
-from robospa.harness.official.official_parts import official_world_parts
+from robospa.harness.official.layout import ASSETS, OfficialLayout, official_world_parts
 from robospa.harness.official.official_world import OfficialWorld
 from robospa.harness.seeds.attempt import ORACLE
 from robospa.harness.trial import run_trial

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from robospa.harness.clock.measure import Load
     from robospa.harness.convention_check.check import Findings
     from robospa.harness.convention_check.episodes import Episode
-    from robospa.harness.official.replays import RecordingReplay
+    from robospa.harness.official.recordings import RecordingReplay
     from robospa.protocol.client import RemotePolicy
     from robospa.protocol.conformance import CheckResult
     from robospa.protocol.transport import Timeouts
@@ -352,8 +352,7 @@ def _replay(console: Console, target: Target, episode: Episode, points: int) -> 
 
 def _again(console: Console, demo: Path, episode: Episode) -> RecordingReplay | None:
     """Play the demonstration again in its scene; None if there is no simulator."""
-    from robospa.harness.official.recordings import recording_of
-    from robospa.harness.official.replays import replay_recording
+    from robospa.harness.official.recordings import recording_of, replay_recording
 
     try:
         from robospa.harness.sim.sapien_world import SapienWorld

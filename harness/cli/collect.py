@@ -159,9 +159,14 @@ def _import(folder: Path, most: int, world: str | None, as_json: bool) -> None:
     """Play the recordings below `folder` again and print how often they meet their goal."""
     from functools import partial
 
-    from robospa.harness.official.checkout_options import CHECKOUT, parse_checkout
-    from robospa.harness.official.recordings import find_recordings
-    from robospa.harness.official.replays import chosen, in_checkout, replay_recording, summary
+    from robospa.harness.official.checkout import CHECKOUT, parse_checkout
+    from robospa.harness.official.recordings import (
+        chosen,
+        find_recordings,
+        in_checkout,
+        replay_recording,
+        summary,
+    )
     from robospa.harness.worlds import world_kind
     from robospa.protocol.options import plain_options
 

@@ -113,9 +113,7 @@ def instructions(
     """Show, for every variant, an official test sentence, how many templates fit its scene, and how
     many of the test templates stand in training too; ends with 1 if a variant has none that fits.
     """
-    from robospa.harness.official.overlap import sentence_of
-    from robospa.harness.official.sentences import read_checkout
-    from robospa.harness.official.survey import survey
+    from robospa.harness.official.sentences import read_checkout, sentence_of, survey
     from robospa.harness.selection import parse_levels, parse_tasks
 
     variants = [(task, level) for task in parse_tasks(tasks) for level in parse_levels(levels)]
@@ -157,9 +155,8 @@ def checkout(
     With --find, try seeds one after another as the official evaluation does. What is found is on
     disk after every variant, and is not looked for again.
     """
-    from robospa.harness.official.checkout_check import examine
-    from robospa.harness.official.checkout_options import PREFIX, parse_checkout
-    from robospa.harness.official.checkout_world import CheckoutWorld
+    from robospa.harness.official.checkout import PREFIX, parse_checkout
+    from robospa.harness.official.checkout_world import CheckoutWorld, examine
     from robospa.harness.selection import parse_levels, parse_tasks
     from robospa.protocol.options import plain_options
     from robospa.trial import TrialKey
@@ -196,7 +193,7 @@ def _find(
     say: Callable[[str], None],
 ) -> None:
     """Add the first `count` valid seeds of `variants`, as `like` has robot and mode, to `file`."""
-    from robospa.harness.official.checkout_check import valid_seeds
+    from robospa.harness.official.checkout_world import valid_seeds
     from robospa.harness.running.atomic_file import replace_file
     from robospa.schema import parse_json
 

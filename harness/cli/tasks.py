@@ -128,8 +128,7 @@ def _scene(name: str, level: int, seed: int) -> Scene:
 def _official(world: str) -> Callable[[Scene], tuple[Scene, Scene]]:
     """Makes a scene of ours one of the official world: as its sentence is made of it, and as it is
     shown. BadParameter for another world, or one that is not there."""
-    from robospa.harness.official.official_options import OFFICIAL, parse_official
-    from robospa.harness.official.official_parts import official_scenes
+    from robospa.harness.official.layout import OFFICIAL, official_scenes, parse_official
     from robospa.harness.settings import SettingsError
     from robospa.harness.worlds import world_kind
     from robospa.tasks.seeds import accepted

@@ -38,7 +38,7 @@ from robospa.harness.datasets.pack import FORMATS, Source, Writer, pack_episodes
 from robospa.harness.datasets.pictures import encode
 from robospa.harness.datasets.robotwin import RoboTwin
 from robospa.harness.datasets.verify import RECORDINGS
-from robospa.harness.official.recordings import Recording, key_of
+from robospa.harness.official.recordings import OfficialRecording, key_of
 from robospa.harness.official.sentences import SEEN
 from robospa.harness.settings import SettingsError
 from robospa.observation import CameraSpec
@@ -63,7 +63,7 @@ class Imported:
 
 
 def import_recordings(
-    recordings: Sequence[Recording], home: Path, layout: str, out: Path, images: str = ""
+    recordings: Sequence[OfficialRecording], home: Path, layout: str, out: Path, images: str = ""
 ) -> Imported:
     """Write the official `recordings`, which lie below `home`, as a data set in `out`.
 
@@ -108,7 +108,7 @@ def import_recordings(
 
 
 def _sources(
-    recordings: Sequence[Recording], home: Path, codec: str, left_out: list[dict[str, str]]
+    recordings: Sequence[OfficialRecording], home: Path, codec: str, left_out: list[dict[str, str]]
 ) -> Iterator[Source]:
     """The recordings that fit with the first that can be read; the others go to `left_out`."""
     layout: EpisodeLayout | None = None
@@ -124,12 +124,12 @@ def _sources(
         yield name, episode
 
 
-def source(recording: Recording, home: Path) -> str:
+def source(recording: OfficialRecording, home: Path) -> str:
     """Where a recording is below `home`."""
     return recording.path.absolute().relative_to(home.absolute()).as_posix()
 
 
-def to_episode(recording: Recording, home: Path, codec: str) -> DatasetEpisode:
+def to_episode(recording: OfficialRecording, home: Path, codec: str) -> DatasetEpisode:
     """A recording with what it has. Raises EpisodeError for one that cannot be read, is ours, or
     lacks its task, level or sentences."""
     if recording.variant is None:
@@ -169,7 +169,7 @@ def to_episode(recording: Recording, home: Path, codec: str) -> DatasetEpisode:
     )
 
 
-def _sentences(recording: Recording) -> tuple[str, ...]:
+def _sentences(recording: OfficialRecording) -> tuple[str, ...]:
     """The distinct training sentences beside a recording; those of `unseen` are left where they
     are."""
     path = recording.path.parent.parent / "instructions" / f"{recording.path.stem}.json"

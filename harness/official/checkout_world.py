@@ -1,14 +1,21 @@
 """A user's RoboSPA checkout as a world: official physics, rendering, scenes and success.
 
 The scene of a trial is made there, from its seed and episode number, and is not known here: a
-`Scene` of ours names it only. Success and progress are the checkout's own.
+`Scene` of ours names it only. It runs in a process of its own, whose answers are as untrusted as
+those of a policy's server: sizes are checked before anything is allocated, and every wait has an
+end. `examine` looks at all of it before it is used, and `valid_seeds` finds its list of seeds.
 """
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+import os
+import selectors
+import subprocess
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,32 +25,153 @@ from numpy.typing import NDArray
 
 from robospa.geometry import Pose
 from robospa.gripper import grasp_points
-from robospa.harness.official.checkout_client import (
-    BadScene,
-    CheckoutFailed,
-    CheckoutProcess,
-    numbers,
-)
-from robospa.harness.official.checkout_options import CONFIGS
-from robospa.harness.official.sentences import OfficialSentences, read_checkout
+from robospa.harness.official import checkout_server
+from robospa.harness.official.checkout import CONFIGS, CheckoutSnapshot, checkout_parts
+from robospa.harness.official.checkout_server import packed, unpacked
+from robospa.harness.official.sentences import UNSEEN, OfficialSentences, read_checkout
 from robospa.harness.robots import embodiment
 from robospa.harness.world import ActionError, Poll, RenderUnavailable, SceneUnstable, StepResult
-from robospa.observation import CameraSpec, Observation
+from robospa.observation import DEFAULT_CAMERAS, CameraSpec, Observation
+from robospa.protocol.errors import printable
 from robospa.protocol.policy import PolicySpec
 from robospa.tasks.scene import Scene
-from robospa.tasks.snapshot import Contact, Snapshot
+from robospa.tasks.snapshot import Contact
+from robospa.trial import TrialKey
+
+SENTENCE = 500
+SECONDS = {"hello": 300.0, "load": 900.0, "step": 300.0, "observe": 120.0}
+"""How long an answer may take [s]: at hello the simulator and torch are imported, at load a GPU
+planner is warmed up and the official expert plays."""
+
+
+class CheckoutFailed(Exception):
+    """The checkout's process cannot go on; the message says what it was doing and what to do."""
+
+
+class BadScene(Exception):
+    """The checkout's scene is not stable, or its expert does not solve it: no valid seed."""
+
+
+class CheckoutProcess:
+    """A process of `python` that runs the checkout at `folder`; `hello` is its greeting."""
+
+    def __init__(
+        self, folder: Path, python: str = "python", seconds: Mapping[str, float] | None = None
+    ) -> None:
+        """Raises CheckoutFailed if it does not come up."""
+        self._seconds = {**SECONDS, **(seconds or {})}
+        script = Path(checkout_server.__file__).resolve()
+        # Nothing of ours may be imported there: our packages need another Python.
+        environment = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"}
+        try:
+            self._process = subprocess.Popen(
+                [python, str(script), str(folder)],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                env=environment,
+            )
+        except OSError as error:
+            raise CheckoutFailed(
+                f"{python} cannot be started ({error.strerror}): name the Python of the "
+                "checkout's environment with --world 'checkout:DIR?python=/path/to/python'"
+            ) from error
+        try:
+            self.hello, _ = self.ask("hello")
+            if self.hello.get("version") != checkout_server.VERSION:
+                raise CheckoutFailed(
+                    f"the checkout's process speaks version {self.hello.get('version')!r} of the "
+                    f"protocol, and this robospa speaks {checkout_server.VERSION}"
+                )
+        except BaseException:
+            self.close()
+            raise
+
+    def ask(
+        self,
+        do: str,
+        arrays: Mapping[str, NDArray[Any]] | None = None,
+        **request: object,
+    ) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
+        """The answer to one request; raises CheckoutFailed, after which it is of no use any more,
+        or BadScene."""
+        deadline = time.monotonic() + self._seconds[do]
+        assert self._process.stdin is not None
+        try:
+            self._process.stdin.write(packed({"do": do, **request}, arrays))
+            self._process.stdin.flush()
+            header, found = unpacked(lambda count: self._read(count, deadline, do))
+        except (BrokenPipeError, EOFError):
+            code = self._ended()
+            raise CheckoutFailed(
+                f"the checkout's process ended ({code}) at {do}: what it printed is in the log of "
+                "this worker"
+            ) from None
+        except ValueError as error:
+            self.close()
+            raise CheckoutFailed(f"the checkout's process answered nonsense: {error}") from error
+        if "error" in header:
+            text = printable(str(header.get("text", "")), SENTENCE)
+            if header["error"] in ("unstable", "unsolved"):
+                raise BadScene(text)
+            what = "be used" if do == "hello" else do
+            raise CheckoutFailed(f"the checkout cannot {what}: {text}")
+        return header, found
+
+    def _read(self, count: int, deadline: float, do: str) -> bytes:
+        """Exactly `count` bytes."""
+        assert self._process.stdout is not None
+        pipe, parts = self._process.stdout.fileno(), []
+        with selectors.DefaultSelector() as ready:
+            ready.register(pipe, selectors.EVENT_READ)
+            while count:
+                if not ready.select(max(0.0, deadline - time.monotonic())):
+                    self.close()
+                    raise CheckoutFailed(
+                        f"the checkout did not {do} within {self._seconds[do]:g} s and was ended; "
+                        "allow more with --world 'checkout:DIR?patience=2', a factor"
+                    )
+                part = os.read(pipe, min(count, 2**20))
+                if not part:
+                    raise EOFError
+                parts.append(part)
+                count -= len(part)
+        return b"".join(parts)
+
+    def _ended(self) -> str:
+        try:
+            code = self._process.wait(5.0)
+        except subprocess.TimeoutExpired:
+            self.close()
+            return "it closed its pipe"
+        return f"signal {-code}" if code < 0 else f"exit code {code}"
+
+    def close(self) -> None:
+        """End the process; may be called again."""
+        self._process.kill()
+        self._process.wait()
+        for pipe in (self._process.stdin, self._process.stdout):
+            if pipe is not None:
+                with contextlib.suppress(BrokenPipeError):  # what was still to be sent
+                    pipe.close()
+
+
+def numbers(value: object, shape: tuple[int, ...], what: str) -> NDArray[np.float64]:
+    """`value` as finite numbers of `shape`, where -1 is any count; raises CheckoutFailed."""
+    try:
+        found = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        found = np.empty(0)
+    fits = found.ndim == len(shape) and all(
+        n in (-1, m) for n, m in zip(shape, found.shape, strict=True)
+    )
+    if not fits or not np.isfinite(found).all():
+        raise CheckoutFailed(f"the checkout's {what} are not numbers of shape {shape}")
+    return found
+
 
 TIMESTEP = 1 / 250
 KINDS = {"joint": "qpos", "ee": "ee"}
 """What the checkout calls our action spaces; it has no others."""
-
-
-@dataclass(frozen=True, slots=True)
-class CheckoutSnapshot(Snapshot):
-    """What is known of an instant: the robot, whether the goal is met, and flags of subtasks."""
-
-    success: bool = False
-    flags: tuple[bool, ...] = ()
 
 
 class CheckoutStill:
@@ -72,7 +200,7 @@ class CheckoutWorld:
     def __init__(
         self, folder: str, python: str = "python", config: str = "", patience: float = 1.0
     ) -> None:
-        from robospa.harness.official.checkout_client import SECONDS
+        from robospa.harness.official.checkout_world import SECONDS
 
         self._folder, self._config = Path(folder), config
         seconds = {name: patience * value for name, value in SECONDS.items()}
@@ -243,3 +371,79 @@ def official_robot(name: str) -> list[object]:
 def _pose(row: NDArray[np.float64]) -> Pose:
     x, y, z, *turn = (float(v) for v in row)
     return Pose((x, y, z), (turn[0], turn[1], turn[2], turn[3]))
+
+
+PINS = {"sapien": "3.0.0b1", "mplib": "0.2.1", "torch": "2.4.1", "warp": "1.12.0"}
+"""What RoboTwin 2.0, which RoboSPA is built on, is pinned to."""
+STILL = 50
+"""Physics steps of an action in which no arm moves (official)."""
+TRIES = 10
+"""Seeds in a row that a look at one variant may need."""
+
+
+class NoValidSeed(Exception):
+    """A checkout has no valid scene among the seeds that were tried."""
+
+
+@dataclass(frozen=True)
+class CheckoutFinding:
+    """One thing that was looked at: None where only a person can say whether it is as it should."""
+
+    what: str
+    good: bool | None
+    seen: str
+
+
+def examine(world: CheckoutWorld, key: TrialKey) -> Iterator[CheckoutFinding]:
+    """Versions, a scene of `key`'s variant, its sentence, its images, and an action that holds
+    still; raises what the world raises, and NoValidSeed."""
+    versions = world.info().get("versions")
+    found = versions if isinstance(versions, Mapping) else {}
+    for name, pin in PINS.items():
+        have = str(found.get(name, "")) or "none"
+        yield CheckoutFinding(f"version of {name}", have.startswith(pin), f"{have}, official {pin}")
+    seeds = valid_seeds(world, key, range(key.seed, key.seed + TRIES), 1)
+    parts = checkout_parts(TrialKey(*key.variant, seeds[0], key.embodiment, key.mode),
+                           {key.variant: seeds})  # fmt: skip
+    yield CheckoutFinding(
+        "scene", True, f"{key.task} level {key.level} seed {seeds[0]}: its expert solves"
+    )
+    yield CheckoutFinding("sentence", None, world.instruction(UNSEEN))
+    seen = world.observe(PolicySpec(name="check", cameras=DEFAULT_CAMERAS))
+    for name, image in seen["images"].items():
+        height, width = image.shape[:2]
+        yield CheckoutFinding(f"camera {name}", bool(image.std() > 1), f"{width}x{height}")
+    result = world.step(seen["state"].astype(np.float32), "joint", lambda snapshot: False)
+    yield CheckoutFinding(
+        "holding still", result.physics_steps == STILL, f"{result.physics_steps} physics steps"
+    )
+    flags, total = len(world.snapshot().flags), parts.tracker.total
+    yield CheckoutFinding("flags of subtasks", flags in (0, total), f"{flags}, of {total} subtasks")
+
+
+def valid_seeds(
+    world: CheckoutWorld,
+    key: TrialKey,
+    seeds: Sequence[int],
+    count: int,
+    on_seed: Callable[[int, str], None] = lambda seed, trouble: None,
+) -> list[int]:
+    """The first `count` of `seeds` whose scene of `key`'s variant is stable and solved by the
+    official expert: the official list, because a seed's episode number is that of valid ones before
+    it. The last one's scene is loaded. Raises NoValidSeed if there are fewer."""
+    accepted: list[int] = []
+    for seed in seeds:
+        trial = TrialKey(*key.variant, seed, key.embodiment, key.mode)
+        trouble = ""
+        try:
+            world.load(checkout_parts(trial, {key.variant: [*accepted, seed]}).scene)
+            accepted.append(seed)
+        except SceneUnstable as error:
+            trouble = str(error)
+        on_seed(seed, trouble)
+        if len(accepted) == count:
+            return accepted
+    raise NoValidSeed(
+        f"of {len(seeds)} seeds from {seeds[0]} on, {len(accepted)} of {key.task} level "
+        f"{key.level} are valid in the checkout, not {count}"
+    )

@@ -10,6 +10,9 @@ value stands as it is. Test templates get test descriptions.
 Ours: which template and descriptions a trial gets follows from its key; officially it depends on an
 unseeded list. And a thing that is not drawn with the official model is named by the model's
 `raw_description`, because the other descriptions say how that model looks.
+
+Of a checkout's test sentences some stand in training, or are like one of it (`overlap`); our own
+held-out sentences pass that test with none (`docs/instructions.md`).
 """
 
 from __future__ import annotations
@@ -19,7 +22,7 @@ import json
 import re
 import stat
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +33,7 @@ from robospa.harness.trial import TrialParts, task_parts
 from robospa.schema import parse_json
 from robospa.tasks.catalog import build_scene
 from robospa.tasks.catalog import task as find_task
+from robospa.tasks.instructions.grammar import similarity
 from robospa.tasks.official import official_assets, official_model, official_models
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.trial import TrialKey
@@ -234,3 +238,111 @@ def _generator(scene: Scene, split: str, salt: str) -> np.random.Generator:
     text = "/".join([scene.suite, *([salt] if salt else []), *place])
     entropy = int.from_bytes(hashlib.sha256(text.encode()).digest()[:16], "big")
     return np.random.Generator(np.random.PCG64(entropy))
+
+
+NEAR = 0.75
+"""From this similarity on two templates count as alike, in our own test too."""
+
+
+@dataclass(frozen=True)
+class Overlap:
+    """Of the `tests` different test templates of a variant: how many stand in training `equal`ly,
+    and how many are `near` one of training (those that are equal, too)."""
+
+    tests: int
+    equal: int
+    near: int
+    examples: tuple[str, ...] = ()
+    """Those that stand in training word for word."""
+
+
+def overlap(texts: Texts) -> Overlap:
+    """The overlap of one variant's templates; case and spaces do not matter."""
+    seen = {_plain(text) for text in texts.seen}
+    tests = list(dict.fromkeys(texts.unseen))
+    equal = tuple(text for text in tests if _plain(text) in seen)
+    near = sum(
+        text in equal or any(similarity(text, other) >= NEAR for other in texts.seen)
+        for text in tests
+    )
+    return Overlap(len(tests), len(equal), near, equal)
+
+
+def overlaps(sentences: OfficialSentences) -> Mapping[tuple[str, int], Overlap]:
+    """The overlap of every variant that was read."""
+    return {variant: overlap(texts) for variant, texts in sentences.templates.items()}
+
+
+def report(sentences: OfficialSentences) -> dict[str, object]:
+    """For a run's manifest: the sums over all variants, and each variant, as JSON values."""
+    found = overlaps(sentences)
+    return {
+        "hash": sentences.digest,
+        "tests": sum(one.tests for one in found.values()),
+        "equal": sum(one.equal for one in found.values()),
+        "near": sum(one.near for one in found.values()),
+        "variants": {f"{task} {level}": asdict(one) for (task, level), one in found.items()},
+    }
+
+
+def sentence_of(sentences: OfficialSentences) -> str:
+    """The sums in words."""
+    found = overlaps(sentences).values()
+    tests, equal, near = (sum(getattr(o, n) for o in found) for n in ("tests", "equal", "near"))
+    return (
+        f"official sentences: of {tests} test templates of {len(found)} variants, {equal} stand in "
+        f"training word for word and {near} are alike or equal to one of training"
+    )
+
+
+def _plain(text: str) -> str:
+    return " ".join(text.casefold().split())
+
+
+@dataclass(frozen=True)
+class VariantSurvey:
+    """Of a variant: how many of its templates fit a scene (to train with, to test with), what of
+    the test is trained on, and a test sentence, or the `trouble` why there is none."""
+
+    task: str
+    level: int
+    seen: tuple[int, int]
+    unseen: tuple[int, int]
+    overlap: Overlap
+    example: str = ""
+    trouble: str = ""
+
+    def __str__(self) -> str:
+        fit = ", ".join(f"{a} of {b}" for a, b in (self.seen, self.unseen))
+        same = f"{self.overlap.equal} equal, {self.overlap.near} alike of {self.overlap.tests}"
+        return f"{self.task} {self.level}: fit {fit}; {same}; {self.trouble or self.example}"
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain JSON values."""
+        return asdict(self)
+
+
+def survey(
+    sentences: OfficialSentences, variants: Iterable[tuple[str, int]], seed: int
+) -> list[VariantSurvey]:
+    """A row for each of `variants`, with the sentence of the scene of `seed`."""
+    rows = []
+    for task, level in variants:
+        scene, texts = build_scene(task, level, seed), sentences.templates[(task, level)]
+        example = trouble = ""
+        try:
+            example = sentences.instruction(scene, UNSEEN)
+        except ValueError as error:
+            trouble = str(error)
+        rows.append(
+            VariantSurvey(
+                task,
+                level,
+                (len(sentences.usable(scene, SEEN)), len(texts.seen)),
+                (len(sentences.usable(scene, UNSEEN)), len(texts.unseen)),
+                overlap(texts),
+                example,
+                trouble,
+            )
+        )
+    return rows

@@ -137,7 +137,7 @@ def make_manifest(request: Request, policies: Mapping[str, ProbedPolicy]) -> Run
     warnings = warnings_of(policies, instructions, config.step_scale)
     overlap: dict[str, object] = {}
     if (official := config.parts_arguments.get("sentences")) is not None:
-        from robospa.harness.official.overlap import report, sentence_of
+        from robospa.harness.official.sentences import report, sentence_of
 
         overlap = report(official)
         warnings.append(sentence_of(official))

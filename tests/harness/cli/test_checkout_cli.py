@@ -9,11 +9,14 @@ from types import SimpleNamespace
 import pytest
 from command_line import robospa
 
-from robospa.harness.official.checkout_check import Finding
+from robospa.harness.official.checkout_world import CheckoutFinding
 
 
 def test_findings_and_seeds_as_json(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    findings = [Finding("scene", None, "seed 100004"), Finding("torch", False, "2.13, not 2.4")]
+    findings = [
+        CheckoutFinding("scene", None, "seed 100004"),
+        CheckoutFinding("torch", False, "2.13, not 2.4"),
+    ]
     closed = SimpleNamespace(close=lambda: None)
     official = "robospa.harness.official"
     monkeypatch.setattr(f"{official}.checkout_world.CheckoutWorld", lambda *_, **__: closed)

@@ -13,19 +13,24 @@ import numpy as np
 import pytest
 from standin_checkout import Ringer, write_standin
 
-from robospa.harness.official.checkout_check import NoValidSeed, examine, valid_seeds
-from robospa.harness.official.checkout_client import CheckoutFailed, CheckoutProcess, numbers
-from robospa.harness.official.checkout_options import (
+from robospa.harness.official.checkout import (
     CHECKOUT,
     CheckoutOptions,
+    CheckoutTracker,
+    checkout_parts,
     episodes_of,
     parse_checkout,
 )
-from robospa.harness.official.checkout_parts import CheckoutTracker, checkout_parts
 from robospa.harness.official.checkout_world import (
+    CheckoutFailed,
+    CheckoutProcess,
     CheckoutSnapshot,
     CheckoutWorld,
+    NoValidSeed,
+    examine,
+    numbers,
     official_robot,
+    valid_seeds,
 )
 from robospa.harness.official.sentences import SEEN, UNSEEN
 from robospa.harness.running.request import make_request

@@ -9,7 +9,6 @@ from pathlib import Path
 import pytest
 from official_table import HEAD, PAGE, RULES, SEED, Rule, goal_and_frames, pieces
 
-from robospa.harness.official.slots import SLOTS
 from robospa.harness.official.switches import SWITCHES
 from robospa.tasks.catalog import build_scene
 from robospa.tasks.official import needs
@@ -31,7 +30,7 @@ LAYOUTS = (
 def rows() -> dict[str, tuple[str, ...]]:
     """The cells of the table by their task."""
     cells = [line.strip("| ").split(" | ") for line in TEXT.splitlines()]
-    return {row[0]: tuple(row[1:]) for row in cells if len(row) == len(HEAD) and row[0] in SLOTS}
+    return {row[0]: tuple(row[1:]) for row in cells if len(row) == len(HEAD) and row[0] in needs()}
 
 
 @pytest.mark.parametrize("task", [*needs()])

@@ -13,15 +13,16 @@ import numpy as np
 import pytest
 from checkouts import write_checkout
 
-from robospa.harness.official import official_options, official_world
-from robospa.harness.official.official_options import (
+from robospa.harness.official import layout as layout_module
+from robospa.harness.official import official_world
+from robospa.harness.official.layout import (
     BUILTIN_SUITE,
     SUITE,
     OfficialLayout,
     OfficialOptions,
+    official_world_parts,
     parse_official,
 )
-from robospa.harness.official.official_parts import official_world_parts
 from robospa.harness.official.sentences import SEEN, UNSEEN
 from robospa.harness.running import evaluate
 from robospa.harness.running.policy_probe import ProbedPolicy
@@ -56,11 +57,11 @@ def test_colours_are_named_by_their_words_and_shown_pure() -> None:
 
 def test_objects_are_of_the_archive_where_there_is_one(monkeypatch: pytest.MonkeyPatch) -> None:
     def load(path: str) -> Any:
-        if path == official_options.PACK:
+        if path == layout_module.PACK:
             return lambda name: SimpleNamespace(digest=lambda: f"hash of {name}")
         return lambda scene, name: SimpleNamespace(scene=scene, name=name)
 
-    monkeypatch.setattr(official_options, "load", load)
+    monkeypatch.setattr(layout_module, "load", load)
     options, layout = parse_official("official")
     assert (options, layout.suite, layout.digest) == (OfficialOptions(), SUITE, "hash of official")
     assert layout.manifest_settings().assets == "official"
@@ -81,7 +82,7 @@ def test_the_archive_that_is_named_is_found_by_workers_with_its_textures(
     (tmp_path / "background_texture").mkdir()
     archive = SimpleNamespace(root=tmp_path)
     opened = SimpleNamespace(digest=lambda: "h", archive=archive)
-    monkeypatch.setattr(official_options, "load", lambda path: lambda name: opened)
+    monkeypatch.setattr(layout_module, "load", lambda path: lambda name: opened)
     made = request(tmp_path, assets=str(tmp_path), world="official")
     assert made.config.parts_arguments["layout"].digest == "h"
     assert os.environ["ROBOSPA_ASSETS"] == str(tmp_path)
@@ -99,7 +100,7 @@ def test_without_an_archive_it_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
 
         return opened
 
-    monkeypatch.setattr(official_options, "load", missing)
+    monkeypatch.setattr(layout_module, "load", missing)
     _, layout = parse_official("official?switches=pure-colors")
     assert layout.suite == BUILTIN_SUITE and layout.manifest_settings().switches == ["pure-colors"]
     (said,) = layout.warnings(official_sentences=False)
@@ -127,7 +128,7 @@ def test_an_archive_that_lacks_what_a_task_needs_is_refused_at_the_start(
         return {task: "a file is missing" for task in tasks if task != TASK}
 
     torn = SimpleNamespace(name="x", has=str, model=str, digest=lambda: "h", faults=faults)
-    monkeypatch.setattr(official_options, "load", lambda path: lambda name: torn)
+    monkeypatch.setattr(layout_module, "load", lambda path: lambda name: torn)
     assert parse_official("official", tasks=[TASK])[1].packed
     with pytest.raises(SettingsError, match=r"1 of 2 tasks cannot run .*, Other because"):
         parse_official("official", tasks=[TASK, "Other"])

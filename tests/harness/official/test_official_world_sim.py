@@ -12,8 +12,7 @@ pytest.importorskip("trimesh", reason="meshes need trimesh: pip install 'robospa
 from made_archive import make_archive  # noqa: E402  (needs trimesh)
 
 from robospa.baselines.oracle import create  # noqa: E402
-from robospa.harness.official.official_options import parse_official  # noqa: E402
-from robospa.harness.official.official_parts import official_world_parts  # noqa: E402
+from robospa.harness.official.layout import official_world_parts, parse_official  # noqa: E402
 from robospa.harness.official.official_world import OfficialWorld  # noqa: E402
 from robospa.harness.trial import run_trial  # noqa: E402
 from robospa.tasks import packs  # noqa: E402

@@ -15,15 +15,19 @@ from robospa.action_space import SEVEN_JOINT_ARMS, ActionSpace
 from robospa.geometry import rotate
 from robospa.harness.convention_check.episodes import Episode, EpisodeError
 from robospa.harness.datasets.imports import source
-from robospa.harness.official.rebuild import NotStored, rebuilt
 from robospa.harness.official.recordings import (
-    Recording,
+    NotStored,
+    OfficialRecording,
+    RecordingReplay,
+    chosen,
     find_recordings,
+    in_checkout,
     key_of,
+    rebuilt,
     recording_of,
+    summary,
     variant_of,
 )
-from robospa.harness.official.replays import RecordingReplay, chosen, in_checkout, summary
 
 LAYOUT: Mapping[str, Any] = {
     "target_index": 1,
@@ -125,7 +129,7 @@ def test_scenes_that_are_not_stored_are_left_with_the_reason(tmp_path: Path) -> 
     official(tmp_path)
     recording = find_recordings(tmp_path)[2]
 
-    def changed(**layout: object) -> Recording:
+    def changed(**layout: object) -> OfficialRecording:
         return replace(recording, scene={"layout": {**LAYOUT, **layout}})
 
     for bad, sentence in (
@@ -145,15 +149,15 @@ def test_scenes_that_are_not_stored_are_left_with_the_reason(tmp_path: Path) -> 
 
 def test_an_episode_of_ours_names_its_trial() -> None:
     about = {"task": "Rank_Blocks_Color", "level": 2, "seed": 1000003, "mode": "clean"}
-    key, parts = rebuilt(Recording(Path("x"), 0), episode(about))
+    key, parts = rebuilt(OfficialRecording(Path("x"), 0), episode(about))
     assert key == key_of(episode(about)) and parts.scene.seed == 1000003
     assert key_of(episode({"task": "Rank_Blocks_Color"})) is None
     with pytest.raises(NotStored, match="its trial cannot be made"):
-        rebuilt(Recording(Path("x"), 0), episode({**about, "task": "No_Such_Task"}))
+        rebuilt(OfficialRecording(Path("x"), 0), episode({**about, "task": "No_Such_Task"}))
 
 
 def test_a_checkout_makes_any_scene_from_seed_and_number() -> None:
-    recording = Recording(Path("x"), 4, ("Click_Bell_Repeat", 2), 7)
+    recording = OfficialRecording(Path("x"), 4, ("Click_Bell_Repeat", 2), 7)
     key, parts = in_checkout(recording, episode())
     assert (key.seed, parts.scene.facts) == (7, {"episode": 4})
     assert parts.scene.suite == "official-checkout"
@@ -162,7 +166,7 @@ def test_a_checkout_makes_any_scene_from_seed_and_number() -> None:
 
 
 def test_the_summary_counts_and_gives_reasons() -> None:
-    one = Recording(Path("/a/T_1/c/data/episode0.hdf5"), 0, ("Press_Stapler_Repeat", 1))
+    one = OfficialRecording(Path("/a/T_1/c/data/episode0.hdf5"), 0, ("Press_Stapler_Repeat", 1))
     rows = [
         RecordingReplay(one, 9, True),
         RecordingReplay(one, 9, False, "step_limit"),

@@ -12,7 +12,6 @@ from checkouts import TEMPLATES, write_checkout
 
 from robospa.geometry import Pose
 from robospa.harness.cli.main import main
-from robospa.harness.official.overlap import overlap, report, sentence_of
 from robospa.harness.official.sentences import (
     SEEN,
     UNSEEN,
@@ -20,7 +19,10 @@ from robospa.harness.official.sentences import (
     OfficialSentences,
     Texts,
     fits,
+    overlap,
     read_checkout,
+    report,
+    sentence_of,
 )
 from robospa.harness.official.slots import NoOfficialSentence
 from robospa.harness.running import evaluate

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from fnmatch import fnmatchcase
 from typing import Any
 
 import pytest
@@ -157,7 +158,8 @@ def test_placeholders_of(made: Scene, expected: dict[str, str]) -> None:
 
 
 def test_every_official_task_has_placeholders_and_no_other() -> None:
-    assert set(SLOTS) == {name for name, task in tasks().items() if task.dimension != "basic"}
+    fitting = {n for n in tasks() if any(fnmatchcase(n, pattern) for pattern in SLOTS)}
+    assert fitting == {name for name, task in tasks().items() if task.dimension != "basic"}
 
 
 def test_another_task_has_no_official_sentence() -> None:

@@ -11,8 +11,7 @@ import pytest
 from made_archive import make_archive
 from pack_fixtures import READS_MESHES, official_pack_in
 
-from robospa.harness.official.official_options import OfficialLayout
-from robospa.harness.official.official_parts import official_world_parts
+from robospa.harness.official.layout import OfficialLayout, official_world_parts
 from robospa.harness.packs.archive import ArchiveError, open_archive
 from robospa.harness.packs.index import THING, clutter_things, digest_of, index
 from robospa.harness.packs.official import OfficialPack

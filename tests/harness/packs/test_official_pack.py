@@ -12,7 +12,7 @@ from made_archive import SCALE, make_archive
 from mesh_writers import Piece, write_glb
 from pack_fixtures import READS_MESHES, official_pack_in
 
-from robospa.harness.official.official_options import use_archive
+from robospa.harness.official.layout import use_archive
 from robospa.harness.packs.archive import ArchiveError
 from robospa.harness.packs.index import index
 from robospa.harness.packs.official import OfficialPack

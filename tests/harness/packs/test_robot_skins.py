@@ -9,7 +9,7 @@ import pytest
 from made_robots import MOVED, make_robot
 from pack_fixtures import READS_MESHES
 
-from robospa.harness.official.official_options import check_robots
+from robospa.harness.official.layout import check_robots
 from robospa.harness.packs import archive as cache
 from robospa.harness.packs.archive import ArchiveError, open_archive
 from robospa.harness.packs.visuals import RobotSkins, robot_skins

@@ -1,27 +1,34 @@
-"""`--world official`: the official world in our simulator, as far as it can be had."""
+"""`--world official`: our simulator with official quirks of scenes and, where there is an archive,
+with official objects.
+"""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from robospa.harness.official.checkout_options import episodes_of
-from robospa.harness.official.switches import chosen
+from robospa.harness.official.checkout import Episodes, episodes_of
+from robospa.harness.official.sentences import SPLITS, OfficialSentences
+from robospa.harness.official.switches import chosen, switched
 from robospa.harness.settings import EvaluationSettings, Selection, SettingsError, Simulation
 from robospa.harness.textures import VARIABLE
+from robospa.harness.trial import TrialParts
 from robospa.harness.worlds import Parts, SapienKind
 from robospa.protocol.options import option, read_options, url_options
 from robospa.registry import UnknownName, load
 from robospa.results.records.manifest import LayoutSettings
 from robospa.tasks import packs
+from robospa.tasks.catalog import build_scene
+from robospa.tasks.catalog import task as find_task
 from robospa.tasks.scene import Scene
+from robospa.tasks.sentences import instruction
 from robospa.trial import TrialKey
 
 NAME = "official"
-PARTS = "robospa.harness.official.official_parts:official_world_parts"
+PARTS = "robospa.harness.official.layout:official_world_parts"
 SUITE = "official-1"
 BUILTIN_SUITE = "official-1-builtin"
 """The suite of results with official objects, and with our own in their place."""
@@ -206,3 +213,36 @@ class _OfficialKind(SapienKind):
 
 
 OFFICIAL = _OfficialKind(NAME, "robospa.harness.official.official_world:OfficialWorld")
+
+
+def official_world_parts(
+    key: TrialKey,
+    layout: OfficialLayout,
+    episodes: Episodes,
+    sentences: OfficialSentences | None = None,
+) -> TrialParts:
+    """Scene, goal and sentence of `key`; with `sentences` the official ones."""
+    told, shown = official_scenes(key, layout, episodes)
+    if sentences is not None:
+        said = sentences.instruction(told, key.split)
+    else:
+        ours = {theirs: own for own, theirs in SPLITS.items()}
+        said = instruction(told, ours.get(key.split, key.split))
+    task = find_task(key.task)
+    return TrialParts(shown, task, task.goal(shown), said)
+
+
+def official_scenes(
+    key: TrialKey, layout: OfficialLayout, episodes: Episodes
+) -> tuple[Scene, Scene]:
+    """The scene of `key` of which its sentence is made, and as it is shown: what only shows is
+    switched after the sentence was made, so that colours are named by their words.
+
+    A seed's place among `episodes` is its episode number.
+    """
+    switches = chosen(layout.switches)
+    number = list(episodes.get(key.variant, (key.seed,))).index(key.seed)
+    drawn = build_scene(key.task, key.level, key.seed, key.embodiment, key.mode)
+    told = layout.scatter(layout.pack(switched(drawn, number, switches)))
+    shown = switched(told, number, switches, unsaid=True)
+    return told, replace(shown, suite=layout.suite)

@@ -1,4 +1,8 @@
-"""How a checkout is named as a world: `checkout:DIR`, with options as in a URL."""
+"""A RoboSPA checkout as a kind of world: how it is named (`checkout:DIR`, with options as in a
+URL), what it can do, and the parts of its trials.
+
+A trial's scene only names what is made there, and its goal is the checkout's own verdict.
+"""
 
 from __future__ import annotations
 
@@ -11,12 +15,17 @@ from msgspec import Meta
 
 from robospa.harness.clock.clock import PAUSED
 from robospa.harness.settings import EvaluationSettings, Selection, SettingsError
+from robospa.harness.trial import TrialParts
 from robospa.harness.worlds import Parts, WorldKind
 from robospa.protocol.options import option, plain_options, read_options, url_options
+from robospa.tasks.catalog import task as find_task
+from robospa.tasks.events import Event, ObjectRole
+from robospa.tasks.scene import Scene
+from robospa.tasks.snapshot import Snapshot
 from robospa.trial import TrialKey
 
 PREFIX = "checkout:"
-PARTS = "robospa.harness.official.checkout_parts:checkout_parts"
+PARTS = "robospa.harness.official.checkout:checkout_parts"
 SUITE = "official-checkout"
 """The suite of results in a checkout: its scenes, simulator, robots and rules."""
 CONFIGS = {"clean": "demo_clean", "randomized": "demo_randomized"}
@@ -116,3 +125,74 @@ def _selection(settings: EvaluationSettings) -> Selection:
         if wrong:
             raise SettingsError(sentence)
     return replace(selection, instructions=folder)
+
+
+@dataclass(frozen=True, slots=True)
+class CheckoutSnapshot(Snapshot):
+    """What is known of an instant: the robot, whether the goal is met, and flags of subtasks."""
+
+    success: bool = False
+    flags: tuple[bool, ...] = ()
+
+
+class CheckoutTracker:
+    """The checkout's own flags and success as events, of `total` subtasks."""
+
+    needs_contacts = False
+
+    def __init__(self, total: int) -> None:
+        self.total = total
+        self._flags: tuple[bool, ...] = ()
+        self._success = False
+
+    @property
+    def roles(self) -> Mapping[str, ObjectRole]:
+        """None: the objects are not known here."""
+        return {}
+
+    def start(self, snapshot: Snapshot) -> tuple[Event, ...]:
+        """Flags that are up before the first action; success counts after one only (official)."""
+        return self._changes(snapshot, _verdict(snapshot).flags)
+
+    def update(self, snapshot: Snapshot) -> tuple[Event, ...]:
+        """Flags that went up or down, and success."""
+        seen = _verdict(snapshot)
+        events = self._changes(snapshot, seen.flags)
+        if seen.success and not self._success:
+            self._success = True
+            events += (Event(snapshot.time, "success"),)
+        return events
+
+    def diagnostics(self) -> Mapping[str, object]:
+        """The flags as they were at the end."""
+        return {"flags": list(self._flags)}
+
+    def _changes(self, snapshot: Snapshot, flags: tuple[bool, ...]) -> tuple[Event, ...]:
+        flags = flags[: self.total]
+        before = self._flags + (False,) * (len(flags) - len(self._flags))
+        self._flags = flags
+        return tuple(
+            Event(snapshot.time, "subtask_done" if now else "subtask_undone", index=index)
+            for index, (was, now) in enumerate(zip(before, flags, strict=False))
+            if was != now
+        )
+
+
+def _verdict(snapshot: Snapshot) -> CheckoutSnapshot:
+    if not isinstance(snapshot, CheckoutSnapshot):
+        raise TypeError("this goal is the verdict of a checkout: it needs its world")
+    return snapshot
+
+
+def checkout_parts(key: TrialKey, episodes: Episodes) -> TrialParts:
+    """What is known here of the trial `key`; its sentence is told by the world."""
+    task = find_task(key.task)
+    try:
+        episode = list(episodes[key.variant]).index(key.seed)
+    except (KeyError, ValueError):
+        raise ValueError(f"{key.slug} is none of the run's trials") from None
+    scene = Scene(
+        key.task, key.level, key.seed, key.embodiment, key.mode, (), {"episode": episode},
+        suite=SUITE,
+    )  # fmt: skip
+    return TrialParts(scene, task, CheckoutTracker(task.levels[key.level].subtasks), "")
