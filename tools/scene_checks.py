@@ -22,7 +22,7 @@ from robospa.geometry import Pose, look_rotation, to_matrix
 from robospa.gripper import grasp_points
 from robospa.harness.robots import embodiment
 from robospa.harness.robots.kinematics import chain_of, end_effector, inverse
-from robospa.harness.skills.grasping import LEANS, LEVEL, candidate_poses, world_grasps
+from robospa.harness.skills.pick import LEANS, LEVEL, candidate_poses, world_grasps
 from robospa.harness.skills.workspace import Workspace
 from robospa.tasks import catalog
 from robospa.tasks.objects import object_model

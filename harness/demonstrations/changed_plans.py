@@ -20,18 +20,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from robospa.action_space import ARMS
-from robospa.geometry import Pose, Vec3, axis_rotation, look_rotation, rotate
+from robospa.geometry import Array, Pose, Vec3, axis_rotation, look_rotation, rotate
 from robospa.gripper import grasp_points
 from robospa.harness.demonstrations.clearance import depths, gaps
 from robospa.harness.robots import embodiment
 from robospa.harness.robots.kinematics import chain_of, end_effector
 from robospa.harness.skills import Expert, SkillFailed
-from robospa.harness.skills.approach import put_down, translated
+from robospa.harness.skills.bring_in import put_down, translated
 from robospa.harness.skills.motion import route, travel
 from robospa.harness.skills.pick import pick
 from robospa.harness.skills.place import arm_holding
-from robospa.harness.skills.press import press
-from robospa.harness.skills.workspace import Array, Steps, Workspace
+from robospa.harness.skills.touch import press
+from robospa.harness.skills.workspace import Steps, Workspace
 from robospa.tasks.catalog import task as find_task
 from robospa.tasks.plan import (
     Drop,

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from robospa.geometry import Pose, from_transform
 from robospa.harness.robots.kinematics import forward
-from robospa.harness.skills.arm_clearance import arm_points
-from robospa.harness.skills.clearance import Boxes, finger_points, palm_points, standing
+from robospa.harness.skills.clearance import Boxes, arm_points, finger_points, palm_points, standing
 from robospa.harness.skills.workspace import Workspace
 from robospa.workcell import WORKCELL
 

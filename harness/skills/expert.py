@@ -6,26 +6,22 @@ with the next object, and what can be done again is done again.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robospa.action_space import ARMS
+from robospa.geometry import Array
 from robospa.harness.robots import embodiment
-from robospa.harness.skills.approach import put_down, slide_out
-from robospa.harness.skills.both_arms import go_home
-from robospa.harness.skills.dock import dock
-from robospa.harness.skills.hang import hang
-from robospa.harness.skills.hit import hit
+from robospa.harness.skills.bring_in import dock, hang, put_down, slide_out
+from robospa.harness.skills.motion import go_home
 from robospa.harness.skills.open import pull_open
 from robospa.harness.skills.pick import arms_for, pick
-from robospa.harness.skills.place import can_follow, drop, place, place_position
-from robospa.harness.skills.pour import pour
-from robospa.harness.skills.press import press
+from robospa.harness.skills.place import can_follow, drop, place, place_position, pour
 from robospa.harness.skills.raise_lower import raise_lower
-from robospa.harness.skills.stamp import stamp
+from robospa.harness.skills.touch import hit, press, stamp
 from robospa.harness.skills.workspace import SkillFailed, Steps, Workspace
 from robospa.tasks.catalog import task
 from robospa.tasks.plan import (
@@ -53,6 +49,22 @@ PLACED_WITHIN = 0.02
 """A placed object this near to its goal [m] is placed."""
 STUCK_ABOVE = 0.04
 """One that is so much higher [m] than its goal hangs on the gripper that let it go."""
+
+
+SKILLS: Mapping[type, Callable[..., Generator[Array, Snapshot, object]]] = {
+    Pick: pick,
+    Place: place,
+    Drop: drop,
+    Press: press,
+    Open: pull_open,
+    Stamp: stamp,
+    Dock: dock,
+    Hang: hang,
+    Hit: hit,
+    Pour: pour,
+    RaiseLower: raise_lower,
+}
+"""What performs each kind of call, from the workspace and the call."""
 
 
 class Expert:
@@ -110,28 +122,9 @@ class Expert:
 
     def _single(self, call: object) -> Steps:
         ws = self.workspace
-        if isinstance(call, Pick):
-            yield from pick(ws, call)
-        elif isinstance(call, Place):
-            yield from place(ws, call)
-        elif isinstance(call, Drop):
-            yield from drop(ws, call)
-        elif isinstance(call, Press):
-            yield from press(ws, call)
-        elif isinstance(call, Open):
-            yield from pull_open(ws, call)
-        elif isinstance(call, Stamp):
-            yield from stamp(ws, call)
-        elif isinstance(call, Dock):
-            yield from dock(ws, call)
-        elif isinstance(call, Hang):
-            yield from hang(ws, call)
-        elif isinstance(call, Hit):
-            yield from hit(ws, call)
-        elif isinstance(call, Pour):
-            yield from pour(ws, call)
-        elif isinstance(call, RaiseLower):
-            yield from raise_lower(ws, call)
+        skill = SKILLS.get(type(call))
+        if skill is not None:
+            yield from skill(ws, call)
         elif isinstance(call, Wait):
             for _ in range(round(call.seconds / HOLD_SECONDS)):
                 ws.add(0)

@@ -12,19 +12,15 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
-from robospa.geometry import Pose, axis_rotation, multiply, rotate
+from robospa.geometry import Array, Pose, axis_rotation, multiply, rotate
 from robospa.harness.robots.kinematics import inverse
-from robospa.harness.skills.arm_clearance import TOUCH, arm_depth
-from robospa.harness.skills.both_arms import go
-from robospa.harness.skills.motion import line_poses, rise
+from robospa.harness.skills.clearance import TOUCH, arm_depth
+from robospa.harness.skills.motion import go, line_poses, rise
 from robospa.harness.skills.pick import arms_for
 from robospa.harness.skills.workspace import SkillFailed, Steps, Workspace, moved_back
 from robospa.tasks.plan import Open
 from robospa.tasks.shapes import Hinge
-
-Array = NDArray[np.float64]
 
 TIPS = (0.5, 0.35, 0.65, 0.2, 0.8)
 """How far the gripper points down from level [rad], best first."""

@@ -1,24 +1,228 @@
-"""Pick: grasp an object and lift it; check that it came along, and try again if it did not."""
+"""Grasp candidates of an object: its model's grasps, tilted, tested for reach and neighbours.
+
+Every candidate is an end-effector pose for one arm. Inverse kinematics runs on all of them at once;
+what is left is ranked by tilt, by room for the fingers and by how far the arm has to go.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Generator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from robospa.action_space import ARMS
-from robospa.geometry import Pose
-from robospa.harness.skills.arm_clearance import TOUCH, arm_depth
-from robospa.harness.skills.both_arms import go
-from robospa.harness.skills.grasping import LEANS, LEVEL, GraspCandidate, reachable_grasps
-from robospa.harness.skills.motion import line_poses, retreat_home, rise, route
-from robospa.harness.skills.workspace import SkillFailed, Workspace, moved_back
+from robospa.geometry import (
+    Array,
+    Pose,
+    Vec3,
+    axis_rotation,
+    look_rotation,
+    multiply,
+    rotate,
+    to_matrix,
+)
+from robospa.gripper import Gripper
+from robospa.harness.robots.kinematics import inverse
+from robospa.harness.skills.clearance import (
+    TOUCH,
+    Boxes,
+    arm_depth,
+    bounding_box,
+    finger_points,
+    neighbours,
+    own_boxes,
+    palm_points,
+)
+from robospa.harness.skills.motion import go, line_poses, retreat_home, rise, route
+from robospa.harness.skills.workspace import (
+    SkillFailed,
+    Workspace,
+    max_gripper_y,
+    moved_back,
+    wall_front,
+)
 from robospa.tasks.plan import Pick
+from robospa.tasks.shapes import Box, Cylinder, Grasp, ObjectModel, Shape
 from robospa.tasks.snapshot import Snapshot
 
-Array = NDArray[np.float64]
+TILTS = (0.0, 0.2, -0.2, 0.4, -0.4, 0.6, -0.6, 0.8, -0.8, 1.0, -1.0, 1.2, -1.2)
+LEVEL = (0.0,)
+LEANS = (0.0, 0.2, -0.2, 0.4, -0.4)
+"""Sideways leans of the gripper [rad], tried when nothing else reaches."""
+OPENING_MARGINS = (0.022, 0.014, 0.008)
+"""How much wider than the object the fingers open [m]; less where they would be in a part of it
+(between a pot and its handle)."""
+SPARE_OPENING = 0.01
+"""What a tipped body is grasped across is narrower than the opening by this [m]."""
+TABLE_CLEARANCE = 0.003
+TOO_THIN = 1.0
+"""Cost of a part that is thinner than the gap of closed fingers: they hold it only if it slopes."""
+WRONG_SIDE = 0.6
+"""Cost of using the arm on the other side of the table."""
+
+
+@dataclass(frozen=True)
+class GraspCandidate:
+    """A grasp that the arm can take: end-effector pose, its joints, and the gripper value 0..1 to
+    come with; `depth` is how deep [m] arm or hand would be in other things."""
+
+    arm: int
+    pose: Pose
+    approach: Vec3
+    joints: Array
+    opening: float
+    cost: float
+    tilt: float
+    depth: float
+
+
+def upright(pose: Pose) -> bool:
+    """True if the body's z axis points up within 25 degrees."""
+    return rotate(pose.rotation, (0, 0, 1))[2] > 0.9
+
+
+def world_grasps(model: ObjectModel, pose: Pose, hand: Gripper) -> tuple[Grasp, ...]:
+    """The model's grasps in the world; for a body that has tipped over, one across its axis."""
+    if upright(pose):
+        return tuple(
+            Grasp(
+                pose.apply(g.point),
+                rotate(pose.rotation, g.approach),
+                rotate(pose.rotation, g.closing),
+                g.width,
+                g.tilt,
+            )
+            for g in model.grasps
+        )
+    middle = Pose((0.0, 0.0, model.bottom + model.size[2] / 2))
+    whole = _level_grasps(pose * middle, model.size, hand.opening - SPARE_OPENING)
+    widest = max((g.width for g in model.grasps), default=0.0)
+    limit = max(hand.opening - SPARE_OPENING, widest + 1e-6)
+    return whole or tuple(
+        grasp
+        for shape in model.shapes
+        if shape.collision and (size := _part_size(shape)) is not None
+        for grasp in _level_grasps(pose * shape.pose, size, limit)
+    )
+
+
+def _part_size(shape: Shape) -> Vec3 | None:
+    """Size [m] of a box or a cylinder along its axes; None for another form."""
+    form = shape.geometry
+    if isinstance(form, Box):
+        return (2 * form.half[0], 2 * form.half[1], 2 * form.half[2])
+    if isinstance(form, Cylinder):
+        return (2 * form.radius, 2 * form.radius, 2 * form.half_length)
+    return None
+
+
+def _level_grasps(pose: Pose, size: Vec3, limit: float) -> tuple[Grasp, ...]:
+    """Grasps from above across the level axes of a body of `size`, centred at `pose`, that are
+    shorter than `limit`; across a lying one's length if it has rolled to where no other is level.
+    """
+    axes = to_matrix(pose.rotation)
+    flat = np.abs(axes[2]) < 0.5
+    across = [(axes[:, i], size[i]) for i in range(3) if flat[i]]
+    if flat[2] and not flat[:2].any():
+        level = np.cross((0.0, 0.0, 1.0), axes[:, 2])
+        across.append((level / np.linalg.norm(level), max(size[:2])))
+    down = (0.0, 0.0, -1.0)
+    return tuple(
+        Grasp(pose.position, down, tuple(closing.tolist()), width, 0.6)
+        for closing, width in across
+        if width < limit
+    )
+
+
+def candidate_poses(
+    grasp: Grasp, hand: Gripper, table_top: float, leans: tuple[float, ...] = LEVEL
+) -> list[tuple[Pose, Vec3, float]]:
+    """End-effector poses for one grasp: both finger orders, all tilts that it allows.
+
+    The fingers stay clear of a table of height `table_top` [m]. `leans` turn the gripper about the
+    approach's other side, so that one finger comes lower.
+    """
+    found = []
+    reach = hand.grip
+    across = np.cross(grasp.approach, grasp.closing)
+    for lean in leans:
+        leaning = axis_rotation(across, lean)
+        for tilt in TILTS:
+            if abs(tilt) > grasp.tilt + 1e-9:
+                continue
+            turn = multiply(leaning, axis_rotation(grasp.closing, tilt))
+            approach = rotate(turn, grasp.approach)
+            if approach[2] > -0.05:
+                continue
+            closing = rotate(leaning, grasp.closing)
+            slope = math.sqrt(max(0.0, 1 - approach[2] ** 2))
+            lowest = hand.hold * -approach[2] + hand.finger_half_width * slope
+            lowest += abs(closing[2]) * (grasp.width / 2 + hand.finger_thickness)
+            x, y, z = grasp.point
+            z = max(z, table_top + TABLE_CLEARANCE + lowest)
+            position = (x - approach[0] * reach, y - approach[1] * reach, z - approach[2] * reach)
+            for sign in (1.0, -1.0):
+                facing = (sign * closing[0], sign * closing[1], sign * closing[2])
+                pose = Pose(position, look_rotation(approach, facing))
+                found.append((pose, approach, abs(tilt) + 2 * abs(lean)))
+    return found
+
+
+def _fitting_opening(hand: Gripper, pose: Pose, width: float, own: Boxes) -> tuple[float, float]:
+    """How deep [m] the fingers are in the object's own boxes, and at what opening [m]."""
+    best = (math.inf, 0.0)
+    for margin in OPENING_MARGINS:
+        opening = min(hand.opening, width + margin)
+        depth = own.depth(finger_points(hand, pose, opening))
+        if depth < best[0]:
+            best = (depth, opening)
+        if depth == 0.0:
+            break
+    return best
+
+
+def reachable_grasps(
+    ws: Workspace, name: str, arms: tuple[int, ...], leans: tuple[float, ...] = LEVEL
+) -> list[GraspCandidate]:
+    """All grasps of `name` that one of `arms` can take now, best first."""
+    model = ws.models[name]
+    body = ws.pose(name)
+    near, own, whole = neighbours(ws, name), own_boxes(model, body), bounding_box(model, body)
+    front = wall_front(ws)
+    found: list[GraspCandidate] = []
+    for arm in arms:
+        hand, home = ws.hand(arm), ws.robot.arms[arm].home
+        poses: list[tuple[Pose, Vec3, float, float]] = []
+        for grasp in world_grasps(model, body, hand):
+            found_poses = candidate_poses(grasp, hand, ws.scene.table_top, leans)
+            poses += [(*c, grasp.width) for c in found_poses]
+        if not poses:
+            continue
+        joints, ok = inverse(ws.chains[arm], [p[0] for p in poses])
+        wrong = WRONG_SIDE if (body.position[0] > 0) != (arm == 1) else 0.0
+        if abs(body.position[0]) < 0.04:
+            wrong *= abs(body.position[0]) / 0.04
+        reached = np.flatnonzero(ok)
+        arm_in = arm_depth(ws, arm, joints[reached], name)
+        for i, blocked in zip(reached, arm_in.tolist(), strict=True):
+            pose, approach, tilt, width = poses[i]
+            inside, opening = _fitting_opening(hand, pose, width, own)
+            palm = palm_points(hand, pose)
+            around = np.concatenate([finger_points(hand, pose, opening), palm])
+            others = max(near.depth(around), blocked)
+            depth = max(inside, whole.depth(palm), others)
+            turned = joints[i] - home  # of the last two joints: how far hand and wrist turn
+            roll = abs(float(turned[-1])) + 0.5 * abs(float(turned[-2]))
+            depth = max(depth, max_gripper_y(pose, hand) - front)
+            thin = TOO_THIN if width <= hand.gap else 0.0
+            cost = wrong + thin + 0.5 * tilt + 0.25 * roll + 60.0 * depth
+            value = ws.robot.arms[arm].gripper_value(opening)
+            found.append(GraspCandidate(arm, pose, approach, joints[i], value, cost, tilt, others))
+    return sorted(found, key=lambda r: r.cost)
+
+
 GraspFilter = Callable[[GraspCandidate], bool]
 """True for a grasp from which the next motion is possible."""
 

@@ -13,11 +13,10 @@ from functools import partial
 import numpy as np
 
 from robospa.action_space import ARMS
-from robospa.harness.skills.both_arms import at_once, go
-from robospa.harness.skills.grasping import LEANS, LEVEL, GraspCandidate, reachable_grasps
-from robospa.harness.skills.motion import line_poses, rise, travel
+from robospa.geometry import Array
+from robospa.harness.skills.motion import at_once, go, line_poses, rise, travel
+from robospa.harness.skills.pick import LEANS, LEVEL, GraspCandidate, reachable_grasps
 from robospa.harness.skills.workspace import (
-    Array,
     SkillFailed,
     Steps,
     Workspace,

@@ -24,7 +24,7 @@ from robospa.harness.demonstrations.noise import (
     smooth_step,
 )
 from robospa.harness.sim.motion import DEMONSTRATION_LIMITS, RATE, Trajectory, profile, rest_to_rest
-from robospa.harness.skills.grasping import reachable_grasps
+from robospa.harness.skills.pick import reachable_grasps
 from robospa.harness.skills.workspace import Workspace, moved_back
 from robospa.tasks.scene import SceneObject
 from robospa.tasks.snapshot import Contact, Snapshot

@@ -1,13 +1,15 @@
-"""Hang: put an object by its handle onto a peg, along the peg, lower it and release it."""
+"""The last centimetres of a held object on a path: Dock into a frame, Hang on a peg."""
 
 from __future__ import annotations
 
 import math
-from itertools import product
+from collections.abc import Callable, Sequence
+from itertools import pairwise, product
 
 import numpy as np
 
 from robospa.geometry import (
+    Array,
     Pose,
     Vec3,
     axis_rotation,
@@ -16,19 +18,167 @@ from robospa.geometry import (
     rotate,
     yaw_rotation,
 )
-from robospa.harness.robots.kinematics import forward
-from robospa.harness.skills.approach import approach_joints, release, translated
-from robospa.harness.skills.around import stop_beside
-from robospa.harness.skills.grasping import GraspCandidate, reachable_grasps
-from robospa.harness.skills.motion import travel
-from robospa.harness.skills.narrow import Narrow
-from robospa.harness.skills.pick import GraspFilter, arms_for, pick
+from robospa.harness.robots.kinematics import forward, inverse
+from robospa.harness.skills.motion import line_poses, retreat_home, rise, route, travel
+from robospa.harness.skills.narrow_passage import NarrowPassage, detour_stop
+from robospa.harness.skills.pick import (
+    GraspCandidate,
+    GraspFilter,
+    arms_for,
+    pick,
+    reachable_grasps,
+)
 from robospa.harness.skills.place import grip_offset, place
-from robospa.harness.skills.workspace import Array, Steps, Workspace
-from robospa.tasks.plan import Hang, Pick, Place
+from robospa.harness.skills.workspace import SkillFailed, Steps, Workspace, moved_back
+from robospa.tasks.plan import Dock, Hang, Pick, Place
 
-ATTEMPTS = 5
-LIFT = 0.14
+RETREAT = 0.07
+"""How far the open gripper backs out [m]."""
+DEEPER, ASIDE = 0.004, 0.045
+"""How far the open gripper goes below where it let go of what jams in it, and out sideways [m]."""
+BEST = 12
+"""How many of the reachable end poses are tried along the whole path."""
+
+
+def translated(pose: Pose, by: Vec3) -> Pose:
+    """`pose` moved by `by` [m, world]."""
+    x, y, z = pose.position
+    return Pose((x + by[0], y + by[1], z + by[2]), pose.rotation)
+
+
+def approach_joints(
+    ws: Workspace,
+    arm: int,
+    offset: Pose,
+    targets: Sequence[Pose],
+    path: Sequence[Vec3],
+    near: Array,
+    free: Callable[[list[Array]], bool] | None = None,
+) -> list[Array] | None:
+    """Joints [rad] that bring an object held with `offset` along `path` to one of `targets`.
+
+    `path` has shifts [m, world] from the target, farthest first, the last one being none; nearest
+    to joints `near` first; only a way that is `free`. None if no target can be reached that way.
+    """
+    back = offset.inverse()
+    ends = [target * back for target in targets]
+    joints, ok = inverse(ws.chains[arm], ends)
+    order = sorted(np.flatnonzero(ok), key=lambda i: float(np.abs(joints[i] - near).max()))
+    for i in order[:BEST]:
+        poses = [translated(ends[i], step) for step in reversed(path[:-1])]
+        before = ws.solve_path(arm, joints[i], poses)
+        way = None if before is None else [*reversed(before), joints[i]]
+        if way is not None and (free is None or free(way)):
+            return way
+    return None
+
+
+def release(ws: Workspace, arm: int) -> None:
+    """Open the gripper, back out along its approach, then rise."""
+    frames, _ = forward(ws.chains[arm], ws.joints[arm][None])
+    pose = from_transform(frames[0])
+    ws.add(arm)
+    ws.add(arm, gripper=1.0)
+    away = moved_back(pose, rotate(pose.rotation, (1, 0, 0)), RETREAT)
+    for joints in ws.solve_path(arm, ws.joints[arm], line_poses(pose, away, 2)) or []:
+        ws.add(arm, joints)
+    ws.held[arm] = None
+    rise(ws, arm)
+
+
+def put_down(ws: Workspace, arm: int, height: float) -> Steps:
+    """Lower the object that the arm holds until its origin is at `height` [m], and release it."""
+    name = ws.held[arm]
+    if name is not None:
+        frames, _ = forward(ws.chains[arm], ws.joints[arm][None])
+        here = from_transform(frames[0])
+        down = translated(here, (0.0, 0.0, height - ws.pose(name).position[2]))
+        for joints in ws.solve_path(arm, ws.joints[arm], line_poses(here, down, 2)) or []:
+            ws.add(arm, joints)
+    release(ws, arm)
+    yield from ws.flush()
+
+
+def slide_out(ws: Workspace, arm: int, name: str, height: float) -> Steps:
+    """Lower `name`, which jams in the open gripper, to `height` [m] and move out beside it.
+
+    What widens upwards to the gripper's opening comes up with it.
+    """
+    frames, _ = forward(ws.chains[arm], ws.joints[arm][None])
+    here = from_transform(frames[0])
+    down = translated(here, (0.0, 0.0, height - ws.pose(name).position[2] - DEEPER))
+    x, y, _ = rotate(here.rotation, (0.0, 0.0, 1.0))
+    share = math.copysign(ASIDE / max(math.hypot(x, y), 1e-9), -y)
+    for step in (share, -share):  # towards the robot first
+        beside = translated(down, (x * step, y * step, 0.0))
+        up = translated(beside, (0.0, 0.0, RETREAT))
+        way = [p for a, b in pairwise((here, down, beside, up)) for p in line_poses(a, b, 2)]
+        joints = ws.solve_path(arm, ws.joints[arm], way)
+        if joints is not None:
+            for stop in joints:
+                ws.add(arm, stop)
+            break
+    rise(ws, arm)
+    yield from ws.flush(exactly=True)
+
+
+def bring_in(ws: Workspace, arm: int, path: Sequence[Array], stop: Array | None = None) -> Steps:
+    """Travel to the first joints of `path`, follow the others, release the object there.
+
+    By way of joints `stop`, if given, without a look at what is in the way.
+    """
+    if stop is None:
+        travel(ws, arm, path[0])
+    else:
+        ws.add(arm, stop)
+        ws.add(arm, path[0])
+    yield from ws.flush()
+    for joints in path[1:]:
+        ws.add(arm, joints)
+    release(ws, arm)
+    yield from ws.flush()
+
+
+DOCK_ATTEMPTS = 3
+DOCK_LIFT = 0.10
+RELEASED_ABOVE = 0.002
+"""Height above its goal at which the object is released [m]."""
+CLOSE = 0.015
+"""An object whose origin is this near to its goal [m] has arrived."""
+
+
+def dock(ws: Workspace, call: Dock) -> Steps:
+    """Pick, bring in along the frame's z axis, release; again if it did not stay there."""
+    frame = ws.pose(call.on) * ws.models[call.on].frames[call.frame]
+    x, y, z = rotate(frame.rotation, (0.0, 0.0, 1.0))
+    goal = translated(frame, (x * RELEASED_ABOVE, y * RELEASED_ABOVE, z * RELEASED_ABOVE))
+    path = [(x * call.above, y * call.above, z * call.above), (0.0, 0.0, 0.0)]
+
+    def feasible(grasp: GraspCandidate) -> bool:
+        offset = grasp.pose.inverse() * ws.pose(call.object)
+        return approach_joints(ws, grasp.arm, offset, [goal], path, grasp.joints) is not None
+
+    for _ in range(DOCK_ATTEMPTS):
+        yield from pick(ws, Pick(call.object, DOCK_LIFT, call.arm), feasible)
+        arm = ws.held.index(call.object)
+        offset = grip_offset(ws, arm, call.object)
+        way = approach_joints(ws, arm, offset, [goal], path, ws.joints[arm])
+        if way is None:
+            ws.held[arm] = None
+            ws.add(arm, gripper=1.0)
+            retreat_home(ws, arm)
+            yield from ws.flush()
+            raise SkillFailed(f"{call.object} cannot be brought to {call.frame} of {call.on}")
+        free = route(ws, arm, way[0]).free
+        stop = None if free else detour_stop(NarrowPassage(ws, arm, call.on, offset), way[0])
+        yield from bring_in(ws, arm, way, stop)
+        here = np.array(ws.pose(call.object).position)
+        if float(np.abs(here - np.array(frame.position)).max()) < CLOSE:
+            return
+
+
+HANG_ATTEMPTS = 5
+HANG_LIFT = 0.14
 OUTS = (0.085, 0.06)
 """How far before the peg's place the object comes in, along the peg [m], the better way first."""
 SAG = 0.008
@@ -66,8 +216,8 @@ def hang(ws: Workspace, call: Hang) -> Steps:
     planned, allowed = _targets(peg, handle, (0.0,)), _targets(peg, handle, WOBBLES)
     refused: list[Pose] = []
     taken: list[GraspCandidate] = []
-    for attempt in range(ATTEMPTS):
-        last = attempt == ATTEMPTS - 1
+    for attempt in range(HANG_ATTEMPTS):
+        last = attempt == HANG_ATTEMPTS - 1
         choices: tuple[list[Pose], ...] = (planned, allowed)
         x, y, z = ws.pose(call.object).position
         grasps = reachable_grasps(ws, call.object, arms_for(call.arm))
@@ -76,7 +226,7 @@ def hang(ws: Workspace, call: Hang) -> Steps:
             for narrow, targets in product((True, False), (planned, allowed))
         )
         feasible = next((f for f in filters if any(f(grasp) for grasp in grasps)), None)
-        taken.append((yield from pick(ws, Pick(call.object, LIFT, call.arm), feasible, taken)))
+        taken.append((yield from pick(ws, Pick(call.object, HANG_LIFT, call.arm), feasible, taken)))
         arm = ws.held.index(call.object)
         gripped = grip_offset(ws, arm, call.object)
         way = _held_way(ws, call, arm, choices, paths)
@@ -108,7 +258,7 @@ def _go_before_peg(ws: Workspace, call: Hang, arm: int, goal: Array) -> None:
     if narrow.open(straight):
         ws.add(arm, goal)
         return
-    stop = stop_beside(narrow, goal)
+    stop = detour_stop(narrow, goal)
     if stop is not None:
         ws.add(arm, stop)
         ws.add(arm, goal)
@@ -124,9 +274,9 @@ def _alike(a: Pose, b: Pose) -> bool:
     return math.hypot(*away.position) < ALIKE[0] and abs(away.rotation[0]) > math.cos(ALIKE[1] / 2)
 
 
-def _narrow(ws: Workspace, call: Hang, arm: int) -> Narrow:
+def _narrow(ws: Workspace, call: Hang, arm: int) -> NarrowPassage:
     """The way past the peg's object with what the arm holds, as it lies in the hand now."""
-    return Narrow(ws, arm, call.on, grip_offset(ws, arm, call.object))
+    return NarrowPassage(ws, arm, call.on, grip_offset(ws, arm, call.object))
 
 
 def _held_way(
@@ -180,7 +330,11 @@ def _path(peg: Pose, out: float) -> list[Vec3]:
 
 
 def _way(
-    narrow: Narrow, targets: list[Pose], paths: list[list[Vec3]], near: Array, only_free: bool
+    narrow: NarrowPassage,
+    targets: list[Pose],
+    paths: list[list[Vec3]],
+    near: Array,
+    only_free: bool,
 ) -> list[Array] | None:
     """Joints [rad] of the first of `paths` that the arm can follow to one of `targets`."""
     free = narrow.free if only_free else None
@@ -206,7 +360,7 @@ def _grasp_filter(
         offset = grasp.pose.inverse() * body
         if any(_alike(offset, other) for other in refused):
             return False
-        narrow = Narrow(ws, grasp.arm, call.on, offset)
+        narrow = NarrowPassage(ws, grasp.arm, call.on, offset)
         return _way(narrow, targets, paths, grasp.joints, only_free) is not None
 
     return feasible

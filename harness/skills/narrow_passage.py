@@ -1,30 +1,30 @@
 """Ways so close past an object that its bounding box is no measure: between post and peg of a rack.
 
-The object counts as the boxes that it is made of.
+`motion.route` takes things for upright cylinders, so that it finds no way out from beside a high
+thing. Here the object, and what is held, count as the boxes that they are made of, arms as links.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
-from numpy.typing import NDArray
 
-from robospa.geometry import Pose, from_transform
+from robospa.geometry import Array, Pose, from_transform
 from robospa.harness.robots.kinematics import forward
-from robospa.harness.skills.arm_clearance import TOUCH, arm_depth, arm_points
 from robospa.harness.skills.clearance import (
+    TOUCH,
     Boxes,
+    arm_depth,
+    arm_points,
     finger_points,
     palm_points,
     part_boxes,
     standing,
 )
 from robospa.harness.skills.workspace import Workspace
-
-Array = NDArray[np.float64]
 
 STRIDE = 0.1
 """How far [rad] a joint turns at most between two places at which a way is looked at."""
@@ -33,7 +33,7 @@ MARGIN = 0.01
 
 
 @dataclass(frozen=True)
-class Narrow:
+class NarrowPassage:
     """Ways past `beside` for an arm that holds something at `offset` from its end effector."""
 
     ws: Workspace
@@ -100,3 +100,27 @@ def _along(way: list[Array]) -> Array:
         count = 2 + math.ceil(float(np.abs(goal - start).max()) / STRIDE)
         lines.append(start + (goal - start) * np.linspace(0.0, 1.0, count)[:, None])
     return np.concatenate(lines)
+
+
+BACK, ASIDE, UP = (0.0, 0.06, 0.12, 0.18), (0.0, 0.06, -0.06, 0.12, -0.12), (0.0, 0.04, 0.08, 0.12)
+"""How far [m] towards the robot, sideways and up from the start a stop may be."""
+
+
+def detour_stop(narrow: NarrowPassage, goal: Array) -> Array | None:
+    """Joints [rad] of a stop between here and joints `goal` with which the arm and what it holds
+    get around the object of `narrow`, and past all else; None if there is none."""
+    ws, arm = narrow.ws, narrow.arm
+    start = ws.joints[arm]
+    frames, _ = forward(ws.chains[arm], np.stack([start, goal]))
+    here, there = (from_transform(frame) for frame in frames)
+    x, y, z = here.position
+    for back, aside, up in product(BACK, ASIDE, UP):
+        place = (x + aside, y - back, z + up)
+        for rotation, near in ((here.rotation, start), (there.rotation, goal)):
+            stop = ws.solve(arm, Pose(place, rotation), near)
+            if stop is None:
+                continue
+            way = [start, stop, goal]
+            if narrow.open(way) and narrow.past_others(way):
+                return stop
+    return None

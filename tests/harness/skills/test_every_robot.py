@@ -13,16 +13,17 @@ from robot_at_home import at_home
 from robospa.geometry import Pose, rotate
 from robospa.harness.robots import embodiment, embodiments
 from robospa.harness.robots.kinematics import end_effector, link_frames
-from robospa.harness.skills.arm_clearance import TOUCH, arm_depth
 from robospa.harness.skills.clearance import (
+    TOUCH,
+    arm_depth,
     bounding_box,
     finger_points,
     own_boxes,
     palm_points,
 )
-from robospa.harness.skills.grasping import TOO_THIN, reachable_grasps
 from robospa.harness.skills.open import Pull, _clear, _ways, pull_open
-from robospa.harness.skills.press import DEPTH, press
+from robospa.harness.skills.pick import TOO_THIN, reachable_grasps
+from robospa.harness.skills.touch import DEPTH, press
 from robospa.tasks.objects import assets, object_model, variant_count
 from robospa.tasks.objects.appliances import OVENS
 from robospa.tasks.plan import Open, Press

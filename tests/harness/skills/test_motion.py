@@ -1,19 +1,14 @@
-"""Both arms at once where they stay apart, and no stop where a straight joint line passes by."""
+"""Both arms at once where they stay apart, and no stop where a straight line passes by."""
 
 from __future__ import annotations
 
 import numpy as np
+from robot_at_home import at_home
 
-from robospa.geometry import Pose
-from robospa.gripper import grasp_points
+from robospa.geometry import Array, Pose
 from robospa.harness.robots import embodiment
-from robospa.harness.robots.kinematics import chain_of, end_effector
-from robospa.harness.skills.both_arms import at_once, go, go_home
-from robospa.harness.skills.motion import travel
-from robospa.harness.skills.thinning import thinned
-from robospa.harness.skills.workspace import Array, Workspace
-from robospa.tasks.scene import Scene
-from robospa.tasks.snapshot import Snapshot
+from robospa.harness.skills.motion import at_once, go, go_home, travel
+from robospa.harness.skills.workspace import Workspace, fewer_waypoints
 
 ROBOT = embodiment("aloha-agilex")
 DOWN = (0.5, -0.5, 0.5, 0.5)
@@ -22,13 +17,7 @@ LEFT, RIGHT = slice(0, 6), slice(7, 13)
 
 
 def workspace() -> Workspace:
-    """An empty table, both arms at home with open grippers."""
-    scene = Scene("none", 1, 0, ROBOT.name, "clean", (), {})
-    left, right = (end_effector(chain_of(a), a.home) for a in ROBOT.arms)
-    points = grasp_points(ROBOT.grippers, (left, right))
-    joints = (ROBOT.arms[0].home, ROBOT.arms[1].home)
-    start = Snapshot(0.0, {}, (1.0, 1.0), (left, right), joints, grasp_points=points)
-    return Workspace(scene, ROBOT, start)
+    return at_home(ROBOT.name)
 
 
 def above(ws: Workspace, arm: int, x: float, y: float = -0.15, z: float = 0.95) -> Array:
@@ -103,10 +92,10 @@ def test_a_short_straight_line_is_one_action_a_corner_is_two() -> None:
     start = ws.row()
     for z in (0.94, 0.93, 0.92):
         ws.add(0, above(ws, 0, -0.2, z=z))
-    assert len(thinned(ws.chains, tips, start, np.stack(ws.rows))) == 1
+    assert len(fewer_waypoints(ws.chains, tips, start, np.stack(ws.rows))) == 1
     ws.add(0, above(ws, 0, -0.25, z=0.92))
     rows = np.stack(ws.rows)
-    assert np.array_equal(thinned(ws.chains, tips, start, rows), rows[2:])
+    assert np.array_equal(fewer_waypoints(ws.chains, tips, start, rows), rows[2:])
 
 
 def test_rests_and_grippers_are_never_left_out() -> None:
@@ -119,7 +108,7 @@ def test_rests_and_grippers_are_never_left_out() -> None:
     ws.add(0, gripper=0.5)
     ws.add(0, above(ws, 0, -0.2, z=0.93))
     rows = np.stack(ws.rows)
-    assert np.array_equal(thinned(ws.chains, tips, start, rows), rows)
+    assert np.array_equal(fewer_waypoints(ws.chains, tips, start, rows), rows)
 
 
 def test_a_free_way_is_direct() -> None:
