@@ -100,14 +100,6 @@ class Pour:
 
 
 @dataclass(frozen=True)
-class Handover:
-    """Pass the held `object` from one arm to the other near the table's middle."""
-
-    object: str
-    to: str
-
-
-@dataclass(frozen=True)
 class Drop:
     """Carry the held `object` over the container `into` and open the gripper above its mouth."""
 
@@ -164,18 +156,5 @@ class Home:
 
 
 Skill = (
-    Pick
-    | Place
-    | Press
-    | Stamp
-    | Dock
-    | Hang
-    | Hit
-    | Pour
-    | Handover
-    | Drop
-    | Open
-    | RaiseLower
-    | Wait
-    | Home
+    Pick | Place | Press | Stamp | Dock | Hang | Hit | Pour | Drop | Open | RaiseLower | Wait | Home
 )

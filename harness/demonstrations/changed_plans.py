@@ -35,7 +35,6 @@ from robospa.harness.skills.workspace import Steps, Workspace
 from robospa.tasks.catalog import task as find_task
 from robospa.tasks.plan import (
     Drop,
-    Handover,
     Hit,
     Home,
     Pick,
@@ -369,7 +368,7 @@ NEVER = ("MIP",)
 """Categories without such episodes: what has to be remembered is seen before they begin."""
 IN_PLACE = ("SDE", "CPI", "RRR", "CVR", "EPG", "SOI")
 """Categories in which sentences name objects by where they lie: there nothing is displaced."""
-CARRIES = (Place, Drop, Handover)
+CARRIES = (Place, Drop)
 """Calls that go on with what an earlier call took."""
 TRACELESS = (Press, Hit, RaiseLower, Wait)
 """Calls that leave nothing behind by which a picture shows that they are done: no episode begins

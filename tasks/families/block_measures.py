@@ -17,7 +17,7 @@ import numpy as np
 
 from robospa.geometry import Array, Pose, Vec3, yaw_rotation
 from robospa.tasks.families.picking import PickFacts, lifted, pick_target
-from robospa.tasks.families.tabletop import drawn_color
+from robospa.tasks.families.table import drawn_color
 from robospa.tasks.goals.pick import Lift
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText, ordinal

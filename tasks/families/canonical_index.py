@@ -18,7 +18,7 @@ from itertools import combinations
 import numpy as np
 
 from robospa.tasks.families.picking import PickFacts, lifted, pick_name, pick_target
-from robospa.tasks.families.tabletop import draw_variant, drawn_color, standing
+from robospa.tasks.families.table import draw_variant, drawn_color, standing
 from robospa.tasks.goals.pick import Lift
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText, ordinal

@@ -13,7 +13,7 @@ import numpy as np
 
 from robospa.action_space import ARMS
 from robospa.geometry import Vec3
-from robospa.tasks.families.tabletop import Item, frame_of, named, side, side_of
+from robospa.tasks.families.table import Item, frame_of, named, side, side_of
 from robospa.tasks.goals.checklist import CHAIN, Checklist, Subtask, by_turns
 from robospa.tasks.goals.conditions import Condition
 from robospa.tasks.goals.counters import PRESS_BOX, PressCounter

@@ -16,16 +16,8 @@ import numpy as np
 
 from robospa.geometry import Pose
 from robospa.tasks import objects
-from robospa.tasks.families import chain
+from robospa.tasks.families import chain, table
 from robospa.tasks.families.chain import Chain, Region, Station
-from robospa.tasks.families.tabletop import (
-    Item,
-    draw_variant,
-    frame_of,
-    in_view,
-    radius,
-    standing,
-)
 from robospa.tasks.goals.conditions import Rests, on_spot
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText
@@ -78,15 +70,17 @@ class ScaleFacts(SceneFacts):
     cards: str = ""
 
 
-def _scale_items(level: int, rng: np.random.Generator, workcell: Workcell) -> list[Item] | None:
-    items: list[Item] = []
+def _scale_items(
+    level: int, rng: np.random.Generator, workcell: Workcell
+) -> list[table.Item] | None:
+    items: list[table.Item] = []
     taken: dict[str, tuple[Turnable, float]] = {}
     thing = THINGS[int(rng.integers(len(THINGS)))]
     for role, region in REGIONS.items():
         if level < FIRST_LEVEL[role]:
             continue
         asset = {"object": thing, "bell": "bell"}.get(role) or FIXED[role]
-        variant = draw_variant(rng, asset)
+        variant = table.draw_variant(rng, asset)
         cards = role == "cards"
         others = [
             (*there, CARDS_DISTANCE if cards else DISTANCE.get((role, other), 0.0))
@@ -97,8 +91,8 @@ def _scale_items(level: int, rng: np.random.Generator, workcell: Workcell) -> li
         if found is None:
             return None
         taken[role] = found
-        pose = standing(found[0].place, found[1])
-        items.append(Item(role, asset, pose, variant, fixed=role in FIXED))
+        pose = table.standing(found[0].place, found[1])
+        items.append(table.Item(role, asset, pose, variant, fixed=role in FIXED))
     return items
 
 
@@ -118,7 +112,7 @@ def _scale_station(scene: Scene, step: str) -> Station:
     if step.isupper():
         after = steps.index(step.lower())
         return chain.back(scene, place, Rests(name, _lower, grip=SCALE_GRIP, after=after))
-    near = on_spot(ON, BELOW, ABOVE, Pose(), frame_of(scene, on, "support"))
+    near = on_spot(ON, BELOW, ABOVE, Pose(), table.frame_of(scene, on, "support"))
     latched = step.upper() in steps
     rests = Rests(name, near, grip=SCALE_GRIP, targets=(on,), latched=latched)
     return chain.there(place, rests)
@@ -170,27 +164,29 @@ class TrayFacts(SceneFacts):
     bell: str = ""
 
 
-def _tray_items(level: int, rng: np.random.Generator, workcell: Workcell) -> list[Item] | None:
+def _tray_items(
+    level: int, rng: np.random.Generator, workcell: Workcell
+) -> list[table.Item] | None:
     """The tray in the middle, food beside it, the bell behind."""
-    variant = draw_variant(rng, "tray")
+    variant = table.draw_variant(rng, "tray")
     middle = (0.0, float(rng.uniform(*TRAY_Y)))
-    items = [Item("tray", "tray", standing(middle), variant, fixed=True)]
+    items = [table.Item("tray", "tray", table.standing(middle), variant, fixed=True)]
     width, depth, _ = objects.object_model("tray", variant).size
     taken: list[tuple[Point, float]] = []
     for key, (role, asset) in FOOD.items():
         if key in TRAY_STEPS[level]:
-            variant = draw_variant(rng, asset)
-            seen = in_view(workcell, asset, variant)
+            variant = table.draw_variant(rng, asset)
+            seen = table.in_view(workcell, asset, variant)
             point = free_point(rng, X[role], FOOD_Y, [], allowed=seen)
-            room = radius(asset, variant)
+            room = table.radius(asset, variant)
             if point is None or abs(point[0]) < width / 2 + room + TRAY_GAP:
                 return None
             taken.append((point, room))
-            items.append(Item(role, asset, standing(point), variant))
+            items.append(table.Item(role, asset, table.standing(point), variant))
     if "c" in TRAY_STEPS[level]:
-        variant = draw_variant(rng, "bell")
-        room = radius("bell", variant) + TRAY_GAP
-        bell_seen = in_view(workcell, "bell", variant)
+        variant = table.draw_variant(rng, "bell")
+        room = table.radius("bell", variant) + TRAY_GAP
+        bell_seen = table.in_view(workcell, "bell", variant)
 
         def allowed(point: Point) -> bool:
             beyond = point[1] > middle[1] + depth / 2 + room or abs(point[0]) > width / 2 + room
@@ -200,7 +196,7 @@ def _tray_items(level: int, rng: np.random.Generator, workcell: Workcell) -> lis
         place = free_point(rng, BELL_X, BELL_Y, far, allowed=allowed)
         if place is None:
             return None
-        items.append(Item("bell", "bell", standing(place), variant, fixed=True))
+        items.append(table.Item("bell", "bell", table.standing(place), variant, fixed=True))
     return items
 
 
@@ -217,7 +213,7 @@ def _tray_station(scene: Scene, step: str) -> Station:
         return chain.click(scene, facts.bell, CLICK_BOX)
     role = FOOD[step.lower()][0]
     name, half = {"burger": facts.burger, "fries": facts.fries}[role], HALF[role]
-    spot = frame_of(scene, facts.tray, half)
+    spot = table.frame_of(scene, facts.tray, half)
     place = Place(name, scene.object(facts.tray).pose.apply(spot.position), arm=half)
     if step.isupper():
         after = steps.index(step.lower())

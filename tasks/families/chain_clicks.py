@@ -17,16 +17,8 @@ import numpy as np
 from robospa.geometry import Pose
 from robospa.tasks import objects
 from robospa.tasks.colors import NAMED
+from robospa.tasks.families import table
 from robospa.tasks.families.chain import Chain, Station, button
-from robospa.tasks.families.tabletop import (
-    Item,
-    draw_variant,
-    frame_of,
-    radius,
-    side_of,
-    standing,
-    variant_phrasings,
-)
 from robospa.tasks.goals.conditions import Opened, Rests, level_with
 from robospa.tasks.goals.counters import PressCounter
 from robospa.tasks.instructions.grammar import Slots
@@ -67,36 +59,42 @@ class CanFacts(SceneFacts):
     pad: str = ""
 
 
-def _can_items(level: int, rng: np.random.Generator, workcell: Workcell) -> list[Item] | None:
-    can = draw_variant(rng, "can")
-    items: list[Item] = []
+def _can_items(level: int, rng: np.random.Generator, workcell: Workcell) -> list[table.Item] | None:
+    can = table.draw_variant(rng, "can")
+    items: list[table.Item] = []
     far: list[tuple[Point, float]] = []  # what the can must keep away from, and how far [m]
     if level >= 2:
-        basket, bread = draw_variant(rng, "bread_basket"), draw_variant(rng, "bread")
-        between = max(0.1, radius("bread_basket", basket) + radius("bread", bread) + GAP)
+        basket, bread = table.draw_variant(rng, "bread_basket"), table.draw_variant(rng, "bread")
+        between = max(
+            0.1, table.radius("bread_basket", basket) + table.radius("bread", bread) + GAP
+        )
         at = free_point(rng, BREAD_X, BREAD_Y, [(BASKET, between)])
         if at is None:
             return None
         turn = float(rng.uniform(-math.pi, math.pi))
-        items.append(Item("basket", "bread_basket", standing(BASKET, turn), basket, fixed=True))
+        items.append(
+            table.Item("basket", "bread_basket", table.standing(BASKET, turn), basket, fixed=True)
+        )
         turn = float(rng.uniform(-BREAD_YAW, BREAD_YAW))
-        items.append(Item("bread", "bread", standing(at, turn), bread))
+        items.append(table.Item("bread", "bread", table.standing(at, turn), bread))
         far += [(BASKET, 0.18), (at, 0.18)]
     if level >= 4:
-        variant = draw_variant(rng, "pill_bottle")
+        variant = table.draw_variant(rng, "pill_bottle")
         bottle = free_point(rng, BOTTLE_X, LEFT_Y, [])
         pad = free_point(rng, PAD_X, LEFT_Y, [(bottle, 0.1)] if bottle else [])
         if bottle is None or pad is None:
             return None
         square = {"half": list(PAD_HALF), "color": list(NAMED["blue"])}
-        items.append(Item("pill_bottle", "pill_bottle", standing(bottle), variant))
-        items.append(Item("pad", "block", standing(pad, 0.0, PAD_HALF[2]), square, fixed=True))
+        items.append(table.Item("pill_bottle", "pill_bottle", table.standing(bottle), variant))
+        items.append(
+            table.Item("pad", "block", table.standing(pad, 0.0, PAD_HALF[2]), square, fixed=True)
+        )
         far += [(bottle, 0.1), (pad, 0.1)]
     first_y = CAN_FIRST_Y if level >= 2 else CAN_Y
     place = free_point(rng, CAN_X, first_y, far, tries=1) or free_point(rng, CAN_X, CAN_Y, far)
     if place is None:
         return None
-    return [*items, Item("can", "can", standing(place), can, fixed=True)]
+    return [*items, table.Item("can", "can", table.standing(place), can, fixed=True)]
 
 
 def _can_station(scene: Scene, step: str) -> Station:
@@ -179,17 +177,17 @@ class MicrowaveFacts(SceneFacts):
     reference: str = ""
 
 
-def _items(level: int, rng: np.random.Generator, workcell: Workcell) -> list[Item] | None:
+def _items(level: int, rng: np.random.Generator, workcell: Workcell) -> list[table.Item] | None:
     """Bell, microwave and things, each in its region, none where the door swings."""
-    bell, variant = _point(rng, BELL_X, BELL_Y), draw_variant(rng, "bell")
-    items = [Item("bell", "bell", standing(bell), variant, fixed=True)]
+    bell, variant = _point(rng, BELL_X, BELL_Y), table.draw_variant(rng, "bell")
+    items = [table.Item("bell", "bell", table.standing(bell), variant, fixed=True)]
     if level >= 2:
-        oven, finish = _point(rng, MICROWAVE_X, MICROWAVE_Y), draw_variant(rng, "microwave")
-        items.append(Item("microwave", "microwave", standing(oven), finish, fixed=True))
+        oven, finish = _point(rng, MICROWAVE_X, MICROWAVE_Y), table.draw_variant(rng, "microwave")
+        items.append(table.Item("microwave", "microwave", table.standing(oven), finish, fixed=True))
         if level >= 4:
             axis = _door(finish).point
             hinge = (oven[0] + axis[0], oven[1] + axis[1])
-            far = [(bell, radius("bell", variant) + ELBOW), (hinge, SWING)]
+            far = [(bell, table.radius("bell", variant) + ELBOW), (hinge, SWING)]
             things = _things(rng, workcell, far, oven)
             return things and [*items, *things]
     return items
@@ -201,14 +199,14 @@ def _point(rng: np.random.Generator, x: Range, y: Range) -> Point:
 
 def _things(
     rng: np.random.Generator, workcell: Workcell, far: list[tuple[Point, float]], oven: Point
-) -> list[Item] | None:
+) -> list[table.Item] | None:
     """Two things, either of which has room to the left of the other; None if there is no room.
 
     Which of the two is to be moved is a toss, so that the scene does not tell.
     """
     kinds = [THINGS[int(i)] for i in rng.choice(len(THINGS), 2, replace=False)]
-    variants = [draw_variant(rng, kind) for kind in kinds]
-    sizes = [radius(kind, variant) for kind, variant in zip(kinds, variants, strict=True)]
+    variants = [table.draw_variant(rng, kind) for kind in kinds]
+    sizes = [table.radius(kind, variant) for kind, variant in zip(kinds, variants, strict=True)]
     west, east = (
         np.stack([rng.uniform(*x, PAIRS), rng.uniform(*THING_Y, PAIRS)], axis=1)
         for x in (WEST_X, EAST_X)
@@ -226,7 +224,9 @@ def _things(
     first = int(np.argmax(fits))
     roles = ("object", "reference") if rng.random() < 0.5 else ("reference", "object")
     return [
-        Item(role, kind, standing((x, y), float(rng.uniform(-math.pi, math.pi))), variant)
+        table.Item(
+            role, kind, table.standing((x, y), float(rng.uniform(-math.pi, math.pi))), variant
+        )
         for role, kind, variant, (x, y) in zip(
             roles, kinds, variants, (west[first].tolist(), east[first].tolist()), strict=True
         )
@@ -248,13 +248,13 @@ def beside(pose: Pose, other: Pose) -> bool:
 def _station(scene: Scene, step: str) -> Station:
     facts = MicrowaveFacts.of(scene)
     if step == "c":
-        press = frame_of(scene, facts.bell, "touched")
+        press = table.frame_of(scene, facts.bell, "touched")
         counter = PressCounter(facts.bell, press, BELL_BOX, arm=0)
         return Station(counter, (Press(facts.bell, arm="left"),))
     if step == "o":
         opened = Opened(facts.microwave, OPEN * _door({}).upper)
         return Station(opened, (Open(facts.microwave, arm="left"),))
-    name, arm = facts.object, side_of(scene, facts.object)
+    name, arm = facts.object, table.side_of(scene, facts.object)
     x, y, _ = scene.object(facts.reference).pose.position
     to = (x - SHIFT, y, scene.table_top - objects.model_of(scene.object(name)).bottom)
     near = Rests(name, beside, targets=(facts.reference,))
@@ -266,7 +266,7 @@ def _slots(scene: Scene) -> Slots:
     phrases = TEXT.slots("arm", "bell", *(("microwave",) if scene.level >= 2 else ()))
     for role in ("object", "reference") if facts.object else ():
         thing = scene.object(getattr(facts, role))
-        train, held = variant_phrasings(objects.model_of(thing))
+        train, held = table.variant_phrasings(objects.model_of(thing))
         phrases[role] = tuple(f"the {p}" for p in train), tuple(f"the {p}" for p in held)
     return phrases
 

@@ -14,18 +14,9 @@ from functools import partial
 import numpy as np
 
 from robospa.geometry import Pose
+from robospa.tasks.families import table
 from robospa.tasks.families.chain import Chain, Station
 from robospa.tasks.families.dustbin import reachable
-from robospa.tasks.families.tabletop import (
-    Item,
-    cube,
-    draw_variant,
-    first_colors,
-    frame_of,
-    in_view,
-    radius,
-    standing,
-)
 from robospa.tasks.goals.conditions import Near, Rests
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText
@@ -37,7 +28,7 @@ from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "chain_mug.toml")
 
-COLORS = first_colors(4)
+COLORS = table.first_colors(4)
 """Bottom to top; level n has the first n - 1."""
 LETTERS = dict(zip("rgby", COLORS, strict=True))
 HALF = 0.015
@@ -79,27 +70,27 @@ class Facts(SceneFacts):
     yellow: str = ""
 
 
-def _items(level: int, rng: np.random.Generator, workcell: Workcell) -> list[Item] | None:
+def _items(level: int, rng: np.random.Generator, workcell: Workcell) -> list[table.Item] | None:
     """Mug and rack on the right, blocks on the left."""
-    mug, rack = draw_variant(rng, "mug"), draw_variant(rng, "mug_rack")
-    at = free_point(rng, MUG_X, MUG_Y, [], allowed=in_view(workcell, "mug", mug))
+    mug, rack = table.draw_variant(rng, "mug"), table.draw_variant(rng, "mug_rack")
+    at = free_point(rng, MUG_X, MUG_Y, [], allowed=table.in_view(workcell, "mug", mug))
     stand = free_point(rng, RACK_X, RACK_Y, [], allowed=partial(_rack_seen, workcell))
     if at is None or stand is None:
         return None
-    if math.dist(at, stand) < radius("mug", mug) + radius("mug_rack", rack):
+    if math.dist(at, stand) < table.radius("mug", mug) + table.radius("mug_rack", rack):
         return None
     turn = float(rng.uniform(-MUG_YAW, MUG_YAW))
-    items = [Item("mug", "mug", standing(at, turn), mug)]
+    items = [table.Item("mug", "mug", table.standing(at, turn), mug)]
     turn = RACK_TURN + float(rng.uniform(-RACK_YAW, RACK_YAW))
-    items.append(Item("rack", "mug_rack", standing(stand, turn), rack, fixed=True))
+    items.append(table.Item("rack", "mug_rack", table.standing(stand, turn), rack, fixed=True))
     points: list[Point] = [PLACE]
     for color in list(COLORS)[: level - 1]:
         point = _block_point(rng, workcell, BLOCK_Y[level], points)
         if point is None:
             return None
         points.append(point)
-        pose = standing(point, float(rng.uniform(-BLOCK_YAW, BLOCK_YAW)), HALF)
-        items.append(Item(color, "block", pose, cube(HALF, COLORS[color])))
+        pose = table.standing(point, float(rng.uniform(-BLOCK_YAW, BLOCK_YAW)), HALF)
+        items.append(table.Item(color, "block", pose, table.cube(HALF, COLORS[color])))
     return items
 
 
@@ -154,7 +145,10 @@ def _station(scene: Scene, step: str) -> Station:
     """The right arm hangs the mug, the left one builds."""
     facts = Facts.of(scene)
     if step == "m":
-        handle, peg = frame_of(scene, facts.mug, "handle"), frame_of(scene, facts.rack, "hang")
+        handle, peg = (
+            table.frame_of(scene, facts.mug, "handle"),
+            table.frame_of(scene, facts.rack, "hang"),
+        )
         near = _hangs(handle, peg, HANGING + scene.table_rise)
         hangs = Rests(facts.mug, near, grip=MUG_GRIP, targets=(facts.rack,))
         return Station(hangs, (Hang(facts.mug, on=facts.rack, arm="right"),))

@@ -24,7 +24,7 @@ from robospa.tasks.families.chain import (
     pressing_arm,
 )
 from robospa.tasks.families.dustbin import BIN, TABLE_SHIFT, container
-from robospa.tasks.families.tabletop import Item, draw_variant, frame_of, radius, standing
+from robospa.tasks.families.table import Item, draw_variant, frame_of, radius, standing
 from robospa.tasks.goals.conditions import Inside, Near, Rests
 from robospa.tasks.goals.counters import StampCounter, inside_box
 from robospa.tasks.instructions.grammar import Slots

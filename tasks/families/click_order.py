@@ -16,15 +16,8 @@ import numpy as np
 from robospa.action_space import ARMS
 from robospa.geometry import Vec3
 from robospa.tasks import objects
-from robospa.tasks.families.tabletop import (
-    Item,
-    draw_variant,
-    frame_of,
-    in_view,
-    named,
-    side_of,
-    standing,
-)
+from robospa.tasks.families import table
+from robospa.tasks.families.table import standing
 from robospa.tasks.goals.clicks import ClickInOrder
 from robospa.tasks.goals.counters import PRESS_BOX, PressCounter
 from robospa.tasks.instructions.grammar import Slots, Templates
@@ -72,7 +65,7 @@ class Facts(SceneFacts):
 
 def clickable(rng: np.random.Generator, asset: str) -> dict[str, int]:
     """Parameters of one of the variants of `asset` that click tasks use, each equally likely."""
-    return draw_variant(rng, asset, VARIANTS.get(asset))
+    return table.draw_variant(rng, asset, VARIANTS.get(asset))
 
 
 def laid_out(
@@ -113,14 +106,14 @@ def laid_out(
 
 def click_counter(scene: Scene, name: str, closed: bool = True) -> PressCounter:
     """Counts clicks of an object; `closed`: only while the gripper on its side is closed."""
-    arm = ARMS.index(side_of(scene, name)) if closed else None
+    arm = ARMS.index(table.side_of(scene, name)) if closed else None
     box = BOXES.get(scene.object(name).asset, PRESS_BOX)
-    return PressCounter(name, frame_of(scene, name, "touched"), box, arm=arm)
+    return PressCounter(name, table.frame_of(scene, name, "touched"), box, arm=arm)
 
 
 def clicks(scene: Scene, order: Sequence[str]) -> tuple[Skill, ...]:
     """A press each, by the arm on the object's side."""
-    return tuple(Press(name, arm=side_of(scene, name)) for name in order)
+    return tuple(Press(name, arm=table.side_of(scene, name)) for name in order)
 
 
 def in_order(scene: Scene, order: Sequence[str], standing: bool) -> ClickInOrder:
@@ -142,17 +135,17 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSampl
     things = [(asset, clickable(rng, asset)) for asset in ORDER[:level]]
     places = laid_out(rng, workcell, AREA, MIDDLE, DISTANCE, things)
     items = [
-        Item(asset, asset, standing(*place), variant, fixed=True)
+        table.Item(asset, asset, standing(*place), variant, fixed=True)
         for (asset, variant), place in zip(things, places, strict=True)
     ]
-    scene_objects, names = named(rng, items)
+    scene_objects, names = table.named(rng, items)
     return SceneSample(scene_objects, Facts(tuple(names[asset] for asset in ORDER[:level])))
 
 
 def slots(scene: Scene) -> Slots:
     """Phrasings for the things, and the arm on the side of the first."""
     order = [scene.object(name) for name in Facts.of(scene).order]
-    arm = acting_arm(side_of(scene, order[0].name))
+    arm = acting_arm(table.side_of(scene, order[0].name))
     if len(order) == 1:
         return TEXT.slots(f"thing.{order[0].asset}") | arm
     nouns = [TEXT.phrasings(f"thing.{item.asset}") for item in order]
@@ -188,12 +181,12 @@ LEAD, TURN, LAYOUTS = 0.012, 0.12, 400
 def _draw_bells(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
     """The ring of bells, all of one variant, shifted to a random place of the region."""
     params = clickable(rng, "bell")
-    points = _ring(level, rng, in_view(workcell, "bell", params))
+    points = _ring(level, rng, table.in_view(workcell, "bell", params))
     items = [
-        Item(f"bell {i}", "bell", standing(point), params, fixed=True)
+        table.Item(f"bell {i}", "bell", standing(point), params, fixed=True)
         for i, point in enumerate(points)
     ]
-    scene_objects, names = named(rng, items)
+    scene_objects, names = table.named(rng, items)
     return SceneSample(scene_objects, Facts(tuple(names[item.role] for item in items)))
 
 
@@ -262,7 +255,7 @@ def _bell_slots(scene: Scene) -> Slots:
         phrases = BELLS_TEXT.slots() | {"order": one_after_another(pair)}
     else:
         phrases = BELLS_TEXT.slots("bells", "way", count=count, word=NUMBERS[count])
-    return phrases | acting_arm(side_of(scene, order[0]))
+    return phrases | acting_arm(table.side_of(scene, order[0]))
 
 
 def _bell_templates(level: int) -> Templates:

@@ -27,7 +27,7 @@ from robospa.tasks.families.picking import (
     pick_name,
     pick_target,
 )
-from robospa.tasks.families.tabletop import standing
+from robospa.tasks.families.table import standing
 from robospa.tasks.goals.pick import Lift
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText

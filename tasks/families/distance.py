@@ -18,7 +18,7 @@ import numpy as np
 from robospa.geometry import Array
 from robospa.tasks.colors import NAMED, nearest
 from robospa.tasks.families.picking import PickFacts, lifted, pick_name, pick_target
-from robospa.tasks.families.tabletop import draw_variant, standing, variant_phrasings
+from robospa.tasks.families.table import draw_variant, standing, variant_phrasings
 from robospa.tasks.goals.pick import Lift
 from robospa.tasks.instructions.grammar import Phrasings, Slots
 from robospa.tasks.instructions.text import TaskText, ordinal

@@ -16,18 +16,7 @@ import numpy as np
 
 from robospa.geometry import Pose
 from robospa.tasks import objects
-from robospa.tasks.families import chain
-from robospa.tasks.families.tabletop import (
-    Item,
-    draw_variant,
-    frame_of,
-    in_view,
-    middle_in_view,
-    named,
-    radius,
-    side_of,
-    standing,
-)
+from robospa.tasks.families import chain, table
 from robospa.tasks.goals.conditions import Container, Inside, Rests, on_spot
 from robospa.tasks.goals.placing import collect
 from robospa.tasks.instructions.grammar import Slots, Templates
@@ -95,7 +84,7 @@ def _usable(workcell: Workcell, point: Point) -> bool:
     return (
         abs(point[0]) >= MIDDLE
         and reachable(workcell, point)
-        and middle_in_view(workcell, point, HALF_HEIGHT)
+        and table.middle_in_view(workcell, point, HALF_HEIGHT)
     )
 
 
@@ -104,10 +93,12 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSampl
     points = scatter_points(rng, level, X, Y, DISTANCE, partial(_usable, workcell))
     count = objects.variant_count("bottle")
     variants = rng.choice(count, size=level, replace=level > min(3, count))
-    items = [Item("dustbin", "dustbin", BIN, {"look": 0}, fixed=True)]
+    items = [table.Item("dustbin", "dustbin", BIN, {"look": 0}, fixed=True)]
     for i, (point, variant) in enumerate(zip(points, variants, strict=True)):
-        items.append(Item(f"bottle {i}", "bottle", standing(point), {"look": int(variant)}))
-    scene_objects, names = named(rng, items)
+        items.append(
+            table.Item(f"bottle {i}", "bottle", table.standing(point), {"look": int(variant)})
+        )
+    scene_objects, names = table.named(rng, items)
     facts = Facts(names["dustbin"], tuple(names[f"bottle {i}"] for i in range(level)))
     return SceneSample(scene_objects, facts, TABLE_SHIFT)
 
@@ -199,28 +190,30 @@ class CupFacts(SceneFacts):
         return tuple(name for name in names if name)
 
 
-def _items(level: int, rng: np.random.Generator, workcell: Workcell) -> list[Item] | None:
+def _items(level: int, rng: np.random.Generator, workcell: Workcell) -> list[table.Item] | None:
     """Bottles on the far half, cups and coasters on the near one."""
-    items = [Item("dustbin", "dustbin", BIN, {"look": 0}, fixed=True)]
+    items = [table.Item("dustbin", "dustbin", BIN, {"look": 0}, fixed=True)]
     points: list[Point] = []
 
     def put(role: str, x: Range, y: Range, far: list[tuple[Point, float]]) -> Point | None:
         asset = role.split("_")[0]
-        variant = CUP if asset == "cup" else draw_variant(rng, asset)
-        wide = radius(asset, variant)
-        seen = in_view(workcell, asset, variant)
+        variant = CUP if asset == "cup" else table.draw_variant(rng, asset)
+        wide = table.radius(asset, variant)
+        seen = table.in_view(workcell, asset, variant)
 
         def allowed(point: Point) -> bool:
             if not reachable(workcell, point):
                 return False
             if asset == "bottle":
-                return middle_in_view(workcell, point, HALF_HEIGHT)
+                return table.middle_in_view(workcell, point, HALF_HEIGHT)
             return point[0] - wide > TABLE_LEFT + EDGE and seen(point)
 
         point = free_point(rng, x, y, far, allowed=allowed)
         if point is not None:
             points.append(point)
-            items.append(Item(role, asset, standing(point), variant, fixed=asset == "coaster"))
+            items.append(
+                table.Item(role, asset, table.standing(point), variant, fixed=asset == "coaster")
+            )
         return point
 
     right = {1: (), 2: (ALONE_X,)}.get(BOTTLE_COUNT[level], (NEXT_X, LAST_X))
@@ -250,8 +243,8 @@ def _station(scene: Scene, step: str) -> chain.Station:
             discard(scene, name, facts.dustbin, _exchange_place(taken)),
         )
     i = "xy".index(step)
-    near = on_spot(REACH, -HEIGHT, HEIGHT, Pose(), frame_of(scene, coasters[0], "support"))
-    arm = side_of(scene, cups[i])
+    near = on_spot(REACH, -HEIGHT, HEIGHT, Pose(), table.frame_of(scene, coasters[0], "support"))
+    arm = table.side_of(scene, cups[i])
     return chain.Station(
         Rests(cups[i], near, grip=GRIP, targets=coasters, latched=True),
         (Pick(cups[i], lift=0.08, arm=arm), Place(cups[i], on=coasters[i], arm=arm)),

@@ -14,7 +14,7 @@ import numpy as np
 
 from robospa.tasks.families.chain import pressing_arm
 from robospa.tasks.families.click_order import click_counter
-from robospa.tasks.families.tabletop import Item, draw_variant, named, standing
+from robospa.tasks.families.table import Item, draw_variant, named, standing
 from robospa.tasks.goals.clicks import PressCounts
 from robospa.tasks.instructions.grammar import Phrasings, Slots
 from robospa.tasks.instructions.text import NUMBERS, TaskText, by_count, ordinal

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robospa.tasks.families.tabletop import Item, cube, first_colors, moved, named, side, standing
+from robospa.tasks.families import table
 from robospa.tasks.goals.memory import AfterCue, Cover, uncover
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText, color_orders
@@ -22,7 +22,7 @@ from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "memory_cover.toml")
 
-COLORS = first_colors(10)
+COLORS = table.first_colors(10)
 ROWS = {
     1: (0.0,),
     2: (-0.20, 0.20),
@@ -55,11 +55,15 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSampl
     chosen = [list(COLORS)[int(i)] for i in rng.permutation(len(COLORS))[:level]]
     items = []
     for color, x in zip(chosen, ROWS[level], strict=True):
-        pose = standing((x, Y), height=HALF)
-        items.append(Item(f"{color} block", "block", pose, cube(HALF, COLORS[color]), fixed=True))
-        items.append(Item(f"{color} cover", "cover", standing((x, Y)), appears_at=COVERED_AT))
+        pose = table.standing((x, Y), height=HALF)
+        items.append(
+            table.Item(f"{color} block", "block", pose, table.cube(HALF, COLORS[color]), fixed=True)
+        )
+        items.append(
+            table.Item(f"{color} cover", "cover", table.standing((x, Y)), appears_at=COVERED_AT)
+        )
     order = tuple(shuffled(rng, chosen))
-    scene_objects, names = named(rng, items)
+    scene_objects, names = table.named(rng, items)
     facts = Facts(
         colors=order,
         covers=tuple(names[f"{color} cover"] for color in order),
@@ -87,7 +91,7 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
     """Hold still until the covers are there, then open them one by one."""
     skills: list[Skill] = [Wait(COVERED_AT + 0.6)]
     for name, (x, y) in _open_places(scene).items():
-        skills += moved(name, (x, y, scene.table_top), side(x))
+        skills += table.moved(name, (x, y, scene.table_top), table.side(x))
     return (*skills, Home())
 
 

@@ -18,16 +18,7 @@ import numpy as np
 from robospa.geometry import Pose, yaw_rotation
 from robospa.tasks import objects
 from robospa.tasks.colors import NAMED
-from robospa.tasks.families import click_order
-from robospa.tasks.families.tabletop import (
-    COLORS,
-    Item,
-    cube,
-    moved,
-    named,
-    side_of,
-    standing,
-)
+from robospa.tasks.families import click_order, table
 from robospa.tasks.goals.conditions import Region
 from robospa.tasks.goals.memory import AfterCue, OrientationTarget, restore
 from robospa.tasks.goals.placing import gather
@@ -56,17 +47,17 @@ SHOWN_X = 0.18
 """Largest |x| [m] of what is shown on a stand."""
 
 
-def wall(y: float, half_x: float = WALL_HALF[0]) -> Item:
+def wall(y: float, half_x: float = WALL_HALF[0]) -> table.Item:
     """The wall across the table at `y` [m]; it stands there from HIDDEN_AT on."""
     params = {"half": [half_x, *WALL_HALF[1:]], "color": list(WALL_COLOR)}
     pose = Pose((0.0, y, WALL_Z))
-    return Item(WALL, "block", pose, params, fixed=True, appears_at=HIDDEN_AT)
+    return table.Item(WALL, "block", pose, params, fixed=True, appears_at=HIDDEN_AT)
 
 
-def stand(y: float, half: tuple[float, float, float]) -> Item:
+def stand(y: float, half: tuple[float, float, float]) -> table.Item:
     """A flat gray stand over the table at `y` [m]: white is seen on it, and black."""
     params = {"half": list(half), "color": list(NAMED["gray"])}
-    return Item("stand", "block", Pose((0.0, y, STAND_Z)), params, fixed=True)
+    return table.Item("stand", "block", Pose((0.0, y, STAND_Z)), params, fixed=True)
 
 
 def noun_of(item: SceneObject) -> str:
@@ -115,17 +106,28 @@ class BlocksFacts(SceneFacts):
 
 def _draw_blocks(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
     """Colours on the stand; the same and as many others on the table, all places alike."""
-    colors = [list(COLORS)[int(i)] for i in rng.permutation(len(COLORS))[: 2 * level]]
+    colors = [list(table.COLORS)[int(i)] for i in rng.permutation(len(table.COLORS))[: 2 * level]]
     shape, radius = (2 * level, TRIES), HALF * math.sqrt(2)
     propose = candidates(workcell, AREA, shape, radius, 2 * HALF, MIDDLE)
     points = shuffled(rng, scatter(rng, propose, DISTANCE))
     items = [wall(0.12), BLOCKS_STAND]
     for color, x in zip(colors[:level], row(level, SHOWN_X), strict=True):
         pose = Pose((x, BLOCKS_STAND.pose.position[1], STAND_TOP + HALF))
-        items.append(Item(f"{color} shown", "block", pose, cube(HALF, COLORS[color]), fixed=True))
+        items.append(
+            table.Item(
+                f"{color} shown", "block", pose, table.cube(HALF, table.COLORS[color]), fixed=True
+            )
+        )
     for color, point in zip(colors, points, strict=True):
-        items.append(Item(color, "block", standing(point, height=HALF), cube(HALF, COLORS[color])))
-    scene_objects, names = named(rng, items)
+        items.append(
+            table.Item(
+                color,
+                "block",
+                table.standing(point, height=HALF),
+                table.cube(HALF, table.COLORS[color]),
+            )
+        )
+    scene_objects, names = table.named(rng, items)
     facts = BlocksFacts(
         colors=tuple(colors[:level]),
         targets=tuple(names[color] for color in colors[:level]),
@@ -147,7 +149,7 @@ def _blocks_plan(scene: Scene) -> tuple[Skill, ...]:
     targets = tuple(sorted(targets, key=lambda n: scene.object(n).pose.position[0]))
     skills: list[Skill] = [HOLD_STILL]
     for name, x in zip(targets, row(len(targets), GOAL_X), strict=True):
-        skills += moved(name, (x, GOAL_Y, scene.table_top + HALF), side_of(scene, name))
+        skills += table.moved(name, (x, GOAL_Y, scene.table_top + HALF), table.side_of(scene, name))
     return (*skills, Home())
 
 
@@ -199,9 +201,9 @@ def _draw_objects(level: int, rng: np.random.Generator, workcell: Workcell) -> S
     for (kind, variant), x, place in zip(things, row(level, SHOWN_X), places, strict=True):
         turn = float(rng.uniform(-SHOWN_TURN, SHOWN_TURN)) if kind == "bread" else 0.0
         pose = Pose((x, OBJECTS_STAND.pose.position[1], STAND_TOP), yaw_rotation(turn))
-        items.append(Item(f"{kind} shown", kind, pose, variant, fixed=True))
-        items.append(Item(kind, kind, standing(*place), variant, fixed=True))
-    scene_objects, names = named(rng, items)
+        items.append(table.Item(f"{kind} shown", kind, pose, variant, fixed=True))
+        items.append(table.Item(kind, kind, table.standing(*place), variant, fixed=True))
+    scene_objects, names = table.named(rng, items)
     facts = ObjectsFacts(tuple(names[kind] for kind in kinds), tuple(kinds), names[WALL])
     return SceneSample(scene_objects, facts)
 
@@ -271,12 +273,14 @@ def _draw_turned(level: int, rng: np.random.Generator, workcell: Workcell) -> Sc
     variant = int(rng.integers(objects.variant_count("t_block")))
     items = [wall(0.10)]
     for i, (x, turn) in enumerate(zip(row(level, FAR_X), shown, strict=True)):
-        pose = standing((x, FAR_Y), TURNS[turn])
-        items.append(Item(f"far {i}", "t_block", pose, {"look": variant, "kind": far_kind}))
+        pose = table.standing((x, FAR_Y), TURNS[turn])
+        items.append(table.Item(f"far {i}", "t_block", pose, {"look": variant, "kind": far_kind}))
     for i, (x, turn) in enumerate(zip(row(level, NEAR_X), start, strict=True)):
-        pose = standing((x, NEAR_Y), TURNS[turn])
-        items.append(Item(f"near {i}", "t_block", pose, {"look": variant, "kind": 1 - far_kind}))
-    scene_objects, names = named(rng, items)
+        pose = table.standing((x, NEAR_Y), TURNS[turn])
+        items.append(
+            table.Item(f"near {i}", "t_block", pose, {"look": variant, "kind": 1 - far_kind})
+        )
+    scene_objects, names = table.named(rng, items)
     facts = TurnedFacts(
         near=tuple(names[f"near {i}"] for i in range(level)),
         far=tuple(names[f"far {i}"] for i in range(level)),
@@ -305,7 +309,7 @@ def _turned_plan(scene: Scene) -> tuple[Skill, ...]:
     skills: list[Skill] = [HOLD_STILL]
     facts = TurnedFacts.of(scene)
     for name, start, turn in zip(facts.near, facts.start, facts.turns, strict=True):
-        place, arm = scene.object(name).pose.position, side_of(scene, name)
+        place, arm = scene.object(name).pose.position, table.side_of(scene, name)
         half = (turn - start) % 4 == 2 and abs(place[0]) < FULL_TURN
         for way in ((start + 1) % 4, turn) if half else (turn,):
             skills.append(Pick(name, lift=0.08, arm=arm))

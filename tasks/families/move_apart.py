@@ -14,17 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from robospa.tasks import objects
-from robospa.tasks.families.tabletop import (
-    Item,
-    cube,
-    draw_variant,
-    first_colors,
-    moved,
-    named,
-    side,
-    side_of,
-    standing,
-)
+from robospa.tasks.families import table
 from robospa.tasks.goals.conditions import Region
 from robospa.tasks.goals.placing import Destination, bring
 from robospa.tasks.instructions.grammar import Phrasings, Slots
@@ -48,7 +38,7 @@ FOOD_TEXT = TaskText.beside(__file__, "move_apart_food.toml")
 
 LEVELS = {n: Level(candidates=n, subtasks=n, steps=200 * n) for n in range(1, 6)}
 
-COLORS = first_colors(7)
+COLORS = table.first_colors(7)
 TO_RIGHT = {2: 1, 3: 1, 4: 2, 5: 2}
 """How many of the blocks have the first colour, which goes right."""
 X, Y, YAW = (-0.06, 0.06), (-0.22, 0.10), 0.75
@@ -116,15 +106,15 @@ def _draw_blocks(level: int, rng: np.random.Generator, workcell: Workcell) -> Sc
     words = [first] * right + [second] * (level - right)
     half = float(rng.uniform(*HALF))
     items = [
-        Item(
+        table.Item(
             str(i),
             "block",
-            standing((square.x, square.y), square.yaw, half),
-            cube(half, COLORS[word]),
+            table.standing((square.x, square.y), square.yaw, half),
+            table.cube(half, COLORS[word]),
         )
         for i, (word, square) in enumerate(zip(words, _squares(rng, level, half), strict=True))
     ]
-    scene_objects, names = named(rng, items)
+    scene_objects, names = table.named(rng, items)
     blocks = tuple(names[str(i)] for i in range(level))
     facts = BlocksFacts(
         right=blocks[:right],
@@ -152,7 +142,7 @@ def _blocks_plan(scene: Scene) -> tuple[Skill, ...]:
         rows = PLACE_Y.get(len(at), ())
         for name, y in zip(sorted(at, key=lambda n: -at[n][1]), rows, strict=True):
             half = float(scene.object(name).params["half"][2])
-            skills += moved(name, (x, y, scene.table_top + half), arm)
+            skills += table.moved(name, (x, y, scene.table_top + half), arm)
     return tuple(skills)
 
 
@@ -209,13 +199,13 @@ def _draw_cards(level: int, rng: np.random.Generator, workcell: Workcell) -> Sce
     """Boxes anywhere in the region, each turned any way that a gripper can take."""
     found = scatter_points(rng, level, CARDS_X, CARDS_Y, CARDS_DISTANCE, tries=10)
     points = shuffled(rng, found)
-    variants = [draw_variant(rng, "playing_cards") for _ in points]
+    variants = [table.draw_variant(rng, "playing_cards") for _ in points]
     lying = [Turnable("playing_cards", *thing) for thing in zip(variants, points, strict=True)]
     items = [
-        Item(str(i), box.asset, standing(box.place, yaw), box.params)
+        table.Item(str(i), box.asset, table.standing(box.place, yaw), box.params)
         for i, (box, yaw) in enumerate(zip(lying, free_turns(rng, workcell, lying), strict=True))
     ]
-    scene_objects, names = named(rng, items)
+    scene_objects, names = table.named(rng, items)
     return SceneSample(scene_objects, CardsFacts(tuple(names[item.role] for item in items)))
 
 
@@ -223,7 +213,7 @@ def _cards_goal(scene: Scene) -> Tracker:
     """Every box far out on either side; the farther side is a diagnostic."""
     both, across = tuple(SIDES.values()), {"left": SIDES["right"], "right": SIDES["left"]}
     boxes = CardsFacts.of(scene).boxes
-    parts = [Destination(name, both, (across[side_of(scene, name)],)) for name in boxes]
+    parts = [Destination(name, both, (across[table.side_of(scene, name)],)) for name in boxes]
     return bring(parts, scene.table_top)
 
 
@@ -231,12 +221,12 @@ def _cards_plan(scene: Scene) -> tuple[Skill, ...]:
     """Each box straight out to its own side, the outer ones first, with room between them."""
     skills: list[Skill] = []
     for arm, x in (("left", -AWAY_X), ("right", AWAY_X)):
-        names = [name for name in CardsFacts.of(scene).boxes if side_of(scene, name) == arm]
+        names = [name for name in CardsFacts.of(scene).boxes if table.side_of(scene, name) == arm]
         at = {name: scene.object(name).pose.position for name in names}
         rows = _rows(sorted(at[name][1] for name in names))
         places = dict(zip(sorted(names, key=lambda n: at[n][1]), rows, strict=True))
         for name in sorted(names, key=lambda n: -abs(at[n][0])):
-            skills += moved(name, (x, places[name], scene.table_top), arm)
+            skills += table.moved(name, (x, places[name], scene.table_top), arm)
     return tuple(skills)
 
 
@@ -316,11 +306,13 @@ def _draw_food(level: int, rng: np.random.Generator, workcell: Workcell) -> Scen
     centres, spread = SLOTS_X[level]
     for centre, index in zip(centres, rng.permutation(level), strict=True):
         kind = kinds[0] if int(index) < first else kinds[1]
-        variant = draw_variant(rng, ASSETS[kind])
+        variant = table.draw_variant(rng, ASSETS[kind])
         yaw = float(rng.uniform(-BREAD_YAW, BREAD_YAW)) if kind == "bread" else 0.0
         x = MIDDLE + centre + float(rng.uniform(-spread, spread))
-        items.append(Item(str(int(index)), ASSETS[kind], standing((x, y), yaw), variant))
-    scene_objects, names = named(rng, items)
+        items.append(
+            table.Item(str(int(index)), ASSETS[kind], table.standing((x, y), yaw), variant)
+        )
+    scene_objects, names = table.named(rng, items)
     foods = tuple(names[str(i)] for i in range(level))
     return SceneSample(scene_objects, FoodFacts(foods[:first], foods[first:], kinds[0], kinds[1]))
 
@@ -343,7 +335,7 @@ def _food_plan(scene: Scene) -> tuple[Skill, ...]:
     ]
     skills: list[Skill] = []
     for x, name, y in sorted(moves):
-        skills += moved(name, (x, y, scene.table_top), side(x))
+        skills += table.moved(name, (x, y, scene.table_top), table.side(x))
     return tuple(skills)
 
 

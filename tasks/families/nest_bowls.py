@@ -12,7 +12,7 @@ import numpy as np
 
 from robospa.geometry import Array, Vec3
 from robospa.tasks import objects
-from robospa.tasks.families.tabletop import Item, draw_variant, named, side, side_of, standing
+from robospa.tasks.families import table
 from robospa.tasks.goals.arranging import nest
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import NUMBERS, TaskText, by_count
@@ -57,9 +57,15 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSampl
     shape, height = (level, TRIES), model.size[2]
     propose = candidates(workcell, AREA, shape, model.radius, height, MIDDLE, free)
     points = shuffled(rng, scatter(rng, propose, DISTANCE, restarts=RESTARTS))
-    items = [Item("plate", "plate", standing(plate), draw_variant(rng, "plate"), fixed=True)]
-    items += [Item(str(i), "bowl", standing(point), BOWL) for i, point in enumerate(points)]
-    scene_objects, names = named(rng, items)
+    items = [
+        table.Item(
+            "plate", "plate", table.standing(plate), table.draw_variant(rng, "plate"), fixed=True
+        )
+    ]
+    items += [
+        table.Item(str(i), "bowl", table.standing(point), BOWL) for i, point in enumerate(points)
+    ]
+    scene_objects, names = table.named(rng, items)
     return SceneSample(
         scene_objects,
         Facts(names["plate"], tuple(names[str(i)] for i in range(level))),
@@ -75,11 +81,11 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
     """One bowl after the other, those on the plate's side and the near ones first."""
     plate = Facts.of(scene).plate
     at = {name: scene.object(name).pose.position for name in Facts.of(scene).bowls}
-    here = side_of(scene, plate)
+    here = table.side_of(scene, plate)
     skills: list[Skill] = []
     below: str | None = None
-    for name in sorted(at, key=lambda n: (side(at[n][0]) != here, at[n][1])):
-        arm = side(at[name][0])
+    for name in sorted(at, key=lambda n: (table.side(at[n][0]) != here, at[n][1])):
+        arm = table.side(at[name][0])
         skills.append(Pick(name, lift=0.10, arm=arm))
         if below is None:
             skills.append(Place(name, on=plate, arm=arm))

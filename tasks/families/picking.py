@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from robospa.tasks.colors import NAMED
-from robospa.tasks.families.tabletop import draw_variant
+from robospa.tasks.families.table import draw_variant
 from robospa.tasks.goals.pick import Lift, PickTracker
 from robospa.tasks.objects import model_of
 from robospa.tasks.plan import Pick, Skill
@@ -51,8 +51,7 @@ def pick_target(scene: Scene) -> tuple[Skill, ...]:
 
 
 BLOCK_HALF = 0.015
-BLOCK_RADIUS = 0.0213
-"""Half an edge [m] of a block among mixed objects, and the radius of its footprint."""
+"""Half an edge [m] of a block among mixed objects."""
 BLOCK_COLORS = ("red", "blue", "green", "yellow", "purple", "black")
 
 

@@ -15,8 +15,8 @@ from itertools import pairwise
 import numpy as np
 
 from robospa.geometry import Vec3
+from robospa.tasks.families import table
 from robospa.tasks.families.stack_blocks import NEAR_BAND
-from robospa.tasks.families.tabletop import ORDERED, Item, drawn_color, moved, named, side, standing
 from robospa.tasks.goals.arranging import row
 from robospa.tasks.goals.placing import bring_alone
 from robospa.tasks.instructions.grammar import Phrasings, Slots
@@ -76,7 +76,7 @@ class Facts(SceneFacts):
 
 
 def _heights(level: int, rng: np.random.Generator) -> list[Block]:
-    half, color = float(rng.uniform(0.013, 0.015)), drawn_color(rng)
+    half, color = float(rng.uniform(0.013, 0.015)), table.drawn_color(rng)
     if level == 1:
         return [((half, half, half), color)]
     ranges = HALF_HEIGHTS if level == 5 else HALF_HEIGHTS[1 : level + 1]
@@ -85,11 +85,13 @@ def _heights(level: int, rng: np.random.Generator) -> list[Block]:
 
 def _colors(level: int, rng: np.random.Generator) -> list[Block]:
     half = float(rng.uniform(0.015, 0.025))
-    return [((half, half, half), color) for color in map(list, list(ORDERED.values())[:level])]
+    return [
+        ((half, half, half), color) for color in map(list, list(table.ORDERED.values())[:level])
+    ]
 
 
 def _sizes(level: int, rng: np.random.Generator) -> list[Block]:
-    color = drawn_color(rng)
+    color = table.drawn_color(rng)
     ranges = HALF_SIZES if level == 5 else HALF_SIZES[1 : level + 1]
     halves = [float(rng.uniform(*ends)) for ends in ranges]
     if level == 1:
@@ -129,17 +131,17 @@ def _places(looks: Sequence[Block], rng: np.random.Generator, workcell: Workcell
 
 def _draw(looks: Sequence[Block], rng: np.random.Generator, workcell: Workcell) -> SceneSample:
     items = [
-        Item(
+        table.Item(
             str(rank),
             "block",
-            standing(point, float(rng.uniform(-YAW, YAW)), half[2]),
+            table.standing(point, float(rng.uniform(-YAW, YAW)), half[2]),
             {"half": list(half), "color": list(color)},
         )
         for rank, ((half, color), point) in enumerate(
             zip(looks, _places(looks, rng, workcell), strict=True)
         )
     ]
-    scene_objects, names = named(rng, items)
+    scene_objects, names = table.named(rng, items)
     return SceneSample(scene_objects, Facts(tuple(names[item.role] for item in items)))
 
 
@@ -152,10 +154,10 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
     at = {name: scene.object(name).pose.position for name in order}
     skills: list[Skill] = []
     for name in sorted(order, key=lambda n: (at[n][0] > 0, -abs(at[n][0]))):
-        arm = side(at[name][0])
+        arm = table.side(at[name][0])
         x = ROWS[scene.level][order.index(name)]
         half = float(scene.object(name).params["half"][2])
-        skills += moved(name, (x, ROW_Y, scene.table_top + half), arm)
+        skills += table.moved(name, (x, ROW_Y, scene.table_top + half), arm)
     return tuple(skills)
 
 
@@ -213,7 +215,7 @@ RANKINGS = (
         "Color",
         _colors,
         "block.red",
-        lambda count: _color_order(list(ORDERED)[:count]),
+        lambda count: _color_order(list(table.ORDERED)[:count]),
         "Line the blocks up from left to right: red, green, blue, yellow, purple.",
         "the next colour's",
     ),

@@ -16,15 +16,8 @@ import numpy as np
 
 from robospa.geometry import Vec3
 from robospa.tasks import objects
+from robospa.tasks.families import table
 from robospa.tasks.families.chain import button, pressing_arm
-from robospa.tasks.families.tabletop import (
-    Item,
-    draw_variant,
-    frame_of,
-    named,
-    side_of,
-    standing,
-)
 from robospa.tasks.goals import lift_cycles
 from robospa.tasks.goals.checklist import Checklist
 from robospa.tasks.goals.counters import FIGURES, PRESS_BOX
@@ -76,9 +69,9 @@ class StaplerFacts(SceneFacts):
 def _draw_stapler(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
     """One stapler anywhere in the region, turned any way."""
     point = (float(rng.uniform(*X)), float(rng.uniform(*Y)))
-    pose = standing(point, float(rng.uniform(-math.pi, math.pi)))
-    items = [Item("stapler", "stapler", pose, draw_variant(rng, "stapler"), fixed=True)]
-    scene_objects, names = named(rng, items)
+    pose = table.standing(point, float(rng.uniform(-math.pi, math.pi)))
+    items = [table.Item("stapler", "stapler", pose, table.draw_variant(rng, "stapler"), fixed=True)]
+    scene_objects, names = table.named(rng, items)
     return SceneSample(scene_objects, StaplerFacts(names["stapler"], level))
 
 
@@ -126,7 +119,7 @@ class BellFacts(SceneFacts):
 
 def _draw_bell(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
     """One bell in view and off the middle strip; left and right are equally likely."""
-    variant = draw_variant(rng, "bell")
+    variant = table.draw_variant(rng, "bell")
     model = objects.object_model("bell", variant)
     y = float(rng.uniform(*BELL_Y))
     low, high = workcell.view_span(y, model.radius, model.size[2])
@@ -134,8 +127,8 @@ def _draw_bell(level: int, rng: np.random.Generator, workcell: Workcell) -> Scen
         x = float(rng.uniform(max(-BELL_FAR, low), -BELL_MIDDLE))
     else:
         x = float(rng.uniform(BELL_MIDDLE, min(BELL_FAR, high)))
-    items = [Item("bell", "bell", standing((x, y)), variant, fixed=True)]
-    scene_objects, names = named(rng, items)
+    items = [table.Item("bell", "bell", table.standing((x, y)), variant, fixed=True)]
+    scene_objects, names = table.named(rng, items)
     return SceneSample(scene_objects, BellFacts(names["bell"], level))
 
 
@@ -147,14 +140,14 @@ def _bell_goal(scene: Scene) -> Checklist:
 def _bell_plan(scene: Scene) -> tuple[Skill, ...]:
     """As many presses as asked for, by the arm on the bell's side."""
     facts = BellFacts.of(scene)
-    return (Press(facts.bell, hover=HOVER, arm=side_of(scene, facts.bell)),) * facts.count
+    return (Press(facts.bell, hover=HOVER, arm=table.side_of(scene, facts.bell)),) * facts.count
 
 
 def _bell_slots(scene: Scene) -> Slots:
     """Phrasings for the bell, the arm on its side and the count."""
     facts = BellFacts.of(scene)
     words = _words(BELL_TEXT, facts.count, ["bell", "closed"], "clicks")
-    return words | acting_arm(side_of(scene, facts.bell))
+    return words | acting_arm(table.side_of(scene, facts.bell))
 
 
 CLICK_BELL = Task(
@@ -211,7 +204,7 @@ class Lifted:
 
 
 def _pot_tests(scene: Scene, name: str) -> tuple[lift_cycles.PoseTest, lift_cycles.PoseTest]:
-    handles = [frame_of(scene, name, arm).position for arm in ("left", "right")]
+    handles = [table.frame_of(scene, name, arm).position for arm in ("left", "right")]
     up = lift_cycles.held_up(name, UP + scene.table_rise, handles)
     return up, lift_cycles.put_down(name, DOWN, ASIDE)
 
@@ -254,9 +247,11 @@ def _draw_lifted(
     thing: Lifted, level: int, rng: np.random.Generator, workcell: Workcell
 ) -> SceneSample:
     point = (float(rng.uniform(*thing.x)), float(rng.uniform(*thing.y)))
-    pose = standing(point, float(rng.uniform(-thing.yaw, thing.yaw)))
-    items = [Item("thing", thing.asset, pose, draw_variant(rng, thing.asset, thing.variants))]
-    scene_objects, names = named(rng, items)
+    pose = table.standing(point, float(rng.uniform(-thing.yaw, thing.yaw)))
+    items = [
+        table.Item("thing", thing.asset, pose, table.draw_variant(rng, thing.asset, thing.variants))
+    ]
+    scene_objects, names = table.named(rng, items)
     return SceneSample(scene_objects, LiftFacts(names["thing"], level))
 
 
@@ -270,7 +265,7 @@ def _lift_goal(thing: Lifted, scene: Scene) -> Checklist:
 def _lift_plan(thing: Lifted, scene: Scene) -> tuple[Skill, ...]:
     """All cycles in one go: both arms for the pot, the arm on its side for the fan."""
     facts = LiftFacts.of(scene)
-    arms = ("left", "right") if thing.both else (side_of(scene, facts.thing),)
+    arms = ("left", "right") if thing.both else (table.side_of(scene, facts.thing),)
     return (RaiseLower(facts.thing, thing.rise, facts.count, arms),)
 
 

@@ -14,16 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robospa.tasks.families.tabletop import (
-    ORDERED,
-    Item,
-    cube,
-    drawn_color,
-    middle_in_view,
-    named,
-    side_of,
-    standing,
-)
+from robospa.tasks.families import table
 from robospa.tasks.goals.arranging import HEIGHT_TOLERANCE, stack
 from robospa.tasks.goals.checklist import Checklist
 from robospa.tasks.goals.conditions import Region
@@ -70,13 +61,13 @@ class TowerFacts(SceneFacts):
 def _sample(
     level: int,
     rng: np.random.Generator,
-    items: Sequence[Item],
+    items: Sequence[table.Item],
     points: Sequence[Point],
     colors: tuple[str, ...] = (),
 ) -> SceneSample:
     """The blocks from bottom to top, at `points`, and the expert's place."""
     place = _building_place(level, rng, points)
-    scene_objects, names = named(rng, items)
+    scene_objects, names = table.named(rng, items)
     order = tuple(names[item.role] for item in items)
     return SceneSample(scene_objects, TowerFacts(order, place, colors))
 
@@ -110,7 +101,7 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
     skills: list[Skill] = []
     height = 0.0
     for i, name in enumerate(order):
-        arm = side_of(scene, name)
+        arm = table.side_of(scene, name)
         half = _half_height(scene, name)
         skills.append(Pick(name, lift=0.10 + height, arm=arm))
         if i == 0:
@@ -161,17 +152,17 @@ def _draw_colors(level: int, rng: np.random.Generator, workcell: Workcell) -> Sc
         return abs(point[0]) >= 0.05 and apart(point, [(0.0, -0.10)], 0.10)
 
     def allowed(point: Point) -> bool:
-        return (level > 1 or away(point)) and middle_in_view(workcell, point, COLOR_HALF)
+        return (level > 1 or away(point)) and table.middle_in_view(workcell, point, COLOR_HALF)
 
     points = scatter_points(rng, level, X, Y, DISTANCE, allowed, near_middle=True)
     items = [
-        Item(
+        table.Item(
             color,
             "block",
-            standing(point, float(rng.uniform(-YAW, YAW)), COLOR_HALF),
-            cube(COLOR_HALF, rgb),
+            table.standing(point, float(rng.uniform(-YAW, YAW)), COLOR_HALF),
+            table.cube(COLOR_HALF, rgb),
         )
-        for (color, rgb), point in zip(ORDERED.items(), points, strict=False)
+        for (color, rgb), point in zip(table.ORDERED.items(), points, strict=False)
     ]
     return _sample(level, rng, items, points, tuple(item.role for item in items))
 
@@ -270,11 +261,11 @@ def _draw_sizes(level: int, rng: np.random.Generator, workcell: Workcell) -> Sce
     cubes = [(half, half, half) for half in halves]
     ground = Ground(AREA, 0.05, MIDDLE, 0.10 if level == 1 else 0.15)
     points = scatter_blocks(rng, workcell, ground, cubes, lambda i, j: DISTANCE)
-    color = drawn_color(rng)
+    color = table.drawn_color(rng)
     items = []
     for i, (half, point) in enumerate(zip(halves, points, strict=True)):
-        pose = standing(point, float(rng.uniform(-YAW, YAW)), half)
-        items.append(Item(f"block {i}", "block", pose, cube(half, color)))
+        pose = table.standing(point, float(rng.uniform(-YAW, YAW)), half)
+        items.append(table.Item(f"block {i}", "block", pose, table.cube(half, color)))
     return _sample(level, rng, items, points)
 
 
@@ -324,11 +315,11 @@ def _draw_lengths(level: int, rng: np.random.Generator, workcell: Workcell) -> S
         return reach[i] + reach[j] + GAP
 
     points = scatter_blocks(rng, workcell, GROUNDS[min(level, 2)], halves, gap, wide)
-    color = drawn_color(rng)
+    color = table.drawn_color(rng)
     items = []
     for i, half in enumerate(halves):
-        pose = standing(points[i], float(rng.uniform(-BAR_YAW, BAR_YAW)), half_z)
-        items.append(Item(f"block {i}", "block", pose, {"half": list(half), "color": color}))
+        pose = table.standing(points[i], float(rng.uniform(-BAR_YAW, BAR_YAW)), half_z)
+        items.append(table.Item(f"block {i}", "block", pose, {"half": list(half), "color": color}))
     return _sample(level, rng, items, points)
 
 

@@ -16,18 +16,7 @@ import numpy as np
 from robospa.geometry import Array
 from robospa.tasks import objects
 from robospa.tasks.colors import LOOK_ALIKES
-from robospa.tasks.families.tabletop import (
-    ORDERED,
-    Item,
-    cube,
-    draw_variant,
-    frame_of,
-    in_view,
-    named,
-    side,
-    side_of,
-    standing,
-)
+from robospa.tasks.families import table
 from robospa.tasks.goals.clicks import UseInOrder
 from robospa.tasks.goals.counters import HitCounter, StampCounter
 from robospa.tasks.instructions.grammar import Phrasings, Slots
@@ -89,12 +78,14 @@ def _draw_hammer(level: int, rng: np.random.Generator, workcell: Workcell) -> Sc
 
     first, *others = scatter(rng, propose, DISTANCE)
     points = [first, *shuffled(rng, others)]
-    items = [Item("hammer", "hammer", standing(HAMMER_AT), draw_variant(rng, "hammer"))]
-    for (color, rgb), point in zip(ORDERED.items(), points, strict=False):
-        pose = standing(point, float(rng.uniform(-YAW, YAW)), HALF)
-        items.append(Item(color, "block", pose, cube(HALF, rgb), fixed=True))
-    scene_objects, names = named(rng, items)
-    colors = tuple(ORDERED)[:level]
+    items = [
+        table.Item("hammer", "hammer", table.standing(HAMMER_AT), table.draw_variant(rng, "hammer"))
+    ]
+    for (color, rgb), point in zip(table.ORDERED.items(), points, strict=False):
+        pose = table.standing(point, float(rng.uniform(-YAW, YAW)), HALF)
+        items.append(table.Item(color, "block", pose, table.cube(HALF, rgb), fixed=True))
+    scene_objects, names = table.named(rng, items)
+    colors = tuple(table.ORDERED)[:level]
     facts = HammerFacts(names["hammer"], colors, tuple(names[c] for c in colors))
     return SceneSample(scene_objects, facts)
 
@@ -110,9 +101,10 @@ def _beside_hammer(x: Array, y: Array) -> Mask:
 def _hammer_goal(scene: Scene) -> UseInOrder:
     """The blocks in their order."""
     facts = HammerFacts.of(scene)
-    head = frame_of(scene, facts.hammer, "head")
+    head = table.frame_of(scene, facts.hammer, "head")
     counters = [
-        HitCounter(name, frame_of(scene, name, "press"), facts.hammer, head) for name in facts.order
+        HitCounter(name, table.frame_of(scene, name, "press"), facts.hammer, head)
+        for name in facts.order
     ]
     return UseInOrder(counters, facts.hammer)
 
@@ -120,7 +112,7 @@ def _hammer_goal(scene: Scene) -> UseInOrder:
 def _hammer_plan(scene: Scene) -> tuple[Skill, ...]:
     """All hits by the arm on the first block's side."""
     facts = HammerFacts.of(scene)
-    return (Hit(facts.hammer, facts.order, arm=side_of(scene, facts.order[0])),)
+    return (Hit(facts.hammer, facts.order, arm=table.side_of(scene, facts.order[0])),)
 
 
 def _hammer_slots(scene: Scene) -> Slots:
@@ -176,12 +168,14 @@ def _draw_seal(level: int, rng: np.random.Generator, workcell: Workcell) -> Scen
     """Pads of different colours, the seal not too near to any."""
     groups = [COLORS[int(i)] for i in rng.permutation(len(COLORS))[:level]]
     colors = tuple(group[int(rng.integers(len(group)))] for group in groups)
-    variant = draw_variant(rng, "seal")
+    variant = table.draw_variant(rng, "seal")
     points, seal = _layout(level, rng, workcell, variant)
-    items = [Item("seal", "seal", standing(seal), variant)]
+    items = [table.Item("seal", "seal", table.standing(seal), variant)]
     for color, point in zip(colors, points, strict=True):
-        items.append(Item(color, "pad", standing(point), {"look": PADS.index(color)}, fixed=True))
-    scene_objects, names = named(rng, items)
+        items.append(
+            table.Item(color, "pad", table.standing(point), {"look": PADS.index(color)}, fixed=True)
+        )
+    scene_objects, names = table.named(rng, items)
     facts = SealFacts(names["seal"], colors, tuple(names[c] for c in colors))
     return SceneSample(scene_objects, facts)
 
@@ -190,7 +184,10 @@ def _layout(
     level: int, rng: np.random.Generator, workcell: Workcell, variant: dict[str, int]
 ) -> tuple[list[Point], Point]:
     """Places of the pads from right to left, and of the seal."""
-    pad_seen, seal_seen = in_view(workcell, "pad", {}), in_view(workcell, "seal", variant)
+    pad_seen, seal_seen = (
+        table.in_view(workcell, "pad", {}),
+        table.in_view(workcell, "seal", variant),
+    )
     for _ in range(LAYOUTS):
         if level == 1:
             way = 1 if rng.random() < 0.5 else -1
@@ -223,7 +220,7 @@ def _seal_plan(scene: Scene) -> tuple[Skill, ...]:
     here = scene.object(facts.seal).pose.position[0]
     for pad in facts.order:
         there = scene.object(pad).pose.position[0]
-        arm = side(max(here, there, key=abs))
+        arm = table.side(max(here, there, key=abs))
         skills.append(Pick(facts.seal, lift=0.06, arm=arm))
         skills.append(Place(facts.seal, on=pad, drop=0.002, arm=arm))
         here = there

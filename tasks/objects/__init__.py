@@ -19,9 +19,7 @@ from robospa.registry import ASSETS, find, names
 from robospa.tasks import packs
 from robospa.tasks.objects import (
     appliances,
-    blocks,
     boxes,
-    bread,
     cans,
     containers,
     desk,
@@ -31,7 +29,6 @@ from robospa.tasks.objects import (
     stands,
     tableware,
     tools,
-    waste,
 )
 from robospa.tasks.objects.build import Asset
 from robospa.tasks.objects.tint import TINTS, tinted
@@ -41,19 +38,16 @@ from robospa.tasks.shapes import ObjectModel, Params
 __all__ = ["assets", "model_of", "object_model", "variant_count"]
 
 FAMILIES = (
-    blocks,
     boxes,
     cans,
     containers,
     food,
-    bread,
     desk,
     gadgets,
     groceries,
     stands,
     tableware,
     tools,
-    waste,
     appliances,
 )
 

@@ -11,20 +11,9 @@ import math
 from dataclasses import dataclass, replace
 
 from robospa.geometry import Pose, Vec3, look_rotation
+from robospa.tasks.objects import build
 from robospa.tasks.objects import meshes as m
-from robospa.tasks.objects.build import (
-    ALONG_Y,
-    DARK,
-    STEEL,
-    Asset,
-    colour,
-    fill_phrases,
-    model,
-    solid,
-    srgb,
-    stretched,
-    visual,
-)
+from robospa.tasks.objects.build import colour, solid, srgb, visual
 from robospa.tasks.shapes import Box, Color, Cylinder, Hinge, ObjectModel, Params, Shape
 
 MICROWAVES = (
@@ -33,8 +22,6 @@ MICROWAVES = (
     ("#6fb1dc", "#f6f4ec", "light blue", 0.0), ("#e0b21e", "#26282c", "yellow", 0.0),
 )  # fmt: skip
 """Housing, control panel, word, metallic. Every other look is of the other size."""
-
-Span = tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -98,11 +85,11 @@ def microwave(look: int, params: Params) -> ObjectModel:
         damping=0.08,
         mass=0.01,
     )
-    phrases = fill_phrases(
+    phrases = build.fill_phrases(
         word, "{} microwave", "{} microwave oven", "microwave in {}", "small {} microwave",
         "{} kitchen microwave", "microwave with a {} housing",
     )  # fmt: skip
-    made = model(
+    made = build.model(
         "microwave", parts, "microwave", phrases, support=(0.0, 0.0, oven.top), hinge=hinge
     )
     handle = Pose((*oven.bar, oven.held), look_rotation((0.0, 1.0, 0.0), (1.0, 0.0, 0.0)))
@@ -130,7 +117,7 @@ def _housing(oven: Oven, color: Color, metallic: float) -> list[Shape]:
     )
     shell = [solid(box, color, at, roughness=0.35, metallic=metallic) for box, at in boxes]
     feet = [
-        solid(Cylinder(0.008, oven.foot / 2), DARK, (x, y, oven.foot / 2))
+        solid(Cylinder(0.008, oven.foot / 2), build.DARK, (x, y, oven.foot / 2))
         for x in (oven.left + 0.025, oven.right - 0.025)
         for y in (oven.behind + 0.015, oven.back - 0.02)
     ]
@@ -193,7 +180,7 @@ def _controls(oven: Oven, trim: Color) -> list[Shape]:
         visual(display, srgb("#101418"), roughness=0.2),
         visual(m.merge(*digits), srgb("#35e07a")),
         visual(m.merge(*keys), ink),
-        visual(dial, STEEL, (x, front, 0.042), ALONG_Y, 0.3, 0.3),
+        visual(dial, build.STEEL, (x, front, 0.042), build.ALONG_Y, 0.3, 0.3),
         visual(m.upright(m.rectangle(0.0015, 0.006), (x, front - 0.0102, 0.048)), srgb("#c8202a")),
     ]
 
@@ -224,16 +211,16 @@ def _handle(oven: Oven, metallic: float) -> list[Shape]:
     turned = m.lathe(
         [(0.0, -half), (1.0, -half + 0.002), (1.0, half - 0.002), (0.0, half)], 14, False
     )
-    color = colour("silver") if metallic == 0.0 else DARK
-    (bar,) = stretched([solid(turned, color, roughness=0.3)], wide, deep, 1.0)
+    color = colour("silver") if metallic == 0.0 else build.DARK
+    (bar,) = build.stretched([solid(turned, color, roughness=0.3)], wide, deep, 1.0)
     posts = [
         _box((x - wide, x + wide), (y, oven.front), (end - 0.004, end + 0.004))
         for end in (low + 0.004, high - 0.004)
     ]
     return [
         replace(bar, pose=Pose((x, y, (low + high) / 2))),
-        *(solid(box, DARK, at) for box, at in posts),
+        *(solid(box, build.DARK, at) for box, at in posts),
     ]
 
 
-ASSETS = {"microwave": Asset(len(MICROWAVES), microwave)}
+ASSETS = {"microwave": build.Asset(len(MICROWAVES), microwave)}

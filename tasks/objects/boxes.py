@@ -1,25 +1,19 @@
-"""Cartons: `tea_box`, `tissue_box`, `playing_cards`; and the `soap` bar."""
+"""Boxes: `block`, `rubikscube`, cartons `tea_box`, `tissue_box`, `playing_cards`, a `soap` bar."""
 
 from __future__ import annotations
 
 import math
+import random
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import lru_cache
 
 from robospa.geometry import Vec3
+from robospa.tasks.colors import NAMED, nearest
+from robospa.tasks.objects import build
 from robospa.tasks.objects import meshes as m
-from robospa.tasks.objects.build import (
-    PAPER,
-    Asset,
-    box_grasps,
-    collision,
-    colour,
-    fill_phrases,
-    model,
-    solid,
-    srgb,
-    visual,
-)
-from robospa.tasks.objects.fitting import fitted
-from robospa.tasks.shapes import Box, Color, Mesh, ObjectModel, Params
+from robospa.tasks.objects.build import collision, colour, solid, srgb, visual
+from robospa.tasks.shapes import Box, Color, Grasp, Mesh, ObjectModel, Params, Shape
 
 SIDES = (-math.pi / 2, 0.0, math.pi / 2, math.pi)
 """Directions of an upright box's four faces: front (-y), right, back, left."""
@@ -64,18 +58,18 @@ def tea_box(look: int, params: Params) -> ObjectModel:
     badge = m.flat(leaf(0.017), 2 * half[2] + 0.0008)
     parts = [
         solid(Box(half), colour(base), (0.0, 0.0, half[2]), roughness=0.7),
-        visual(m.merge(*ovals, lid), PAPER),
+        visual(m.merge(*ovals, lid), build.PAPER),
         visual(m.merge(*leaves, badge), srgb(mark) if base != "cream" else colour("green")),
         visual(m.merge(*bands), srgb(mark)),
     ]
-    phrases = fill_phrases(
+    phrases = build.fill_phrases(
         word, "{} tea box", "{} box of tea", "{} carton of tea bags", "tea box in {} cardboard",
         "{} package of tea", "box of tea with {} sides", "{} tea carton",
     )  # fmt: skip
     wide, deep, tall = TEA_SIZES[look]
-    made = fitted(parts, TEA_SIZES[look])
-    grasps = box_grasps(wide / 2, deep / 2, 0.58 * tall)
-    return model("tea_box", made.shapes, "tea box", phrases, grasps)
+    made = build.fitted(parts, TEA_SIZES[look])
+    grasps = build.box_grasps(wide / 2, deep / 2, 0.58 * tall)
+    return build.model("tea_box", made.shapes, "tea box", phrases, grasps)
 
 
 TISSUES = (
@@ -112,15 +106,17 @@ def tissue_box(look: int, params: Params) -> ObjectModel:
         visual(slot, srgb("#3a3f46")),
         visual(_tissue(2 * half[2]), srgb("#ffffff"), roughness=0.9),
     ]
-    phrases = fill_phrases(
+    phrases = build.fill_phrases(
         word, "{} tissue box", "{} box of tissues", "tissue box in {}",
         "{} carton of paper tissues",        "{} box with a tissue sticking out",
         "box of tissues with {} sides", "{} facial tissue box",
     )  # fmt: skip
-    made = fitted(parts, TISSUE_SIZES[look])
+    made = build.fitted(parts, TISSUE_SIZES[look])
     x, y, z = made.at(half[0], half[1], 0.024)
     top = made.at(0.0, 0.0, 2 * half[2])
-    return model("tissue_box", made.shapes, "tissue box", phrases, box_grasps(x, y, z), support=top)
+    return build.model(
+        "tissue_box", made.shapes, "tissue box", phrases, build.box_grasps(x, y, z), support=top
+    )
 
 
 def _tissue(z: float) -> Mesh:
@@ -183,14 +179,16 @@ def playing_cards(look: int, params: Params) -> ObjectModel:
         visual(m.merge(frame, diamond, *small, *edges), srgb(mark)),
         visual(panel, colour(base)),
     ]
-    phrases = fill_phrases(
+    phrases = build.fill_phrases(
         word, "{} pack of playing cards", "{} card box", "{} deck of cards", "{} playing cards",
         "boxed deck of cards in {}", "{} box of playing cards", "card pack with a {} back",
     )  # fmt: skip
     wide, long, tall = CARD_SIZES[look]
-    made = fitted(parts, CARD_SIZES[look])
-    grasps = box_grasps(wide / 2, long / 2, tall / 2, 0.6)
-    return model("playing_cards", made.shapes, "pack of playing cards", phrases, grasps, mass=0.01)
+    made = build.fitted(parts, CARD_SIZES[look])
+    grasps = build.box_grasps(wide / 2, long / 2, tall / 2, 0.6)
+    return build.model(
+        "playing_cards", made.shapes, "pack of playing cards", phrases, grasps, mass=0.01
+    )
 
 
 SOAPS: tuple[tuple[Color, str], ...] = (
@@ -218,13 +216,13 @@ def soap(look: int, params: Params) -> ObjectModel:
         visual(m.flat(m.ellipse(0.0172, 0.0073, 18), top + 0.0006), pale),
         visual(m.merge(*_letters(top + 0.0009)), dark),
     ]
-    phrases = fill_phrases(
+    phrases = build.fill_phrases(
         word, "{} soap bar", "{} bar of soap", "bar of {} soap", "{} soap", "soap bar in {}",
         "{} hand soap", "{} block of soap",
     )  # fmt: skip
-    made = fitted(parts, SOAP_SIZES[look])
+    made = build.fitted(parts, SOAP_SIZES[look])
     x, y, z = made.at(half[0], half[1] - 0.0005, 0.011)
-    return model("soap", made.shapes, "soap", phrases, box_grasps(x, y, z, 0.6)[::-1])
+    return build.model("soap", made.shapes, "soap", phrases, build.box_grasps(x, y, z, 0.6)[::-1])
 
 
 def _letters(z: float) -> list[Mesh]:
@@ -233,9 +231,121 @@ def _letters(z: float) -> list[Mesh]:
     return [m.flat(m.rectangle(w, 0.0026, x), z) for x, w in strokes]
 
 
+BLOCK_COLORS = (
+    *("red", "green", "blue", "yellow", "cyan"),
+    *("magenta", "orange", "purple", "white", "black"),
+)
+"""Look k of a block has colour k."""
+
+
+def block(look: int, params: Params) -> ObjectModel:
+    """A plain cuboid around its origin; params "half" [m] and "color" (linear RGB)."""
+    half = build.three_numbers(params.get("half", (0.02, 0.02, 0.02)), "block half")
+    color = build.three_numbers(params.get("color", NAMED[BLOCK_COLORS[look]]), "block color")
+    if min(half) <= 0:
+        raise ValueError(f"block half sizes must be positive, not {list(half)}")
+    shape = solid(Box(half), color, roughness=0.6)
+    return replace(_plain_block(half), shapes=(shape,), phrases=_block_phrases(color))
+
+
+@lru_cache(maxsize=1024)
+def _block_phrases(color: Color) -> tuple[str, ...]:
+    """Noun phrases of a block: by the nearest colour that has a word."""
+    word = nearest(color)
+    return (
+        f"{word} block", f"{word} box", f"block that is {word}", f"{word} building block",
+        f"{word}-coloured block", f"block painted {word}", f"block with {word} sides",
+    )  # fmt: skip
+
+
+@lru_cache(maxsize=1024)
+def _plain_block(half: Vec3) -> ObjectModel:
+    """A block of that size: what does not depend on its colour, which is new in many a scene."""
+    return build.model(
+        "block",
+        [solid(Box(half), (1.0, 1.0, 1.0), roughness=0.6)],
+        "block",
+        (),
+        _block_grasps(half),
+        mass=0.01,
+        press=(0.0, 0.0, half[2]),
+        support=(0.0, 0.0, half[2]),
+    )
+
+
+def _block_grasps(half: Vec3) -> tuple[Grasp, ...]:
+    """At half height; a tall block is taken higher, where the palm still clears its top."""
+    z = max(0.0, half[2] - 0.035)
+    found = list(build.box_grasps(half[0], half[1], z))
+    if len(found) == 2 and half[1] < half[0]:
+        found.reverse()
+    return tuple(found)
+
+
+CUBE_HALF = 0.028
+STICKERS: Mapping[str, Color] = {
+    "white": srgb("#f4f4f0"), "red": srgb("#c41e2a"), "blue": srgb("#1648b8"),
+    "green": srgb("#109a48"), "orange": srgb("#f77a10"), "yellow": srgb("#ffd812"),
+}  # fmt: skip
+CUBES: tuple[tuple[str, bool, int, tuple[str, ...]], ...] = (
+    ("#141416", True, 3, (
+        "scrambled Rubik's cube", "mixed-up puzzle cube", "black puzzle cube with mixed colours",
+        "unsolved Rubik's cube", "colourful scrambled magic cube", "jumbled colour cube",
+    )),
+    ("#141416", False, 0, (
+        "solved Rubik's cube", "finished puzzle cube", "puzzle cube with one colour per side",
+        "Rubik's cube with matching sides", "completed magic cube", "sorted colour cube",
+    )),
+    ("#8d939a", True, 2, (
+        "grey-framed Rubik's cube", "puzzle cube with a grey frame", "magic cube in grey",
+        "grey puzzle cube with mixed colours", "Rubik's cube with grey edges",
+        "colour cube on a grey body",
+    )),
+)  # fmt: skip
+
+
+def rubikscube(look: int, params: Params) -> ObjectModel:
+    """A 3 x 3 puzzle cube of 5.6 cm."""
+    body, mixed, seed, phrases = CUBES[look]
+    h = CUBE_HALF
+    faces = ("white", "red", "orange", "blue", "green")  # top, -y, +y, +x, -x
+    colors = [name for name in faces for _ in range(9)]
+    if mixed:
+        colors = random.Random(seed).sample([n for n in STICKERS for _ in range(9)], 45)
+        colors[4::9] = list(faces)
+    patches: dict[str, list[Mesh]] = {}
+    cell = 2 * h / 3
+    tile = m.rounded_rectangle(cell * 0.43, cell * 0.43, cell * 0.1, 2)
+    for i, name in enumerate(colors):
+        u, v = (i % 3 - 1) * cell, (i // 3 % 3 - 1) * cell
+        side, lift = i // 9, h + 0.0004
+        if side == 0:
+            patch = m.flat(tile, 2 * h + 0.0004, (u, v))
+        else:
+            at = ((u, -lift), (u, lift), (lift, u), (-lift, u))[side - 1]
+            facing = (-math.pi / 2, math.pi / 2, 0.0, math.pi)[side - 1]
+            patch = m.upright(tile, (at[0], at[1], h + v), facing)
+        patches.setdefault(name, []).append(patch)
+    parts: list[Shape] = [solid(Box((h, h, h)), srgb(body), (0.0, 0.0, h), roughness=0.4)]
+    parts += [visual(m.merge(*p), STICKERS[n], roughness=0.35) for n, p in patches.items()]
+    return build.model(
+        "rubikscube",
+        parts,
+        "Rubik's cube",
+        phrases,
+        [
+            build.top_grasp((0.0, 0.0, h), 2 * h, 0.0),
+            build.top_grasp((0.0, 0.0, h), 2 * h, math.pi / 2),
+        ],
+        support=(0.0, 0.0, 2 * h),
+    )
+
+
 ASSETS = {
-    "tea_box": Asset(len(TEAS), tea_box),
-    "tissue_box": Asset(len(TISSUES), tissue_box),
-    "playing_cards": Asset(len(CARDS), playing_cards),
-    "soap": Asset(len(SOAPS), soap),
+    "tea_box": build.Asset(len(TEAS), tea_box),
+    "tissue_box": build.Asset(len(TISSUES), tissue_box),
+    "playing_cards": build.Asset(len(CARDS), playing_cards),
+    "soap": build.Asset(len(SOAPS), soap),
+    "block": build.Asset(len(BLOCK_COLORS), block, frozenset({"half", "color"})),
+    "rubikscube": build.Asset(len(CUBES), rubikscube),
 }

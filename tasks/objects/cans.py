@@ -4,21 +4,9 @@ from __future__ import annotations
 
 import math
 
+from robospa.tasks.objects import build
 from robospa.tasks.objects import meshes as m
-from robospa.tasks.objects.build import (
-    PAPER,
-    STEEL,
-    Asset,
-    collision,
-    colour,
-    fill_phrases,
-    model,
-    round_grasps,
-    side_grasps,
-    srgb,
-    top_grasp,
-    visual,
-)
+from robospa.tasks.objects.build import collision, colour, srgb, visual
 from robospa.tasks.shapes import Cylinder, Mesh, ObjectModel, Params, Shape
 
 THIRDS = (-math.pi / 2, math.pi / 6, 5 * math.pi / 6)
@@ -56,20 +44,20 @@ def sauce_can(look: int, params: Params) -> ObjectModel:
     ]
     parts = [
         collision(Cylinder(r, h / 2), (0.0, 0.0, h / 2)),
-        visual(m.lathe(rim, 16), STEEL, roughness=0.3, metallic=0.5),
+        visual(m.lathe(rim, 16), build.STEEL, roughness=0.3, metallic=0.5),
         visual(m.lathe([(r, 0.010), (r, h - 0.010)], 16, False), colour(base), roughness=0.6),
         visual(around(m.ellipse(0.78 * r, 0.031, 12), r + 0.0006, h / 2), srgb(field)),
         visual(around(m.ellipse(0.48 * r, 0.019, 10), r + 0.0013, h / 2 - 0.003), srgb(mark)),
         visual(around(_sprig(1.5), r + 0.0019, h / 2 + 0.013), colour("green")),
         visual(_pull_ring(0.013, h - 0.0024), srgb("#8d9298"), roughness=0.3, metallic=0.4),
     ]
-    phrases = fill_phrases(
+    phrases = build.fill_phrases(
         word, "{} sauce can", "{} tin of sauce", "can of sauce with a {} label", "{} sauce tin",
         "sauce can wrapped in {}", "{}-labelled can of sauce",
     )  # fmt: skip
     phrases += (f"{word} can of {content}",)
-    grasps = round_grasps(2 * r, SAUCE_GRIP, 0.9)
-    return model("sauce_can", parts, "sauce can", phrases, grasps, support=(0.0, 0.0, h))
+    grasps = build.round_grasps(2 * r, SAUCE_GRIP, 0.9)
+    return build.model("sauce_can", parts, "sauce can", phrases, grasps, support=(0.0, 0.0, h))
 
 
 def _sprig(size: float) -> list[m.Point]:
@@ -104,16 +92,18 @@ def can(look: int, params: Params) -> ObjectModel:
     parts = [
         collision(Cylinder(r, h / 2), (0.0, 0.0, h / 2)),
         visual(m.lathe(body, 16, False), colour(base), roughness=0.35, metallic=0.2),
-        visual(m.merge(m.lathe(bottom, 16), m.lathe(top, 16)), STEEL, roughness=0.3, metallic=0.5),
+        visual(
+            m.merge(m.lathe(bottom, 16), m.lathe(top, 16)), build.STEEL, roughness=0.3, metallic=0.5
+        ),
         visual(_sign(sign, r, h), colour(mark), roughness=0.4),
         visual(_tab(h - 0.0026), srgb("#7f858c"), roughness=0.3, metallic=0.4),
     ]
-    phrases = fill_phrases(
+    phrases = build.fill_phrases(
         base, "{} drink can", "{} soda can", "can in {}", "{} can", "{} beverage can",
         "{} aluminium can", "can of soda with a {} body",
     )  # fmt: skip
-    return model(
-        "can", parts, "can", phrases, round_grasps(2 * r, CAN_GRIP, 1.2),
+    return build.model(
+        "can", parts, "can", phrases, build.round_grasps(2 * r, CAN_GRIP, 1.2),
         press=(0.0, 0.0, h), support=(0.0, 0.0, h),
     )  # fmt: skip
 
@@ -178,18 +168,20 @@ def bottle(look: int, params: Params) -> ObjectModel:
         visual(around(m.ellipse(0.0145, 0.021, 10), r + 0.0011, middle), _emblem(label)),
         visual(_cap(screw, 0.88 * h, h), colour(cap), roughness=0.4),
     ]
-    phrases = fill_phrases(
+    phrases = build.fill_phrases(
         word, "{} bottle", "{} drink bottle", "bottle in {}", "{} plastic bottle",
         "{} bottle with a cap", "tall {} bottle",
     )  # fmt: skip
     phrases = (*phrases[:4], f"{word} bottle with a {detail}", *phrases[4:])
-    grasps = side_grasps(2 * r, grip)
+    grasps = build.side_grasps(2 * r, grip)
     top = (0.0, 0.0, h)
-    return model("bottle", parts, "bottle", phrases, grasps, support=top)
+    return build.model("bottle", parts, "bottle", phrases, grasps, support=top)
 
 
 def _emblem(label: str) -> tuple[float, float, float]:
-    return colour("red") if label == "white" else PAPER if label != "yellow" else colour("green")
+    return (
+        colour("red") if label == "white" else build.PAPER if label != "yellow" else colour("green")
+    )
 
 
 def _cap(radius: float, low: float, high: float) -> Mesh:
@@ -212,7 +204,7 @@ def pill_bottle(look: int, params: Params) -> ObjectModel:
     shell, cap, word, r = PILLS[look]
     h = PILL_HEIGHT
     body = [(r - 0.002, 0.0), (r, 0.002), (r, 0.106), (r * 0.86, 0.116)]
-    label = srgb("#cfe0f4") if word == "white" else PAPER
+    label = srgb("#cfe0f4") if word == "white" else build.PAPER
     cross = m.rectangle(0.0042, 0.0140), m.rectangle(0.0140, 0.0042)
     print_color = srgb("#c8202a") if word != "orange" else srgb("#1f55c4")
     parts = [
@@ -222,13 +214,13 @@ def pill_bottle(look: int, params: Params) -> ObjectModel:
         visual(m.merge(*(around(c, r + 0.0012, 0.047) for c in cross)), print_color),
         visual(_ribbed(r - 0.0015, 0.114, h), colour(cap), roughness=0.5),
     ]
-    phrases = fill_phrases(
+    phrases = build.fill_phrases(
         word, "{} pill bottle", "{} medicine bottle", "{} bottle of pills", "pill bottle in {}",
         "{} plastic medicine bottle", "{} pill container",
     )  # fmt: skip
     phrases = (*phrases, f"{word} pill bottle with a {cap} cap")
-    grasps = round_grasps(2 * r, PILL_GRIP, 1.0)
-    return model("pill_bottle", parts, "pill bottle", phrases, grasps, support=(0.0, 0.0, h))
+    grasps = build.round_grasps(2 * r, PILL_GRIP, 1.0)
+    return build.model("pill_bottle", parts, "pill bottle", phrases, grasps, support=(0.0, 0.0, h))
 
 
 def _ribbed(radius: float, low: float, high: float) -> Mesh:
@@ -262,14 +254,14 @@ def glue(look: int, params: Params) -> ObjectModel:
         f"{base} paper glue", f"{base} school {noun}",
     )  # fmt: skip
     if kind == "stick":
-        shapes, grasps = _glue_stick(base, tip, rx), round_grasps(2 * rx, 0.090, 1.0)
+        shapes, grasps = _glue_stick(base, tip, rx), build.round_grasps(2 * rx, 0.090, 1.0)
     else:
         shapes, z = _glue_bottle(base, tip, rx, ry), 0.110
         grasps = (
-            top_grasp((0.0, 0.0, z), 2 * ry, math.pi / 2, 0.8),
-            top_grasp((0.0, 0.0, z), 2 * rx, 0.0, 0.8),
+            build.top_grasp((0.0, 0.0, z), 2 * ry, math.pi / 2, 0.8),
+            build.top_grasp((0.0, 0.0, z), 2 * rx, 0.0, 0.8),
         )
-    return model("glue", shapes, "glue", phrases, grasps, mass=0.01)
+    return build.model("glue", shapes, "glue", phrases, grasps, mass=0.01)
 
 
 def _glue_stick(base: str, cap: str, r: float) -> list[Shape]:
@@ -281,7 +273,7 @@ def _glue_stick(base: str, cap: str, r: float) -> list[Shape]:
         collision(Cylinder(r, h / 2), (0.0, 0.0, h / 2)),
         visual(m.lathe(profile, 14), colour(base)),
         visual(_cap(r, 0.099, h), colour(cap)),
-        visual(label, PAPER),
+        visual(label, build.PAPER),
         visual(drop, srgb("#c8202a") if base != "red" else srgb("#1f55c4")),
     ]
 
@@ -299,14 +291,14 @@ def _glue_bottle(base: str, tip: str, rx: float, ry: float) -> list[Shape]:
     signs = [
         m.upright(_drop(0.021), (0.0, s * (ry + 0.0011), 0.066), s * math.pi / 2) for s in (-1, 1)
     ]
-    panel = colour("blue") if base == "white" else PAPER
+    panel = colour("blue") if base == "white" else build.PAPER
     return [
         collision(m.pillow(levels[:3], 12, 0.7)),
         collision(Cylinder(0.009, (h - shoulder) / 2), (0.0, 0.0, (h + shoulder) / 2)),
         visual(m.pillow(levels, 16, 0.7), colour(base)),
         visual(m.lathe(nozzle, 10), colour(tip)),
         visual(m.merge(*sides), panel),
-        visual(m.merge(*signs), PAPER if base == "white" else colour("red")),
+        visual(m.merge(*signs), build.PAPER if base == "white" else colour("red")),
     ]
 
 
@@ -317,9 +309,9 @@ def _drop(size: float) -> list[m.Point]:
 
 
 ASSETS = {
-    "sauce_can": Asset(len(SAUCES), sauce_can),
-    "can": Asset(len(CANS), can),
-    "bottle": Asset(len(BOTTLES), bottle),
-    "pill_bottle": Asset(len(PILLS), pill_bottle),
-    "glue": Asset(len(GLUES), glue),
+    "sauce_can": build.Asset(len(SAUCES), sauce_can),
+    "can": build.Asset(len(CANS), can),
+    "bottle": build.Asset(len(BOTTLES), bottle),
+    "pill_bottle": build.Asset(len(PILLS), pill_bottle),
+    "glue": build.Asset(len(GLUES), glue),
 }

@@ -1,28 +1,17 @@
-"""Hollow things: `bowl`, `mug`, `bread_basket`, `dustbin` and the `cover` that hides a block."""
+"""Hollow things: `bowl`, `mug`, `bread_basket`, `dustbin`, the `cover` that hides a block.
+
+For throwing away: `table_trash_bin`, a small bin to empty, and `garbage`, what lies in it.
+"""
 
 from __future__ import annotations
 
 import math
 
-from robospa.geometry import Pose
+from robospa.geometry import Pose, axis_rotation, multiply
+from robospa.tasks.objects import build
 from robospa.tasks.objects import meshes as m
-from robospa.tasks.objects.build import (
-    RIM,
-    STEEL,
-    Asset,
-    collision,
-    colour,
-    fill_phrases,
-    model,
-    rim_grasps,
-    round_grasps,
-    srgb,
-    visual,
-    wall_ring,
-    with_frames,
-)
-from robospa.tasks.objects.fitting import fitted
-from robospa.tasks.shapes import Box, Color, Cylinder, Mesh, ObjectModel, Params, Shape
+from robospa.tasks.objects.build import collision, colour, solid, srgb, visual
+from robospa.tasks.shapes import Box, Color, Cylinder, Mesh, ObjectModel, Params, Shape, Sphere
 
 BOWLS = (
     ("blue", "white", "blue", 0.0572, 0.049), ("white", "blue", "white", 0.0600, 0.0506),
@@ -44,8 +33,10 @@ def bowl(look: int, params: Params) -> ObjectModel:
     foot, belly = 0.414 * rim, 0.742 * rim
     stand, middle = 0.27 * h, 0.54 * h
     low, high = math.atan2(belly - foot, middle - stand), math.atan2(rim - belly, h - middle)
-    floor = stand + RIM / math.sin(low) + 0.0015  # so high that another bowl's foot fits inside
-    thick = RIM / math.cos(high)
+    floor = (
+        stand + build.RIM / math.sin(low) + 0.0015
+    )  # so high that another bowl's foot fits inside
+    thick = build.RIM / math.cos(high)
 
     def wall(z: float) -> float:
         """Radius of the outside of the upper wall."""
@@ -66,20 +57,26 @@ def bowl(look: int, params: Params) -> ObjectModel:
         visual(m.lathe(ring, 18, False), colour(stripe), roughness=0.25),
         visual(m.lathe(inside, 18, False), colour(stripe), roughness=0.25),
         collision(Cylinder(foot, floor / 2), (0.0, 0.0, floor / 2)),
-        *wall_ring((foot + belly) / 2 * flat - RIM, RIM, stand, middle, BOWL_SIDES, low),
-        *wall_ring((belly + rim) / 2 * flat - RIM, RIM, middle, h, BOWL_SIDES, high),
+        *build.wall_ring(
+            (foot + belly) / 2 * flat - build.RIM, build.RIM, stand, middle, BOWL_SIDES, low
+        ),
+        *build.wall_ring(
+            (belly + rim) / 2 * flat - build.RIM, build.RIM, middle, h, BOWL_SIDES, high
+        ),
     ]
-    phrases = fill_phrases(
+    phrases = build.fill_phrases(
         word, "{} bowl", "{} soup bowl", "bowl in {}", "round {} bowl", "{} cereal bowl",
         "bowl that is {} on the outside", "{} ceramic bowl",
     )  # fmt: skip
     grip = 0.86 * h
-    grasps = rim_grasps(wall(grip) * flat - thick / 2, RIM, grip, BOWL_SIDES, lean=round(high, 4))
-    made = model(
+    grasps = build.rim_grasps(
+        wall(grip) * flat - thick / 2, build.RIM, grip, BOWL_SIDES, lean=round(high, 4)
+    )
+    made = build.model(
         "bowl", parts, "bowl", phrases, grasps, mass=0.01,
         support=(0.0, 0.0, floor), press=(0.0, 0.0, floor),
     )  # fmt: skip
-    return with_frames(made, nest=Pose((0.0, 0.0, floor)))
+    return build.with_frames(made, nest=Pose((0.0, 0.0, floor)))
 
 
 MUGS = (
@@ -103,7 +100,7 @@ def mug(look: int, params: Params) -> ObjectModel:
     which runs along y.
     """
     base, mark, (r, h, reach, ear) = MUGS[look]
-    inside, bar = r - RIM, MUG_HANDLE
+    inside, bar = r - build.RIM, MUG_HANDLE
     outer = [(r - 0.003, 0.0), (r, 0.003), (r, h)]
     inner = [(r, h), (inside, h), (inside, 0.006), (0.0, 0.006)]
     wide, half = reach - bar - r, MUG_EAR
@@ -121,23 +118,23 @@ def mug(look: int, params: Params) -> ObjectModel:
         visual(m.lathe([(r + 0.0004, 0.74 * h), (r + 0.0004, 0.86 * h)], 20, False), colour(mark)),
         visual(m.tube(arc, bar, 6), colour(base), roughness=0.25),
         collision(Cylinder(r - 0.001, 0.003), (0.0, 0.0, 0.003)),
-        *wall_ring(inside * math.cos(math.pi / 12), RIM, 0.0, h, 12),
+        *build.wall_ring(inside * math.cos(math.pi / 12), build.RIM, 0.0, h, 12),
         collision(reaching, (r + wide / 2, 0.0, ear + half)),
         collision(Box((bar * 0.8, bar * 0.9, half)), (reach - bar, 0.0, ear)),
         collision(reaching, (r + wide / 2, 0.0, ear - half)),
     ]
-    phrases = fill_phrases(
+    phrases = build.fill_phrases(
         base, "{} mug", "{} coffee mug", "mug in {}", "{} cup with a handle", "{} ceramic mug",
         "{} tea mug",
     )  # fmt: skip
     phrases = (*phrases[:4], f"{base} mug with a {mark} stripe", *phrases[4:])
-    middle_of_wall = inside * math.cos(math.pi / 12) + RIM / 2
-    rims = rim_grasps(middle_of_wall, RIM, h - 0.007, 12)[2:11]
-    made = model(
+    middle_of_wall = inside * math.cos(math.pi / 12) + build.RIM / 2
+    rims = build.rim_grasps(middle_of_wall, build.RIM, h - 0.007, 12)[2:11]
+    made = build.model(
         "mug", parts, "mug", phrases, rims,
         support=(0.0, 0.0, 0.006), press=(0.0, 0.0, 0.006),
     )  # fmt: skip
-    return with_frames(made, handle=Pose((round(middle, 5), 0.0, ear)))
+    return build.with_frames(made, handle=Pose((round(middle, 5), 0.0, ear)))
 
 
 BASKETS = (
@@ -177,22 +174,23 @@ def bread_basket(look: int, params: Params) -> ObjectModel:
         visual(m.merge(*weave[dark]), srgb(dark), roughness=0.9),
         visual(m.merge(*weave[pale]), srgb(pale), roughness=0.9),
         visual(
-            m.lathe([(inside, h - 0.012), (inside, floor), (0.0, floor)], 20, False), colour(cloth)
+            m.lathe([(inside, h - 0.012), (inside, floor), (0.0, floor)], 20, False),
+            colour(cloth),
         ),
         visual(m.lathe([(inside, h), (inside, h - 0.012)], 20, False), srgb(dark), roughness=0.9),
         collision(Cylinder(0.077, floor / 2), (0.0, 0.0, floor / 2)),
-        *wall_ring(inside, 0.005, 0.0, h, 16),
+        *build.wall_ring(inside, 0.005, 0.0, h, 16),
     ]
     shape = "round" if length == width else "oval"
-    phrases = fill_phrases(
+    phrases = build.fill_phrases(
         word, "{} bread basket", "{} basket", "{} wicker basket", "basket for bread in {}",
         f"{shape} {{}} basket",
     )  # fmt: skip
     lining = f"{word} basket lined with {cloth} cloth"
     phrases = (*phrases[:4], lining, *phrases[4:], f"{word} woven basket")
-    made = fitted(parts, (length, width, high))
+    made = build.fitted(parts, (length, width, high))
     on_floor = made.at(0.0, 0.0, floor)
-    return model(
+    return build.model(
         "bread_basket", made.shapes, "bread basket", phrases,
         support=on_floor, press=on_floor,
     )  # fmt: skip
@@ -239,11 +237,11 @@ def dustbin(look: int, params: Params) -> ObjectModel:
         parts.append(collision(Box((wall / 2, hy, half)), at_x))
         parts.append(collision(Box((hx, wall / 2, half)), at_y))
     parts.append(collision(Box((hx - wall, hy - wall, 0.02)), (0.0, 0.0, floor - 0.02)))
-    phrases = fill_phrases(
+    phrases = build.fill_phrases(
         word, "{} dustbin", "{} trash bin", "{} waste bin", "dustbin in {}", "open {} bin",
         "{} rubbish bin", "{} garbage bin",
     )  # fmt: skip
-    return model(
+    return build.model(
         "dustbin", parts, "dustbin", phrases,
         support=(0.0, 0.0, floor), press=(0.0, 0.0, floor),
     )  # fmt: skip
@@ -296,7 +294,7 @@ def _recycling(hx: float, h: float) -> Mesh:
 
 
 COVERS: tuple[tuple[Color, Color, str, float], ...] = (
-    (srgb("#d9d2c4"), srgb("#6b4a2c"), "cream", 0.0), (STEEL, srgb("#2a2c30"), "silver", 0.4),
+    (srgb("#d9d2c4"), srgb("#6b4a2c"), "cream", 0.0), (build.STEEL, srgb("#2a2c30"), "silver", 0.4),
     (srgb("#9a6a3c"), srgb("#5a3a1e"), "brown", 0.0),
 )  # fmt: skip
 COVER_INNER_RADIUS = 0.0312
@@ -319,20 +317,135 @@ def cover(look: int, params: Params) -> ObjectModel:
         visual(m.lathe(ring, 18, False), trim, roughness=0.5),
         collision(Cylinder(0.0285, (top - hollow) / 2), (0.0, 0.0, (top + hollow) / 2)),
         collision(Cylinder(0.0112, 0.0125), (0.0, 0.0, top + 0.0125)),
-        *wall_ring(r, 0.0033, 0.0, hollow, 12),
+        *build.wall_ring(r, 0.0033, 0.0, hollow, 12),
     ]
-    phrases = fill_phrases(
+    phrases = build.fill_phrases(
         word, "{} cover", "{} lid", "{} dome", "cover in {}", "{} cup turned upside down",
         "{} cover with a knob", "{} domed lid",
     )  # fmt: skip
-    grasps = round_grasps(0.0224, top + 0.014, 0.7, 8)
-    return model("cover", parts, "cover", phrases, grasps, mass=0.01)
+    grasps = build.round_grasps(0.0224, top + 0.014, 0.7, 8)
+    return build.model("cover", parts, "cover", phrases, grasps, mass=0.01)
+
+
+TRASH_BINS = (
+    ("blue", "white"), ("green", "white"), ("silver", "black"), ("pink", "white"),
+    ("black", "red"), ("yellow", "black"),
+)  # fmt: skip
+TRASH_BIN_SIZES = (
+    (0.1460, 0.1320), (0.1500, 0.1437), (0.0865, 0.1162), (0.0820, 0.1162), (0.0970, 0.1167),
+    (0.0854, 0.1356),
+)  # fmt: skip
+"""Width at the rim (of the official contact points) and official height [m] of each look."""
+
+
+WALL = 0.0064
+"""Thickness of its walls [m]: some grippers' closed fingers stay 5.4 mm apart."""
+
+
+def table_trash_bin(look: int, params: Params) -> ObjectModel:
+    """A small open bin for a table, square, wider at the top, held by one of its walls."""
+    body, band = TRASH_BINS[look]
+    low, high, h, floor = 0.0235, 0.0280, 0.085, 0.0040
+    wall = WALL * 2 * high / TRASH_BIN_SIZES[look][0]  # before it is stretched
+    lean = math.atan2(high - low, h)
+
+    def square(half: float, z: float, corner: float = 0.007) -> list[tuple[float, float, float]]:
+        return [(x, y, z) for x, y in m.rounded_rectangle(half, half, corner, 4)]
+
+    def half_at(z: float) -> float:
+        return low + z * math.tan(lean)
+
+    shell = m.loft([square(low, 0.0), square(high, h)], False)
+    lip = m.loft([square(high, h), square(high - wall, h, 0.005)], False)
+    inner = m.loft(
+        [square(high - wall, h, 0.005), square(half_at(floor) - wall, floor, 0.005)], False
+    )
+    base = m.rounded_rectangle(half_at(floor) - wall, half_at(floor) - wall, 0.005, 4)
+    stripe = m.loft([square(half_at(z) + 0.0004, z) for z in (h - 0.013, h - 0.005)], False)
+    under = [(x, y, 0.0) for x, y, _ in reversed(square(low, 0.0))]
+    underside = m.mesh(under, m.triangulate([(x, -y) for x, y, _ in under]))
+    shade = tuple(0.55 * c for c in colour(body))
+    parts = [
+        visual(shell, colour(body), roughness=0.5),
+        visual(lip, colour(body), roughness=0.5),
+        visual(inner, (shade[0], shade[1], shade[2]), roughness=0.7),
+        visual(m.flat(base, floor), (shade[0], shade[1], shade[2]), roughness=0.7),
+        visual(
+            m.merge(stripe, *_can_icons(half_at(0.036) + 0.0006, lean)),
+            colour(band),
+            roughness=0.5,
+        ),
+        visual(underside, colour(body), roughness=0.5),
+        collision(Box((low, low, floor / 2)), (0.0, 0.0, floor / 2)),
+    ]
+    middle = half_at(h / 2) - wall / 2
+    for k in range(4):
+        a = math.pi / 2 * k
+        turned = multiply(axis_rotation((0.0, 0.0, 1.0), a), axis_rotation((0.0, 1.0, 0.0), lean))
+        at = (middle * math.cos(a), middle * math.sin(a), h / 2)
+        parts.append(
+            collision(Box((wall / 2, high - 0.0015, h / 2 / math.cos(lean) - 0.0005)), at, turned)
+        )
+    phrases = build.fill_phrases(
+        body, "{} trash bin", "{} table bin", "small {} trash bin", "{} desktop trash bin",
+        "little {} bin", "{} tabletop bin", "{} desk bin",
+    )  # fmt: skip
+    wide, tall = TRASH_BIN_SIZES[look]
+    made = build.fitted(parts, (wide, wide, tall))
+    rim = 0.074
+    out = half_at(rim) - wall / 2
+    angles = [math.pi / 2 * k for k in range(4)]
+    points = [made.at(out * round(math.cos(a)), out * round(math.sin(a)), rim) for a in angles]
+    thick = wall * made.factors[0]
+    rims = [build.top_grasp(p, thick, a, 0.5) for p, a in zip(points, angles, strict=True)]
+    inside = made.at(0.0, 0.0, floor)
+    return build.model(
+        "table_trash_bin", made.shapes, "trash bin", phrases, rims,
+        support=inside, press=inside,
+    )  # fmt: skip
+
+
+def _can_icons(out: float, lean: float) -> list[Mesh]:
+    """A small drawing of a bin on each of the four walls, `out` [m] from the axis."""
+    can = [(-0.0058, -0.0095), (0.0058, -0.0095), (0.0075, 0.0050), (-0.0075, 0.0050)]
+    pieces = []
+    for k in range(4):
+        a = math.pi / 2 * k
+        for outline in (
+            can,
+            m.rectangle(0.0090, 0.0011, 0.0, 0.0075),
+            m.rectangle(0.0028, 0.001, 0.0, 0.0098),
+        ):
+            part = m.upright(outline, (0.0, 0.0, 0.0), 0.0)
+            tipped = m.moved(part, (out, 0.0, 0.036), axis_rotation((0.0, 1.0, 0.0), lean))
+            pieces.append(m.moved(tipped, rotation=axis_rotation((0.0, 0.0, 1.0), a)))
+    return pieces
+
+
+BALLS = ("red", "blue", "green", "yellow")
+BALL_RADIUS = 0.008
+
+
+def garbage(look: int, params: Params) -> ObjectModel:
+    """A small ball to be thrown away."""
+    word = BALLS[look]
+    r = BALL_RADIUS
+    parts = [solid(Sphere(r), colour(word), (0.0, 0.0, r), roughness=0.7)]
+    phrases = build.fill_phrases(
+        word, "{} ball", "{} piece of garbage", "small {} ball", "ball of {} garbage",
+        "{} piece of trash", "little {} ball",
+    )  # fmt: skip
+    return build.model(
+        "garbage", parts, "ball", phrases, build.round_grasps(2 * r, r, 0.7), mass=0.002
+    )
 
 
 ASSETS = {
-    "bowl": Asset(len(BOWLS), bowl),
-    "mug": Asset(len(MUGS), mug),
-    "bread_basket": Asset(len(BASKETS), bread_basket),
-    "dustbin": Asset(len(BINS), dustbin),
-    "cover": Asset(len(COVERS), cover),
+    "bowl": build.Asset(len(BOWLS), bowl),
+    "mug": build.Asset(len(MUGS), mug),
+    "bread_basket": build.Asset(len(BASKETS), bread_basket),
+    "dustbin": build.Asset(len(BINS), dustbin),
+    "cover": build.Asset(len(COVERS), cover),
+    "table_trash_bin": build.Asset(len(TRASH_BINS), table_trash_bin),
+    "garbage": build.Asset(len(BALLS), garbage),
 }

@@ -6,24 +6,9 @@ import math
 from collections.abc import Sequence
 
 from robospa.geometry import Pose, axis_rotation
+from robospa.tasks.objects import build
 from robospa.tasks.objects import meshes as m
-from robospa.tasks.objects.build import (
-    ALONG_X,
-    ALONG_Y,
-    DARK,
-    STEEL,
-    Asset,
-    collision,
-    colour,
-    fill_phrases,
-    model,
-    round_grasps,
-    srgb,
-    top_grasp,
-    visual,
-    with_frames,
-)
-from robospa.tasks.objects.fitting import fitted
+from robospa.tasks.objects.build import collision, colour, srgb, visual
 from robospa.tasks.shapes import Box, Cylinder, Mesh, ObjectModel, Params, Shape
 
 STAPLERS = (
@@ -65,21 +50,26 @@ def stapler(look: int, params: Params) -> ObjectModel:
         collision(m.side_prism(arm, w)),
         collision(Box((w, 0.006, 0.008)), (0.0, 0.033, 0.013)),
         visual(m.slab(0.0124, 0.0415, 0.0075, 0.005, 0.0015), colour(base), roughness=0.5),
-        visual(m.side_prism(rail, 0.0078), STEEL, roughness=0.3, metallic=0.5),
+        visual(m.side_prism(rail, 0.0078), build.STEEL, roughness=0.3, metallic=0.5),
         visual(_rounded_arm(arm, w), colour(top), roughness=0.3),
-        visual(m.merge(*ridges, stripe), colour(base) if base != "black" else srgb("#3a3c42")),
-        visual(m.prism(m.rectangle(0.0062, 0.0045, 0.0, -0.034), 0.0074, 0.0084), STEEL),
-        visual(Cylinder(0.0048, 0.0128), STEEL, (0.0, 0.0345, 0.0165), ALONG_X, 0.3, 0.4),
+        visual(
+            m.merge(*ridges, stripe),
+            colour(base) if base != "black" else srgb("#3a3c42"),
+        ),
+        visual(m.prism(m.rectangle(0.0062, 0.0045, 0.0, -0.034), 0.0074, 0.0084), build.STEEL),
+        visual(
+            Cylinder(0.0048, 0.0128), build.STEEL, (0.0, 0.0345, 0.0165), build.ALONG_X, 0.3, 0.4
+        ),
     ]
-    phrases = fill_phrases(
+    phrases = build.fill_phrases(
         top, "{} stapler", "stapler with a {} top", "{} desk stapler", "stapler in {}",
         "{} paper stapler", "{} office stapler", "small {} stapler",
     )  # fmt: skip
-    made = fitted(parts, STAPLER_SIZES[look])
+    made = build.fitted(parts, STAPLER_SIZES[look])
     width = 2 * w * made.factors[0]
-    grasps = tuple(top_grasp(made.at(0.0, y, 0.022), width) for y in (0.0, 0.012))
+    grasps = tuple(build.top_grasp(made.at(0.0, y, 0.022), width) for y in (0.0, 0.012))
     _, _, top_z = made.at(0.0, 0.0, 0.0385)
-    return model(
+    return build.model(
         "stapler", made.shapes, "stapler", phrases, grasps,
         press=(0.0, -STAPLER_PRESS[look], top_z), support=made.at(0.0, -0.010, 0.0385),
     )  # fmt: skip
@@ -130,17 +120,17 @@ def seal(look: int, params: Params) -> ObjectModel:
         visual(m.lathe(handle, 14), srgb(wood), roughness=0.3),
         visual(band, colour("gold"), roughness=0.3, metallic=0.4),
     ]
-    phrases = fill_phrases(
+    phrases = build.fill_phrases(
         word, "{} stamp", "{} hand stamp", "{} seal", "stamp with a {} handle", "{} stamper",
         "{} rubber stamp",
     )  # fmt: skip
     phrases = (*phrases, f"{word} stamp with a {ink} base")
-    made = fitted(parts, SEAL_SIZES[look])
+    made = build.fitted(parts, SEAL_SIZES[look])
     wide, deep, tall = made.factors
     ways = ((0.0, wide), (math.pi / 2, deep)) if wide != deep else ()
-    grasps = tuple(top_grasp((0.0, 0.0, 0.046 * tall), 0.030 * f, a) for a, f in ways)
-    grasps = grasps or round_grasps(0.030 * wide, 0.046 * tall, 0.7)
-    return model("seal", made.shapes, "seal", phrases, grasps)
+    grasps = tuple(build.top_grasp((0.0, 0.0, 0.046 * tall), 0.030 * f, a) for a, f in ways)
+    grasps = grasps or build.round_grasps(0.030 * wide, 0.046 * tall, 0.7)
+    return build.model("seal", made.shapes, "seal", phrases, grasps)
 
 
 MICE = (
@@ -168,19 +158,19 @@ def mouse(look: int, params: Params) -> ObjectModel:
         visual(body, srgb(shell), roughness=0.35),
         visual(belt, srgb(detail), roughness=0.5),
         visual(m.merge(*_seams(levels)), srgb(detail)),
-        visual(Cylinder(0.0052, 0.0024), DARK, (0.0, 0.020, 0.0215), ALONG_X),
+        visual(Cylinder(0.0052, 0.0024), build.DARK, (0.0, 0.020, 0.0215), build.ALONG_X),
     ]
-    phrases = fill_phrases(
+    phrases = build.fill_phrases(
         word, "{} computer mouse", "{} mouse", "mouse in {}", "{} wireless mouse",
         "computer mouse with a {} shell", "{} PC mouse",
     )  # fmt: skip
-    made = fitted(parts, MOUSE_SIZES[look])
+    made = build.fitted(parts, MOUSE_SIZES[look])
     width = made.factors[0]
     grasps = (
-        top_grasp(made.at(0.0, 0.0, 0.010), 0.0405 * width, 0.0, 0.6),
-        top_grasp(made.at(0.0, -0.006, 0.010), 0.040 * width, 0.0, 0.6),
+        build.top_grasp(made.at(0.0, 0.0, 0.010), 0.0405 * width, 0.0, 0.6),
+        build.top_grasp(made.at(0.0, -0.006, 0.010), 0.040 * width, 0.0, 0.6),
     )
-    return model("mouse", made.shapes, "computer mouse", phrases, grasps)
+    return build.model("mouse", made.shapes, "computer mouse", phrases, grasps)
 
 
 def _seams(levels: Sequence[tuple[float, float, float]]) -> list[Mesh]:
@@ -238,21 +228,21 @@ def bell(look: int, params: Params) -> ObjectModel:
         collision(Cylinder(0.0095, 0.0085), (0.0, 0.0, h - 0.0085)),
         visual(m.lathe([(r, 0.0), (r, 0.0060), (0.0420, 0.0115)], 24), srgb(foot), roughness=0.5),
         visual(m.lathe(shell, 24), srgb(dome), roughness=0.25, metallic=metallic),
-        visual(m.lathe([(0.0055, 0.0530), (0.0055, 0.0600)], 8), STEEL, roughness=0.3),
+        visual(m.lathe([(0.0055, 0.0530), (0.0055, 0.0600)], 8), build.STEEL, roughness=0.3),
         visual(m.lathe([(0.0095, 0.0575), (0.0100, 0.0640), (0.0060, h), (0.0, h)], 14),
                srgb(foot)),
     ]  # fmt: skip
     wide, tall = BELL_SIZES[look]
-    made = fitted(parts, (wide, wide, tall))
-    phrases = fill_phrases(
+    made = build.fitted(parts, (wide, wide, tall))
+    phrases = build.fill_phrases(
         word, "{} bell", "{} call bell", "{} desk bell", "bell with a {} dome", "{} service bell",
         "{} reception bell",
     )  # fmt: skip
     phrases = (*phrases, f"{word} bell on a {low} base")
-    grasps = round_grasps(2 * body * made.factors[0], 0.024 * made.factors[2], 0.6)
-    bell = model("bell", made.shapes, "bell", phrases, grasps, press=(0.0, 0.0, tall))
+    grasps = build.round_grasps(2 * body * made.factors[0], 0.024 * made.factors[2], 0.6)
+    bell = build.model("bell", made.shapes, "bell", phrases, grasps, press=(0.0, 0.0, tall))
     touched = (0.0380, 0.0258)[look % 2]
-    return with_frames(bell, touched=Pose((0.0, 0.0, touched)))
+    return build.with_frames(bell, touched=Pose((0.0, 0.0, touched)))
 
 
 FANS = (
@@ -286,31 +276,31 @@ def fan(look: int, params: Params) -> ObjectModel:
     parts = [
         collision(Cylinder(0.042, 0.0085), (0.0, 0.0, 0.0085)),
         collision(Cylinder(0.011, 0.018), (0.0, 0.0, 0.033)),
-        collision(Cylinder(r, deep), at, ALONG_Y),
+        collision(Cylinder(r, deep), at, build.ALONG_Y),
         visual(m.lathe(foot, 22), colour(frame), roughness=0.4),
         visual(m.lathe([(0.011, 0.015), (0.009, 0.050)], 10), colour(frame), roughness=0.4),
-        visual(hoop, colour(frame), at, ALONG_Y, 0.4),
-        visual(back, pale, at, ALONG_Y, 0.8),
-        visual(_blades(), colour(blade), at, ALONG_Y, 0.5),
-        visual(m.merge(*spokes), pale, at, ALONG_Y, 0.4),
+        visual(hoop, colour(frame), at, build.ALONG_Y, 0.4),
+        visual(back, pale, at, build.ALONG_Y, 0.8),
+        visual(_blades(), colour(blade), at, build.ALONG_Y, 0.5),
+        visual(m.merge(*spokes), pale, at, build.ALONG_Y, 0.4),
         visual(
             m.lathe([(0.0110, 0.0), (0.0110, deep), (0.006, deep + 0.001)], 14),
             colour(frame),
             at,
-            ALONG_Y,
+            build.ALONG_Y,
         ),
         visual(m.lathe([(0.006, 0.0), (0.006, 0.003)], 10), colour("red"), (0.0, -0.029, 0.0135)),
     ]
-    phrases = fill_phrases(
+    phrases = build.fill_phrases(
         frame, "{} fan", "small {} fan", "{} desk fan", "fan with a {} frame", "{} electric fan",
         "{} table fan",
     )  # fmt: skip
     phrases = (*phrases, f"{frame} fan with {blade} blades")
-    made = fitted(parts, FAN_SIZES[look])
+    made = build.fitted(parts, FAN_SIZES[look])
     grasps = (
-        top_grasp(made.at(0.0, 0.0, z + 0.032), 2 * deep * made.factors[1], math.pi / 2, 0.8),
+        build.top_grasp(made.at(0.0, 0.0, z + 0.032), 2 * deep * made.factors[1], math.pi / 2, 0.8),
     )
-    return model("fan", made.shapes, "fan", phrases, grasps, mass=0.01)
+    return build.model("fan", made.shapes, "fan", phrases, grasps, mass=0.01)
 
 
 def _blades() -> Mesh:
@@ -328,9 +318,9 @@ def _blades() -> Mesh:
 
 
 ASSETS = {
-    "stapler": Asset(len(STAPLERS), stapler),
-    "seal": Asset(len(SEALS), seal),
-    "mouse": Asset(len(MICE), mouse),
-    "bell": Asset(len(BELLS), bell),
-    "fan": Asset(len(FANS), fan),
+    "stapler": build.Asset(len(STAPLERS), stapler),
+    "seal": build.Asset(len(SEALS), seal),
+    "mouse": build.Asset(len(MICE), mouse),
+    "bell": build.Asset(len(BELLS), bell),
+    "fan": build.Asset(len(FANS), fan),
 }

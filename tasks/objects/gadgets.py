@@ -5,24 +5,9 @@ from __future__ import annotations
 import math
 
 from robospa.geometry import Pose, axis_rotation
+from robospa.tasks.objects import build
 from robospa.tasks.objects import meshes as m
-from robospa.tasks.objects.build import (
-    ALONG_X,
-    ALONG_Y,
-    DARK,
-    PAPER,
-    STEEL,
-    Asset,
-    collision,
-    colour,
-    fill_phrases,
-    model,
-    srgb,
-    top_grasp,
-    visual,
-    with_frames,
-)
-from robospa.tasks.objects.fitting import fitted
+from robospa.tasks.objects.build import collision, colour, srgb, visual
 from robospa.tasks.shapes import Box, Cylinder, Mesh, ObjectModel, Params, Shape
 
 PHONES = (
@@ -71,17 +56,17 @@ def phone(look: int, params: Params) -> ObjectModel:
         ),
         visual(dock, srgb("#dfe5ee")),
         *(visual(m.merge(*p), srgb(c)) for p, c in zip(icons, ICONS, strict=True)),
-        visual(m.merge(*side), DARK),
+        visual(m.merge(*side), build.DARK),
     ]
-    phrases = fill_phrases(
+    phrases = build.fill_phrases(
         body, "{} phone", "{} mobile phone", "{} smartphone", "phone in a {} case", "{} cell phone",
         "phone with a {} frame", "{} touchscreen phone",
     )  # fmt: skip
-    made = fitted(parts, PHONE_SIZES[look])
+    made = build.fitted(parts, PHONE_SIZES[look])
     width = 2 * hx * made.factors[0]
-    grasps = tuple(top_grasp(made.at(0.0, y, 0.006), width, 0.0, 0.5) for y in (0.0, -0.012))
-    phone = model("phone", made.shapes, "phone", phrases, grasps)
-    return with_frames(phone, end=Pose((0.0, -PHONE_LENGTH / 2, 0.0)))
+    grasps = tuple(build.top_grasp(made.at(0.0, y, 0.006), width, 0.0, 0.5) for y in (0.0, -0.012))
+    phone = build.model("phone", made.shapes, "phone", phrases, grasps)
+    return build.with_frames(phone, end=Pose((0.0, -PHONE_LENGTH / 2, 0.0)))
 
 
 REMOTES = (
@@ -110,7 +95,7 @@ def remote_control(look: int, params: Params) -> ObjectModel:
     ring_out, ring_in = m.ellipse(0.0105, 0.0105, 16), m.ellipse(0.0042, 0.0042, 10)
     pad = m.moved(m.prism(ring_out, 0.0, 0.0010), (0.0, 0.0085, h - 0.0002))
     bars = [_key(m.rectangle(0.0016, 0.0042), h, (s * 0.009, 0.0255)) for s in (-1, 1)]
-    shade = srgb("#3a3d44") if body == "black" else DARK
+    shade = srgb("#3a3d44") if body == "black" else build.DARK
     parts = [
         collision(Box((hx, hy, h / 2)), (0.0, 0.0, h / 2)),
         visual(m.slab(hx, hy, h, 0.006, 0.0025), colour(body), roughness=0.45),
@@ -123,14 +108,14 @@ def remote_control(look: int, params: Params) -> ObjectModel:
             srgb("#400c14"),
         ),
     ]
-    phrases = fill_phrases(
+    phrases = build.fill_phrases(
         body, "{} remote control", "{} remote", "{} TV remote", "remote control in {}",
         "{} television remote", "{} remote with buttons", "{} TV control",
     )  # fmt: skip
-    made = fitted(parts, REMOTE_SIZES[look])
+    made = build.fitted(parts, REMOTE_SIZES[look])
     width = 2 * hx * made.factors[0]
-    grasps = tuple(top_grasp(made.at(0.0, y, 0.008), width, 0.0, 0.6) for y in (0.0, 0.010))
-    return model("remote_control", made.shapes, "remote control", phrases, grasps)
+    grasps = tuple(build.top_grasp(made.at(0.0, y, 0.008), width, 0.0, 0.6) for y in (0.0, 0.010))
+    return build.model("remote_control", made.shapes, "remote control", phrases, grasps)
 
 
 def _key(outline: m.Polygon, h: float, at: m.Point) -> Mesh:
@@ -161,25 +146,25 @@ def alarm_clock(look: int, params: Params) -> ObjectModel:
     own = ("{} digital alarm clock", "wide {} alarm clock", "{} clock with a digital display")
     if look not in DIGITAL:
         own = ("{} twin-bell alarm clock", "round {} alarm clock", "{} clock with two bells")
-    phrases = fill_phrases(body, "{} alarm clock", "{} clock", "alarm clock in {}", *own)
+    phrases = build.fill_phrases(body, "{} alarm clock", "{} clock", "alarm clock in {}", *own)
     trim = "snooze button" if look in DIGITAL else "bells"
     phrases = (*phrases, f"{body} alarm clock with {'a ' if look in DIGITAL else ''}{metal} {trim}")
     parts, top = (_digital if look in DIGITAL else _two_bells)(body, metal)
-    made = fitted(parts, CLOCK_SIZES[look])
+    made = build.fitted(parts, CLOCK_SIZES[look])
     _, deep, _ = CLOCK_SIZES[look]
     z = 0.55 * CLOCK_SIZES[look][2]
-    grasps = (top_grasp((0.0, 0.0, z), deep, math.pi / 2, 0.7),)
+    grasps = (build.top_grasp((0.0, 0.0, z), deep, math.pi / 2, 0.7),)
     press = made.at(0.0, 0.0, top)
-    clock = model(
+    clock = build.model(
         "alarm_clock", made.shapes, "alarm clock", phrases, grasps, press=press, support=press
     )
-    return with_frames(clock, touched=Pose((0.0, 0.0, CLOCK_TOUCHED[look])))
+    return build.with_frames(clock, touched=Pose((0.0, 0.0, CLOCK_TOUCHED[look])))
 
 
 def _digital(body: str, metal: str) -> tuple[list[Shape], float]:
     """A rounded block with a dark screen, 10:10 in bright bars, and a long button on top."""
     hx, hy, h, top = 0.097, 0.036, 0.110, 0.1228
-    outline = m.moved(m.slab(hx, h / 2, 2 * hy, 0.022, 0.004, 4), rotation=ALONG_Y)
+    outline = m.moved(m.slab(hx, h / 2, 2 * hy, 0.022, 0.004, 4), rotation=build.ALONG_Y)
     block = m.moved(outline, (0.0, hy, h / 2))
     screen = m.upright(m.rounded_rectangle(0.082, 0.040, 0.010), (0.0, -hy - 0.0006, h / 2))
     digits = [
@@ -233,12 +218,12 @@ def _two_bells(body: str, metal: str) -> tuple[list[Shape], float]:
     trim = colour(metal)
     shine = 0.4 if metal != "black" else 0.0
     parts = [
-        collision(Cylinder(r, deep), at, ALONG_Y),
+        collision(Cylinder(r, deep), at, build.ALONG_Y),
         collision(Box((0.025, 0.012, 0.011)), (0.0, 0.0, 0.011)),
         collision(Box((0.024, 0.010, 0.007)), (0.0, 0.0, z + r)),
-        visual(m.lathe(drum, 22), colour(body), at, ALONG_Y, 0.35),
-        visual(dial, PAPER, at, ALONG_Y),
-        visual(m.merge(*ticks, *hands), DARK, at, ALONG_Y),
+        visual(m.lathe(drum, 22), colour(body), at, build.ALONG_Y, 0.35),
+        visual(dial, build.PAPER, at, build.ALONG_Y),
+        visual(m.merge(*ticks, *hands), build.DARK, at, build.ALONG_Y),
         visual(m.merge(*domes, handle), trim, roughness=0.3, metallic=shine),
         visual(_grounded(m.merge(*legs)), trim, roughness=0.4),
     ]
@@ -322,27 +307,27 @@ def toycar(look: int, params: Params) -> ObjectModel:
         visual(m.merge(*bands), colour(stripe), roughness=0.3),
         visual(m.merge(*lamps), srgb("#fff3b0")),
         visual(m.merge(*tails), srgb("#a3101a") if body != "red" else srgb("#ffb0a0")),
-        visual(m.merge(*bumper), STEEL, roughness=0.3, metallic=0.3),
+        visual(m.merge(*bumper), build.STEEL, roughness=0.3, metallic=0.3),
         visual(
-            m.merge(*(m.moved(tyre, (x, y, 0.0088), ALONG_X) for x, y in wheels)),
+            m.merge(*(m.moved(tyre, (x, y, 0.0088), build.ALONG_X) for x, y in wheels)),
             srgb("#18181a"),
             roughness=0.9,
         ),
         visual(
-            m.merge(*(m.moved(hub, (x, y, 0.0088), ALONG_X) for x, y in wheels)),
+            m.merge(*(m.moved(hub, (x, y, 0.0088), build.ALONG_X) for x, y in wheels)),
             srgb("#cfd3d8"),
             roughness=0.3,
         ),
     ]
-    phrases = fill_phrases(
+    phrases = build.fill_phrases(
         body, "{} toy car", "{} car", "small {} car", "toy car in {}", "{} model car",
         "{} racing car",
     )  # fmt: skip
     phrases = (*phrases, f"{body} toy car with a {stripe} stripe")
-    made = fitted(parts, CAR_SIZES[look])
+    made = build.fitted(parts, CAR_SIZES[look])
     width = 0.0366 * made.factors[0]
-    grasps = tuple(top_grasp(made.at(0.0, y, 0.012), width, 0.0, 0.6) for y in (0.0, 0.010))
-    return model("toycar", made.shapes, "toy car", phrases, grasps)
+    grasps = tuple(build.top_grasp(made.at(0.0, y, 0.012), width, 0.0, 0.6) for y in (0.0, 0.010))
+    return build.model("toycar", made.shapes, "toy car", phrases, grasps)
 
 
 def _cabin(low: float, high: float) -> Mesh:
@@ -354,8 +339,8 @@ def _cabin(low: float, high: float) -> Mesh:
 
 
 ASSETS = {
-    "phone": Asset(len(PHONES), phone),
-    "remote_control": Asset(len(REMOTES), remote_control),
-    "alarm_clock": Asset(len(CLOCKS), alarm_clock),
-    "toycar": Asset(len(CARS), toycar),
+    "phone": build.Asset(len(PHONES), phone),
+    "remote_control": build.Asset(len(REMOTES), remote_control),
+    "alarm_clock": build.Asset(len(CLOCKS), alarm_clock),
+    "toycar": build.Asset(len(CARS), toycar),
 }

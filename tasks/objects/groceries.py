@@ -5,27 +5,10 @@ from __future__ import annotations
 import math
 import random
 
+from robospa.tasks.objects import build
 from robospa.tasks.objects import meshes as m
 from robospa.tasks.objects.boxes import SIDES, on_side
-from robospa.tasks.objects.build import (
-    PAPER,
-    RIM,
-    STEEL,
-    Asset,
-    box_grasps,
-    collision,
-    colour,
-    fill_phrases,
-    model,
-    rim_grasps,
-    round_grasps,
-    solid,
-    srgb,
-    stretched,
-    top_grasp,
-    visual,
-    wall_ring,
-)
+from robospa.tasks.objects.build import collision, colour, solid, srgb, visual
 from robospa.tasks.shapes import Box, Cylinder, Mesh, ObjectModel, Params, Shape
 
 CUPS = (
@@ -41,7 +24,7 @@ CUP_LEAN = 0.09
 def cup(look: int, params: Params) -> ObjectModel:
     """A drinking cup without handle, wider at the top, with painted dots or bands."""
     base, mark, style, rim, h = CUPS[look]
-    foot, wall, floor = rim - h * math.tan(CUP_LEAN), RIM, 0.006
+    foot, wall, floor = rim - h * math.tan(CUP_LEAN), build.RIM, 0.006
 
     def radius(z: float) -> float:
         return foot + z * math.tan(CUP_LEAN)
@@ -69,17 +52,17 @@ def cup(look: int, params: Params) -> ObjectModel:
         visual(m.lathe(inner, 18, False), glaze, roughness=0.3),
         visual(m.merge(*marks), colour(mark), roughness=0.3),
         collision(Cylinder(foot, floor / 2), (0.0, 0.0, floor / 2)),
-        *wall_ring(radius(h / 2) - wall, wall, 0.0005, h - 0.0003, 12, CUP_LEAN),
+        *build.wall_ring(radius(h / 2) - wall, wall, 0.0005, h - 0.0003, 12, CUP_LEAN),
     ]
     word = {"dots": "dotted", "bands": "striped"}[style]
-    phrases = fill_phrases(
+    phrases = build.fill_phrases(
         base, "{} cup", "{} drinking cup", "cup in {}", "{} cup without a handle",
         "{} tumbler", "round {} drinking cup",
     )  # fmt: skip
     phrases = (*phrases[:4], f"{word} {base} cup", *phrases[4:], f"{base} cup with {mark} {style}")
     z = h - 0.007
-    grasps = rim_grasps(radius(z) - wall / 2, wall, z, 12, lean=CUP_LEAN)
-    return model(
+    grasps = build.rim_grasps(radius(z) - wall / 2, wall, z, 12, lean=CUP_LEAN)
+    return build.model(
         "cup", parts, "cup", phrases, grasps,
         support=(0.0, 0.0, floor), press=(0.0, 0.0, floor),
     )  # fmt: skip
@@ -110,15 +93,15 @@ def apple(look: int, params: Params) -> ObjectModel:
               colour("brown"), roughness=0.8),
         visual(turned, srgb("#3c8a2e"), roughness=0.6),
     ]  # fmt: skip
-    phrases = fill_phrases(
+    phrases = build.fill_phrases(
         word, "{} apple", "round {} apple", "apple with {} skin", "fresh {} apple", "apple in {}",
         "{} fruit", "ripe {} apple",
     )  # fmt: skip
     wide, high = 0.975 * size, 1.02 * size
-    parts = stretched(parts, wide, wide, high)
-    grasps = round_grasps(2 * 0.0292 * wide, 0.031 * high, 0.8)
+    parts = build.stretched(parts, wide, wide, high)
+    grasps = build.round_grasps(2 * 0.0292 * wide, 0.031 * high, 0.8)
     top = (0.0, 0.0, 0.052 * high)
-    return model("apple", parts, "apple", phrases, grasps, mass=0.01, support=top)
+    return build.model("apple", parts, "apple", phrases, grasps, mass=0.01, support=top)
 
 
 PERFUMES = (
@@ -156,8 +139,8 @@ def perfume(look: int, params: Params) -> ObjectModel:
           for s in faces for v in (0.009, 0.0, -0.009))
     )  # fmt: skip
     r, top = PERFUME_CAP, PERFUME_HEIGHT
-    body_grip = top_grasp((0.0, 0.0, 0.085), 2 * hy, math.pi / 2)
-    grasps = (*round_grasps(2 * r, PERFUME_GRIP, 0.7), body_grip)
+    body_grip = build.top_grasp((0.0, 0.0, 0.085), 2 * hy, math.pi / 2)
+    grasps = (*build.round_grasps(2 * r, PERFUME_GRIP, 0.7), body_grip)
     collar = [(0.012, h - 0.001), (0.012, h + 0.006)]
     lid = [(r, h + 0.005), (r, top - 0.003), (r - 0.002, top), (0.0, top)]
     shine = 0.4 if cap != "black" else 0.0
@@ -167,15 +150,15 @@ def perfume(look: int, params: Params) -> ObjectModel:
         body,
         visual(label, srgb(pale), roughness=0.5),
         visual(line, colour("brown") if word != "black" else srgb("#2a2b31")),
-        visual(m.lathe(collar, 12), STEEL, roughness=0.25, metallic=0.4),
+        visual(m.lathe(collar, 12), build.STEEL, roughness=0.25, metallic=0.4),
         visual(m.lathe(lid, 14), colour(cap), roughness=0.25, metallic=shine),
     ]
-    phrases = fill_phrases(
+    phrases = build.fill_phrases(
         word, "{} perfume", "{} perfume bottle", "bottle of {} perfume", "{} fragrance bottle",
         "perfume in {} glass", "{} scent bottle",
     )  # fmt: skip
     phrases = (*phrases[:4], f"{word} perfume with a {cap} cap", *phrases[4:])
-    return model("perfume", parts, "perfume bottle", phrases, grasps)
+    return build.model("perfume", parts, "perfume bottle", phrases, grasps)
 
 
 COFFEES = (
@@ -218,19 +201,19 @@ def coffee_box(look: int, params: Params) -> ObjectModel:
     cut = m.flat(m.rectangle(0.0115, 0.0009), top + 0.0008)
     parts = [
         solid(Box(half), colour(base), (0.0, 0.0, half[2]), roughness=0.7),
-        visual(m.merge(*field), PAPER),
+        visual(m.merge(*field), build.PAPER),
         visual(m.merge(*icon), colour(base) if base != "black" else srgb("#5a2f14")),
         visual(m.merge(*beans, lid, *bands), colour(mark)),
         visual(m.merge(*seams, cut), colour(base)),
     ]
-    phrases = fill_phrases(
+    phrases = build.fill_phrases(
         word, "{} coffee box", "{} box of coffee", "{} carton of coffee", "coffee box in {}",
         "{} package of coffee", "coffee carton with {} sides", "{} coffee package",
     )  # fmt: skip
     x, y, z = (round(s / drawn, 4) for s, drawn in zip(size, COFFEE_BOX, strict=True))
-    parts = stretched(parts, x, y, z)
-    grasps = box_grasps(half[0] * x, half[1] * y, 0.65 * size[2])[::-1]
-    return model("coffee_box", parts, "coffee box", phrases, grasps)
+    parts = build.stretched(parts, x, y, z)
+    grasps = build.box_grasps(half[0] * x, half[1] * y, 0.65 * size[2])[::-1]
+    return build.model("coffee_box", parts, "coffee box", phrases, grasps)
 
 
 SIGNS = (
@@ -267,17 +250,17 @@ def payment_sign(look: int, params: Params) -> ObjectModel:
         visual(m.slab(hx, foot, z0, 0.004, 0.0015), srgb("#d9dde2"), roughness=0.3),
         visual(m.moved(m.slab(hx, hy, z1 - z0, 0.002, 0.001, 2), (0.0, 0.0, z0)), colour(word),
               roughness=0.3),
-        visual(on_side(field, half, front, 0.0006), PAPER),
+        visual(on_side(field, half, front, 0.0006), build.PAPER),
         visual(m.merge(*dots), srgb("#16171a")),
         visual(_waves(half, front, size, at), colour("white")),
         visual(_waves(half, back, size, at), colour("white")),
     ]  # fmt: skip
-    phrases = fill_phrases(
+    phrases = build.fill_phrases(
         word, "{} payment sign", "{} sign for paying by phone", "{} payment stand",
         "payment sign in {}", "{} sign with a square code", "{} QR code sign", "{} pay sign",
     )  # fmt: skip
-    grasps = (top_grasp((0.0, 0.0, z1 - 0.016), 2 * hy, math.pi / 2, 0.6),)
-    return model("payment_sign", parts, "payment sign", phrases, grasps)
+    grasps = (build.top_grasp((0.0, 0.0, z1 - 0.016), 2 * hy, math.pi / 2, 0.6),)
+    return build.model("payment_sign", parts, "payment sign", phrases, grasps)
 
 
 def _code(seed: int) -> list[list[tuple[int, int]]]:
@@ -309,9 +292,9 @@ def _waves(half: tuple[float, float, float], side: float, size: float, at: float
 
 
 ASSETS = {
-    "cup": Asset(len(CUPS), cup),
-    "apple": Asset(len(APPLES), apple),
-    "perfume": Asset(len(PERFUMES), perfume),
-    "coffee_box": Asset(len(COFFEES), coffee_box),
-    "payment_sign": Asset(len(SIGNS), payment_sign),
+    "cup": build.Asset(len(CUPS), cup),
+    "apple": build.Asset(len(APPLES), apple),
+    "perfume": build.Asset(len(PERFUMES), perfume),
+    "coffee_box": build.Asset(len(COFFEES), coffee_box),
+    "payment_sign": build.Asset(len(SIGNS), payment_sign),
 }

@@ -8,21 +8,9 @@ from __future__ import annotations
 import math
 
 from robospa.geometry import Pose, Vec3, axis_rotation
+from robospa.tasks.objects import build
 from robospa.tasks.objects import meshes as m
-from robospa.tasks.objects.build import (
-    DARK,
-    STEEL,
-    Asset,
-    collision,
-    colour,
-    fill_phrases,
-    model,
-    srgb,
-    top_grasp,
-    visual,
-    with_frames,
-)
-from robospa.tasks.objects.fitting import fitted
+from robospa.tasks.objects.build import collision, colour, srgb, visual
 from robospa.tasks.objects.gadgets import PHONE_LENGTH
 from robospa.tasks.shapes import Box, Mesh, ObjectModel, Params
 
@@ -83,15 +71,15 @@ def phone_stand(look: int, params: Params) -> ObjectModel:
         collision(Box((0.008, 0.009, 0.045)), (0.0, knee_y + 0.002, 0.055)),
         visual(m.slab(0.0383, 0.069, 0.012, 0.020, 0.003, 5), colour(body), roughness=0.4),
         visual(m.merge(plate, lip, *hooks), colour(body), roughness=0.4),
-        visual(stem, STEEL if body != "silver" else DARK, roughness=0.3),
+        visual(stem, build.STEEL if body != "silver" else build.DARK, roughness=0.3),
         visual(cushion, colour(pad), roughness=0.9),
         visual(m.flat(m.rounded_rectangle(0.028, 0.050, 0.014), 0.0124), colour(pad)),
     ]
-    made = fitted(parts, PHONE_STAND_SIZES[look])
+    made = build.fitted(parts, PHONE_STAND_SIZES[look])
     _, fy, fz = made.factors
     slope = math.atan2(fz * s, fy * c)
     tilt = axis_rotation((1.0, 0.0, 0.0), slope)
-    phrases = fill_phrases(
+    phrases = build.fill_phrases(
         body, "{} phone stand", "{} phone holder", "{} stand for a phone", "phone stand in {}",
         "{} mobile phone stand", "{} smartphone stand",
     )  # fmt: skip
@@ -104,13 +92,13 @@ def phone_stand(look: int, params: Params) -> ObjectModel:
         rest[2] + at * math.sin(slope) + 0.0013 * math.cos(slope),
     )
     grip_y, grip_z = on_back(long - 0.016, -thick)
-    grasps = (top_grasp(made.at(0.0, grip_y, grip_z), 2 * wide * made.factors[0], 0.0, 0.7),)
-    stand = model(
+    grasps = (build.top_grasp(made.at(0.0, grip_y, grip_z), 2 * wide * made.factors[0], 0.0, 0.7),)
+    stand = build.model(
         "phone_stand", made.shapes, "phone stand", phrases, grasps, press=rest, support=rest
     )
     leaning = Pose(support, tilt)
     end = leaning.apply((0.0, -PHONE_LENGTH / 2, 0.0))
-    return with_frames(stand, support=leaning, end=Pose(end, tilt))
+    return build.with_frames(stand, support=leaning, end=Pose(end, tilt))
 
 
 DISPLAYS = (
@@ -141,14 +129,14 @@ def display_stand(look: int, params: Params) -> ObjectModel:
         visual(m.flat(m.rounded_rectangle(hx - 0.008, hy - 0.008, 0.008), h + 0.0004),
                colour(felt), roughness=0.95),
     ]  # fmt: skip
-    phrases = fill_phrases(
+    phrases = build.fill_phrases(
         word, "{} display stand", "{} display platform", "wide {} display stand", "{} plinth",
         "{} pedestal", "{} exhibition stand",
     )  # fmt: skip
     phrases = (*phrases[:4], f"{word} display stand with a {felt} top", *phrases[4:])
-    made = fitted(parts, DISPLAY_SIZES[look])
+    made = build.fitted(parts, DISPLAY_SIZES[look])
     top = made.at(0.0, 0.0, h)
-    return model("display_stand", made.shapes, "display stand", phrases, support=top)
+    return build.model("display_stand", made.shapes, "display stand", phrases, support=top)
 
 
 SCALES = (("white", "#c6f6a0"), ("black", "#7fe8ff"), ("blue", "#c6f6a0"), ("red", "#ffe08a"),
@@ -183,20 +171,24 @@ def electronic_scale(look: int, params: Params) -> ObjectModel:
         collision(Box((hx, hy, h / 2)), (0.0, 0.0, h / 2)),
         collision(Box((size, size, (top - h) / 2)), (0.0, plate_y, (top + h) / 2)),
         visual(m.slab(hx, hy, h, 0.012, 0.003, 4), colour(word), roughness=0.4),
-        visual(steel, STEEL, roughness=0.3, metallic=0.5),
-        visual(m.flat(m.rounded_rectangle(0.0245, 0.0088, 0.003), h + 0.0004, window), DARK),
-        visual(m.flat(m.rectangle(0.0225, 0.0072), h + 0.0008, window), srgb(light), roughness=0.9),
+        visual(steel, build.STEEL, roughness=0.3, metallic=0.5),
+        visual(m.flat(m.rounded_rectangle(0.0245, 0.0088, 0.003), h + 0.0004, window), build.DARK),
+        visual(
+            m.flat(m.rectangle(0.0225, 0.0072), h + 0.0008, window),
+            srgb(light),
+            roughness=0.9,
+        ),
         visual(m.merge(*digits, point, units), srgb("#101418")),
-        visual(button, colour("red") if word != "red" else DARK),
+        visual(button, colour("red") if word != "red" else build.DARK),
     ]
-    phrases = fill_phrases(
+    phrases = build.fill_phrases(
         word, "{} electronic scale", "{} digital scale", "{} kitchen scale",
         "electronic scale in {}",
         "{} weighing scale", "{} scale with a digital display", "{} scale",
     )  # fmt: skip
-    made = fitted(parts, SCALE_SIZES[look])
+    made = build.fitted(parts, SCALE_SIZES[look])
     on_top = made.at(0.0, plate_y, top)
-    return model(
+    return build.model(
         "electronic_scale", made.shapes, "electronic scale", phrases,
         support=on_top, press=on_top,
     )  # fmt: skip
@@ -271,12 +263,12 @@ def mug_rack(look: int, params: Params) -> ObjectModel:
         visual(pegs, wood, roughness=0.6),
         visual(m.merge(*knobs), colour(trim), roughness=0.5),
     ]  # fmt: skip
-    phrases = fill_phrases(
+    phrases = build.fill_phrases(
         word, "{} mug rack", "{} mug holder", "{} mug tree", "{} rack for mugs", "{} cup rack",
         "{} stand for hanging mugs",
     )  # fmt: skip
-    made = model("mug_rack", parts, "mug rack", phrases, support=knee)
-    return with_frames(made, hang=Pose(knee, tilt), tip=Pose(tip, tilt))
+    made = build.model("mug_rack", parts, "mug rack", phrases, support=knee)
+    return build.with_frames(made, hang=Pose(knee, tilt), tip=Pose(tip, tilt))
 
 
 def _middle(a: Vec3, b: Vec3) -> Vec3:
@@ -285,8 +277,8 @@ def _middle(a: Vec3, b: Vec3) -> Vec3:
 
 
 ASSETS = {
-    "display_stand": Asset(len(DISPLAYS), display_stand),
-    "electronic_scale": Asset(len(SCALES), electronic_scale),
-    "mug_rack": Asset(len(RACKS), mug_rack),
-    "phone_stand": Asset(len(PHONE_STANDS), phone_stand),
+    "display_stand": build.Asset(len(DISPLAYS), display_stand),
+    "electronic_scale": build.Asset(len(SCALES), electronic_scale),
+    "mug_rack": build.Asset(len(RACKS), mug_rack),
+    "phone_stand": build.Asset(len(PHONE_STANDS), phone_stand),
 }

@@ -5,28 +5,16 @@ from __future__ import annotations
 import math
 
 from robospa.geometry import Pose
+from robospa.tasks.objects import build
 from robospa.tasks.objects import meshes as m
-from robospa.tasks.objects.build import (
-    DARK,
-    STEEL,
-    Asset,
-    collision,
-    colour,
-    fill_phrases,
-    model,
-    srgb,
-    top_grasp,
-    visual,
-    wall_ring,
-    with_frames,
-)
-from robospa.tasks.objects.fitting import fitted
+from robospa.tasks.objects.build import collision, colour, srgb, visual
 from robospa.tasks.shapes import Box, Color, Cylinder, Mesh, ObjectModel, Params
 
 POTS: tuple[tuple[Color, Color, str, float], ...] = (
-    (STEEL, DARK, "silver", 0.5), (colour("red"), DARK, "red", 0.0),
-    (colour("blue"), STEEL, "blue", 0.0), (srgb("#2b2d31"), colour("brown"), "black", 0.0),
-    (colour("yellow"), DARK, "yellow", 0.0), (colour("dark green"), STEEL, "green", 0.0),
+    (build.STEEL, build.DARK, "silver", 0.5), (colour("red"), build.DARK, "red", 0.0),
+    (colour("blue"), build.STEEL, "blue", 0.0), (srgb("#2b2d31"), colour("brown"), "black", 0.0),
+    (colour("yellow"), build.DARK, "yellow", 0.0),
+    (colour("dark green"), build.STEEL, "green", 0.0),
 )  # fmt: skip
 POT_RADIUS, POT_HEIGHT = 0.075, 0.078
 HANDLE_HEIGHT, HANDLE_OUT, HANDLE_HALF, HANDLE_THICK = 0.058, 0.033, 0.028, 0.0045
@@ -52,7 +40,7 @@ def kitchen_pot(look: int, params: Params) -> ObjectModel:
         visual(m.lathe(inner, 28, False), srgb("#9aa0a6"), roughness=0.45, metallic=0.2),
         visual(m.lathe([(r + 0.0004, 0.018), (r + 0.0004, 0.022)], 28, False), grip),
         collision(Cylinder(r - 0.004, floor / 2), (0.0, 0.0, floor / 2)),
-        *wall_ring(r - wall, wall, 0.001, h, 16),
+        *build.wall_ring(r - wall, wall, 0.001, h, 16),
     ]
     for side in (-1.0, 1.0):
         t = HANDLE_THICK
@@ -65,18 +53,18 @@ def kitchen_pot(look: int, params: Params) -> ObjectModel:
             out = HANDLE_OUT / 2 - 0.002
             parts.append(collision(Box((out, t, t)), (side * (r + out - 0.001), y, HANDLE_HEIGHT)))
     parts.append(visual(m.merge(*loops), grip, roughness=0.4))
-    phrases = fill_phrases(
+    phrases = build.fill_phrases(
         word, "{} pot", "{} cooking pot", "{} kitchen pot", "pot in {}", "{} pot with two handles",
         "{} soup pot", "open {} cooking pot",
     )  # fmt: skip
     hold = r + HANDLE_OUT - HANDLE_THICK
     points = {"left": (-hold, 0.0, HANDLE_HEIGHT), "right": (hold, 0.0, HANDLE_HEIGHT)}
-    grasps = [top_grasp(p, 2 * HANDLE_THICK, 0.0, 0.7) for p in points.values()]
-    made = model(
+    grasps = [build.top_grasp(p, 2 * HANDLE_THICK, 0.0, 0.7) for p in points.values()]
+    made = build.model(
         "kitchen_pot", parts, "pot", phrases, grasps, mass=0.12,
         support=(0.0, 0.0, floor), press=(0.0, 0.0, floor),
     )  # fmt: skip
-    return with_frames(made, **{side: Pose(p) for side, p in points.items()})
+    return build.with_frames(made, **{side: Pose(p) for side, p in points.items()})
 
 
 PLATES = (
@@ -105,16 +93,20 @@ def plate(look: int, params: Params) -> ObjectModel:
         visual(m.lathe([outer[-1], inner[0]], 28, False), colour(base), roughness=0.25),
         visual(m.lathe(inner[:2], 28, False), colour(base), roughness=0.25),
         visual(m.lathe(inner[1:], 28, False), (0.78 * red, 0.78 * g, 0.78 * b), roughness=0.25),
-        visual(m.merge(ring(0.0710, 0.0785), ring(0.0550, 0.0575)), colour(stripe), roughness=0.25),
+        visual(
+            m.merge(ring(0.0710, 0.0785), ring(0.0550, 0.0575)),
+            colour(stripe),
+            roughness=0.25,
+        ),
         collision(Cylinder(flat, low / 2), (0.0, 0.0, low / 2)),
-        *wall_ring(0.0632, 0.0035, low, h - 0.001, 24, math.pi / 2 - slope),
+        *build.wall_ring(0.0632, 0.0035, low, h - 0.001, 24, math.pi / 2 - slope),
     ]
-    phrases = fill_phrases(
+    phrases = build.fill_phrases(
         word, "{} plate", "{} dinner plate", "round {} plate", "plate in {}", "{} dish",
         "{} ceramic plate",
     )  # fmt: skip
     phrases = (*phrases[:4], f"{word} plate with {stripe} rings", *phrases[4:])
-    return model(
+    return build.model(
         "plate", parts, "plate", phrases,
         support=(0.0, 0.0, low), press=(0.0, 0.0, low),
     )  # fmt: skip
@@ -140,11 +132,11 @@ def coaster(look: int, params: Params) -> ObjectModel:
         visual(m.lathe(edge, 24), colour(base), roughness=0.9),
         visual(m.merge(*rings), colour(mark), roughness=0.9),
     ]
-    phrases = fill_phrases(
+    phrases = build.fill_phrases(
         base, "{} coaster", "round {} coaster", "coaster in {}", "{} drink coaster",
         "{} cup coaster", "flat {} coaster", "{} cup mat",
     )  # fmt: skip
-    return model("coaster", parts, "coaster", phrases, support=(0.0, 0.0, h))
+    return build.model("coaster", parts, "coaster", phrases, support=(0.0, 0.0, h))
 
 
 TRAYS = (
@@ -193,21 +185,21 @@ def tray(look: int, params: Params) -> ObjectModel:
         parts.append(collision(Box((wall / 2, hy - 0.008, h / 2)), side))
         front = (0.0, sign * (hy - wall / 2 - 0.001), h / 2)
         parts.append(collision(Box((hx - 0.008, wall / 2, h / 2)), front))
-    phrases = fill_phrases(
+    phrases = build.fill_phrases(
         base, "{} tray", "{} serving tray", "tray in {}", "{} food tray", "wide {} tray",
         "{} meal tray",
     )  # fmt: skip
     phrases = (*phrases[:4], f"{base} tray with a {lining} lining", *phrases[4:])
-    sized = fitted(parts, TRAY_SIZES[look])
+    sized = build.fitted(parts, TRAY_SIZES[look])
     middle = sized.at(0.0, 0.0, floor)
-    made = model("tray", sized.shapes, "tray", phrases, support=middle, press=middle)
+    made = build.model("tray", sized.shapes, "tray", phrases, support=middle, press=middle)
     places = {"left": sized.at(-0.068, 0.0, floor), "right": sized.at(0.068, 0.0, floor)}
-    return with_frames(made, **{side: Pose(p) for side, p in places.items()})
+    return build.with_frames(made, **{side: Pose(p) for side, p in places.items()})
 
 
 ASSETS = {
-    "kitchen_pot": Asset(len(POTS), kitchen_pot),
-    "plate": Asset(len(PLATES), plate),
-    "coaster": Asset(len(COASTERS), coaster),
-    "tray": Asset(len(TRAYS), tray),
+    "kitchen_pot": build.Asset(len(POTS), kitchen_pot),
+    "plate": build.Asset(len(PLATES), plate),
+    "coaster": build.Asset(len(COASTERS), coaster),
+    "tray": build.Asset(len(TRAYS), tray),
 }

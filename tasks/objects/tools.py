@@ -6,26 +6,10 @@ import math
 
 from robospa.geometry import Pose
 from robospa.tasks.colors import NAMED, nearest
+from robospa.tasks.objects import build
 from robospa.tasks.objects import meshes as m
 from robospa.tasks.objects.boxes import SIDES, on_side
-from robospa.tasks.objects.build import (
-    DARK,
-    PAPER,
-    STEEL,
-    Asset,
-    box_grasps,
-    collision,
-    colour,
-    fill_phrases,
-    model,
-    solid,
-    srgb,
-    three_numbers,
-    top_grasp,
-    visual,
-    with_frames,
-)
-from robospa.tasks.objects.fitting import fitted
+from robospa.tasks.objects.build import collision, colour, solid, srgb, visual
 from robospa.tasks.shapes import Box, Mesh, ObjectModel, Params, Shape
 
 HAMMERS = (
@@ -59,7 +43,7 @@ def hammer(look: int, params: Params) -> ObjectModel:
 
     handle = m.rounded_rectangle(bar, (near - far) / 2 + 0.002, 0.003, 2)
     sleeve = m.rounded_rectangle(bar + 0.0004, 0.026, 0.003, 2)
-    dark = srgb("#3b3f45") if head == "black" else DARK
+    dark = srgb("#3b3f45") if head == "black" else build.DARK
     metallic = 0.5 if head == "silver" else 0.0
     middle, up = (near + far) / 2, (h - neck) / 2
     parts = [
@@ -72,16 +56,16 @@ def hammer(look: int, params: Params) -> ObjectModel:
                roughness=0.7),
         visual(m.moved(m.prism(handle, -bar, bar), (0.0, middle, z)), colour(shaft), roughness=0.6),
         visual(m.moved(m.prism(sleeve, -bar - 0.0004, bar + 0.0004), (0.0, far + 0.026, z)),
-              colour(head) if head != "silver" else STEEL, roughness=0.6),
+              colour(head) if head != "silver" else build.STEEL, roughness=0.6),
     ]  # fmt: skip
-    phrases = fill_phrases(
+    phrases = build.fill_phrases(
         word, "{} hammer", "{} mallet", "{} hammer with a handle", "hammer with a {} head",
         "small {} hammer", "{} hand hammer",
     )  # fmt: skip
     phrases = (*phrases, f"{word} hammer with a {shaft} handle")
-    grasps = tuple(top_grasp((0.0, at, z), 2 * bar, 0.0, 0.7) for at in (0.0, -0.018, -0.036))
-    made = model("hammer", parts, "hammer", phrases, grasps, mass=0.035, support=(0.0, y, h))
-    return with_frames(made, head=Pose((0.0, y, 0.0)))
+    grasps = tuple(build.top_grasp((0.0, at, z), 2 * bar, 0.0, 0.7) for at in (0.0, -0.018, -0.036))
+    made = build.model("hammer", parts, "hammer", phrases, grasps, mass=0.035, support=(0.0, y, h))
+    return build.with_frames(made, head=Pose((0.0, y, 0.0)))
 
 
 PADS = (
@@ -97,18 +81,18 @@ def pad(look: int, params: Params) -> ObjectModel:
 
     Only drawn unless "solid" is true: what is not solid must be fixed in its scene.
     """
-    half = three_numbers(params.get("half", (0.035, 0.035, 0.0005)), "pad half sizes")
-    color = three_numbers(params.get("color", NAMED[PADS[look]]), "pad color")
+    half = build.three_numbers(params.get("half", (0.035, 0.035, 0.0005)), "pad half sizes")
+    color = build.three_numbers(params.get("color", NAMED[PADS[look]]), "pad color")
     if min(half) <= 0:
         raise ValueError(f"pad half sizes must be positive, not {list(half)}")
     word = nearest(color)
     at = Pose((0.0, 0.0, half[2]))
     shape = Shape(Box(half), at, color, collision=bool(params.get("solid")), roughness=0.8)
-    phrases = fill_phrases(
+    phrases = build.fill_phrases(
         word, "{} pad", "{} square", "pad in {}", "flat {} pad", "{} square pad", "{} mat",
     )  # fmt: skip
-    grasps = box_grasps(half[0], half[1], half[2]) if half[2] > 0.005 else ()
-    return model("pad", [shape], "pad", phrases, grasps)
+    grasps = build.box_grasps(half[0], half[1], half[2]) if half[2] > 0.005 else ()
+    return build.model("pad", [shape], "pad", phrases, grasps)
 
 
 TEES = ("red", "blue", "green", "yellow", "orange", "purple")
@@ -139,19 +123,19 @@ def t_block(look: int, params: Params) -> ObjectModel:
     ]
     if kind:
         dot = m.flat(m.ellipse(0.0055, 0.0055, 12), h + 0.0004, (0.0, end - arm))
-        parts.append(visual(dot, PAPER))
-    phrases = fill_phrases(
+        parts.append(visual(dot, build.PAPER))
+    phrases = build.fill_phrases(
         word, "{} T-shaped block", "{} T block", "{} block in the shape of a T",
         "T-shaped {} block",
         "block shaped like a {} T", "{} letter T",
     )  # fmt: skip
     z = 0.017
     grasps = (
-        top_grasp((0.0, -0.004, z), 2 * arm, 0.0, 0.6),
-        top_grasp((0.0235, end - arm, z), 2 * arm, math.pi / 2, 0.6),
-        top_grasp((-0.0235, end - arm, z), 2 * arm, math.pi / 2, 0.6),
+        build.top_grasp((0.0, -0.004, z), 2 * arm, 0.0, 0.6),
+        build.top_grasp((0.0235, end - arm, z), 2 * arm, math.pi / 2, 0.6),
+        build.top_grasp((-0.0235, end - arm, z), 2 * arm, math.pi / 2, 0.6),
     )
-    return model("t_block", parts, "T-shaped block", phrases, grasps, mass=0.01)
+    return build.model("t_block", parts, "T-shaped block", phrases, grasps, mass=0.01)
 
 
 def _tee(end: float, arm: float, low: float, round_ends: bool) -> list[m.Point]:
@@ -205,19 +189,19 @@ def wooden_block(look: int, params: Params) -> ObjectModel:
             for y, w in ((-0.009, 0.75), (-0.002, 0.85), (0.006, 0.6))
         ]
         parts.append(visual(m.merge(*rings), srgb(lines), roughness=0.9))
-    phrases = fill_phrases(
+    phrases = build.fill_phrases(
         word, "{} wooden block", "{} toy block of wood", "{} block of wood", "{} piece of wood",
         "wooden block with a {} top", "{} wood block", "{} wooden toy block",
     )  # fmt: skip
-    made = fitted(parts, WOOD_SIZES[look])
+    made = build.fitted(parts, WOOD_SIZES[look])
     x, y, z = made.at(*half)
-    grasps = box_grasps(x, y, 1.1 * z)[::-1]
-    return model("wooden_block", made.shapes, "wooden block", phrases, grasps)
+    grasps = build.box_grasps(x, y, 1.1 * z)[::-1]
+    return build.model("wooden_block", made.shapes, "wooden block", phrases, grasps)
 
 
 ASSETS = {
-    "t_block": Asset(len(TEES), t_block, frozenset({"kind"})),
-    "wooden_block": Asset(len(WOODS), wooden_block),
-    "hammer": Asset(len(HAMMERS), hammer),
-    "pad": Asset(len(PADS), pad, frozenset({"half", "color", "solid"})),
+    "t_block": build.Asset(len(TEES), t_block, frozenset({"kind"})),
+    "wooden_block": build.Asset(len(WOODS), wooden_block),
+    "hammer": build.Asset(len(HAMMERS), hammer),
+    "pad": build.Asset(len(PADS), pad, frozenset({"half", "color", "solid"})),
 }

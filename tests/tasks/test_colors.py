@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from robospa.tasks.colors import NAMED, difference, lab, nearest, stands_out
-from robospa.tasks.families.tabletop import drawn_color
+from robospa.tasks.families.table import drawn_color
 
 SHARMA = (
     ((50.0, 2.6772, -79.7751), (50.0, 0.0, -82.7485), 2.0425),

@@ -56,7 +56,7 @@ def test_inputs_are_of_what_a_task_executes(monkeypatch: pytest.MonkeyPatch) -> 
     module._hash.cache_clear()
     first = inputs(KEY)
     module._hash.cache_clear()
-    for path in ("harness/skills/pick.py", "tasks/objects/blocks.py", "harness/robots/piper.py",
+    for path in ("harness/skills/pick.py", "tasks/objects/boxes.py", "harness/robots/piper.py",
                  "tasks/families/block_measures.py", "baselines/oracle.py"):  # fmt: skip
         assert path in counted
     for path in ("tasks/families/repeat.py", "tasks/instructions/grammar.py",

@@ -20,7 +20,7 @@ from robospa.observation import CameraSpec
 from robospa.tasks.colors import LOOK_ALIKES, NAMED, difference, lab
 from robospa.tasks.families.basic_color import COLORS as TINTED
 from robospa.tasks.families.distance import BLOCK_COLORS
-from robospa.tasks.families.tabletop import COLORS
+from robospa.tasks.families.table import COLORS
 from robospa.tasks.objects import assets, object_model, variant_count
 from robospa.tasks.objects.tint import TINTS
 from robospa.tasks.objects.tools import PADS
