@@ -16,9 +16,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from robospa.action_space import quantize
 from robospa.baselines.oracle import Oracle
-from robospa.harness.clock.clock import action_steps, rate_of
-from robospa.harness.quantize import quantize
+from robospa.harness.clock.policy_clock import action_steps, rate_of
 from robospa.harness.robots import embodiment
 from robospa.harness.skills import Expert
 from robospa.observation import Observation

@@ -27,7 +27,6 @@ from types import SimpleNamespace
 import numpy as np
 from frame import RESULTS, Figure, Json, Result, gather, main
 
-from robospa.categories import BASIC, CATEGORIES
 from robospa.harness.datasets.jobs import EpisodeJob, attempt_job
 from robospa.harness.datasets.maker import EpisodeMaker
 from robospa.harness.demonstrations.changed_plans import occasions
@@ -38,7 +37,7 @@ from robospa.harness.world import SceneUnstable
 from robospa.observation import DEFAULT_CAMERAS
 from robospa.results.failures.labels import label
 from robospa.tasks.catalog import LEVELS, build_scene, task, tasks
-from robospa.trial import TrialKey
+from robospa.trial import BASIC, CATEGORIES, TrialKey
 
 SUCCEEDED = 95.0
 SHARE = 85.0

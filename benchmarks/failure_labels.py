@@ -18,7 +18,7 @@ from frame import Figure, Result, main
 
 from robospa.baselines.failure_policies import create
 from robospa.harness.sim.sapien_world import SapienWorld
-from robospa.harness.trial import TrialParts, run_trial, task_parts
+from robospa.harness.trial import TrialSetup, run_trial, task_parts
 from robospa.results.failures.labels import NAMES, label
 from robospa.tasks.catalog import tasks
 from robospa.trial import TrialKey
@@ -47,7 +47,7 @@ EXPECTED = {
 """The label that each mistake should get."""
 
 
-def parts(key: TrialKey) -> TrialParts:
+def parts(key: TrialKey) -> TrialSetup:
     """The trial's parts with a limit that lies shortly after the script's end."""
     found = task_parts(key)
     level = found.task.levels[key.level]

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from robospa.clients import connect
 from robospa.geometry import Pose
-from robospa.harness.trial import TrialParts, run_trial
+from robospa.harness.trial import TrialSetup, run_trial
 from robospa.harness.world import Poll, StepResult
 from robospa.observation import CameraSpec, Observation
 from robospa.protocol.policy import PolicySpec
@@ -112,14 +112,14 @@ def _unused(*_: object) -> NoReturn:
     raise AssertionError("the task of this benchmark is never drawn")
 
 
-def endless_trial(key: TrialKey, steps: int = STEPS) -> TrialParts:
+def endless_trial(key: TrialKey, steps: int = STEPS) -> TrialSetup:
     """A trial of `steps` policy actions that no policy ends sooner."""
     levels = {1: Level(candidates=1, subtasks=1, steps=steps)}
     task = Task(
         key.task, "GAC", levels, _unused, _unused, _unused, _unused, _unused, "idle", "never"
     )
     scene = Scene(key.task, key.level, key.seed, key.embodiment, key.mode, (), {})
-    return TrialParts(scene, task, NeverMet(), "Do nothing.")
+    return TrialSetup(scene, task, NeverMet(), "Do nothing.")
 
 
 class TimedWorld(IdleWorld):

@@ -31,7 +31,7 @@ from robospa.harness.running.request import HELD
 from robospa.harness.running.runner import Runner, RunOptions
 from robospa.harness.running.status import Status, cores, most_workers
 from robospa.harness.running.worker import WorkerConfig
-from robospa.harness.trial import TrialParts
+from robospa.harness.trial import TrialSetup
 from robospa.harness.world import Poll, StepResult
 from robospa.observation import Observation
 from robospa.protocol.policy import PolicySpec, TrialInfo
@@ -85,7 +85,7 @@ class BusyWorld(IdleWorld):
         return super().step(action, space, poll)
 
 
-def parts(key: TrialKey) -> TrialParts:
+def parts(key: TrialKey) -> TrialSetup:
     """A trial of CALLS steps."""
     return endless_trial(key, CALLS)
 

@@ -21,9 +21,8 @@ from numpy.typing import NDArray
 
 from robospa.action_space import SIX_JOINT_ARMS, ActionSpace
 from robospa.clients.model_policy import Chunk, Query
-from robospa.geometry import Array
+from robospa.geometry import Array, matrix_to_quaternion, quaternion_to_matrix
 from robospa.protocol.errors import PolicyAnswerError
-from robospa.rotations import matrix_to_quaternion, quaternion_to_matrix
 
 ORDERS = ("xyzw", "wxyz")
 LAYOUTS = ("interleaved", "columns")

@@ -46,12 +46,12 @@ from robospa.clients.chunks import (
 from robospa.clients.detect import Probe
 from robospa.clients.dialect import ConnectionParams, Dialect, StatelessSession
 from robospa.clients.numpy_msgpack import MsgpackSocket, binary_form
+from robospa.geometry import quaternion_to_matrix
 from robospa.observation import Observation
 from robospa.protocol.errors import PolicyAnswerError, ServerError, printable
 from robospa.protocol.options import option
 from robospa.protocol.policy import PolicySpec, TrialInfo
 from robospa.registry import did_you_mean
-from robospa.rotations import quaternion_to_matrix
 
 BODIES = {"joint": "arm_joint_state", "ee": "ee_pose"}
 """What moves an arm in each space, under its usual name without the arm."""

@@ -7,7 +7,7 @@ out of reach leaves that arm where it is. `JointTargets.problems` reports it.
 
 Equal actions give equal targets, to the bit, on every processor. Joint actions are only clipped.
 Those of poses come from inverse kinematics, whose last bits differ, so what it finds is rounded to
-a whole number of steps (`harness.quantize`), brought onto the pose in fixed-order arithmetic
+a whole number of steps (`action_space`), brought onto the pose in fixed-order arithmetic
 (`harness.robots.fixed_order`), and rounded again.
 """
 
@@ -19,9 +19,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from robospa.action_space import KINDS, ActionSpace, ArmColumns
+from robospa.action_space import KINDS, STEPS_PER_UNIT, ActionSpace, ArmColumns, nearest, quantize
 from robospa.geometry import Pose, from_matrix
-from robospa.harness.quantize import STEPS_PER_UNIT, nearest, quantize
 from robospa.harness.robots.embodiment import Embodiment
 from robospa.harness.robots.fixed_order import (
     FixedChain,

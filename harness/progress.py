@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Protocol, TextIO, TypeVar
 from robospa.harness.running.status import ServerStats, Status, server_text, shares_text
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.statistics.intervals import wilson
-from robospa.terminal import plain_console, recording_console
-from robospa.text import clock_text, percent_text
+from robospa.text import clock_text, percent_text, plain_console, recording_console
 
 if TYPE_CHECKING:
     from rich.console import RenderableType

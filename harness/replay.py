@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.harness.running.record_store import ActionRecorder, read_actions, read_joints
-from robospa.harness.trial import Recorder, TrialParts, run_trial, task_parts
-from robospa.harness.trial_identity import policy_seed, trial_id
+from robospa.harness.trial import Recorder, TrialSetup, policy_seed, run_trial, task_parts, trial_id
 from robospa.harness.world import JOINTS_FROM_EE, ActionError, Poll, StepResult, World
 from robospa.observation import Observation
 from robospa.protocol.errors import PolicyAnswerError
@@ -88,7 +87,7 @@ def replay(
     joints: NDArray[np.float32] | None = None,
     policy_seed: int = 0,
     recorder: Recorder | None = None,
-    parts: Callable[[TrialKey], TrialParts] = task_parts,
+    parts: Callable[[TrialKey], TrialSetup] = task_parts,
     step_scale: float = 1.0,
 ) -> TrialRecord:
     """The record that `actions` give on `key` in `world`, with step limits of `step_scale`.
@@ -112,7 +111,7 @@ def replay_record(
     folder: Path,
     recorder: Recorder,
     *,
-    parts: Callable[[TrialKey], TrialParts] = task_parts,
+    parts: Callable[[TrialKey], TrialSetup] = task_parts,
     step_scale: float = 1.0,
 ) -> None:
     """Replay the trial of `record`, whose actions are in the run in `folder`, for `recorder`.
@@ -155,7 +154,7 @@ def expert_actions(world: World, expert: Policy, key: TrialKey) -> NDArray[np.fl
     return recorder.actions
 
 
-def rehearse(world: World, policy: Policy, key: TrialKey, setup: TrialParts) -> TrialRecord:
+def rehearse(world: World, policy: Policy, key: TrialKey, setup: TrialSetup) -> TrialRecord:
     """The record of `key` with this scene, goal and instruction, which serve for one trial."""
     return run_trial(
         world,

@@ -7,10 +7,9 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
-from robospa.categories import BASIC, CATEGORIES, DIMENSIONS
 from robospa.harness.settings import Selection, SettingsError
 from robospa.schema import MAX_INTEGER, parse_json
-from robospa.trial import REFERENCE, TrialKey
+from robospa.trial import BASIC, CATEGORIES, DIMENSIONS, REFERENCE, TrialKey
 
 GROUPS = {"all": CATEGORIES, **DIMENSIONS, "basic": BASIC}
 

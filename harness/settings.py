@@ -1,21 +1,26 @@
 """The settings of an evaluation: one definition for the command line, a file and the driver.
 
-Every field is a flag of `robospa eval`, a key of a settings file (`harness.settings_file`), a
-keyword of `robospa.evaluate`, and an entry of what a run keeps. Its name is unique among all
-groups, so flags and keywords need no group. Secrets are no settings: a server's token is passed
-beside them and written nowhere.
+Every field is a flag of `robospa eval`, a key of a settings file, a keyword of `robospa.evaluate`,
+and an entry of what a run keeps. Its name is unique among all groups, so flags and keywords need no
+group. Secrets are no settings: a server's token is passed beside them and written nowhere.
+
+A file is TOML or JSON, one table a group; what it does not name has its default. Paths in it are
+relative to the folder in which the command runs, as on the command line.
 """
 
 from __future__ import annotations
 
+import json
+import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, replace
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, TypeVar
 
 from msgspec import Meta
 
-from robospa.harness.clock.settings import Timing
+from robospa.harness.clock.policy_clock import Timing
 from robospa.harness.world import ROBOT_ASSETS
 from robospa.observation import CAMERAS
 from robospa.protocol.options import check_ranges, option, plain_options, read_options
@@ -336,3 +341,92 @@ def check_values(group: object) -> None:
         words = value.split(",") if choices and item.name in LISTS else [value]
         if choices and (wrong := [word for word in words if word not in choices]):
             raise SettingsError(f"{item.name} {wrong[0]!r} is not one of {', '.join(choices)}")
+
+
+FILE = "settings.toml"
+"""In a run's folder: its settings, to be given to `robospa eval --config`."""
+MOST_BYTES = 2**20
+SECRETS = ("token",)
+
+
+def read_settings(path: Path) -> EvaluationSettings:
+    """The settings in the file at `path`: JSON if it is called so, else TOML.
+
+    Raises SettingsError, naming the file, if it cannot be read, has an unknown key or a value that
+    is impossible.
+    """
+    try:
+        return updated(EvaluationSettings(), _values(_parse(path)))
+    except SettingsError as error:
+        raise SettingsError(f"{path}: {error}") from error
+
+
+def to_toml(settings: EvaluationSettings) -> str:
+    """All settings, the defaults too, as TOML that `read_settings` reads."""
+    lines: list[str] = []
+    for group, values in plain(settings).items():
+        if group:
+            lines += ["", f"[{group}]"]
+        lines += [f"{name} = {_toml(v)}" for name, v in values.items() if v is not None]
+    return "\n".join(lines) + "\n"
+
+
+def _toml(value: Value) -> str:
+    """A value of TOML: as in JSON, but for infinite numbers and one character."""
+    if isinstance(value, float):
+        return repr(value)
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def _parse(path: Path) -> Mapping[str, object]:
+    try:
+        if path.stat().st_size > MOST_BYTES:
+            raise SettingsError(f"it has more than {MOST_BYTES} bytes")
+        text = path.read_text()
+        found = json.loads(text) if path.suffix == ".json" else tomllib.loads(text)
+    except OSError as error:
+        raise SettingsError(f"it cannot be read ({error.strerror})") from error
+    except (ValueError, RecursionError) as error:
+        kind = "JSON" if path.suffix == ".json" else "TOML"
+        raise SettingsError(f"it is no {kind} ({str(error)[:200]})") from error
+    if not isinstance(found, dict):
+        raise SettingsError("it is no map of settings")
+    return found
+
+
+def _values(data: Mapping[str, object]) -> dict[str, object]:
+    """The settings in a file's `data`, by name without their groups."""
+    values: dict[str, object] = {}
+    for name, value in data.items():
+        if name not in GROUPS:
+            values |= _known("", {name: value})
+        elif isinstance(value, dict):
+            values |= _known(name, value)
+        else:
+            raise SettingsError(f"{name} is a group of settings: write a table [{name}]")
+    return values
+
+
+def _known(group: str, values: Mapping[str, object]) -> Mapping[str, object]:
+    """`values` if all of them are settings of `group`; raises SettingsError with near matches."""
+    groups = group_of()
+    for name in values:
+        if name in SECRETS:
+            raise SettingsError(
+                f"a {name} does not belong in a file: use --{name} or ROBOSPA_{name.upper()}"
+            )
+        if groups.get(name) != group:
+            near = get_close_matches(name, [*groups, *GROUPS], n=1)
+            hint = f"did you mean {_place(near[0])}? " if near else ""
+            where = f"[{group}]" if group else "the top level"
+            known = [n for n, g in groups.items() if g == group] + ([] if group else list(GROUPS))
+            raise SettingsError(
+                f"{where} has no setting {name!r}; {hint}known there are {', '.join(known)}"
+            )
+    return values
+
+
+def _place(name: str) -> str:
+    """The place of a setting in a file, for messages."""
+    group = group_of().get(name)
+    return f"{name} of [{group}]" if group else f"[{name}]" if name in GROUPS else name

@@ -13,6 +13,7 @@ What goes wrong is sorted once, here:
 from __future__ import annotations
 
 import hashlib
+import hmac
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -21,13 +22,12 @@ from typing import Protocol, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.harness.answers import Answers
-from robospa.harness.clock.clock import Clock
-from robospa.harness.clock.real_loop import RealTime
-from robospa.harness.quantize import quantize
+from robospa.action_space import quantize
+from robospa.harness.clock.policy_clock import PolicyClock
+from robospa.harness.clock.real_time import RealTime
+from robospa.harness.policy_calls import PolicyCaller, Stopwatch, answer_times
 from robospa.harness.robots import embodiment
 from robospa.harness.robots.embodiment import Embodiment
-from robospa.harness.trial_times import Stopwatch, answer_times
 from robospa.harness.world import ActionError, StepResult, TellsInstruction, World
 from robospa.observation import Observation, View
 from robospa.protocol.errors import PolicyAnswerError, PolicyError
@@ -62,7 +62,7 @@ class Recorder(Protocol):
 
 
 @dataclass(frozen=True)
-class TrialParts:
+class TrialSetup:
     """Scene, task, goal and instruction of a trial; tests replace them."""
 
     scene: Scene
@@ -71,7 +71,7 @@ class TrialParts:
     instruction: str
 
 
-def task_parts(key: TrialKey, salt: str = "") -> TrialParts:
+def task_parts(key: TrialKey, salt: str = "") -> TrialSetup:
     """Scene, goal and instruction of `key` from the catalog; KeyError or ValueError if unknown.
 
     `salt` is the secret of hidden scenes.
@@ -80,7 +80,7 @@ def task_parts(key: TrialKey, salt: str = "") -> TrialParts:
 
     task = find_task(key.task)
     scene = build_scene(key.task, key.level, key.seed, key.embodiment, key.mode, salt)
-    return TrialParts(scene, task, task.goal(scene), instruction(scene, key.split, salt))
+    return TrialSetup(scene, task, task.goal(scene), instruction(scene, key.split, salt))
 
 
 @dataclass
@@ -89,7 +89,7 @@ class TrialState:
     `run_trial` and an environment that is stepped from outside execute actions alike."""
 
     world: World
-    parts: TrialParts
+    parts: TrialSetup
     robot: Embodiment
     recorder: Recorder | None = None
     stopwatch: Stopwatch = field(default_factory=Stopwatch)
@@ -250,7 +250,7 @@ def _images_and_state(observation: Observation) -> View:
     return cast(View, {k: v for k, v in observation.items() if k in ("images", "state")})
 
 
-def _loop(run: TrialState, answers: Answers, limit: int) -> str:
+def _loop(run: TrialState, answers: PolicyCaller, limit: int) -> str:
     """Act until the goal is met or lost or `limit` actions are spent; returns the end reason."""
     spec = answers.policy.spec
     while len(run.actions) < limit:
@@ -275,7 +275,7 @@ def actions_digest(actions: list[NDArray[np.float32]]) -> str:
 
 
 def _play(
-    run: TrialState, answers: Answers, info: TrialInfo, limit: int, real: RealTime | None
+    run: TrialState, answers: PolicyCaller, info: TrialInfo, limit: int, real: RealTime | None
 ) -> tuple[str, str]:
     """(end reason, message) of the trial whose scene is loaded."""
     try:
@@ -304,7 +304,7 @@ def _diagnostics(run: TrialState) -> dict[str, object]:
 
 
 def open_trial(
-    world: World, key: TrialKey, setup: TrialParts, recorder: Recorder | None = None
+    world: World, key: TrialKey, setup: TrialSetup, recorder: Recorder | None = None
 ) -> TrialState:
     """The trial `setup` in `world`, its scene at rest; raises SceneUnstable."""
     run = TrialState(world, setup, embodiment(key.embodiment), recorder)
@@ -325,14 +325,14 @@ def run_trial(
     policy_seed: int,
     trial_id: str = "",
     recorder: Recorder | None = None,
-    parts: Callable[[TrialKey], TrialParts] = task_parts,
+    parts: Callable[[TrialKey], TrialSetup] = task_parts,
     step_scale: float = 1.0,
-    clock: Clock | None = None,
+    clock: PolicyClock | None = None,
     processor: Callable[[], float] = time.process_time,
 ) -> TrialRecord:
     """Run the trial `key` to its end and return its record.
 
-    `policy_seed` and `trial_id` are what the policy is sent (`robospa.harness.trial_identity`).
+    `policy_seed` and `trial_id` are what the policy is sent (`robospa.harness.trial`).
     `step_scale` multiplies the task's step limit; anything but 1 departs from the benchmark.
     `clock`: a real one, in a `world` whose actions take its period; None for the paused one.
     `processor` tells its time [s] where several trials share a process.
@@ -340,7 +340,7 @@ def run_trial(
     passed on. `world` may be used for any other trial before and after.
     """
     started, busy = time.perf_counter(), processor()
-    run, answers = open_trial(world, key, parts(key), recorder), Answers(policy)
+    run, answers = open_trial(world, key, parts(key), recorder), PolicyCaller(policy)
     info = TrialInfo(
         task=key.task,
         embodiment=key.embodiment,
@@ -398,3 +398,30 @@ def record_of(
         events=run.rows(),
         diagnostics=_diagnostics(run),
     )
+
+
+def policy_seed(key: TrialKey, run_seed: int = 0, salt: str = "") -> int:
+    """The seed that a stochastic policy gets for `key`, 0 to 2^31 - 1.
+
+    Like `trial_id` it follows from the key and the run's seed: the same in every worker and order,
+    and whenever a trial is repeated. With the salt of hidden scenes these are keyed hashes, from
+    which nobody without it learns the key. Without one they are plain hashes: whoever tries all
+    public keys can invert those, as she can tell a public scene by its sentence.
+    """
+    return int.from_bytes(_digest(f"{run_seed}/{key.slug}", salt)[:4], "big") >> 1
+
+
+def trial_id(key: TrialKey, run_seed: int = 0, salt: str = "") -> str:
+    """The name by which a policy knows the trial `key`: 16 hexadecimal digits."""
+    return _digest(f"id/{run_seed}/{key.slug}", salt)[:8].hex()
+
+
+def salt_hash(salt: str) -> str:
+    """What may be published of a salt."""
+    return hashlib.sha256(salt.encode()).hexdigest()
+
+
+def _digest(text: str, salt: str) -> bytes:
+    if salt:
+        return hmac.digest(salt.encode(), text.encode(), "sha256")
+    return hashlib.sha256(text.encode()).digest()

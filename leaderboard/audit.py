@@ -20,7 +20,7 @@ from robospa.harness.factory import load_function, open_policy
 from robospa.harness.replay import expert_actions, rehearse
 from robospa.harness.running.record_store import read_actions, read_joints
 from robospa.harness.sim.sapien_world import SapienWorld
-from robospa.harness.trial import TrialParts, task_parts
+from robospa.harness.trial import TrialSetup, task_parts
 from robospa.leaderboard.agreement import Counts, agreement
 from robospa.leaderboard.rules import shipped, spec_of
 from robospa.leaderboard.traces import Trace, joint_path, with_joints
@@ -42,7 +42,7 @@ EXPERT = "robospa.baselines.oracle:create"
 STILL = 0.8
 """Share of the successes that may not remain when the sentences are another trial's."""
 
-Parts = Callable[[TrialKey], TrialParts]
+Parts = Callable[[TrialKey], TrialSetup]
 
 
 @dataclass(frozen=True)
@@ -177,7 +177,7 @@ def other_sentence(key: TrialKey, parts: Parts = task_parts) -> str | None:
 
 
 def sentence_reaction(
-    play: Callable[[TrialKey, TrialParts], TrialRecord],
+    play: Callable[[TrialKey, TrialSetup], TrialRecord],
     keys: Sequence[TrialKey],
     parts: Parts = task_parts,
     other: Callable[[TrialKey], str | None] = other_sentence,

@@ -13,7 +13,6 @@ from typing import Annotated
 
 from msgspec import UNSET, Struct, UnsetType
 
-from robospa.categories import CATEGORIES, DIMENSIONS, SPATIAL
 from robospa.leaderboard.agreement import LEAST_POWER, LIE
 from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.card import Card, recipe_of
@@ -30,6 +29,7 @@ from robospa.results.scoring.scores import VariantScore, combine
 from robospa.results.scoring.setting import Setting
 from robospa.results.statistics.intervals import Estimate
 from robospa.schema import Count, pattern, read
+from robospa.trial import CATEGORIES, DIMENSIONS, SPATIAL
 
 
 @dataclass(frozen=True, order=True)

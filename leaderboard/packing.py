@@ -18,8 +18,8 @@ from pathlib import Path
 
 from msgspec import structs, to_builtins
 
+from robospa.action_space import STEPS_PER_UNIT, is_quantized
 from robospa.harness.factory import load_function
-from robospa.harness.quantize import STEPS_PER_UNIT, is_quantized
 from robospa.harness.running.manifest import changed_settings
 from robospa.harness.running.record_store import read_actions, read_joints
 from robospa.harness.world import World

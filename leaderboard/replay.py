@@ -37,7 +37,7 @@ from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
 if TYPE_CHECKING:
-    from robospa.harness.trial import TrialParts
+    from robospa.harness.trial import TrialSetup
     from robospa.harness.world import World
 
 IDENTICAL, AGREES, DIFFERENT = "identical", "agrees", "different"
@@ -165,7 +165,7 @@ def _replayer(where: tuple[str, str]) -> Callable[[Job], Replayed]:
         raise WorkerDied(str(error)) from None
 
 
-def _again(world: World, parts: Callable[[TrialKey], TrialParts], job: Job) -> Replayed:
+def _again(world: World, parts: Callable[[TrialKey], TrialSetup], job: Job) -> Replayed:
     """Play one trial again and compare."""
     from robospa.harness.replay import replay
 

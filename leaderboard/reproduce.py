@@ -28,7 +28,7 @@ from robospa.harness.running.evaluate import Request
 from robospa.harness.running.manifest import changed_settings
 from robospa.harness.running.policy_probe import probe_policies
 from robospa.harness.seeds.attempt import expert_pool
-from robospa.harness.trial_identity import salt_hash
+from robospa.harness.trial import salt_hash
 from robospa.leaderboard.agreement import (
     LEAST_POWER,
     LIE,

@@ -18,7 +18,6 @@ from importlib.resources import files
 from pathlib import Path
 from statistics import NormalDist
 
-from robospa.categories import CATEGORIES, CATEGORY_NAMES, DIMENSIONS
 from robospa.harness.running.atomic_file import replace_file
 from robospa.leaderboard import bundle as layout
 from robospa.leaderboard.bundle import IN_REPOSITORY, BundleError
@@ -45,6 +44,7 @@ from robospa.results.report.method import method_notes
 from robospa.results.report.page import FIGURES, card, figure, own_version, render
 from robospa.results.report.tables import ReportTable, for_page, report_tables
 from robospa.results.scoring.model_results import ModelResults
+from robospa.trial import CATEGORIES, CATEGORY_NAMES, DIMENSIONS
 
 MARK = ".robospa-site"
 """A file that says a folder is ours to write over."""

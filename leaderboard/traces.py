@@ -5,7 +5,7 @@
     uint32    actions of each trial
     4 planes  the differences from action to action, most significant bytes first
 
-All little-endian. Executed actions are quantised (`harness.quantize`), so every number is a whole
+All little-endian. Executed actions are quantised (`action_space`), so every number is a whole
 number of its steps; nothing finer can be written down, and the same float32 bits come back. Of each
 the difference to the action before is kept, small ones of either sign as small numbers; column by
 column through all trials, first all first bytes, then all second ones and so on. Deflate finds
@@ -27,7 +27,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.harness.quantize import LARGEST, STEPS_PER_UNIT, is_quantized
+from robospa.action_space import LARGEST, STEPS_PER_UNIT, is_quantized
 from robospa.harness.robots import embodiment
 from robospa.harness.sim.motion import action_steps, step_count
 from robospa.leaderboard.bundle import BundleError

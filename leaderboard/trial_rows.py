@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.harness.sim.motion import RATE
-from robospa.harness.trial_identity import policy_seed
+from robospa.harness.trial import policy_seed
 from robospa.leaderboard.bundle import BundleError, is_sha256, sha256
 from robospa.leaderboard.rules import Reference, VariantFacts, spec_of
 from robospa.leaderboard.traces import Trace, split_trace

@@ -21,7 +21,6 @@ from typing import Annotated
 
 from msgspec import Meta, Struct, to_builtins
 
-from robospa.categories import METRICS
 from robospa.harness.running.status import cores
 from robospa.leaderboard import bundle as layout
 from robospa.leaderboard.bundle import (
@@ -62,7 +61,7 @@ from robospa.results.scoring.scores import score_run
 from robospa.results.scoring.setting import IncomparableError
 from robospa.results.scoring.weights import Variant
 from robospa.schema import pattern, read
-from robospa.trial import TrialKey
+from robospa.trial import METRICS, TrialKey
 
 LISTING = ("unequal-trials", "missing")
 """Lint rules about how many trials there are, which `check_seeds` decides."""

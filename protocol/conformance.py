@@ -19,8 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.action_space import ActionSpace
-from robospa.environment_state import WIDTH
-from robospa.observation import Observation
+from robospa.observation import WIDTH, Observation
 from robospa.protocol.client import RemotePolicy, connect
 from robospa.protocol.codec import DEFAULT_LIMITS, encode
 from robospa.protocol.errors import TransportError, WireError

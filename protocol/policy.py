@@ -70,7 +70,7 @@ class PolicySpec:
     """Whether it reads the exact state of the simulation, as no learned policy does."""
     environment_state: bool = False
     """Whether it reads the objects' poses, sizes and colours as numbers
-    (`robospa.environment_state`): such a policy counts as privileged in all results."""
+    (`robospa.observation`): such a policy counts as privileged in all results."""
     needs_trial_key: bool = False
     """Whether it asks for the trial's level, seed, scene mode and split, from which its scene can
     be rebuilt with the answer: such a policy is marked in all results and never ranked."""

@@ -15,8 +15,7 @@ from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING
 
-from robospa.terminal import plain_console
-from robospa.text import markdown_table, plain
+from robospa.text import markdown_table, plain, plain_console
 
 if TYPE_CHECKING:
     from rich.console import Console

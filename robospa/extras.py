@@ -1,4 +1,4 @@
-"""Packages that not everybody needs: where one is missing, what brings it.
+"""Packages that not everybody needs: where one is missing, what brings it; and the user's cache.
 
 `pip install robospa` stays small; everything else is an extra of pyproject.toml.
 """
@@ -6,7 +6,10 @@
 from __future__ import annotations
 
 import json
+import os
+import sys
 from importlib import import_module, metadata
+from pathlib import Path
 from types import ModuleType
 
 EXTRAS = {
@@ -65,3 +68,22 @@ def source() -> str:
     except (metadata.PackageNotFoundError, ValueError):
         return "robospa"
     return url.removeprefix("file://") if url.startswith("file://") else "robospa"
+
+
+VARIABLE = "ROBOSPA_CACHE"
+"""Environment variable that names another folder."""
+
+
+def user_cache() -> Path:
+    """The folder of all caches: $ROBOSPA_CACHE, or `robospa` where the platform keeps caches.
+
+    That is $XDG_CACHE_HOME or ~/.cache; ~/Library/Caches on macOS; %LOCALAPPDATA% on Windows.
+    """
+    if named := os.environ.get(VARIABLE):
+        return Path(named)
+    home = Path(os.path.expanduser("~"))
+    if sys.platform == "darwin":
+        return home / "Library" / "Caches" / "robospa"
+    if sys.platform == "win32":
+        return Path(os.environ.get("LOCALAPPDATA") or home / "AppData" / "Local") / "robospa"
+    return Path(os.environ.get("XDG_CACHE_HOME") or home / ".cache") / "robospa"

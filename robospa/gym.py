@@ -13,4 +13,4 @@ from __future__ import annotations
 
 from importlib import import_module
 
-import_module("robospa.harness.gym.registration").register_tasks()
+import_module("robospa.harness.gym.environment").register_tasks()

@@ -1,8 +1,17 @@
-"""Texts that are made in many places: intervals, durations, lists of names, Markdown tables."""
+"""Texts that are made in many places: intervals, durations, lists of names, Markdown tables; and a
+terminal where what comes from outside is text, and never markup.
+
+Names of policies, messages and instructions may hold "[/bold]", "[link=...]" or ":boom:". A console
+of this module prints them as they are; what shall be coloured is a `rich.text.Text` with a style.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import IO, TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 NAMED = 3
 """So many names of a list are given before the others are only counted."""
@@ -57,3 +66,40 @@ def markdown_table(
     lines = ["| " + " | ".join(row) + " |" for row in (heads, *rows)]
     rule = "|" + "".join(f"{one}|" for one in align or ["---"] * len(heads))
     return "\n".join([lines[0], rule, *lines[1:]])
+
+
+def plain_console(
+    wide: int | None = None, file: IO[str] | None = None, quiet: bool = False
+) -> Console:
+    """A console that takes no text for markup, an emoji or something to colour.
+
+    `wide`: columns that it has where it is no terminal, which none would read narrowly.
+    """
+    from rich.console import Console
+
+    def made(width: int | None) -> Console:
+        return Console(
+            width=width, file=file, quiet=quiet, markup=False, emoji=False, highlight=False
+        )
+
+    console = made(None)
+    return console if wide is None or console.is_terminal else made(wide)
+
+
+def recording_console(columns: int) -> Console:
+    """The same kind of console, of so many columns: shows nothing, and exports what was printed."""
+    import io
+
+    from rich.console import Console
+
+    return Console(
+        record=True,
+        file=io.StringIO(),
+        width=columns,
+        markup=False,
+        emoji=False,
+        highlight=False,
+        force_terminal=True,
+        force_jupyter=False,
+        color_system="truecolor",
+    )

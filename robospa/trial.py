@@ -1,4 +1,4 @@
-"""The key of a trial: the unit of scheduling, retry, resume, record and replay."""
+"""The key of a trial, the unit of scheduling, retry, resume, record and replay; the categories."""
 
 from __future__ import annotations
 
@@ -43,3 +43,31 @@ class TrialKey:
 def path_part(name: str) -> str:
     """The name of a robot or scene mode as part of a path."""
     return re.sub(r"[:,=+]", "-", name)
+
+
+SPATIAL = ("GAC", "SDE", "CPI", "RRR", "CVR")
+PROCEDURAL = ("RPF", "OFE", "OCE", "CAC", "MIP")
+CATEGORIES = SPATIAL + PROCEDURAL
+BASIC = ("CBG", "EPG", "SOI")
+"""The appendix's references: scored by category, part of no dimension, not of the overall value."""
+CATEGORY_NAMES = {
+    "GAC": "Geometric Attribute Cognition",
+    "SDE": "Spatial Distance Estimation",
+    "CPI": "Canonical Position Indexing",
+    "RRR": "Referential Relational Reasoning",
+    "CVR": "Cross-View Reasoning",
+    "RPF": "Repetitive Procedure Following",
+    "OFE": "Order-Free Execution",
+    "OCE": "Order-Constrained Execution",
+    "CAC": "Composite Action Coordination",
+    "MIP": "Memory-Intensive Planning",
+    "CBG": "Color-Based Grounding",
+    "EPG": "Egocentric Position Grounding",
+    "SOI": "Simple Ordinal Indexing",
+}
+DIMENSIONS = {"spatial": SPATIAL, "procedural": PROCEDURAL}
+METRICS = ("sr", "onta", "ps")
+"""Success rate, object-normalized target accuracy, progress score."""
+METRIC_NAMES = {"sr": "SR", "onta": "ONTA", "ps": "PS"}
+METRIC_CATEGORIES = {"sr": CATEGORIES, "onta": SPATIAL, "ps": PROCEDURAL}
+"""The categories that a metric is averaged over."""

@@ -1,6 +1,6 @@
 """The objects of a scene as one row of numbers: what a policy without eyes is told of them.
 
-The layout of a row is `robospa.environment_state`. Objects take the slots from left to right as
+The layout of a row is `robospa.observation`. Objects take the slots from left to right as
 they lie when the trial starts, and keep them. So neither the order nor a number tells an object's
 role: a row says what a perfect camera could measure. It says nothing of clutter, of the sentence,
 or of what was seen earlier.
@@ -15,8 +15,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.environment_state import FEATURES, KIND_BITS, SLOTS, TURNS
 from robospa.geometry import Pose, rotate
+from robospa.observation import FEATURES, KIND_BITS, SLOTS, TURNS
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.shapes import Box, Color, Cylinder, Geometry, ObjectModel, Params, Sphere
 from robospa.tasks.snapshot import Snapshot

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from robospa.geometry import Pose, Vec3
-from robospa.gripper import Gripper, grasp_points
+from robospa.workcell import Gripper, grasp_points
 
 GRIPPER_OPEN = 0.8
 """A commanded gripper above this is open (official predicate)."""

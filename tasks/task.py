@@ -8,12 +8,12 @@ from typing import Any, Protocol, Self
 
 import numpy as np
 
-from robospa.categories import BASIC, SPATIAL
 from robospa.tasks.events import Event, ObjectRole
 from robospa.tasks.instructions.grammar import Phrasings, Templates
 from robospa.tasks.plan import Skill
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.snapshot import Snapshot
+from robospa.trial import BASIC, SPATIAL
 from robospa.workcell import Workcell
 
 

@@ -29,7 +29,7 @@ ALLOWED = {
         "harness.demonstrations",
         "harness.datasets",
         "harness.clock",
-        "harness.quantize",
+        "action_space",
         "harness.running.atomic_file",
         "clients.model_policy",
         "results.figures",

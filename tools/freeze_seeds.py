@@ -41,7 +41,7 @@ from robospa.results.paper.published import load
 from robospa.results.tables import show
 from robospa.tasks.catalog import LEVELS
 from robospa.tasks.seeds import FIRST_SEED, PER_VARIANT, ListKey
-from robospa.terminal import plain_console
+from robospa.text import plain_console
 from robospa.trial import REFERENCE
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -19,7 +19,6 @@ from scene_answers import targets_of
 
 from robospa.action_space import ARMS
 from robospa.geometry import Pose, look_rotation, to_matrix
-from robospa.gripper import grasp_points
 from robospa.harness.robots import embodiment
 from robospa.harness.robots.kinematics import chain_of, end_effector, inverse
 from robospa.harness.skills.pick import LEANS, LEVEL, candidate_poses, world_grasps
@@ -30,7 +29,7 @@ from robospa.tasks.objects.build import points_of
 from robospa.tasks.plan import Pick
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.snapshot import Snapshot
-from robospa.workcell import HEIGHT, WIDTH, WORKCELL
+from robospa.workcell import HEIGHT, WIDTH, WORKCELL, grasp_points
 
 TILTS = (0.0, 0.3, 0.6, 0.9, 1.2)
 """How far a gripper may lean away from the arm's base [rad]."""

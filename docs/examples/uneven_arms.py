@@ -9,10 +9,9 @@ from __future__ import annotations
 import math
 
 from robospa.geometry import Pose, Vec3, axis_rotation, yaw_rotation
-from robospa.gripper import Gripper
 from robospa.harness.robots.embodiment import Arm, Embodiment, Joint
 from robospa.tasks.shapes import Box, Color, Shape
-from robospa.workcell import WORKCELL
+from robospa.workcell import WORKCELL, Gripper
 
 GREY: Color = (0.3, 0.32, 0.35)
 BLUE: Color = (0.05, 0.15, 0.4)

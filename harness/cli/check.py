@@ -3,7 +3,7 @@ fit to be evaluated?
 
 Of a server there are four parts: the protocol (`robospa.protocol.conformance`), the first actions
 (`robospa.harness.convention_check.initial_actions`), a real trial run twice
-(`robospa.harness.conformance_rollout`), and with --demo the replay of a demonstration
+(`robospa.harness.server_checks`), and with --demo the replay of a demonstration
 (`robospa.harness.convention_check.check`). Exit code 1 if a check of the protocol or a real trial
 failed, or if the replay names a mistake; hints, and a replay that does not fit, are only reported.
 """
@@ -19,16 +19,16 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from robospa.harness.cli.options import DAYS, SECONDS, TRIALS, AsJson, Token, print_json
-from robospa.harness.clock.latency import latency_json
-from robospa.terminal import plain_console
+from robospa.harness.clock.policy_clock import latency_json
+from robospa.text import plain_console
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from robospa.harness.clock.measure import Load
     from robospa.harness.convention_check.check import Findings
     from robospa.harness.convention_check.episodes import Episode
     from robospa.harness.official.recordings import RecordingReplay
+    from robospa.harness.server_checks import Load
     from robospa.protocol.client import RemotePolicy
     from robospa.protocol.conformance import CheckResult
     from robospa.protocol.transport import Timeouts
@@ -200,7 +200,7 @@ def measured(console: Console, target: Target, seconds: float) -> list[Load]:
     policy that only a simulator can ask."""
     from rich.table import Table
 
-    from robospa.harness.clock.measure import CLIENTS, measure
+    from robospa.harness.server_checks import CLIENTS, measure
 
     with target.connect() as policy:
         if policy.spec.privileged:
@@ -281,7 +281,7 @@ def _run_checks(console: Console, target: Target, trials: int) -> list[CheckResu
     from rich.table import Table
     from rich.text import Text
 
-    from robospa.harness.conformance_rollout import rollouts
+    from robospa.harness.server_checks import rollouts
     from robospa.protocol.conformance import check as check_protocol
 
     results = check_protocol(
@@ -306,7 +306,7 @@ def _run_checks(console: Console, target: Target, trials: int) -> list[CheckResu
 
 def _is_hint(result: CheckResult) -> bool:
     """Whether a check that fails nobody saw something suspicious."""
-    from robospa.harness.conformance_rollout import EXECUTED_ACTIONS
+    from robospa.harness.server_checks import EXECUTED_ACTIONS
 
     return result.name in (FIRST_ACTIONS, EXECUTED_ACTIONS) and result.passed is None
 

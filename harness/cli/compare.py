@@ -80,8 +80,8 @@ def compare(
 
 
 def _print(found: Comparison, variants: bool) -> None:
-    from robospa.categories import METRIC_NAMES
     from robospa.results.statistics.significance import ALPHA
+    from robospa.trial import METRIC_NAMES
 
     if found.banner:
         print(found.banner)

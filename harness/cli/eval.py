@@ -17,8 +17,13 @@ from robospa.harness.cli.options import AsJson, Token, given_flags, print_json, 
 from robospa.harness.running.evaluate import Request, RunAborted
 from robospa.harness.running.evaluate import evaluate as run_request
 from robospa.harness.running.films import FilmsInterrupted
-from robospa.harness.settings import GROUPS, EvaluationSettings, SettingsError, updated
-from robospa.harness.settings_file import read_settings
+from robospa.harness.settings import (
+    GROUPS,
+    EvaluationSettings,
+    SettingsError,
+    read_settings,
+    updated,
+)
 
 if TYPE_CHECKING:
     from robospa.results.records.run_io import Run

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from robospa.harness.cli.options import TRIALS, AsJson, aside, print_json
-from robospa.terminal import plain_console
+from robospa.text import plain_console
 from robospa.trial import REFERENCE
 
 if TYPE_CHECKING:

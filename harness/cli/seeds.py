@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from robospa.harness.cli.options import PROCESSES, SEED, TRIALS
-from robospa.terminal import plain_console
+from robospa.text import plain_console
 from robospa.trial import REFERENCE
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from robospa.harness.cli.options import DAYS, PORT, SEED, AsJson, print_json
-from robospa.terminal import plain_console
+from robospa.text import plain_console
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -166,8 +166,8 @@ def _listing() -> Table:
     from rich import box
     from rich.table import Table
 
-    from robospa.categories import BASIC, DIMENSIONS
     from robospa.tasks.catalog import tasks as all_tasks
+    from robospa.trial import BASIC, DIMENSIONS
 
     groups = {**DIMENSIONS, "basic": BASIC}
     table = Table(

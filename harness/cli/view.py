@@ -58,8 +58,7 @@ def _trial(run: Path, trial: str, html: Path | None, port: int, minutes: float) 
 def _report(run: Path, with_published: bool, film: bool, port: int, minutes: float) -> None:
     import time
 
-    from robospa.harness.live_report import LiveReport
-    from robospa.harness.report_server import serving
+    from robospa.harness.report_server import LiveReport, serving
     from robospa.harness.running.films import film_lines, films_afterwards
     from robospa.results.paper.published import load
     from robospa.results.records.run_io import read_run

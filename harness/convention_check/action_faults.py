@@ -14,8 +14,7 @@ from itertools import permutations
 import numpy as np
 
 from robospa.action_space import ARMS, ActionSpace, ArmColumns
-from robospa.geometry import Array
-from robospa.rotations import angle_between, product, quaternion_to_matrix
+from robospa.geometry import Array, angle_between, product, quaternion_to_matrix
 
 SCALES = {"joints": 0.1, "gripper": 0.2, "position": 0.03, "rotation": 0.2}
 """The mean error [rad, 1, m, rad] of an answer that is about as good as it should be."""

@@ -19,13 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.action_space import ActionSpace
-from robospa.geometry import Array
+from robospa.geometry import Array, product
 from robospa.harness.convention_check import action_faults
 from robospa.harness.convention_check.action_faults import ActionFault, AnswerSample, fitted, score
 from robospa.harness.convention_check.episodes import Episode, EpisodeError
 from robospa.observation import Observation, View
 from robospa.protocol.policy import Policy, PolicySpec, TrialInfo
-from robospa.rotations import product
 from robospa.trial import REFERENCE
 
 Image = NDArray[np.uint8]

@@ -15,7 +15,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.categories import CATEGORY_NAMES
 from robospa.harness.datasets.episode import DatasetEpisode
 from robospa.harness.datasets.features import EpisodeLayout
 from robospa.harness.datasets.manifest import EPISODES, EVENTS, MANIFEST, SUMS, DatasetManifest
@@ -24,6 +23,7 @@ from robospa.harness.demonstrations.noise import LABELS
 from robospa.harness.pictures.gallery import PAPER, TEXT, wrapped
 from robospa.results.figures.series import COLOURS, new_figure, plain, styled
 from robospa.text import markdown_table
+from robospa.trial import CATEGORY_NAMES
 
 CARD, SHEET, LENGTHS = "README.md", "episodes.jpg", "lengths.png"
 PICTURED = 24

@@ -29,9 +29,8 @@ from msgspec import Meta
 from numpy.typing import NDArray
 
 from robospa.action_space import ActionSpace
-from robospa.environment_state import WIDTH
 from robospa.harness.running.atomic_file import replace_file
-from robospa.observation import Pixels
+from robospa.observation import WIDTH, Pixels
 from robospa.schema import one_of, parse_json, read
 from robospa.tasks.events import Event
 from robospa.trial import TrialKey
@@ -101,7 +100,7 @@ class DatasetEpisode:
     (`robospa.harness.demonstrations.noise`)."""
     environment_state: NDArray[np.float32]
     """(T, E): the objects as numbers, measured at the frame, named by `NAMES` of
-    `robospa.environment_state`; E is 0 where they were not asked for."""
+    `robospa.observation`; E is 0 where they were not asked for."""
     prefix_action: NDArray[np.float32]
     """(P, D): actions that lead from the start of the trial to the first frame; P is 0 but for
     `midstate`."""

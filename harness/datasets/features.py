@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.action_space import ARMS, ActionSpace
-from robospa.environment_state import NAMES
 from robospa.harness.datasets.episode import DatasetEpisode, Pictures, Stills
 from robospa.harness.datasets.pictures import FPS
+from robospa.observation import NAMES
 
 if TYPE_CHECKING:
     import pyarrow as pa

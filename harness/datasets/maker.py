@@ -29,7 +29,7 @@ from robospa.harness.demonstrations.demonstration import (
 from robospa.harness.demonstrations.recorder import KEYFRAMES, FrameRecorder, drawn, frame_steps
 from robospa.harness.replay import ENDED
 from robospa.harness.sim.sapien_world import SapienWorld
-from robospa.harness.trial import TrialParts, task_parts
+from robospa.harness.trial import TrialSetup, task_parts
 from robospa.results.failures.labels import label
 from robospa.results.records.trial_record import TrialRecord
 from robospa.tasks.descriptions import describe_objects
@@ -98,7 +98,7 @@ def _wanted(kind: str) -> str:
 
 
 def episode_of(
-    key: TrialKey, setup: TrialParts, shown: ShownEpisode, recorder: FrameRecorder
+    key: TrialKey, setup: TrialSetup, shown: ShownEpisode, recorder: FrameRecorder
 ) -> DatasetEpisode:
     """What was recorded, before its replay and without pictures."""
     columns = zip(

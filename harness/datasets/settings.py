@@ -15,7 +15,6 @@ from typing import Annotated
 
 from msgspec import Meta
 
-from robospa.environment_state import WIDTH
 from robospa.harness.datasets.pictures import CODECS
 from robospa.harness.running.code_hash import FOLDERS, code_hash
 from robospa.harness.running.ray_executor import versions as packages
@@ -26,7 +25,7 @@ from robospa.harness.selection import (
     parse_tasks,
 )
 from robospa.harness.settings import SettingsError, check_values
-from robospa.observation import CAMERAS, CameraSpec
+from robospa.observation import CAMERAS, WIDTH, CameraSpec
 from robospa.protocol.options import option
 from robospa.tasks.catalog import task
 from robospa.tasks.modes import for_training

@@ -21,7 +21,6 @@ import numpy as np
 
 from robospa.action_space import ARMS
 from robospa.geometry import Array, Pose, Vec3, axis_rotation, look_rotation, rotate
-from robospa.gripper import grasp_points
 from robospa.harness.demonstrations.clearance import depths, gaps
 from robospa.harness.robots import embodiment
 from robospa.harness.robots.kinematics import chain_of, end_effector
@@ -46,6 +45,7 @@ from robospa.tasks.plan import (
 )
 from robospa.tasks.scene import Scene
 from robospa.tasks.snapshot import Snapshot
+from robospa.workcell import grasp_points
 
 KINDS = {
     "neighbour": "picks the object nearest to the target instead",

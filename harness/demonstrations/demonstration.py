@@ -23,12 +23,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.action_space import ActionSpace
+from robospa.action_space import ActionSpace, quantize
 from robospa.harness import trial
 from robospa.harness.demonstrations import changed_plans
 from robospa.harness.demonstrations.noise import EXPERT, MISTAKE, STRENGTH, Noise
 from robospa.harness.demonstrations.recorder import FrameRecorder, frame_steps
-from robospa.harness.quantize import quantize
 from robospa.harness.replay import RecordedPolicy
 from robospa.harness.robots import embodiment
 from robospa.harness.sim.motion import DEMONSTRATION_LIMITS, RATE, Trajectory
@@ -136,7 +135,7 @@ class DemonstrationRun(trial.TrialState):
 
 
 def open_run(
-    world: World, key: TrialKey, setup: trial.TrialParts, recorder: trial.Recorder
+    world: World, key: TrialKey, setup: trial.TrialSetup, recorder: trial.Recorder
 ) -> DemonstrationRun:
     """The demonstration of `setup`, begun; passes on what `world` raises."""
     run = DemonstrationRun(world, setup, embodiment(key.embodiment), recorder)
@@ -149,7 +148,7 @@ def demonstrate(
     world: World,
     key: TrialKey,
     recorder: trial.Recorder,
-    parts: Callable[[TrialKey], trial.TrialParts] = trial.task_parts,
+    parts: Callable[[TrialKey], trial.TrialSetup] = trial.task_parts,
     make_expert: Callable[[Scene, Snapshot], Expert] = Expert,
 ) -> Demonstration:
     """Run the expert on `key` to its plan's end, then rest.
@@ -235,7 +234,7 @@ def show(
     key: TrialKey,
     recorder: trial.Recorder,
     kind: str = "expert",
-    parts: Callable[[TrialKey], trial.TrialParts] = trial.task_parts,
+    parts: Callable[[TrialKey], trial.TrialSetup] = trial.task_parts,
     strength: float = STRENGTH,
 ) -> ShownEpisode:
     """Make the demonstration `key` of a kind. `strength` is that of noise [m].

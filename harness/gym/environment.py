@@ -15,14 +15,13 @@ import numpy as np
 from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
+from robospa.extras import need
 from robospa.harness.factory import load_function
 from robospa.harness.gym.spaces import action_space, check_spec, observation_space
-from robospa.harness.gym.window import Window
 from robospa.harness.robots import embodiment as robot_named
 from robospa.harness.seeds.lists import find_list
 from robospa.harness.settings import SettingsError
-from robospa.harness.trial import TrialState, open_trial, record_of, step_limit
-from robospa.harness.trial_identity import policy_seed
+from robospa.harness.trial import TrialState, open_trial, policy_seed, record_of, step_limit
 from robospa.harness.world import ActionError, StepResult, World
 from robospa.harness.worlds import SAPIEN_NAME, TASK_PARTS, open_world
 from robospa.observation import CAMERAS, DEFAULT_CAMERAS, CameraSpec
@@ -30,7 +29,9 @@ from robospa.protocol.errors import PolicyError
 from robospa.protocol.policy import PolicySpec
 from robospa.results.records.trial_record import TrialRecord
 from robospa.tasks.catalog import task as find_task
+from robospa.tasks.catalog import tasks
 from robospa.tasks.events import outcome
+from robospa.tasks.scene import SUITE
 from robospa.tasks.seeds import ListKey
 from robospa.trial import REFERENCE, TrialKey
 
@@ -292,3 +293,40 @@ class _Watcher:
 
     def ended(self, world: World) -> None:
         """The last picture stays."""
+
+
+class Window:
+    """`width` x `height` pixels; raises MissingPackage without pygame, of the extra `gym`."""
+
+    def __init__(self, title: str, width: int, height: int) -> None:
+        self._pygame = need("pygame")
+        self._pygame.display.init()
+        self._pygame.display.set_caption(title)
+        self._surface = self._pygame.display.set_mode((width, height))
+
+    def show(self, image: NDArray[np.uint8]) -> None:
+        """Show an RGB image, uint8 (height, width, 3)."""
+        self._pygame.surfarray.blit_array(self._surface, image.swapaxes(0, 1))
+        self._pygame.display.flip()
+        self._pygame.event.pump()  # else the desktop calls the program dead
+
+    def close(self) -> None:
+        """Close it."""
+        self._pygame.display.quit()
+
+
+NAMESPACE = "RoboSPA"
+ENTRY = "robospa.harness.gym.environment:TaskEnv"
+
+
+def env_id(task: str) -> str:
+    """The id of `task`; another suite has other ids, because its trials are others."""
+    return f"{NAMESPACE}/{task}-v{SUITE.rpartition('-')[2]}"
+
+
+def register_tasks() -> None:
+    """Register every task that is not registered yet; raises MissingPackage without Gymnasium."""
+    registration = need("gymnasium.envs.registration")
+    for name in tasks():
+        if env_id(name) not in registration.registry:
+            registration.register(env_id(name), entry_point=ENTRY, kwargs={"task": name})

@@ -5,10 +5,20 @@ after every control step. A trial of ours has a fresh scene, actions that last a
 and a goal that watches at 50 Hz. So nothing here is built by ManiSkill: what it computes from a
 scene comes from the trial, and what it computes from that (observation modes, spaces, rewards,
 recording) is its own. An episode is a trial, and `reset(seed=s)` the trial of the seed s.
+
+An observation is a tree of arrays whose first axis is ManiSkill's batch, or time:
+
+    agent        qpos, controller/target_qpos      joints [rad] and grippers (0 closed, 1 open),
+                                                    as measured and as last commanded (D,)
+    extra        left_tcp_pose, right_tcp_pose      x y z [m], qw qx qy qz, world frame (7,)
+                 objects                            the objects as numbers (E,), state modes alone
+    sensor_param CAMERA/intrinsic_cv                (3, 3) [px]
+    sensor_data  CAMERA/rgb                         uint8 (height, width, 3)
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -24,15 +34,9 @@ from mani_skill.utils.registration import register_env
 from mani_skill.utils.visualization.misc import tile_images
 from numpy.typing import NDArray
 
+from robospa.action_space import ARMS
 from robospa.harness.gym.environment import USUAL_CAMERAS, TaskEnv
-from robospa.harness.gym.maniskill_layout import (
-    BACKEND,
-    MODULE,
-    Tree,
-    proprioception,
-    sensor_params,
-    variant_id,
-)
+from robospa.harness.robots import embodiment as robot_named
 from robospa.harness.settings import SettingsError
 from robospa.harness.trial import step_limit
 from robospa.harness.worlds import SAPIEN_NAME, TASK_PARTS
@@ -41,6 +45,7 @@ from robospa.protocol.policy import PolicySpec
 from robospa.results.records.trial_record import TrialRecord
 from robospa.tasks.catalog import task as find_task
 from robospa.tasks.catalog import tasks
+from robospa.tasks.scene import SUITE
 from robospa.trial import REFERENCE
 
 CONTROL_MODES = {"pd_joint_pos": "joint", "ee": "ee", "delta_ee": "delta_ee"}
@@ -334,3 +339,45 @@ def _no_states() -> NotImplementedError:
     return NotImplementedError(
         "a state cannot be set: a trial follows from its seed and its actions; replay it by those"
     )
+
+
+MODULE = "robospa.maniskill"
+"""What has to be imported before Gymnasium knows the ids, and may stand before one."""
+BACKEND = "physx_cpu"
+"""ManiSkill's name of the simulator that our worlds run on."""
+Tree = dict[str, Any]
+
+
+def variant_id(task: str, level: int) -> str:
+    """The id of a variant, such as RoboSPA-Pick_Blocks_Size-L3-v2, where 2 is the suite's
+    version."""
+    return f"RoboSPA-{task}-L{level}-v{SUITE.rpartition('-')[2]}"
+
+
+def proprioception(
+    measured: NDArray[np.float32],
+    commanded: NDArray[np.float32],
+    ee: NDArray[np.float32],
+    objects: NDArray[np.float32] | None = None,
+) -> Tree:
+    """`agent` and `extra` of joints (N, D), end effectors (N, 2, 8) and objects (N, E)."""
+    extra = {"left_tcp_pose": ee[:, 0, :7], "right_tcp_pose": ee[:, 1, :7]}
+    if objects is not None:
+        extra["objects"] = objects
+    return {
+        "agent": {"qpos": measured, "controller": {"target_qpos": commanded}},
+        "extra": extra,
+    }
+
+
+def sensor_params(robot: str, sizes: Mapping[str, tuple[int, int]], count: int) -> Tree:
+    """`sensor_param` of cameras of `sizes` (width, height) [px], `count` times each."""
+    known = robot_named(robot)
+    fields = {f"{side}_wrist": arm.wrist_fov for side, arm in zip(ARMS, known.arms, strict=True)}
+    fields.update({name: camera.fov for name, camera in known.cameras.items()})
+    found = {}
+    for camera, (width, height) in sizes.items():
+        focal = height / 2 / math.tan(fields[camera] / 2)
+        matrix = [[focal, 0, width / 2], [0, focal, height / 2], [0, 0, 1]]
+        found[camera] = {"intrinsic_cv": np.tile(np.array(matrix, np.float32), (count, 1, 1))}
+    return found

@@ -82,7 +82,7 @@ def observation_space(spec: PolicySpec, robot: Embodiment, limit: int) -> spaces
         parts["state"] = spaces.Box(low, high, dtype=np.float32)
     parts["ee"] = _ee_space()
     if spec.environment_state:
-        from robospa.environment_state import WIDTH
+        from robospa.observation import WIDTH
 
         parts["environment_state"] = spaces.Box(-np.inf, np.inf, (WIDTH,), np.float32)
     parts["instruction"] = spaces.Text(SENTENCE, charset=LETTERS)

@@ -13,9 +13,9 @@ from typing import Annotated
 
 from msgspec import Meta
 
-from robospa.harness.clock.clock import PAUSED
+from robospa.harness.clock.policy_clock import PAUSED
 from robospa.harness.settings import EvaluationSettings, Selection, SettingsError
-from robospa.harness.trial import TrialParts
+from robospa.harness.trial import TrialSetup
 from robospa.harness.worlds import Parts, WorldKind
 from robospa.protocol.options import option, plain_options, read_options, url_options
 from robospa.tasks.catalog import task as find_task
@@ -184,7 +184,7 @@ def _verdict(snapshot: Snapshot) -> CheckoutSnapshot:
     return snapshot
 
 
-def checkout_parts(key: TrialKey, episodes: Episodes) -> TrialParts:
+def checkout_parts(key: TrialKey, episodes: Episodes) -> TrialSetup:
     """What is known here of the trial `key`; its sentence is told by the world."""
     task = find_task(key.task)
     try:
@@ -195,4 +195,4 @@ def checkout_parts(key: TrialKey, episodes: Episodes) -> TrialParts:
         key.task, key.level, key.seed, key.embodiment, key.mode, (), {"episode": episode},
         suite=SUITE,
     )  # fmt: skip
-    return TrialParts(scene, task, CheckoutTracker(task.levels[key.level].subtasks), "")
+    return TrialSetup(scene, task, CheckoutTracker(task.levels[key.level].subtasks), "")

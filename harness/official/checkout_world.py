@@ -24,7 +24,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.geometry import Pose
-from robospa.gripper import grasp_points
 from robospa.harness.official import checkout_server
 from robospa.harness.official.checkout import CONFIGS, CheckoutSnapshot, checkout_parts
 from robospa.harness.official.checkout_server import packed, unpacked
@@ -37,6 +36,7 @@ from robospa.protocol.policy import PolicySpec
 from robospa.tasks.scene import Scene
 from robospa.tasks.snapshot import Contact
 from robospa.trial import TrialKey
+from robospa.workcell import grasp_points
 
 SENTENCE = 500
 SECONDS = {"hello": 300.0, "load": 900.0, "step": 300.0, "observe": 120.0}

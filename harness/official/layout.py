@@ -15,7 +15,7 @@ from robospa.harness.official.sentences import SPLITS, OfficialSentences
 from robospa.harness.official.switches import chosen, switched
 from robospa.harness.settings import EvaluationSettings, Selection, SettingsError, Simulation
 from robospa.harness.textures import VARIABLE
-from robospa.harness.trial import TrialParts
+from robospa.harness.trial import TrialSetup
 from robospa.harness.worlds import Parts, SapienKind
 from robospa.protocol.options import option, read_options, url_options
 from robospa.registry import UnknownName, load
@@ -220,7 +220,7 @@ def official_world_parts(
     layout: OfficialLayout,
     episodes: Episodes,
     sentences: OfficialSentences | None = None,
-) -> TrialParts:
+) -> TrialSetup:
     """Scene, goal and sentence of `key`; with `sentences` the official ones."""
     told, shown = official_scenes(key, layout, episodes)
     if sentences is not None:
@@ -229,7 +229,7 @@ def official_world_parts(
         ours = {theirs: own for own, theirs in SPLITS.items()}
         said = instruction(told, ours.get(key.split, key.split))
     task = find_task(key.task)
-    return TrialParts(shown, task, task.goal(shown), said)
+    return TrialSetup(shown, task, task.goal(shown), said)
 
 
 def official_scenes(

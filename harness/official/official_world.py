@@ -7,6 +7,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from robospa.geometry import angle_between
 from robospa.harness.sim.lazy_snapshot import FLOATS
 from robospa.harness.sim.motion import RATE
 from robospa.harness.sim.physics import Physics
@@ -14,7 +15,6 @@ from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.harness.world import SceneUnstable
 from robospa.observation import Observation
 from robospa.protocol.policy import PolicySpec
-from robospa.rotations import angle_between
 from robospa.tasks.scene import Scene
 
 STEPS = 2750

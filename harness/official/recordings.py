@@ -36,7 +36,7 @@ from robospa.harness.convention_check.episodes import (
 from robospa.harness.official.checkout import checkout_parts
 from robospa.harness.official.sentences import UNSEEN
 from robospa.harness.replay import replay
-from robospa.harness.trial import TrialParts, task_parts
+from robospa.harness.trial import TrialSetup, task_parts
 from robospa.harness.world import ActionError, SceneUnstable, World
 from robospa.schema import Count, Number, parse_json
 from robospa.schema import read as read_as
@@ -170,7 +170,7 @@ class NotStored(ValueError):
     """The scene of a recording cannot be made from what it keeps; the message says why."""
 
 
-def rebuilt(recording: OfficialRecording, episode: Episode) -> tuple[TrialKey, TrialParts]:
+def rebuilt(recording: OfficialRecording, episode: Episode) -> tuple[TrialKey, TrialSetup]:
     """The trial of `recording` with its scene made again; raises NotStored."""
     key = key_of(episode)
     if key is not None:
@@ -191,7 +191,7 @@ def rebuilt(recording: OfficialRecording, episode: Episode) -> tuple[TrialKey, T
     return key, _parts(key, layout, episode)
 
 
-def _parts(key: TrialKey, layout: Mapping[str, Any], episode: Episode) -> TrialParts:
+def _parts(key: TrialKey, layout: Mapping[str, Any], episode: Episode) -> TrialSetup:
     names = read_as(list[str], layout.get("scene_assets"), "scene_assets", NotStored)
     places = read_as(list[list[Number]], layout["object_positions"], "object_positions", NotStored)
     target = read_as(Count, layout.get("target_index"), "target_index", NotStored)
@@ -215,7 +215,7 @@ def _parts(key: TrialKey, layout: Mapping[str, Any], episode: Episode) -> TrialP
     }
     scene = Scene(key.task, key.level, key.seed, key.embodiment, key.mode, tuple(objects), facts)
     task = find_task(key.task)
-    return TrialParts(scene, task, task.goal(scene), episode.instruction)
+    return TrialSetup(scene, task, task.goal(scene), episode.instruction)
 
 
 def _ours(name: str) -> tuple[str, dict[str, Any]]:
@@ -257,7 +257,7 @@ def _turn(model: ObjectModel, episode: Episode) -> float:
     return best[1]
 
 
-Rebuild = Callable[[OfficialRecording, Episode], tuple[TrialKey, TrialParts]]
+Rebuild = Callable[[OfficialRecording, Episode], tuple[TrialKey, TrialSetup]]
 """The trial of a recording with its scene; raises NotStored."""
 
 
@@ -297,7 +297,7 @@ def replay_recording(
     return RecordingReplay(recording, len(found), record.success, reason, record.done, record.total)
 
 
-def in_checkout(recording: OfficialRecording, episode: Episode) -> tuple[TrialKey, TrialParts]:
+def in_checkout(recording: OfficialRecording, episode: Episode) -> tuple[TrialKey, TrialSetup]:
     """The trial of `recording` in an official checkout, which makes its scene from its seed."""
     if recording.variant is None or recording.seed is None:
         raise NotStored("its folder names no task and level, or seed.txt has no seed for it")

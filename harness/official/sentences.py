@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 
 from robospa.harness.official.slots import NoOfficialSentence, Value, arms, official_values
-from robospa.harness.trial import TrialParts, task_parts
+from robospa.harness.trial import TrialSetup, task_parts
 from robospa.schema import parse_json
 from robospa.tasks.catalog import build_scene
 from robospa.tasks.catalog import task as find_task
@@ -178,7 +178,7 @@ def read_checkout(folder: Path, variants: Iterable[tuple[str, int]]) -> Official
     return OfficialSentences(templates, descriptions, digest)
 
 
-def spoken_parts(key: TrialKey, sentences: OfficialSentences, salt: str = "") -> TrialParts:
+def spoken_parts(key: TrialKey, sentences: OfficialSentences, salt: str = "") -> TrialSetup:
     """Scene and goal of `key` from the catalog, with a sentence of the checkout.
 
     Raises KeyError or ValueError if something of `key` is unknown, or has no official sentence.
@@ -186,10 +186,10 @@ def spoken_parts(key: TrialKey, sentences: OfficialSentences, salt: str = "") ->
     task = find_task(key.task)
     scene = build_scene(key.task, key.level, key.seed, key.embodiment, key.mode, salt)
     said = sentences.instruction(scene, key.split, salt)
-    return TrialParts(scene, task, task.goal(scene), said)
+    return TrialSetup(scene, task, task.goal(scene), said)
 
 
-def unspoken_parts(key: TrialKey, salt: str = "") -> TrialParts:
+def unspoken_parts(key: TrialKey, salt: str = "") -> TrialSetup:
     """The same without the checkout, for what only shows a trial that has been run: its sentence
     is one of ours, and tells nothing."""
     return task_parts(replace(key, split="heldout"), salt)

@@ -20,9 +20,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from robospa.extras import user_cache
 from robospa.tasks.official import OfficialModel
 from robospa.tasks.packs import PackError
-from robospa.user_cache import user_cache
 
 Arrays = Mapping[str, NDArray[Any]]
 VARIABLE = "ROBOSPA_ASSETS"

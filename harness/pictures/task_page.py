@@ -12,10 +12,10 @@ from collections.abc import Iterable, Sequence
 from itertools import groupby, pairwise
 from pathlib import Path
 
-from robospa.categories import CATEGORY_NAMES
 from robospa.harness.world import RenderUnavailable, SceneUnstable
 from robospa.tasks.catalog import tasks
 from robospa.tasks.task import Task
+from robospa.trial import CATEGORY_NAMES
 
 PAGE = Path("docs/tasks.md")
 PICTURES = Path("docs/images/tasks")

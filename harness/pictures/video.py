@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.harness.replay import replay_record
-from robospa.harness.trial import TrialParts, task_parts
+from robospa.harness.trial import TrialSetup, task_parts
 from robospa.harness.world import RenderableState, StepResult, World
 from robospa.observation import CameraSpec
 from robospa.results.records.trial_record import TrialRecord
@@ -123,7 +123,7 @@ def film(
     record: TrialRecord,
     folder: Path,
     *,
-    parts: Callable[[TrialKey], TrialParts] = task_parts,
+    parts: Callable[[TrialKey], TrialSetup] = task_parts,
     step_scale: float = 1.0,
     cameras: Sequence[str] = (CAMERA,),
 ) -> bytes:

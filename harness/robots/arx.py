@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.gripper import Gripper
+from robospa.workcell import Gripper
 
 Array = NDArray[np.float64]
 

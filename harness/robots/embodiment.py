@@ -11,9 +11,8 @@ from dataclasses import dataclass, field
 
 from robospa.action_space import ActionSpace
 from robospa.geometry import Pose, Vec3
-from robospa.gripper import Gripper
 from robospa.tasks.shapes import Shape
-from robospa.workcell import FixedCamera
+from robospa.workcell import FixedCamera, Gripper
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 
 from robospa.geometry import Pose, Vec3, look_rotation, yaw_rotation
-from robospa.gripper import Gripper
 from robospa.harness.robots.embodiment import Arm, Embodiment
 from robospa.harness.robots.links import (
     SINGLE_ARM_CAMERAS,
@@ -24,6 +23,7 @@ from robospa.harness.robots.links import (
 )
 from robospa.tasks.objects.meshes import loft, rounded_rectangle
 from robospa.tasks.shapes import Box, Color, Shape
+from robospa.workcell import Gripper
 
 WHITE: Color = (0.80, 0.81, 0.82)
 CAP: Color = (0.52, 0.54, 0.56)

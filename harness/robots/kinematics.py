@@ -15,10 +15,9 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.geometry import Array, Pose, from_transform, to_transform
+from robospa.geometry import Array, Pose, from_transform, to_transform, turning_vector
 from robospa.harness.robots import arx
 from robospa.harness.robots.embodiment import Arm
-from robospa.rotations import turning_vector
 
 POSITION_TOLERANCE = 2e-5  # [m]
 ROTATION_TOLERANCE = 5e-5  # [rad]

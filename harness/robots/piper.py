@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 
 from robospa.geometry import Pose, Vec3, look_rotation, yaw_rotation
-from robospa.gripper import Gripper
 from robospa.harness.robots.embodiment import Arm, Embodiment
 from robospa.harness.robots.links import (
     SINGLE_ARM_CAMERAS,
@@ -23,6 +22,7 @@ from robospa.harness.robots.links import (
     shell,
 )
 from robospa.tasks.shapes import Box, Color, Shape
+from robospa.workcell import Gripper
 
 WHITE: Color = (0.78, 0.79, 0.80)
 DARK: Color = (0.05, 0.05, 0.055)

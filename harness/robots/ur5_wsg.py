@@ -9,7 +9,6 @@ maintainers name for this robot. The description counts a finger's travel from -
 from __future__ import annotations
 
 from robospa.geometry import Pose, Vec3, look_rotation
-from robospa.gripper import Gripper
 from robospa.harness.robots.embodiment import Arm, Embodiment
 from robospa.harness.robots.links import (
     SINGLE_ARM_CAMERAS,
@@ -22,6 +21,7 @@ from robospa.harness.robots.links import (
     shell,
 )
 from robospa.tasks.shapes import Box, Color, Shape
+from robospa.workcell import Gripper
 
 GREY: Color = (0.48, 0.50, 0.52)
 BLUE: Color = (0.13, 0.40, 0.68)

@@ -10,8 +10,7 @@ from typing import cast
 
 from robospa.harness.running.evaluate import evaluate as run_request
 from robospa.harness.running.request import make_request, run_folder
-from robospa.harness.settings import EvaluationSettings, SettingsError, updated
-from robospa.harness.settings_file import read_settings
+from robospa.harness.settings import EvaluationSettings, SettingsError, read_settings, updated
 from robospa.protocol.policy import Policy
 from robospa.protocol.server import ServerThread
 from robospa.results.records.run_io import Run, read_run

@@ -13,7 +13,7 @@ from typing import Any
 
 from msgspec import structs, to_builtins
 
-from robospa.harness.clock.clock import timed_suite, timing_warning
+from robospa.harness.clock.policy_clock import timed_suite, timing_warning
 from robospa.harness.factory import is_url
 from robospa.harness.pool import JobProcess, WorkerDied, WorkerStuck
 from robospa.harness.progress import Progress, summary
@@ -35,9 +35,8 @@ from robospa.harness.running.runner import Runner, RunOptions
 from robospa.harness.running.status import Status
 from robospa.harness.running.tracking import Careful, open_tracker
 from robospa.harness.running.worker import WorkerConfig, describe, load_parts
-from robospa.harness.settings import EvaluationSettings
-from robospa.harness.settings_file import FILE, to_toml
-from robospa.harness.trial_identity import salt_hash
+from robospa.harness.settings import FILE, EvaluationSettings, to_toml
+from robospa.harness.trial import salt_hash
 from robospa.harness.worlds import SHUFFLED_PARTS, open_world, world_kind
 from robospa.results.records.manifest import (
     ClockSettings,

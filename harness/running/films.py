@@ -29,8 +29,7 @@ from robospa.harness.running.atomic_file import (
 )
 from robospa.harness.running.status import cores
 from robospa.harness.running.worker import WorkerConfig, describe, load_parts
-from robospa.harness.settings import Recording, SettingsError
-from robospa.harness.settings_file import FILE, read_settings
+from robospa.harness.settings import FILE, Recording, SettingsError, read_settings
 from robospa.harness.worlds import SAPIEN_NAME, TASK_PARTS, open_world
 from robospa.results.failures.labels import label
 from robospa.results.records.films import film_name, films_in, owed_films

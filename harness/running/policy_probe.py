@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from robospa.harness.clock.clock import Clock
+from robospa.harness.clock.policy_clock import PolicyClock
 from robospa.harness.factory import is_url, open_policy
 from robospa.harness.robots import embodiment
 from robospa.protocol.client import Identity, identity_of
@@ -205,7 +205,7 @@ def check_blind(policies: Iterable[ProbedPolicy]) -> None:
             )
 
 
-def check_clock(clock: Clock | None, specs: Iterable[PolicySpec]) -> None:
+def check_clock(clock: PolicyClock | None, specs: Iterable[PolicySpec]) -> None:
     """Raises RunError if a policy's chunks cannot follow each other as `clock` says."""
     for spec in specs:
         if clock is not None and clock.switching.kind == "ensemble" and spec.action != "joint":

@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from robospa.extras import need
-from robospa.harness.clock.clock import Clock, ClockError
-from robospa.harness.clock.settings import frozen_timing, real_clock
+from robospa.harness.clock.policy_clock import ClockError, PolicyClock, frozen_timing, real_clock
 from robospa.harness.factory import is_url
 from robospa.harness.running.evaluate import Request
 from robospa.harness.running.policy_probe import read_map
@@ -182,7 +181,7 @@ def _each(targets: Targets) -> tuple[str, ...]:
     return (targets,) if isinstance(targets, str) else targets
 
 
-def _clock(settings: EvaluationSettings) -> Clock | None:
+def _clock(settings: EvaluationSettings) -> PolicyClock | None:
     """The real clock, None for the paused one; raises SettingsError."""
     try:
         return real_clock(settings.timing, settings.simulation.control)

@@ -22,7 +22,7 @@ from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from robospa.harness.clock.clock import Clock
+from robospa.harness.clock.policy_clock import PolicyClock
 from robospa.harness.factory import is_url, load_function, open_policy
 from robospa.harness.pool import Child
 from robospa.harness.running.atomic_file import LOGS, StorageError, log_to
@@ -49,7 +49,7 @@ from robospa.results.records.trial_record import RetryRow, TrialRecord
 from robospa.trial import TrialKey
 
 if TYPE_CHECKING:
-    from robospa.harness.trial import TrialParts
+    from robospa.harness.trial import TrialSetup
     from robospa.harness.world import World
     from robospa.tasks.task import Task
 
@@ -108,7 +108,7 @@ class WorkerConfig:
     identities: Mapping[str, Identity] = field(default_factory=dict)
     step_scale: float = 1.0
     salt: str = field(default="", repr=False)
-    clock: Clock | None = None
+    clock: PolicyClock | None = None
 
     def targets(self, task: str) -> tuple[str, ...]:
         """URLs or names of the policies that can do `task`."""
@@ -128,7 +128,7 @@ class WorkerConfig:
         return self.video == "all" or (self.video == "failures" and not success)
 
 
-def load_parts(config: WorkerConfig) -> Callable[[TrialKey], TrialParts]:
+def load_parts(config: WorkerConfig) -> Callable[[TrialKey], TrialSetup]:
     """What finds a trial's scene, goal and instruction."""
     found = load_function(config.parts)
     arguments = {**config.parts_arguments, **({"salt": config.salt} if config.salt else {})}
@@ -156,8 +156,7 @@ class Worker:
     def run(self, key: TrialKey, target: str, retries: tuple[RetryRow, ...] = ()) -> TrialRecord:
         """Run one trial with the policy `target` after the attempts `retries`; its record and
         trace are then on disk."""
-        from robospa.harness.trial import run_trial
-        from robospa.harness.trial_identity import policy_seed, trial_id
+        from robospa.harness.trial import policy_seed, run_trial, trial_id
 
         self._recorder = None
         world, policy = self._open_world(), self._open_policy(target)

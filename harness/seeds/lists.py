@@ -17,6 +17,7 @@ from importlib import metadata
 from importlib.util import find_spec
 from pathlib import Path
 
+from robospa.extras import user_cache
 from robospa.harness.running.atomic_file import replace_file
 from robospa.harness.running.code_hash import FOLDERS, LENGTH, code_hash
 from robospa.registry import ROBOTS, SCENE_MODES, module_of
@@ -24,7 +25,6 @@ from robospa.tasks.catalog import home_of
 from robospa.tasks.modes import tangible
 from robospa.tasks.scene import SUITE
 from robospa.tasks.seeds import ListKey, NoSeedList, accepted
-from robospa.user_cache import user_cache
 
 SHIPPED, LOCAL = "shipped", "local"
 

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 from robospa.geometry import Pose, Quat, Vec3, multiply, rotate
-from robospa.gripper import Gripper, grasp_points
 from robospa.harness.sim.motion import RATE, Trajectory
 from robospa.tasks.snapshot import Contact, Snapshot
+from robospa.workcell import Gripper, grasp_points
 
 FLOATS = 7
 """Numbers of a pose in SAPIEN's packed form: qw qx qy qz, x y z, float32."""

@@ -19,13 +19,12 @@ from numpy.typing import NDArray
 from sapien import physx
 
 from robospa.action_space import ARMS
-from robospa.geometry import Pose, Vec3
+from robospa.geometry import Pose, Vec3, angle_between
 from robospa.harness.robots.embodiment import Arm, Embodiment
 from robospa.harness.sim import bodies, furniture
 from robospa.harness.sim.lazy_snapshot import FLOATS, NO_HINGES, unpack
 from robospa.harness.sim.motion import RATE, Trajectory
 from robospa.harness.world import SceneUnstable
-from robospa.rotations import angle_between
 from robospa.tasks.shapes import Hinge, ObjectModel
 from robospa.tasks.snapshot import Contact
 from robospa.workcell import WORKCELL

@@ -19,13 +19,12 @@ from itertools import product
 import numpy as np
 
 from robospa.geometry import Array, Pose, to_matrix
-from robospa.gripper import Gripper
 from robospa.harness.robots.embodiment import Arm
 from robospa.harness.robots.kinematics import forward, link_frames
 from robospa.harness.skills.workspace import Workspace, is_wall
 from robospa.tasks.objects.build import points_of
 from robospa.tasks.shapes import Box, ObjectModel
-from robospa.workcell import WORKCELL
+from robospa.workcell import WORKCELL, Gripper
 
 BEHIND = 0.2
 """Half of how deep [m] the space behind a wall is that no part of a gripper may enter."""

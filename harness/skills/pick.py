@@ -23,7 +23,6 @@ from robospa.geometry import (
     rotate,
     to_matrix,
 )
-from robospa.gripper import Gripper
 from robospa.harness.robots.kinematics import inverse
 from robospa.harness.skills.clearance import (
     TOUCH,
@@ -46,6 +45,7 @@ from robospa.harness.skills.workspace import (
 from robospa.tasks.plan import Pick
 from robospa.tasks.shapes import Box, Cylinder, Grasp, ObjectModel, Shape
 from robospa.tasks.snapshot import Snapshot
+from robospa.workcell import Gripper
 
 TILTS = (0.0, 0.2, -0.2, 0.4, -0.4, 0.6, -0.6, 0.8, -0.8, 1.0, -1.0, 1.2, -1.2)
 LEVEL = (0.0,)

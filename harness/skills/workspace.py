@@ -18,13 +18,13 @@ import numpy as np
 
 from robospa.action_space import ARMS
 from robospa.geometry import Array, Pose, Vec3, rotate
-from robospa.gripper import Gripper
 from robospa.harness.robots.embodiment import Embodiment
 from robospa.harness.robots.kinematics import Chain, chain_of, forward, inverse
 from robospa.tasks.objects import object_model
 from robospa.tasks.scene import Scene
 from robospa.tasks.shapes import ObjectModel
 from robospa.tasks.snapshot import Snapshot
+from robospa.workcell import Gripper
 
 Steps = Generator[Array, Snapshot, None]
 

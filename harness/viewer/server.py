@@ -16,8 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from robospa.extras import need
 from robospa.geometry import Pose
-from robospa.harness.viewer.drawing import DrawnBody, Mesh
-from robospa.harness.viewer.playback import Playback
+from robospa.harness.viewer.playback import DrawnBody, Mesh, Playback
 
 if TYPE_CHECKING:
     import viser

@@ -12,7 +12,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from robospa.categories import METRIC_NAMES
 from robospa.results.comparison.groups import collections
 from robospa.results.comparison.notes import banner_of, notes, worst_and_best
 from robospa.results.comparison.pairs import VariantPair, discordant, paired_variants
@@ -33,6 +32,7 @@ from robospa.results.statistics.significance import (
     mcnemar_mid_p,
     p_of_interval,
 )
+from robospa.trial import METRIC_NAMES
 
 if TYPE_CHECKING:
     from robospa.results.tables import Table

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from robospa.categories import BASIC, CATEGORIES, DIMENSIONS
+from robospa.trial import BASIC, CATEGORIES, DIMENSIONS
 
 
 def collections(category: Mapping[str, str]) -> list[tuple[str, str, tuple[str, ...]]]:

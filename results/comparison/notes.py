@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from robospa.categories import METRIC_CATEGORIES
 from robospa.results.comparison.pairs import common_seeds
 from robospa.results.paper.origin import banner
 from robospa.results.scoring.model_results import ModelResults
 from robospa.results.scoring.weights import Variant, weights_of
+from robospa.trial import METRIC_CATEGORIES
 
 
 def banner_of(first: ModelResults, second: ModelResults) -> str:

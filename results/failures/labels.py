@@ -16,14 +16,13 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, fields, replace
 from typing import SupportsIndex, overload
 
-from robospa.categories import SPATIAL
 from robospa.results.failures.attribution import Cause, roles_of, root_of
 from robospa.results.records.action_problems import problem_counts
 from robospa.results.records.object_names import described
 from robospa.results.records.trial_record import EventRow, TrialRecord
 from robospa.results.tables import Table, TableCell, TableRow, html_fragment
 from robospa.text import markdown_table, plain
-from robospa.trial import TrialKey
+from robospa.trial import SPATIAL, TrialKey
 
 NAMES = {
     "target_grounding": "target grounding",

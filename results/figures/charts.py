@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from robospa.categories import CATEGORIES, CATEGORY_NAMES, PROCEDURAL, SPATIAL
 from robospa.results.figures.series import (
     COLOURS,
     DASHES,
@@ -22,6 +21,7 @@ from robospa.results.figures.series import (
     series_handles,
 )
 from robospa.results.scoring.scores import Scores
+from robospa.trial import CATEGORIES, CATEGORY_NAMES, PROCEDURAL, SPATIAL
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

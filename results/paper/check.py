@@ -12,13 +12,13 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 
-from robospa.categories import DIMENSIONS, METRIC_CATEGORIES
 from robospa.results.paper import rounding
 from robospa.results.paper.columns import Column, published_column
 from robospa.results.paper.published import LEVELS, PrintedTable, Published, load, row_title
 from robospa.results.paper.rounding import rounded
 from robospa.results.statistics import onta
 from robospa.results.statistics.intervals import interval_of
+from robospa.trial import DIMENSIONS, METRIC_CATEGORIES
 
 ENDS = 0.1
 """Allowed distance [percent] of a printed interval end from ours: rounding and bootstrap noise."""

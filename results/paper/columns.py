@@ -12,7 +12,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from robospa.categories import BASIC, DIMENSIONS, METRIC_CATEGORIES
 from robospa.results.paper import rounding
 from robospa.results.paper.published import LEVELS, load
 from robospa.results.paper.published_results import published_results
@@ -31,6 +30,7 @@ from robospa.results.statistics import onta
 from robospa.results.statistics.bootstrap import Sample, rate
 from robospa.results.statistics.intervals import METHODS, Estimate, interval_of
 from robospa.results.tables import MISSING, TableCell
+from robospa.trial import BASIC, DIMENSIONS, METRIC_CATEGORIES
 
 Values = Mapping[str, Mapping[tuple[str, int], float | None]]
 """Percent by metric and (row, level)."""

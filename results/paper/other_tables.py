@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from robospa.categories import BASIC, CATEGORY_NAMES, DIMENSIONS
 from robospa.results.paper import rounding
 from robospa.results.paper.check import checks, errata
 from robospa.results.paper.columns import Column, check_columns
@@ -13,6 +12,7 @@ from robospa.results.paper.published import load, row_title, title
 from robospa.results.paper.result_tables import DASH, DIMENSION_NAMES, not_run_note
 from robospa.results.statistics.intervals import interval_of
 from robospa.results.tables import MISSING, Table, TableCell, TableRow
+from robospa.trial import BASIC, CATEGORY_NAMES, DIMENSIONS
 
 INTERVAL_METHODS = (("bootstrap", "Stratified bootstrap"), ("wilson", "MOVER on Wilson limits"))
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from robospa.categories import SPATIAL
 from robospa.results.paper import rounding
 from robospa.results.paper.published import LEVELS, Published, find_model, load, title
 from robospa.results.scoring.model_results import ModelResults
@@ -18,6 +17,7 @@ from robospa.results.statistics.intervals import (
     chance_corrected,
     wilson,
 )
+from robospa.trial import SPATIAL
 
 
 def published_cell(published: Published, model: str, task: str, level: int) -> VariantScore:

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from robospa.categories import CATEGORY_NAMES, DIMENSIONS, METRIC_CATEGORIES, METRIC_NAMES
 from robospa.results.paper import rounding
 from robospa.results.paper.check import Check, errata
 from robospa.results.paper.columns import Column, check_columns
@@ -19,6 +18,7 @@ from robospa.results.paper.published import LEVELS, load, row_title, title
 from robospa.results.scoring.model_results import in_official_world
 from robospa.results.statistics.significance import supported_best
 from robospa.results.tables import MISSING, PRINTED_OTHERWISE, Table, TableCell, TableRow
+from robospa.trial import CATEGORY_NAMES, DIMENSIONS, METRIC_CATEGORIES, METRIC_NAMES
 
 MARKS = ("tied", "highest", "none")
 """Which values are marked as best among the runs (in a table without runs among the published

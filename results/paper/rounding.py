@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 
-from robospa.categories import DIMENSIONS
+from robospa.trial import DIMENSIONS
 
 OVERALL = "overall"
 

@@ -14,7 +14,6 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
-from robospa.categories import PROCEDURAL
 from robospa.results.paper.published import load
 from robospa.results.paper.rounding import rounded
 from robospa.results.records.action_problems import (
@@ -29,6 +28,7 @@ from robospa.results.records.run_io import Run, finished, lost_actions
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.statistics.onta import of_percent
 from robospa.text import some
+from robospa.trial import PROCEDURAL
 
 FASTEST_STEP = 4e-6
 """Wall time of a physics step [s] that no machine known to us beats: 1000 times real time. Arms

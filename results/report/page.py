@@ -14,7 +14,6 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from robospa.categories import BASIC, CATEGORY_NAMES
 from robospa.results.failures.labels import NAMES, SIMULATED_PER_FILM
 from robospa.results.figures.series import FORMATS, GRID, INK, Drawing
 from robospa.results.records.manifest import departures
@@ -26,6 +25,7 @@ from robospa.results.report.tables import for_page
 from robospa.results.report.trials import failure_counts, trial_rows
 from robospa.results.scoring.scores import Scores
 from robospa.results.statistics.intervals import Estimate
+from robospa.trial import BASIC, CATEGORY_NAMES
 
 if TYPE_CHECKING:
     from markupsafe import Markup

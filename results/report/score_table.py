@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from robospa.categories import BASIC, CATEGORIES, CATEGORY_NAMES, DIMENSIONS
 from robospa.results.records.action_problems import problem_lines
 from robospa.results.records.manifest import departures
 from robospa.results.records.run_io import Run
@@ -17,8 +16,8 @@ from robospa.results.scoring.score_json import level_name
 from robospa.results.scoring.scores import AverageScore, Scores, VariantScore
 from robospa.results.statistics.intervals import Estimate
 from robospa.results.tables import MISSING, Table, TableCell, TableRow, show
-from robospa.terminal import plain_console
-from robospa.trial import REFERENCE
+from robospa.text import plain_console
+from robospa.trial import BASIC, CATEGORIES, CATEGORY_NAMES, DIMENSIONS, REFERENCE
 
 
 @dataclass(frozen=True)

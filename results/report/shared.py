@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from robospa.categories import BASIC
 from robospa.results.scoring.model_results import ModelResults, restricted
 from robospa.results.scoring.weights import Variant
+from robospa.trial import BASIC
 
 
 def shared_variants(models: Sequence[ModelResults]) -> set[Variant]:

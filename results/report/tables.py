@@ -12,12 +12,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from robospa.categories import METRIC_CATEGORIES
 from robospa.results.paper.columns import Column
 from robospa.results.paper.other_tables import basic_table
 from robospa.results.paper.result_tables import DASH, summary_table, task_table
 from robospa.results.paper.tables import write_tables
 from robospa.results.tables import Table, TableRow, html_fragment
+from robospa.trial import METRIC_CATEGORIES
 
 if TYPE_CHECKING:
     from markupsafe import Markup

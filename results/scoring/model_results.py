@@ -6,7 +6,6 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
-from robospa.categories import BASIC, METRIC_CATEGORIES
 from robospa.results.records.manifest import REST_TO_REST, RunManifest
 from robospa.results.records.run_io import Run, finished
 from robospa.results.records.trial_record import TrialRecord
@@ -22,7 +21,7 @@ from robospa.results.scoring.setting import (
 from robospa.results.scoring.weights import Variant
 from robospa.results.statistics.bootstrap import Sample
 from robospa.results.statistics.intervals import METHODS
-from robospa.trial import TrialKey
+from robospa.trial import BASIC, METRIC_CATEGORIES, TrialKey
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,6 @@ from functools import cached_property
 
 import numpy as np
 
-from robospa.categories import BASIC, CATEGORIES, DIMENSIONS, METRICS, PROCEDURAL, SPATIAL
 from robospa.results.records.run_io import Run, finished
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.scoring.weights import Variant
@@ -30,7 +29,7 @@ from robospa.results.statistics.intervals import (
     wilson,
 )
 from robospa.results.statistics.onta import of_bound
-from robospa.trial import TrialKey
+from robospa.trial import BASIC, CATEGORIES, DIMENSIONS, METRICS, PROCEDURAL, SPATIAL, TrialKey
 
 Weighted = tuple[tuple[Sample, float], ...]
 Range = tuple[float, float]

@@ -8,12 +8,11 @@ from pathlib import Path
 import pytest
 from report_runs import KNOWN, make_run
 
-from robospa.harness.ablations import other_seed, shuffled_parts
 from robospa.harness.running.request import make_request
 from robospa.harness.running.worker import task_finder
 from robospa.harness.settings import EvaluationSettings, SettingsError, Simulation
 from robospa.harness.trial import task_parts
-from robospa.harness.worlds import SHUFFLED_PARTS, TASK_PARTS
+from robospa.harness.worlds import SHUFFLED_PARTS, TASK_PARTS, other_seed, shuffled_parts
 from robospa.results.paper.columns import run_column
 from robospa.results.report.page import badges
 from robospa.results.report.run_card import facts

@@ -14,9 +14,9 @@ import pytest
 from unequal_arms import unequal_arms
 from world_scenes import READY, joint_action
 
+from robospa.action_space import is_quantized
 from robospa.harness import action_decoder
 from robospa.harness.action_decoder import ActionDecoder
-from robospa.harness.quantize import is_quantized
 from robospa.harness.robots import embodiment
 from robospa.harness.robots.kinematics import end_effector
 from robospa.harness.world import ActionError

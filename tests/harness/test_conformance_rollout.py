@@ -12,7 +12,7 @@ import pytest
 from run_fakes import SPEC, FakePolicy, FakeWorld, NanPolicy, parts
 
 from robospa.harness.cli.main import main
-from robospa.harness.conformance_rollout import rollouts, trial_for
+from robospa.harness.server_checks import rollouts, trial_for
 from robospa.protocol.client import connect
 from robospa.protocol.conformance import CheckResult
 from robospa.protocol.policy import PolicySpec
@@ -116,7 +116,7 @@ def test_the_command_counts_them(
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("robospa.harness.conformance_rollout.rollouts", rows(*verdicts))
+    monkeypatch.setattr("robospa.harness.server_checks.rollouts", rows(*verdicts))
     with ServerThread(policy_factory=FakePolicy) as server, pytest.raises(SystemExit) as end:
         main(["check", server.url, "--load-seconds", "0"])
     assert (end.value.code or 0) == code

@@ -10,9 +10,8 @@ from pathlib import Path
 import pytest
 from report_runs import EVIL, make_run, record
 
-from robospa.harness import live_report
-from robospa.harness.live_report import LiveReport
-from robospa.harness.report_server import ReportServer, byte_range, serving
+from robospa.harness import report_server as live_report
+from robospa.harness.report_server import LiveReport, ReportServer, byte_range, serving
 from robospa.results.records.films import film_name
 from robospa.results.records.manifest import RunError
 from robospa.results.records.run_io import to_line

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from run_fakes import FakePolicy, FakeWorld, parts
 
-from robospa.harness.quantize import STEPS_PER_UNIT, is_quantized, quantize
+from robospa.action_space import STEPS_PER_UNIT, is_quantized, quantize
 from robospa.harness.running.record_store import ActionRecorder
 from robospa.harness.trial import actions_digest, run_trial
 from robospa.harness.world import Poll, StepResult

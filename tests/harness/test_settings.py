@@ -26,9 +26,10 @@ from robospa.harness.settings import (
     SettingsError,
     flat,
     group_of,
+    read_settings,
+    to_toml,
     updated,
 )
-from robospa.harness.settings_file import read_settings, to_toml
 
 DEFAULTS = EvaluationSettings()
 

@@ -10,8 +10,7 @@ import pytest
 from run_fakes import LIMIT, SPEC, FakePolicy, FakeWorld, NanPolicy, parts
 
 from robospa.harness.running.record_store import ActionRecorder
-from robospa.harness.trial import run_trial
-from robospa.harness.trial_identity import policy_seed
+from robospa.harness.trial import policy_seed, run_trial
 from robospa.harness.world import ActionProblem, Poll, SceneUnstable, StepResult
 from robospa.results.records.action_problems import UNREACHABLE
 from robospa.results.records.trial_record import TrialRecord

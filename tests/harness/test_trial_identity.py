@@ -6,8 +6,7 @@ from dataclasses import replace
 
 from run_fakes import KEYED, FakePolicy, FakeWorld, parts
 
-from robospa.harness.trial import run_trial
-from robospa.harness.trial_identity import policy_seed, salt_hash, trial_id
+from robospa.harness.trial import policy_seed, run_trial, salt_hash, trial_id
 from robospa.protocol.codec import decode
 from robospa.protocol.messages import Reset, pack
 from robospa.trial import TrialKey

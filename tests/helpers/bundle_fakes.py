@@ -18,8 +18,7 @@ from run_fakes import LIMIT, FakePolicy, FakeWorld, parts
 from robospa.harness.running.manifest import about_machine, write_manifest
 from robospa.harness.running.record_store import ActionRecorder, RecordWriter, write_actions
 from robospa.harness.sim.motion import RATE
-from robospa.harness.trial import run_trial
-from robospa.harness.trial_identity import policy_seed
+from robospa.harness.trial import policy_seed, run_trial
 from robospa.harness.world import ActionError, Poll, StepResult
 from robospa.leaderboard import bundle as layout
 from robospa.leaderboard.bundle import BundleError, BundleLimits

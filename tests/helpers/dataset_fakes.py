@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from robospa.action_space import ActionSpace
-from robospa.environment_state import WIDTH
 from robospa.harness.datasets.episode import DatasetEpisode, EpisodeFilm, Pictures, Stills
+from robospa.observation import WIDTH
 from robospa.tasks.events import Event
 from robospa.trial import TrialKey
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from robospa.gripper import grasp_points
 from robospa.harness.robots import embodiment
 from robospa.harness.robots.kinematics import chain_of, end_effector
 from robospa.harness.skills.workspace import Workspace
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.snapshot import Snapshot
+from robospa.workcell import grasp_points
 
 
 def at_home(name: str, *objects: SceneObject) -> Workspace:

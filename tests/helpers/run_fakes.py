@@ -21,8 +21,7 @@ from numpy.typing import NDArray
 from robospa.geometry import Pose
 from robospa.harness.action_decoder import ActionDecoder
 from robospa.harness.robots import embodiment
-from robospa.harness.trial import TrialParts
-from robospa.harness.trial_identity import trial_id
+from robospa.harness.trial import TrialSetup, trial_id
 from robospa.harness.world import Poll, SceneUnstable, StepResult
 from robospa.observation import CameraSpec
 from robospa.protocol.errors import ConnectionLost
@@ -139,11 +138,11 @@ def fake_task(name: str) -> Task:
     return Task(name, category, levels, *functions, summary="fake", success="fake")
 
 
-def parts(key: TrialKey, salt: str = "") -> TrialParts:
+def parts(key: TrialKey, salt: str = "") -> TrialSetup:
     facts = {"salt": trial_id(key, salt=salt)} if salt else {}
     scene = Scene(key.task, key.level, key.seed, key.embodiment, key.mode, (), facts)
     tracker = SumTracker(key.seed % 10 + 1, 2)
-    return TrialParts(
+    return TrialSetup(
         scene, fake_task(key.task), tracker, f"level {key.level}: sum to {key.seed % 10 + 1}"
     )
 

@@ -15,8 +15,7 @@ import numpy as np
 from robospa.baselines.oracle import Oracle
 from robospa.harness.running.record_store import ActionRecorder
 from robospa.harness.sim.sapien_world import SapienWorld
-from robospa.harness.trial import run_trial, task_parts
-from robospa.harness.trial_identity import policy_seed, trial_id
+from robospa.harness.trial import policy_seed, run_trial, task_parts, trial_id
 from robospa.protocol.policy import PolicySpec, TrialInfo
 from robospa.tasks.seeds import accepted
 from robospa.trial import TrialKey

@@ -114,7 +114,7 @@ def test_five_percent_of_invented_outcomes_are_caught(files: Files, tmp_path: Pa
 def test_actions_of_another_task_forged_with_all_hashes_are_caught(
     files: Files, tmp_path: Path
 ) -> None:
-    from robospa.harness.quantize import quantize
+    from robospa.action_space import quantize
     from robospa.harness.trial import actions_digest
     from robospa.leaderboard.traces import decode, encode
     from robospa.leaderboard.trial_rows import trace_hash

@@ -12,8 +12,7 @@ from bundle_fakes import PICK, REFERENCE, Weak, World
 from run_fakes import FakePolicy, parts
 from site_fakes import make_valid
 
-from robospa.harness.trial import run_trial
-from robospa.harness.trial_identity import salt_hash
+from robospa.harness.trial import run_trial, salt_hash
 from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.reproduce import (
     FIRST,

@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from robospa.harness.quantize import quantize
+from robospa.action_space import quantize
 from robospa.harness.robots import embodiment
 from robospa.harness.running.record_store import write_actions
 from robospa.harness.sim.motion import HOLD_STEPS, action_steps, rest_to_rest, step_count

@@ -69,7 +69,7 @@ from robospa.baselines.learned.act.network import inputs, keyframes
 from robospa.baselines.learned.act.objects import _PLACE
 from robospa.baselines.learned.act.settings import ActOptions
 from robospa.baselines.learned.act.training import Training, describe
-from robospa.environment_state import FEATURES, SLOTS
+from robospa.observation import FEATURES, SLOTS
 
 rng = np.random.default_rng(0)
 scenes, frames = 300, 4

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from robospa.user_cache import user_cache
+from robospa.extras import user_cache
 
 
 @pytest.mark.parametrize(

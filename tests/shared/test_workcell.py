@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from robospa.geometry import Pose, axis_rotation, rotate
-from robospa.gripper import grasp_points
 from robospa.harness.robots import embodiment, embodiments
-from robospa.workcell import HEIGHT, TABLE_TOP, WIDTH, WORKCELL
+from robospa.workcell import HEIGHT, TABLE_TOP, WIDTH, WORKCELL, grasp_points
 
 A = np.array
 CELL = WORKCELL

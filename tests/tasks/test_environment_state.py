@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from robospa.environment_state import FEATURES, NAMES, SLOTS, WIDTH
 from robospa.geometry import Pose, axis_rotation
+from robospa.observation import FEATURES, NAMES, SLOTS, WIDTH
 from robospa.tasks.catalog import build_scene, tasks
 from robospa.tasks.colors import NAMED
 from robospa.tasks.environment_state import EnvironmentState, TooManyObjects, kind_code

@@ -8,9 +8,9 @@ from dataclasses import replace
 import pytest
 
 from robospa.geometry import Pose
-from robospa.gripper import grasp_points
 from robospa.harness.robots import embodiment
 from robospa.tasks.snapshot import Contact, Snapshot, snapshot_from_json, snapshot_to_json
+from robospa.workcell import grasp_points
 
 GRIPPERS = embodiment("aloha-agilex").grippers
 ENDS = (Pose(), Pose((1.0, 2.0, 3.0)))

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.baselines.learned.act.poses import ARM
-from robospa.environment_state import FEATURES
+from robospa.observation import FEATURES
 
 SIDES = frozenset({"left", "right", "leftmost", "rightmost", "clockwise", "counterclockwise"})
 """A sentence with one of these words is about a side."""

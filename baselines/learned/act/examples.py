@@ -23,10 +23,10 @@ from robospa.baselines.learned.act.augment import (
 )
 from robospa.baselines.learned.act.poses import WIDTH, from_joints, from_poses
 from robospa.baselines.learned.words import words_of
-from robospa.environment_state import FEATURES, SLOTS
-from robospa.environment_state import WIDTH as ENVIRONMENT_WIDTH
 from robospa.harness.datasets.manifest import SUMS, EpisodeLine, file_hash, read_lines, read_record
 from robospa.harness.robots import embodiment
+from robospa.observation import FEATURES, SLOTS
+from robospa.observation import WIDTH as ENVIRONMENT_WIDTH
 
 KINDS = ("expert", "midstate")
 """Kinds of episodes that are learned from: mistakes are not."""

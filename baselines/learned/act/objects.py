@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.environment_state import FEATURES
+from robospa.observation import FEATURES
 
 TABLE = 0.74
 """Heights count from here [m]."""

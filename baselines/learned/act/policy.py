@@ -17,7 +17,7 @@ from robospa.baselines.learned.act.examples import Batch, WordTable
 from robospa.baselines.learned.act.poses import WIDTH, from_poses, resting, to_poses
 from robospa.baselines.learned.act.settings import About
 from robospa.clients.model_policy import Chunk, ModelPolicy, Query
-from robospa.environment_state import FEATURES, SLOTS
+from robospa.observation import FEATURES, SLOTS
 from robospa.protocol.policy import PolicySpec
 
 PLANS = 3

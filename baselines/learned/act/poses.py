@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from robospa.geometry import matrix_to_quaternion, quaternion_to_matrix
 from robospa.harness.robots.embodiment import Embodiment
-from robospa.rotations import matrix_to_quaternion, quaternion_to_matrix
 
 Array = NDArray[np.float64]
 

@@ -15,7 +15,7 @@ from robospa.baselines.learned.act.objects import (
     present,
 )
 from robospa.baselines.learned.act.poses import WIDTH, from_poses
-from robospa.environment_state import FEATURES, SLOTS
+from robospa.observation import FEATURES, SLOTS
 
 SIZE, X = list(COMPARED).index("half_x"), list(COMPARED).index("x")
 

@@ -12,7 +12,7 @@ from robospa.baselines.learned.act.examples import Batch
 from robospa.baselines.learned.act.policy import PLANS, ActPolicy, until_rest
 from robospa.baselines.learned.act.poses import WIDTH, from_poses, to_poses
 from robospa.baselines.learned.act.settings import About, ActOptions
-from robospa.environment_state import WIDTH as ENVIRONMENT_WIDTH
+from robospa.observation import WIDTH as ENVIRONMENT_WIDTH
 from robospa.protocol.conformance import synthetic_observation
 from robospa.protocol.policy import TrialInfo, check_chunk, check_observation
 

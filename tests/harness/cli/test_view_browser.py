@@ -13,9 +13,8 @@ import pytest
 from devtools import Page, chromium
 from report_runs import EVIL, make_run, record, write_film
 
-from robospa.harness import live_report
-from robospa.harness.live_report import LiveReport
-from robospa.harness.report_server import serving
+from robospa.harness import report_server as live_report
+from robospa.harness.report_server import LiveReport, serving
 from robospa.results.records.run_io import to_line
 
 pytestmark = pytest.mark.browser

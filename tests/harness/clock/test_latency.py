@@ -11,10 +11,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robospa.harness.clock.clock import ClockError, declared_latency, frozen
-from robospa.harness.clock.latency import (
+from robospa.harness.clock.policy_clock import (
+    ClockError,
     Latency,
     LatencyError,
+    declared_latency,
+    frozen,
     latency_json,
     of_samples,
     parse_latency,

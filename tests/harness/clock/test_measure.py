@@ -11,10 +11,10 @@ import pytest
 from wire_helpers import SPEC, Recall
 
 from robospa.clients import connect
+from robospa.harness import server_checks as module
 from robospa.harness.cli.main import main
-from robospa.harness.clock import measure as module
-from robospa.harness.clock.clock import declared_latency
-from robospa.harness.clock.measure import Load, measure
+from robospa.harness.clock.policy_clock import declared_latency
+from robospa.harness.server_checks import Load, measure
 from robospa.protocol.errors import WireError
 from robospa.protocol.server import ServerThread
 

@@ -11,10 +11,8 @@ import pytest
 from clock_fakes import TargetWorld, Walker
 from run_fakes import LIMIT, FakePolicy, parts
 
-from robospa.harness.clock.clock import Clock
-from robospa.harness.clock.latency import parse_latency
-from robospa.harness.clock.motion_log import ENTRY
-from robospa.harness.clock.switching import parse_switching
+from robospa.harness.clock.policy_clock import PolicyClock, parse_latency, parse_switching
+from robospa.harness.clock.real_time import ENTRY
 from robospa.harness.replay import replay, replay_record
 from robospa.harness.running.record_store import ActionRecorder, write_actions
 from robospa.harness.trial import run_trial
@@ -26,13 +24,13 @@ KEY = TrialKey("Pick_Fake", 2, 100004)
 """Its goal is ten actions of the walker away."""
 
 
-def real(latency: str, switching: str = "wait", **more: Any) -> Clock:
+def real(latency: str, switching: str = "wait", **more: Any) -> PolicyClock:
     """A clock with periods of 60 ms."""
-    return Clock(parse_latency(latency), parse_switching(switching), **more)
+    return PolicyClock(parse_latency(latency), parse_switching(switching), **more)
 
 
 def play(
-    policy: FakePolicy, clock: Clock | None, key: TrialKey = KEY, seed: int = 7
+    policy: FakePolicy, clock: PolicyClock | None, key: TrialKey = KEY, seed: int = 7
 ) -> TrialRecord:
     return run_trial(TargetWorld(), policy, key, policy_seed=seed, parts=parts, clock=clock)
 

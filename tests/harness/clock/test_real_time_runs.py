@@ -12,10 +12,8 @@ from clock_fakes import TargetWorld
 from msgspec import structs
 from report_runs import make_run, record
 
-from robospa.harness.clock.clock import Clock
-from robospa.harness.clock.latency import parse_latency
-from robospa.harness.clock.motion_log import ENTRY
-from robospa.harness.clock.switching import parse_switching
+from robospa.harness.clock.policy_clock import PolicyClock, parse_latency, parse_switching
+from robospa.harness.clock.real_time import ENTRY
 from robospa.harness.running import evaluate
 from robospa.harness.running.evaluate import make_manifest
 from robospa.harness.running.policy_probe import ProbedPolicy, check_clock, probe_policies
@@ -127,7 +125,7 @@ def test_a_rate_sets_the_duration_of_actions_in_the_built_in_world(tmp_path: Pat
         "control": "fixed_rate",
         "action_steps": 15,
     }
-    assert request.config.clock == Clock(parse_latency("200ms"))
+    assert request.config.clock == PolicyClock(parse_latency("200ms"))
 
 
 def run_all(folder: Path, keys: list[TrialKey]) -> list[TrialRecord]:
@@ -137,7 +135,7 @@ def run_all(folder: Path, keys: list[TrialKey]) -> list[TrialRecord]:
         "clock_fakes:walker",
         world="clock_fakes:TargetWorld",
         parts="run_fakes:parts",
-        clock=Clock(parse_latency("p0=0ms,p100=400ms")),
+        clock=PolicyClock(parse_latency("p0=0ms,p100=400ms")),
     )
     for name in ("trials", "actions"):
         (folder / name).mkdir(parents=True)
@@ -233,7 +231,7 @@ def test_no_bundle_is_made_of_it(tmp_path: Path) -> None:
 
 def test_the_mean_of_poses_is_refused_before_the_first_trial() -> None:
     spec = PolicySpec("poses", action="ee")
-    clock = Clock(switching=replace(Clock().switching, kind="ensemble", after=1))
+    clock = PolicyClock(switching=replace(PolicyClock().switching, kind="ensemble", after=1))
     with pytest.raises(RunError, match="'poses' answers ee actions"):
         check_clock(clock, [spec])
     check_clock(clock, [PolicySpec("joints")])
@@ -241,7 +239,7 @@ def test_the_mean_of_poses_is_refused_before_the_first_trial() -> None:
 
 
 def test_real_time_chunking_needs_a_policy_that_reads_committed_actions() -> None:
-    clock = Clock(switching=parse_switching("rtc:4"))
+    clock = PolicyClock(switching=parse_switching("rtc:4"))
     with pytest.raises(RunError, match="choose --switch after:4"):
         check_clock(clock, [PolicySpec("plain")])
     check_clock(clock, [PolicySpec("chunker", committed_actions=True)])

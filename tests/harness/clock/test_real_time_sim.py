@@ -7,10 +7,8 @@ from dataclasses import replace
 import pytest
 
 from robospa.baselines.reactive import Reactive
-from robospa.harness.clock.clock import Clock
-from robospa.harness.clock.latency import parse_latency
-from robospa.harness.clock.motion_log import ENTRY
-from robospa.harness.clock.switching import parse_switching
+from robospa.harness.clock.policy_clock import PolicyClock, parse_latency, parse_switching
+from robospa.harness.clock.real_time import ENTRY
 from robospa.harness.replay import replay
 from robospa.harness.running.record_store import ActionRecorder
 from robospa.harness.sim.sapien_world import SapienWorld
@@ -25,7 +23,10 @@ KEYS = [TrialKey(task, 1, 100000) for task in ("Press_Stapler_Repeat", "Pick_Blo
 
 
 def play(
-    world: SapienWorld, key: TrialKey, clock: Clock | None, recorder: ActionRecorder | None = None
+    world: SapienWorld,
+    key: TrialKey,
+    clock: PolicyClock | None,
+    recorder: ActionRecorder | None = None,
 ) -> TrialRecord:
     policy = Reactive(chunk=8, rate=16.67, feedback=True)
     return run_trial(world, policy, key, policy_seed=5, clock=clock, recorder=recorder)
@@ -34,7 +35,7 @@ def play(
 def test_without_latency_it_is_the_paused_clock_at_the_same_rate() -> None:
     world = SapienWorld(render=False, control="fixed_rate", action_steps=15)
     for key in KEYS:
-        paused, real = play(world, key, None), play(world, key, Clock())
+        paused, real = play(world, key, None), play(world, key, PolicyClock())
         rest = {n: v for n, v in real.diagnostics.items() if n != ENTRY}
         assert differences(paused, replace(real, diagnostics=rest)) == []
         assert paused.success and paused.physics_steps <= 15 * paused.steps
@@ -42,7 +43,7 @@ def test_without_latency_it_is_the_paused_clock_at_the_same_rate() -> None:
 
 
 def test_a_trial_comes_again_to_the_bit_in_another_order_and_from_its_actions() -> None:
-    clock = Clock(parse_latency("p0=20ms,p100=500ms"), parse_switching("arrival"))
+    clock = PolicyClock(parse_latency("p0=20ms,p100=500ms"), parse_switching("arrival"))
     worlds = [SapienWorld(render=False, control="fixed_rate", action_steps=15) for _ in range(2)]
     first = [play(worlds[0], key, clock) for key in KEYS]
     recorder = ActionRecorder()

@@ -7,13 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from robospa.harness.clock.switching import (
-    DECAY,
-    Remaining,
-    Switching,
-    SwitchingError,
-    parse_switching,
-)
+from robospa.harness.clock.policy_clock import Switching, SwitchingError, parse_switching
+from robospa.harness.clock.real_time import DECAY, Remaining
 
 
 def chunk(first: float, length: int = 4) -> np.ndarray:

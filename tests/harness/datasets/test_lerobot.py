@@ -12,13 +12,13 @@ import pytest
 from dataset_fakes import fake_episode
 from tiny_datasets import CAMERAS, MANIFEST, SIZE, tiny_dataset, written
 
-from robospa.environment_state import NAMES
 from robospa.harness.datasets.episode import DatasetEpisode, EpisodeFilm
 from robospa.harness.datasets.lerobot import TableFiles
 from robospa.harness.datasets.manifest import DatasetError
 from robospa.harness.datasets.pack import pack
 from robospa.harness.datasets.pictures import FPS, film_frames
 from robospa.harness.datasets.verify import verify
+from robospa.observation import NAMES
 from robospa.trial import TrialKey
 
 STATS = ("min", "max", "mean", "std", "count", "q01", "q10", "q50", "q90", "q99")

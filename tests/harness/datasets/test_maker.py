@@ -10,7 +10,6 @@ import pytest
 from fake_records import trial_record
 from numpy.typing import NDArray
 
-from robospa.environment_state import FEATURES, SLOTS
 from robospa.harness.datasets.episode import DatasetEpisode, EpisodeFilm, read_episode_file
 from robospa.harness.datasets.jobs import EpisodeAttempt, EpisodeJob, attempt_job
 from robospa.harness.datasets.maker import (
@@ -27,7 +26,7 @@ from robospa.harness.demonstrations.demonstration import DemonstrationWorld, dem
 from robospa.harness.demonstrations.recorder import KEYFRAMES
 from robospa.harness.replay import ENDED
 from robospa.harness.trial import task_parts
-from robospa.observation import CameraSpec
+from robospa.observation import FEATURES, SLOTS, CameraSpec
 from robospa.protocol.policy import PolicySpec
 from robospa.tasks.events import Event
 from robospa.trial import TrialKey

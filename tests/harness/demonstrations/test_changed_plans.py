@@ -5,7 +5,6 @@ from __future__ import annotations
 import pytest
 
 from robospa.geometry import Pose
-from robospa.gripper import grasp_points
 from robospa.harness.demonstrations.changed_plans import split_steps, wrong_plan
 from robospa.harness.robots import embodiment
 from robospa.harness.skills.workspace import Workspace
@@ -13,6 +12,7 @@ from robospa.tasks.catalog import build_scene, task
 from robospa.tasks.plan import Pick, Place, Press
 from robospa.tasks.scene import Scene
 from robospa.tasks.snapshot import Snapshot
+from robospa.workcell import grasp_points
 
 SEED = 930_000
 

@@ -15,7 +15,7 @@ from pack_fixtures import READS_MESHES, official_pack_in
 from robospa.baselines.oracle import Oracle
 from robospa.geometry import Pose
 from robospa.harness.sim.sapien_world import SapienWorld
-from robospa.harness.trial import TrialParts, run_trial, task_parts
+from robospa.harness.trial import TrialSetup, run_trial, task_parts
 from robospa.harness.world import RenderUnavailable
 from robospa.observation import CameraSpec
 from robospa.protocol.policy import TrialInfo
@@ -50,10 +50,10 @@ class OfficialOracle(Oracle):
         self._scene = with_pack(self._scene, "official")
 
 
-def parts_of(key: TrialKey) -> TrialParts:
+def parts_of(key: TrialKey) -> TrialSetup:
     parts = task_parts(key)
     scene = with_pack(parts.scene, "official")
-    return TrialParts(scene, parts.task, parts.task.goal(scene), parts.instruction)
+    return TrialSetup(scene, parts.task, parts.task.goal(scene), parts.instruction)
 
 
 def test_the_expert_solves_a_scene_of_the_archive() -> None:

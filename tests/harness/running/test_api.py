@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from run_fakes import FakePolicy
 
 import robospa
-from robospa.harness.settings import SettingsError
-from robospa.harness.settings_file import FILE
+from robospa.harness.settings import FILE, SettingsError
 from robospa.protocol.server import ServerThread
 from robospa.results.records.lint import lint_run
 from robospa.results.records.run_io import Run

@@ -15,12 +15,12 @@ from held_fakes import ScriptedExecutor, ThreadExecutor
 from numpy.typing import NDArray
 from run_fakes import SPEC, FakePolicy, FakeWorld, parts
 
+from robospa.harness.policy_calls import Stopwatch
 from robospa.harness.running.heartbeat import HeartbeatSender, MonitoredPolicy, Turn
 from robospa.harness.running.runner import Runner, RunOptions
 from robospa.harness.running.status import Autoscaler
 from robospa.harness.running.worker import WorkerConfig
 from robospa.harness.trial import run_trial
-from robospa.harness.trial_times import Stopwatch
 from robospa.protocol.connection_limits import ServerOptions
 from robospa.protocol.policy import TrialInfo
 from robospa.protocol.server import ServerThread

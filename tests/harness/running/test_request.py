@@ -9,8 +9,7 @@ from typing import Any
 import pytest
 
 from robospa.harness.running.request import client_options, make_request, run_folder
-from robospa.harness.settings import EvaluationSettings, SettingsError, updated
-from robospa.harness.settings_file import to_toml
+from robospa.harness.settings import EvaluationSettings, SettingsError, to_toml, updated
 from robospa.trial import TrialKey
 
 KEYS = [TrialKey("A", 1, 0)]

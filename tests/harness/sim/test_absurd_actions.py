@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from run_fakes import FakeWorld, parts
 
 from robospa.harness.sim.sapien_world import SapienWorld
-from robospa.harness.trial import TrialParts, run_trial, task_parts
+from robospa.harness.trial import TrialSetup, run_trial, task_parts
 from robospa.harness.world import World
 from robospa.protocol.policy import PolicySpec, TrialInfo
 from robospa.trial import TrialKey
@@ -57,7 +57,7 @@ CASES = {
 }
 
 
-def problems(world: World, find: Callable[..., TrialParts], case: str) -> dict[str, Any]:
+def problems(world: World, find: Callable[..., TrialSetup], case: str) -> dict[str, Any]:
     """What the record of a trial of ACTIONS actions says of them."""
     limit = find(KEY).task.levels[KEY.level].steps
     policy = Absurd(*CASES[case])

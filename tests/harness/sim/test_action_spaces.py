@@ -7,8 +7,8 @@ import pytest
 from disguised_oracle import Disguised
 from unequal_arms import READY, unequal_arms
 
+from robospa.action_space import is_quantized
 from robospa.harness import action_decoder
-from robospa.harness.quantize import is_quantized
 from robospa.harness.replay import replay
 from robospa.harness.running.record_store import ActionRecorder
 from robospa.harness.sim import sapien_world

@@ -10,7 +10,7 @@ import pytest
 from robospa.geometry import Pose
 from robospa.harness.factory import policy_factory
 from robospa.harness.sim.sapien_world import SapienWorld
-from robospa.harness.trial import TrialParts, run_trial, task_parts
+from robospa.harness.trial import TrialSetup, run_trial, task_parts
 from robospa.observation import CameraSpec
 from robospa.tasks.catalog import build_scene
 from robospa.tasks.scene import SceneObject
@@ -63,7 +63,7 @@ def test_a_collision_is_recorded_and_the_trial_goes_on(world: SapienWorld) -> No
     """Things stand right beside the target, where the opened fingers come down."""
     key = TrialKey(*PLACE, mode="randomized:clutter")
 
-    def crowded(key: TrialKey) -> TrialParts:
+    def crowded(key: TrialKey) -> TrialSetup:
         parts = task_parts(key)
         x, y, _ = parts.scene.object(parts.scene.facts["target"]).pose.position
         row = (-0.055, 0.055)

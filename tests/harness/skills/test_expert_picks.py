@@ -10,7 +10,6 @@ from robot_at_home import at_home
 
 from robospa.baselines.oracle import create
 from robospa.geometry import Pose, axis_rotation, multiply, rotate, to_matrix
-from robospa.gripper import grasp_points
 from robospa.harness.robots import embodiment
 from robospa.harness.robots.kinematics import chain_of, end_effector
 from robospa.harness.skills import Expert, pick
@@ -31,7 +30,7 @@ from robospa.tasks.plan import Pick
 from robospa.tasks.scene import SceneObject
 from robospa.tasks.snapshot import Snapshot
 from robospa.trial import TrialKey
-from robospa.workcell import TABLE_TOP
+from robospa.workcell import TABLE_TOP, grasp_points
 
 FRANKA = embodiment("franka-panda").grippers[0]
 HALF = 0.018

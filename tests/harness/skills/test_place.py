@@ -10,7 +10,6 @@ import pytest
 from robot_at_home import at_home
 
 from robospa.geometry import Pose, look_rotation, multiply, rotate, yaw_rotation
-from robospa.gripper import grasp_points
 from robospa.harness.robots import embodiment
 from robospa.harness.robots.kinematics import chain_of, end_effector, inverse
 from robospa.harness.skills import bring_in, place
@@ -30,7 +29,7 @@ from robospa.tasks.objects import object_model
 from robospa.tasks.plan import Hang, Place, Pour
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.snapshot import Snapshot
-from robospa.workcell import TABLE_TOP
+from robospa.workcell import TABLE_TOP, grasp_points
 
 HALF = 0.018
 HEIGHT = TABLE_TOP + HALF

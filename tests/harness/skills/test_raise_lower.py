@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from robospa.geometry import Pose
-from robospa.gripper import grasp_points
 from robospa.harness.robots import Embodiment, embodiment
 from robospa.harness.robots.kinematics import chain_of, end_effector
 from robospa.harness.skills.raise_lower import raise_lower
@@ -16,7 +15,7 @@ from robospa.harness.skills.workspace import SkillFailed, Workspace
 from robospa.tasks.plan import RaiseLower
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.snapshot import Snapshot
-from robospa.workcell import TABLE_TOP
+from robospa.workcell import TABLE_TOP, grasp_points
 
 ROBOT = embodiment("aloha-agilex")
 RISE = 0.1

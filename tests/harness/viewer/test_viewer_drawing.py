@@ -11,7 +11,7 @@ from robospa.geometry import Pose
 from robospa.tasks.shapes import Box, Shape, Skin
 
 pytest.importorskip("sapien", reason="shapes are made by the simulator's extra `sim`")
-from robospa.harness.viewer.drawing import drawn_bodies, meshes, srgb
+from robospa.harness.viewer.playback import drawn_bodies, meshes, srgb
 
 RED, WHITE = (1.0, 0.0, 0.0), (1.0, 1.0, 1.0)
 

@@ -11,7 +11,7 @@ from run_fakes import FakeWorld, parts
 
 from robospa.geometry import Pose
 from robospa.harness.replay import ReplayError
-from robospa.harness.viewer.replay import PoseRecorder, recorded_playback
+from robospa.harness.viewer.show import PoseRecorder, recorded_playback
 
 
 class Posed(FakeWorld):
@@ -55,7 +55,7 @@ def test_a_world_that_does_not_tell_where_its_bodies_are_is_refused(tmp_path: Pa
 def test_the_simulator_tells_where_links_objects_and_doors_are() -> None:
     from robospa.harness.robots import embodiment
     from robospa.harness.sim.sapien_world import SapienWorld
-    from robospa.harness.viewer.drawing import drawn_bodies
+    from robospa.harness.viewer.playback import drawn_bodies
     from robospa.tasks.catalog import build_scene
 
     scene = build_scene("Click_Bell_Open_Microwave_Place_Object", 3, 100000)

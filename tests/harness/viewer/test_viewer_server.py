@@ -12,7 +12,7 @@ import pytest
 from test_playback import played
 
 from robospa.geometry import Pose
-from robospa.harness.viewer.drawing import DrawnBody, Mesh
+from robospa.harness.viewer.playback import DrawnBody, Mesh
 
 HAS_VISER = bool(pytest.importorskip("importlib.util").find_spec("viser"))
 needs_viser = pytest.mark.skipif(not HAS_VISER, reason="needs viser, of the extra `view`")

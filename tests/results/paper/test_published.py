@@ -9,13 +9,13 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
-from robospa.categories import CATEGORIES, CATEGORY_NAMES, SPATIAL
 from robospa.results.paper import published
 from robospa.results.paper.check import Check, checks, errata
 from robospa.results.paper.columns import published_column
 from robospa.results.paper.published import LEVELS, load
 from robospa.results.paper.tables import make_tables
 from robospa.results.tables import to_csv
+from robospa.trial import CATEGORIES, CATEGORY_NAMES, SPATIAL
 
 FOLDER = Path(published.__file__).parent
 DATA = load()

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from report_runs import KNOWN, make_run
 
-from robospa.harness.live_report import LiveReport
+from robospa.harness.report_server import LiveReport
 from robospa.harness.running.atomic_file import run_lock
 from robospa.results.records.lint import lint_run
 from robospa.results.records.run_io import Run, read_run, to_line

@@ -31,7 +31,7 @@ from robospa.results.tables import (
     to_latex,
     to_markdown,
 )
-from robospa.terminal import plain_console
+from robospa.text import plain_console
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -172,7 +172,7 @@ def test_a_console_is_made_in_one_place_alone() -> None:
         if not (folder == "robospa" and len(path.relative_to(ROOT).parts) > 2)
         and re.search(r"\bConsole\(|rich\.markup|markup=True", path.read_text())
     ]
-    assert places == ["robospa/terminal.py"]
+    assert places == ["robospa/text.py"]
 
 
 def test_a_console_takes_nothing_for_markup(capsys: pytest.CaptureFixture[str], name: str) -> None:

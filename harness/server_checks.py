@@ -1,21 +1,29 @@
-"""The last part of `robospa check`: a real trial in the simulator, run twice.
+"""What `robospa check` tests beyond the wire: a real trial in the simulator, run twice, and load.
 
-The checks before it use synthetic observations: noise for images, random postures. Here the policy
-sees a scene and its actions move a robot. If the server promises to honour seeds, a second run of
-the trial with the same policy seed must end in the same state, to the bit. Success is not required.
+The checks of the protocol use synthetic observations: noise for images, random postures. In the
+trial the policy sees a scene and its actions move a robot. If the server promises to honour seeds,
+a second run with the same policy seed must end in the same state, to the bit. Success is not
+required.
+
+Load is what a client sees when one, four or eight ask at once: from the request to the answer's
+arrival, with transport and queue. Every client is a connection of its own, with made-up
+observations of the form that the policy asks for.
 """
 
 from __future__ import annotations
 
+import threading
+import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
+from dataclasses import dataclass
 
 from robospa.extras import remedy
-from robospa.harness.trial import TrialParts, run_trial, task_parts
-from robospa.harness.trial_identity import policy_seed, trial_id
+from robospa.harness.clock.policy_clock import Latency, of_samples
+from robospa.harness.trial import TrialSetup, policy_seed, run_trial, task_parts, trial_id
 from robospa.harness.world import World
 from robospa.protocol.client import RemotePolicy
-from robospa.protocol.conformance import CheckResult
+from robospa.protocol.conformance import CheckResult, synthetic_observation, trial_for
 from robospa.protocol.errors import WireError
 from robospa.protocol.policy import PolicySpec, robot_of
 from robospa.results.records.action_problems import problem_counts
@@ -27,7 +35,7 @@ EXECUTED_ACTIONS = "executed actions"
 TASK, LEVEL = "Pick_Blocks_Size", 1
 
 
-def trial_for(spec: PolicySpec) -> TrialKey:
+def real_trial_for(spec: PolicySpec) -> TrialKey:
     """A real trial that a policy with this `spec` can be asked to do."""
     return TrialKey(TASK, LEVEL, accepted(TASK, LEVEL)[0], robot_of(spec))
 
@@ -37,7 +45,7 @@ def rollouts(
     count: int,
     *,
     make_world: Callable[[], World] | None = None,
-    parts: Callable[[TrialKey], TrialParts] = task_parts,
+    parts: Callable[[TrialKey], TrialSetup] = task_parts,
 ) -> Iterator[CheckResult]:
     """Run the same trial `count` times, each on a connection of its own; a result for each, and one
     about the actions of all.
@@ -55,7 +63,7 @@ def rollouts(
             return
         try:
             with closing(world), connect() as policy:
-                spec, key = policy.spec, trial_for(policy.spec)
+                spec, key = policy.spec, real_trial_for(policy.spec)
                 record = run_trial(
                     world,
                     policy,
@@ -115,3 +123,86 @@ def _result(name: str, records: list[TrialRecord], spec: PolicySpec) -> CheckRes
             name, False, f"{text}; it differs from the first, though seeds are honoured"
         )
     return CheckResult(name, True, f"{text}; it differs from the first: seeds are not honoured")
+
+
+CLIENTS = (1, 4, 8)
+"""How many at once; one is a robot with a server for itself."""
+QUERIES = 40
+"""Of each client, where the time allows them."""
+LEAST = 3
+"""Queries of each client, however long they take."""
+SHARES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
+"""What of a distribution its `--clock` line has."""
+
+
+@dataclass(frozen=True)
+class Load:
+    """The answers to `clients` at once: their times [ms], and how many came a second."""
+
+    clients: int
+    latencies: tuple[float, ...]
+    per_second: float
+
+    @property
+    def latency(self) -> Latency:
+        """The distribution, to a tenth of a millisecond."""
+        whole = of_samples(self.latencies)
+        return Latency(tuple((100.0 * s, round(whole.at(s), 1)) for s in SHARES))
+
+    @property
+    def clock(self) -> str:
+        """The setting that stands for it."""
+        return f"real:{self.latency}"
+
+
+def measure(
+    connect: Callable[[], RemotePolicy], seconds: float, clients: Sequence[int] = CLIENTS
+) -> list[Load]:
+    """The load of each number of `clients`, in `seconds` each, or less if the server is fast.
+
+    The first answer of a client does not count: it may compile. Raises what the connections do.
+    """
+    return [_load(connect, count, seconds) for count in clients]
+
+
+def _load(connect: Callable[[], RemotePolicy], count: int, seconds: float) -> Load:
+    ready = threading.Barrier(count)
+    times: list[float] = []
+    spans: list[tuple[float, float]] = []
+    errors: list[BaseException] = []
+
+    def ask() -> None:
+        try:
+            with connect() as policy:
+                policy.reset(trial_for(policy.spec))
+                policy.infer(synthetic_observation(policy.spec))
+                ready.wait()
+                began = time.perf_counter()
+                own = _times(policy, began + seconds)
+                spans.append((began, time.perf_counter()))
+                times.extend(own)
+        except BaseException as error:  # raised again in the caller's thread
+            errors.append(error)
+            ready.abort()
+
+    threads = [threading.Thread(target=ask) for _ in range(count)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    real = [error for error in errors if not isinstance(error, threading.BrokenBarrierError)]
+    if errors:
+        raise real[0] if real else errors[0]
+    took = max(end for _, end in spans) - min(start for start, _ in spans)
+    return Load(count, tuple(sorted(times)), len(times) / took)
+
+
+def _times(policy: RemotePolicy, until: float) -> list[float]:
+    """Latencies [ms] of one client's queries."""
+    found: list[float] = []
+    while len(found) < QUERIES and (len(found) < LEAST or time.perf_counter() < until):
+        seen = synthetic_observation(policy.spec, step=len(found) + 1, seed=len(found) + 1)
+        start = time.perf_counter()
+        policy.infer(seen)
+        found.append(1000.0 * (time.perf_counter() - start))
+    return found

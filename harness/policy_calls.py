@@ -1,12 +1,19 @@
-"""Where the time of a trial goes, and how long its policy takes to answer."""
+"""A policy during a trial: what it is asked, how long it takes, and where the trial's time goes."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from typing import ParamSpec, Protocol, TypeVar, runtime_checkable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, ParamSpec, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
+from numpy.typing import NDArray
+
+from robospa.protocol.policy import Policy, PolicySpec
+
+if TYPE_CHECKING:
+    from robospa.harness.trial import TrialState
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -72,3 +79,35 @@ def answer_times(
         if usable:
             found[name] = sum(usable) / len(usable)
     return found
+
+
+@dataclass(frozen=True)
+class Committed:
+    """What real-time chunking reads: `actions` float32 (n, D) that the robot has left, and how many
+    of them will be executed before the answer takes over."""
+
+    actions: NDArray[np.float32]
+    delay: int
+
+
+@dataclass
+class PolicyCaller:
+    """A policy, and how long it took to answer."""
+
+    policy: Policy
+    latencies: list[float] = field(default_factory=list)
+    server_timings: list[Mapping[str, float]] = field(default_factory=list)
+    """For every answer, the times that the policy's server reported [ms]."""
+
+    def next_actions(
+        self, run: TrialState, spec: PolicySpec, committed: Committed | None = None
+    ) -> NDArray[np.float32]:
+        """The policy's next actions, float32 (T, D), quantised as they are executed; `committed`
+        is sent along with the observation."""
+        observation = run.observation(spec)
+        if committed is not None:
+            observation["committed"], observation["delay"] = committed.actions, committed.delay
+        answer = run.stopwatch.ask(self.policy, self.policy.infer, observation)
+        self.latencies.append(1000.0 * run.stopwatch.last_call)
+        self.server_timings.append(getattr(self.policy, "last_timing", {}))
+        return run.checked(answer, spec)
