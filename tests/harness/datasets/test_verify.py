@@ -130,21 +130,16 @@ def test_counts_that_do_not_agree_are_found(tmp_path: Path) -> None:
 
 def test_replays_that_end_otherwise_are_told(tmp_path: Path) -> None:
     episodes = tiny_dataset(tmp_path, count=3)
-    others = [
-        replace(episodes[0], success=False),
-        replace(episodes[1], replay_digest="00" * 32),
-        episodes[2],
-    ]
+    first, second, third = episodes
+    others = [replace(first, success=False), replace(second, replay_digest="00" * 32), third]
 
     def broken(line: EpisodeLine, commanded: NDArray[np.float32]) -> ReplayEnding:
         if line.episode_index == 2:
             raise RuntimeError("the scene does not come to rest")
         return Replayed(others)(line, commanded)
 
-    problems = verify(tmp_path, replay=broken).problems
-    assert len(problems) == 3
-    assert "succeeded when it was collected, and fails when replayed" in problems[0]
-    assert "ends in another state" in problems[1] and "cannot be replayed: the scene" in problems[2]
+    fails, differs, ends = verify(tmp_path, replay=broken).problems
+    assert "fails when" in fails and "another state" in differs and "cannot be replayed" in ends
 
 
 def test_mistakes_and_midstates_are_replayed_as_what_they_are(tmp_path: Path) -> None:

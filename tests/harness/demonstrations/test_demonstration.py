@@ -32,6 +32,7 @@ from robospa.harness.robots import embodiment
 from robospa.harness.sim.motion import DEMONSTRATION_LIMITS
 from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.results.failures.labels import label as failure_type
+from robospa.results.records.trial_record import TrialRecord
 from robospa.tasks.catalog import build_scene, task
 from robospa.tasks.plan import Pick, Place, Press
 from robospa.trial import TrialKey
@@ -123,25 +124,25 @@ def test_a_mistake_is_marked_before_the_step_that_differs() -> None:
     assert marked(scene, (pick, Place(pick.object)))[0] == GoWrong()
 
 
-def shown(kind: str, name: str) -> tuple[ShownEpisode, FrameRecorder]:
+def shown(
+    kind: str, name: str
+) -> tuple[ShownEpisode, FrameRecorder, np.ndarray, np.ndarray, TrialRecord]:
+    """A demonstration, its frames with labels and actions, and its replay."""
     recorder, world = FrameRecorder(), DemonstrationWorld(render=False)
     made = show(world, key(name), recorder, kind)
     world.close()
-    return made, recorder
-
-
-def annotated(made: ShownEpisode, recorder: FrameRecorder) -> tuple[np.ndarray, np.ndarray]:
-    return made.annotate(recorder.commanded, np.array([f.time for f in recorder.frames]))
+    times = np.array([frame.time for frame in recorder.frames])
+    record = replay(
+        SapienWorld(render=False), key(name), recorder.commanded, made.prefix_action, kind
+    )
+    return made, recorder, *made.annotate(recorder.commanded, times), record
 
 
 @pytest.mark.sim
 def test_noise_is_recovered_from_and_repeats_to_the_bit() -> None:
-    made, recorder = shown("noise", "Pick_Blocks_Size")
-    _, same = shown("noise", "Pick_Blocks_Size")
-    assert np.array_equal(recorder.commanded, same.commanded)
-    assert made.noise is not None and made.noise.pushes
-    assert max(off for off, _ in made.noise.pushes) > 0.005
-    label, action = annotated(made, recorder)
+    made, recorder, label, action, record = shown("noise", "Pick_Blocks_Size")
+    assert np.array_equal(recorder.commanded, shown("noise", "Pick_Blocks_Size")[1].commanded)
+    assert made.noise is not None and max(off for off, _ in made.noise.pushes) > 0.005
     assert {EXPERT, NOISE, RECOVERY} == set(label.tolist())
     next_command = np.concatenate([recorder.commanded[1:], recorder.commanded[-1:]])
     differs = np.abs(action - next_command).max(axis=1) > 1e-4
@@ -149,21 +150,16 @@ def test_noise_is_recovered_from_and_repeats_to_the_bit() -> None:
     plain = shown("expert", "Pick_Blocks_Size")[1]
     assert not np.array_equal(plain.commanded, recorder.commanded)
     assert np.allclose(plain.commanded[-1], recorder.commanded[-1], atol=0.05)
-    record = replay(SapienWorld(render=False), key("Pick_Blocks_Size"), recorder.commanded,
-        made.prefix_action, "noise")  # fmt: skip
     assert made.demonstration.success and record.success
 
 
 @pytest.mark.sim
 def test_a_mistake_fails_as_it_should_and_says_where() -> None:
-    made, recorder = shown("mistake:stops", "Stack_Blocks_Color_Order")
-    label, _ = annotated(made, recorder)
+    made, recorder, label, _, record = shown("mistake:stops", "Stack_Blocks_Color_Order")
     begins = int(np.flatnonzero(label == MISTAKE)[0])
     assert 0 < begins < len(label) and (label[begins:] == MISTAKE).all()
     assert not made.demonstration.success
     assert np.array_equal(recorder.commanded[-1], recorder.commanded[-5])
-    record = replay(SapienWorld(render=False), key("Stack_Blocks_Color_Order"),
-        recorder.commanded, made.prefix_action, made.kind)  # fmt: skip
     failure = failure_type(record)
     assert record.end == "step_limit" and record.steps == len(label)
     assert failure is not None and failure.kind == "no_attempt"
@@ -171,23 +167,14 @@ def test_a_mistake_fails_as_it_should_and_says_where() -> None:
 
 @pytest.mark.sim
 def test_a_midstate_begins_later_and_elsewhere_and_is_replayed_from_the_start() -> None:
-    made, recorder = shown("midstate", "Pick_Blocks_Size")
+    made, recorder, label, _, record = shown("midstate", "Pick_Blocks_Size")
     first = recorder.frames[0]
     assert first.time > 0.5 and len(made.prefix_action) > 3
     assert np.array_equal(made.prefix_action[-1], first.commanded)
-    home = np.concatenate([[*arm, 1.0] for arm in _homes()])
+    home = np.concatenate([[*arm.home, 1.0] for arm in embodiment("aloha-agilex").arms])
     assert np.abs(first.commanded - home).max() > 0.2
-    label, _ = annotated(made, recorder)
     assert set(label.tolist()) == {EXPERT}
-    record = replay(SapienWorld(render=False), key("Pick_Blocks_Size"), recorder.commanded,
-        made.prefix_action, made.kind)  # fmt: skip
     assert made.demonstration.success and record.success
-
-
-def _homes() -> list[tuple[float, ...]]:
-    from robospa.harness.robots import embodiment
-
-    return [arm.home for arm in embodiment("aloha-agilex").arms]
 
 
 SHARE = 0.85

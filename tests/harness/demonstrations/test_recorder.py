@@ -77,24 +77,21 @@ def recorded(lengths: list[int], stride: int = 15, rests: bool = False) -> Episo
     return made
 
 
-def kept(lengths: list[int], stride: int = 15) -> list[int]:
-    """Physics steps of the frames of actions that take so many, all with a motion."""
-    return [int(row) for row in recorded(lengths, stride).commanded[:, 0]]
-
-
-def test_a_frame_every_stride_and_one_at_every_action_s_end() -> None:
-    assert kept([40]) == [0, 15, 30, 40]
-    assert kept([40], stride=20) == [0, 20, 40]
-    assert kept([12, 8, 24]) == [0, 12, 20, 35, 44]
-
-
-def test_a_frame_just_before_an_action_s_end_gives_way_to_that() -> None:
-    assert kept([35]) == [0, 15, 35]
-    assert kept([3, 3, 50]) == [0, 3, 6, 25, 40, 56]
-
-
-def test_keyframes_are_where_actions_begin_and_end() -> None:
-    assert kept([40, 12, 3, 500], stride=KEYFRAMES) == [0, 40, 52, 55, 555]
+@pytest.mark.parametrize(
+    ("lengths", "stride", "frames"),
+    [
+        ([40], 15, [0, 15, 30, 40]),
+        ([40], 20, [0, 20, 40]),
+        ([12, 8, 24], 15, [0, 12, 20, 35, 44]),
+        ([35], 15, [0, 15, 35]),  # a frame just before an action's end is replaced by that
+        ([3, 3, 50], 15, [0, 3, 6, 25, 40, 56]),
+        ([40, 12, 3, 500], KEYFRAMES, [0, 40, 52, 55, 555]),
+    ],
+)
+def test_a_frame_every_stride_and_one_at_every_action_s_end(
+    lengths: list[int], stride: int, frames: list[int]
+) -> None:
+    assert [int(row) for row in recorded(lengths, stride).commanded[:, 0]] == frames
 
 
 def test_a_recording_may_begin_in_the_midst_of_a_trial() -> None:
@@ -110,10 +107,8 @@ def test_a_rest_is_one_frame_however_long_the_action() -> None:
     assert len(recorded([HOLD_STEPS, HOLD_STEPS], rests=True)) == 1 + 2
 
 
-@pytest.mark.parametrize("task", tasks())
-def test_strides_are_those_of_polls_and_no_wait_gets_shorter(task: str) -> None:
-    assert STRIDE <= frame_steps(task) <= HOLD_STEPS and frame_steps(task) % POLL_STEPS == 0
-
-
-def test_strides_are_of_tasks_that_exist() -> None:
+def test_strides_are_those_of_polls_and_no_wait_gets_shorter() -> None:
     assert set(STRIDES) <= set(tasks())
+    for stride in (STRIDE, *STRIDES.values()):
+        assert STRIDE <= stride <= HOLD_STEPS and stride % POLL_STEPS == 0
+    assert frame_steps("Press_Stapler_Memory") == 20 and frame_steps("Pick_Blocks_Size") == STRIDE

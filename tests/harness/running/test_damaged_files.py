@@ -37,27 +37,28 @@ from robospa.leaderboard.untrusted import BundleArchive
 from robospa.leaderboard.verify import verify
 from robospa.results.records.manifest import RunError, read_manifest, seed_hash
 from robospa.results.records.run_io import finished, from_line, merge, read_file, read_run, to_line
+from robospa.results.report.score_table import print_scores
+from robospa.results.scoring.scores import score_run
 from robospa.trial import TrialKey
 
 ALLOWED = (RunError, BundleError, SettingsError)
-DOCUMENTED: dict[str, tuple[type[Exception], ...]] = {"line": (ValueError,)}
 TOKENS: list[Any] = [None, True, False, 0, -1, 1, 2**31, 2**63, 10**400, 0.5, -0.0, 1e308]
 TOKENS += ["", "x", "../../x", "a/b", "\x00", "\ud800", "é", "A" * 5000, [], {}, [[]], [1, "a"]]
 TOKENS += [{"a": {}}, {"1": [1]}, "success", "infrastructure", [None], "NaN", float("nan")]
 TOKENS += [float("inf"), "100000", {"kind": "success"}, [{"kind": 3}], {"seeds": 1}]
-RAW = [
-    b"[" * 3000,
-    b"{" * 300,
-    b'"',
-    b"\\ud800",
-    b"1e999",
-    b"-",
-    b"9" * 5000,
-    b"NaN",
-    b"\n",
+RAW = [b"[" * 3000, b"{" * 300, b'"', b"\\ud800", b"1e999", b"-", b"9" * 5000, b"NaN", b"\n"]
+RAW += [
     b"\x00",
+    b"\xff\xfe",
+    b"null",
+    b"true",
+    b'{"a":',
+    b",",
+    b"]",
+    b"}",
+    b"\xff" * 4,
+    b"PK\x01\x02",
 ]
-RAW += [b"\xff\xfe", b"null", b"true", b'{"a":', b",", b"]", b"}", b"\xff" * 4, b"PK\x01\x02"]
 EXAMPLES = {"bundle": 12, "run": 30}
 """Of these kinds; of the others a hundred."""
 
@@ -110,6 +111,7 @@ class Readers:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
+        (folder / "read").mkdir()
         self.run = fakes.make_run(folder / "run")
         self.bundle = folder / "run.zip"
         pack([self.run], fakes.CARD, self.bundle, fakes.REFERENCE)
@@ -117,90 +119,76 @@ class Readers:
         self.known = read_manifest(self.run)
         traces = [np.arange(28, dtype=np.float32).reshape(2, 14), np.zeros((0, 14), np.float32)]
         write_actions(folder, TrialKey("A", 1, 1), traces[0], "joint")
-        text = next((self.run / "trials").glob("*.jsonl")).read_bytes()
+        self.text = next((self.run / "trials").glob("*.jsonl")).read_bytes()
+        lines = self.text.splitlines()
         options = {"horizon": 25, "execute": 10, "names": "head:cam", "extra": '{"a": 1}'}
-        self.seeds: dict[str, list[bytes]] = {
-            "line": text.splitlines()[::7],
-            "records": [text[:2500], text[2000:5000], b"\n".join(text.splitlines()[:2]) + b"\n"],
-            "manifest": [(self.run / "run.json").read_bytes()],
-            "policy map": [
-                b'{"Pick_A": "ws://a:1", "Pick_B": "ws://b:2"}',
-                b'{"Pick_A": ["ws://a"]}',
-            ],
-            "client options": [json.dumps(options).encode(), b'{"horizon": 5}'],
-            "seeds": [b'{"Pick_A": {"1": [1, 2], "2": [3]}}', b"[100000, 100001]"],
-            "actions": [next((folder / "actions").glob("*.npz")).read_bytes()],
-            "traces": [encode(traces), encode(traces * 3), encode([])],
-            "archive": [self.bundle.read_bytes()],
-            "bundle": [self.files[name] for name in sorted(self.files) if name.endswith("json")],
-            "run": [],
-        }
-        self.last: Any = b""
+        maps = [b'{"Pick_A": "ws://a:1", "Pick_B": "ws://b:2"}', b'{"Pick_A": ["ws://a"]}']
+        self.kinds: dict[str, tuple[list[bytes], Callable[[Path], object]]] = {
+            "line": (lines[::7], self.line),
+            "records": ([self.text[:2500], self.text[2000:5000], b"\n".join(lines[:2]) + b"\n"],
+                lambda path: merge(read_file(path))),
+            "run.json": ([(self.run / "run.json").read_bytes()], self.manifest),
+            "policy map": (maps, lambda path: read_map(path, ["Pick_A"], ["Pick_A", "Pick_B"])),
+            "client options": ([json.dumps(options).encode(), b'{"horizon": 5}'],
+                lambda path: client_options("openpi://h:1", path)),
+            "seeds": ([b'{"Pick_A": {"1": [1, 2], "2": [3]}}', b"[100000, 100001]"],
+                lambda path: parse_seeds(str(path))("Pick_A", 1)),
+            "actions": ([next((folder / "actions").glob("*.npz")).read_bytes()], read_actions),
+            "traces": ([encode(traces), encode(traces * 3), encode([])],
+                lambda path: decode(path.read_bytes(), "actions")),
+            "archive": ([self.bundle.read_bytes()], self.archive),
+        }  # fmt: skip
 
-    def input(self, name: str, rng: random.Random) -> bytes:
-        """A damaged or a changed file of the kind `name`."""
-        seeds = self.seeds[name]
+    def attempt(self, name: str, rng: random.Random) -> str:
+        """How it ended: `read`, or the documented error; anything else is raised."""
+        errors = (ValueError,) if name == "line" else ALLOWED
+        try:
+            if name in ("bundle", "run"):
+                (self.forged_bundle if name == "bundle" else self.whole_run)(rng)
+            else:
+                seeds, read = self.kinds[name]
+                path = self.folder / "read" / (f"{name}.json" if name == "seeds" else name)
+                path.write_bytes(self.harmed(rng, seeds))
+                read(path)
+        except errors as error:
+            assert 0 < len(str(error)) < 2000, "an error without a word, or with too many"
+            return type(error).__name__
+        return "read"
+
+    @staticmethod
+    def harmed(rng: random.Random, seeds: list[bytes]) -> bytes:
+        """A damaged or a changed file."""
         if rng.random() < 0.5:
-            self.last = damage(rng, seeds)
-        else:
-            try:
-                value = json.loads(rng.choice(seeds))
-                for _ in range(rng.choice((1, 1, 2, 4))):
-                    value = change(rng, value)
-                self.last = json.dumps(value).encode()
-            except ValueError:
-                self.last = damage(rng, seeds)
-        data: bytes = self.last
-        return data
+            return damage(rng, seeds)
+        try:
+            value = json.loads(rng.choice(seeds))
+            for _ in range(rng.choice((1, 1, 2, 4))):
+                value = change(rng, value)
+            return json.dumps(value).encode()
+        except ValueError:
+            return damage(rng, seeds)
 
-    def _put(self, name: str, rng: random.Random, place: str) -> Path:
-        path = self.folder / place
-        path.write_bytes(self.input(name, rng))
-        return path
-
-    def _line(self, rng: random.Random) -> None:
-        record = from_line(self.input("line", rng).decode())
+    def line(self, path: Path) -> None:
+        record = from_line(path.read_bytes().decode())
         line = to_line(record)
         line.encode()
         assert from_line(line) == record or "NaN" in line, "a record does not survive its line"
         assert "/" not in record.key.slug and finished(record) in (True, False)
         merge([record, record])
 
-    def _records(self, rng: random.Random) -> None:
-        merge(read_file(self._put("records", rng, "records.jsonl")))
-
-    def _manifest(self, rng: random.Random) -> None:
-        (self.folder / "m").mkdir(exist_ok=True)
-        self._put("manifest", rng, "m/run.json")
-        found = read_manifest(self.folder / "m")
+    def manifest(self, path: Path) -> None:
+        found = read_manifest(path.parent)
         seed_hash(found.keys)
         changed_settings(found.settings, self.known.settings)
 
-    def _policy_map(self, rng: random.Random) -> None:
-        read_map(self._put("policy map", rng, "map.json"), ["Pick_A"], ["Pick_A", "Pick_B"])
+    def archive(self, path: Path) -> None:
+        with BundleArchive(path) as archive:
+            assert all(archive.read(name) is not None for name in archive.sizes)
 
-    def _client_options(self, rng: random.Random) -> None:
-        client_options("openpi://h:1", self._put("client options", rng, "client.json"))
-
-    def _seeds(self, rng: random.Random) -> None:
-        parse_seeds(str(self._put("seeds", rng, "seeds.json")))("Pick_A", 1)
-
-    def _actions(self, rng: random.Random) -> None:
-        read_actions(self._put("actions", rng, "a.npz"))
-
-    def _traces(self, rng: random.Random) -> None:
-        decode(self.input("traces", rng), "actions")
-
-    def _archive(self, rng: random.Random) -> None:
-        with BundleArchive(self._put("archive", rng, "a.zip")) as archive:
-            for name in archive.sizes:
-                archive.read(name)
-
-    def _bundle(self, rng: random.Random) -> None:
+    def forged_bundle(self, rng: random.Random) -> None:
         """One inner file changed; the hashes hold again, as a forger would see to."""
         files = dict(self.files)
         name = rng.choice(sorted(files))
-        self.last = name, damage(rng, [files[name]])
         if name == layout.RECORDS and rng.random() < 0.7:
             rows = fakes.rows_of(files)
             place = rng.randrange(len(rows))
@@ -208,50 +196,33 @@ class Readers:
             rows[place] = changed if isinstance(changed, dict) else {"record": changed}
             fakes.put_rows(files, rows)
         elif name.endswith("json") and rng.random() < 0.8:
-            try:
+            with contextlib.suppress(ValueError, UnicodeEncodeError):
                 files[name] = canonical(change(rng, json.loads(files[name])))
-            except (ValueError, UnicodeEncodeError):
-                return
         else:
-            files[name] = self.last[1]
-        self.last = name, files[name]
+            files[name] = damage(rng, [files[name]])
         if name != layout.MANIFEST:
             with contextlib.suppress(Exception):  # the forger's own tools may choke on it
                 fakes.seal(files)
         verify(fakes.zip_up(self.folder / "b.zip", files), fakes.REFERENCE)
 
-    def _run(self, rng: random.Random) -> None:
+    def whole_run(self, rng: random.Random) -> None:
         """A whole run, one of its records or its manifest changed, up to its tables."""
-        from robospa.results.report.score_table import print_scores
-        from robospa.results.scoring.scores import score_run
-
         run = self.folder / "whole"
         (run / "trials").mkdir(parents=True, exist_ok=True)
-        lines = next((self.run / "trials").glob("*.jsonl")).read_bytes().splitlines()
-        place, manifest = rng.randrange(len(lines)), (self.run / "run.json").read_bytes()
+        lines, manifest = self.text.splitlines(), (self.run / "run.json").read_bytes()
+        place = rng.randrange(len(lines))
         if rng.random() < 0.7:
             lines[place] = json.dumps(change(rng, json.loads(lines[place]))).encode()
         else:
             manifest = json.dumps(change(rng, json.loads(manifest))).encode()
-        self.last = lines[place], manifest
         (run / "run.json").write_bytes(manifest)
         (run / "trials" / "0000.jsonl").write_bytes(b"\n".join(lines) + b"\n")
         with contextlib.redirect_stdout(io.StringIO()):
             found = read_run(run)
             print_scores(found, score_run(found))
 
-    def attempt(self, name: str, rng: random.Random) -> str:
-        """How it ended: `read`, or the documented error; anything else is raised."""
-        target: Callable[[random.Random], None] = getattr(self, f"_{name.replace(' ', '_')}")
-        try:
-            target(rng)
-        except DOCUMENTED.get(name, ALLOWED) as error:
-            assert 0 < len(str(error)) < 2000, "an error without a word, or with too many"
-            return type(error).__name__
-        return "read"
 
-
-KINDS = "line,records,manifest,policy map,client options,seeds,actions,traces,archive,bundle,run"
+KINDS = "line,records,run.json,policy map,client options,seeds,actions,traces,archive,bundle,run"
 
 
 @pytest.fixture(scope="module")
@@ -274,5 +245,4 @@ def test_a_damaged_file_is_read_or_refused(name: str, readers: Readers) -> None:
 
 
 def test_an_archive_that_is_not_damaged_is_read(readers: Readers) -> None:
-    with BundleArchive(readers.bundle) as archive:
-        assert all(archive.read(name) for name in archive.sizes)
+    readers.archive(readers.bundle)
