@@ -150,13 +150,6 @@ def test_committed_actions_go_under_the_names_of_the_server() -> None:
         OpenPiClientOptions(committed="prefix")
 
 
-def test_openpi_complains_in_a_text_frame() -> None:
-    with OpenPi() as url, connect(url + "?names=head:cam_top", timeouts=QUICK) as policy:
-        with pytest.raises(ServerError, match="Expected images to contain") as caught:
-            policy.infer(observation())
-        assert "Traceback" in caught.value.__notes__[0]
-
-
 def test_openpis_own_codec_reads_and_is_read() -> None:
     original = pytest.importorskip("openpi_client.msgpack_numpy")
     answer = {"actions": joint_chunk(), "server_timing": {"infer_ms": np.float64(3.5)}}

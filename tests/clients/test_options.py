@@ -87,10 +87,6 @@ def test_the_url_overrules_the_file() -> None:
     assert (endpoint.host, endpoint.port) == ("gpu", 9000)
 
 
-def test_xvlas_own_server_listens_at_8010() -> None:
-    assert find_endpoint("xvla+http://gpu").port == 8010
-
-
 def test_none_and_flags_and_numbers_from_a_url() -> None:
     assert url_options("execute=none&ctrl_freq=12.5") == {"execute": "none", "ctrl_freq": "12.5"}
     check_options("go1+http://h?execute=none&ctrl_freq=12.5")
@@ -100,22 +96,23 @@ def test_none_and_flags_and_numbers_from_a_url() -> None:
 # ---------------------------------------------------------------- the page of options
 
 
-def page_table(dialect: Dialect) -> str:
-    """The table of one dialect as docs/clients.md or the model's own page must have it."""
-    rows = ["| option | default | values | meaning |", "|---|---|---|---|"]
-    rows += [
+def table_of(dialect: Dialect) -> list[str]:
+    """The rows of one dialect's options."""
+    return [
         f"| `{r.name}` | {f'`{r.default}`' if r.default else 'empty'} | {r.values} | {r.help} |"
         for r in option_table(dialect.options)
     ]
-    return "\n".join(rows)
 
 
 @pytest.mark.parametrize("dialect", [d for d in DIALECTS if d.scheme != "ws"], ids=by_scheme)
-def test_the_page_lists_every_option(dialect: Dialect) -> None:
-    table = page_table(dialect)
+def test_a_page_lists_every_option(dialect: Dialect) -> None:
+    """Those of nearly all dialects in the first table of clients.md, its own in a table."""
+    head = "| option | default | values | meaning |\n|---|---|---|---|\n"
+    first = (ROOT / "docs/clients.md").read_text().partition(head)[2].partition("\n\n")[0]
+    own = head + "\n".join(row for row in table_of(dialect) if row not in first.splitlines())
     pages = [ROOT / "docs/clients.md", *(ROOT / "docs/policies").glob("*.md")]
-    assert any(table in page.read_text() for page in pages), (
-        f"no page has the options of {dialect.scheme}; the table must be:\n{table}"
+    assert any(own in page.read_text() for page in pages), (
+        f"no page has the options of {dialect.scheme}; the table must be:\n{own}"
     )
 
 

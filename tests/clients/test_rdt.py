@@ -189,10 +189,3 @@ def test_the_model_is_made_as_its_own_script_does(
 def test_options_that_cannot_be(given: dict[str, Any], words: str) -> None:
     with pytest.raises(ValueError, match=words):
         rdt.RdtServerOptions(**given)
-
-
-def test_missing_code_is_named(torch: Any, tmp_path: Path) -> None:
-    with pytest.raises(ModelMissing, match=r"cannot import scripts\.agilex_model"):
-        rdt.create(rdt.RdtServerOptions(checkpoint="x", code=str(tmp_path)))
-    with pytest.raises(ModelMissing, match="there is no folder"):
-        rdt.create(rdt.RdtServerOptions(checkpoint="x", code=str(tmp_path / "none")))

@@ -143,12 +143,6 @@ def test_the_documented_url_gives_robotwins_dp_the_windows_of_its_own_client() -
     assert calls(server)[:2] == ["reset_obs", "get_action"]
 
 
-def test_images_in_float32_are_what_float64_becomes_in_the_model() -> None:
-    values = np.arange(256, dtype=np.uint8)
-    single = values.astype(np.float32) / np.float32(255)
-    assert np.array_equal(single, (values / 255).astype(np.float32))
-
-
 def test_earlier_steps_are_told_once() -> None:
     server = RoboTwin()
     with server as url, connect(url + "?layout=dp&history=2", timeouts=QUICK) as policy:

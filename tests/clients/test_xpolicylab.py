@@ -108,17 +108,6 @@ def test_xpolicylab_answers_poses() -> None:
     assert chunk[0, [7, 15]].tolist() == [1, 0]
 
 
-def test_xpolicylab_what_is_not_named_stays() -> None:
-    with (
-        XPolicyLab(lambda seen: [{"right_arm_joint_state": np.ones(6)}]) as url,
-        connect(url, timeouts=QUICK) as policy,
-    ):
-        chunk = policy.infer(observation())
-    assert np.array_equal(chunk[0, :7], STATE[:7])
-    assert chunk[0, 7:13].tolist() == [1] * 6
-    assert chunk[0, 13] == STATE[13]
-
-
 def test_xpolicylab_grippers_can_be_turned_round() -> None:
     with (
         XPolicyLab(lambda seen: np.zeros((1, 14))) as url,

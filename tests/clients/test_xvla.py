@@ -115,15 +115,6 @@ def test_xvla_is_told_the_last_command_from_the_second_query_on() -> None:
     assert np.array_equal(third, first)
 
 
-def test_xvla_can_be_told_what_is_measured() -> None:
-    server = XVla(lambda seen: ee6d())
-    with server as url, connect(url + "?proprio=measured", timeouts=QUICK) as policy:
-        policy.reset(TRIAL)
-        policy.infer(observation(0))
-        policy.infer(observation(2))
-    assert np.array_equal(server.requests[1]["proprio"], server.requests[0]["proprio"])
-
-
 def test_xvla_options_of_view_colour_text_and_domain() -> None:
     query = "?cameras=head&colors=bgr&domain_id=0&steps=5&text=task"
     sent = first_request(XVla(lambda seen: ee6d()), query)
@@ -359,12 +350,3 @@ def test_the_model_is_loaded_as_its_own_server_does(
     install(monkeypatch, "models.processing_xvla", XVLAProcessor=Loads)
     xvla.create(xvla.XvlaServerOptions(checkpoint="here"))
     assert asked == [("here", {}), ("here", {"torch_dtype": np.float32})]
-
-
-@pytest.mark.parametrize(
-    "given",
-    [{"cameras": "head,head"}, {"domain_id": 30}, {"batch": 0}, {"horizon": 30, "execute": 31}],
-)
-def test_options_that_cannot_be(given: dict[str, Any]) -> None:
-    with pytest.raises(ValueError, match=r"option"):
-        xvla.XvlaServerOptions(checkpoint="x", **given)
