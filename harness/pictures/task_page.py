@@ -45,16 +45,21 @@ def page() -> str:
     head = HEAD.format(bases=len(found) - basics, basics=basics, first=SHOWN[0], last=SHOWN[-1])
     parts = [head]
     by_category = sorted(found, key=lambda task: list(CATEGORY_NAMES).index(task.category))
-    for category, members in groupby(by_category, key=lambda task: task.category):
+    for category, grouped in groupby(by_category, key=lambda task: task.category):
+        members = list(grouped)
         parts.append(f"## {CATEGORY_NAMES[category]} ({category})\n")
-        parts.append("| | task | levels 1 to 5 | success |\n|---|---|---|---|")
-        parts += [row(task) for task in members]
+        alike = len({task.success for task in members}) == 1
+        if alike:
+            parts.append(f"Success: {members[0].success.rstrip('.')}.\n")
+        parts.append("| | task | levels 1 to 5 |" + ("" if alike else " success |"))
+        parts.append("|---|---|---|" + ("" if alike else "---|"))
+        parts += [row(task, success=not alike) for task in members]
         parts.append("")
     return "\n".join(parts)
 
 
-def row(task: Task) -> str:
-    """The line of one task."""
+def row(task: Task, success: bool) -> str:
+    """The line of one task, with or without what `success` is."""
     levels = [task.levels[k] for k in sorted(task.levels)]
     n, total, limit = (
         per_level([getattr(level, name) for level in levels])
@@ -64,7 +69,7 @@ def row(task: Task) -> str:
         f"![{task.name}]({PICTURES.relative_to(PAGE.parent).as_posix()}/{picture_name(task)})",
         f"**{task.name}**<br>{task.summary}",
         f"n {n}; T {total}<br>limit {limit}",
-        task.success[:1].upper() + task.success[1:].rstrip("."),
+        *([task.success[:1].upper() + task.success[1:].rstrip(".")] if success else []),
     )
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
