@@ -20,8 +20,8 @@ def test_findings_and_seeds_as_json(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     closed = SimpleNamespace(close=lambda: None)
     official = "robospa.harness.official"
     monkeypatch.setattr(f"{official}.checkout_world.CheckoutWorld", lambda *_, **__: closed)
-    monkeypatch.setattr(f"{official}.checkout_check.examine", lambda *_: iter(findings))
-    monkeypatch.setattr(f"{official}.checkout_check.valid_seeds", lambda *_: [100_000, 100_004])
+    monkeypatch.setattr(f"{official}.checkout_world.examine", lambda *_: iter(findings))
+    monkeypatch.setattr(f"{official}.checkout_world.valid_seeds", lambda *_: [100_000, 100_004])
     done = robospa("official", "checkout", tmp_path, "--json")
     assert done.code == 1 and json.loads(done.out) == [
         {"what": "scene", "good": None, "seen": "seed 100004"},
