@@ -18,7 +18,6 @@ from robospa.harness.running.atomic_file import StorageError
 from robospa.harness.settings import Compute, SettingsError
 
 if TYPE_CHECKING:
-    from robospa.harness.convention_check.episodes import Episode
     from robospa.harness.datasets.collect import CollectionResult, Order
     from robospa.trial import TrialKey
 
@@ -244,13 +243,14 @@ def _record(
     many physics steps apart as fits the task's step limit (15 to 50).
     """
     from robospa.harness.convention_check.episodes import require, write_episode
+    from robospa.harness.demonstrations.demonstration import recorded_expert
 
     require()
     key = _one_trial(task, settings, seed)
     path = out or Path(f"{key.task}-L{key.level}-{key.seed}.hdf5")
     if path.exists():
         raise SettingsError(f"{path} exists already; choose another --out")
-    episode, success = _recorded(key, path.name)
+    episode, success = recorded_expert(key, path.name)
     write_episode(path, episode)
     if as_json:
         about = {"frames": len(episode), "success": success, "instruction": episode.instruction}
@@ -273,22 +273,3 @@ def _one_trial(task: str, settings: Collection, seed: int | None) -> TrialKey:
     if len(trials) != 1:
         raise SettingsError("record one task with one robot in one scene mode at a time")
     return trials[0]
-
-
-def _recorded(key: TrialKey, name: str) -> tuple[Episode, bool]:
-    """The trial `key` of the expert as an episode called `name`, and whether it met the goal."""
-    from contextlib import closing
-
-    from robospa.harness.demonstrations.demonstration import demonstrate
-    from robospa.harness.demonstrations.recorder import FrameRecorder, frame_steps
-    from robospa.harness.robots import embodiment
-    from robospa.harness.sim.motion import DEMONSTRATION_LIMITS
-    from robospa.harness.sim.sapien_world import SapienWorld
-
-    stride = frame_steps(key.task)
-    recorder = FrameRecorder(stride)
-    with closing(SapienWorld(True, limits=DEMONSTRATION_LIMITS)) as world:
-        made = demonstrate(world, key, recorder)
-    space = embodiment(key.embodiment).action_space("joint")
-    about = {**asdict(key), "stride": stride}
-    return recorder.episode(name, made.instruction, about, space), made.success

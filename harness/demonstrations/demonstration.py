@@ -18,13 +18,15 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from contextlib import closing
+from dataclasses import asdict, dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robospa.action_space import ActionSpace, quantize
 from robospa.harness import trial
+from robospa.harness.convention_check.episodes import Episode
 from robospa.harness.demonstrations import changed_plans
 from robospa.harness.demonstrations.noise import EXPERT, MISTAKE, STRENGTH, Noise
 from robospa.harness.demonstrations.recorder import FrameRecorder, frame_steps
@@ -171,6 +173,18 @@ def run_expert(run: DemonstrationRun, expert: Expert) -> Demonstration:
                 break
         run.act(rows)
     return run.ended(expert)
+
+
+def recorded_expert(key: TrialKey, name: str) -> tuple[Episode, bool]:
+    """The expert's demonstration of `key` with pictures, as an episode called `name` in the layout
+    of official recordings, and whether it met the goal."""
+    stride = frame_steps(key.task)
+    recorder = FrameRecorder(stride)
+    with closing(DemonstrationWorld(render=True)) as world:
+        made = demonstrate(world, key, recorder)
+        space = embodiment(key.embodiment).action_space("joint")
+        about = {**asdict(key), "stride": stride}
+        return recorder.episode(name, made.instruction, about, space), made.success
 
 
 @dataclass(frozen=True)
