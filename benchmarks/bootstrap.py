@@ -12,7 +12,7 @@ from frame import Figure, Result, main
 
 from robospa.results.paper.published import LEVELS, load
 from robospa.results.statistics import bootstrap, significance
-from robospa.results.statistics.bootstrap import RESAMPLES, Sample, draw, rate, resample_episodes
+from robospa.results.statistics.samples import RESAMPLES, Sample, draw, rate, resample_episodes
 
 
 def seconds(work: Callable[[], object], repeat: int) -> tuple[float, float]:

@@ -20,7 +20,7 @@ from pathlib import Path
 
 from frame import Figure, Result, main
 
-from robospa.results.records.run_io import read_run
+from robospa.results.records.runs import read_run
 from robospa.results.records.trial_record import TrialRecord
 from robospa.tasks.catalog import LEVELS, tasks
 from robospa.tasks.seeds import FIRST_SEED, PER_VARIANT, accepted

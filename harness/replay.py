@@ -19,7 +19,7 @@ from robospa.harness.world import JOINTS_FROM_EE, ActionError, Poll, StepResult,
 from robospa.observation import Observation
 from robospa.protocol.errors import PolicyAnswerError
 from robospa.protocol.policy import Policy, PolicySpec, TrialInfo
-from robospa.results.records.run_io import action_path
+from robospa.results.records.runs import action_path
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 

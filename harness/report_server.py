@@ -22,9 +22,8 @@ from tempfile import TemporaryDirectory
 from urllib.parse import unquote
 
 from robospa.results.figures.series import Drawing
-from robospa.results.records.films import VIDEOS
 from robospa.results.records.manifest import MANIFEST, RunError
-from robospa.results.records.run_io import TRIALS, Run, read_run
+from robospa.results.records.runs import TRIALS, VIDEOS, Run, read_run
 from robospa.results.report.page import FIGURES, page
 from robospa.results.report.report import draw_figures, make_report
 

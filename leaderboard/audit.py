@@ -25,9 +25,9 @@ from robospa.leaderboard.agreement import Counts, agreement
 from robospa.leaderboard.rules import shipped, spec_of
 from robospa.leaderboard.traces import Trace, joint_path, with_joints
 from robospa.leaderboard.verify import read_traces, verify
-from robospa.results.records.run_io import Run, action_path, finished, read_run
+from robospa.results.records.runs import Run, action_path, finished, read_run
 from robospa.results.records.trial_record import TrialRecord
-from robospa.results.scoring.retried import fault_rates
+from robospa.results.scoring.repeats import fault_rates
 from robospa.tasks.seeds import accepted
 from robospa.tasks.sentences import sentences
 from robospa.trial import TrialKey

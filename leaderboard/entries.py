@@ -23,10 +23,8 @@ from robospa.results.paper import rounding
 from robospa.results.paper.columns import Column, published_column
 from robospa.results.paper.origin import DIFFERENCES
 from robospa.results.paper.published import LEVELS, load
-from robospa.results.scoring.model_results import ModelResults
-from robospa.results.scoring.score_json import to_json
-from robospa.results.scoring.scores import VariantScore, combine
-from robospa.results.scoring.setting import Setting
+from robospa.results.scoring.models import ModelResults, Setting
+from robospa.results.scoring.scores import VariantScore, combine, to_json
 from robospa.results.statistics.intervals import Estimate
 from robospa.schema import Count, pattern, read
 from robospa.trial import CATEGORIES, DIMENSIONS, SPATIAL

@@ -42,8 +42,7 @@ from robospa.leaderboard.verify import (
     verify,
 )
 from robospa.results.records.manifest import PolicySettings, RunAbout, make_manifest
-from robospa.results.records.run_io import Run, action_path, read_run
-from robospa.results.records.settings_of_run import by_setting
+from robospa.results.records.runs import Run, action_path, by_setting, read_run
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey, path_part
 

@@ -32,7 +32,7 @@ from robospa.leaderboard.rules import Reference, spec_of
 from robospa.leaderboard.traces import Trace, split_trace
 from robospa.leaderboard.verify import Valid, read_traces
 from robospa.results.records.manifest import RunAbout
-from robospa.results.records.run_io import differences
+from robospa.results.records.runs import differences
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 

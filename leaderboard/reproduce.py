@@ -43,8 +43,8 @@ from robospa.leaderboard.evidence import CategoryTest, OverallTest, Reproduction
 from robospa.leaderboard.rules import Reference
 from robospa.leaderboard.untrusted import parse_map
 from robospa.leaderboard.verify import Valid
-from robospa.results.records.run_io import Run
-from robospa.results.scoring.retried import was_repeated, with_repeated_failed
+from robospa.results.records.runs import Run
+from robospa.results.scoring.repeats import was_repeated, with_repeated_failed
 from robospa.tasks.scene import SUITE
 from robospa.tasks.seeds import ListKey
 from robospa.trial import REFERENCE, TrialKey

@@ -40,10 +40,9 @@ from robospa.results.figures.draw import draw
 from robospa.results.figures.series import Drawing, Series, save, styled
 from robospa.results.paper.origin import DIFFERENCES, ORIGIN
 from robospa.results.paper.published import load
-from robospa.results.report.method import method_notes
 from robospa.results.report.page import FIGURES, card, figure, own_version, render
-from robospa.results.report.tables import ReportTable, for_page, report_tables
-from robospa.results.scoring.model_results import ModelResults
+from robospa.results.report.tables import ReportTable, for_page, method_notes, report_tables
+from robospa.results.scoring.models import ModelResults
 from robospa.trial import CATEGORIES, CATEGORY_NAMES, DIMENSIONS
 
 MARK = ".robospa-site"

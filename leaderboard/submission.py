@@ -52,7 +52,7 @@ from robospa.leaderboard.untrusted import BundleArchive, parse_map
 from robospa.leaderboard.verify import Valid
 from robospa.results.failures.labels import NAMES, distribution, failures_of
 from robospa.results.records.manifest import RunSettings
-from robospa.results.records.run_io import Run
+from robospa.results.records.runs import Run
 from robospa.results.report.run_card import END_NAMES
 from robospa.results.report.trials import trial_rows
 from robospa.schema import Count, one_of, pattern, read

@@ -28,9 +28,9 @@ from robospa.leaderboard.rules import Reference, VariantFacts, spec_of
 from robospa.leaderboard.traces import Trace, split_trace
 from robospa.leaderboard.untrusted import check_text, parse_row
 from robospa.results.records.manifest import PolicySpecification, RunSettings
-from robospa.results.records.run_io import FIELDS, KEY_FIELDS, finished, from_data
+from robospa.results.records.runs import FIELDS, KEY_FIELDS, finished, from_data
 from robospa.results.records.trial_record import EventRow, TrialRecord
-from robospa.results.scoring.retried import repeats
+from robospa.results.scoring.repeats import repeats
 from robospa.tasks.events import KINDS, Event, outcome
 
 ROW_FIELDS = {"previous", "trace", "record"}

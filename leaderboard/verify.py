@@ -47,19 +47,15 @@ from robospa.leaderboard.rules import (
 from robospa.leaderboard.traces import Trace, decode, most_bytes
 from robospa.leaderboard.trial_rows import check_record, check_trace, read_rows, trace_hash
 from robospa.leaderboard.untrusted import BundleArchive, check_text, parse
-from robospa.results.comparison.compare import Difference, compare, over_levels
+from robospa.results.comparison.compare import Difference, compare_results, over_levels
+from robospa.results.lint import lint_run
 from robospa.results.paper.columns import run_column
-from robospa.results.paper.tables import FORMATS
-from robospa.results.records.lint import lint_run
 from robospa.results.records.manifest import RunManifest, RunSettings, seed_hash
-from robospa.results.records.run_io import Run
+from robospa.results.records.runs import Run
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.report.tables import report_tables
-from robospa.results.scoring.model_results import ModelResults, results_of_records
-from robospa.results.scoring.score_json import ScoresData, to_json
-from robospa.results.scoring.scores import score_run
-from robospa.results.scoring.setting import IncomparableError
-from robospa.results.scoring.weights import Variant
+from robospa.results.scoring.models import IncomparableError, ModelResults, results_of_records
+from robospa.results.scoring.scores import ScoresData, Variant, score_run, to_json
 from robospa.schema import pattern, read
 from robospa.trial import METRICS, TrialKey
 
@@ -534,7 +530,7 @@ def paired(first: ModelResults, second: ModelResults) -> dict[str, Rows]:
     made: dict[str, Rows] = {}
     for metric in METRICS:
         try:
-            found = compare(first, second, metric)
+            found = compare_results(first, second, metric)
             rows = [*found.cells, *found.groups, *over_levels(first, second, metric)]
         except IncomparableError:
             continue

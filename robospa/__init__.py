@@ -27,10 +27,10 @@ if TYPE_CHECKING:
     from robospa.protocol.policy import PolicySpec as PolicySpec
     from robospa.protocol.policy import TrialInfo as TrialInfo
     from robospa.protocol.server import serve as serve
-    from robospa.results.comparison.runs import compare as compare
-    from robospa.results.records.run_io import Run as Run
-    from robospa.results.records.run_io import read_run as load_run
+    from robospa.results.comparison.compare import compare_results as compare
     from robospa.results.records.trial_record import TrialRecord as TrialRecord
+    from robospa.results.run import LoadedRun as Run
+    from robospa.results.run import load_run as load_run
     from robospa.tasks.catalog import build_scene as build_scene
     from robospa.tasks.scene import Scene as Scene
     from robospa.trial import TrialKey as TrialKey
@@ -42,17 +42,17 @@ _HOMES = {
     "Policy": "robospa.protocol.policy:Policy",
     "PolicySpec": "robospa.protocol.policy:PolicySpec",
     "Pose": "robospa.geometry:Pose",
-    "Run": "robospa.results.records.run_io:Run",
+    "Run": "robospa.results.run:LoadedRun",
     "Scene": "robospa.tasks.scene:Scene",
     "TrialInfo": "robospa.protocol.policy:TrialInfo",
     "TrialKey": "robospa.trial:TrialKey",
     "TrialRecord": "robospa.results.records.trial_record:TrialRecord",
     "build_scene": "robospa.tasks.catalog:build_scene",
     "collect": "robospa.harness.datasets.api:collect",
-    "compare": "robospa.results.comparison.runs:compare",
+    "compare": "robospa.results.comparison.compare:compare",
     "connect": "robospa.clients:connect",
     "evaluate": "robospa.harness.running.api:evaluate",
-    "load_run": "robospa.results.records.run_io:read_run",
+    "load_run": "robospa.results.run:load_run",
     "serve": "robospa.protocol.server:serve",
 }
 """Where each public name is defined."""

@@ -17,14 +17,14 @@ NAMED = 3
 """So many names of a list are given before the others are only counted."""
 
 
-def interval_text(value: float, low: float, high: float, style: str = "z.1f") -> str:
+def interval_text(value: float, low: float, high: float, *, style: str = "z.1f") -> str:
     """`12.0 [5.6, 23.8]`: a value with the ends of its interval, each in the format `style`."""
     return f"{value:{style}} [{low:{style}}, {high:{style}}]"
 
 
-def percent_text(value: float, low: float, high: float, style: str = "z.1f") -> str:
+def percent_text(value: float, low: float, high: float, *, style: str = "z.1f") -> str:
     """`interval_text` of fractions, in percent."""
-    return interval_text(100 * value, 100 * low, 100 * high, style)
+    return interval_text(100 * value, 100 * low, 100 * high, style=style)
 
 
 def duration_text(seconds: float) -> str:

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 from collect_fakes import FakePool, fake_pack
+from fake_runs import make_run, shown
 from PIL import Image
-from report_runs import make_run, record
 
 from robospa.harness.datasets import api, collect
 from robospa.tasks import catalog
@@ -68,7 +68,7 @@ def test_collect_data(
 
 def test_compare_two_runs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for name, won in (("good", 30), ("poor", 3)):
-        make_run(tmp_path / name, [record("Pick_It", 1, n, n < won) for n in range(30)])
+        make_run(tmp_path / name, [shown("Pick_It", 1, n, n < won) for n in range(30)])
     run("compare_two_runs", str(tmp_path / "good"), str(tmp_path / "poor"))
     out = capsys.readouterr().out
     assert "good and poor differ: [+" in out and "100.0" in out and "90.0" in out

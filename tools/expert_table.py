@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from robospa.results.paper.published import load
-from robospa.results.records.run_io import read_run
+from robospa.results.records.runs import read_run
 
 ROOT = Path(__file__).resolve().parents[1]
 COUNTS = ROOT / "benchmarks" / "results" / "expert_robots.csv"

@@ -13,7 +13,7 @@ from robospa.harness.cli.options import SHARE, AsJson, print_json
 
 if TYPE_CHECKING:
     from robospa.results.comparison.compare import Comparison, Difference
-    from robospa.results.scoring.model_results import ModelResults
+    from robospa.results.scoring.models import ModelResults
 
 GAPS = (0.02, 0.05, 0.1, 0.2)
 """Differences of rates in the table of sample sizes."""
@@ -66,8 +66,8 @@ def compare(
         return
     if not (first and second):
         raise ValueError("compare needs two sides: folders of runs, or names of published models")
-    from robospa.results.comparison.compare import compare as differences
-    from robospa.results.comparison.runs import both_sides
+    from robospa.results.comparison.compare import both_sides
+    from robospa.results.comparison.compare import compare_results as differences
 
     one, two = both_sides(first, second)
     found = differences(one, two, metric.value, ci.value)
@@ -105,7 +105,7 @@ def _print(found: Comparison, variants: bool) -> None:
 
 
 def _table(title: str, rows: Sequence[Difference], found: Comparison) -> None:
-    from robospa.results.comparison.table import difference_table
+    from robospa.results.comparison.compare import difference_table
     from robospa.results.tables import show
 
     if rows:
@@ -113,8 +113,7 @@ def _table(title: str, rows: Sequence[Difference], found: Comparison) -> None:
 
 
 def _print_drops(one: ModelResults, two: ModelResults, metric: str) -> None:
-    from robospa.results.comparison.drops import drops
-    from robospa.results.comparison.table import chance
+    from robospa.results.comparison.compare import chance, drops
 
     for model in (one, two):
         print(f"{model.name} loses from level to level, percentage points")
@@ -131,8 +130,13 @@ def _power(tasks: str, levels: str, base: float, as_json: bool) -> None:
     """Print how well the overall rate is known by trials of every variant, if rates are like the
     published models', and the trials that tell two rates apart."""
     from robospa.harness.selection import parse_levels, parse_tasks
-    from robospa.results.paper.planning import half_width, published_variances, trials_for
-    from robospa.results.statistics.power import POWER, sample_size
+    from robospa.results.comparison.sample_size import (
+        POWER,
+        half_width,
+        published_variances,
+        sample_size,
+        trials_for,
+    )
 
     variants = [(task, level) for task in parse_tasks(tasks) for level in parse_levels(levels)]
     models = published_variances(variants)

@@ -84,8 +84,8 @@ def _evaluate(policy: str, chosen: Selection, folder: Path, workers: int, video:
     from robospa.harness.cli.eval import run_and_show
     from robospa.harness.running.request import make_request
     from robospa.harness.settings import Compute, Connection, EvaluationSettings, Recording
-    from robospa.results.records.run_io import read_run
-    from robospa.results.report.files import write_report
+    from robospa.results.records.runs import read_run
+    from robospa.results.report.page import write_report
     from robospa.results.report.report import make_report
 
     with server(policy) as url:

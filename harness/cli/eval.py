@@ -26,7 +26,7 @@ from robospa.harness.settings import (
 )
 
 if TYPE_CHECKING:
-    from robospa.results.records.run_io import Run
+    from robospa.results.records.runs import Run
 
 CURVE = "success-latency"
 """Name of the files of a curve, beside its runs."""
@@ -93,10 +93,9 @@ def run_and_show(request: Request, *, as_json: bool = False) -> None:
 
     Scores are a table, or as JSON one object on standard output.
     """
-    from robospa.results.records.run_io import read_run
-    from robospa.results.records.settings_of_run import by_setting
-    from robospa.results.report.faults import many_policy_errors
+    from robospa.results.records.runs import by_setting, read_run
     from robospa.results.report.score_table import print_scores
+    from robospa.results.scoring.repeats import many_policy_errors
     from robospa.results.scoring.scores import score_run
 
     folder = request.config.folder
@@ -142,10 +141,9 @@ def run_data(run: Run) -> dict[str, object]:
     Of several robots or scene modes there are `parts` instead, by their names.
     """
     from robospa.results.records.action_problems import problem_data
-    from robospa.results.records.settings_of_run import by_setting, setting_name
+    from robospa.results.records.runs import by_setting, setting_name
     from robospa.results.report.run_card import ends
-    from robospa.results.scoring.score_json import to_json
-    from robospa.results.scoring.scores import score_run
+    from robospa.results.scoring.scores import score_run, to_json
 
     if len(parts := by_setting(run)) > 1:
         return {"parts": {setting_name(part): run_data(part) for part in parts}}
@@ -196,8 +194,8 @@ def _curve(
     from robospa.results.comparison.latency_curve import curve_table, latency_curve
     from robospa.results.figures.curves import draw_latency_curves
     from robospa.results.figures.series import save, styled
-    from robospa.results.records.run_io import read_run
-    from robospa.results.scoring.model_results import results_of_run
+    from robospa.results.records.runs import read_run
+    from robospa.results.scoring.models import results_of_run
     from robospa.results.tables import show, to_markdown
 
     if settings.out is None:
@@ -230,7 +228,7 @@ def _run_one(request: Request, what: str) -> None:
 
     Ends with 130 on Ctrl-C; raises RunAborted, also if trials are missing.
     """
-    from robospa.results.records.run_io import read_run
+    from robospa.results.records.runs import read_run
 
     again = "the same command with --resume goes on from here"
     print(f"{what}:", file=sys.stderr)

@@ -84,7 +84,7 @@ def curve(
     from robospa.harness.settings import SettingsError
     from robospa.results.figures.curves import CurvePoint, draw_learning_curve
     from robospa.results.figures.series import FORMATS, save, styled
-    from robospa.results.records.run_io import read_run
+    from robospa.results.records.runs import read_run
     from robospa.results.scoring.scores import score_run
 
     ending = out.suffix.removeprefix(".")

@@ -34,13 +34,16 @@ def paper(
     Prints the first of them (the main one) and all printed values that cannot be reproduced.
     """
     from robospa.results.paper.check import checks, errata
-    from robospa.results.paper.columns import Column, run_column
+    from robospa.results.paper.columns import (
+        Column,
+        published_results,
+        results_beside_runs,
+        run_column,
+    )
     from robospa.results.paper.origin import banner
     from robospa.results.paper.published import load
-    from robospa.results.paper.published_results import published_results, results_beside_runs
     from robospa.results.paper.tables import FORMATS, like_paper, make_tables, write_tables
-    from robospa.results.records.run_io import read_run
-    from robospa.results.records.settings_of_run import by_setting
+    from robospa.results.records.runs import by_setting, read_run
     from robospa.results.tables import show
 
     endings = list(FORMATS) if format == "all" else [format]

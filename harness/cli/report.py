@@ -16,7 +16,7 @@ import typer
 from robospa.harness.cli.options import AsJson, Token, aside, between, print_json
 
 if TYPE_CHECKING:
-    from robospa.results.records.run_io import Run
+    from robospa.results.records.runs import Run
 
 PAPER = "paper"
 
@@ -100,8 +100,8 @@ def _report(
     folders: Sequence[Path], with_published: bool, ci: str, out: Path | None, as_json: bool
 ) -> None:
     from robospa.results.paper.published import load
-    from robospa.results.records.run_io import read_run
-    from robospa.results.report.files import write_report
+    from robospa.results.records.runs import read_run
+    from robospa.results.report.page import write_report
     from robospa.results.report.report import make_report
     from robospa.results.report.score_table import print_scores
     from robospa.results.statistics.intervals import METHODS
@@ -129,7 +129,7 @@ def _failures(folder: Path, by: str, trials: bool, film: bool, as_json: bool) ->
     """Print the types of failure in a run; docs/failures.md says how they are decided."""
     from robospa.results.failures.labels import OURS, counts_table, label, trials_table
     from robospa.results.records.action_problems import problem_lines
-    from robospa.results.records.run_io import read_run
+    from robospa.results.records.runs import read_run
 
     found = _make_films(folder) if film else read_run(folder)
     records = list(found.records.values())
@@ -151,7 +151,7 @@ def _failures(folder: Path, by: str, trials: bool, film: bool, as_json: bool) ->
 def _make_films(folder: Path) -> Run:
     """The run in `folder`, with the films that it lacked; ends the program with 130 on Ctrl-C."""
     from robospa.harness.running.films import FilmsInterrupted, film_now
-    from robospa.results.records.run_io import read_run
+    from robospa.results.records.runs import read_run
 
     try:
         for text in film_now(read_run(folder)):
@@ -165,9 +165,8 @@ def _make_films(folder: Path) -> Run:
 def _lint(folders: Sequence[Path], as_json: bool) -> None:
     """Print what is implausible in the runs, or in the paper's tables; of several runs, also what
     keeps them out of one table."""
-    from robospa.results.records.finding import SEVERITIES
-    from robospa.results.records.lint import lint_actions, lint_published, lint_run, lint_runs
-    from robospa.results.records.run_io import read_run
+    from robospa.results.lint import SEVERITIES, lint_actions, lint_published, lint_run, lint_runs
+    from robospa.results.records.runs import read_run
     from robospa.tasks.catalog import tasks
 
     known = {(name, level) for name in tasks() for level in range(1, 6)}

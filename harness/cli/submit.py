@@ -219,7 +219,7 @@ def reproduce(
     from robospa.harness.running.evaluate import evaluate
     from robospa.harness.running.request import make_request
     from robospa.harness.settings import EvaluationSettings, updated
-    from robospa.results.records.run_io import read_run
+    from robospa.results.records.runs import read_run
 
     reference = _load("rules:shipped")(world, parts)
     valid = _load("verify:verify")(bundle, reference, practice)

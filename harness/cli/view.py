@@ -61,7 +61,7 @@ def _report(run: Path, with_published: bool, film: bool, port: int, minutes: flo
     from robospa.harness.report_server import LiveReport, serving
     from robospa.harness.running.films import film_lines, films_afterwards
     from robospa.results.paper.published import load
-    from robospa.results.records.run_io import read_run
+    from robospa.results.records.runs import read_run
 
     films = films_afterwards(read_run(run)) if film else None
     published = tuple(load().models) if with_published else ()

@@ -43,7 +43,7 @@ from robospa.harness.seeds.attempt import Attempt, Evidence
 from robospa.harness.seeds.sweep import Search, sweep
 from robospa.harness.settings import SettingsError
 from robospa.registry import did_you_mean
-from robospa.results.records.run_state import LOCK
+from robospa.results.records.runs import LOCK
 from robospa.tasks.seeds import FIRST_TRAINING_SEED, ListKey
 from robospa.trial import path_part
 

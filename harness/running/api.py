@@ -13,7 +13,7 @@ from robospa.harness.running.request import make_request, run_folder
 from robospa.harness.settings import EvaluationSettings, SettingsError, read_settings, updated
 from robospa.protocol.policy import Policy
 from robospa.protocol.server import ServerThread
-from robospa.results.records.run_io import Run, read_run
+from robospa.results.run import LoadedRun, load_run
 
 PolicyFactory = Callable[[], Policy]
 
@@ -30,7 +30,7 @@ def evaluate(
     token: str | None = None,
     config: EvaluationSettings | str | Path | None = None,
     **settings: object,
-) -> Run:
+) -> LoadedRun:
     """Evaluate a policy on a fixed list of seeded trials, and return the run.
 
         run = robospa.evaluate("ws://gpu:8000", tasks="spatial", levels=[1, 3], trials=20)
@@ -72,7 +72,7 @@ def evaluate(
             asked = updated(asked, {"policy": policy, "policy_map": None})
         request = make_request(asked, token=token, resume=resume)
         run_request(request)
-        return read_run(request.config.folder)
+        return load_run(request.config.folder)
     if token is not None:
         raise SettingsError("token goes with policy servers, and this policy is in this process")
     instance, factory = _object_or_factory(policy)
@@ -82,7 +82,7 @@ def evaluate(
         request = make_request(replace(asked, policy=(server.url,)), token=secret, resume=resume)
         # The address ends with this call: whoever uses these settings again names a policy.
         run_request(replace(request, settings=asked, in_process=True))
-    return read_run(request.config.folder)
+    return load_run(request.config.folder)
 
 
 def _base(config: EvaluationSettings | str | Path | None) -> EvaluationSettings:

@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from robospa.results.records.manifest import RunError
-from robospa.results.records.run_state import LOCK
+from robospa.results.records.runs import LOCK
 
 PARTIAL = ".*.part"
 """What a file is called while it is being written."""

@@ -13,11 +13,10 @@ from pathlib import Path
 
 from robospa.harness.running.record_store import RecordWriter
 from robospa.harness.running.scheduler import TrialQueue
-from robospa.results.records.action_problems import problem_counts
-from robospa.results.records.reasons import error_kind
-from robospa.results.records.run_io import finished
+from robospa.results.records.action_problems import error_kind, problem_counts
+from robospa.results.records.runs import finished
 from robospa.results.records.trial_record import RetryRow, TrialRecord
-from robospa.results.scoring.retried import reached_policy
+from robospa.results.scoring.repeats import reached_policy
 from robospa.trial import TrialKey
 
 Retries = tuple[RetryRow, ...]

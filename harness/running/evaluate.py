@@ -47,7 +47,7 @@ from robospa.results.records.manifest import (
     WorldSettings,
 )
 from robospa.results.records.manifest import make_manifest as new_manifest
-from robospa.results.records.run_io import finished, lost_actions, read_records
+from robospa.results.records.runs import finished, lost_actions, read_records
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 

@@ -32,9 +32,8 @@ from robospa.harness.running.worker import WorkerConfig, describe, load_parts
 from robospa.harness.settings import FILE, Recording, SettingsError, read_settings
 from robospa.harness.worlds import SAPIEN_NAME, TASK_PARTS, open_world
 from robospa.results.failures.labels import label
-from robospa.results.records.films import film_name, films_in, owed_films
 from robospa.results.records.manifest import RunError
-from robospa.results.records.run_io import Run, finished
+from robospa.results.records.runs import Run, film_name, films_in, finished, owed_films
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 

@@ -29,7 +29,7 @@ from robospa.results.records.manifest import (
     manifest_text,
     read_manifest,
 )
-from robospa.results.records.run_state import LOCK
+from robospa.results.records.runs import LOCK
 
 Part = TypeVar("Part", RunSettings, RunAbout)
 

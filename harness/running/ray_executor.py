@@ -40,7 +40,7 @@ from robospa.harness.running.executor import (
 )
 from robospa.harness.running.record_store import RecordWriter
 from robospa.harness.running.worker import LocalExecutor, WorkerConfig
-from robospa.results.records.run_io import ACTIONS
+from robospa.results.records.runs import ACTIONS
 
 NODES_SECONDS = 1.0
 """How often the nodes are counted."""

@@ -34,9 +34,8 @@ from robospa.harness.running.atomic_file import (
     sync_folder,
 )
 from robospa.harness.world import StepResult, World
-from robospa.results.records.films import VIDEOS
 from robospa.results.records.manifest import RunError
-from robospa.results.records.run_io import ACTIONS, TRIALS, action_path, to_line
+from robospa.results.records.runs import ACTIONS, TRIALS, VIDEOS, action_path, to_line
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 

@@ -50,7 +50,7 @@ from robospa.harness.running.slot import (
 from robospa.harness.running.status import Autoscaler, Status, TimeBreakdown
 from robospa.harness.running.worker import LocalExecutor, WorkerConfig, task_finder
 from robospa.results.records.trial_record import RetryRow, TrialRecord
-from robospa.results.scoring.retried import reached_policy
+from robospa.results.scoring.repeats import reached_policy
 from robospa.trial import TrialKey
 
 FALSE_STARTS = 3

@@ -15,7 +15,7 @@ from robospa.harness.running.executor import RunTrial, Stop, WorkerHandle
 from robospa.harness.running.heartbeat import HeartbeatMonitor
 from robospa.harness.running.scheduler import Job, TrialQueue
 from robospa.harness.running.status import ServerStats, Status, time_left
-from robospa.results.records.run_io import read_file
+from robospa.results.records.runs import read_file
 from robospa.results.records.trial_record import TrialRecord
 
 START_SECONDS = 120.0

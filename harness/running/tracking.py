@@ -13,7 +13,7 @@ from typing import Any, Protocol
 
 from robospa.extras import need
 from robospa.harness.running.atomic_file import replace_file
-from robospa.results.records.run_io import Run, read_run
+from robospa.results.records.runs import Run, read_run
 from robospa.results.records.trial_record import TrialRecord
 
 PROJECT = "robospa"
@@ -82,8 +82,8 @@ class WandbTracker:
 
     def finish(self, run: Run) -> None:
         """Log the scores with their intervals and every trial."""
-        from robospa.results.frame import trial_columns
-        from robospa.results.records.settings_of_run import by_setting, setting_name
+        from robospa.results.records.runs import by_setting, setting_name
+        from robospa.results.run import trial_columns
         from robospa.results.scoring.scores import score_run
 
         for part in by_setting(run):

@@ -44,7 +44,7 @@ from robospa.harness.worlds import SAPIEN_NAME, TASK_PARTS, open_world
 from robospa.protocol.client import Identity
 from robospa.protocol.errors import printable
 from robospa.protocol.policy import PolicySpec
-from robospa.results.records.films import film_name
+from robospa.results.records.runs import film_name
 from robospa.results.records.trial_record import RetryRow, TrialRecord
 from robospa.trial import TrialKey
 

@@ -20,7 +20,7 @@ from robospa.geometry import Pose, to_matrix
 from robospa.harness.robots.embodiment import Embodiment
 from robospa.harness.sim.render_bodies import surface
 from robospa.results.failures.labels import NAMES, label
-from robospa.results.records.object_names import with_names
+from robospa.results.records.action_problems import with_names
 from robospa.results.records.trial_record import EventRow, TrialRecord
 from robospa.results.report.run_card import END_NAMES
 from robospa.tasks.objects import object_model

@@ -22,7 +22,7 @@ from robospa.harness.viewer.playback import DrawnBody, Playback, drawn_bodies, p
 from robospa.harness.world import StepResult, World
 from robospa.protocol.policy import Policy
 from robospa.results.records.manifest import RunError
-from robospa.results.records.run_io import Run, finished, read_run
+from robospa.results.records.runs import Run, finished, read_run
 from robospa.results.records.trial_record import TrialRecord
 from robospa.tasks.descriptions import describe_objects
 from robospa.trial import TrialKey

@@ -10,14 +10,30 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from html import escape
+from itertools import pairwise
+from pathlib import Path
 
-from robospa.results.comparison.groups import collections
-from robospa.results.comparison.notes import banner_of, notes, worst_and_best
-from robospa.results.comparison.pairs import VariantPair, discordant, paired_variants
-from robospa.results.scoring.model_results import ModelResults, categories_of
-from robospa.results.scoring.setting import IncomparableError
-from robospa.results.scoring.weights import Variant, weights_of
+from robospa.results.comparison.pairs import (
+    VariantPair,
+    banner_of,
+    discordant,
+    notes,
+    paired_variants,
+    worst_and_best,
+)
+from robospa.results.paper.columns import published_results
+from robospa.results.records.manifest import RunError
+from robospa.results.records.runs import MARK, Run, by_setting, read_part, setting_name
+from robospa.results.scoring.models import (
+    FREE,
+    IncomparableError,
+    ModelResults,
+    categories_of,
+    one_policy,
+    results_of_run,
+)
+from robospa.results.scoring.scores import Variant, weights_of
 from robospa.results.statistics.intervals import (
     METHODS,
     Estimate,
@@ -32,10 +48,17 @@ from robospa.results.statistics.significance import (
     mcnemar_mid_p,
     p_of_interval,
 )
-from robospa.trial import METRIC_NAMES
+from robospa.results.tables import Table, TableCell, TableRow
+from robospa.text import interval_text, percent_text
+from robospa.trial import BASIC, CATEGORIES, DIMENSIONS, METRIC_NAMES
 
-if TYPE_CHECKING:
-    from robospa.results.tables import Table
+
+def collections(category: Mapping[str, str]) -> list[tuple[str, str, tuple[str, ...]]]:
+    """(label, kind, categories) of all that is averaged, present or not."""
+    present = [c for c in CATEGORIES + BASIC if c in category.values()]
+    found: list[tuple[str, str, tuple[str, ...]]] = [(c, "category", (c,)) for c in present]
+    found += [(name, "dimension", members) for name, members in DIMENSIONS.items()]
+    return [*found, ("overall", "overall", CATEGORIES)]
 
 
 @dataclass(frozen=True)
@@ -80,20 +103,16 @@ class Comparison:
     def table(self, variants: bool = False) -> Table:
         """The averages, or all `variants`, as a table: `print` shows it as text, a notebook as
         HTML."""
-        from robospa.results.comparison.table import difference_table
-
         title = f"{METRIC_NAMES[self.metric]} of {self.first} minus {self.second}, points"
         return difference_table(self, self.cells if variants else self.groups, title)
 
     def _repr_html_(self) -> str:
         """What a notebook shows."""
-        from html import escape
-
         said = "<br>".join(escape(text) for text in (self.banner, *self.notes) if text)
         return f"<p>{said}</p>\n{self.table()._repr_html_()}"
 
 
-def compare(
+def compare_results(
     first: ModelResults, second: ModelResults, metric: str = "sr", method: str = "wilson"
 ) -> Comparison:
     """All differences `first - second`; IncomparableError if they are of different things."""
@@ -235,3 +254,201 @@ def _member(
 def _corrected(rows: Sequence[Difference]) -> tuple[Difference, ...]:
     qs = benjamini_hochberg([row.p for row in rows])
     return tuple(replace(row, q=q) for row, q in zip(rows, qs, strict=True))
+
+
+HEAD = 18
+"""Letters of a side's name over a column."""
+
+
+def difference_table(found: Comparison, rows: Sequence[Difference], title: str) -> Table:
+    """`rows` of the comparison `found`, in percentage points."""
+    several = any(row.over_tasks for row in rows)
+    names = heads_of(found.first, found.second)
+    heads = ("level", *names, "difference [95 %]", "p", "q", "trials")
+    heads += ("other tasks",) * several
+    heads += tuple(f"only {name}" for name in names) * found.paired
+    made = tuple(_table_row(row, several, found.paired) for row in rows)
+    return Table("differences", title, "", heads, made)
+
+
+def _table_row(row: Difference, several: bool, paired: bool) -> TableRow:
+    partly = f" ({row.variants} of {row.listed})" if row.variants < row.listed else ""
+    e = row.estimate
+    cells = [
+        f"L{row.level}" if row.level else "mean",
+        f"{100 * row.first:z.1f}",
+        f"{100 * row.second:z.1f}",
+        percent_text(e.value, e.low, e.high, style="+z.1f"),
+        chance(row.p),
+        chance(row.q) if row.kind in ("variant", "category") else "",
+        str(row.trials),
+    ]
+    if several:
+        o = row.over_tasks
+        cells.append(f"[{100 * o.low:+z.1f}, {100 * o.high:+z.1f}]" if o else "")
+    if paired:
+        cells += [str(row.only_first), str(row.only_second)]
+    return TableRow(f"{row.label}{partly}", tuple(map(TableCell, cells)))
+
+
+def heads_of(first: str, second: str) -> list[str]:
+    """The names of two sides, short enough to stand over columns: their ends if need be, which is
+    where names of runs differ."""
+    short = [n if len(n) <= HEAD else "…" + n[1 - HEAD :] for n in (first, second)]
+    return short if short[0] != short[1] else ["first", "second"]
+
+
+def chance(p: float) -> str:
+    """A p-value in a table."""
+    return f"{p:.3f}" if p >= 0.0005 else "<.001"
+
+
+def drops(results: ModelResults, metric: str = "sr") -> list[Difference]:
+    """The loss of each category, dimension and the whole between levels, and from first to last.
+
+    Only tasks that both levels have count. Scenes of different levels are unrelated.
+    """
+    samples, category = results.samples(metric), results.categories
+    levels = sorted({level for _, level in samples})
+    steps = [*pairwise(levels)]
+    if len(levels) > 2:
+        steps.append((levels[0], levels[-1]))
+    found = []
+    for low, high in steps:
+        both = [t for t, n in samples if n == low and (t, high) in samples]
+        all_tasks = {t for t, n in results.listed if n in (low, high)}
+        for label, kind, chosen in collections(category):
+            tasks = [t for t in both if category.get(t) in chosen]
+            if not tasks:
+                continue
+            shares = weights_of([(t, low) for t in tasks], category)
+            easy, hard = (interval_of([samples[t, n] for t in tasks], shares) for n in (low, high))
+            gap = difference(easy, hard)
+            count = sum(category.get(t) in chosen for t in all_tasks)
+            trials = sum(samples[t, n].trials for t in tasks for n in (low, high))
+            name = f"{label} L{low}-L{high}"
+            row = (len(tasks), count, trials, easy.value, hard.value, gap, p_of_interval(gap))
+            found.append(Difference(name, kind, high, *row))
+    return found
+
+
+AXES = {
+    "embodiment": "robots",
+    "mode": "scene modes",
+    "split": "instruction splits",
+    "clock": "clocks",
+}
+"""What the parts of a setting are called in the title."""
+
+
+def by_axis(models: Sequence[ModelResults], metric: str = "sr") -> Table | None:
+    """The table of runs that differ in robot, scene mode, split or clock; None if these are none.
+
+    Rows are categories, dimensions and the whole, over all variants that every run has results of.
+    """
+    axes = [part for part in FREE if len({getattr(m.setting, part) for m in models}) > 1]
+    if len(models) < 2 or not axes or not one_policy(models):
+        return None
+    samples = [model.samples(metric) for model in models]
+    shared = [v for v in samples[0] if all(v in other for other in samples[1:])]
+    if not shared:
+        return None
+    names = [" ".join(value for part in axes for value in getattr(m.setting, part)) for m in models]
+    pairs = [
+        {pair.variant: pair for pair in paired_variants(model, models[0], metric)[0]}
+        for model in models[1:]
+    ]
+    category = {name: c for model in models for name, c in model.categories.items()}
+    rows = []
+    for label, kind, chosen in collections(category):
+        variants = [v for v in shared if category[v[0]] in chosen]
+        if variants:
+            weights = weights_of(variants, category)
+            own = [interval_of([s[v] for v in variants], weights) for s in samples]
+            gaps = [_gap([found[v] for v in variants], weights) for found in pairs]
+            cells = (*map(estimate_cell, own), *(estimate_cell(gap, "+z.1f") for gap in gaps))
+            rows.append(TableRow(label, cells, "row" if kind == "category" else "average"))
+    paired = all(pair.gap is not None for found in pairs for pair in found.values())
+    return Table(
+        f"{metric}-by-{'-'.join(axes)}",
+        f"{metric.upper()} by {' and '.join(AXES[part] for part in axes)}",
+        "",
+        (*names, *(f"{name} minus {names[0]}" for name in names[1:])),
+        tuple(rows),
+        notes=(_axis_note(shared, paired),),
+    )
+
+
+def _gap(pairs: Sequence[VariantPair], weights: Sequence[float]) -> Estimate:
+    """The weighted difference: of pairs of trials, or of unrelated samples."""
+    gaps = [pair.gap for pair in pairs if pair.gap is not None]
+    if len(gaps) == len(pairs):
+        return paired_mean(gaps, weights)
+    first, second = ([getattr(pair, side) for pair in pairs] for side in ("first", "second"))
+    return difference(interval_of(first, weights), interval_of(second, weights))
+
+
+def estimate_cell(estimate: Estimate, style: str = "z.1f") -> TableCell:
+    """A cell of an estimate in percent, with its interval."""
+    ends = (100 * estimate.value, 100 * estimate.low, 100 * estimate.high)
+    return TableCell(interval_text(*ends, style=style), *ends)
+
+
+def _axis_note(shared: Sequence[Variant], paired: bool) -> str:
+    how = "paired by seed" if paired else "not paired: some variants share no seed"
+    return (
+        f"In percent, over the {len(shared)} variants that all have results of, with 95 % "
+        f"intervals; differences in percentage points, {how}."
+    )
+
+
+Side = Run | str | Path
+"""A run, its folder (`FOLDER@ROBOT` for a part of it), or the name of a published model."""
+
+
+def compare(first: Side, second: Side, metric: str = "sr", ci: str = "wilson") -> Comparison:
+    """All differences `first - second`, with intervals and tests; paired where seeds are equal.
+
+        found = robospa.compare("runs/mine", "runs/before")
+        print(found.table())
+
+    Args:
+        first: A run, its folder, `FOLDER@ROBOT` for one robot of it, or a published model's name.
+        second: What it is compared with.
+        metric: "sr", "onta" or "ps".
+        ci: How intervals of single rates are made: "wilson", "exact", "jeffreys" or "bootstrap".
+
+    Raises:
+        RunError: A folder holds no run, or one of several robots.
+        ValueError: Nothing goes by a name; IncomparableError if the sides are of different things.
+    """
+    return compare_results(*both_sides(first, second), metric, ci)
+
+
+def both_sides(first: Side, second: Side) -> tuple[ModelResults, ModelResults]:
+    """The results of both sides, under different names; raises what `compare` raises."""
+    one, two = results_of(first), results_of(second)
+    if one.name == two.name:
+        one, two = replace(one, name=_name(first)), replace(two, name=_name(second))
+    return one, two
+
+
+def _name(side: Side) -> str:
+    return str(side.folder) if isinstance(side, Run) else str(side)
+
+
+def results_of(side: Side) -> ModelResults:
+    """The results of one side; raises what `compare` raises."""
+    if isinstance(side, Run):
+        parts = by_setting(side)
+        if len(parts) > 1:
+            names = "; ".join(map(setting_name, parts))
+            raise RunError(f"{side.folder} holds trials of {names}: name one as FOLDER{MARK}ROBOT")
+        return results_of_run(side)
+    name = str(side)
+    if Path(name).exists() or Path(name.rpartition(MARK)[0] or name).is_dir():
+        return results_of_run(read_part(name), name.rpartition("/")[2] if MARK in name else "")
+    try:
+        return published_results(name)
+    except ValueError as error:
+        raise ValueError(f"there is no folder {name}, and {error}") from None

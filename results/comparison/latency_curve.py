@@ -15,11 +15,11 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from robospa.results.comparison.compare import estimate_cell
 from robospa.results.comparison.pairs import check_comparable, common_seeds, paired_variants
 from robospa.results.records.trial_record import TrialRecord
-from robospa.results.scoring.model_results import ModelResults
-from robospa.results.scoring.setting import IncomparableError
-from robospa.results.scoring.weights import Variant, weights_of
+from robospa.results.scoring.models import IncomparableError, ModelResults
+from robospa.results.scoring.scores import Variant, weights_of
 from robospa.results.statistics.intervals import (
     Estimate,
     interval_of,
@@ -249,7 +249,7 @@ def curve_table(curve: LatencyCurve) -> Table:
 
 
 def _cells(point: LatencyPoint) -> tuple[TableCell, ...]:
-    gap = TableCell() if point.gap is None else _estimate(point.gap, "+.1f")
+    gap = TableCell() if point.gap is None else estimate_cell(point.gap, "+z.1f")
     p = TableCell() if point.p is None else TableCell(f"{point.p:.2g}", point.p)
     shares = [TableCell(f"{100 * v:.1f}", 100 * v) for v in (point.held, point.blind)]
     over = TableCell(f"{100 * point.timed_out:.1f}", 100 * point.timed_out)
@@ -257,9 +257,4 @@ def _cells(point: LatencyPoint) -> tuple[TableCell, ...]:
         TableCell() if v is None else TableCell(f"{v:.0f}", v)
         for v in (point.seam_jerk, point.other_jerk)
     ]
-    return (_estimate(point.success, ".1f"), gap, p, *shares, over, *jerks)
-
-
-def _estimate(estimate: Estimate, style: str) -> TableCell:
-    value, low, high = (100.0 * v for v in (estimate.value, estimate.low, estimate.high))
-    return TableCell(f"{value:{style}} [{low:{style}}, {high:{style}}]", value, low, high)
+    return (estimate_cell(point.success), gap, p, *shares, over, *jerks)

@@ -17,8 +17,7 @@ from dataclasses import asdict, dataclass, fields, replace
 from typing import SupportsIndex, overload
 
 from robospa.results.failures.attribution import Cause, roles_of, root_of
-from robospa.results.records.action_problems import problem_counts
-from robospa.results.records.object_names import described
+from robospa.results.records.action_problems import described, problem_counts
 from robospa.results.records.trial_record import EventRow, TrialRecord
 from robospa.results.tables import Table, TableCell, TableRow, html_fragment
 from robospa.text import markdown_table, plain

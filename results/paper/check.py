@@ -16,8 +16,8 @@ from robospa.results.paper import rounding
 from robospa.results.paper.columns import Column, published_column
 from robospa.results.paper.published import LEVELS, PrintedTable, Published, load, row_title
 from robospa.results.paper.rounding import rounded
-from robospa.results.statistics import onta
 from robospa.results.statistics.intervals import interval_of
+from robospa.results.statistics.samples import onta_of_percent
 from robospa.trial import DIMENSIONS, METRIC_CATEGORIES
 
 ENDS = 0.1
@@ -165,9 +165,9 @@ def _per_task(data: Published) -> Iterator[Check]:
                         0,
                     )
                 elif metric == "onta":
-                    ours = rounded(onta.of_percent(success, count))
+                    ours = rounded(onta_of_percent(success, count))
                     fits = [
-                        n for n in range(101) if rounded(onta.of_percent(n, count)) == printed_value
+                        n for n in range(101) if rounded(onta_of_percent(n, count)) == printed_value
                     ]
                     if ours != printed_value:
                         guesses = ["is the SR itself"] if printed_value == success else []

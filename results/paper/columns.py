@@ -3,8 +3,7 @@
 A run covers what it covers. A variant that was not run, or lost every trial, leaves open all
 averages above it, unless the run is in progress, whose averages are over what it has so far; one
 that lost some trials keeps its rate, and everything above it knows how many are missing. Columns of
-one table must have been measured alike: `check_columns` says where not.
-"""
+one table must have been measured alike: `check_columns` says where not."""
 
 from __future__ import annotations
 
@@ -13,24 +12,76 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from robospa.results.paper import rounding
-from robospa.results.paper.published import LEVELS, load
-from robospa.results.paper.published_results import published_results
+from robospa.results.paper.published import LEVELS, Published, find_model, load, title
 from robospa.results.records.manifest import Departure, departures
-from robospa.results.records.run_io import Run
-from robospa.results.scoring.model_results import (
+from robospa.results.records.runs import Run
+from robospa.results.scoring.models import (
+    TABLE,
+    IncomparableError,
     ModelResults,
+    Setting,
     check_alike,
+    check_same,
     in_official_world,
     results_of_run,
     suite_of,
 )
-from robospa.results.scoring.scores import AverageScore, Scores, VariantScore
-from robospa.results.scoring.setting import TABLE, IncomparableError, check_same
-from robospa.results.statistics import onta
-from robospa.results.statistics.bootstrap import Sample, rate
-from robospa.results.statistics.intervals import METHODS, Estimate, interval_of
+from robospa.results.scoring.scores import AverageScore, Scores, VariantScore, combine
+from robospa.results.statistics.intervals import (
+    METHODS,
+    Estimate,
+    bounded_mean,
+    chance_corrected,
+    interval_of,
+    wilson,
+)
+from robospa.results.statistics.samples import Sample, onta_of_percent, rate
 from robospa.results.tables import MISSING, TableCell
-from robospa.trial import BASIC, DIMENSIONS, METRIC_CATEGORIES
+from robospa.trial import BASIC, DIMENSIONS, METRIC_CATEGORIES, SPATIAL
+
+
+def published_cell(published: Published, model: str, task: str, level: int) -> VariantScore:
+    """A published variant as if it had been run: counts from SR, progress as a bare mean."""
+    about = published.tasks[task]
+    trials, count = published.trials, about.counts[level - 1]
+    sr = published.value(model, "sr", task, level)
+    assert sr is not None, f"no SR of {task}"
+    successes = round(sr * trials / 100)
+    found = wilson(successes, trials)
+    values: dict[str, Estimate | None] = {"sr": found}
+    samples = {"sr": rate(successes, trials)}
+    if about.category in SPATIAL:
+        values["onta"] = chance_corrected(found, count)
+        samples["onta"] = rate(successes, trials, count)
+        return VariantScore(
+            task, level, about.category, trials, trials, successes, values, count, samples
+        )
+    printed = published.value(model, "ps", task, level)
+    assert printed is not None, f"no PS of {task}"
+    progress = rounding.exact_progress(printed, count, trials)
+    values["ps"] = bounded_mean(progress / 100, trials)
+    return VariantScore(
+        task, level, about.category, trials, trials, successes, values, samples=samples
+    )
+
+
+def results_beside_runs(model: str, ci: str = METHODS[0]) -> ModelResults:
+    """A published model whose name says that its numbers are the paper's."""
+    found = published_results(model, ci)
+    return replace(found, name=f"{found.name} (paper)")
+
+
+def published_results(model: str, ci: str = METHODS[0]) -> ModelResults:
+    """A published model, computed from its per-task tables."""
+    data, model = load(), find_model(model)
+    cells = {
+        (task, level): published_cell(data, model, task, level)
+        for task in data.tasks
+        for level in LEVELS
+    }
+    setting = Setting((data.embodiment,), (data.mode,), (data.split,), (data.suite,))
+    return ModelResults(title(model), combine(cells, ci), setting, published=model)
+
 
 Values = Mapping[str, Mapping[tuple[str, int], float | None]]
 """Percent by metric and (row, level)."""
@@ -178,7 +229,7 @@ def cell_percent(cell: VariantScore | None, metric: str) -> float | None:
     if metric == "ps":
         return 100 * estimate.value
     success = 100 * cell.successes / cell.trials
-    return success if metric == "sr" else onta.of_percent(success, cell.candidates)
+    return success if metric == "sr" else onta_of_percent(success, cell.candidates)
 
 
 def table_values(

@@ -7,15 +7,16 @@ not follow from the per-task tables is a * with what was printed instead.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import groupby
 
 from robospa.results.paper import rounding
 from robospa.results.paper.check import Check, errata
 from robospa.results.paper.columns import Column, check_columns
 from robospa.results.paper.origin import table_note
 from robospa.results.paper.published import LEVELS, load, row_title, title
-from robospa.results.scoring.model_results import in_official_world
+from robospa.results.scoring.models import in_official_world
 from robospa.results.statistics.significance import supported_best
 from robospa.results.tables import MISSING, PRINTED_OTHERWISE, Table, TableCell, TableRow
 from robospa.trial import CATEGORY_NAMES, DIMENSIONS, METRIC_CATEGORIES, METRIC_NAMES
@@ -36,73 +37,131 @@ _MARK_NOTES = {
     "none": "",
 }
 DASH = TableCell("–")
+Marked = Mapping[tuple[str, int], set[str]]
+"""Titles of the columns to mark, by row and level."""
+CellMaker = Callable[[Column, str, str, Marked], TableCell]
 
 
 def summary_table(
-    columns: Sequence[Column], name: str, metric: str, heads: Sequence[str], mark: str = "tied"
+    columns: Sequence[Column],
+    name: str,
+    metric: str,
+    heads: Sequence[str],
+    mark: str = "tied",
+    covering: Sequence[Column] = (),
 ) -> Table:
-    """Categories, dimensions and the overall value of `metric` at some levels, or their drop."""
+    """Categories, dimensions and the overall value of `metric` at some levels, or their drop; only
+    the rows and levels that any of the columns `covering` has a value at, if there are some."""
     check_columns(columns)
-    rows = _summary_rows(metric)
+    rows = [(row, label, "row" if row in CATEGORY_NAMES else "average" if row else "section")
+            for row, label in _summary_rows(metric)]  # fmt: skip
     levels = [int(head[1]) for head in heads if head != "Drop"]
-    best = _best(columns, metric, [r for r, _ in rows if r], levels, mark)
     wrong = _wrong(_source(name))
-    lines = []
-    for row, label in rows:
-        if not row:
-            lines.append(TableRow(label, kind="section"))
-            continue
-        entries = []
-        for column in columns:
-            for head in heads:
-                if head == "Drop":
-                    ends = [column.value(metric, row, level) for level in levels]
-                    entry = _number(rounding.drop(*ends))
-                else:
-                    level = int(head[1])
-                    entry = _value(column, metric, row, level, column.title in best[row, level])
-                sign = PRINTED_OTHERWISE if (row, column.published, head) in wrong else ""
-                entries.append(_signed(entry, sign))
-        lines.append(TableRow(label, tuple(entries), "row" if row in CATEGORY_NAMES else "average"))
+
+    def cell(column: Column, row: str, head: str, best: Marked) -> TableCell:
+        if head == "Drop":
+            entry = _number(rounding.drop(*(column.value(metric, row, level) for level in levels)))
+        else:
+            level = int(head[1])
+            entry = _value(column, metric, row, level, column.title in best[row, level])
+        return _signed(entry, PRINTED_OTHERWISE * ((row, column.published, head) in wrong))
+
     title = f"{_long_name(metric)} in percent by category"
-    notes = _notes(columns, metric, [r for r, _ in rows if r], levels, mark, wrong)
-    groups = tuple((c.title, len(heads)) for c in columns)
-    return Table(name, title, "", tuple(heads) * len(columns), tuple(lines), groups, notes)
+    made = _Made(columns, metric, rows, tuple(heads), tuple(levels), mark, covering, wrong)
+    return made.table(name, title, "", cell)
 
 
-def task_table(columns: Sequence[Column], name: str, metric: str, mark: str = "tied") -> Table:
-    """Every task at every level."""
+def task_table(
+    columns: Sequence[Column],
+    name: str,
+    metric: str,
+    mark: str = "tied",
+    covering: Sequence[Column] = (),
+) -> Table:
+    """Every task at every level; see `summary_table` for `covering`."""
     check_columns(columns)
     data = load()
     tasks = [t for t in data.tasks.values() if t.category in METRIC_CATEGORIES[metric]]
-    best = _best(columns, metric, [t.name for t in tasks], LEVELS, mark)
+    rows: list[tuple[str, str, str]] = []
+    for category, members in groupby(tasks, key=lambda task: task.category):
+        rows.append(("", f"{category} {CATEGORY_NAMES[category]}", "section"))
+        rows += [(task.name, task.title, "row") for task in members]
     wrong = {
         key: check
         for column in columns
         if column.published
         for key, check in _wrong(data.per_task[column.published, metric].source).items()
     }
-    lines, last = [], ""
-    for task in tasks:
-        if task.category != last:
-            last = task.category
-            lines.append(TableRow(f"{last} {CATEGORY_NAMES[last]}", kind="section"))
-        entries = []
-        for column in columns:
-            for level in LEVELS:
-                marked = column.title in best[task.name, level]
-                entry = _value(column, metric, task.name, level, marked)
-                key = (task.printed, column.published, f"L{level}")
-                if key in wrong and metric == "ps":  # it is given there, not derived
-                    entry = _signed(_number(wrong[key].printed), "")
-                sign = PRINTED_OTHERWISE if key in wrong else ""
-                entries.append(_signed(entry, sign))
-        lines.append(TableRow(task.title, tuple(entries)))
+
+    def cell(column: Column, row: str, head: str, best: Marked) -> TableCell:
+        level = int(head[1])
+        key = (data.tasks[row].printed, column.published, head)
+        if key in wrong and metric == "ps":  # it is given there, not derived
+            return _signed(_number(wrong[key].printed), PRINTED_OTHERWISE)
+        entry = _value(column, metric, row, level, column.title in best[row, level])
+        return _signed(entry, PRINTED_OTHERWISE * (key in wrong))
+
     heads = tuple(f"L{level}" for level in LEVELS)
     title = f"{_long_name(metric)} in percent by task"
-    notes = _notes(columns, metric, [t.name for t in tasks], LEVELS, mark, wrong)
-    groups = tuple((c.title, len(heads)) for c in columns)
-    return Table(name, title, "Task", heads * len(columns), tuple(lines), groups, notes)
+    made = _Made(columns, metric, rows, heads, LEVELS, mark, covering, wrong)
+    return made.table(name, title, "Task", cell)
+
+
+@dataclass(frozen=True)
+class _Made:
+    """What a table of results is made of; `rows` are (row, label, kind)."""
+
+    columns: Sequence[Column]
+    metric: str
+    rows: Sequence[tuple[str, str, str]]
+    heads: tuple[str, ...]
+    levels: tuple[int, ...]
+    mark: str
+    covering: Sequence[Column]
+    wrong: Mapping[tuple[str, str, str], Check]
+
+    def table(
+        self,
+        name: str,
+        title: str,
+        corner: str,
+        cell: Callable[[Column, str, str, Marked], TableCell],
+    ) -> Table:
+        """The table, with marks and notes that look at all rows and levels."""
+        names = [row for row, _, _ in self.rows if row]
+        best = _best(self.columns, self.metric, names, self.levels, self.mark)
+        rows = [one for one in self.rows if not one[0] or self._covered([one[0]], self.heads)]
+        after = [kind for _, _, kind in rows[1:]] + ["section"]
+        pairs = zip(rows, after, strict=False)  # a section without rows is left out
+        rows = [one for one, following in pairs if not one[2] == following == "section"]
+        names = [row for row, _, _ in rows if row]
+        heads = tuple(head for head in self.heads if self._covered(names, [head])) or self.heads
+        lines = [
+            TableRow(label, kind=kind)
+            if not row
+            else TableRow(
+                label,
+                tuple(cell(column, row, head, best) for column in self.columns for head in heads),
+                kind,
+            )
+            for row, label, kind in rows
+        ]
+        whole = [row for row, _, _ in self.rows if row]
+        notes = _notes(self.columns, self.metric, whole, self.levels, self.mark, self.wrong)
+        groups = tuple((column.title, len(heads)) for column in self.columns)
+        return Table(name, title, corner, heads * len(self.columns), tuple(lines), groups, notes)
+
+    def _covered(self, rows: Sequence[str], heads: Sequence[str]) -> bool:
+        """Whether any of the columns `covering` has a value in these rows, under these heads."""
+        if not self.covering:
+            return True
+        wanted = [[int(h[1])] if h != "Drop" else self.levels for h in heads]
+        return any(
+            all(column.value(self.metric, row, level) is not None for level in levels)
+            for column in self.covering
+            for row in rows
+            for levels in wanted
+        )
 
 
 def _source(name: str) -> str:

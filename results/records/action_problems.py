@@ -7,7 +7,8 @@ every reader of a run is told: how many actions, how large a share, one example,
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+import re
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 
 from robospa.results.records.trial_record import TrialRecord
@@ -136,3 +137,43 @@ def _count(record: TrialRecord, kind: ProblemKind) -> int:
 
 def _percent(share: float) -> str:
     return f"{100 * share:.0f} %" if share >= 0.005 else "under 1 %"
+
+
+def described(text: str, record: TrialRecord) -> str:
+    """`text` with the names of the scene's objects replaced by what the record calls them.
+
+    A record that was written before records described their objects leaves `text` as it is.
+    """
+    known = record.diagnostics.get("objects")
+    return with_names(text, known) if isinstance(known, dict) else text
+
+
+def with_names(text: str, names: Mapping[str, object]) -> str:
+    """`text` with the names of the scene's objects replaced by what `names` calls them."""
+    if "object_" not in text:
+        return text
+    return re.sub(r"\bobject_\d+\b", lambda found: str(names.get(found[0], found[0])), text)
+
+
+NUMBER = re.compile(r"0x[0-9a-f]+|[-+]?\d[\d.]*(?:e[-+]?\d+)?", re.IGNORECASE)
+
+
+def error_kind(message: str) -> str:
+    """`message` without its numbers: "nan in action 1" and "nan in action 7" are one error."""
+    return NUMBER.sub("#", message)
+
+
+def grouped(messages: Iterable[str], most: int = 5) -> list[tuple[int, str]]:
+    """How many of `messages` are of one kind and the first of them, the most frequent first; what
+    is over `most` kinds becomes one last row."""
+    first: dict[str, str] = {}
+    counts: dict[str, int] = {}
+    for message in messages:
+        kind = error_kind(message)
+        first.setdefault(kind, message or "no reason was recorded")
+        counts[kind] = counts.get(kind, 0) + 1
+    common = sorted(counts.items(), key=lambda item: -item[1])
+    rows = [(count, first[kind]) for kind, count in common[:most]]
+    if rest := common[most:]:
+        rows.append((sum(count for _, count in rest), f"for {len(rest)} other reasons"))
+    return rows

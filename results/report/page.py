@@ -7,6 +7,7 @@ the page's colours; only videos lie beside it.
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,15 +17,18 @@ from typing import TYPE_CHECKING
 
 from robospa.results.failures.labels import NAMES, SIMULATED_PER_FILM
 from robospa.results.figures.series import FORMATS, GRID, INK, Drawing
+from robospa.results.paper.origin import origin_of
+from robospa.results.records.action_problems import problem_data
 from robospa.results.records.manifest import departures
-from robospa.results.records.run_io import Run
-from robospa.results.report.report import Report
-from robospa.results.report.run_card import facts
+from robospa.results.records.runs import Run
+from robospa.results.report.report import Report, draw_figures
+from robospa.results.report.run_card import about, ends, facts
 from robospa.results.report.score_table import percent
-from robospa.results.report.tables import for_page
+from robospa.results.report.tables import for_page, write_files
 from robospa.results.report.trials import failure_counts, trial_rows
-from robospa.results.scoring.scores import Scores
+from robospa.results.scoring.scores import Scores, to_json
 from robospa.results.statistics.intervals import Estimate
+from robospa.results.tables import escape_markdown, to_markdown
 from robospa.trial import BASIC, CATEGORY_NAMES
 
 if TYPE_CHECKING:
@@ -220,3 +224,53 @@ def own_version() -> str:
         return version("robospa")
     except PackageNotFoundError:
         return ""
+
+
+TABLES_FOLDER = "tables"
+
+
+def write_report(report: Report, folder: Path) -> Path:
+    """Write `report` into `folder` and return it."""
+    (folder / FIGURES).mkdir(parents=True, exist_ok=True)
+    drawings = draw_figures(report.runs, report.columns, folder / FIGURES, failures=report.failures)
+    write_files(report.tables, folder / TABLES_FOLDER)
+    (folder / "report.md").write_text(markdown(report), encoding="utf-8")
+    (folder / "report.json").write_text(json.dumps(to_data(report), indent=1) + "\n")
+    (folder / "report.html").write_text(page(report, drawings, folder), encoding="utf-8")
+    return folder
+
+
+def markdown(report: Report) -> str:
+    """report.md: the cards, what is missing or odd, and all tables."""
+    lines = ["# " + escape_markdown(", ".join(name for name, _ in report.named_runs)), ""]
+    for name, run in report.named_runs:
+        lines += [f"## {escape_markdown(name)}", ""]
+        lines += [f"* {title}: {escape_markdown(text)}" for title, text in facts(run)] + [""]
+    for what, found in (
+        ("note", report.banner),
+        ("missing", report.missing),
+        ("findings", [text for text in report.findings if text.startswith("error")]),
+    ):
+        lines += [f"* **{what}**: {escape_markdown(text)}" for text in found]
+    for table in report.tables:
+        lines += ["", to_markdown(table.table)]
+    warnings = [text for text in report.findings if not text.startswith("error")]
+    lines += ["", *(f"* **findings**: {escape_markdown(text)}" for text in warnings)]
+    return "\n".join([*lines, "", " ".join(report.method), ""])
+
+
+def to_data(report: Report) -> dict[str, object]:
+    """report.json: facts, scores, ends and action problems of every run."""
+    return {
+        "origin": origin_of([model for model in report.models if not model.published]),
+        "runs": [
+            {
+                "name": model.name,
+                "run": about(run),
+                **to_json(model.scores),
+                "ends": ends(run),
+                "problems": problem_data(run.records.values()),
+            }
+            for model, run in zip(report.models, report.runs, strict=False)
+        ],
+    }

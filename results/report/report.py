@@ -10,23 +10,25 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from robospa.results.comparison.by_axis import by_axis
+from robospa.results.comparison.compare import by_axis
 from robospa.results.failures.labels import Failure, distribution, failures_of
 from robospa.results.figures.draw import draw
 from robospa.results.figures.series import FORMATS, Drawing, Series
-from robospa.results.paper.columns import Column, check_columns, column_of
+from robospa.results.lint import lint_run, lint_runs
+from robospa.results.paper.columns import Column, check_columns, column_of, results_beside_runs
 from robospa.results.paper.origin import banner, origin_of
-from robospa.results.paper.published_results import results_beside_runs
-from robospa.results.records.lint import lint_run, lint_runs
-from robospa.results.records.run_io import Run, finished
-from robospa.results.records.settings_of_run import by_setting
-from robospa.results.report.method import method_notes
-from robospa.results.report.missing import loss_lines, missing_lines
+from robospa.results.records.runs import Run, by_setting, finished
 from robospa.results.report.run_card import names_of
-from robospa.results.report.shared import beside_runs, over_shared, shared_variants
-from robospa.results.report.tables import ReportTable, report_tables
-from robospa.results.scoring.model_results import ModelResults, results_of_run
-from robospa.results.scoring.setting import IncomparableError
+from robospa.results.report.score_table import loss_lines, missing_lines
+from robospa.results.report.tables import (
+    ReportTable,
+    beside_runs,
+    method_notes,
+    over_shared,
+    report_tables,
+    shared_variants,
+)
+from robospa.results.scoring.models import IncomparableError, ModelResults, results_of_run
 from robospa.trial import TrialKey
 
 

@@ -8,10 +8,9 @@ from msgspec import to_builtins
 
 from robospa.results.records.action_problems import problem_lines
 from robospa.results.records.manifest import RunAbout, departures
-from robospa.results.records.run_io import Run
-from robospa.results.records.settings_of_run import setting_name
+from robospa.results.records.runs import Run, setting_name
 from robospa.results.records.trial_record import PROCESSOR
-from robospa.results.report.faults import error_rates_text, policy_errors, repeats_text
+from robospa.results.scoring.repeats import error_rates_text, policy_errors, repeats_text
 
 END_NAMES = {
     "success": "success",

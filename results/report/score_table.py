@@ -1,23 +1,41 @@
-"""A run's scores as a table for the print_scores."""
+"""A run's scores as one table, and what is to be said below it: on a terminal and in a notebook."""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from html import escape
 
-from robospa.results.records.action_problems import problem_lines
+from robospa.results.failures.labels import NAMES, failures_of
+from robospa.results.paper.rounding import rounded, text
+from robospa.results.records.action_problems import grouped, problem_lines
 from robospa.results.records.manifest import departures
-from robospa.results.records.run_io import Run
-from robospa.results.records.settings_of_run import setting_name
-from robospa.results.report.faults import policy_error_lines, repeat_lines
-from robospa.results.report.missing import loss_lines, missing_lines
+from robospa.results.records.runs import Run, by_setting, setting_name
 from robospa.results.report.run_card import ends
-from robospa.results.scoring.score_json import level_name
-from robospa.results.scoring.scores import AverageScore, Scores, VariantScore
+from robospa.results.scoring.repeats import policy_error_lines, repeat_lines
+from robospa.results.scoring.scores import AverageScore, Scores, VariantScore, level_name, score_run
 from robospa.results.statistics.intervals import Estimate
-from robospa.results.tables import MISSING, Table, TableCell, TableRow, show
-from robospa.text import plain_console
+from robospa.results.tables import MISSING, Table, TableCell, TableRow, html_fragment, show
+from robospa.text import interval_text, plain_console
 from robospa.trial import BASIC, CATEGORIES, CATEGORY_NAMES, DIMENSIONS, REFERENCE
+
+
+def missing_lines(scores: Scores) -> list[str]:
+    """One sentence for every variant that lacks trials."""
+    return [
+        f"{cell.task} L{cell.level}: {cell.missing} of {cell.listed} trials are missing; if all "
+        f"had failed SR would be {100 * cell.worst:.1f}, if all had succeeded {100 * cell.best:.1f}"
+        for cell in scores.cells.values()
+        if cell.missing
+    ]
+
+
+def loss_lines(run: Run, most: int = 5) -> list[str]:
+    """The reasons for missing trials, one sentence a reason, the most frequent first."""
+    records = [run.records.get(key) for key in run.missing]
+    reasons = ["not run yet" if r is None else r.message for r in records]
+    return [f"missing {count}: {reason}" for count, reason in grouped(reasons, most)]
 
 
 @dataclass(frozen=True)
@@ -30,21 +48,16 @@ class ScoreRow:
     category: str = ""
 
 
-def percent(estimate: Estimate | None, digits: int = 1) -> str:
-    """`12.0 [5.6, 23.8]`, or a dash."""
+def percent(estimate: Estimate | None) -> str:
+    """`12.0 [5.6, 23.8]`, or a dash; rounded as everywhere (`paper.rounding`)."""
     if estimate is None:
         return "–"
-    value, low, high = (f"{100 * x:z.{digits}f}" for x in _all(estimate))
-    return f"{value} [{low}, {high}]"
+    return interval_text(*(rounded(100 * x) for x in (estimate.value, estimate.low, estimate.high)))
 
 
 def short(estimate: Estimate | None) -> str:
-    """The value alone, without decimals where there are none."""
-    return "–" if estimate is None else f"{100 * estimate.value:.1f}"
-
-
-def _all(estimate: Estimate) -> tuple[float, float, float]:
-    return estimate.value, estimate.low, estimate.high
+    """The value alone."""
+    return "–" if estimate is None else text(100 * estimate.value)
 
 
 def rows(scores: Scores) -> list[ScoreRow]:
@@ -153,3 +166,51 @@ def _ends_line(run: Run) -> str:
     counts = ", ".join(f"{count} {name}" for name, count in ends(run).items())
     note = f" ({MISSING} lacks trials)" if run.missing else ""
     return f"{len(run.keys)} trials: {counts}{note}"
+
+
+def run_table(run: Run) -> Table:
+    """The scores of `run`, and below them why trials ended in policy errors and what could not be
+    executed as sent; of several robots, scene modes or splits a section each."""
+    table = _scores(run)
+    return replace(table, notes=(*table.notes, *_hindrances(run)))
+
+
+def _scores(run: Run) -> Table:
+    parts = by_setting(run)
+    tables = [score_table(part, score_run(part)) for part in parts]
+    if len(tables) == 1:
+        return tables[0]
+    *_, tail = (table.heads[-4:] for table in tables)
+    levels = sorted({head for table in tables for head in table.heads[:-4]})
+    heads = (*levels, *tail)
+    rows: list[TableRow] = []
+    for part, table in zip(parts, tables, strict=True):
+        rows.append(TableRow(setting_name(part), kind="section"))
+        rows += [_spread(row, table.heads, heads) for row in table.rows]
+    title = run.manifest.policy.name or "policy"
+    return replace(tables[0], title=title, heads=heads, rows=tuple(rows))
+
+
+def _spread(row: TableRow, heads: tuple[str, ...], wanted: tuple[str, ...]) -> TableRow:
+    """`row` with its cells below the columns `wanted`, empty where it has none."""
+    cells = dict(zip(heads, row.cells, strict=True))
+    return replace(row, cells=tuple(cells.get(head, TableCell()) for head in wanted))
+
+
+def run_html(run: Run) -> str:
+    """Scores, how trials ended, types of failure, and what was executed otherwise than sent."""
+    counts = ", ".join(f"{count} {name}" for name, count in ends(run).items())
+    lines = [f"{len(run.keys)} trials: {counts}", *_lines(run), f"folder: {run.folder}"]
+    notes = "<br>".join(escape(line) for line in lines)
+    return f"{html_fragment(_scores(run))}\n<p>{notes}</p>"
+
+
+def _lines(run: Run) -> list[str]:
+    kinds = Counter(NAMES[f.kind] for f in failures_of(run.records.values()).values())
+    found = ", ".join(f"{count} {name}" for name, count in kinds.most_common())
+    failures = [f"failures: {found}"] if found else []
+    return [*failures, *_hindrances(run)]
+
+
+def _hindrances(run: Run) -> list[str]:
+    return [*policy_error_lines(run), *problem_lines(run.records.values())]

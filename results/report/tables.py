@@ -2,8 +2,7 @@
 
 Rows of tasks that no run of the report has are left out, so that a run of ten tasks is no page of
 dashes; the notes below a table say how much was not run. Averages over tasks that were not run stay
-open and are shown as dashes.
-"""
+open and are shown as dashes."""
 
 from __future__ import annotations
 
@@ -13,14 +12,42 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from robospa.results.paper.columns import Column
-from robospa.results.paper.other_tables import basic_table
-from robospa.results.paper.result_tables import DASH, summary_table, task_table
-from robospa.results.paper.tables import write_tables
-from robospa.results.tables import Table, TableRow, html_fragment
-from robospa.trial import METRIC_CATEGORIES
+from robospa.results.paper.result_tables import summary_table, task_table
+from robospa.results.paper.tables import basic_table, write_tables
+from robospa.results.scoring.models import ModelResults, restricted
+from robospa.results.scoring.scores import Variant
+from robospa.results.tables import Table, html_fragment
+from robospa.trial import BASIC, METRIC_CATEGORIES
 
 if TYPE_CHECKING:
     from markupsafe import Markup
+
+
+def shared_variants(models: Sequence[ModelResults]) -> set[Variant]:
+    """The variants that all `models` have results of; published ones do not restrict the basic
+    grounding tasks, of which the paper prints no model's results."""
+    basic = {v for m in models for v, cell in m.scores.cells.items() if cell.category in BASIC}
+    found = [with_results(m) | (basic if m.published else set()) for m in models]
+    return set.intersection(*found) if found else set()
+
+
+def with_results(model: ModelResults) -> set[Variant]:
+    """The variants that `model` has any result of."""
+    return {variant for variant, cell in model.scores.cells.items() if cell.trials}
+
+
+def over_shared(models: Sequence[ModelResults]) -> list[ModelResults]:
+    """`models` as if each had run the shared variants only; as they are if there is one alone, or
+    if they share nothing. Runs in progress have only what they have results of."""
+    begun = [restricted(m, with_results(m)) if m.to_run else m for m in models]
+    shared = shared_variants(models) if len(models) > 1 else set()
+    return [restricted(model, shared) for model in begun] if shared else begun
+
+
+def beside_runs(published: ModelResults, runs: Sequence[ModelResults]) -> ModelResults:
+    """`published` over the variants that any of `runs` has results of."""
+    return restricted(published, set().union(*map(with_results, runs)))
+
 
 FEW = 2
 """So many columns are shown with all their levels; more of them as in the paper."""
@@ -46,16 +73,17 @@ def report_tables(columns: Sequence[Column]) -> list[ReportTable]:
     made = []
     for name, metric in SUMMARIES:
         if any(_has(c, metric) for c in runs):
-            table = summary_table(columns, name, metric, _heads(columns, levels, metric))
-            made.append(ReportTable(covered(table, len(runs)), False))
+            heads = _heads(columns, levels, metric)
+            made.append(
+                ReportTable(summary_table(columns, name, metric, heads, covering=runs), False)
+            )
     if any(c.covers_basic for c in runs):
         made.append(ReportTable(basic_table(columns), False))
     for _, metric in SUMMARIES:
         if any(_has(c, metric) for c in runs):
-            table = task_table(columns, f"{metric}-tasks", metric)
-            table = covered(table, len(runs))
+            table = task_table(columns, f"{metric}-tasks", metric, covering=runs)
             made.append(ReportTable(table, len(columns) > 1 and len(table.rows) > MOST_OPEN_ROWS))
-    return [s for s in made if any(line.cells for line in s.table.rows)]
+    return [one for one in made if any(line.cells for line in one.table.rows)]
 
 
 def _has(column: Column, metric: str) -> bool:
@@ -67,45 +95,6 @@ def _heads(columns: Sequence[Column], levels: Sequence[int], metric: str) -> tup
     if len(columns) <= FEW or not {1, 5} <= set(levels):
         return tuple(f"L{level}" for level in levels)
     return ("L1", "L3", "L5") if metric != "sr" else ("L1", "L5", "Drop")
-
-
-def covered(table: Table, runs: int) -> Table:
-    """`table` without the rows that none of its first `runs` columns has a value in."""
-    width = len(table.heads) // max(1, len(table.groups)) * runs
-    kept: list[TableRow] = []
-    for line in table.rows:
-        if line.kind == "section" or any(e.text != DASH.text for e in line.cells[:width]):
-            kept.append(line)
-    after = [line.kind for line in kept[1:]] + ["section"]
-    pairs = list(zip(kept, after, strict=False))
-    full = [line for line, kind in pairs if line.kind != "section" or kind != "section"]
-    return _levels_that_were_run(replace(table, rows=tuple(full)), runs)
-
-
-def _levels_that_were_run(table: Table, runs: int) -> Table:
-    """`table` without the levels at which its first `runs` groups have no value at all."""
-    width = len(table.heads) // max(1, len(table.groups))
-    cells = [line.cells for line in table.rows if line.kind != "section"]
-    kept = [
-        place
-        for place in range(width)
-        if any(row[n * width + place].text != DASH.text for row in cells for n in range(runs))
-    ]
-    if not cells or len(kept) == width:
-        return table
-    places = [n * width + place for n in range(len(table.heads) // width) for place in kept]
-    lines = [
-        line
-        if line.kind == "section"
-        else replace(line, cells=tuple(line.cells[p] for p in places))
-        for line in table.rows
-    ]
-    return replace(
-        table,
-        heads=tuple(table.heads[p] for p in places),
-        groups=tuple((title, len(kept)) for title, _ in table.groups),
-        rows=tuple(lines),
-    )
 
 
 @dataclass(frozen=True)
@@ -142,3 +131,41 @@ def write_files(tables: Sequence[ReportTable], folder: Path) -> None:
     """The same tables for papers and programs: LaTeX and CSV."""
     if tables:
         write_tables([t.table for t in tables], folder, ("tex", "csv"))
+
+
+AVERAGES = (
+    "Values in percent. A category is the mean of its tasks; dimensions and the overall value are "
+    "means of categories. ONTA is 0 for guessing among the candidates."
+)
+SINGLE = {"wilson": "Wilson's", "exact": "Clopper and Pearson's exact", "jeffreys": "Jeffreys'"}
+"""Methods for the success rate of one variant, by the name of `intervals.METHODS`."""
+BOOTSTRAP = "95 % intervals are the paper's: a bootstrap over the trials within each variant."
+PROGRESS = "Intervals of progress are a bootstrap over trials."
+PRINTED = (
+    "Of published progress only the mean is known: its interval is rather too wide than too narrow."
+)
+
+
+def method_notes(columns: Sequence[Column]) -> list[str]:
+    """The sentences for a report of `columns`; none if there are none."""
+    if not columns:
+        return []
+    cells = [
+        (c, estimate) for c in columns for cell in c.scores.cells.values()
+        if (estimate := cell.values.get("ps")) is not None
+    ]  # fmt: skip
+    printed = any(column.published for column, _ in cells)
+    ci = columns[0].scores.ci
+    if ci == "bootstrap":
+        return [AVERAGES, BOOTSTRAP, *([PRINTED] if printed else [])]
+    rates = (
+        f"95 % intervals are over trials on other seeds: {SINGLE[ci]} for the rate of one variant; "
+        "for an average MOVER, which combines the intervals of the variants below it."
+    )
+    resampled = any(not column.published for column, _ in cells)
+    return [
+        AVERAGES,
+        rates,
+        *([PROGRESS] if resampled else []),
+        *([PRINTED] if printed else []),
+    ]

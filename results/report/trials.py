@@ -9,10 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from robospa.results.failures.labels import NAMES, Failure
-from robospa.results.records.action_problems import trial_problems
-from robospa.results.records.films import VIDEOS, film_name
-from robospa.results.records.object_names import described
-from robospa.results.records.run_io import Run
+from robospa.results.records.action_problems import described, trial_problems
+from robospa.results.records.runs import VIDEOS, Run, film_name
 from robospa.results.records.trial_record import EventRow, TrialRecord
 from robospa.results.report.run_card import END_NAMES, NOT_RUN
 from robospa.trial import TrialKey

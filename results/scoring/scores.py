@@ -4,8 +4,7 @@ As in the paper: ONTA for the five spatial categories, progress for the five pro
 category is the mean of its tasks, a dimension or the overall value the mean of its categories.
 The appendix's basic grounding categories have success rates of their own and enter nothing above.
 Missing trials are never averaged away: a cell knows how many it lacks and between which values its
-rate must lie, and every average says how many trials are missing below it.
-"""
+rate must lie, and every average says how many trials are missing below it."""
 
 from __future__ import annotations
 
@@ -13,13 +12,12 @@ import zlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import TypedDict
 
 import numpy as np
 
-from robospa.results.records.run_io import Run, finished
+from robospa.results.records.runs import Run, finished
 from robospa.results.records.trial_record import TrialRecord
-from robospa.results.scoring.weights import Variant
-from robospa.results.statistics.bootstrap import Sample, progress, rate
 from robospa.results.statistics.intervals import (
     METHODS,
     Estimate,
@@ -28,8 +26,23 @@ from robospa.results.statistics.intervals import (
     mean,
     wilson,
 )
-from robospa.results.statistics.onta import of_bound
+from robospa.results.statistics.samples import Sample, onta_of_bound, progress, rate
 from robospa.trial import BASIC, CATEGORIES, DIMENSIONS, METRICS, PROCEDURAL, SPATIAL, TrialKey
+
+Variant = tuple[str, int]
+"""Task and level."""
+
+
+def weights_of(variants: Sequence[Variant], category: Mapping[str, str]) -> list[float]:
+    """Categories count the same, in them tasks, in them levels."""
+    tasks: dict[str, int] = {}
+    for task, _ in variants:
+        tasks[task] = tasks.get(task, 0) + 1
+    sizes: dict[str, int] = {}
+    for task in tasks:
+        sizes[category[task]] = sizes.get(category[task], 0) + 1
+    return [1 / (len(sizes) * sizes[category[t]] * tasks[t]) for t, _ in variants]
+
 
 Weighted = tuple[tuple[Sample, float], ...]
 Range = tuple[float, float]
@@ -77,7 +90,7 @@ class VariantScore:
         if metric == "onta":
             if self.candidates < 2:
                 return None
-            low, high = (of_bound(rate, self.candidates) for rate in (self.worst, self.best))
+            low, high = (onta_of_bound(rate, self.candidates) for rate in (self.worst, self.best))
             return low, high
         if metric == "ps":
             known = self.values["ps"]
@@ -320,3 +333,56 @@ def combine(cells: Mapping[Variant, VariantScore], ci: str = METHODS[0]) -> Scor
 def score_run(run: Run, ci: str = METHODS[0]) -> Scores:
     """All scores of `run`, of what has been run so far, with intervals by the method `ci`."""
     return score(run.counted, run.records, run.manifest.categories, ci)
+
+
+ScoreData = dict[str, int | list[float] | None]
+"""Counts, and by metric the estimate (value, low, high) and its bounds."""
+ByLevel = dict[str, dict[str, ScoreData]]
+"""By name and level (`level_name`)."""
+
+
+class ScoresData(TypedDict):
+    """All scores of a model; rates are fractions."""
+
+    estimate: list[str]
+    variants: ByLevel
+    tasks: dict[str, ScoreData]
+    categories: ByLevel
+    dimensions: ByLevel
+    overall: dict[str, ScoreData]
+
+
+def level_name(level: int) -> str:
+    """Column title."""
+    return f"L{level}" if level else "mean"
+
+
+def to_json(scores: Scores) -> ScoresData:
+    """All scores as JSON values; rates are fractions."""
+
+    def part(item: VariantScore | AverageScore) -> ScoreData:
+        data: ScoreData = {"trials": item.trials, "missing": item.missing}
+        if isinstance(item, VariantScore):
+            data["successes"] = item.successes
+        for metric, found in item.values.items():
+            data[metric] = None if found is None else [found.value, found.low, found.high]
+            if item.missing and (ends := item.bounds(metric)) is not None:
+                data[f"{metric}_bounds"] = list(ends)
+        return data
+
+    def table(
+        pairs: Iterable[tuple[tuple[str, int], VariantScore | AverageScore]],
+    ) -> ByLevel:
+        made: ByLevel = {}
+        for (name, level), item in pairs:
+            made.setdefault(name, {})[level_name(level)] = part(item)
+        return made
+
+    return {
+        "estimate": ["value", "low", "high"],
+        "variants": table(scores.cells.items()),
+        "tasks": {name: part(item) for name, item in scores.tasks.items()},
+        "categories": table(scores.categories.items()),
+        "dimensions": table(scores.dimensions.items()),
+        "overall": {level_name(n): part(item) for n, item in scores.overall.items()},
+    }

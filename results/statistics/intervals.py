@@ -19,8 +19,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.results.statistics.bootstrap import Sample, draw, draw_over_tasks
-from robospa.results.statistics.onta import scale_and_shift
+from robospa.results.statistics.samples import Sample, draw, draw_over_tasks, scale_and_shift
 
 Z95 = 1.959963984540054
 """Two-sided 95 % quantile of the normal distribution."""

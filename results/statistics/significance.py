@@ -14,8 +14,8 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.results.statistics.bootstrap import Sample
 from robospa.results.statistics.intervals import Z95, Estimate, difference, interval_of
+from robospa.results.statistics.samples import Sample
 
 ALPHA = 0.05
 LARGEST = 1000

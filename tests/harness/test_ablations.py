@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from report_runs import KNOWN, make_run
+from fake_runs import KNOWN, make_run
 
 from robospa.harness.running.request import make_request
 from robospa.harness.running.worker import task_finder

@@ -8,18 +8,17 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from report_runs import EVIL, make_run, record
+from fake_runs import EVIL, make_run, shown
 
 from robospa.harness import report_server as live_report
 from robospa.harness.report_server import LiveReport, ReportServer, byte_range, serving
-from robospa.results.records.films import film_name
 from robospa.results.records.manifest import RunError
-from robospa.results.records.run_io import to_line
+from robospa.results.records.runs import film_name, to_line
 
 pytestmark = pytest.mark.usefixtures("same_figures_once")
 
 FILM = bytes(range(200))
-RECORDS = [record("Pick_Blocks_Size", 1, n, n < 3, candidates=2) for n in range(4)]
+RECORDS = [shown("Pick_Blocks_Size", 1, n, n < 3, candidates=2) for n in range(4)]
 
 
 @pytest.fixture

@@ -161,7 +161,7 @@ worker = LocalExecutor(WorkerConfig(out, "hold"), 1).start("worker-000")""",
     "films": """
 from robospa.harness.running.films import Films
 from robospa.harness.running.worker import WorkerConfig
-from fake_records import trial_record
+from fake_runs import trial_record
 from film_fakes import KEYS
 Films(WorkerConfig(out, "hold")).add([trial_record(KEYS[0], False)])""",
     "probe": """
@@ -185,7 +185,7 @@ with expert_pool(1) as pool:
 from types import SimpleNamespace
 from robospa.harness.factory import load_function
 from robospa.leaderboard import replay
-from fake_records import trial_record
+from fake_runs import trial_record
 from film_fakes import KEYS
 replay.drawn = lambda *_: KEYS[:1]
 replay.read_traces = lambda *_: {KEYS[0]: ()}
@@ -196,7 +196,7 @@ valid = SimpleNamespace(
 where = SimpleNamespace(world="sapien", parts="robospa.harness.trial:task_parts")
 replay.replay(valid, "challenge", 1, where)""",
     "scenes": """
-from fake_records import trial_record
+from fake_runs import trial_record
 from film_fakes import KEYS
 from robospa.leaderboard import rules
 rules.FEW = 0

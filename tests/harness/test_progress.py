@@ -7,7 +7,7 @@ import sys
 import types
 
 import pytest
-from fake_records import trial_record
+from fake_runs import trial_record
 
 from robospa.harness.progress import ROWS, Progress, details, summary
 from robospa.harness.running.status import ServerStats, Status

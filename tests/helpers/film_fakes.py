@@ -13,7 +13,7 @@ from robospa.harness.running.films import FilmDone
 from robospa.harness.running.record_store import ActionRecorder, write_actions
 from robospa.harness.running.worker import WorkerConfig
 from robospa.harness.trial import run_trial
-from robospa.results.records.films import film_name
+from robospa.results.records.runs import film_name
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 

@@ -11,7 +11,7 @@ from multiprocessing.connection import Connection, wait
 from typing import Any
 
 import numpy as np
-from fake_records import trial_record
+from fake_runs import trial_record
 from numpy.typing import NDArray
 from run_fakes import FakeWorld
 

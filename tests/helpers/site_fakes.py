@@ -20,9 +20,8 @@ from robospa.leaderboard.verify import Valid
 from robospa.results.paper.columns import Column
 from robospa.results.paper.published import LEVELS, load
 from robospa.results.records.trial_record import TrialRecord
-from robospa.results.scoring.model_results import ModelResults
+from robospa.results.scoring.models import ModelResults, Setting
 from robospa.results.scoring.scores import combine, score_cell
-from robospa.results.scoring.setting import Setting
 from robospa.trial import TrialKey
 
 REPLAYED: dict[str, Any] = {

@@ -17,7 +17,7 @@ from contextlib import contextmanager
 from soak_run import PATIENCE, Finding, Run, kill, wait_gone
 
 from robospa.harness.running.atomic_file import PARTIAL
-from robospa.results.records.run_io import ACTIONS
+from robospa.results.records.runs import ACTIONS
 
 
 def _signal_driver(run: Run, number: int, code: int) -> bool:

@@ -17,14 +17,7 @@ from typing import Any
 from robospa.harness.running.atomic_file import PARTIAL
 from robospa.harness.running.record_store import read_actions
 from robospa.harness.trial import actions_digest
-from robospa.results.records.run_io import (
-    ACTIONS,
-    TRIALS,
-    action_path,
-    finished,
-    read_file,
-    read_run,
-)
+from robospa.results.records.runs import ACTIONS, TRIALS, action_path, finished, read_file, read_run
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 

@@ -22,7 +22,7 @@ from robospa.leaderboard.audit import (
     sentence_reaction,
 )
 from robospa.results.records.manifest import RunManifest
-from robospa.results.records.run_io import Run
+from robospa.results.records.runs import Run
 from robospa.results.records.trial_record import RetryRow
 from robospa.tasks.catalog import build_scene
 from robospa.tasks.sentences import sentences

@@ -15,9 +15,9 @@ from robospa.leaderboard.entries import entry_of
 from robospa.leaderboard.site import pairs_of, write_pairs
 from robospa.leaderboard.submission import read_submissions
 from robospa.leaderboard.verify import outcomes_of, paired, results_of
-from robospa.results.comparison.compare import compare
-from robospa.results.records.run_io import Run, read_run
-from robospa.results.scoring.model_results import ModelResults, results_of_run
+from robospa.results.comparison.compare import compare_results
+from robospa.results.records.runs import Run, read_run
+from robospa.results.scoring.models import ModelResults, results_of_run
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +36,7 @@ def side(run: Run) -> ModelResults:
 def test_the_numbers_are_those_of_comparing_the_runs(runs: tuple[Run, Run]) -> None:
     rows = paired(side(runs[0]), side(runs[1]))
     for metric in ("sr", "onta"):
-        right = compare(*(results_of_run(run) for run in runs), metric)
+        right = compare_results(*(results_of_run(run) for run in runs), metric)
         assert right.paired
         for row in (*right.cells, *right.groups):
             shown = rows[metric][row.label][str(row.level)]

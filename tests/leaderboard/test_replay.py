@@ -16,7 +16,7 @@ from robospa.leaderboard.evidence import sample_size
 from robospa.leaderboard.replay import SampleReplay, replay
 from robospa.leaderboard.rules import Reference, manifest_of
 from robospa.leaderboard.verify import outcomes_of, scores_of, tables_of, verify
-from robospa.results.records.run_io import Run, from_data
+from robospa.results.records.runs import Run, from_data
 
 CHALLENGE = "a value nobody knew"
 

@@ -25,7 +25,7 @@ from robospa.leaderboard.reproduce import (
 )
 from robospa.leaderboard.verify import Valid
 from robospa.results.records.manifest import RunManifest, RunSettings
-from robospa.results.records.run_io import Run
+from robospa.results.records.runs import Run
 from robospa.results.records.trial_record import RetryRow
 from robospa.trial import TrialKey
 

@@ -42,7 +42,7 @@ from robospa.leaderboard.reproduce import (
 from robospa.leaderboard.rules import shipped
 from robospa.leaderboard.verify import Valid
 from robospa.protocol.server import ServerThread
-from robospa.results.records.run_io import Run, action_path, read_run
+from robospa.results.records.runs import Run, action_path, read_run
 from robospa.tasks.seeds import accepted
 from robospa.trial import TrialKey
 

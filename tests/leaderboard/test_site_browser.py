@@ -17,8 +17,8 @@ from robospa.leaderboard.entries import BADGES, entry_of, published_entries
 from robospa.leaderboard.site import index_page, pairs_of, write_model, write_pairs
 from robospa.leaderboard.submission import read_submission, read_submissions
 from robospa.results.comparison.compare import over_levels
-from robospa.results.records.run_io import read_run
-from robospa.results.scoring.model_results import results_of_run
+from robospa.results.records.runs import read_run
+from robospa.results.scoring.models import results_of_run
 
 pytestmark = pytest.mark.browser
 

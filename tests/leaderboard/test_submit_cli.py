@@ -21,7 +21,7 @@ from robospa.leaderboard.reproduce import FIRST, Block, write_block
 from robospa.leaderboard.verify import verify
 from robospa.protocol.server import ServerThread
 from robospa.results.records.manifest import RunError
-from robospa.results.records.run_io import read_run
+from robospa.results.records.runs import read_run
 from robospa.trial import TrialKey
 
 pytestmark = pytest.mark.usefixtures("world_asked_here")

@@ -7,16 +7,16 @@ from pathlib import Path
 
 import pytest
 from expert_table import COUNTS, PAGE, Variant, below, counted, merged, read, table, write
-from report_runs import make_run, record
+from fake_runs import make_run, shown
 
 TEXT = PAGE.read_text("utf-8")
 
 
 def test_runs_are_counted_kept_and_merged(tmp_path: Path) -> None:
     task, robot = "Pick_Blocks_Size", "aloha-agilex"
-    first = [record(task, 1, seed, seed > 7) for seed in (7, 8, 9)]
+    first = [shown(task, 1, seed, seed > 7) for seed in (7, 8, 9)]
     make_run(tmp_path / "a", first)
-    make_run(tmp_path / "b", [record(task, 1, 7, True)])
+    make_run(tmp_path / "b", [shown(task, 1, 7, True)])
     old = counted([tmp_path / "a"])
     assert old == [Variant(robot, task, 1, 2, 3, (7,))]
     new = counted([tmp_path / "a", tmp_path / "b"])  # of a trial in both the last counts

@@ -7,11 +7,11 @@ import re
 from pathlib import Path
 
 import pytest
-from run_by_hand import outcomes, write
+from fake_runs import outcomes, write
 
 from robospa.harness.cli.main import main
-from robospa.results.comparison.table import heads_of
-from robospa.results.paper.published_results import published_results
+from robospa.results.comparison.compare import heads_of
+from robospa.results.paper.columns import published_results
 
 
 def run(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, str, str]:

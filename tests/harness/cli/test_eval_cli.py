@@ -26,7 +26,7 @@ from run_fakes import FakePolicy, NanPolicy
 from robospa.harness.cli.main import main
 from robospa.protocol.policy import TrialInfo
 from robospa.protocol.server import ServerThread
-from robospa.results.records.run_io import finished, read_file, read_run
+from robospa.results.records.runs import finished, read_file, read_run
 from robospa.results.records.trial_record import TrialRecord
 
 quickly = pytest.mark.usefixtures("world_asked_here")

@@ -7,10 +7,10 @@ from dataclasses import asdict
 from pathlib import Path
 
 import pytest
-from fake_records import trial_record
+from fake_runs import trial_record
 
 from robospa.harness.cli.main import main
-from robospa.results.records.run_io import to_line
+from robospa.results.records.runs import to_line
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 

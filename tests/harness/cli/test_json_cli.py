@@ -12,7 +12,7 @@ import pytest
 import typer
 from checkouts import write_checkout
 from command_line import robospa
-from run_by_hand import outcomes, write
+from fake_runs import outcomes, write
 
 from robospa.harness.cli.main import COMMANDS, NAMES
 

@@ -11,11 +11,11 @@ from pathlib import Path
 
 import pytest
 from devtools import Page, chromium
-from report_runs import EVIL, make_run, record, write_film
+from fake_runs import EVIL, make_run, shown, write_film
 
 from robospa.harness import report_server as live_report
 from robospa.harness.report_server import LiveReport, serving
-from robospa.results.records.run_io import to_line
+from robospa.results.records.runs import to_line
 
 pytestmark = pytest.mark.browser
 
@@ -34,7 +34,7 @@ def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Four of seven listed trials, the first filmed."""
     monkeypatch.setattr(live_report, "PAUSE_FACTOR", 0.0)
     events = ({"time": 4.0, "kind": "wrong_object", "object": "b", "index": -1, "note": EVIL},)
-    records = [record("Pick_Blocks_Size", 1, n, n > 0, candidates=2) for n in range(4)]
+    records = [shown("Pick_Blocks_Size", 1, n, n > 0, candidates=2) for n in range(4)]
     records[0] = replace(records[0], video="videos/a.mp4", events=events, message=EVIL)
     folder = make_run(tmp_path / "run", records, lost=3).folder
     (folder / "videos").mkdir()
@@ -58,7 +58,7 @@ def page(browser: Page, run: Path) -> Iterator[Page]:
 def finish(run: Path, seed: int) -> None:
     """One more trial comes in."""
     with (run / "trials" / "0000.jsonl").open("a") as file:
-        file.write(to_line(record("Pick_Blocks_Size", 1, seed, True, candidates=2)))
+        file.write(to_line(shown("Pick_Blocks_Size", 1, seed, True, candidates=2)))
 
 
 def test_new_trials_come_in_without_losing_the_readers_place(page: Page, run: Path) -> None:

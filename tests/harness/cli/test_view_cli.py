@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from report_runs import KNOWN, make_run
+from fake_runs import KNOWN, make_run
 
 from robospa.harness.cli.main import main
 

@@ -16,7 +16,7 @@ from robospa.harness.clock.real_time import ENTRY
 from robospa.harness.replay import replay, replay_record
 from robospa.harness.running.record_store import ActionRecorder, write_actions
 from robospa.harness.trial import run_trial
-from robospa.results.records.run_io import action_path
+from robospa.results.records.runs import action_path
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 

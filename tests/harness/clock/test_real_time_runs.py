@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 from clock_fakes import TargetWorld
+from fake_runs import make_run, shown
 from msgspec import structs
-from report_runs import make_run, record
 
 from robospa.harness.clock.policy_clock import PolicyClock, parse_latency, parse_switching
 from robospa.harness.clock.real_time import ENTRY
@@ -24,17 +24,14 @@ from robospa.harness.settings import EvaluationSettings, SettingsError, updated
 from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.rules import Reference, check_settings
 from robospa.protocol.policy import PolicySpec
-from robospa.results.comparison.by_axis import by_axis
-from robospa.results.comparison.compare import compare
-from robospa.results.paper.columns import column_of
-from robospa.results.paper.published_results import published_results
-from robospa.results.records.lint import lint_run
+from robospa.results.comparison.compare import by_axis, compare_results
+from robospa.results.lint import lint_run
+from robospa.results.paper.columns import column_of, published_results
 from robospa.results.records.manifest import PolicySettings, RunError, WorldSettings
-from robospa.results.records.run_io import Run, differences, read_run
+from robospa.results.records.runs import Run, differences, read_run
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.report.score_table import score_table
-from robospa.results.scoring.model_results import results_of_run
-from robospa.results.scoring.setting import IncomparableError
+from robospa.results.scoring.models import IncomparableError, results_of_run
 from robospa.trial import TrialKey
 
 KEYS = [TrialKey("Pick_Fake", 1, 100000 + n) for n in range(6)]
@@ -161,7 +158,7 @@ def test_records_are_equal_to_the_bit_whatever_the_worker_and_the_order(tmp_path
 
 def timed(folder: Path, clock: str, good: int, suite: str = "robospa-2-16.67hz") -> Run:
     """A run of eight trials under a clock, of which `good` succeed."""
-    make_run(folder, [record("Pick_Blocks_Size", 1, n, n < good) for n in range(8)])
+    make_run(folder, [shown("Pick_Blocks_Size", 1, n, n < good) for n in range(8)])
     manifest = json.loads((folder / "run.json").read_text())
     manifest["suite"] = suite
     manifest["about"]["world"] = {"control": "fixed_rate", "action_steps": 15}
@@ -178,7 +175,7 @@ def test_two_latencies_stand_in_one_table_paired_by_seed(tmp_path: Path) -> None
     assert table is not None and table.title == "SR by clocks"
     assert table.heads[:2] == ("real:0", "real:200ms")
     assert "paired by seed" in table.notes[0]
-    found = compare(*sides)
+    found = compare_results(*sides)
     assert found.paired and "Latency comparison" in found.banner
     assert found.cells[0].p < 0.1
 
@@ -188,13 +185,13 @@ def test_another_rate_or_the_benchmark_is_another_suite(tmp_path: Path) -> None:
     for suite in ("robospa-2", "robospa-2-50hz"):
         other = results_of_run(timed(tmp_path / suite, "", 5, suite))
         with pytest.raises(IncomparableError, match=f"the suites robospa-2-16.67hz and {suite}"):
-            compare(slow, other)
+            compare_results(slow, other)
 
 
 def test_published_numbers_are_of_another_rule(tmp_path: Path) -> None:
     run = results_of_run(timed(tmp_path / "a", "200ms", 5), "mine")
     with pytest.raises(IncomparableError, match=r"mine is of the suite robospa-2-16\.67hz"):
-        compare(run, published_results("pi0.5"))
+        compare_results(run, published_results("pi0.5"))
 
 
 def test_tables_and_lint_say_that_it_is_real_time_and_rank_it_never(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from robospa.harness.replay import replay
 from robospa.harness.running.record_store import ActionRecorder
 from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.harness.trial import run_trial
-from robospa.results.records.run_io import differences
+from robospa.results.records.runs import differences
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 

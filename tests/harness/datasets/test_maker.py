@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from fake_records import trial_record
+from fake_runs import trial_record
 from numpy.typing import NDArray
 
 from robospa.harness.datasets.episode import DatasetEpisode, EpisodeFilm, read_episode_file

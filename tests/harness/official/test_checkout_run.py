@@ -10,8 +10,7 @@ import pytest
 from standin_checkout import write_standin
 
 from robospa.harness.cli.main import main
-from robospa.results.records.run_io import read_run
-from robospa.results.records.settings_of_run import setting_name
+from robospa.results.records.runs import read_run, setting_name
 
 pytestmark = pytest.mark.sim
 pytest.importorskip("yaml", reason="a checkout needs PyYAML")

@@ -14,8 +14,8 @@ from run_fakes import FakePolicy
 import robospa
 from robospa.harness.settings import FILE, SettingsError
 from robospa.protocol.server import ServerThread
-from robospa.results.records.lint import lint_run
-from robospa.results.records.run_io import Run
+from robospa.results.lint import lint_run
+from robospa.results.records.runs import Run
 
 pytestmark = pytest.mark.usefixtures("world_asked_here")
 

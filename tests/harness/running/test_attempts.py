@@ -22,8 +22,8 @@ from robospa.harness.running.worker import WorkerConfig
 from robospa.protocol.server import ServerThread
 from robospa.protocol.transport import Timeouts
 from robospa.results.records.manifest import RunError
-from robospa.results.records.run_io import Run, read_file, read_run
-from robospa.results.scoring.retried import fault_rates, was_repeated, worst_case
+from robospa.results.records.runs import Run, read_file, read_run
+from robospa.results.scoring.repeats import fault_rates, was_repeated, worst_case
 from robospa.results.scoring.scores import score_run
 from robospa.trial import TrialKey
 

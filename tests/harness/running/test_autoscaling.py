@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from fake_records import trial_record
+from fake_runs import trial_record
 
 from robospa.harness.running.status import Autoscaler, most_workers
 from robospa.trial import TrialKey

@@ -36,7 +36,7 @@ from robospa.leaderboard.traces import decode, encode
 from robospa.leaderboard.untrusted import BundleArchive
 from robospa.leaderboard.verify import verify
 from robospa.results.records.manifest import RunError, read_manifest, seed_hash
-from robospa.results.records.run_io import finished, from_line, merge, read_file, read_run, to_line
+from robospa.results.records.runs import finished, from_line, merge, read_file, read_run, to_line
 from robospa.results.report.score_table import print_scores
 from robospa.results.scoring.scores import score_run
 from robospa.trial import TrialKey

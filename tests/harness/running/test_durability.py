@@ -7,13 +7,13 @@ import os
 from pathlib import Path
 
 import pytest
-from fake_records import KEY, RECORD, other
+from fake_runs import KEY, RECORD, other
 
 from robospa.harness.running.atomic_file import StorageError, replace_file
 from robospa.harness.running.record_store import RecordWriter, read_actions, recover_folder
 from robospa.harness.running.worker import Worker, WorkerConfig
 from robospa.results.records.manifest import RunError
-from robospa.results.records.run_io import action_path, read_file, read_records
+from robospa.results.records.runs import action_path, read_file, read_records
 from robospa.results.records.trial_record import TrialRecord
 
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from fake_records import trial_record
+from fake_runs import trial_record
 
 from robospa.harness.running.attempts import FIRST, IN_A_ROW, ErrorWatch, Verdict
-from robospa.results.records.reasons import error_kind
+from robospa.results.records.action_problems import error_kind
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 

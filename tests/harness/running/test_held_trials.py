@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fake_records import trial_record
+from fake_runs import trial_record
 from held_fakes import ScriptedExecutor, ThreadExecutor
 from numpy.typing import NDArray
 from run_fakes import SPEC, FakePolicy, FakeWorld, parts
@@ -25,7 +25,7 @@ from robospa.protocol.connection_limits import ServerOptions
 from robospa.protocol.policy import TrialInfo
 from robospa.protocol.server import ServerThread
 from robospa.protocol.transport import Timeouts
-from robospa.results.records.run_io import differences, read_records
+from robospa.results.records.runs import differences, read_records
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 

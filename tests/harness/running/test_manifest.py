@@ -28,7 +28,7 @@ from robospa.results.records.manifest import (
     read_manifest,
     seed_hash,
 )
-from robospa.results.records.run_io import read_records
+from robospa.results.records.runs import read_records
 from robospa.trial import TrialKey
 
 KEYS = tuple(TrialKey("Pick_Fake", level, seed) for level in (1, 2) for seed in (5, 6))

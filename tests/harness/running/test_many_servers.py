@@ -23,7 +23,7 @@ from robospa.harness.running.runner import Runner, RunOptions
 from robospa.harness.running.worker import WorkerConfig
 from robospa.protocol.policy import TrialInfo
 from robospa.protocol.server import ServerThread
-from robospa.results.records.run_io import finished, read_file, read_records, read_run
+from robospa.results.records.runs import finished, read_file, read_records, read_run
 from robospa.trial import TrialKey
 
 TASKS = ("Pick_Blocks_Size", "Pick_Blocks_Height", "Pick_Cans_Relational")

@@ -19,9 +19,9 @@ from robospa.harness.running.executor import RunAborted
 from robospa.harness.running.request import make_request
 from robospa.harness.settings import EvaluationSettings, updated
 from robospa.protocol.server import ServerThread
-from robospa.results.records.lint import lint_run
+from robospa.results.lint import lint_run
 from robospa.results.records.manifest import RunError
-from robospa.results.records.run_io import read_run
+from robospa.results.records.runs import read_run
 
 
 @pytest.fixture(autouse=True)

@@ -38,7 +38,7 @@ from robospa.results.records.manifest import (
     WorldSettings,
     make_manifest,
 )
-from robospa.results.records.run_io import action_path, read_file, read_run
+from robospa.results.records.runs import action_path, read_file, read_run
 from robospa.results.scoring.scores import score_run
 from robospa.trial import TrialKey
 

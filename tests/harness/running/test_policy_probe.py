@@ -21,9 +21,9 @@ from robospa.harness.running.policy_probe import (
 )
 from robospa.harness.running.worker import WorkerConfig
 from robospa.protocol.server import ServerThread
-from robospa.results.records.lint import lint_run
+from robospa.results.lint import lint_run
 from robospa.results.records.manifest import RunError
-from robospa.results.records.run_io import read_run
+from robospa.results.records.runs import read_run
 from robospa.trial import TrialKey
 
 pytestmark = pytest.mark.usefixtures("world_asked_here")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from run_by_hand import record
+from fake_runs import record
 
 from robospa.harness.running.attempts import ProblemWatch
 

@@ -30,7 +30,7 @@ from robospa.harness.running.ray_executor import (
 from robospa.harness.running.runner import Runner, RunOptions
 from robospa.harness.running.worker import WorkerConfig
 from robospa.harness.settings import Compute
-from robospa.results.records.run_io import finished, read_file, read_records
+from robospa.results.records.runs import finished, read_file, read_records
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 

@@ -10,8 +10,7 @@ import pytest
 from robospa.harness.running.ray_executor import RaySettings, ray_executor
 from robospa.harness.running.runner import Runner, RunOptions
 from robospa.harness.running.worker import WorkerConfig
-from robospa.results.records.films import VIDEOS, owed_films
-from robospa.results.records.run_io import differences, read_records
+from robospa.results.records.runs import VIDEOS, differences, owed_films, read_records
 from robospa.trial import TrialKey
 
 pytest.importorskip("ray")

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fake_records import KEY, RECORD, other
+from fake_runs import KEY, RECORD, other
 
 from robospa.harness.running.atomic_file import StorageError, replace_file
 from robospa.harness.running.record_store import (
@@ -19,7 +19,7 @@ from robospa.harness.running.record_store import (
     write_actions,
 )
 from robospa.results.records.manifest import RunError
-from robospa.results.records.run_io import (
+from robospa.results.records.runs import (
     RepeatabilityError,
     action_path,
     from_line,

@@ -13,9 +13,8 @@ from typing import Any
 
 import pytest
 import typer
-from fake_records import trial_record
+from fake_runs import RECORDS, make_run, trial_record
 from film_fakes import KEYS, Filmers, config, recorded
-from report_runs import RECORDS, make_run
 from run_fakes import FakePolicy, FakeStill, FakeWorld, NanPolicy
 
 from robospa.harness.cli import eval as command
@@ -30,9 +29,8 @@ from robospa.harness.running.runner import RunOptions
 from robospa.harness.running.worker import WorkerConfig
 from robospa.harness.world import RenderUnavailable
 from robospa.observation import CameraSpec
-from robospa.results.records.films import film_name, films_in
 from robospa.results.records.manifest import RunError
-from robospa.results.records.run_io import Run, read_records, read_run
+from robospa.results.records.runs import Run, film_name, films_in, read_records, read_run
 from robospa.results.records.trial_record import TrialRecord
 
 av = pytest.importorskip("av")

@@ -13,7 +13,7 @@ import pytest
 
 from robospa.harness.running.atomic_file import run_lock
 from robospa.results.records.manifest import RunError
-from robospa.results.records.run_state import LOCK
+from robospa.results.records.runs import LOCK
 
 
 def test_a_second_driver_is_told_who_holds_the_run(tmp_path: Path) -> None:

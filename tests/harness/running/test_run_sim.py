@@ -17,7 +17,7 @@ from robospa.harness.trial import run_trial
 from robospa.observation import CameraSpec, Observation
 from robospa.protocol.policy import PolicySpec, TrialInfo
 from robospa.protocol.server import ServerThread
-from robospa.results.records.run_io import differences, read_records
+from robospa.results.records.runs import differences, read_records
 from robospa.trial import TrialKey
 
 pytestmark = pytest.mark.sim

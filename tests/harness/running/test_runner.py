@@ -15,7 +15,7 @@ from robospa.harness.running.executor import RunAborted
 from robospa.harness.running.runner import Runner, RunOptions
 from robospa.harness.running.worker import WorkerConfig
 from robospa.results.records.manifest import RunError
-from robospa.results.records.run_io import finished, read_file, read_records
+from robospa.results.records.runs import finished, read_file, read_records
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
@@ -134,7 +134,7 @@ from pathlib import Path
 from robospa.harness.running.runner import Runner, RunOptions
 from robospa.harness.running.atomic_file import run_lock
 from robospa.harness.running.worker import WorkerConfig
-from robospa.results.records.run_io import finished, read_records
+from robospa.results.records.runs import finished, read_records
 from robospa.results.records.trial_record import TrialKey
 
 if __name__ == "__main__":

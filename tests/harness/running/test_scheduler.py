@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 import pytest
-from fake_records import trial_record
+from fake_runs import trial_record
 from run_fakes import fake_task_of
 
 from robospa.harness.running.scheduler import Job, Scheduler, TrialQueue

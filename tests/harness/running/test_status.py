@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
-from fake_records import trial_record
+from fake_runs import trial_record
 
 from robospa.harness.running.status import (
     ServerStats,

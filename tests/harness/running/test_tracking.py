@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from report_runs import make_run, record
+from fake_runs import make_run, shown
 
 import robospa
 from robospa.extras import MissingPackage
@@ -55,7 +55,7 @@ def test_rates_scores_and_every_trial_are_logged(
 ) -> None:
     fake = FakeWandb()
     monkeypatch.setitem(sys.modules, "wandb", fake)
-    run = make_run(tmp_path / "mine", [record("Pick_It", 1, n, n < 3) for n in range(4)], lost=1)
+    run = make_run(tmp_path / "mine", [shown("Pick_It", 1, n, n < 3) for n in range(4)], lost=1)
     tracker = WandbTracker(run.folder, "arms", {"run_seed": 0})
     for one in run.records.values():
         tracker.add(one)

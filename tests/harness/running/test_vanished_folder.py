@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fake_records import KEY, RECORD, other
-from run_by_hand import outcomes, write
+from fake_runs import KEY, RECORD, other, outcomes, write
 from run_fakes import FakePolicy
 
 from robospa.harness.running.atomic_file import StorageError, run_lock
@@ -21,8 +20,8 @@ from robospa.harness.running.request import make_request
 from robospa.harness.settings import EvaluationSettings, updated
 from robospa.protocol.policy import TrialInfo
 from robospa.protocol.server import ServerThread
-from robospa.results.records.lint import lint_actions
-from robospa.results.records.run_io import read_file, read_run
+from robospa.results.lint import lint_actions
+from robospa.results.records.runs import read_file, read_run
 
 pytestmark = pytest.mark.usefixtures("world_asked_here")
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from fake_records import trial_record
+from fake_runs import trial_record
 
 from robospa.geometry import Pose
 from robospa.harness.viewer.playback import Moment, Playback, moments, playback_of

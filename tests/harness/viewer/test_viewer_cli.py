@@ -6,7 +6,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
-from report_runs import KNOWN, make_run
+from fake_runs import KNOWN, make_run
 
 from robospa.harness.cli.main import main
 from robospa.harness.viewer.show import trial_named

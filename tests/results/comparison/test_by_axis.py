@@ -6,18 +6,18 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from report_runs import make_run, record
+from fake_runs import make_run, shown
 
-from robospa.results.comparison.by_axis import by_axis
-from robospa.results.records.settings_of_run import by_setting
+from robospa.results.comparison.compare import by_axis
+from robospa.results.records.runs import by_setting
 from robospa.results.report.report import make_report
-from robospa.results.scoring.model_results import ModelResults, results_of_run
+from robospa.results.scoring.models import ModelResults, results_of_run
 
 pytestmark = pytest.mark.usefixtures("same_figures_once")
 
 
 def trials(mode: str, good: int, split: str = "heldout") -> list:  # type: ignore[type-arg]
-    made = [record("Pick_Blocks_Size", 1, n, n < good) for n in range(8)]
+    made = [shown("Pick_Blocks_Size", 1, n, n < good) for n in range(8)]
     return [replace(r, key=replace(r.key, mode=mode, split=split)) for r in made]
 
 

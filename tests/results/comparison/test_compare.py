@@ -6,14 +6,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from run_by_hand import outcomes, record, write
+from fake_runs import outcomes, record, write
 
-from robospa.results.comparison.compare import Comparison, Difference, compare
-from robospa.results.comparison.drops import drops
-from robospa.results.paper.published_results import published_results
+from robospa.results.comparison.compare import Comparison, Difference, compare_results, drops
+from robospa.results.paper.columns import published_results
 from robospa.results.records.trial_record import TrialRecord
-from robospa.results.scoring.model_results import ModelResults, results_of_run
-from robospa.results.scoring.setting import IncomparableError
+from robospa.results.scoring.models import IncomparableError, ModelResults, results_of_run
 from robospa.results.statistics.intervals import difference, paired_difference, wilson
 from robospa.results.statistics.significance import boschloo, mcnemar_mid_p
 from robospa.trial import TrialKey
@@ -32,7 +30,7 @@ def group(found: Comparison, label: str, level: int) -> Difference:
 def test_a_paired_variant_by_hand(tmp_path: Path) -> None:
     first = side(tmp_path / "a", outcomes(SIZE, 1, [1, 1, 1, 0, 0, 1]))
     second = side(tmp_path / "b", outcomes(SIZE, 1, [1, 0, 0, 0, 1, 0]))
-    found = compare(first, second)
+    found = compare_results(first, second)
     (cell,) = found.cells
     assert found.paired
     assert (cell.only_first, cell.only_second, cell.trials) == (3, 1, 6)
@@ -42,18 +40,20 @@ def test_a_paired_variant_by_hand(tmp_path: Path) -> None:
     assert (cell.estimate.low, cell.estimate.high) == pytest.approx((by_hand.low, by_hand.high))
     assert cell.estimate.method == "Tango"
     assert cell.p == cell.q == mcnemar_mid_p(3, 1)
-    assert compare(first, second) == found
+    assert compare_results(first, second) == found
 
 
 def test_averages_weigh_categories_the_same_and_say_how_they_were_made(tmp_path: Path) -> None:
     one = outcomes(SIZE, 1, [1, 1]) + outcomes("Other", 1, [1, 0]) + outcomes(MUGS, 1, [1, 1])
     two = outcomes(SIZE, 1, [0, 0]) + outcomes("Other", 1, [1, 0]) + outcomes(MUGS, 1, [1, 1])
-    found = compare(side(tmp_path / "a", one), side(tmp_path / "b", two))
+    found = compare_results(side(tmp_path / "a", one), side(tmp_path / "b", two))
     assert group(found, "GAC", 1).estimate.value == pytest.approx(0.5)
     assert group(found, "GAC", 1).p == mcnemar_mid_p(2, 0)
     assert group(found, "overall", 1).estimate.value == pytest.approx(0.25)
     assert group(found, "overall", 1).estimate.method == "MOVER on Tango"
-    again = compare(side(tmp_path / "c", one), side(tmp_path / "d", two), method="bootstrap")
+    again = compare_results(
+        side(tmp_path / "c", one), side(tmp_path / "d", two), method="bootstrap"
+    )
     assert group(again, "overall", 1).estimate.method == "stratified bootstrap"
     assert group(again, "overall", 1).p == group(found, "overall", 1).p  # not from a point
 
@@ -61,7 +61,7 @@ def test_averages_weigh_categories_the_same_and_say_how_they_were_made(tmp_path:
 def test_runs_on_other_seeds_are_not_paired(tmp_path: Path) -> None:
     one = outcomes(SIZE, 1, [1, 1, 0])
     two = [replace(r, key=replace(r.key, seed=r.key.seed + 50)) for r in outcomes(SIZE, 1, [0, 0])]
-    found = compare(a := side(tmp_path / "a", one), b := side(tmp_path / "b", two))
+    found = compare_results(a := side(tmp_path / "a", one), b := side(tmp_path / "b", two))
     (cell,) = found.cells
     assert not found.paired
     assert cell.only_first is None
@@ -71,7 +71,7 @@ def test_runs_on_other_seeds_are_not_paired(tmp_path: Path) -> None:
 
 def test_a_run_against_the_paper(tmp_path: Path) -> None:
     run = side(tmp_path / "a", outcomes(SIZE, 1, [1] * 9 + [0]))
-    found = compare(run, published_results("RDT"))
+    found = compare_results(run, published_results("RDT"))
     (cell,) = found.cells
     assert not found.paired
     assert (cell.first, cell.second) == (0.9, pytest.approx(0.03))
@@ -81,7 +81,7 @@ def test_a_run_against_the_paper(tmp_path: Path) -> None:
 
 
 def test_two_published_models() -> None:
-    found = compare(published_results("pi0.5"), published_results("X-VLA"))
+    found = compare_results(published_results("pi0.5"), published_results("X-VLA"))
     assert found.first == "π0.5"
     best = group(found, "overall", 5)
     assert 100 * best.estimate.value == pytest.approx(22.25 - 19.87, abs=0.02)
@@ -92,7 +92,7 @@ def test_two_published_models() -> None:
 def test_onta_is_the_difference_of_rates_on_its_own_scale(tmp_path: Path) -> None:
     one = side(tmp_path / "a", outcomes(SIZE, 1, [1, 1, 0, 0]))
     two = side(tmp_path / "b", outcomes(SIZE, 1, [0, 1, 0, 0]))
-    (cell,) = compare(one, two, "onta").cells
+    (cell,) = compare_results(one, two, "onta").cells
     assert cell.estimate.value == pytest.approx(0.25 * 2)  # chance is one half
     assert (cell.first, cell.second) == (pytest.approx(0.0), pytest.approx(-0.5))
 
@@ -100,7 +100,7 @@ def test_onta_is_the_difference_of_rates_on_its_own_scale(tmp_path: Path) -> Non
 def test_progress_compares_shares_of_subtasks(tmp_path: Path) -> None:
     one = [record(BOTTLES, 3, n, d, 3) for n, d in enumerate((3, 2, 1, 2))]
     two = [record(BOTTLES, 3, n, d, 3) for n, d in enumerate((3, 1, 1, 0))]
-    found = compare(side(tmp_path / "a", one), side(tmp_path / "b", two), "ps")
+    found = compare_results(side(tmp_path / "a", one), side(tmp_path / "b", two), "ps")
     (cell,) = found.cells
     assert cell.estimate.value == pytest.approx((0 + 1 + 0 + 2) / 3 / 4)
     assert (cell.only_first, cell.only_second) == (2, 0)
@@ -110,12 +110,12 @@ def test_progress_compares_shares_of_subtasks(tmp_path: Path) -> None:
 def test_other_tasks_move_a_difference_more(tmp_path: Path) -> None:
     one = [*outcomes(SIZE, 1, [1] * 20), *outcomes("Other", 1, [1] * 2 + [0] * 18)]
     two = [*outcomes(SIZE, 1, [0] * 20), *outcomes("Other", 1, [1] * 2 + [0] * 18)]
-    found = compare(side(tmp_path / "a", one), side(tmp_path / "b", two))
+    found = compare_results(side(tmp_path / "a", one), side(tmp_path / "b", two))
     row = group(found, "GAC", 1)
     assert row.over_tasks is not None
     assert (row.over_tasks.low, row.over_tasks.high) == pytest.approx((0.0, 1.0), abs=1e-6)
     assert row.estimate.low > 0.3
-    unpaired = compare(published_results("RDT"), published_results("GO-1"))
+    unpaired = compare_results(published_results("RDT"), published_results("GO-1"))
     nothing = group(unpaired, "MIP", 5)
     assert nothing.over_tasks is not None  # all at 0: as wide as over seeds, never a point
     assert nothing.over_tasks.high == nothing.estimate.high > 0.01
@@ -125,7 +125,7 @@ def test_lost_trials_are_left_out_in_pairs_and_counted(tmp_path: Path) -> None:
     lost = record(SIZE, 1, 2, 0, end="infrastructure")
     one = side(tmp_path / "a", [*outcomes(SIZE, 1, [1, 1]), lost])
     two = side(tmp_path / "b", outcomes(SIZE, 1, [0, 1, 1]))
-    found = compare(one, two)
+    found = compare_results(one, two)
     assert found.cells[0].trials == 2
     assert any("1 listed trials have no result" in note for note in found.notes)
 
@@ -135,7 +135,7 @@ def test_notes_tell_of_versions_and_of_policies_that_ignore_their_seed(tmp_path:
     blind = {"policy": {"spec": {"seeded": False}}}
     one = side(tmp_path / "a", outcomes(SIZE, 1, [1]), about=about[0], settings=blind)
     two = side(tmp_path / "b", outcomes(SIZE, 1, [1]), about=about[1])
-    notes = " ".join(compare(one, two).notes)
+    notes = " ".join(compare_results(one, two).notes)
     assert "different versions of robospa" in notes
     assert "a ignores the policy seed" in notes
 
@@ -165,7 +165,7 @@ def test_a_run_that_mixes_settings_is_refused(
     other = replace(one, key=replace(one.key, **change))  # type: ignore[arg-type]
     mixed = side(tmp_path / "a", [one, other])
     with pytest.raises(IncomparableError, match=message):
-        compare(mixed, mixed)
+        compare_results(mixed, mixed)
 
 
 def test_sides_of_different_embodiments_are_refused(tmp_path: Path) -> None:
@@ -173,9 +173,9 @@ def test_sides_of_different_embodiments_are_refused(tmp_path: Path) -> None:
     other = replace(one, key=TrialKey(SIZE, 1, 0, "piper"))
     first, second = side(tmp_path / "a", [one]), side(tmp_path / "b", [other])
     with pytest.raises(IncomparableError, match=r"a and b .* embodiments aloha-agilex and piper"):
-        compare(first, second)
+        compare_results(first, second)
     with pytest.raises(IncomparableError, match=r"b and RDT .* embodiments piper and aloha-agilex"):
-        compare(second, published_results("RDT"))
+        compare_results(second, published_results("RDT"))
 
 
 def test_other_step_limits_are_refused_but_not_against_the_paper(tmp_path: Path) -> None:
@@ -183,8 +183,8 @@ def test_other_step_limits_are_refused_but_not_against_the_paper(tmp_path: Path)
     plain = side(tmp_path / "a", outcomes(SIZE, 1, [1, 0]))
     tripled = replace(plain, setting=replace(plain.setting, step_scale=(3.0,)))
     with pytest.raises(IncomparableError, match="3 and 1 times the official step limits"):
-        compare(tripled, plain)
-    assert compare(tripled, published_results("X-VLA")).cells
+        compare_results(tripled, plain)
+    assert compare_results(tripled, published_results("X-VLA")).cells
 
 
 def test_other_scenes_under_one_seed_are_refused(tmp_path: Path) -> None:
@@ -194,21 +194,21 @@ def test_other_scenes_under_one_seed_are_refused(tmp_path: Path) -> None:
     with pytest.raises(
         IncomparableError, match="seed 0 of Pick_Blocks_Size L1 is another scene in b"
     ):
-        compare(first, second)
+        compare_results(first, second)
 
 
 def test_what_cannot_be_compared_is_one_sentence(tmp_path: Path) -> None:
     first = side(tmp_path / "a", outcomes(SIZE, 1, [1]))
     second = side(tmp_path / "b", outcomes(MUGS, 1, [1]))
     with pytest.raises(IncomparableError, match="no variant in common"):
-        compare(first, second)
+        compare_results(first, second)
     empty = side(tmp_path / "c", [record(SIZE, 1, 0, 0, end="infrastructure")])
     with pytest.raises(IncomparableError, match="holds no result yet"):
-        compare(first, empty)
+        compare_results(first, empty)
     with pytest.raises(ValueError, match="no published model is called 'pi9'; there are RDT"):
         published_results("pi9")
     with pytest.raises(IncomparableError, match="only the mean progress"):
-        compare(published_results("RDT"), published_results("GO-1"), "ps")
+        compare_results(published_results("RDT"), published_results("GO-1"), "ps")
     mixed = side(tmp_path / "d", [record(SIZE, 1, 0, 1), record(SIZE, 1, 1, 1, candidates=5)])
     with pytest.raises(IncomparableError, match="differ in their number of candidates"):
-        compare(first, mixed, "onta")
+        compare_results(first, mixed, "onta")

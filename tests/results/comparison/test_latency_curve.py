@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from report_runs import make_run, record
+from fake_runs import make_run, shown
 
 from robospa.results.comparison.latency_curve import (
     LatencyCurve,
@@ -19,9 +19,8 @@ from robospa.results.comparison.latency_curve import (
 )
 from robospa.results.figures.curves import draw_latency_curves
 from robospa.results.figures.series import styled
-from robospa.results.records.run_io import read_run
-from robospa.results.scoring.model_results import ModelResults, results_of_run
-from robospa.results.scoring.setting import IncomparableError
+from robospa.results.records.runs import read_run
+from robospa.results.scoring.models import IncomparableError, ModelResults, results_of_run
 
 TRIALS = 40
 
@@ -31,7 +30,7 @@ def at(folder: Path, latency: float, good: int, switching: str = "wait") -> Mode
     seen = {"periods": 100, "held": 20, "blind": 5, "seam_jerk": 300.0, "other_jerk": 50.0}
     records = [
         replace(
-            record("Pick_Blocks_Size", 1, n, n < good),
+            shown("Pick_Blocks_Size", 1, n, n < good),
             diagnostics={"real_time": seen},
             end="success" if n < good else "time_limit",
         )
@@ -108,7 +107,7 @@ def test_what_is_no_curve_is_refused(tmp_path: Path) -> None:
         latency_curve([one, at(tmp_path / "b", 0, 30)])
     with pytest.raises(IncomparableError, match="one way to switch"):
         latency_curve([one, at(tmp_path / "c", 100, 30, "after:4")])
-    paused = results_of_run(make_run(tmp_path / "d", [record("Pick_Blocks_Size", 1, 0, True)]))
+    paused = results_of_run(make_run(tmp_path / "d", [shown("Pick_Blocks_Size", 1, 0, True)]))
     with pytest.raises(IncomparableError, match="has no constant latency"):
         latency_curve([one, paused])
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import pytest
-from fake_records import trial_record
+from fake_runs import trial_record
 
 from robospa.results.failures.labels import (
     KINDS,

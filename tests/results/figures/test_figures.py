@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
-from fake_records import trial_record
+from fake_runs import trial_record
 
 from robospa.results.failures.labels import KINDS, distribution
 from robospa.results.figures.charts import (

@@ -5,19 +5,19 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from report_runs import make_run, record
+from fake_runs import make_run, shown
 
 from robospa.harness.cli.main import main
 from robospa.results.figures.curves import CurvePoint, draw_learning_curve, value_at
 from robospa.results.figures.series import styled
-from robospa.results.records.run_io import Run
+from robospa.results.records.runs import Run
 from robospa.results.scoring.scores import score_run
 
 
 def run(folder: Path, won: int) -> Run:
     """Ten trials of level 1, of which `won` succeed, and ten of level 2, of which half as many."""
     records = [
-        record("Pick_Blocks_Size", level, seed, seed < won // level, candidates=2)
+        shown("Pick_Blocks_Size", level, seed, seed < won // level, candidates=2)
         for level in (1, 2)
         for seed in range(10)
     ]

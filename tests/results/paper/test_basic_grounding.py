@@ -6,16 +6,15 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from run_by_hand import outcomes, write
+from fake_runs import outcomes, write
 
 from robospa.results.paper.columns import published_column, run_column
 from robospa.results.paper.tables import make_tables
-from robospa.results.records.run_io import Run
+from robospa.results.records.runs import Run
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.report.score_table import rows
 from robospa.results.report.tables import report_tables
-from robospa.results.scoring.score_json import to_json
-from robospa.results.scoring.scores import score_run
+from robospa.results.scoring.scores import score_run, to_json
 
 SETS = 5
 SOLVED = (4, 3, 4, 2, 4)

@@ -7,18 +7,25 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from fake_records import trial_record
+from fake_runs import trial_record
 
-from robospa.results.comparison.compare import compare
-from robospa.results.paper.columns import Column, published_column, run_column
-from robospa.results.paper.origin import ORIGIN, RANKED, banner, origin_of, printed_note
-from robospa.results.paper.pieces import pieces, pieces_of, told
-from robospa.results.paper.published_results import published_results
+from robospa.results.comparison.compare import compare_results
+from robospa.results.paper.columns import Column, published_column, published_results, run_column
+from robospa.results.paper.origin import (
+    ORIGIN,
+    RANKED,
+    banner,
+    origin_of,
+    pieces,
+    pieces_of,
+    printed_note,
+    told,
+)
 from robospa.results.paper.tables import make_tables
 from robospa.results.records.manifest import RunManifest, RunSettings
-from robospa.results.records.run_io import Run
+from robospa.results.records.runs import Run
 from robospa.results.report.report import make_report
-from robospa.results.scoring.setting import IncomparableError
+from robospa.results.scoring.models import IncomparableError
 from robospa.results.tables import Table
 from robospa.schema import read
 from robospa.tasks.scene import SUITE as OURS
@@ -125,7 +132,7 @@ def test_runs_of_official_worlds_are_ranked_with_the_paper_and_ours_are_not(worl
 @pytest.mark.parametrize("world", WORLDS)
 def test_banners_reports_and_comparisons_say_the_same(world: str) -> None:
     own = column_in(world).results
-    line = compare(own, published_results("RDT")).banner
+    line = compare_results(own, published_results("RDT")).banner
     assert line == banner(["RDT"], [own]) and line.startswith("RDT was") != world.startswith("ours")
     report = make_report(run_in(world), ["RDT"])
     assert report.banner[0] == banner(["RDT (paper)"], report.models[:1])

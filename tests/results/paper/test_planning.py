@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from robospa.results.paper.planning import half_width, published_variances, trials_for
+from robospa.results.comparison.sample_size import half_width, published_variances, trials_for
 from robospa.results.paper.published import LEVELS, load
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from robospa.results.paper import rounding
-from robospa.results.statistics import onta
+from robospa.results.statistics.samples import onta_of_percent
 
 
 @pytest.mark.parametrize(
@@ -36,9 +36,9 @@ def test_a_mean_of_something_missing_is_missing() -> None:
 
 
 def test_onta_is_zero_at_chance_and_needs_a_choice() -> None:
-    assert onta.of_percent(25, 4) == 0
+    assert onta_of_percent(25, 4) == 0
     with pytest.raises(ValueError, match="certainty"):
-        onta.of_percent(50, 1)
+        onta_of_percent(50, 1)
 
 
 def test_progress_is_recovered_from_its_printed_form() -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from fake_records import trial_record
+from fake_runs import trial_record
 from msgspec import structs
 
 from robospa.results.paper.columns import published_column, run_column
@@ -15,9 +15,9 @@ from robospa.results.paper.published import LEVELS, load
 from robospa.results.paper.result_tables import summary_table, task_table
 from robospa.results.paper.tables import make_tables
 from robospa.results.records.manifest import RunManifest
-from robospa.results.records.run_io import Run
+from robospa.results.records.runs import Run
 from robospa.results.records.trial_record import TrialRecord
-from robospa.results.scoring.setting import IncomparableError
+from robospa.results.scoring.models import IncomparableError
 from robospa.results.tables import Table, TableCell
 from robospa.schema import read
 from robospa.trial import TrialKey

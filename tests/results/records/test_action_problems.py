@@ -7,18 +7,17 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from fake_records import KEY, trial_record
-from run_by_hand import record, write
+from fake_runs import KEY, record, trial_record, write
 
 from robospa.harness.cli.main import main
 from robospa.results.failures.labels import label
+from robospa.results.lint import lint_run
 from robospa.results.records.action_problems import (
     problem_counts,
     problem_data,
     problem_lines,
     trial_problems,
 )
-from robospa.results.records.lint import lint_run
 from robospa.results.records.trial_record import TrialRecord
 
 pytestmark = pytest.mark.usefixtures("same_figures_once")

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from fake_runs import outcomes, record, write
 from msgspec import structs
-from run_by_hand import outcomes, record, write
 
-from robospa.results.records.lint import (
+from robospa.results.lint import (
     Finding,
     ResultRow,
     lint_published,
@@ -20,7 +20,7 @@ from robospa.results.records.lint import (
     run_rows,
 )
 from robospa.results.records.manifest import RunError
-from robospa.results.records.run_io import read_run, to_line
+from robospa.results.records.runs import read_run, to_line
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from fake_records import trial_record
+from fake_runs import trial_record
 
-from robospa.results.records.lint_faults import lint_faults
+from robospa.results.lint import lint_faults
 from robospa.results.records.trial_record import RetryRow, TrialRecord
 from robospa.trial import TrialKey
 

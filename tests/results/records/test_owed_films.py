@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from report_runs import RECORDS, make_run
+from fake_runs import RECORDS, make_run
 
-from robospa.results.records.films import film_name, films_in, owed_films
-from robospa.results.records.run_io import read_run
+from robospa.results.records.runs import film_name, films_in, owed_films, read_run
 
 NAMES = [film_name(record.key) for record in RECORDS]
 

@@ -6,15 +6,14 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from report_runs import KNOWN, make_run
+from fake_runs import KNOWN, make_run
 
-from robospa.results.comparison.compare import compare
+from robospa.results.comparison.compare import compare_results
 from robospa.results.records.manifest import RunError
-from robospa.results.records.run_io import Run
-from robospa.results.records.settings_of_run import by_setting, read_part, setting_name
-from robospa.results.report.files import write_report
+from robospa.results.records.runs import Run, by_setting, read_part, setting_name
+from robospa.results.report.page import write_report
 from robospa.results.report.report import make_report
-from robospa.results.scoring.model_results import results_of_run
+from robospa.results.scoring.models import results_of_run
 
 pytestmark = pytest.mark.usefixtures("same_figures_once")
 
@@ -65,7 +64,7 @@ def test_the_report_has_the_robots_side_by_side(run: Run, tmp_path: Path) -> Non
 
 def test_robots_of_one_policy_are_compared_pair_by_pair(run: Run) -> None:
     one, two = (results_of_run(part, setting_name(part)) for part in by_setting(run))
-    found = compare(one, two)
+    found = compare_results(one, two)
     assert found.paired
     assert any(note.startswith("Different robots: aloha-agilex and franka") for note in found.notes)
     assert all(row.only_second == 0 for row in found.cells)

@@ -9,15 +9,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from report_runs import EVIL, KNOWN, RECORDS, make_run, record
+from fake_runs import EVIL, KNOWN, RECORDS, make_run, shown
 
 from robospa.results.paper.published import load
-from robospa.results.records.films import film_name
 from robospa.results.records.manifest import RunError
-from robospa.results.records.run_io import read_run
+from robospa.results.records.runs import film_name, read_run
 from robospa.results.records.trial_record import EventRow
 from robospa.results.report import score_table as tables
-from robospa.results.report.files import write_report
+from robospa.results.report.page import write_report
 from robospa.results.report.report import make_report
 from robospa.results.report.trials import event_row
 from robospa.results.scoring.scores import score_run
@@ -68,16 +67,9 @@ def test_every_trial_is_listed_with_its_failure_type(tmp_path: Path) -> None:
     lost = replace(KNOWN[0], end="infrastructure", success=False)
     run = make_run(tmp_path / "run", [lost, *KNOWN[1:]], lost=1)
     found = trials_of(write_report(make_report(run), tmp_path / "report"))
-    assert [t["end"] for t in found] == [
-        "missing",
-        "success",
-        "success",
-        "step limit",
-        "step limit",
-        "step limit",
-        "not run",
-    ]
-    assert ["failure" in t for t in found] == [False, False, False, True, True, True, False]
+    good, bad = ["success"] * 2, ["step limit"] * 2
+    assert [t["end"] for t in found] == ["missing", *good, "step limit", "not run", *bad]
+    assert ["failure" in t for t in found] == [False, False, False, True, False, True, True]
 
 
 def test_several_runs_and_published_models_stand_side_by_side(tmp_path: Path) -> None:
@@ -135,7 +127,7 @@ def test_a_banner_says_what_differs_before_any_number_of_the_paper(tmp_path: Pat
 
 def test_runs_of_different_variants_have_cards_of_what_both_ran(tmp_path: Path) -> None:
     """The second run has all of the first and another level, at which it always fails."""
-    more = [record("Pick_Blocks_Size", 3, n, False) for n in range(4)]
+    more = [shown("Pick_Blocks_Size", 3, n, False) for n in range(4)]
     runs = [make_run(tmp_path / "one", KNOWN), make_run(tmp_path / "two", [*KNOWN, *more])]
     report = make_report(runs)
     assert [len(model.scores.cells) for model in report.models] == [2, 3]
@@ -257,7 +249,7 @@ def test_percent_has_no_negative_zero() -> None:
 
 def test_an_event_in_words() -> None:
     event = EventRow(time=1.5, kind="wrong_object", object="object_3", index=1, note="lifted")
-    old = record("Pick_Blocks_Size", 1, 0, False)
+    old = shown("Pick_Blocks_Size", 1, 0, False)
     assert event_row(event, old) == [1.5, "wrong object", "#2 object_3 lifted"]
     new = replace(old, diagnostics={"objects": {"object_3": "the red cup", "object_30": "no"}})
     assert event_row(event, new) == [1.5, "wrong object", "#2 the red cup lifted"]
@@ -267,7 +259,7 @@ def test_runs_at_both_ends_are_marked_under_the_bootstrap_too(tmp_path: Path) ->
     """Its intervals are [100, 100] and [0, 0]: the test of their difference takes others."""
     task = "Pick_Blocks_Size"
     good, bad = (
-        make_run(tmp_path / name, [record(task, 1, n, success) for n in range(10)])
+        make_run(tmp_path / name, [shown(task, 1, n, success) for n in range(10)])
         for name, success in (("good", True), ("bad", False))
     )
     report = make_report([good, bad], ci="bootstrap")

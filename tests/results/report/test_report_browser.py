@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 from devtools import Page, chromium
-from report_runs import EVIL, make_run, record, write_film
+from fake_runs import EVIL, make_run, shown, write_film
 
-from robospa.results.report.files import write_report
+from robospa.results.report.page import write_report
 from robospa.results.report.report import make_report
 
 pytestmark = pytest.mark.browser
@@ -32,10 +32,10 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """130 trials of two tasks, the second of them filmed; 30 failed."""
     folder = tmp_path_factory.mktemp("browser")
     records = [
-        record("Pick_Blocks_Size", 1, n, n >= 30, candidates=2, instruction=f"take {n} {EVIL}")
+        shown("Pick_Blocks_Size", 1, n, n >= 30, candidates=2, instruction=f"take {n} {EVIL}")
         for n in range(COUNT - 10)
     ]
-    records += [record("Press_Stapler_Repeat", 2, n, True, steps=n) for n in range(10)]
+    records += [shown("Press_Stapler_Repeat", 2, n, True, steps=n) for n in range(10)]
     records[1] = replace(records[1], video="videos/a b#1.mp4", events=EVENTS)
     run = make_run(folder / "run", records)
     (folder / "run" / "videos").mkdir()
@@ -55,7 +55,7 @@ def two_runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("two")
     runs = []
     for name, good in (("one", False), ("two", True)):
-        records = [record("Pick_Blocks_Size", 1, n, good, candidates=2) for n in range(3)]
+        records = [shown("Pick_Blocks_Size", 1, n, good, candidates=2) for n in range(3)]
         records[0] = replace(records[0], video="videos/a.mp4")
         runs.append(make_run(folder / name, records))
         (folder / name / "videos").mkdir()

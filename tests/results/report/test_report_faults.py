@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from fake_records import trial_record
+from fake_runs import trial_record
 
 from robospa.results.records.manifest import RunManifest
-from robospa.results.records.run_io import Run
+from robospa.results.records.runs import Run
 from robospa.results.records.trial_record import RetryRow, TrialRecord
-from robospa.results.report.faults import (
+from robospa.results.report.run_card import facts
+from robospa.results.scoring.repeats import (
     many_policy_errors,
     policy_error_lines,
     repeat_lines,
     repeats_text,
 )
-from robospa.results.report.run_card import facts
 from robospa.trial import TrialKey
 
 LOST = RetryRow("connection_lost", "the line went dead")

@@ -9,15 +9,14 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
-from report_runs import KNOWN, make_run
+from fake_runs import KNOWN, make_run
 
 from robospa.harness.report_server import LiveReport
 from robospa.harness.running.atomic_file import run_lock
-from robospa.results.records.lint import lint_run
-from robospa.results.records.run_io import Run, read_run, to_line
-from robospa.results.records.run_state import in_progress
+from robospa.results.lint import lint_run
+from robospa.results.records.runs import Run, in_progress, read_run, to_line
 from robospa.results.report import score_table
-from robospa.results.report.files import to_data
+from robospa.results.report.page import to_data
 from robospa.results.report.report import make_report
 from robospa.results.scoring.scores import score_run
 from robospa.results.statistics.intervals import wilson

@@ -7,15 +7,15 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from report_runs import make_run, record
+from fake_runs import make_run, shown
 
 from robospa.extras import MissingPackage
 from robospa.results.failures.labels import FailedTrials
-from robospa.results.frame import trial_columns
-from robospa.results.records.run_io import Run
+from robospa.results.records.runs import Run
+from robospa.results.run import trial_columns
 
 GRASP = {"time": 1.5, "kind": "grasped", "object": "object_2", "index": -1, "note": "", "step": 4}
-WRONG = record(
+WRONG = shown(
     "Pick_It",
     2,
     8,
@@ -29,7 +29,11 @@ WRONG = record(
         "first_unreachable": "the left arm cannot reach it",
     },
 )
-ROWS = [record("Pick_It", 1, 7, True), WRONG, record("Pick_It", 2, 9, False, end="infrastructure")]
+ROWS = [
+    shown("Pick_It", 1, 7, True),
+    WRONG,
+    shown("Pick_It", 2, 9, False, end="infrastructure"),
+]
 
 
 @pytest.fixture

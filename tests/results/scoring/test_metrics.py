@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from fake_records import trial_record
+from fake_runs import trial_record
 
 from robospa.results.paper.columns import published_column
 from robospa.results.records.trial_record import TrialRecord

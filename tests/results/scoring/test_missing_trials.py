@@ -8,18 +8,16 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from run_by_hand import outcomes, record, write
+from fake_runs import outcomes, record, write
 
-from robospa.results.comparison.compare import compare
-from robospa.results.records.run_io import Run
+from robospa.results.comparison.compare import compare_results
+from robospa.results.records.runs import Run
 from robospa.results.records.trial_record import TrialRecord
-from robospa.results.report.files import write_report
-from robospa.results.report.missing import loss_lines
+from robospa.results.report.page import write_report
 from robospa.results.report.report import make_report
-from robospa.results.report.score_table import print_scores
-from robospa.results.scoring.model_results import results_of_run
-from robospa.results.scoring.score_json import to_json
-from robospa.results.scoring.scores import score_run
+from robospa.results.report.score_table import loss_lines, print_scores
+from robospa.results.scoring.models import results_of_run
+from robospa.results.scoring.scores import score_run, to_json
 from robospa.trial import TrialKey
 
 pytestmark = pytest.mark.usefixtures("same_figures_once")
@@ -135,10 +133,10 @@ def test_the_csv_has_them_as_numbers(report: Path) -> None:
 def test_a_comparison_knows_its_worst_and_best_case(run: Run, tmp_path: Path) -> None:
     records = outcomes(PICK, 1, [0] * 8) + [record(PUT, 1, seed, 1, 2) for seed in range(8)]
     other = write(tmp_path / "other", records)
-    found = compare(results_of_run(run, "mine"), results_of_run(other, "other"))
+    found = compare_results(results_of_run(run, "mine"), results_of_run(other, "other"))
     assert (
         "mine lacks 4 of the trials that both list: over these the difference is +50.0 in the "
         "worst and +75.0 in the best case for mine." in found.notes
     )
-    whole = compare(results_of_run(other, "other"), results_of_run(other, "again"))
+    whole = compare_results(results_of_run(other, "other"), results_of_run(other, "again"))
     assert not any("lacks" in note for note in whole.notes)

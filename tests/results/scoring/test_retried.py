@@ -5,12 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from fake_records import trial_record
+from fake_runs import trial_record
 
 from robospa.results.records.manifest import RunManifest
-from robospa.results.records.run_io import Run, from_line, to_line
+from robospa.results.records.runs import Run, from_line, to_line
 from robospa.results.records.trial_record import RetryRow, TrialRecord
-from robospa.results.scoring.retried import FaultRate, fault_rates, was_repeated, worst_case
+from robospa.results.scoring.repeats import FaultRate, fault_rates, was_repeated, worst_case
 from robospa.trial import TrialKey
 
 LOST = RetryRow("connection_lost", "the line went dead", 7)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from robospa.results.paper.published import load
-from robospa.results.statistics.bootstrap import (
+from robospa.results.statistics.samples import (
     Sample,
     draw,
     draw_over_tasks,

@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robospa.results.statistics.bootstrap import Sample, rate
 from robospa.results.statistics.intervals import (
     METHODS,
     Estimate,
@@ -27,6 +26,7 @@ from robospa.results.statistics.intervals import (
     paired_sample_difference,
     wilson,
 )
+from robospa.results.statistics.samples import Sample, rate
 
 
 @pytest.mark.parametrize(

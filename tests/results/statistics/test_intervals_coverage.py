@@ -13,7 +13,6 @@ from math import comb
 import numpy as np
 import pytest
 
-from robospa.results.statistics.bootstrap import Sample, rate
 from robospa.results.statistics.intervals import (
     Estimate,
     difference,
@@ -22,6 +21,7 @@ from robospa.results.statistics.intervals import (
     paired_difference,
     wilson,
 )
+from robospa.results.statistics.samples import Sample, rate
 
 TRIALS = 100
 NOISE = 0.011

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from robospa.results.statistics.power import (
+from robospa.results.comparison.sample_size import (
     discordant,
     power_paired,
     sample_size,

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from robospa.results.paper.published import load
-from robospa.results.statistics.bootstrap import Sample, rate
 from robospa.results.statistics.intervals import Estimate, interval_of, paired_difference
+from robospa.results.statistics.samples import Sample, rate
 from robospa.results.statistics.significance import (
     benjamini_hochberg,
     boschloo,

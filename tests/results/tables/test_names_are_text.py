@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
 import pytest
-from run_by_hand import outcomes, write
+from fake_runs import outcomes, write
 
 from robospa.harness.cli.main import main
 from robospa.harness.progress import Progress
 from robospa.harness.running.status import ServerStats, Status
 from robospa.results.figures.charts import draw_levels, draw_radar
 from robospa.results.figures.series import Series, save, styled
-from robospa.results.records.run_io import Run
+from robospa.results.records.runs import Run
 from robospa.results.report.page import inline_svg
 from robospa.results.report.score_table import score_table
 from robospa.results.scoring.scores import score_run
@@ -172,7 +172,7 @@ def test_a_console_is_made_in_one_place_alone() -> None:
         if not (folder == "robospa" and len(path.relative_to(ROOT).parts) > 2)
         and re.search(r"\bConsole\(|rich\.markup|markup=True", path.read_text())
     ]
-    assert places == ["robospa/text.py"]
+    assert places == ["robospa/terminal.py"]
 
 
 def test_a_console_takes_nothing_for_markup(capsys: pytest.CaptureFixture[str], name: str) -> None:

@@ -1,8 +1,9 @@
-"""Number of trials needed to tell two success rates apart, before running them.
+"""How many trials tell two rates apart, or measure an average, before any is run.
 
 Normal approximations, good to a few percent from about 20 trials on: the arcsine formula for
 unrelated seeds, the variance of the discordant pairs for equal seeds. Two policies on equal seeds
 tend to succeed on the same ones; the correlation of their outcomes is what pairing gains from.
+What averages vary by is what the published models say.
 """
 
 from __future__ import annotations
@@ -11,6 +12,37 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import NormalDist
+
+from robospa.results.paper.published import LEVELS, load
+from robospa.results.scoring.scores import Variant, weights_of
+from robospa.results.statistics.intervals import Z95
+
+
+def published_variances(variants: Sequence[Variant]) -> dict[str, float]:
+    """By published model the variance of the mean over `variants` with one trial of each; only
+    those of the 280 count. Empty if `variants` has none."""
+    data = load()
+    known = [v for v in variants if v[0] in data.tasks and v[1] in LEVELS]
+    if not known:
+        return {}
+    weights = weights_of(known, {task: about.category for task, about in data.tasks.items()})
+    found = {}
+    for model in data.models:
+        rows = data.per_task[model, "sr"].rows
+        rates = [rows[task][level - 1] / 100 for task, level in known]
+        found[model] = sum(w * w * p * (1 - p) for w, p in zip(weights, rates, strict=True))
+    return found
+
+
+def half_width(variance: float, trials: int) -> float:
+    """Half of the 95 % interval of a mean that varies by `variance` with one trial a variant."""
+    return Z95 * math.sqrt(variance / trials)
+
+
+def trials_for(variance: float, half: float) -> int:
+    """Trials of every variant that a `half` width takes."""
+    return math.ceil(variance * (Z95 / half) ** 2)
+
 
 POWER = 0.8
 ALPHA = 0.05
@@ -28,7 +60,7 @@ class SampleSize:
 
 def trials_unpaired(base: float, other: float, power: float = POWER, alpha: float = ALPHA) -> int:
     """Trials a side, each on seeds of its own, to tell the rates apart with probability `power`."""
-    _check(base, other)
+    _check_rates(base, other)
     gap = 2 * math.asin(math.sqrt(other)) - 2 * math.asin(math.sqrt(base))
     return math.ceil(2 * (_z(power, alpha) / gap) ** 2)
 
@@ -37,7 +69,7 @@ def trials_paired(
     base: float, other: float, correlation: float, power: float = POWER, alpha: float = ALPHA
 ) -> int:
     """Common seeds needed if outcomes on one seed have this (phi) `correlation`."""
-    _check(base, other)
+    _check_rates(base, other)
     normal, gap = NormalDist(), other - base
     apart = discordant(base, other, correlation)
     spread = math.sqrt(max(0.0, apart - gap * gap))
@@ -83,6 +115,6 @@ def _z(power: float, alpha: float) -> float:
     return normal.inv_cdf(1 - alpha / 2) + normal.inv_cdf(power)
 
 
-def _check(base: float, other: float) -> None:
+def _check_rates(base: float, other: float) -> None:
     if not (0 <= base <= 1 and 0 <= other <= 1) or base == other:
         raise ValueError(f"{base:g} and {other:g} are not two different rates between 0 and 1")

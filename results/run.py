@@ -1,21 +1,90 @@
-"""The trials of a run as columns: for pandas, Parquet, and whatever reads those."""
+"""A run as its user sees it: one that shows its scores and failures and becomes a data frame."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from robospa.extras import need
-from robospa.results.failures.labels import NAMES, label
-from robospa.results.records.action_problems import KINDS
-from robospa.results.records.object_names import described
-from robospa.results.records.run_io import Run, finished
+from robospa.results.failures.labels import NAMES, FailedTrials, failed_trials, label
+from robospa.results.records.action_problems import KINDS, described
+from robospa.results.records.runs import Run, finished, read_run
 from robospa.results.records.trial_record import TrialRecord
+from robospa.results.report.score_table import run_html, run_table
+from robospa.results.tables import Table
 from robospa.trial import TrialKey
 
 if TYPE_CHECKING:
     from pandas import DataFrame
+
+
+class LoadedRun(Run):
+    """A run that was read: its manifest, its list of trials, and one record per finished trial.
+
+        run = robospa.load_run("runs/mine")
+        print(run.table())
+        frame = run.to_pandas()
+        by_level = frame.groupby("level").success.mean()
+
+    In a notebook it shows its scores and its failures.
+    """
+
+    def table(self) -> Table:
+        """The success rates with their intervals, by task and level: `print` shows it as text, a
+        notebook as HTML."""
+        return run_table(self)
+
+    def failures(self) -> FailedTrials:
+        """A list of every failed trial with the type of its failure and the evidence for it;
+        `print` and a notebook show a line of each."""
+        return failed_trials(self.records.values())
+
+    def to_pandas(self) -> DataFrame:
+        """One row a listed trial, as `trial_columns` has them; of a trial without a result
+        everything but its key and `end` is missing.
+
+        Counts and `success` have types that know missing values. Raises MissingPackage without
+        pandas, which the extra `notebook` brings.
+        """
+        frame = need("pandas").DataFrame(trial_columns(self))
+        kinds = {"success": "boolean", **dict.fromkeys((*COUNTS, *PROBLEMS), "Int64")}
+        kinds |= dict.fromkeys(NUMBERS, "float64")
+        return frame.astype(kinds)
+
+    def to_parquet(self, path: str | Path) -> None:
+        """Write the rows of `to_pandas` as a Parquet file.
+
+        Raises MissingPackage without pyarrow, which the extra `notebook` brings.
+        """
+        arrow, parquet = need("pyarrow"), need("pyarrow.parquet")
+        texts = dict.fromkeys((*KEY_COLUMNS, "end", *TEXTS), arrow.string())
+        numbers = dict.fromkeys(NUMBERS, arrow.float64())
+        counts = dict.fromkeys(("level", "seed", *COUNTS, *PROBLEMS), arrow.int64())
+        kinds = {**texts, **numbers, **counts, "success": arrow.bool_()}
+        columns = trial_columns(self)
+        schema = arrow.schema([(name, kinds[name]) for name in columns])
+        parquet.write_table(arrow.table(columns, schema=schema), Path(path))
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows."""
+        return run_html(self)
+
+
+def load_run(folder: str | Path) -> LoadedRun:
+    """The run in `folder`, finished or not.
+
+        run = robospa.load_run("runs/mine")
+        ends = {key: record.end for key, record in run.records.items()}
+
+    Raises:
+        RunError: There is no run, or a file of it is damaged or contradicts itself.
+        RepeatabilityError: Two records of one trial differ in more than times.
+    """
+    run = read_run(folder)
+    return LoadedRun(**{field.name: getattr(run, field.name) for field in fields(run)})
+
 
 Cell = str | int | float | bool | None
 NOT_RUN = "not run"
@@ -104,26 +173,3 @@ def _result(run: Run, key: TrialKey) -> TrialRecord | None:
 def _end(run: Run, key: TrialKey) -> str:
     record = run.records.get(key)
     return NOT_RUN if record is None else record.end
-
-
-def to_pandas(run: Run) -> DataFrame:
-    """`trial_columns` as a data frame; counts and `success` have types that know missing values.
-
-    Raises MissingPackage without pandas.
-    """
-    frame = need("pandas").DataFrame(trial_columns(run))
-    kinds = {"success": "boolean", **dict.fromkeys((*COUNTS, *PROBLEMS), "Int64")}
-    kinds |= dict.fromkeys(NUMBERS, "float64")
-    return frame.astype(kinds)
-
-
-def to_parquet(run: Run, path: Path) -> None:
-    """Write `trial_columns` to `path`; raises MissingPackage without pyarrow."""
-    arrow, parquet = need("pyarrow"), need("pyarrow.parquet")
-    texts = dict.fromkeys((*KEY_COLUMNS, "end", *TEXTS), arrow.string())
-    numbers = dict.fromkeys(NUMBERS, arrow.float64())
-    counts = dict.fromkeys(("level", "seed", *COUNTS, *PROBLEMS), arrow.int64())
-    kinds = {**texts, **numbers, **counts, "success": arrow.bool_()}
-    columns = trial_columns(run)
-    schema = arrow.schema([(name, kinds[name]) for name in columns])
-    parquet.write_table(arrow.table(columns, schema=schema), path)

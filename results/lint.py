@@ -18,15 +18,22 @@ from robospa.results.paper.published import load
 from robospa.results.paper.rounding import rounded
 from robospa.results.records.action_problems import (
     OFTEN,
+    grouped,
     problem_counts,
     truncated_instructions,
 )
-from robospa.results.records.finding import Finding
-from robospa.results.records.lint_faults import lint_faults
 from robospa.results.records.manifest import LIMITS, REAL_TIME, departures
-from robospa.results.records.run_io import Run, finished, lost_actions
+from robospa.results.records.runs import Run, finished, lost_actions
 from robospa.results.records.trial_record import TrialRecord
-from robospa.results.statistics.onta import of_percent
+from robospa.results.scoring.repeats import (
+    FEW,
+    MOST_AT_LEVEL,
+    MOST_REPEATED,
+    NOTED,
+    FaultRate,
+    fault_rates,
+)
+from robospa.results.statistics.samples import onta_of_percent
 from robospa.text import some
 from robospa.trial import PROCEDURAL
 
@@ -125,7 +132,7 @@ def _lint_row(row: ResultRow) -> Iterator[Finding]:
             yield Finding("ps-not-a-share", "error", where, text)
         n = _at(row.candidates, place)
         if corrected is not None and sr is not None and n:
-            follows = of_percent(sr, n)
+            follows = onta_of_percent(sr, n)
             if abs((rounded(follows) if row.printed else follows) - corrected) > 0.05:
                 text = f"ONTA {corrected:g} does not follow from SR {sr:g} and n = {n}"
                 yield Finding("onta-from-sr", "error", where, f"{text}: {rounded(follows):g} does")
@@ -360,3 +367,53 @@ def _shared(
                 first, second = sorted(alike)[:2]
                 example = example or f"such as {task} L{level} seeds {first} and {second}"
     return _Shared(count, example) if count else None
+
+
+SEVERITIES = ("error", "warning", "note")
+"""From wrong numbers to what a reader may want to know."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing found: `rule` is its short name, `severity` is one of SEVERITIES."""
+
+    rule: str
+    severity: str
+    where: str
+    text: str
+
+    def __str__(self) -> str:
+        return f"{self.severity}: {self.where}: {self.text} [{self.rule}]"
+
+
+MANY_ERRORS = 0.05
+"""Share of policy errors that asks for a look."""
+
+
+def lint_faults(results: Sequence[TrialRecord], name: str) -> Iterator[Finding]:
+    """Findings in the `results` of the run called `name`."""
+    whole, *levels = fault_rates(results)
+    bad = [rate for rate in (whole, *levels) if rate.too_many]
+    for rate in bad:
+        most = MOST_AT_LEVEL if rate.level else MOST_REPEATED
+        text = (
+            f"{_counted(rate)}, more than {100 * most:g} % (or {FEW}): each had another chance "
+            "after a fault that its policy may have caused"
+        )
+        yield Finding("repeated-trials", "error", name, text)
+    if not bad and whole.repeated > NOTED * whole.results:
+        text = f"{_counted(whole)}: each had another chance after a fault"
+        yield Finding("repeated-trials", "warning", name, text)
+    if whole.policy_errors > MANY_ERRORS * whole.results:
+        errors = [record.message for record in results if record.end == "policy_error"]
+        count, reason = grouped(errors)[0]
+        text = (
+            f"{len(errors)} of {len(results)} trials ended in a policy error, {count} of them: "
+            f"{reason}"
+        )
+        yield Finding("policy-errors", "warning", name, text)
+
+
+def _counted(rate: FaultRate) -> str:
+    where = f" at level {rate.level}" if rate.level else ""
+    return f"{rate.repeated} of {rate.results} trials{where} were repeated"

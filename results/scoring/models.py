@@ -1,27 +1,104 @@
-"""The results of one model, the input of tables, figures, reports and comparisons."""
+"""The results of one model in its setting; different settings are never averaged or compared."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
-from robospa.results.records.manifest import REST_TO_REST, RunManifest
-from robospa.results.records.run_io import Run, finished
+from robospa.results.records.manifest import OFFICIAL, REST_TO_REST, RunManifest
+from robospa.results.records.runs import Run, finished
 from robospa.results.records.trial_record import TrialRecord
-from robospa.results.scoring.scores import Scores, score
-from robospa.results.scoring.setting import (
-    BESIDE_PAPER,
-    OFFICIAL,
-    IncomparableError,
-    Setting,
-    check_same,
-    setting_of,
-)
-from robospa.results.scoring.weights import Variant
-from robospa.results.statistics.bootstrap import Sample
+from robospa.results.scoring.scores import Scores, Variant, score
 from robospa.results.statistics.intervals import METHODS
+from robospa.results.statistics.samples import Sample
 from robospa.trial import BASIC, METRIC_CATEGORIES, TrialKey
+
+TABLE = ("embodiment", "mode", "suite", "split")
+COMPARISON = (*TABLE, "step_scale")
+"""Parts of a setting that runs have to share in one table, and in one comparison."""
+BESIDE_PAPER = ("embodiment", "mode")
+"""Parts that a run has to share with published models, which are a suite of their own."""
+RAN_WITH = {
+    "embodiment": "the embodiments {} and {}",
+    "mode": "the scene modes {} and {}",
+    "split": "the instruction splits {} and {}",
+    "suite": "the suites {} and {}",
+    "step_scale": "{:g} and {:g} times the official step limits",
+    "clock": "the clocks {} and {}",
+}
+"""Words of messages for two different values of each part."""
+
+
+class IncomparableError(ValueError):
+    """Results that cannot stand in one table or comparison; the message says why and what to do."""
+
+
+@dataclass(frozen=True)
+class Setting:
+    """The distinct values of every part over all trials; empty where a part is not known.
+
+    `step_scale` multiplied the official step limits. `clock` is "paused", or a real one with its
+    latency.
+    """
+
+    embodiment: tuple[str, ...] = ()
+    mode: tuple[str, ...] = ()
+    split: tuple[str, ...] = ()
+    suite: tuple[str, ...] = ()
+    step_scale: tuple[float, ...] = ()
+    clock: tuple[str, ...] = ()
+
+    def mixed(self) -> list[tuple[str, tuple[str, ...]]]:
+        """The parts that have several values, with these."""
+        parts = (("embodiment", self.embodiment), ("mode", self.mode), ("split", self.split))
+        return [(name, values) for name, values in parts if len(values) > 1]
+
+
+PAUSED = "paused"
+"""The clock of the benchmark: the simulation waits for the policy."""
+
+
+def setting_of(keys: Sequence[TrialKey], manifest: RunManifest) -> Setting:
+    """The setting of the trials `keys` of a run."""
+    return Setting(
+        tuple(sorted({key.embodiment for key in keys})),
+        tuple(sorted({key.mode for key in keys})),
+        tuple(sorted({key.split for key in keys})),
+        (manifest.suite,) if manifest.suite else (),
+        (manifest.settings.step_scale,),
+        (manifest.clock or PAUSED,),
+    )
+
+
+def check_same(settings: Iterable[tuple[str, Setting]], parts: Sequence[str]) -> None:
+    """IncomparableError if one of the named settings mixes values, or two differ in `parts`.
+
+    What one of several does not state equals nothing.
+    """
+    known = list(settings)
+    for name, setting in known:
+        for part, values in setting.mixed():
+            raise IncomparableError(
+                f"{name} mixes {RAN_WITH[part].format(', '.join(values[:-1]), values[-1])}, whose "
+                "mean means nothing: evaluate one at a time"
+            )
+    for part in parts:
+        found: dict[str | float, str] = {}
+        for name, setting in known:
+            if len(known) > 1 and not getattr(setting, part):
+                raise IncomparableError(
+                    f"{name} does not state its {part}, so it stands beside no other run: "
+                    "evaluate it again"
+                )
+            for value in getattr(setting, part):
+                found.setdefault(value, name)
+        if len(found) > 1:
+            (one, first), (other, second), *_ = found.items()
+            raise IncomparableError(
+                f"{first} and {second} cannot be compared: they ran with "
+                f"{RAN_WITH[part].format(one, other)}"
+            )
 
 
 @dataclass(frozen=True)

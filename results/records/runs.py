@@ -8,6 +8,7 @@ one trial must agree on everything that a repeatable world decides; if not, that
 
 from __future__ import annotations
 
+import fcntl
 import json
 import os
 from collections import Counter
@@ -15,21 +16,20 @@ from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from robospa.results.records.films import film_name, films_in
-from robospa.results.records.manifest import RunError, RunManifest, read_bytes, read_manifest
-from robospa.results.records.run_state import in_progress
+from msgspec import structs
+
+from robospa.results.records.manifest import (
+    OFFICIAL,
+    RunError,
+    RunManifest,
+    read_bytes,
+    read_manifest,
+)
 from robospa.results.records.trial_record import TrialRecord
 from robospa.schema import parse_json, read
 from robospa.text import some
 from robospa.trial import TrialKey
-
-if TYPE_CHECKING:
-    from pandas import DataFrame
-
-    from robospa.results.failures.labels import FailedTrials
-    from robospa.results.tables import Table
 
 TRIALS = "trials"
 """Folder inside a run that holds the record files."""
@@ -62,15 +62,7 @@ class RepeatabilityError(RunError):
 
 @dataclass(frozen=True, repr=False)
 class Run:
-    """A run that was read: its manifest, its list of trials, and one record per finished trial.
-
-        run = robospa.load_run("runs/mine")
-        print(run.table())
-        frame = run.to_pandas()
-        by_level = frame.groupby("level").success.mean()
-
-    In a notebook it shows its scores and its failures.
-    """
+    """A run that was read: its manifest, its list of trials, and one record per finished trial."""
 
     folder: Path
     """The run's folder."""
@@ -110,50 +102,11 @@ class Run:
         waiting = set(self.waiting)
         return tuple(k for k in self.keys if k not in waiting) if waiting else self.keys
 
-    def table(self) -> Table:
-        """The success rates with their intervals, by task and level: `print` shows it as text, a
-        notebook as HTML."""
-        from robospa.results.report.run_view import run_table
-
-        return run_table(self)
-
-    def failures(self) -> FailedTrials:
-        """A list of every failed trial with the type of its failure and the evidence for it;
-        `print` and a notebook show a line of each."""
-        from robospa.results.failures.labels import failed_trials
-
-        return failed_trials(self.records.values())
-
-    def to_pandas(self) -> DataFrame:
-        """One row a listed trial, as `robospa.results.frame.trial_columns` has them; of a
-        trial without a result everything but its key and `end` is missing.
-
-        Raises MissingPackage without pandas, which the extra `notebook` brings.
-        """
-        from robospa.results.frame import to_pandas
-
-        return to_pandas(self)
-
-    def to_parquet(self, path: str | Path) -> None:
-        """Write the rows of `to_pandas` as a Parquet file.
-
-        Raises MissingPackage without pyarrow, which the extra `notebook` brings.
-        """
-        from robospa.results.frame import to_parquet
-
-        to_parquet(self, Path(path))
-
     def __repr__(self) -> str:
         """The folder and the counts, not thousands of records."""
         won = sum(record.success for record in self.records.values())
         done = len(self.keys) - len(self.without_result)
         return f"Run({str(self.folder)!r}, {won} successes in {done} of {len(self.keys)} trials)"
-
-    def _repr_html_(self) -> str:
-        """What a notebook shows."""
-        from robospa.results.report.run_view import run_html
-
-        return run_html(self)
 
 
 def finished(record: TrialRecord | None) -> bool:
@@ -252,9 +205,6 @@ def read_records(folder: Path) -> dict[TrialKey, TrialRecord]:
 def read_run(folder: str | Path) -> Run:
     """The run in `folder`, finished or not.
 
-        run = robospa.load_run("runs/mine")
-        ends = {key: record.end for key, record in run.records.items()}
-
     Raises:
         RunError: There is no run, or a file of it is damaged or contradicts itself.
         RepeatabilityError: Two records of one trial differ in more than times.
@@ -310,3 +260,115 @@ def lost_actions(folder: Path, records: Mapping[TrialKey, TrialRecord]) -> list[
 
 def _record_files(folder: Path) -> list[Path]:
     return sorted((folder / TRIALS).glob("*.jsonl"))
+
+
+VIDEOS = "videos"
+"""Folder inside a run that holds the films."""
+
+
+def film_name(key: TrialKey) -> str:
+    """Path of the film of `key` inside its run's folder."""
+    return f"{VIDEOS}/{key.slug}.mp4"
+
+
+def films_in(folder: Path) -> frozenset[str]:
+    """Paths of the films that are there, inside the run's `folder`."""
+    try:
+        return frozenset(f"{VIDEOS}/{name}" for name in os.listdir(folder / VIDEOS))
+    except OSError:
+        return frozenset()
+
+
+def owed_films(folder: Path, records: Iterable[TrialRecord]) -> list[TrialRecord]:
+    """Those of `records` whose film the run in `folder` wants and does not have."""
+    there = films_in(folder)
+    return [r for r in records if r.video == film_name(r.key) and r.video not in there]
+
+
+LOCK = ".lock"
+"""File of a run's folder that its driver holds a lock on."""
+
+
+def in_progress(folder: Path) -> bool:
+    """Whether a process is running the run in `folder`; False where locks do not tell.
+
+    A driver that starts at the very instant of the look tries again (`running.run_lock`).
+    """
+    try:
+        file = os.open(folder / LOCK, os.O_RDONLY)
+    except OSError:
+        return False
+    try:
+        fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except OSError:  # a file system without locks
+        return False
+    finally:
+        os.close(file)
+    return False
+
+
+MARK = "@"
+"""Between a run's folder and a robot, scene mode or split of it: `runs/mine@piper`."""
+PARTS = ("embodiment", "mode", "split")
+
+
+def by_setting(run: Run) -> list[Run]:
+    """`run` itself, or a run for each robot, scene mode and split that it holds, in its order."""
+    settings = dict.fromkeys(map(_setting, run.keys))
+    if len(settings) < 2:
+        return [run]
+    return [_part(run, setting) for setting in settings]
+
+
+def _setting(key: TrialKey) -> tuple[str, str, str]:
+    return key.embodiment, key.mode, key.split
+
+
+def _part(run: Run, setting: tuple[str, str, str]) -> Run:
+    keys = tuple(key for key in run.keys if _setting(key) == setting)
+    chosen = set(keys)
+    parts = {name: (value,) for name, value in zip(PARTS, setting, strict=True)}
+    settings = structs.replace(run.manifest.settings, **parts)
+    return replace(
+        run,
+        manifest=structs.replace(run.manifest, settings=settings),
+        keys=keys,
+        records={key: record for key, record in run.records.items() if key in chosen},
+        repeated=tuple(key for key in run.repeated if key in chosen),
+    )
+
+
+def setting_name(run: Run) -> str:
+    """Robots, scene modes and splits of `run` in a few words, with its suite and clock where they
+    are not the benchmark's; the usual mode and split go without saying."""
+    robots = dict.fromkeys(key.embodiment for key in run.keys)
+    modes = dict.fromkeys(key.mode for key in run.keys if key.mode != "clean")
+    splits = dict.fromkeys(key.split for key in run.keys if key.split != "heldout")
+    official = [run.manifest.suite] if run.manifest.suite.startswith(OFFICIAL) else []
+    clock = [run.manifest.clock] if run.manifest.clock else []
+    return ", ".join((*official, *robots, *modes, *splits, *clock))
+
+
+def read_part(name: str) -> Run:
+    """The run in a folder, or the part that `FOLDER@ROBOT`, `FOLDER@MODE` or `FOLDER@SPLIT` names.
+
+    Raises RunError if the folder holds several of these and `name` does not choose one.
+    """
+    folder, mark, chosen = name.rpartition(MARK)
+    if Path(name).exists() or not mark:
+        folder, chosen = name, ""
+    parts = by_setting(read_run(Path(folder).resolve()))
+    found = [
+        part
+        for part in parts
+        if not chosen or chosen in (*_setting(part.keys[0]), setting_name(part))
+    ]
+    if len(found) == 1:
+        return found[0]
+    names = ", ".join(setting_name(part) for part in parts)
+    raise RunError(
+        f"{folder} holds trials of {names}: choose one, such as {folder}{MARK}"
+        f"{parts[0].keys[0].embodiment}"
+    )

@@ -7,8 +7,7 @@ way, kept as the reference that the tests hold the fast one to.
 
 What it answers: the same tasks with other seeds. `draw_over_tasks` resamples the tasks as well.
 Where all outcomes of a variant are equal its resamples are all equal too, so a percentile interval
-there is a point: see `robospa.results.statistics.intervals` for what to print instead.
-"""
+there is a point: see `robospa.results.statistics.intervals` for what to print instead."""
 
 from __future__ import annotations
 
@@ -20,7 +19,30 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.results.statistics.onta import scale_and_shift
+
+def scale_and_shift(candidates: int) -> tuple[float, float]:
+    """ONTA as `shift + scale * rate`; ValueError if there are fewer than two candidates."""
+    _check_candidates(candidates)
+    chance = 1 / candidates
+    return 1 / (1 - chance), -chance / (1 - chance)
+
+
+def onta_of_percent(success: float, candidates: int) -> float:
+    """ONTA in percent of a success rate in percent, computed as the paper does."""
+    _check_candidates(candidates)
+    return (success - 100 / candidates) / (1 - 1 / candidates)
+
+
+def onta_of_bound(rate: float, candidates: int) -> float:
+    """ONTA of a bound of a success rate (a fraction): exactly 1 at 1."""
+    _check_candidates(candidates)
+    return (rate * candidates - 1) / (candidates - 1)
+
+
+def _check_candidates(candidates: int) -> None:
+    if candidates < 2:
+        raise ValueError(f"chance among {candidates} candidates is certainty")
+
 
 RESAMPLES = 10_000
 CHUNK = 16
@@ -121,7 +143,7 @@ def draw(
     resamples: int = RESAMPLES,
 ) -> NDArray[np.float64]:
     """Resampled values of the weighted sum of independent `samples`, shape [resamples]."""
-    _check(samples, weights)
+    _check_weights(samples, weights)
     generator = np.random.default_rng(seed)
     drawn = np.full(resamples, sum(w * s.shift for s, w in zip(samples, weights, strict=True)))
     for first in range(0, len(samples), CHUNK):
@@ -192,7 +214,7 @@ def resample_episodes(
     samples: Sequence[Sample], weights: Sequence[float], seed: int = 0, resamples: int = RESAMPLES
 ) -> NDArray[np.float64]:
     """The values of `draw`, episode by episode: the slow way, to check the fast one against."""
-    _check(samples, weights)
+    _check_weights(samples, weights)
     generator = np.random.default_rng(seed)
     drawn = np.zeros(resamples)
     for sample, weight in zip(samples, weights, strict=True):
@@ -202,6 +224,6 @@ def resample_episodes(
     return drawn
 
 
-def _check(samples: Sequence[Sample], weights: Sequence[float]) -> None:
+def _check_weights(samples: Sequence[Sample], weights: Sequence[float]) -> None:
     if len(samples) != len(weights) or not samples:
         raise ValueError("a weighted sum needs one weight for each of at least one sample")
