@@ -50,6 +50,7 @@ from robospa.leaderboard.untrusted import BundleArchive, check_text, parse
 from robospa.results.comparison.compare import Difference, compare_results, over_levels
 from robospa.results.lint import lint_run
 from robospa.results.paper.columns import run_column
+from robospa.results.paper.tables import FORMATS
 from robospa.results.records.manifest import RunManifest, RunSettings, seed_hash
 from robospa.results.records.runs import Run
 from robospa.results.records.trial_record import TrialRecord
