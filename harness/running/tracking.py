@@ -21,7 +21,7 @@ ID_FILE = "wandb.txt"
 """In a run's folder: the id under which W&B knows it, so that a resumed run goes on there."""
 
 
-class Tracker(Protocol):
+class RunTracker(Protocol):
     """What is told of a run while it goes on."""
 
     def add(self, record: TrialRecord) -> None:
@@ -106,7 +106,7 @@ class WandbTracker:
 class Careful:
     """A tracker that is left alone after its first error, which `say` is told."""
 
-    def __init__(self, tracker: Tracker, say: Callable[[str], None]) -> None:
+    def __init__(self, tracker: RunTracker, say: Callable[[str], None]) -> None:
         self._tracker, self._say = tracker, say
         self._failed = False
 
@@ -133,7 +133,7 @@ class Careful:
             self._say(f"warning: nothing more is logged with --log, the run goes on: {reason}")
 
 
-def open_tracker(log: str, folder: Path, settings: Mapping[str, Any]) -> Tracker:
+def open_tracker(log: str, folder: Path, settings: Mapping[str, Any]) -> RunTracker:
     """The tracker that the setting `log` names; raises MissingPackage without its package."""
     name, _, project = log.partition(":")
     return Nothing() if name == "none" else WandbTracker(folder, project or PROJECT, settings)

@@ -160,7 +160,7 @@ STAND = "stand"
 
 
 @dataclass(frozen=True)
-class Mesh:
+class DrawnMesh:
     """Triangles `faces` (F, 3) of `vertices` (V, 3) [m] in the frame of their body.
 
     `colors` are sRGB, uint8: (3,) one for all, or (V, 3) one a vertex.
@@ -179,7 +179,7 @@ class DrawnBody:
     """
 
     name: str
-    meshes: tuple[Mesh, ...]
+    meshes: tuple[DrawnMesh, ...]
     pose: Pose | None = None
 
     @property
@@ -208,7 +208,7 @@ def drawn_bodies(scene: Scene, robot: Embodiment) -> list[DrawnBody]:
     return [body for body in found if body.meshes]
 
 
-def meshes(shapes: Iterable[Shape], skin: Skin | None = None) -> tuple[Mesh, ...]:
+def meshes(shapes: Iterable[Shape], skin: Skin | None = None) -> tuple[DrawnMesh, ...]:
     """The visual ones of `shapes`, one mesh a colour, and `skin`."""
     by_color: dict[Color, list[Shape]] = {}
     for shape in shapes:
@@ -224,7 +224,7 @@ def srgb(linear: NDArray[np.float64]) -> NDArray[np.uint8]:
     return levels
 
 
-def _merged(shapes: Sequence[Shape], color: Color) -> Mesh:
+def _merged(shapes: Sequence[Shape], color: Color) -> DrawnMesh:
     vertices, faces, count = [], [], 0
     for shape in shapes:
         corners, index = surface(shape.geometry)
@@ -232,14 +232,14 @@ def _merged(shapes: Sequence[Shape], color: Color) -> Mesh:
         vertices.append(turned + np.asarray(shape.pose.position))
         faces.append(index + count)
         count += len(corners)
-    return Mesh(
+    return DrawnMesh(
         np.concatenate(vertices).astype(np.float32),
         np.concatenate(faces).astype(np.uint32),
         srgb(np.asarray(color)),
     )
 
 
-def _skinned(skin: Skin) -> Mesh:
+def _skinned(skin: Skin) -> DrawnMesh:
     """The mesh in the file of `skin`, with its picture's colours at its vertices."""
     from robospa.harness.sim.render_bodies import tinted
 
@@ -250,4 +250,4 @@ def _skinned(skin: Skin) -> Mesh:
     placed = (vertices * np.asarray(skin.scale)) @ turn + np.asarray(skin.pose.position)
     size = np.array(picture.shape[:2])
     rows, columns = (np.mod(uvs[:, ::-1], 1.0) * size).astype(int).clip(0, size - 1).T
-    return Mesh(placed.astype(np.float32), faces.astype(np.uint32), picture[rows, columns, :3])
+    return DrawnMesh(placed.astype(np.float32), faces.astype(np.uint32), picture[rows, columns, :3])

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from robospa.extras import need
 from robospa.geometry import Pose
-from robospa.harness.viewer.playback import DrawnBody, Mesh, Playback
+from robospa.harness.viewer.playback import DrawnBody, DrawnMesh, Playback
 
 if TYPE_CHECKING:
     import viser
@@ -77,7 +77,7 @@ class Scene3D:
             )
 
     @staticmethod
-    def _mesh(scene: Any, path: str, mesh: Mesh) -> None:
+    def _mesh(scene: Any, path: str, mesh: DrawnMesh) -> None:
         if mesh.colors.ndim == 1:
             color = tuple(map(int, mesh.colors))
             scene.add_mesh_simple(path, mesh.vertices, mesh.faces, color=color)

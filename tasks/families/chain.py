@@ -48,7 +48,7 @@ class Station:
 
 
 @dataclass(frozen=True)
-class Chain:
+class ActionChain:
     """A chain of actions. `steps` are the letters of each level, `limits` its step limits.
 
     `items` draws a level's things, None if they do not fit; their roles are the fields of `facts`.

@@ -17,7 +17,7 @@ import numpy as np
 from robospa.geometry import Pose
 from robospa.tasks import objects
 from robospa.tasks.families import chain, table
-from robospa.tasks.families.chain import Chain, Region, Station
+from robospa.tasks.families.chain import ActionChain, Region, Station
 from robospa.tasks.goals.conditions import Rests, on_spot
 from robospa.tasks.instructions.grammar import Slots
 from robospa.tasks.instructions.text import TaskText
@@ -126,7 +126,7 @@ def _scale_slots(scene: Scene) -> Slots:
     return phrases | (SCALE_TEXT.slots("cards") if scene.level >= 3 else {})
 
 
-SCALE = Chain(
+SCALE = ActionChain(
     "Place_Object_Scale_Click", SCALE_STEPS, LIMITS, ScaleFacts, _scale_items, _scale_station
 ).task(
     SCALE_TEXT.templates,
@@ -223,7 +223,7 @@ def _tray_station(scene: Scene, step: str) -> Station:
     return chain.there(place, rests)
 
 
-TRAY = Chain(
+TRAY = ActionChain(
     "Place_Burger_Fries_Click_Bell", TRAY_STEPS, LIMITS, TrayFacts, _tray_items, _tray_station
 ).task(
     TRAY_TEXT.templates,

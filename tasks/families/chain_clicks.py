@@ -18,7 +18,7 @@ from robospa.geometry import Pose
 from robospa.tasks import objects
 from robospa.tasks.colors import NAMED
 from robospa.tasks.families import table
-from robospa.tasks.families.chain import Chain, Station, button
+from robospa.tasks.families.chain import ActionChain, Station, button
 from robospa.tasks.goals.conditions import Opened, Rests, level_with
 from robospa.tasks.goals.counters import PressCounter
 from robospa.tasks.instructions.grammar import Slots
@@ -120,7 +120,7 @@ def _can_slots(scene: Scene) -> Slots:
     return CAN_TEXT.slots(*things[: {1: 1, 2: 3, 3: 3}.get(scene.level, 5)])
 
 
-CAN = Chain(
+CAN = ActionChain(
     "Click_Can_Place_Items",
     # c a click, b the bread into the basket, p the pill bottle onto the pad
     steps={1: "c", 2: "cb", 3: "cbc", 4: "cbcp", 5: "cbcpc"},
@@ -271,7 +271,7 @@ def _slots(scene: Scene) -> Slots:
     return phrases
 
 
-MICROWAVE = Chain(
+MICROWAVE = ActionChain(
     "Click_Bell_Open_Microwave_Place_Object",
     # c a click, o the microwave opened, p one thing placed left of another
     steps={1: "c", 2: "co", 3: "coc", 4: "cocp", 5: "cocpc"},

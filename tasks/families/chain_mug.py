@@ -15,7 +15,7 @@ import numpy as np
 
 from robospa.geometry import Pose
 from robospa.tasks.families import table
-from robospa.tasks.families.chain import Chain, Station
+from robospa.tasks.families.chain import ActionChain, Station
 from robospa.tasks.families.dustbin import reachable
 from robospa.tasks.goals.conditions import Near, Rests
 from robospa.tasks.instructions.grammar import Slots
@@ -169,7 +169,7 @@ def _slots(scene: Scene) -> Slots:
     return TEXT.slots("mug", "rack", *(("area",) if colors else ())) | blocks
 
 
-TASK = Chain(
+TASK = ActionChain(
     "Hang_Mug_Stack_Blocks",
     steps={n: "mrgby"[:n] for n in range(1, 6)},
     limits={n: 200 + 200 * n for n in range(1, 6)},

@@ -16,7 +16,7 @@ import numpy as np
 
 from robospa.geometry import Pose
 from robospa.tasks.families.chain import (
-    Chain,
+    ActionChain,
     Region,
     Station,
     button,
@@ -126,7 +126,7 @@ def _phone_slots(scene: Scene) -> Slots:
     return phrases | (PHONE_TEXT.slots("bin", "dustbin") if scene.level == DUMP_LEVEL else {})
 
 
-PHONE = Chain(
+PHONE = ActionChain(
     "Place_Phone_Press_Stapler",
     # d the phone onto its stand, s the stapler, b the small bin emptied; only presses latch
     steps={n: "d" + "s" * count + "b" * (n == DUMP_LEVEL) for n, count in PRESSES.items()},
@@ -219,7 +219,7 @@ def _seals_slots(scene: Scene) -> Slots:
     return phrases
 
 
-SEALS = Chain(
+SEALS = ActionChain(
     "Stamp_Seals_Press_Stapler",
     SEALS_STEPS,
     limits={n: 200 * n for n in range(1, 6)},

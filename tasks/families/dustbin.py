@@ -282,7 +282,7 @@ def _cup_templates(level: int) -> Templates:
     return (CUPS_TEXT if CUP_COUNT[level] else TEXT).templates(level)
 
 
-CUPS = chain.Chain(
+CUPS = chain.ActionChain(
     "Place_Bottle_Cup",
     steps={n: "123"[: BOTTLE_COUNT[n]] + "xy"[: CUP_COUNT[n]] for n in range(1, 6)},
     limits={1: 400, 2: 800, 3: 1200, 4: 1400, 5: 1600},

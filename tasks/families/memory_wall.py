@@ -95,7 +95,7 @@ GOAL_Y, GOAL_X = -0.18, 0.16
 
 
 @dataclass(frozen=True)
-class BlocksFacts(SceneFacts):
+class WallFacts(SceneFacts):
     """The colours shown, the blocks of these colours, all other blocks, and the wall."""
 
     colors: tuple[str, ...]
@@ -128,7 +128,7 @@ def _draw_blocks(level: int, rng: np.random.Generator, workcell: Workcell) -> Sc
             )
         )
     scene_objects, names = table.named(rng, items)
-    facts = BlocksFacts(
+    facts = WallFacts(
         colors=tuple(colors[:level]),
         targets=tuple(names[color] for color in colors[:level]),
         others=tuple(names[color] for color in colors[level:]),
@@ -139,13 +139,13 @@ def _draw_blocks(level: int, rng: np.random.Generator, workcell: Workcell) -> Sc
 
 def _blocks_goal(scene: Scene) -> AfterCue:
     """The shown colours' blocks in the strip near the robot, after the wall has come."""
-    facts = BlocksFacts.of(scene)
+    facts = WallFacts.of(scene)
     return AfterCue(gather(facts.targets, facts.others, NEAR), [facts.wall])
 
 
 def _blocks_plan(scene: Scene) -> tuple[Skill, ...]:
     """Hold still, then bring the blocks of each side to the nearest free place of the strip."""
-    targets = BlocksFacts.of(scene).targets
+    targets = WallFacts.of(scene).targets
     targets = tuple(sorted(targets, key=lambda n: scene.object(n).pose.position[0]))
     skills: list[Skill] = [HOLD_STILL]
     for name, x in zip(targets, row(len(targets), GOAL_X), strict=True):
@@ -155,7 +155,7 @@ def _blocks_plan(scene: Scene) -> tuple[Skill, ...]:
 
 def _blocks_slots(scene: Scene) -> Slots:
     """What is shown, and where the blocks have to go; no colour is named."""
-    count = len(BlocksFacts.of(scene).targets)
+    count = len(WallFacts.of(scene).targets)
     return BLOCKS_TEXT.slots("wall", f"blocks.{by_count(count)}", "strip", word=NUMBERS[count])
 
 

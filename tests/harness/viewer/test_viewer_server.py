@@ -12,13 +12,13 @@ import pytest
 from test_playback import played
 
 from robospa.geometry import Pose
-from robospa.harness.viewer.playback import DrawnBody, Mesh
+from robospa.harness.viewer.playback import DrawnBody, DrawnMesh
 
 HAS_VISER = bool(pytest.importorskip("importlib.util").find_spec("viser"))
 needs_viser = pytest.mark.skipif(not HAS_VISER, reason="needs viser, of the extra `view`")
 
 CORNERS = np.array([[0, 0, 0], [0.1, 0, 0], [0, 0.1, 0.2]], np.float32)
-MESH = Mesh(CORNERS, np.array([[0, 1, 2]], np.uint32), np.array([255, 0, 0], np.uint8))
+MESH = DrawnMesh(CORNERS, np.array([[0, 1, 2]], np.uint32), np.array([255, 0, 0], np.uint8))
 BODIES = [
     DrawnBody("table", (MESH,), Pose((0.0, 0.0, 0.7))),
     DrawnBody("object_0", (MESH,)),
