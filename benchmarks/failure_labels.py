@@ -2,7 +2,7 @@
 
     python benchmarks/failure_labels.py [--seeds 3] [--names TASK,...] [--json]
 
-Every kind of mistake (`robospa.baselines.failure_policies`) runs on every task that gives occasion
+Every kind of mistake (`robospa.baselines.oracle`) runs on every task that gives occasion
 for it. A trial counts only if it failed and no skill of the expert that acts it out failed. Nothing
 is drawn. Trials end some actions after the script is over instead of at the task's limit, which
 changes no label and saves the time of standing still.
@@ -16,7 +16,7 @@ from dataclasses import replace
 
 from frame import Figure, Result, main
 
-from robospa.baselines.failure_policies import create
+from robospa.baselines.oracle import create_failing
 from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.harness.trial import TrialSetup, run_trial, task_parts
 from robospa.results.failures.labels import NAMES, label
@@ -57,7 +57,7 @@ def parts(key: TrialKey) -> TrialSetup:
 
 def found_label(world: SapienWorld, kind: str, key: TrialKey) -> str | None:
     """The label of one scripted trial; "" if the script did not come off, None without occasion."""
-    policy = create(kind)
+    policy = create_failing(kind)
     record = run_trial(world, policy, key, policy_seed=0, parts=parts)
     if not policy.applies:
         return None

@@ -9,9 +9,9 @@ of its model. A server that speaks openpi's dialect gets the checks that make se
 from __future__ import annotations
 
 import ssl as ssl_module
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from typing import cast
 
@@ -129,13 +129,17 @@ class _Target:
             return self.connector()
         return connect(self.url, self.token, self.timeouts, ssl=self.ssl)
 
-    def raw(self) -> Transport:
+    @contextmanager
+    def raw(self) -> Iterator[Transport]:
+        """A connection in `robospa.v1`, past its hello."""
         if self.dialect != OURS:
             raise _Skip(f"the dialect {self.dialect} has nothing like it")
         transport = Transport(Address(self.url, self.token, self.ssl), self.timeouts)
-        hello = unpack(_bytes(transport, self.timeouts.hello))
-        assert isinstance(hello, Hello)
-        return transport
+        try:
+            assert isinstance(unpack(_bytes(transport, self.timeouts.hello)), Hello)
+            yield transport
+        finally:
+            transport.close()
 
 
 def check(
@@ -248,20 +252,16 @@ def _latency(target: _Target) -> str:
 
 
 def _order(target: _Target) -> str:
-    transport = target.raw()
-    try:
+    with target.raw() as transport:
         answer = _ask(transport, Infer(1, synthetic_observation(target.spec)), target.timeouts)
         assert isinstance(answer, Error), f"infer before reset was answered with {answer.type}"
         answer = _ask(transport, Reset(2, trial_for(target.spec)), target.timeouts)
         assert isinstance(answer, Ready), f"reset was then answered with {answer.type}"
         return "infer before reset is refused, and the reset after it works"
-    finally:
-        transport.close()
 
 
 def _bad_observation(target: _Target) -> str:
-    transport = target.raw()
-    try:
+    with target.raw() as transport:
         _ask(transport, Reset(1, trial_for(target.spec)), target.timeouts)
         broken = {**synthetic_observation(target.spec), "images": None, "instruction": None}
         answer = _ask(transport, Infer(2, broken), target.timeouts)
@@ -274,25 +274,15 @@ def _bad_observation(target: _Target) -> str:
         answer = _ask(transport, Infer(4, synthetic_observation(target.spec)), target.timeouts)
         assert isinstance(answer, Actions), f"infer after the error gave {answer.type}"
         return "refused, and the next trial gets its own answers"
-    finally:
-        transport.close()
 
 
 def _unknown_fields(target: _Target) -> str:
-    transport = target.raw()
-    try:
-        later = {
-            "type": "reset",
-            "id": 1,
-            "trial": trial_for(target.spec).to_json(),
-            "field_of_1_9": [1, 2],
-        }
-        transport.send(encode(later))
+    with target.raw() as transport:
+        trial = trial_for(target.spec).to_json()
+        transport.send(encode({"type": "reset", "id": 1, "trial": trial, "field_of_1_9": [1, 2]}))
         answer = unpack(_bytes(transport, target.timeouts.reset))
         assert isinstance(answer, Ready), f"a reset with an unknown field gave {answer.type}"
         return "fields of later minor versions are ignored"
-    finally:
-        transport.close()
 
 
 def _two_sessions(target: _Target) -> str:
@@ -382,15 +372,10 @@ def _reconnect(target: _Target) -> str:
 
 
 def _garbage(target: _Target) -> str:
-    transport = target.raw()
-    transport.send(b"\xc1 no message")
-    try:
+    with target.raw() as transport, suppress(TransportError):
+        transport.send(b"\xc1 no message")
         answer = unpack(_bytes(transport, target.timeouts.end))
         assert isinstance(answer, Error), f"garbage was answered with {answer.type}"
-    except TransportError:
-        pass
-    finally:
-        transport.close()
     with target.connect() as policy:
         policy.reset(trial_for(target.spec))
     return "garbage is refused and the server lives on"

@@ -90,9 +90,9 @@ def __getattr__(name: str) -> Callable[[], object]:
     if name not in MISTAKES:
         raise AttributeError(name)
 
-    from robospa.baselines import failure_policies
+    from robospa.baselines import oracle
 
-    return lambda: failure_policies.create(kind=name)
+    return lambda: oracle.create_failing(kind=name)
 
 
 def write_scenes(folder: Path) -> None:

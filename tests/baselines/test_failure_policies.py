@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from robospa.baselines.failure_policies import FailingOracle, create
+from robospa.baselines.oracle import FailingOracle, create_failing
 from robospa.harness.demonstrations.changed_plans import KINDS
 from robospa.results.failures.labels import label
 from robospa.trial import TrialKey
@@ -14,7 +14,7 @@ SEED = 930_000
 
 def test_an_unknown_mistake_is_refused_at_once() -> None:
     with pytest.raises(ValueError, match="no mistake 'sulks'; there are neighbour"):
-        create("sulks")
+        create_failing("sulks")
 
 
 def test_the_spec_says_which_mistake_it_is() -> None:
@@ -41,7 +41,7 @@ def test_a_scripted_mistake_is_labelled_as_scripted(kind: str, name: str, expect
     from robospa.harness.sim.sapien_world import SapienWorld
     from robospa.harness.trial import run_trial
 
-    world, policy = SapienWorld(render=False), create(kind)
+    world, policy = SapienWorld(render=False), create_failing(kind)
     found = label(run_trial(world, policy, TrialKey(name, 2, SEED), policy_seed=0))
     world.close()
     assert policy.applies and found is not None

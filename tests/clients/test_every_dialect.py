@@ -14,7 +14,6 @@ from standins import (
     Go1,
     OpenPi,
     RoboTwin,
-    Status,
     VlaEval,
     XPolicyLab,
     XVla,
@@ -256,19 +255,6 @@ def test_something_that_never_answers_is_not_guessed_at(
         with pytest.raises(TransportError) as caught:
             use(url, Timeouts(connect=0.1, hello=0.1, reset=0.1, first_infer=0.1, close=0.1))
         assert "looks like" not in str(caught.value)
-
-
-@pytest.mark.parametrize("status", [404, 405, 422])
-@pytest.mark.parametrize("scheme", ["go1+http", "xvla+http"])
-def test_an_endpoint_that_takes_something_else(scheme: str, status: int) -> None:
-    class Other(Go1):
-        def act(self, body: bytes) -> Any:
-            raise Status(status, {"detail": [{"loc": ["body", "image"], "msg": "Field required"}]})
-
-    with Other() as url, pytest.raises(HandshakeError) as caught:
-        use(url.replace("go1+http", scheme), QUICK)
-    assert "an HTTP server of another kind" in str(caught.value)
-    assert f"HTTP {status}" in str(caught.value) and "Field required" in str(caught.value)
 
 
 def test_an_http_server_of_another_kind() -> None:

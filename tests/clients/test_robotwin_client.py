@@ -149,23 +149,10 @@ def test_earlier_steps_are_told_once() -> None:
         assert policy.spec.history == (-2, -1)
         policy.reset(TRIAL)
         for step in (0, 1, 5):
-            past = {
-                offset: {
-                    "images": observation()["images"],
-                    "state": np.full(14, max(step + offset, 0), np.float32),
-                }
-                for offset in (-2, -1)
-            }
-            now = np.full(14, step, np.float32)
-            policy.infer(observation(step, history=past, state=now))
-    told = [(r["cmd"], r["obs"]["agent_pos"][0]) for r in server.requests[1:]]
-    assert told == [
-        ("get_action", 0),
-        ("get_action", 1),
-        ("update_obs", 3),
-        ("update_obs", 4),
-        ("get_action", 5),
-    ]
+            policy.infer(at(step, policy.spec.history))
+    told = [(r["cmd"], step_of(r["obs"])) for r in server.requests[1:]]
+    asked, earlier = "get_action", "update_obs"
+    assert told == [(asked, 0), (asked, 1), (earlier, 3), (earlier, 4), (asked, 5)]
 
 
 def test_answers_may_come_in_any_pieces() -> None:

@@ -147,30 +147,20 @@ def test_xvlas_silent_400_points_to_its_log() -> None:
         assert caught.value.retriable
 
 
-@pytest.mark.parametrize("shape", [(2, 14), (2, 7), (20,)])
-def test_xvla_in_the_other_space_is_the_policys_error(shape: Any) -> None:
+@pytest.mark.parametrize(
+    ("answer", "error", "words"),
+    [
+        ({"action": [[0.0] * 14] * 2}, PolicyAnswerError, "option space"),
+        ({"action": [0.0] * 20}, PolicyAnswerError, "option space"),
+        ({"action": [[0.0] * 20] * 2}, PolicyAnswerError, "rotation"),
+        ({"actions": []}, ProtocolViolation, "did not answer an 'action'"),
+    ],
+)
+def test_xvla_answers_that_cannot_be(answer: Any, error: Any, words: str) -> None:
     with (
-        XVla(lambda seen: np.zeros(shape)) as url,
+        XVla(None, answer) as url,
         connect(url, timeouts=QUICK) as policy,
-        pytest.raises(PolicyAnswerError, match="option space"),
-    ):
-        policy.infer(observation())
-
-
-def test_xvla_without_a_rotation() -> None:
-    with (
-        XVla(lambda seen: np.zeros((2, 20))) as url,
-        connect(url, timeouts=QUICK) as policy,
-        pytest.raises(PolicyAnswerError, match="rotation"),
-    ):
-        policy.infer(observation())
-
-
-def test_an_answer_without_action() -> None:
-    with (
-        XVla(None, {"actions": []}) as url,
-        connect(url, timeouts=QUICK) as policy,
-        pytest.raises(ProtocolViolation, match="did not answer an 'action'"),
+        pytest.raises(error, match=words),
     ):
         policy.infer(observation())
 

@@ -199,21 +199,15 @@ def test_without_file_descriptors_it_waits_and_says_so(
     assert served(server)
 
 
-def test_one_byte_a_second(start: Any, dial: Any) -> None:
+@pytest.mark.parametrize(
+    "begun", [frame(pack(Reset(1, TRIAL)))[:3], frame(b"abc", fin=False)], ids=["bytes", "fragment"]
+)
+def test_a_message_that_is_never_complete(start: Any, dial: Any, begun: bytes) -> None:
     server = start(policy_factory=Recall, options=HURRIED)
     sock = greeted(dial, server)
-    message = frame(pack(Reset(1, TRIAL)))
-    sock.sendall(message[:3])
+    sock.sendall(begun)
     assert served(server)
     ended(sock)  # comes back because the server gives up
-
-
-def test_one_fragment_and_then_nothing(start: Any, dial: Any) -> None:
-    server = start(policy_factory=Recall, options=HURRIED)
-    sock = greeted(dial, server)
-    sock.sendall(frame(b"abc", fin=False))
-    ended(sock)
-    assert served(server)
 
 
 def test_a_long_inference_is_no_slow_client(start: Any) -> None:

@@ -45,12 +45,12 @@ def test_the_end_effector_is_where_a_library_finds_it_in_the_official_descriptio
 
 
 @pytest.mark.parametrize("name", ROBOTS)
-def test_a_hundred_thousand_postures(name: str) -> None:
+def test_twenty_thousand_postures(name: str) -> None:
     # frames are rigid, and the Jacobian is the derivative
     chain = chain_of(embodiment(name).arms[0])
     rng = np.random.default_rng(3)
     low, high = chain.working_lower, chain.working_upper
-    joints = rng.uniform(low, high, (100_000, len(low)))
+    joints = rng.uniform(low, high, (20_000, len(low)))
     frames, jacobian = forward(chain, joints)
     turn = frames[:, :3, :3]
     assert np.abs(np.einsum("nij,nik->njk", turn, turn) - np.eye(3)).max() < 1e-12
