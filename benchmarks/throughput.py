@@ -151,7 +151,9 @@ def run(
             Path(folder), url, world="throughput:BusyWorld", world_arguments={"busy": busy},
             parts="throughput:parts", expects={url: SimulatedModel(*model).spec},
         )  # fmt: skip
-        options = RunOptions(workers or cores(), most=workers or most_workers(), held=held)
+        options = RunOptions(
+            workers or cores(), most=workers or most_workers(), concurrent_trials=held
+        )
         with contextlib.suppress(Enough):
             Runner(config, keys, options, on_status=watch.look).run()
         until = time.monotonic() - 0.5

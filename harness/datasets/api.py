@@ -15,7 +15,7 @@ from robospa.harness.datasets.collect import CollectionResult, OpenPool, Order
 from robospa.harness.datasets.collect import collect as make
 from robospa.harness.datasets.settings import Collection, command_of, versions
 from robospa.harness.pool import JobProcess, JobWorker, Pool, WorkerDied
-from robospa.harness.running.ray_executor import NoCluster, RaySettings, error_line, join_cluster
+from robospa.harness.running.ray_executor import NoCluster, error_line, fitting, join_cluster
 from robospa.harness.running.status import cores
 from robospa.harness.seeds.attempt import Attempt
 from robospa.harness.settings import Compute, SettingsError, changed
@@ -100,10 +100,7 @@ def pool_opener(compute: Compute, maker: str = jobs.MAKER) -> Iterator[OpenPool]
         start = partial(JobProcess, jobs.maker_at, maker, seconds=EPISODE_SECONDS, name="maker")
         yield lambda episodes: _pool(start, min(compute.workers or cores(), episodes))
         return
-    settings = RaySettings(
-        compute.address or "auto", compute.workers, compute.cpus_per_worker, compute.gpus_per_worker
-    )
-    with ray_makers(settings, maker) as on_node:
+    with ray_makers(compute, maker) as on_node:
         yield lambda episodes: _pool(on_node, min(on_node.capacity(), episodes))
 
 
@@ -160,31 +157,29 @@ class RayMaker:
 class RayMakers:
     """Starts makers on a cluster."""
 
-    def __init__(self, ray: Any, settings: RaySettings, path: str) -> None:
+    def __init__(self, ray: Any, settings: Compute, path: str) -> None:
         from robospa.harness.running.ray_executor import versions
 
         self._ray, self._settings, self._path = ray, settings, path
         self._versions = versions()
+        self._needs = {"CPU": settings.cpus_per_worker, "GPU": settings.gpus_per_worker}
 
     def capacity(self) -> int:
         """How many workers fit into the cluster; raises NoCluster if none does."""
-        free = self._ray.cluster_resources()
-        fitting = int(free.get("CPU", 0.0) / self._settings.cpus + 1e-6)
-        if self._settings.gpus:
-            fitting = min(fitting, int(free.get("GPU", 0.0) / self._settings.gpus + 1e-6))
-        if not fitting:
+        found = fitting(self._ray.cluster_resources(), self._needs)
+        if not found:
             raise NoCluster("the Ray cluster has no room for a worker; lower --cpus-per-worker")
-        return min(fitting, self._settings.workers or fitting)
+        return min(found, self._settings.workers or found)
 
     def __call__(self) -> RayMaker:
         """One more, where there is room."""
-        needs = {"num_cpus": self._settings.cpus, "num_gpus": self._settings.gpus}
+        needs = {"num_cpus": self._needs["CPU"], "num_gpus": self._needs["GPU"]}
         actor = self._ray.remote(MakerActor).options(**needs).remote(self._versions, self._path)
         return RayMaker(self._ray, actor)
 
 
 @contextmanager
-def ray_makers(settings: RaySettings, path: str) -> Iterator[RayMakers]:
+def ray_makers(settings: Compute, path: str) -> Iterator[RayMakers]:
     """The makers of the cluster of `settings`, which is left afterwards; raises NoCluster."""
     ray = join_cluster(settings.address)
     try:

@@ -99,7 +99,7 @@ ADVICE = (
 
 
 @dataclass(frozen=True)
-class Verdict:
+class ErrorVerdict:
     """Why the run stops, and whose policy errors are withdrawn."""
 
     text: str
@@ -119,7 +119,7 @@ class ErrorWatch:
         """Take note of results of earlier drivers."""
         self.sound |= {r.key.task for r in records if finished(r) and r.end != "policy_error"}
 
-    def add(self, record: TrialRecord, target: str) -> Verdict | None:
+    def add(self, record: TrialRecord, target: str) -> ErrorVerdict | None:
         """A trial at the policy `target` has its `record`; whether the run should stop."""
         if record.end == "infrastructure":
             return None
@@ -135,11 +135,13 @@ class ErrorWatch:
         of_task = [r for r in row if r.key.task == task]
         same = f"ended in the same policy error: {record.message}"
         if task not in self.sound and len(of_task) >= FIRST:
-            return Verdict(f"the first {FIRST} trials of {task} all {same}; {ADVICE}", (*of_task,))
+            return ErrorVerdict(
+                f"the first {FIRST} trials of {task} all {same}; {ADVICE}", (*of_task,)
+            )
         if not self.sound and len(row) >= FIRST:
-            return Verdict(f"the first {FIRST} trials all {same}; {ADVICE}", (*row,))
+            return ErrorVerdict(f"the first {FIRST} trials all {same}; {ADVICE}", (*row,))
         if len(row) >= IN_A_ROW:
-            return Verdict(f"{IN_A_ROW} trials in a row {same}; {ADVICE}")
+            return ErrorVerdict(f"{IN_A_ROW} trials in a row {same}; {ADVICE}")
         return None
 
 

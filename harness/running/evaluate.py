@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -29,13 +30,13 @@ from robospa.harness.running.policy_probe import (
     probe_policies,
     warnings_of,
 )
-from robospa.harness.running.ray_executor import RaySettings, loopback_warnings, ray_executor
+from robospa.harness.running.ray_executor import RayExecutor, loopback_warnings
 from robospa.harness.running.record_store import recover_folder, remove_partial_files
 from robospa.harness.running.runner import Runner, RunOptions
 from robospa.harness.running.status import Status
-from robospa.harness.running.tracking import Careful, open_tracker
+from robospa.harness.running.tracking import CarefulTracker, open_tracker
 from robospa.harness.running.worker import WorkerConfig, describe, load_parts
-from robospa.harness.settings import FILE, EvaluationSettings, to_toml
+from robospa.harness.settings import FILE, Compute, EvaluationSettings, to_toml
 from robospa.harness.trial import salt_hash
 from robospa.harness.worlds import SHUFFLED_PARTS, open_world, world_kind
 from robospa.results.records.manifest import (
@@ -74,8 +75,8 @@ class Request:
     seeds: Sequence[Mapping[str, str]] = ()
     resume: bool = False
     wait: float = 0.0
-    ray: RaySettings | None = None
-    """Where the workers are, if not on this machine."""
+    compute: Compute = field(default_factory=Compute)
+    """Where the workers are."""
     in_process: bool = False
     """The policy's server is one of this process, which ends with the run."""
 
@@ -226,10 +227,12 @@ def evaluate(request: Request) -> None:
     check_clock(request.config.clock, [policy.spec for policy in policies.values()])
     manifest = make_manifest(request, policies)
     config = ready_config(request.config, request.keys, policies)
-    with (
-        ray_executor(request.ray, config, _renders(policies)) as executor,
-        run_lock(folder) as lock,
-    ):
+    with ExitStack() as stack:
+        executor = None
+        if request.compute.executor == "ray":
+            executor = RayExecutor(config, request.compute, _renders(policies))
+            stack.callback(executor.close)
+        lock = stack.enter_context(run_lock(folder))
         recover_folder(folder)
         known = read_records(folder)
         results = {key.task for key, record in known.items() if finished(record)}
@@ -254,7 +257,7 @@ def evaluate(request: Request) -> None:
                 )
             log = "none" if request.settings is None else request.settings.recording.log
             kept = to_builtins(manifest.settings)
-            tracker = Careful(open_tracker(log, folder, kept), progress.note)
+            tracker = CarefulTracker(open_tracker(log, folder, kept), progress.note)
             runner = Runner(config, missing, request.options, on_note=progress.note)
             runner.known = known
             runner.executor = executor

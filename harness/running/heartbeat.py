@@ -41,7 +41,7 @@ class HeartbeatSender:
     `turn` is there if other trials compute while this one waits for its server."""
 
     def __init__(
-        self, send: Callable[[Heartbeat], None] = lambda beat: None, turn: Turn | None = None
+        self, send: Callable[[Heartbeat], None] = lambda beat: None, turn: ComputeLock | None = None
     ) -> None:
         self._send = send
         self._turn = turn
@@ -228,7 +228,7 @@ class HeartbeatMonitor:
         return float("inf") if self._activity == "in_policy" else self._since + self.seconds
 
 
-class Turn:
+class ComputeLock:
     """A trial's access to its process; `lock` is the same for all trials there."""
 
     def __init__(self, lock: threading.Lock) -> None:
@@ -236,7 +236,7 @@ class Turn:
         self._seconds = 0.0
         self._since: float | None = None
 
-    def __enter__(self) -> Turn:
+    def __enter__(self) -> ComputeLock:
         self._lock.acquire()
         self._since = time.process_time()
         return self

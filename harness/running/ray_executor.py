@@ -17,8 +17,8 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from importlib import import_module, metadata
 from pathlib import Path
@@ -31,15 +31,17 @@ from robospa.harness.running.atomic_file import LOGS, replace_file
 from robospa.harness.running.code_hash import code_hash
 from robospa.harness.running.executor import (
     Command,
+    Executor,
     Heartbeat,
     Message,
-    Ready,
     RunAborted,
     TrialDone,
     WorkerHandle,
+    WorkerReady,
 )
 from robospa.harness.running.record_store import RecordWriter
 from robospa.harness.running.worker import LocalExecutor, WorkerConfig
+from robospa.harness.settings import Compute
 from robospa.results.records.runs import ACTIONS
 
 NODES_SECONDS = 1.0
@@ -53,11 +55,11 @@ NO_HEAD_SECONDS = 10.0
 CLOSE_SECONDS = 2.0
 
 
-class RayWorker:
+class RayWorker(WorkerHandle):
     """One worker: an actor, once a node has room for it."""
 
     def __init__(self, name: str, executor: RayExecutor) -> None:
-        self.name = name
+        super().__init__(name)
         self.node = ""
         self.actor: Any = None
         self.call: Any = None
@@ -67,10 +69,6 @@ class RayWorker:
         self.inbox: list[Message] = []
         self.ended: str | None = None
         self._executor = executor
-
-    def another(self) -> RayWorker | None:
-        """None: it holds one trial."""
-        return None
 
     def send(self, command: Command) -> None:
         """Send it a command; nothing happens if it has ended."""
@@ -106,14 +104,19 @@ class RayWorker:
         self._executor.remove(self)
 
 
-class RayExecutor:
-    """As many workers as the cluster of `settings` has room for, at most `settings.workers`."""
+class RayExecutor(Executor):
+    """As many workers as the cluster of `settings` has room for, at most `settings.workers`.
 
-    def __init__(self, config: WorkerConfig, settings: RaySettings) -> None:
+    GPUs are only taken by a run that `renders`.
+    """
+
+    def __init__(self, config: WorkerConfig, settings: Compute, renders: bool = True) -> None:
         """Join the cluster; raises NoCluster, also if no node is large enough for a worker."""
         self._folder = config.folder
         self._config = pickle.dumps(config)
         self._settings = settings
+        gpus = settings.gpus_per_worker if renders else 0.0
+        self._needs = {"CPU": settings.cpus_per_worker, "GPU": gpus}
         self._versions = versions()
         self._workers: list[RayWorker] = []
         self._addresses: dict[str, str] = {}
@@ -126,8 +129,9 @@ class RayExecutor:
         self._gone = False
         self._ray = join_cluster(settings.address)
         try:
-            remote = settings.address.startswith("ray://")
-            self._head = settings.address if remote else self._ray.get_runtime_context().gcs_address
+            address = settings.address or ""
+            remote = address.startswith("ray://")
+            self._head = address if remote else self._ray.get_runtime_context().gcs_address
             self._actor_class = self._ray.remote(WorkerActor)
             self._affinity = import_module("ray.util.scheduling_strategies")
             self._count_nodes()
@@ -232,8 +236,7 @@ class RayExecutor:
 
     def _fitting(self, resources: Mapping[str, float]) -> int:
         """How many workers a node with `resources` holds."""
-        needs = (("CPU", self._settings.cpus), ("GPU", self._settings.gpus))
-        return int(min(resources.get(name, 0.0) / n + 1e-6 for name, n in needs if n > 0))
+        return fitting(resources, self._needs)
 
     def _leave_out(self, node: str, reason: str) -> None:
         if node not in self._left_out:
@@ -248,13 +251,12 @@ class RayExecutor:
         return self._addresses.get(node, "a node that is gone")
 
     def _too_small(self) -> str:
-        needs = f"{self._settings.cpus:g} CPUs"
-        needs += f" and {self._settings.gpus:g} GPUs" if self._settings.gpus else ""
+        needs = " and ".join(f"{count:g} {name}s" for name, count in self._needs.items() if count)
         cpus = [node["Resources"].get("CPU", 0.0) for node in self._ray.nodes() if node["Alive"]]
         return (
-            f"no node of the Ray cluster at {self._settings.address} has the {needs} that a worker "
-            f"takes (the largest has {max(cpus, default=0.0):g} CPUs); lower --cpus-per-worker or "
-            "--gpus-per-worker, or start larger nodes"
+            f"no node of the Ray cluster at {self._settings.address or 'auto'} has the {needs} "
+            f"that a worker takes (the largest has {max(cpus, default=0.0):g} CPUs); lower "
+            "--cpus-per-worker or --gpus-per-worker, or start larger nodes"
         )
 
     # --- workers ----------------------------------------------------------------------------------
@@ -270,8 +272,8 @@ class RayExecutor:
                     return
                 node = self._affinity.NodeAffinitySchedulingStrategy(worker.node, soft=False)
                 worker.actor = self._actor_class.options(
-                    num_cpus=self._settings.cpus,
-                    num_gpus=self._settings.gpus,
+                    num_cpus=self._needs["CPU"],
+                    num_gpus=self._needs["GPU"],
                     max_concurrency=4,
                     scheduling_strategy=node,
                 ).remote()
@@ -289,7 +291,7 @@ class RayExecutor:
             else:
                 self._start_elsewhere(worker, f"workers do not start there ({error_line(error)})")
             return
-        if isinstance(result, Report):
+        if isinstance(result, WorkerReport):
             self._keep(worker, result)
         elif result:
             self._start_elsewhere(worker, result)
@@ -307,7 +309,7 @@ class RayExecutor:
         worker.started = False
         self._workers.append(worker)
 
-    def _keep(self, worker: RayWorker, report: Report) -> None:
+    def _keep(self, worker: RayWorker, report: WorkerReport) -> None:
         """Put what came with a message on disk, then pass the message on.
 
         Files first, because a record promises that they are there.
@@ -321,7 +323,7 @@ class RayExecutor:
         for name, data in report.files.items():
             replace_file(self._folder / name, data, parents=False)
         for message in report.messages:
-            worker.ready |= isinstance(message, Ready)
+            worker.ready |= isinstance(message, WorkerReady)
             if isinstance(message, TrialDone):
                 if self._writer is None:
                     self._writer = RecordWriter(self._folder)
@@ -330,27 +332,14 @@ class RayExecutor:
         worker.ended = report.exit_status
 
 
-@contextmanager
-def ray_executor(
-    settings: RaySettings | None, config: WorkerConfig, renders: bool
-) -> Iterator[RayExecutor | None]:
-    """Workers on the cluster of `settings`, None for this machine.
-
-    GPUs are only taken by a run that `renders`.
-    """
-    if settings is None:
-        yield None
-        return
-    executor = RayExecutor(config, settings if renders else replace(settings, gpus=0.0))
-    try:
-        yield executor
-    finally:
-        executor.close()
+def fitting(resources: Mapping[str, float], needs: Mapping[str, float]) -> int:
+    """How many workers that need so much fit into `resources`."""
+    return int(min(resources.get(name, 0.0) / n + 1e-6 for name, n in needs.items() if n > 0))
 
 
-def loopback_warnings(executor: RayExecutor | None, config: WorkerConfig) -> list[str]:
+def loopback_warnings(executor: Executor | None, config: WorkerConfig) -> list[str]:
     """A warning for every server that each node of the cluster would look for on itself."""
-    if executor is None or len(executor.nodes()) < 2:
+    if not isinstance(executor, RayExecutor) or len(executor.nodes()) < 2:
         return []
     here = ("localhost", "127.0.0.1", "::1")
     return [
@@ -371,22 +360,13 @@ class NoCluster(Exception):
     """There is no Ray, or no Ray cluster that can be used."""
 
 
-@dataclass(frozen=True)
-class RaySettings:
-    """Where the cluster is and what a worker takes of it: `address` is auto, local, host:port or
-    ray://host:port; at most `workers` workers, 0 for as many as fit."""
-
-    address: str = "auto"
-    workers: int = 0
-    cpus: float = 1.0
-    gpus: float = 0.0
-
-
-def join_cluster(address: str) -> Any:
-    """The module `ray`, connected to the cluster at `address` or having started one.
+def join_cluster(address: str | None) -> Any:
+    """The module `ray`, connected to the cluster at `address` (auto, local, host:port or
+    ray://host:port; by default auto) or having started one.
 
     Raises NoCluster. Ray logs nothing into a run's progress, and signals act as before.
     """
+    address = address or "auto"
     check_address(address)
     os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
     ray: Any = importlib.import_module("ray")
@@ -481,7 +461,7 @@ LOG_BYTES = 64_000
 
 
 @dataclass(frozen=True)
-class Report:
+class WorkerReport:
     """What one worker sent since its last report, the `files` of a trial that is done (by path
     within the run's folder), its `output`, and how it ended (None while it runs)."""
 
@@ -537,7 +517,7 @@ class WorkerActor:
         """Pass `command` on to the worker."""
         self._worker.send(command)
 
-    def report(self, seconds: float) -> Report:
+    def report(self, seconds: float) -> WorkerReport:
         """Wait until the worker sends more than heartbeats or ends, `seconds` at most."""
         until = time.monotonic() + seconds
         beats: list[Message] = []
@@ -549,8 +529,8 @@ class WorkerActor:
             for message in self._worker.messages():
                 (beats if isinstance(message, Heartbeat) else others).append(message)
         files = self._take_files() if any(isinstance(m, TrialDone) for m in others) else {}
-        others = [Ready(None) if isinstance(m, Ready) else m for m in others]
-        return Report((*beats[-1:], *others), files, self._new_output(), exit_status)
+        others = [WorkerReady(None) if isinstance(m, WorkerReady) else m for m in others]
+        return WorkerReport((*beats[-1:], *others), files, self._new_output(), exit_status)
 
     def close(self) -> None:
         """End the worker and remove its folder."""

@@ -6,7 +6,7 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from robospa.extras import need
 from robospa.harness.clock.policy_clock import ClockError, PolicyClock, frozen_timing, real_clock
@@ -27,9 +27,6 @@ from robospa.harness.settings import (
 from robospa.harness.worlds import WorldKind, world_kind
 from robospa.registry import UnknownName
 from robospa.trial import TrialKey
-
-if TYPE_CHECKING:
-    from robospa.harness.running.ray_executor import RaySettings
 
 HELD = 3
 """Trials that a worker holds at once: with two, where model and cores are equally slow, either
@@ -99,7 +96,7 @@ def make_request(
         seeds=seed_sources(settings.selection, trials) if keys is None else (),
         resume=resume,
         wait=settings.connection.wait,
-        ray=_on_ray(compute),
+        compute=compute,
     )
 
 
@@ -246,7 +243,7 @@ def trials_per_worker(
     return asked or (HELD if kind.shared and compute.workers != 1 else 1)
 
 
-def _run_options(settings: EvaluationSettings, workers: int, held: int) -> RunOptions:
+def _run_options(settings: EvaluationSettings, workers: int, concurrent_trials: int) -> RunOptions:
     retries = settings.retries
     return RunOptions(
         workers or cores(),
@@ -257,16 +254,5 @@ def _run_options(settings: EvaluationSettings, workers: int, held: int) -> RunOp
         most=workers or most_workers(),
         patience=settings.connection.patience,
         policy_errors=retries.policy_errors,
-        held=held,
-    )
-
-
-def _on_ray(compute: Compute) -> RaySettings | None:
-    """How the workers are placed on a Ray cluster; None if they run on this machine."""
-    if compute.executor != "ray":
-        return None
-    from robospa.harness.running.ray_executor import RaySettings
-
-    return RaySettings(
-        compute.address or "auto", compute.workers, compute.cpus_per_worker, compute.gpus_per_worker
+        concurrent_trials=concurrent_trials,
     )

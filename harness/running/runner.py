@@ -29,13 +29,13 @@ from robospa.harness.running.executor import (
     Fatal,
     Heartbeat,
     Message,
-    Ready,
     RunAborted,
     Stop,
     TrialDone,
     TrialLost,
+    WorkerReady,
 )
-from robospa.harness.running.scheduler import Job, Scheduler, TrialQueue
+from robospa.harness.running.scheduler import Scheduler, TrialJob, TrialQueue
 from robospa.harness.running.slot import (
     START_SECONDS,
     Slot,
@@ -67,7 +67,7 @@ class RunOptions:
     """Limits and retries of a run.
 
     workers: worker processes at the start, on this machine.
-    held: trials that each of these holds at once, while servers have room for their connections.
+    concurrent_trials: that each of these holds at once, while servers have room for connections.
     attempts: how often a trial is tried, over all drivers of the run, before it is recorded as
         missing; attempts that reached no server count for this driver alone.
     backoff: the pause before attempt k + 2 is `backoff` * 2^k [s].
@@ -88,7 +88,7 @@ class RunOptions:
     most: int = 0
     patience: float = 60.0
     policy_errors: str = "stop"
-    held: int = 1
+    concurrent_trials: int = 1
 
 
 @dataclass
@@ -125,10 +125,10 @@ class Runner:
             pause=self.options.backoff,
             patience=self.options.patience,
         )
-        held = self._held = self.options.held
-        self._workers = self.executor or LocalExecutor(self.config, most, held)
+        each = self._concurrent_trials = self.options.concurrent_trials
+        self._workers = self.executor or LocalExecutor(self.config, most, each)
         first = most if self.executor else self.options.workers
-        self._autoscaler = Autoscaler(first, most, held=held)
+        self._autoscaler = Autoscaler(first, most, concurrent_trials=each)
         self.times = TimeBreakdown()
         self._slots: list[Slot] = []
         self._closed_by = 0.0  # when the connections of places given up are closed
@@ -162,8 +162,8 @@ class Runner:
             worker = self._workers.start(f"worker-{self._started:03d}")
             self._started += 1
             self._slots.append(Slot(worker, time.monotonic() + START_SECONDS))
-        for slot in [slot for slot in workers if slot.ready and self._held > 1]:
-            if len(self._slots) < left and (more := slot.worker.another()) is not None:
+        for slot in [slot for slot in workers if slot.ready and self._concurrent_trials > 1]:
+            if len(self._slots) < left and (more := slot.worker.another_trial()) is not None:
                 self._slots.append(Slot(more, time.monotonic() + START_SECONDS, extra=True))
 
     def _most_workers(self) -> int:
@@ -174,11 +174,13 @@ class Runner:
         """Give every free place its next trial, as far as there are any."""
         for slot in sendable(self._slots):
             self._send(slot)
-        for slot in [s for s in self._slots if self._held == 1 and s.extra and s.job is None]:
+        for slot in [
+            s for s in self._slots if self._concurrent_trials == 1 and s.extra and s.job is None
+        ]:
             slot.worker.send(Stop())  # its connection may be in another's place
             self._slots.remove(slot)
             self._closed_by = time.monotonic() + STOP_SECONDS
-        for slot in free(self._slots, self._held > 1):
+        for slot in free(self._slots, self._concurrent_trials > 1):
             job = self._scheduler.next(time.monotonic(), slot.target)
             if job is None:
                 return
@@ -212,7 +214,7 @@ class Runner:
 
     def _handle(self, slot: Slot, message: Message) -> None:
         match message:
-            case Ready():
+            case WorkerReady():
                 slot.ready, slot.records = True, message.records
                 self._false_starts = 0
             case Heartbeat():
@@ -315,21 +317,21 @@ class Runner:
             self._lost_in_a_row = 0
         self.on_record(record)
 
-    def _narrow(self, slot: Slot, job: Job, lost: TrialLost) -> bool:
+    def _narrow(self, slot: Slot, job: TrialJob, lost: TrialLost) -> bool:
         """Whether `job` may only have found no room for one more connection of a worker. It is not
         charged, and from now on every worker holds one trial."""
         several = time.monotonic() < self._closed_by or any(s.extra for s in self._slots)
         unfit = lost.fault == "incompatible" and not slot.extra
         if lost.row.cause != "unreachable" or not several or unfit:
             return False
-        if self._held > 1:
+        if self._concurrent_trials > 1:
             text = "workers hold one trial each from now on, since one more could not connect"
             self.on_note(f"{text}: {lost.row.message}")
-        self._held = self._autoscaler.held = 1
+        self._concurrent_trials = self._autoscaler.concurrent_trials = 1
         self._scheduler.give_back(job, time.monotonic() + self.options.backoff)
         return True
 
-    def _retry(self, job: Job, lost: TrialLost) -> None:
+    def _retry(self, job: TrialJob, lost: TrialLost) -> None:
         """Queue another attempt at the trial of `job`, or record it as missing."""
         work, text, now = job.work, lost.row.message, time.monotonic()
         unfit = lost.fault == "incompatible"

@@ -37,7 +37,7 @@ STAY = 0.8
 
 
 @dataclass(frozen=True)
-class Job:
+class TrialJob:
     """A trial and the policy that is to do it."""
 
     work: Pending
@@ -70,7 +70,7 @@ class Scheduler:
             for target, tasks in tasks_of.items()
         }
 
-    def next(self, now: float, at: str = "") -> Job | None:
+    def next(self, now: float, at: str = "") -> TrialJob | None:
         """What a free worker that is connected to the policy `at` does next; None to wait."""
         due = self.queue.due(now)
         usable = [
@@ -87,7 +87,7 @@ class Scheduler:
         work = self.queue.take(self._task(server, due), now)
         assert work is not None
         server.start_trial(work.key.task, now)
-        return Job(work, server.target)
+        return TrialJob(work, server.target)
 
     def _taken(self, server: ServerStats) -> bool:
         """Whether `server` does one trial at a time and has one, under whatever URL."""
@@ -122,12 +122,12 @@ class Scheduler:
         free = [task for task in mine if task not in held]
         return max(free or mine, key=lambda task: due[task])
 
-    def done(self, job: Job, record: TrialRecord, now: float, seconds: float) -> None:
+    def done(self, job: TrialJob, record: TrialRecord, now: float, seconds: float) -> None:
         """`job` has its record at time `now`, after `seconds`."""
         self.servers[job.target].finish_trial(record, now)
         self.queue.durations.add(record.key, seconds)
 
-    def lost(self, job: Job, now: float, fault: Fault = "", text: str = "") -> bool:
+    def lost(self, job: TrialJob, now: float, fault: Fault = "", text: str = "") -> bool:
         """`job` could not be run; whether that counts as one of its attempts."""
         server = self.servers[job.target]
         server.running -= 1
@@ -139,12 +139,12 @@ class Scheduler:
         server.fail(now, self._pause)
         return fault == "disconnected" or not self._can_wait(server, job, now)
 
-    def give_back(self, job: Job, due: float) -> None:
+    def give_back(self, job: TrialJob, due: float) -> None:
         """`job` was not begun; not to be run before time `due`."""
         self.servers[job.target].running -= 1
         self.requeue(job, due, charged=False)
 
-    def _can_wait(self, server: ServerStats, job: Job, now: float) -> bool:
+    def _can_wait(self, server: ServerStats, job: TrialJob, now: float) -> bool:
         """Whether nothing is lost by trying `job` again after the others."""
         if now - server.failing_since < self._patience:
             return True
@@ -152,7 +152,7 @@ class Scheduler:
         busy = any(s.running for s in up)
         return busy or any(job.work.key.task in s.tasks for s in up)
 
-    def requeue(self, job: Job, due: float, charged: bool) -> None:
+    def requeue(self, job: TrialJob, due: float, charged: bool) -> None:
         """Put the trial of `job` back, not to be run before time `due`."""
         work = job.work
         self.queue.requeue(replace(work, attempt=work.attempt + charged), due)

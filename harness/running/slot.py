@@ -13,7 +13,7 @@ from pathlib import Path
 
 from robospa.harness.running.executor import RunTrial, Stop, WorkerHandle
 from robospa.harness.running.heartbeat import HeartbeatMonitor
-from robospa.harness.running.scheduler import Job, TrialQueue
+from robospa.harness.running.scheduler import TrialJob, TrialQueue
 from robospa.harness.running.status import ServerStats, Status, time_left
 from robospa.results.records.runs import read_file
 from robospa.results.records.trial_record import TrialRecord
@@ -31,7 +31,7 @@ class Slot:
     records: Path | None = None
     extra: bool = False
     """Whether its worker has another place, which was there first."""
-    job: Job | None = None
+    job: TrialJob | None = None
     sent: bool = True
     """Whether its worker has `job`; it may have to wait until it is alone there."""
     target: str = ""
@@ -83,7 +83,7 @@ class Slot:
             self.monitor.extend(seconds)
 
 
-def needs_worker_alone(job: Job) -> bool:
+def needs_worker_alone(job: TrialJob) -> bool:
     """Whether a worker may have died of this trial."""
     return any(row.cause in ("worker_ended", "worker_stuck") for row in job.work.retries)
 

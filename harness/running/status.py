@@ -363,12 +363,12 @@ def most_workers() -> int:
 @dataclass
 class Autoscaler:
     """How many workers there should be: `target` now, `maximum` ever, for `cores` cores. Each holds
-    `held` trials at once."""
+    `concurrent_trials` at once."""
 
     target: int
     maximum: int
     cores: int = field(default_factory=cores)
-    held: int = 1
+    concurrent_trials: int = 1
     _seconds: float = 0.0
     _busy: float = 0.0
     _trials: int = 0
@@ -381,7 +381,7 @@ class Autoscaler:
 
     def scale_up(self, saturated: bool) -> int:
         """How many more workers to start now. `saturated`: no server has room for more."""
-        at_once = self.target * self.held
+        at_once = self.target * self.concurrent_trials
         if self.target >= self.maximum or self._trials < at_once or self._seconds <= 0:
             return 0
         busy = at_once * self._busy / self._seconds

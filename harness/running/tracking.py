@@ -34,7 +34,7 @@ class RunTracker(Protocol):
         """Nothing else comes, whether the run has ended or was stopped."""
 
 
-class Nothing:
+class NoTracker:
     """Tells nobody."""
 
     def add(self, record: TrialRecord) -> None:
@@ -103,7 +103,7 @@ class WandbTracker:
         self._run.finish()
 
 
-class Careful:
+class CarefulTracker:
     """A tracker that is left alone after its first error, which `say` is told."""
 
     def __init__(self, tracker: RunTracker, say: Callable[[str], None]) -> None:
@@ -136,7 +136,7 @@ class Careful:
 def open_tracker(log: str, folder: Path, settings: Mapping[str, Any]) -> RunTracker:
     """The tracker that the setting `log` names; raises MissingPackage without its package."""
     name, _, project = log.partition(":")
-    return Nothing() if name == "none" else WandbTracker(folder, project or PROJECT, settings)
+    return NoTracker() if name == "none" else WandbTracker(folder, project or PROJECT, settings)
 
 
 def _identity(folder: Path) -> str:

@@ -2,8 +2,8 @@
 
 Every trial that it may hold at once has a pipe to the driver, a world and a policy connection of
 its own; one computes while the others wait for their servers (`harness.running.turn`). The driver's
-commands are answered with the messages of `harness.running.messages`: Ready, then TrialDone for
-each trial once the record is on disk, TrialLost if it could not be run, or Fatal if no trial could
+commands are answered with the messages of `harness.running.executor`: WorkerReady, then TrialDone
+for each trial once the record is on disk, TrialLost if it could not be run, or Fatal if no trial could
 ever be run. After a loss the world is rebuilt and the policy reconnected before the next trial,
 never within one. Threads send heartbeats.
 """
@@ -28,16 +28,17 @@ from robospa.harness.pool import Child
 from robospa.harness.running.atomic_file import LOGS, StorageError, log_to
 from robospa.harness.running.executor import (
     Command,
+    Executor,
     Fatal,
     Message,
-    Ready,
     RunTrial,
     Stop,
     TrialDone,
     TrialLost,
     WorkerHandle,
+    WorkerReady,
 )
-from robospa.harness.running.heartbeat import HeartbeatSender, MonitoredPolicy, Turn
+from robospa.harness.running.heartbeat import ComputeLock, HeartbeatSender, MonitoredPolicy
 from robospa.harness.running.policy_probe import over_budget
 from robospa.harness.running.record_store import ActionRecorder, RecordWriter, write_actions
 from robospa.harness.worlds import SAPIEN_NAME, TASK_PARTS, open_world
@@ -302,7 +303,9 @@ def _serve(
         send(message)
 
 
-def _hold(pipe: Connection, config: WorkerConfig, writer: RecordWriter, turn: Turn | None) -> None:
+def _hold(
+    pipe: Connection, config: WorkerConfig, writer: RecordWriter, turn: ComputeLock | None
+) -> None:
     """Run the trials that come through `pipe`, one after the other, until it says Stop."""
     sending = threading.Lock()
 
@@ -313,7 +316,7 @@ def _hold(pipe: Connection, config: WorkerConfig, writer: RecordWriter, turn: Tu
     worker = Worker(config, writer, HeartbeatSender(send, turn))
     worker.heartbeat.start()
     try:
-        send(Ready(writer.path))
+        send(WorkerReady(writer.path))
         _serve(pipe, send, worker)
     except (EOFError, ConnectionError):
         return
@@ -344,7 +347,7 @@ def main(pipes: Sequence[Connection], argument: tuple[WorkerConfig, str]) -> Non
     if len(pipes) > 1:
         sys.setswitchinterval(SWITCH_SECONDS)
     lock = threading.Lock()
-    turns = [Turn(lock) if len(pipes) > 1 else None for _ in pipes]
+    turns = [ComputeLock(lock) if len(pipes) > 1 else None for _ in pipes]
     first, *others = [(pipe, config, writer, turn) for pipe, turn in zip(pipes, turns, strict=True)]
     threads = [threading.Thread(target=_hold_beside, args=one, daemon=True) for one in others]
     for thread in threads:
@@ -357,26 +360,25 @@ def main(pipes: Sequence[Connection], argument: tuple[WorkerConfig, str]) -> Non
         writer.close()
 
 
-class LocalWorker:
+class LocalWorker(WorkerHandle):
     """One worker process and the pipe of one trial that it may hold; `spare` are those of more."""
 
     def __init__(
         self, process: Child, pipe: Connection, name: str, spare: Sequence[Connection] = ()
     ) -> None:
-        self.process, self.pipe, self.name = process, pipe, name
+        super().__init__(name)
+        self.process, self.pipe = process, pipe
         self._spare = list(spare)
 
-    def another(self) -> LocalWorker | None:
+    def another_trial(self) -> LocalWorker | None:
         """A place for one more trial; None if there is none."""
         return LocalWorker(self.process, self._spare.pop(), self.name) if self._spare else None
 
     def send(self, command: Command) -> None:
         """Send it a command; nothing happens if it has ended. To stop it stops unused places."""
         for pipe in [self.pipe, *(self._spare if isinstance(command, Stop) else ())]:
-            try:
+            with contextlib.suppress(OSError):  # it has just died, which `exit_status` reports
                 pipe.send(command)
-            except OSError:
-                return  # it has just died, which `exit_status` reports
 
     def messages(self) -> list[Message]:
         """What it has sent since the last call; also after it has ended."""
@@ -392,10 +394,6 @@ class LocalWorker:
         """How it ended; None while it runs."""
         return self.process.exit_status()
 
-    def pending(self) -> bool:
-        """Never: a process starts at once."""
-        return False
-
     def kill(self) -> None:
         """End it now."""
         self.process.kill()
@@ -409,13 +407,12 @@ class LocalWorker:
         self.process.close()
 
 
-class LocalExecutor:
-    """At most `workers` processes on this machine, which hold up to `held` trials each."""
+class LocalExecutor(Executor):
+    """At most `workers` processes on this machine, with up to `concurrent_trials` each."""
 
-    def __init__(self, config: WorkerConfig, workers: int, held: int = 1) -> None:
-        self._config = config
+    def __init__(self, config: WorkerConfig, workers: int, concurrent_trials: int = 1) -> None:
+        self._config, self._concurrent_trials = config, concurrent_trials
         self.workers = workers
-        self._held = held
 
     def capacity(self) -> int:
         """As many as were asked for."""
@@ -423,17 +420,10 @@ class LocalExecutor:
 
     def start(self, name: str) -> LocalWorker:
         """Start one more process."""
-        process = Child(main, (self._config, name), name, pipes=self._held)
+        process = Child(main, (self._config, name), name, pipes=self._concurrent_trials)
         first, *spare = process.pipes
         return LocalWorker(process, first, name, spare)
 
     def wait(self, workers: Sequence[WorkerHandle], seconds: float) -> None:
         """Return as soon as one of `workers` has sent something or ended, or after `seconds`."""
         wait([worker.pipe for worker in workers if isinstance(worker, LocalWorker)], seconds)
-
-    def notes(self) -> list[str]:
-        """None: nothing ever happens to one machine."""
-        return []
-
-    def close(self) -> None:
-        """Nothing is left once the workers have ended."""

@@ -18,11 +18,11 @@ from run_fakes import FakeWorld
 from robospa.harness.running.executor import (
     Command,
     Message,
-    Ready,
     RunTrial,
     TrialDone,
+    WorkerReady,
 )
-from robospa.harness.running.heartbeat import Turn
+from robospa.harness.running.heartbeat import ComputeLock
 from robospa.harness.running.record_store import RecordWriter
 from robospa.harness.running.worker import WorkerConfig, _hold
 from robospa.harness.world import Poll, StepResult
@@ -51,7 +51,7 @@ class ThreadPlace:
     pipe: Connection
     spare: list[Connection] = field(default_factory=list)
 
-    def another(self) -> ThreadPlace | None:
+    def another_trial(self) -> ThreadPlace | None:
         return ThreadPlace(self.name, self.spare.pop()) if self.spare else None
 
     def send(self, command: Command) -> None:
@@ -81,8 +81,8 @@ class ThreadPlace:
 class ThreadExecutor:
     """One worker whose places are threads; `ended` of them have ended when it is closed."""
 
-    def __init__(self, config: WorkerConfig, held: int) -> None:
-        self.config, self.held = config, held
+    def __init__(self, config: WorkerConfig, concurrent_trials: int) -> None:
+        self.config, self.concurrent_trials = config, concurrent_trials
         self.threads: list[threading.Thread] = []
         self.ended = 0
 
@@ -92,10 +92,15 @@ class ThreadExecutor:
     def start(self, name: str) -> ThreadPlace:
         lock, writer = threading.Lock(), RecordWriter(self.config.folder)
         pipes = []
-        for _ in range(self.held):
+        for _ in range(self.concurrent_trials):
             ours, theirs = Pipe()
             pipes.append(ours)
-            arguments = (theirs, self.config, writer, Turn(lock) if self.held > 1 else None)
+            arguments = (
+                theirs,
+                self.config,
+                writer,
+                ComputeLock(lock) if self.concurrent_trials > 1 else None,
+            )
             self.threads.append(threading.Thread(target=_hold, args=arguments, daemon=True))
             self.threads[-1].start()
         return ThreadPlace(name, pipes[0], pipes[1:])
@@ -127,10 +132,10 @@ class ScriptedPlace:
     worker: ScriptedWorker
     number: int
     most: int
-    inbox: list[Message] = field(default_factory=lambda: [Ready(None)])
+    inbox: list[Message] = field(default_factory=lambda: [WorkerReady(None)])
     used: list[int] = field(default_factory=lambda: [1])
 
-    def another(self) -> ScriptedPlace | None:
+    def another_trial(self) -> ScriptedPlace | None:
         if self.used[0] == self.most:
             return None
         self.used[0] += 1
@@ -161,8 +166,8 @@ class ScriptedPlace:
 class ScriptedExecutor:
     """One worker at a time, which dies of the trials that `deadly` names and does all others."""
 
-    def __init__(self, held: int, deadly: Callable[[TrialKey], bool]) -> None:
-        self.held, self.deadly = held, deadly
+    def __init__(self, concurrent_trials: int, deadly: Callable[[TrialKey], bool]) -> None:
+        self.concurrent_trials, self.deadly = concurrent_trials, deadly
         self.together: list[set[int]] = []
         """Seeds that a worker had at once, whenever it was looked at."""
 
@@ -170,14 +175,18 @@ class ScriptedExecutor:
         return 1
 
     def start(self, name: str) -> ScriptedPlace:
-        return ScriptedPlace(name, ScriptedWorker(), 0, self.held)
+        return ScriptedPlace(name, ScriptedWorker(), 0, self.concurrent_trials)
 
     def wait(self, workers: Sequence[Any], seconds: float) -> None:
         """Whoever can take another trial has it by now: let the worker die or finish."""
         if not workers or any(place.inbox for place in workers):
             return
         worker: ScriptedWorker = workers[0].worker
-        if len(workers) < self.held and len(worker.running) == 1 and len(self.together) == 0:
+        if (
+            len(workers) < self.concurrent_trials
+            and len(worker.running) == 1
+            and len(self.together) == 0
+        ):
             return  # its other places are still being made
         if not worker.running:
             time.sleep(min(seconds, 0.001))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fake_runs import trial_record
 
-from robospa.harness.running.attempts import FIRST, IN_A_ROW, ErrorWatch, Verdict
+from robospa.harness.running.attempts import FIRST, IN_A_ROW, ErrorVerdict, ErrorWatch
 from robospa.results.records.action_problems import error_kind
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
@@ -18,7 +18,7 @@ def error(seed: int, message: str = "no camera 'wrist'", task: str = "Pick_A") -
     return trial_record(key(seed, task), end="policy_error", message=message)
 
 
-def watch(*records: TrialRecord, known: tuple[TrialRecord, ...] = ()) -> list[Verdict]:
+def watch(*records: TrialRecord, known: tuple[TrialRecord, ...] = ()) -> list[ErrorVerdict]:
     watching = ErrorWatch()
     watching.know(known)
     found = [watching.add(record, "ws://a") for record in records]

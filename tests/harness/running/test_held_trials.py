@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from run_fakes import SPEC, FakePolicy, FakeWorld, parts
 
 from robospa.harness.policy_calls import Stopwatch
-from robospa.harness.running.heartbeat import HeartbeatSender, MonitoredPolicy, Turn
+from robospa.harness.running.heartbeat import ComputeLock, HeartbeatSender, MonitoredPolicy
 from robospa.harness.running.runner import Runner, RunOptions
 from robospa.harness.running.status import Autoscaler
 from robospa.harness.running.worker import WorkerConfig
@@ -73,14 +73,19 @@ class Site:
 
 
 def run(
-    folder: Path, site: Site, held: int, world: str = "held_fakes:LoneWorld"
+    folder: Path, site: Site, concurrent_trials: int, world: str = "held_fakes:LoneWorld"
 ) -> tuple[dict[TrialKey, TrialRecord], list[str], ThreadExecutor]:
     folder.mkdir()
     notes: list[str] = []
     options = {"timeouts": Timeouts(wait=0.0, connect=5.0)}
     config = WorkerConfig(folder, site.server.url, options, world=world, parts="run_fakes:parts")
-    executor = ThreadExecutor(config, held)
-    runner = Runner(config, KEYS, RunOptions(backoff=0.01, held=held), on_note=notes.append)
+    executor = ThreadExecutor(config, concurrent_trials)
+    runner = Runner(
+        config,
+        KEYS,
+        RunOptions(backoff=0.01, concurrent_trials=concurrent_trials),
+        on_note=notes.append,
+    )
     runner.executor = executor
     runner.run()
     return read_records(folder), notes, executor
@@ -91,7 +96,7 @@ def test_trials_of_one_worker_overlap_and_their_records_are_those_of_trials_alon
 ) -> None:
     """The first answer comes when two trials ask; worlds never compute at once."""
     with Site(meet=2) as site:
-        records, notes, executor = run(tmp_path / "run", site, held=2)
+        records, notes, executor = run(tmp_path / "run", site, concurrent_trials=2)
     assert sorted(records) == KEYS and notes == []
     for key, record in records.items():
         alone = run_trial(FakeWorld(), FakePolicy(SPEC, 1), key, policy_seed=0, parts=parts)
@@ -103,7 +108,7 @@ def test_trials_of_one_worker_overlap_and_their_records_are_those_of_trials_alon
 
 def test_a_connection_belongs_to_one_trial_at_a_time(tmp_path: Path) -> None:
     with Site(meet=3) as site:
-        run(tmp_path / "run", site, held=3)
+        run(tmp_path / "run", site, concurrent_trials=3)
     assert len(site.calls) == 3
     for calls in site.calls:
         current = ""
@@ -117,7 +122,7 @@ def test_a_connection_belongs_to_one_trial_at_a_time(tmp_path: Path) -> None:
 def test_a_server_with_room_for_one_connection_loses_no_trial(tmp_path: Path) -> None:
     """Nothing is charged to the trial that found no place, and nobody tries again."""
     with Site(max_connections=1, patience=0.05) as site:
-        records, notes, _ = run(tmp_path / "run", site, held=3)
+        records, notes, _ = run(tmp_path / "run", site, concurrent_trials=3)
     assert sorted(records) == KEYS
     assert [(r.success, r.attempts, r.retries) for r in records.values()] == [(True, 1, ())] * 6
     assert len(notes) == 1
@@ -131,7 +136,7 @@ def test_after_the_death_of_a_worker_its_trials_have_the_next_one_to_themselves(
     executor = ScriptedExecutor(2, lambda key: key == deadly)
     records: dict[TrialKey, TrialRecord] = {}
     config = WorkerConfig(tmp_path, "ws://h:1", parts="run_fakes:parts")
-    runner = Runner(config, KEYS[:3], RunOptions(backoff=0.001, held=2))
+    runner = Runner(config, KEYS[:3], RunOptions(backoff=0.001, concurrent_trials=2))
     runner.on_record = lambda record: records.update({record.key: record})
     runner.executor = executor
     runner.run()
@@ -161,7 +166,7 @@ def test_the_wait_for_another_trial_is_no_time_of_the_policy(
             now[0] += 1.0
             return super().infer(observation)
 
-    heartbeat, watch = HeartbeatSender(turn=Turn(Slow())), Stopwatch()  # type: ignore[arg-type]
+    heartbeat, watch = HeartbeatSender(turn=ComputeLock(Slow())), Stopwatch()  # type: ignore[arg-type]
     policy = MonitoredPolicy(Remote(), "ws://h:1", heartbeat)
     with heartbeat.computing():
         watch.ask(policy, policy.infer, {})
@@ -171,7 +176,7 @@ def test_the_wait_for_another_trial_is_no_time_of_the_policy(
 
 def test_a_policy_in_the_worker_keeps_the_turn() -> None:
     lock = threading.Lock()
-    heartbeat = HeartbeatSender(turn=Turn(lock))
+    heartbeat = HeartbeatSender(turn=ComputeLock(lock))
     seen: list[bool] = []
 
     class Here(FakePolicy):
@@ -186,7 +191,7 @@ def test_a_policy_in_the_worker_keeps_the_turn() -> None:
 
 def test_one_waiting_for_its_turn_is_not_stuck() -> None:
     lock, seen = threading.Lock(), list[str]()
-    heartbeat = HeartbeatSender(turn=Turn(lock))
+    heartbeat = HeartbeatSender(turn=ComputeLock(lock))
     lock.acquire()
 
     def hold() -> None:
@@ -205,7 +210,7 @@ def test_one_waiting_for_its_turn_is_not_stuck() -> None:
 def test_workers_are_added_by_what_all_their_trials_compute() -> None:
     """Two workers with 3 trials each, of which every one computes for a third of its time."""
     record = trial_record(KEYS[0], True, wall_time=3.0, timing={"processor": 1.0})
-    scaler = Autoscaler(2, 16, cores=2, held=3)
+    scaler = Autoscaler(2, 16, cores=2, concurrent_trials=3)
     for _ in range(6):
         scaler.add(record)
     assert scaler.scale_up(saturated=False) == 0

@@ -10,6 +10,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -23,9 +24,7 @@ from robospa.harness.datasets.collect import collect
 from robospa.harness.running.ray_executor import (
     NoCluster,
     RayExecutor,
-    RaySettings,
     check_address,
-    ray_executor,
 )
 from robospa.harness.running.runner import Runner, RunOptions
 from robospa.harness.running.worker import WorkerConfig
@@ -95,7 +94,7 @@ def test_a_cluster_that_is_no_more_is_told_at_once(
 def test_a_worker_that_fits_on_no_node_is_refused(
     tmp_path: Path, home: tuple[Any, Any, Path]
 ) -> None:
-    wish = RaySettings(home[0].address, cpus=64.0)
+    wish = Compute(executor="ray", address=home[0].address, cpus_per_worker=64.0)
     with pytest.raises(NoCluster, match=r"64 CPUs that a worker takes \(the largest has 1 CPUs\)"):
         RayExecutor(config(tmp_path / "run"), wish)
     assert not (tmp_path / "run").exists()
@@ -153,7 +152,8 @@ def test_a_node_that_dies_and_one_that_joins_cost_and_double_nothing(
             made.add_node(num_cpus=1, env_vars={"FAKE_NODE": "two"}, **SIZE)
 
     patient = config(tmp_path / "ray", "ray_helpers:NodePolicy")
-    with ray_executor(RaySettings(made.address), patient, False) as executor:
+    there = Compute(executor="ray", address=made.address)
+    with closing(RayExecutor(patient, there, False)) as executor:
         runner = Runner(patient, KEYS, RunOptions(backoff=0.01), on_record)
         runner.executor = executor
         runner.run()

@@ -8,9 +8,10 @@ from typing import Any
 import pytest
 
 from robospa.harness.running import ray_executor
-from robospa.harness.running.executor import Ready, RunAborted
-from robospa.harness.running.ray_executor import NoCluster, RayExecutor, RaySettings, Report
+from robospa.harness.running.executor import RunAborted, WorkerReady
+from robospa.harness.running.ray_executor import NoCluster, RayExecutor, WorkerReport
 from robospa.harness.running.worker import WorkerConfig
+from robospa.harness.settings import Compute
 
 pytest.importorskip("ray")
 
@@ -92,39 +93,37 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def executor(
-    monkeypatch: pytest.MonkeyPatch, ray: FakeRay, settings: RaySettings | None = None
+    monkeypatch: pytest.MonkeyPatch, ray: FakeRay, settings: Compute | None = None
 ) -> RayExecutor:
     monkeypatch.setattr(ray_executor, "join_cluster", lambda address: ray)
-    return RayExecutor(WorkerConfig(Path("run"), "hold"), settings or RaySettings())
+    return RayExecutor(WorkerConfig(Path("run"), "hold"), settings or Compute(executor="ray"))
 
 
 def test_the_capacity_is_what_fits_and_grows_with_the_cluster(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     ray = FakeRay(small=1.0, large=3.0)
-    made = executor(monkeypatch, ray, RaySettings(cpus=1.5))
+    made = executor(monkeypatch, ray, Compute(executor="ray", cpus_per_worker=1.5))
     assert made.capacity() == 2
     ray.cpus["new"] = 3.1
     made.wait([], 0.0)
     assert made.capacity() == 4
-    assert executor(monkeypatch, ray, RaySettings(workers=3)).capacity() == 3
+    assert executor(monkeypatch, ray, Compute(executor="ray", workers=3)).capacity() == 3
 
 
 @pytest.mark.parametrize(
     ("has", "workers"),
     [({"CPU": 8.0, "GPU": 1.0}, 8), ({"CPU": 32.0, "GPU": 1.0}, 10), ({"CPU": 32.0}, 0)],
 )
-def test_a_share_of_a_gpu_counts_too(
-    monkeypatch: pytest.MonkeyPatch, has: dict[str, float], workers: int
-) -> None:
-    made = executor(monkeypatch, FakeRay(one=1.0))
-    made._settings = RaySettings(gpus=0.1)
-    assert made._fitting(has) == workers
+def test_a_share_of_a_gpu_counts_too(has: dict[str, float], workers: int) -> None:
+    assert ray_executor.fitting(has, {"CPU": 1.0, "GPU": 0.1}) == workers
 
 
 def test_a_worker_that_fits_on_no_node_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(NoCluster, match=r"4 CPUs that a worker takes \(the largest has 3 CPUs\)"):
-        executor(monkeypatch, FakeRay(small=1.0, large=3.0), RaySettings(cpus=4.0))
+        executor(
+            monkeypatch, FakeRay(small=1.0, large=3.0), Compute(executor="ray", cpus_per_worker=4.0)
+        )
 
 
 def test_workers_go_where_most_is_free(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -196,9 +195,9 @@ def test_a_worker_that_was_ready_ends_with_its_actor(monkeypatch: pytest.MonkeyP
     actor.start.calls[0].finish("")
     made.wait([worker], 0.0)
     assert not worker.pending()
-    actor.report.calls[0].finish(Report((Ready(None),)))
+    actor.report.calls[0].finish(WorkerReport((WorkerReady(None),)))
     made.wait([worker], 0.0)
-    assert worker.messages() == [Ready(None)]
+    assert worker.messages() == [WorkerReady(None)]
     actor.report.calls[1].finish(RuntimeError("the node is gone"))
     made.wait([worker], 0.0)
     assert worker.exit_status() == "Ray lost it on only"

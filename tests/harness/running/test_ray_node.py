@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import pickle
-import sys
 import tempfile
 from pathlib import Path
 
 import pytest
 
 from robospa.harness.running import ray_executor as ray_node
-from robospa.harness.running.executor import Heartbeat, Message, Ready, RunTrial, Stop, TrialDone
+from robospa.harness.running.executor import (
+    Heartbeat,
+    Message,
+    RunTrial,
+    Stop,
+    TrialDone,
+    WorkerReady,
+)
 from robospa.harness.running.ray_executor import WorkerActor, version_differences, versions
 from robospa.harness.running.worker import WorkerConfig
 from robospa.results.records.trial_record import RetryRow
@@ -28,13 +34,11 @@ def test_a_node_with_other_versions_is_named() -> None:
 @pytest.fixture
 def actor(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> WorkerActor:
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    for name in ("__spec__", "__file__"):
-        monkeypatch.setattr(sys.modules["__main__"], name, None, raising=False)
     fakes = {"world": "run_fakes:FakeWorld", "parts": "run_fakes:parts"}
     config = WorkerConfig(tmp_path / "elsewhere", "run_fakes:FakePolicy", **fakes)  # type: ignore[arg-type]
     made = WorkerActor()
     assert made.start(versions(), pickle.dumps(config), "worker-000") == ""
-    assert received(made) == ([Ready(None)], set())
+    assert received(made) == ([WorkerReady(None)], set())
     return made
 
 

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
+from contextlib import closing, suppress
 from pathlib import Path
 
 import pytest
 
-from robospa.harness.running.ray_executor import RaySettings, ray_executor
+from robospa.harness.running.ray_executor import RayExecutor
 from robospa.harness.running.runner import Runner, RunOptions
 from robospa.harness.running.worker import WorkerConfig
+from robospa.harness.settings import Compute
 from robospa.results.records.runs import VIDEOS, differences, owed_films, read_records
 from robospa.trial import TrialKey
 
@@ -28,7 +29,7 @@ def test_records_of_a_cluster_equal_local_ones_and_the_cluster_ends_with_the_run
     before = processes("raylet")
     Runner(config("here"), KEYS, RunOptions(workers=1)).run()
     there = config("ray")
-    with ray_executor(RaySettings("local", workers=1), there, True) as executor:
+    with closing(RayExecutor(there, Compute(1, "ray", "local"))) as executor:
         Runner(there, KEYS, executor=executor).run()
     here, ray = read_records(tmp_path / "here"), read_records(tmp_path / "ray")
     assert [differences(here[key], ray[key]) for key in KEYS] == [[] for _ in KEYS]

@@ -120,11 +120,11 @@ def test_beside_such_a_server_others_may_have_more_workers() -> None:
 
 def test_a_ray_cluster_gets_no_more_either() -> None:
     request = make_request(settings("xpolicylab://h:1", executor="ray"), keys=KEYS)
-    assert request.ray is not None and request.ray.workers == 1
+    assert request.compute.workers == 1
 
 
 @pytest.mark.parametrize(
-    ("policy", "given", "held"),
+    ("policy", "given", "most"),
     [
         ("ws://h:1", {}, 3),
         ("ws://h:1", {"workers": 8}, 3),
@@ -137,8 +137,8 @@ def test_a_ray_cluster_gets_no_more_either() -> None:
         ("hold", {}, 1),
     ],
 )
-def test_how_many_trials_a_worker_holds(policy: str, given: dict[str, Any], held: int) -> None:
-    assert make_request(settings(policy, **given), keys=KEYS).options.held == held
+def test_how_many_trials_a_worker_holds(policy: str, given: dict[str, Any], most: int) -> None:
+    assert make_request(settings(policy, **given), keys=KEYS).options.concurrent_trials == most
 
 
 def test_more_trials_a_worker_than_can_be_are_refused() -> None:

@@ -69,7 +69,7 @@ def test_records_are_equal_to_the_bit_however_many_trials_a_worker_holds(tmp_pat
     keys = [KEYS[0], *(replace(key, mode="randomized") for key in KEYS[:2])]
     with ServerThread(policy_factory=Looking) as server:
         config = WorkerConfig(tmp_path, server.url, step_scale=0.08)
-        Runner(config, keys, RunOptions(held=3)).run()
+        Runner(config, keys, RunOptions(concurrent_trials=3)).run()
     world = SapienWorld()
     records = read_records(tmp_path)
     for key in keys:

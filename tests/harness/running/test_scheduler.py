@@ -12,7 +12,7 @@ import pytest
 from fake_runs import trial_record
 from run_fakes import fake_task_of
 
-from robospa.harness.running.scheduler import Job, Scheduler, TrialQueue
+from robospa.harness.running.scheduler import Scheduler, TrialJob, TrialQueue
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
@@ -45,15 +45,15 @@ class Simulation:
     speed: Mapping[str, float]
     gone: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     now: float = 0.0
-    order: list[Job] = field(default_factory=list)
-    settled: list[Job] = field(default_factory=list)
+    order: list[TrialJob] = field(default_factory=list)
+    settled: list[TrialJob] = field(default_factory=list)
     after: Callable[[int], None] = lambda count: None
 
     def run(self) -> None:
         """Until every trial is settled."""
         queue = self.scheduler.queue
         at = [""] * self.workers
-        busy: list[tuple[float, int, float, Job]] = []
+        busy: list[tuple[float, int, float, TrialJob]] = []
         free = list(range(self.workers))
         while queue.unsettled:
             for worker in list(free):
