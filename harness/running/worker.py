@@ -1,11 +1,11 @@
 """One worker process: one record file, and one trial at a time or several that take turns.
 
 Every trial that it may hold at once has a pipe to the driver, a world and a policy connection of
-its own; one computes while the others wait for their servers (`harness.running.turn`). The driver's
-commands are answered with the messages of `harness.running.executor`: WorkerReady, then TrialDone
-for each trial once the record is on disk, TrialLost if it could not be run, or Fatal if no trial could
-ever be run. After a loss the world is rebuilt and the policy reconnected before the next trial,
-never within one. Threads send heartbeats.
+its own; one computes while the others wait for their servers (`ComputeLock`). Commands are answered
+with the messages of `harness.running.executor`: WorkerReady, then for each trial TrialDone once its
+record is on disk or TrialLost if it could not be run, or Fatal if no trial could ever be run. After
+a loss the world is rebuilt and the policy reconnected before the next trial, never within one.
+Threads send heartbeats.
 """
 
 from __future__ import annotations
