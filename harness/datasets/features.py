@@ -74,25 +74,25 @@ class EpisodeLayout:
         return [name for name, camera in self.cameras.items() if not camera.filmed]
 
     def check(self, episode: DatasetEpisode) -> None:
-        """Raises EpisodeMisfit if `episode` is of another robot, or has other pictures."""
-        if episode.key.embodiment != self.robot or episode.space != self.space:
-            raise EpisodeMisfit(
-                f"{episode.key.slug} is of the robot {episode.key.embodiment}, and the data set of "
-                f"{self.robot}: a data set has one robot"
-            )
-        if bool(episode.environment_state.size) is not self.environment_state:
-            raise EpisodeMisfit(
-                f"{episode.key.slug} differs from the data set in whether it has the environment "
-                "state: collect it with the same settings"
-            )
-        if _absent(episode) != self.absent:
-            raise EpisodeMisfit(f"{episode.key.slug} lacks other features than the data set")
-        found = _cameras(episode)
-        if found != self.cameras:
-            raise EpisodeMisfit(
-                f"{episode.key.slug} has pictures {_list(found)}, and the data set "
-                f"{_list(self.cameras)}: collect it with the same cameras and images"
-            )
+        """Raises EpisodeMisfit if `episode` is of another robot or of other settings."""
+        found = layout_of(episode)
+        for name, what in MISFITS.items():
+            theirs, ours = getattr(found, name), getattr(self, name)
+            if theirs != ours:
+                raise EpisodeMisfit(
+                    f"{episode.key.slug} has the {what} {_text(theirs)}, and the data set "
+                    f"{_text(ours)}: a data set has one robot and the same settings throughout"
+                )
+
+
+MISFITS = {
+    "robot": "robot",
+    "space": "actions",
+    "environment_state": "environment state",
+    "absent": "missing features",
+    "cameras": "pictures",
+}
+"""What all episodes have alike, in words."""
 
 
 def layout_of(episode: DatasetEpisode) -> EpisodeLayout:
@@ -131,13 +131,15 @@ def _cameras(episode: DatasetEpisode) -> dict[str, Camera]:
     return {name: Camera(of.codec, of.width, of.height) for name, of in seen.items()}
 
 
-def _list(cameras: Mapping[str, Camera]) -> str:
-    each = (f"{name} {c.codec} {c.width}x{c.height}" for name, c in cameras.items())
+def _text(value: object) -> str:
+    if not isinstance(value, dict):
+        return str(value)
+    each = (f"{name} {c.codec} {c.width}x{c.height}" for name, c in value.items())
     return ", ".join(each) or "none"
 
 
 ENVIRONMENT = "observation.environment_state"
-"""As LeRobot calls what a policy is told of its surroundings besides pictures."""
+"""As LeRobot calls what a policy knows of its surroundings besides pictures."""
 POSES = tuple(
     f"{side}_{part}" for side in ARMS for part in ("x", "y", "z", "qw", "qx", "qy", "qz", "gripper")
 )

@@ -7,15 +7,14 @@ should. Pictures come last, for good ones alone: they are nearly all that an epi
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
 from importlib import metadata
 
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.harness.datasets.episode import DatasetEpisode, episode_bytes
+from robospa.harness.datasets.episode import DatasetEpisode, Pictures, episode_bytes
 from robospa.harness.datasets.jobs import PURPOSES, EpisodeAttempt, EpisodeJob, RejectedSeed
 from robospa.harness.datasets.pictures import encode, require
 from robospa.harness.demonstrations.demonstration import (
@@ -30,7 +29,7 @@ from robospa.harness.demonstrations.recorder import KEYFRAMES, FrameRecorder, dr
 from robospa.harness.replay import ENDED
 from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.harness.trial import TrialSetup, task_parts
-from robospa.results.failures.labels import label
+from robospa.results.failures.labels import label as failure_type
 from robospa.results.records.trial_record import TrialRecord
 from robospa.tasks.descriptions import describe_objects
 from robospa.tasks.events import Event
@@ -64,14 +63,13 @@ class EpisodeMaker:
         if made.success is kind.startswith(MISTAKE_PREFIX):
             why = "; ".join(made.failures) or "each of its motions went as planned"
             raise RejectedSeed(f"the expert does not {_wanted(kind)}: {why}")
-        episode = episode_of(job.key, setup, shown, recorder)
         with timed(times, "replay"):
-            record = replay(self._replayed, job.key, episode.commanded, episode.prefix_action, kind)
+            record = replay(self._replayed, job.key, recorder.commanded, shown.prefix_action, kind)
         if record.success is not made.success:
             raise RejectedSeed(f"its replay does not {_wanted(kind)}: {replay_end(record)}")
         with timed(times, "pictures"):
             pictures = encode(drawn(recorder.frames, job.cameras), job.cameras, job.images)
-        data = episode_bytes(replace(verified(episode, record), pictures=pictures))
+        data = episode_bytes(episode_of(job.key, setup, shown, recorder, record, pictures))
         times["rest"] = time.process_time() - began - sum(times.values())
         return EpisodeAttempt(
             job.key.seed,
@@ -81,7 +79,7 @@ class EpisodeMaker:
             steps=record.steps,
             seconds=round(record.wall_time, 4),
             data=data,
-            frames=len(episode),
+            frames=len(recorder),
             times=times,
         )
 
@@ -98,9 +96,14 @@ def _wanted(kind: str) -> str:
 
 
 def episode_of(
-    key: TrialKey, setup: TrialSetup, shown: ShownEpisode, recorder: FrameRecorder
+    key: TrialKey,
+    setup: TrialSetup,
+    shown: ShownEpisode,
+    recorder: FrameRecorder,
+    record: TrialRecord,
+    pictures: Mapping[str, Pictures],
 ) -> DatasetEpisode:
-    """What was recorded, before its replay and without pictures."""
+    """What was recorded, and what its replay has shown."""
     columns = zip(
         *((f.commanded, f.measured, f.ee, f.environment_state) for f in recorder.frames),
         strict=True,
@@ -108,39 +111,30 @@ def episode_of(
     commanded, measured, ee, objects = (np.stack(rows).astype(np.float32) for rows in columns)
     sim_time = np.array([frame.time for frame in recorder.frames])
     label, action = shown.annotate(commanded, sim_time)
-    made = shown.demonstration
-    instructions = (made.instruction, *sentences(setup.scene, key.split))
+    made, failure = shown.demonstration, failure_type(record)
     return DatasetEpisode(
-        key,
-        shown.kind,
-        made.success,
-        tuple(dict.fromkeys(instructions)),
-        shown.space,
-        recorder.stride,
-        commanded,
-        measured,
-        action,
-        ee,
-        sim_time,
-        subtask_of_frames(made.events, sim_time),
-        label,
-        objects,
-        shown.prefix_action,
+        key=key,
+        kind=shown.kind,
+        success=record.success,
+        instructions=tuple(dict.fromkeys((made.instruction, *sentences(setup.scene, key.split)))),
+        space=shown.space,
+        stride=recorder.stride,
+        commanded=commanded,
+        measured=measured,
+        action=action,
+        ee=ee,
+        sim_time=sim_time,
+        subtask=subtask_of_frames(made.events, sim_time),
+        label=label,
+        environment_state=objects,
+        prefix_action=shown.prefix_action,
         subtasks=subtask_texts(setup.tracker, setup.scene),
         events=made.events,
-        about={"suite": SUITE, "version": metadata.version("robospa")},
-    )
-
-
-def verified(episode: DatasetEpisode, record: TrialRecord) -> DatasetEpisode:
-    """The episode with what its replay has shown."""
-    failure = label(record)
-    return replace(
-        episode,
-        success=record.success,
         scene_digest=record.scene_digest,
         replay_digest=record.digest,
         failure="" if failure is None else failure.kind,
+        pictures=pictures,
+        about={"suite": SUITE, "version": metadata.version("robospa")},
     )
 
 

@@ -15,7 +15,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, Protocol, cast
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -178,14 +178,6 @@ libx264 that looks ahead gives the same pictures other bytes in 1 of 130 films o
 one thread; without, in none of 4,000. Quality 27 has then the error that 23 had."""
 
 
-class _Sink(Protocol):
-    """Takes the frames of one camera in their order."""
-
-    def add(self, image: Picture) -> None: ...
-
-    def finish(self) -> Pictures: ...
-
-
 class FilmSink:
     """An MP4 file of `camera` in memory; frame t is shown at t / FPS seconds."""
 
@@ -258,7 +250,7 @@ def encode(
         return {}
     require(codec)
     kind = FilmSink if codec in FILM_CODECS else StillSink
-    sinks: list[_Sink] = [kind(camera, codec) for camera in cameras]
+    sinks: list[FilmSink | StillSink] = [kind(camera, codec) for camera in cameras]
     for images in frames:
         for sink, image in zip(sinks, images, strict=True):
             sink.add(image)
