@@ -56,13 +56,13 @@ def driver_stopped(run: Run, rng: random.Random) -> bool:
     """Ctrl-Z for longer than a worker may be silent, then on: nobody is to blame."""
     if not _in_flight(run) or run.driver is None:
         return False
-    with _concurrent_trials(run):
+    with _kept_stopped(run):
         time.sleep(6.0)
     return True
 
 
 @contextmanager
-def _concurrent_trials(run: Run) -> Iterator[None]:
+def _kept_stopped(run: Run) -> Iterator[None]:
     assert run.driver is not None
     everybody = [run.driver.pid, *run.workers()]
     for pid in everybody:
@@ -180,7 +180,7 @@ def second_driver(run: Run, rng: random.Random) -> bool:
     if not _in_flight(run):
         return False
     words = [*run.words, "--resume"]
-    with _concurrent_trials(run):  # so that it is still there when the second one asks
+    with _kept_stopped(run):  # so that it is still there when the second one asks
         done = subprocess.run(
             words, env=run.environment, capture_output=True, text=True, timeout=PATIENCE
         )

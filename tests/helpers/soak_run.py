@@ -115,7 +115,7 @@ class Run:
     def workers(self) -> list[int]:
         """Process ids of the driver's workers."""
         return (
-            [p for p in children(self.driver.pid) if "spawn_main" in command_of(p)]
+            [p for p in children(self.driver.pid) if "robospa.harness.pool" in command_of(p)]
             if (self.driver is not None)
             else []
         )

@@ -167,20 +167,6 @@ def test_servers_with_different_specs_are_not_one_policy(
     assert not (tmp_path / "run").exists()
 
 
-@pytest.mark.parametrize(
-    ("more", "sentence"),
-    [
-        (["ws://a:1", "--policy", "ws://a:1"], "ws://a:1 is named twice"),
-        (["ws://a:1", "--policy", "hold"], "'hold' is no URL"),
-        (["--policy", "ws://a:1", "--policy-map", "x.json"], "either the policy or --policy-map"),
-    ],
-)
-def test_lists_of_servers_that_cannot_be(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], more: list[str], sentence: str
-) -> None:
-    assert sentence in refused(words(tmp_path / "run", *more), capsys)
-
-
 def test_workers_come_while_others_wait_and_the_server_has_room(tmp_path: Path) -> None:
     notes: list[str] = []
     keys = [TrialKey("Pick_Fake", 1, 100000 + n) for n in range(30)]

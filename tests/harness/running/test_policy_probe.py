@@ -227,12 +227,3 @@ def test_warnings_and_options_are_printed_and_kept(tmp_path: Path) -> None:
     assert run.manifest.settings.step_scale == 3
     assert all(r.diagnostics["text_budget"] == 4 for r in run.records.values())
     assert "step-limits" in {finding.rule for finding in lint_run(run)}
-
-
-def test_step_limits_are_scaled(tmp_path: Path) -> None:
-    with ServerThread(policy_factory=lambda: Named("lazy")) as server:
-        words = [server.url, "--tasks", "Pick_Blocks_Size", "--step-scale", "0.5"]
-        code, err = evaluate(tmp_path / "run", *words)
-    assert code == 0, err
-    found = read_run(tmp_path / "run").records.values()
-    assert {(r.end, r.steps) for r in found} == {("step_limit", 10)}

@@ -1,10 +1,10 @@
-"""A run whose trials all end in the same policy error stops, and what is withdrawn is bounded."""
+"""What a driver notices: a policy that always fails alike, or speaks another language."""
 
 from __future__ import annotations
 
-from fake_runs import trial_record
+from fake_runs import record, trial_record
 
-from robospa.harness.running.attempts import FIRST, IN_A_ROW, ErrorVerdict, ErrorWatch
+from robospa.harness.running.attempts import FIRST, IN_A_ROW, ErrorVerdict, ErrorWatch, ProblemWatch
 from robospa.results.records.action_problems import error_kind
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
@@ -70,3 +70,24 @@ def test_lost_trials_say_nothing_of_the_policy() -> None:
 def test_numbers_do_not_make_another_error() -> None:
     assert error_kind("nan in action 1, 0x7f3a") == error_kind("nan in action -2.5e3, 0x11bc")
     assert error_kind("no camera a") != error_kind("no camera b")
+
+
+def watched(actions: int, end: str = "step_limit") -> list[list[str]]:
+    """What is said after each of seven trials of 130 actions, so many of them out of reach."""
+    watch = ProblemWatch()
+    found = {"unreachable_actions": actions, "first_unreachable": "action 1: left pose"}
+    more = {"end": end, "steps": 130, "diagnostics": found}
+    return [watch.add(record("Pick_Blocks_Size", 1, seed, 0, **more)) for seed in range(7)]
+
+
+def test_many_unreachable_actions_are_said_once_after_five_trials() -> None:
+    said = watched(128)
+    assert [len(lines) for lines in said] == [0, 0, 0, 0, 1, 0, 0]
+    assert said[4][0].startswith(
+        "warning: in the first 5 trials 640 of 650 actions (98 %) ask for a pose out of reach"
+    )
+    assert "are poses in the world frame" in said[4][0] and "action 1: left pose" in said[4][0]
+
+
+def test_few_and_lost_trials_say_nothing() -> None:
+    assert not any(watched(3)) and not any(watched(130, "infrastructure"))
