@@ -1,33 +1,28 @@
 """Who stands on the leaderboard: submissions with their badges, and the four published models.
 
-An entry's values come from the counts of its single variants; all averages are computed here, and
-a submission whose own averages differ from them is refused. Two entries are ranked against each
+An entry's values come from the outcomes of its trials; all averages are computed here, and a
+submission whose own scores differ from them is refused. Two entries are ranked against each
 other only if both are `rankable` and share a `Group`. What an entry does not state equals nothing.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import astuple, dataclass
-from typing import Annotated
-
-from msgspec import UNSET, Struct, UnsetType
+from dataclasses import astuple, dataclass, replace
 
 from robospa.leaderboard.agreement import LEAST_POWER, LIE
 from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.card import Card, recipe_of
 from robospa.leaderboard.evidence import BadgeEvidence, what_it_catches
 from robospa.leaderboard.submission import Submission, slug_of
-from robospa.leaderboard.verify import compare_scores
+from robospa.leaderboard.verify import compare_scores, results_of
 from robospa.results.paper import rounding
 from robospa.results.paper.columns import Column, published_column
 from robospa.results.paper.origin import DIFFERENCES
 from robospa.results.paper.published import LEVELS, load
-from robospa.results.scoring.models import ModelResults, Setting
-from robospa.results.scoring.scores import VariantScore, combine, to_json
+from robospa.results.scoring.scores import to_json
 from robospa.results.statistics.intervals import Estimate
-from robospa.schema import Count, pattern, read
-from robospa.trial import CATEGORIES, DIMENSIONS, SPATIAL
+from robospa.trial import CATEGORIES, DIMENSIONS
 
 
 @dataclass(frozen=True, order=True)
@@ -191,7 +186,7 @@ def published_entries() -> list[Entry]:
 
 def entry_of(submission: Submission) -> Entry:
     """The entry of a submission; BundleError if its scores do not hold together."""
-    card, evidence = submission.card, submission.evidence
+    card, run, evidence = submission.card, submission.run, submission.evidence
     column = _column(submission)
     training, actions = card.training, card.actions
     demonstrations = ", ".join(map(str, training.demonstrations))
@@ -206,9 +201,9 @@ def entry_of(submission: Submission) -> Entry:
         ("demonstrations", f"{demonstrations} (levels 1 to 5, per base task)"),
         ("actions", f"{actions.space}, chunks of {actions.chunk}, {actions.rate:g} Hz"),
         ("embodiment", column.embodiment),
-        ("scene mode", submission.settings.mode[0]),
-        ("instructions", submission.settings.split[0]),
-        ("suite", submission.suite),
+        ("scene mode", run.settings.mode[0]),
+        ("instructions", run.settings.split[0]),
+        ("suite", run.suite),
         ("bundle", submission.bundle),
     )  # fmt: skip
     return Entry(
@@ -219,9 +214,9 @@ def entry_of(submission: Submission) -> Entry:
         link="" if recipe_of(card.link) else card.link,
         badges=evidence.badges,
         embodiment=column.embodiment,
-        mode=submission.settings.mode[0],
-        split=submission.settings.split[0],
-        suite=submission.suite,
+        mode=run.settings.mode[0],
+        split=run.settings.split[0],
+        suite=run.suite,
         training=training.tasks,
         scenes=training.scenes,
         column=column,
@@ -249,69 +244,13 @@ def short_count(count: int) -> str:
     return str(count)
 
 
-Interval = tuple[float, float, float]
-"""A value with the bounds of its interval."""
-
-
-class VariantRow(Struct, frozen=True):
-    """A variant in `scores.json`; a metric that does not apply is absent, one without trials is
-    None."""
-
-    trials: Count
-    missing: Count
-    successes: Count
-    sr: Interval | UnsetType | None = UNSET
-    onta: Interval | UnsetType | None = UNSET
-    ps: Interval | UnsetType | None = UNSET
-
-    @property
-    def values(self) -> dict[str, Estimate | None]:
-        """The metrics that apply."""
-        found = {"sr": self.sr, "onta": self.onta, "ps": self.ps}
-        return {
-            name: None if value is None else Estimate(*value)
-            for name, value in found.items()
-            if value is not UNSET
-        }
-
-
-class ScoresFile(Struct, frozen=True):
-    """The part of `scores.json` that everything else in it is computed from."""
-
-    variants: dict[str, dict[Annotated[str, pattern("L[1-5]", "L1 to L5")], VariantRow]]
-
-
 def _column(submission: Submission) -> Column:
-    """The submission's scores as a column, computed from its variants."""
+    """The submission's scores as a column, computed from the outcomes of its trials."""
     where = f"the submission {submission.folder.name}: scores.json"
-    given = read(ScoresFile, submission.scores, where, BundleError)
-    settings, counts = submission.settings, load().tasks
-    cells: dict[tuple[str, int], VariantScore] = {}
-    for task, levels in given.variants.items():
-        category = submission.categories.get(task)
-        if category is None:
-            raise BundleError(
-                f"{where} has scores of {task[:80]!a}, of which the run has no trials"
-            )
-        for name, row in levels.items():
-            level = int(name.removeprefix("L"))
-            known = counts.get(task)
-            n = known.counts[level - 1] if known and category in SPATIAL else 0
-            listed = row.trials + row.missing
-            cells[task, level] = VariantScore(
-                task, level, category, listed, row.trials, row.successes, row.values, n
-            )
-    try:
-        scores = combine(cells)
-        parts = (settings.embodiment[:1], settings.mode[:1], settings.split[:1])
-        setting = Setting(*parts, (submission.suite,))
-        column = Column(ModelResults(submission.card.name, scores, setting))
-        assert column.values, "computed here, where an error is the bundle's"
-    except (KeyError, TypeError, ValueError, AttributeError, AssertionError, IndexError) as error:
-        raise BundleError(f"{where} is not a report's: {error!r}") from None
-    if found := compare_scores(to_json(scores), submission.scores):
+    results = results_of(submission.card.name, submission.outcomes, submission.run)
+    if found := compare_scores(to_json(results.scores), submission.scores):
         raise BundleError(f"{where} does not hold together: {found}")
-    return column
+    return Column(replace(results, trials={}))  # 28,000 records of every submission
 
 
 def evidence_lines(evidence: BadgeEvidence) -> list[tuple[str, str]]:

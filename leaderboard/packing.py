@@ -35,7 +35,6 @@ from robospa.leaderboard.verify import (
     Valid,
     check_run,
     outcomes_of,
-    own_version,
     scores_of,
     seed_lists,
     tables_of,
@@ -44,6 +43,7 @@ from robospa.leaderboard.verify import (
 from robospa.results.records.manifest import PolicySettings, RunAbout, make_manifest
 from robospa.results.records.runs import Run, action_path, by_setting, read_run
 from robospa.results.records.trial_record import TrialRecord
+from robospa.results.report.page import own_version
 from robospa.trial import TrialKey, path_part
 
 ABOUT = ("versions", "git", "code", "machine", "world", "warnings")

@@ -31,7 +31,6 @@ from robospa.leaderboard.entries import (
     page_values,
     rankable,
 )
-from robospa.leaderboard.rules import manifest_of
 from robospa.leaderboard.submission import left_out, read_submissions
 from robospa.leaderboard.verify import paired, results_of
 from robospa.results.failures.labels import KINDS, NAMES, SIMULATED_PER_FILM
@@ -309,8 +308,7 @@ def write_pairs(pairs: Sequence[Pair], out: Path, note: Callable[[str], None]) -
 def _results(entry: Entry) -> ModelResults:
     kept = entry.submission
     assert kept is not None
-    keys = manifest_of(kept.run).keys
-    return results_of(entry.name, kept.outcomes, keys, kept.categories, kept.suite)
+    return results_of(entry.name, kept.outcomes, kept.run)
 
 
 def _state(entry: Entry) -> str:

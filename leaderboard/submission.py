@@ -51,7 +51,7 @@ from robospa.leaderboard.rules import manifest_of
 from robospa.leaderboard.untrusted import BundleArchive, parse_map
 from robospa.leaderboard.verify import Valid
 from robospa.results.failures.labels import NAMES, distribution, failures_of
-from robospa.results.records.manifest import RunSettings
+from robospa.results.records.manifest import RunManifest
 from robospa.results.records.runs import Run
 from robospa.results.report.run_card import END_NAMES
 from robospa.results.report.trials import trial_rows
@@ -122,16 +122,13 @@ SLUG = re.compile(r"[a-z0-9][a-z0-9-]{0,63}")
 
 @dataclass(frozen=True)
 class Submission:
-    """A folder read back. `run`, `scores` and `outcomes` are the bundle's files as they are;
-    `settings` and `categories` are those of the run, `bundle` is the bundle's hash."""
+    """A folder read back. `scores` and `outcomes` are the bundle's files as they are, `bundle` is
+    its hash."""
 
     folder: Path
     bundle: str
     card: Card
-    run: Mapping[str, object]
-    suite: str
-    settings: RunSettings
-    categories: Mapping[str, str]
+    run: RunManifest
     scores: Mapping[str, object]
     outcomes: Mapping[str, object]
     evidence: BadgeEvidence
@@ -323,10 +320,7 @@ def read_submission(folder: Path) -> Submission:
         folder=folder,
         bundle=manifest.bundle,
         card=card,
-        run=parts[layout.RUN],
-        suite=run.suite,
-        settings=run.settings,
-        categories=run.categories,
+        run=run,
         scores=parts["scores.json"],
         outcomes=parts["outcomes.json"],
         evidence=evidence,

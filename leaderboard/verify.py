@@ -54,6 +54,7 @@ from robospa.results.paper.tables import FORMATS
 from robospa.results.records.manifest import RunManifest, RunSettings, seed_hash
 from robospa.results.records.runs import Run
 from robospa.results.records.trial_record import TrialRecord
+from robospa.results.report.page import own_version
 from robospa.results.report.tables import report_tables
 from robospa.results.scoring.models import IncomparableError, ModelResults, results_of_records
 from robospa.results.scoring.scores import ScoresData, Variant, score_run, to_json
@@ -385,13 +386,6 @@ def _cells(ending: str, text: str) -> list[list[float]]:
     return [[float(number) for number in NUMBER.findall(row)] for row in rows]
 
 
-def own_version() -> str:
-    """The version of the reporter that made, or makes, the tables."""
-    from importlib.metadata import version
-
-    return version("robospa")
-
-
 def _check_videos(
     archive: BundleArchive, manifest: BundleManifest, records: Mapping[TrialKey, TrialRecord]
 ) -> None:
@@ -481,27 +475,22 @@ def outcomes_of(run: Run) -> dict[str, Outcomes]:
     return found
 
 
-def results_of(
-    name: str,
-    outcomes: Mapping[str, object],
-    keys: Sequence[TrialKey],
-    categories: Mapping[str, str],
-    suite: str,
-) -> ModelResults:
-    """The results of a model, from the `outcomes` of the trials `keys` of `suite`; BundleError if
-    they do not fit each other."""
+def results_of(name: str, outcomes: Mapping[str, object], run: RunManifest) -> ModelResults:
+    """The results of a model, from the `outcomes` of the trials of `run`; BundleError if they do
+    not fit each other."""
     seeds: dict[Variant, list[TrialKey]] = {}
-    for key in sorted(keys):
+    for key in sorted(run.keys):
         seeds.setdefault(key.variant, []).append(key)
     if set(outcomes) != {f"{task}/{level}" for task, level in seeds}:
         raise BundleError(f"{name[:80]!a}: the outcomes are of other variants than the run")
     records: dict[TrialKey, TrialRecord] = {}
     for (task, level), own in seeds.items():
         part = _checked(outcomes[f"{task}/{level}"], len(own), f"{name[:80]!a}, {task} L{level}")
-        records |= {k: _record(k, categories[task], part, place) for place, k in enumerate(own)}
-    return results_of_records(
-        name, sorted(keys), records, RunManifest(categories=dict(categories), suite=suite)
-    )
+        category = run.categories.get(task, "")
+        records |= {k: _record(k, category, part, place) for place, k in enumerate(own)}
+    # What else the run says of itself is for its card: a column is shown as any other model's.
+    told = RunManifest(categories=run.categories, suite=run.suite)
+    return results_of_records(name, sorted(run.keys), records, told)
 
 
 def _checked(data: object, count: int, where: str) -> Outcomes:

@@ -30,7 +30,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> tuple[Run, Run]:
 
 
 def side(run: Run) -> ModelResults:
-    return results_of("x", outcomes_of(run), run.keys, run.manifest.categories, "robospa-1")
+    return results_of("x", outcomes_of(run), run.manifest)
 
 
 def test_the_numbers_are_those_of_comparing_the_runs(runs: tuple[Run, Run]) -> None:
@@ -64,10 +64,10 @@ def test_outcomes_that_cannot_be_are_refused(
     outcomes = to_builtins(outcomes_of(runs[0]))
     outcomes[f"{PICK}/1"][field] = value
     with pytest.raises(BundleError, match=words):
-        results_of("x", outcomes, runs[0].keys, runs[0].manifest.categories, "robospa-1")
+        results_of("x", outcomes, runs[0].manifest)
     del outcomes[f"{PICK}/1"]
     with pytest.raises(BundleError, match="other variants"):
-        results_of("x", outcomes, runs[0].keys, runs[0].manifest.categories, "robospa-1")
+        results_of("x", outcomes, runs[0].manifest)
 
 
 def test_pairs_are_written_once_and_only_of_what_was_measured_alike(tmp_path: Path) -> None:
