@@ -65,10 +65,7 @@ def _by_size(phrase: str, group: Sequence[SceneObject]) -> dict[str, str]:
     first, first_of_many, last, last_of_many = SIZES[axes[0]]
     count = len(ranked)
     if count == 2:
-        return {
-            ranked[0].name: first.format("", phrase),
-            ranked[1].name: last.format("", phrase),
-        }
+        return {ranked[0].name: first.format("", phrase), ranked[1].name: last.format("", phrase)}
     names = [first_of_many.format("", phrase)]
     names += [first_of_many.format(f"{_ordinal(i)} ", phrase) for i in range(2, count)]
     names.append(last_of_many.format("", phrase))

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
-from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from robospa.registry import PACKS, find
 
@@ -99,7 +99,7 @@ def pack(name: str) -> Pack:
     return opened
 
 
-def without_pack(params: Params) -> dict[str, Any]:
+def without_pack(params: Params) -> Params:
     """`params` of the built-in model."""
     return {key: value for key, value in params.items() if key != "pack"}
 
@@ -109,15 +109,13 @@ def with_pack(scene: Scene, name: str) -> Scene:
     chosen = pack(name)
 
     def packed(item: SceneObject) -> SceneObject:
-        params: Mapping[str, Any] = without_pack(item.params)
+        params = without_pack(item.params)
         if name != Builtin.name and chosen.has(item.asset, params):
             params = {**params, "pack": name}
         return replace(item, params=params)
 
     return replace(
-        scene,
-        objects=tuple(map(packed, scene.objects)),
-        clutter=tuple(map(packed, scene.clutter)),
+        scene, objects=tuple(map(packed, scene.objects)), clutter=tuple(map(packed, scene.clutter))
     )
 
 

@@ -174,10 +174,7 @@ class Scene:
 def _objects(rows: Iterable[Mapping[str, Any]]) -> tuple[SceneObject, ...]:
     return tuple(
         SceneObject(
-            **{
-                **row,
-                "pose": Pose(tuple(row["pose"]["position"]), tuple(row["pose"]["rotation"])),
-            }
+            **{**row, "pose": Pose(tuple(row["pose"]["position"]), tuple(row["pose"]["rotation"]))}
         )
         for row in rows
     )

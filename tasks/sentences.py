@@ -65,10 +65,7 @@ def instruction(scene: Scene, split: str = "heldout", salt: str = "") -> str:
 
 
 def _fillings(
-    template: str,
-    phrasings: Mapping[str, tuple[str, ...]],
-    count: int,
-    rng: np.random.Generator,
+    template: str, phrasings: Mapping[str, tuple[str, ...]], count: int, rng: np.random.Generator
 ) -> list[str]:
     names = slot_names(template)
     missing = [name for name in names if name not in phrasings]

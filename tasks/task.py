@@ -33,7 +33,7 @@ class SceneFacts:
     "there is none" ("" or 0).
     """
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, object]:
         """Plain JSON values by field, without those at their default."""
         values = {f.name: (getattr(self, f.name), f.default) for f in fields(self)}
         return {
@@ -47,7 +47,7 @@ class SceneFacts:
         return cls(**{name: _frozen(value) for name, value in known.items()})
 
 
-def _plain(value: Any) -> Any:
+def _plain(value: object) -> object:
     return [_plain(item) for item in value] if isinstance(value, list | tuple) else value
 
 

@@ -16,13 +16,7 @@ from robospa.action_space import ARMS
 from robospa.geometry import Array
 from robospa.harness.skills.motion import at_once, go, line_poses, rise, travel
 from robospa.harness.skills.pick import LEANS, LEVEL, GraspCandidate, reachable_grasps
-from robospa.harness.skills.workspace import (
-    SkillFailed,
-    Steps,
-    Workspace,
-    moved_back,
-    moved_up,
-)
+from robospa.harness.skills.workspace import SkillFailed, Steps, Workspace, moved_back, moved_up
 from robospa.tasks.plan import RaiseLower
 
 STANDOFF = 0.08

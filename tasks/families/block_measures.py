@@ -28,33 +28,13 @@ from robospa.workcell import TABLE_TOP, FixedCamera, Workcell
 
 TEXT = TaskText.beside(__file__, "block_measures.toml")
 
-WORDS: Mapping[str, Mapping[str, str]] = {
-    "size": {
-        "measure": "size",
-        "how": "big each block is",
-        "most": "largest",
-        "least": "smallest",
-    },
-    "height": {
-        "measure": "height",
-        "how": "tall each block is",
-        "most": "tallest",
-        "least": "shortest",
-    },
-    "length": {
-        "measure": "length",
-        "how": "long each block is from left to right",
-        "most": "longest",
-        "least": "shortest",
-    },
-    "area": {
-        "measure": "base area",
-        "how": "much table each block covers",
-        "most": "largest base",
-        "least": "smallest base",
-    },
+WORDS = {
+    "size": ("size", "big each block is", "largest", "smallest"),
+    "height": ("height", "tall each block is", "tallest", "shortest"),
+    "length": ("length", "long each block is from left to right", "longest", "shortest"),
+    "area": ("base area", "much table each block covers", "largest base", "smallest base"),
 }
-"""How a measure of blocks is called, how it is looked at, and its two ends, by slot."""
+"""How a measure of blocks is called, how it is looked at, and its two ends."""
 
 DISC = ((0.0, -0.12), 0.015)
 """No block lies within this squared radius [m2] of this point."""
@@ -212,7 +192,8 @@ def rank_task(measure: Measure, layouts: Mapping[int, BlockLayout]) -> Task:
         else:
             which = "first" if rank == 1 else "other"
         number, spelled = ordinal(rank)
-        fixed: Slots = {slot: ((text,), (text,)) for slot, text in WORDS[word].items()}
+        said = zip(("measure", "how", "most", "least"), WORDS[word], strict=True)
+        fixed: Slots = {slot: ((text,), (text,)) for slot, text in said}
         return fixed | TEXT.slots(f"block.{word}.{which}", number=number, word=spelled)
 
     return Task(
@@ -229,39 +210,15 @@ def rank_task(measure: Measure, layouts: Mapping[int, BlockLayout]) -> Task:
     )
 
 
-HALF_EDGES = (
-    (0.032, 0.033),
-    (0.027, 0.028),
-    (0.022, 0.023),
-    (0.017, 0.018),
-    (0.014, 0.015),
-    (0.009, 0.010),
-)
-HALF_HEIGHTS = (
-    (0.077, 0.078),
-    (0.060, 0.061),
-    (0.045, 0.046),
-    (0.032, 0.033),
-    (0.021, 0.022),
-    (0.012, 0.013),
-)
-HALF_LENGTHS = (
-    (0.044, 0.045),
-    (0.033, 0.034),
-    (0.024, 0.025),
-    (0.017, 0.018),
-    (0.012, 0.013),
-    (0.009, 0.010),
-)
-HALF_BASES = (
-    (0.032, 0.033),
-    (0.027, 0.028),
-    (0.022, 0.023),
-    (0.017, 0.018),
-    (0.012, 0.013),
-    (0.009, 0.010),
-)
-"""Ranges [m] of each rank."""
+def _bands(*least: float) -> tuple[Range, ...]:
+    """Ranges [m] of each rank, a millimetre wide."""
+    return tuple((low, round(low + 0.001, 3)) for low in least)
+
+
+HALF_EDGES = _bands(0.032, 0.027, 0.022, 0.017, 0.014, 0.009)
+HALF_HEIGHTS = _bands(0.077, 0.060, 0.045, 0.032, 0.021, 0.012)
+HALF_LENGTHS = _bands(0.044, 0.033, 0.024, 0.017, 0.012, 0.009)
+HALF_BASES = _bands(0.032, 0.027, 0.022, 0.017, 0.012, 0.009)
 HALF_SIDE = (0.0155, 0.0165)
 """The two other half sizes [m] of blocks of different height or length, the same in a scene."""
 BASE_HALF_HEIGHT = {1: 0.029, 2: 0.027, 3: 0.025, 4: 0.022, 5: 0.020}

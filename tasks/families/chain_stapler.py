@@ -15,14 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from robospa.geometry import Pose
-from robospa.tasks.families.chain import (
-    ActionChain,
-    Region,
-    Station,
-    button,
-    placed,
-    pressing_arm,
-)
+from robospa.tasks.families.chain import ActionChain, Region, Station, button, placed, pressing_arm
 from robospa.tasks.families.dustbin import BIN, TABLE_SHIFT, container
 from robospa.tasks.families.table import Item, draw_variant, frame_of, radius, standing
 from robospa.tasks.goals.conditions import Inside, Near, Rests

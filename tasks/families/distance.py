@@ -318,19 +318,15 @@ BLOCK_COLORS = (
     *("orange", "cyan", "pink", "brown", "gray"),
 )
 """A level of n blocks has the first n of these colours."""
-HALF_EDGES = {
-    1: (0.018, 0.022),
-    2: (0.0165, 0.0185),
-    3: (0.015, 0.017),
-    4: (0.014, 0.016),
-    5: (0.012, 0.014),
-}
+HALF_EDGES = (
+    (0.018, 0.022), (0.0165, 0.0185), (0.015, 0.017), (0.014, 0.016), (0.012, 0.014),
+)  # fmt: skip
 """Range of the half edge [m], the same for all blocks of a scene."""
 
 
 def blocks(level: int, rng: np.random.Generator) -> list[Thing]:
     """Equal cubes of different colours."""
-    half = float(rng.uniform(*HALF_EDGES[level]))
+    half = float(rng.uniform(*HALF_EDGES[level - 1]))
     colors = [NAMED[word] for word in BLOCK_COLORS][: BLOCKS.rules.counts[level - 1]]
     order = rng.permutation(len(colors))
     return [("block", {"half": [half] * 3, "color": list(colors[i])}) for i in order]
@@ -363,13 +359,7 @@ BLOCKS = ObjectSet(
     yaw=0.75,
 )
 
-MUG_MODELS = {
-    "black": (1, 5),
-    "brown": (0, 2, 4),
-    "yellow": (1, 3),
-    "white": (0, 1),
-    "green": (4,),
-}
+MUG_MODELS = {"black": (1, 5), "brown": (0, 2, 4), "yellow": (1, 3), "white": (0, 1), "green": (4,)}
 PILL_MODELS = {"orange": (0, 1), "white": (1,), "brown": (2,), "green": (3,)}
 """Looks (their print or cap) of each official colour: as many models as officially."""
 

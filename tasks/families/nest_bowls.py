@@ -67,8 +67,7 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSampl
     ]
     scene_objects, names = table.named(rng, items)
     return SceneSample(
-        scene_objects,
-        Facts(names["plate"], tuple(names[str(i)] for i in range(level))),
+        scene_objects, Facts(names["plate"], tuple(names[str(i)] for i in range(level)))
     )
 
 

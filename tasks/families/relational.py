@@ -44,15 +44,11 @@ EDGE = (0.02, 0.02)
 """Whole objects are this far inside."""
 LAYOUTS = 200
 """Layouts that are drawn until the objects lie free of each other in one."""
-DIRECTIONS: Mapping[str, tuple[int, int]] = {
-    "left": (-1, 0),
-    "right": (1, 0),
-    "front": (0, 1),
-    "back": (0, -1),
-    "front_left": (-1, 1),
-    "front_right": (1, 1),
-    "back_left": (-1, -1),
-    "back_right": (1, -1),
+_ALONG = {"left": (-1, 0), "right": (1, 0), "front": (0, 1), "back": (0, -1)}
+DIRECTIONS: Mapping[str, tuple[int, int]] = _ALONG | {
+    f"{depth}_{side}": (_ALONG[side][0], _ALONG[depth][1])
+    for depth in ("front", "back")
+    for side in ("left", "right")
 }
 """Steps in columns (to the right) and rows (away from the robot)."""
 
@@ -113,7 +109,7 @@ class Crowd:
     kind: str
     noun: str
     families: tuple[SpacedKind, ...]
-    pitches: tuple[Pitches, Pitches, Pitches]
+    pitches: tuple[Pitches, ...]
     what: str
     wording: str = "noun"
 
@@ -326,38 +322,33 @@ MOUSE = SpacedKind("mouse", (0.100, 0.082, 0.090))
 CARDS = SpacedKind("playing_cards", (0.090, 0.078, 0.084))
 REMOTE = SpacedKind("remote_control", (0.124, 0.078, 0.104))
 
+
+def _pitches(*least: tuple[float, float]) -> tuple[Pitches, ...]:
+    """Those with these least distances; the largest are the same for all objects."""
+    largest = ((0.185, 0.17), (0.16, 0.16), (0.132, 0.122))
+    return tuple(((a, c), (b, d)) for (a, b), (c, d) in zip(least, largest, strict=True))
+
+
 CROWDS = (
     Crowd(
         kind="Tea_Box",
         noun="tea_box",
         families=(TEA_BOX,),
-        pitches=(
-            ((0.0902, 0.185), (0.085, 0.17)),
-            ((0.1054, 0.16), (0.0888, 0.16)),
-            ((0.0969, 0.132), (0.0814, 0.122)),
-        ),
+        pitches=_pitches((0.0902, 0.085), (0.1054, 0.0888), (0.0969, 0.0814)),
         what="equal tea boxes",
     ),
     Crowd(
         kind="Cans",
         noun="can",
         families=(CAN,),
-        pitches=(
-            ((0.09, 0.185), (0.085, 0.17)),
-            ((0.0998, 0.16), (0.087, 0.16)),
-            ((0.0917, 0.132), (0.0797, 0.122)),
-        ),
+        pitches=_pitches((0.09, 0.085), (0.0998, 0.087), (0.0917, 0.0797)),
         what="equal cans",
     ),
     Crowd(
         kind="Soaps",
         noun="soap_bar",
         families=(SOAP,),
-        pitches=(
-            ((0.09, 0.185), (0.085, 0.17)),
-            ((0.0943, 0.16), (0.082, 0.16)),
-            ((0.0866, 0.132), (0.076, 0.122)),
-        ),
+        pitches=_pitches((0.09, 0.085), (0.0943, 0.082), (0.0866, 0.076)),
         what="equal soap bars",
         wording="soap",
     ),
@@ -365,22 +356,14 @@ CROWDS = (
         kind="Mixed_Objects_A",
         noun="object",
         families=(BLOCK, CAN, SOAP, STAPLER, TEA_BOX, TOYCAR, SEAL, CUBE, BELL),
-        pitches=(
-            ((0.098, 0.185), (0.085, 0.17)),
-            ((0.1146, 0.16), (0.0934, 0.16)),
-            ((0.1055, 0.132), (0.0857, 0.122)),
-        ),
+        pitches=_pitches((0.098, 0.085), (0.1146, 0.0934), (0.1055, 0.0857)),
         what="different objects",
     ),
     Crowd(
         kind="Mixed_Objects_B",
         noun="object",
         families=(MOUSE, CARDS, REMOTE, CAN, SOAP, STAPLER, TOYCAR, SEAL, BELL),
-        pitches=(
-            ((0.1027, 0.185), (0.085, 0.17)),
-            ((0.1201, 0.16), (0.0906, 0.16)),
-            ((0.1106, 0.132), (0.0831, 0.122)),
-        ),
+        pitches=_pitches((0.1027, 0.085), (0.1201, 0.0906), (0.1106, 0.0831)),
         what="different objects",
     ),
 )

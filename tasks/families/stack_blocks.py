@@ -117,12 +117,7 @@ def _half_height(scene: Scene, name: str) -> float:
 
 
 def _task(
-    name: str,
-    draw: Draw,
-    text: TaskText,
-    slots: Callable[[Scene], Slots],
-    order: str,
-    below: str,
+    name: str, draw: Draw, text: TaskText, slots: Callable[[Scene], Slots], order: str, below: str
 ) -> Task:
     return Task(
         name=f"Stack_Blocks_{name}_Order",

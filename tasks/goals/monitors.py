@@ -220,7 +220,4 @@ class ClutterMonitor:
 
     def diagnostics(self) -> dict[str, object]:
         """How many things there were, and which were moved."""
-        return {
-            "clutter": len(self._there) + len(self._moved),
-            "clutter_moved": list(self._moved),
-        }
+        return {"clutter": len(self._there) + len(self._moved), "clutter_moved": list(self._moved)}

@@ -13,7 +13,6 @@ import json
 from collections.abc import Mapping
 from functools import cache, lru_cache
 from types import MappingProxyType
-from typing import Any
 
 from robospa.registry import ASSETS, find, names
 from robospa.tasks import packs
@@ -122,7 +121,7 @@ def _asset(name: str) -> Asset:
 @lru_cache(maxsize=4096)
 def _build(name: str, text: str) -> ObjectModel:
     asset = _asset(name)
-    params: dict[str, Any] = json.loads(text)
+    params: Params = json.loads(text)
     known = asset.params | {"look"} | ({"tint"} if name in TINTS else set())
     unknown = sorted(set(params) - known)
     if unknown:

@@ -138,10 +138,7 @@ def _inside(oven: Oven) -> list[Shape]:
     centre, deep = (oven.behind + rear) / 2, (rear - oven.behind) / 2 - 0.001
     lining = m.merge(
         m.flat(m.rectangle(half, deep, middle, centre), low + 0.0003),
-        m.upright(
-            m.rectangle(half, (high - low) / 2),
-            (middle, rear - 0.0003, (low + high) / 2),
-        ),
+        m.upright(m.rectangle(half, (high - low) / 2), (middle, rear - 0.0003, (low + high) / 2)),
         m.upright(
             m.rectangle(deep, (high - low) / 2), (left + 0.0003, centre, (low + high) / 2), 0.0
         ),

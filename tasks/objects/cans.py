@@ -35,13 +35,7 @@ def sauce_can(look: int, params: Params) -> ObjectModel:
     base, field, mark, content, word, r = SAUCES[look]
     h = SAUCE_HEIGHT
     rim = [(r - 0.002, 0.0), (r, 0.001), (r, 0.005), (r - 0.0012, 0.006)]
-    rim += [
-        (r - 0.0012, h - 0.006),
-        (r, h - 0.005),
-        (r, h),
-        (r - 0.003, h),
-        (r - 0.003, h - 0.003),
-    ]
+    rim += [(r - 0.0012, h - 0.006), (r, h - 0.005), (r, h), (r - 0.003, h), (r - 0.003, h - 0.003)]
     parts = [
         collision(Cylinder(r, h / 2), (0.0, 0.0, h / 2)),
         visual(m.lathe(rim, 16), build.STEEL, roughness=0.3, metallic=0.5),

@@ -174,8 +174,7 @@ def bread_basket(look: int, params: Params) -> ObjectModel:
         visual(m.merge(*weave[dark]), srgb(dark), roughness=0.9),
         visual(m.merge(*weave[pale]), srgb(pale), roughness=0.9),
         visual(
-            m.lathe([(inside, h - 0.012), (inside, floor), (0.0, floor)], 20, False),
-            colour(cloth),
+            m.lathe([(inside, h - 0.012), (inside, floor), (0.0, floor)], 20, False), colour(cloth)
         ),
         visual(m.lathe([(inside, h), (inside, h - 0.012)], 20, False), srgb(dark), roughness=0.9),
         collision(Cylinder(0.077, floor / 2), (0.0, 0.0, floor / 2)),
@@ -371,9 +370,7 @@ def table_trash_bin(look: int, params: Params) -> ObjectModel:
         visual(inner, (shade[0], shade[1], shade[2]), roughness=0.7),
         visual(m.flat(base, floor), (shade[0], shade[1], shade[2]), roughness=0.7),
         visual(
-            m.merge(stripe, *_can_icons(half_at(0.036) + 0.0006, lean)),
-            colour(band),
-            roughness=0.5,
+            m.merge(stripe, *_can_icons(half_at(0.036) + 0.0006, lean)), colour(band), roughness=0.5
         ),
         visual(underside, colour(body), roughness=0.5),
         collision(Box((low, low, floor / 2)), (0.0, 0.0, floor / 2)),

@@ -52,10 +52,7 @@ def stapler(look: int, params: Params) -> ObjectModel:
         visual(m.slab(0.0124, 0.0415, 0.0075, 0.005, 0.0015), colour(base), roughness=0.5),
         visual(m.side_prism(rail, 0.0078), build.STEEL, roughness=0.3, metallic=0.5),
         visual(_rounded_arm(arm, w), colour(top), roughness=0.3),
-        visual(
-            m.merge(*ridges, stripe),
-            colour(base) if base != "black" else srgb("#3a3c42"),
-        ),
+        visual(m.merge(*ridges, stripe), colour(base) if base != "black" else srgb("#3a3c42")),
         visual(m.prism(m.rectangle(0.0062, 0.0045, 0.0, -0.034), 0.0074, 0.0084), build.STEEL),
         visual(
             Cylinder(0.0048, 0.0128), build.STEEL, (0.0, 0.0345, 0.0165), build.ALONG_X, 0.3, 0.4

@@ -173,11 +173,7 @@ def electronic_scale(look: int, params: Params) -> ObjectModel:
         visual(m.slab(hx, hy, h, 0.012, 0.003, 4), colour(word), roughness=0.4),
         visual(steel, build.STEEL, roughness=0.3, metallic=0.5),
         visual(m.flat(m.rounded_rectangle(0.0245, 0.0088, 0.003), h + 0.0004, window), build.DARK),
-        visual(
-            m.flat(m.rectangle(0.0225, 0.0072), h + 0.0008, window),
-            srgb(light),
-            roughness=0.9,
-        ),
+        visual(m.flat(m.rectangle(0.0225, 0.0072), h + 0.0008, window), srgb(light), roughness=0.9),
         visual(m.merge(*digits, point, units), srgb("#101418")),
         visual(button, colour("red") if word != "red" else build.DARK),
     ]

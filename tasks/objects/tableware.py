@@ -93,11 +93,7 @@ def plate(look: int, params: Params) -> ObjectModel:
         visual(m.lathe([outer[-1], inner[0]], 28, False), colour(base), roughness=0.25),
         visual(m.lathe(inner[:2], 28, False), colour(base), roughness=0.25),
         visual(m.lathe(inner[1:], 28, False), (0.78 * red, 0.78 * g, 0.78 * b), roughness=0.25),
-        visual(
-            m.merge(ring(0.0710, 0.0785), ring(0.0550, 0.0575)),
-            colour(stripe),
-            roughness=0.25,
-        ),
+        visual(m.merge(ring(0.0710, 0.0785), ring(0.0550, 0.0575)), colour(stripe), roughness=0.25),
         collision(Cylinder(flat, low / 2), (0.0, 0.0, low / 2)),
         *build.wall_ring(0.0632, 0.0035, low, h - 0.001, 24, math.pi / 2 - slope),
     ]

@@ -2,28 +2,30 @@
 
 from __future__ import annotations
 
+import pytest
+
 from robospa.tasks.events import Event, outcome
 
 
-def done(time: float, index: int) -> Event:
-    return Event(time, "subtask_done", "", index)
-
-
-def undone(time: float, index: int) -> Event:
-    return Event(time, "subtask_undone", "", index)
-
-
-def test_the_best_stays_when_a_subtask_is_undone() -> None:
-    both_undone = [done(0.1, 0), done(0.2, 1), undone(0.3, 1), undone(0.4, 0)]
-    found = outcome([*both_undone, done(0.5, 0)], 3)
-    assert (found.done, found.best, found.success) == (1, 2, False)
-
-
-def test_doing_one_subtask_twice_is_one_subtask() -> None:
-    found = outcome([done(0.1, 0), undone(0.2, 0), done(0.3, 0)], 3)
-    assert (found.done, found.best) == (1, 1)
-
-
-def test_success_counts_all_and_failure_none() -> None:
-    assert outcome([Event(0.1, "success")], 2).success
-    assert outcome([done(0.1, 0), Event(0.2, "failed")], 2).failed
+@pytest.mark.parametrize(
+    ("told", "total", "done", "best"),
+    [
+        (["done 0", "done 1", "undone 1", "undone 0", "done 0"], 3, 1, 2),
+        (["done 0", "undone 0", "done 0"], 3, 1, 1),
+        (["success"], 2, 2, 2),
+        (["done 0", "failed"], 2, 1, 1),
+    ],
+)
+def test_the_best_stays_and_a_subtask_counts_once(
+    told: list[str], total: int, done: int, best: int
+) -> None:
+    """What is undone counts no more, and success is all."""
+    events = []
+    for time, text in enumerate(told):
+        kind, _, index = text.partition(" ")
+        events.append(
+            Event(time, f"subtask_{kind}", "", int(index)) if index else Event(time, kind)
+        )
+    found = outcome(events, total)
+    assert (found.done, found.best) == (done, best)
+    assert (found.success, found.failed) == ("success" in told, "failed" in told)

@@ -1,4 +1,4 @@
-"""Scenes made of a pack's objects, and packs of other packages."""
+"""Scenes made of a pack's objects; packs and assets of other packages, which replace none here."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 from installed import installed
 
 from robospa.registry import UnknownName
-from robospa.tasks import packs
+from robospa.tasks import objects, packs
 from robospa.tasks.catalog import build_scene
 from robospa.tasks.objects import object_model
 from robospa.tasks.packs import pack, with_pack
@@ -19,9 +19,11 @@ from robospa.tasks.scene import Scene
 
 @pytest.fixture(autouse=True)
 def fresh() -> Iterator[None]:
-    packs.pack.cache_clear()
+    for clear in (packs.pack.cache_clear, objects._packs.cache_clear):
+        clear()
     yield
-    packs.pack.cache_clear()
+    for clear in (packs.pack.cache_clear, objects._packs.cache_clear):
+        clear()
 
 
 @pytest.fixture
@@ -76,3 +78,31 @@ def test_only_the_objects_models_change(scene: Scene) -> None:
 def test_an_unknown_pack_is_named_with_those_there_are(scene: Scene) -> None:
     with pytest.raises(UnknownName, match="no asset pack 'offical'; did you mean official"):
         with_pack(scene, "offical")
+
+
+BALLS = """
+from robospa.tasks.objects.build import Asset
+from robospa.tasks.shapes import ObjectModel
+
+BALL = Asset(1, lambda look, params: ObjectModel("ball", (), (0.04,) * 3, 0.02, "ball"))
+PACK, CLASH = {"ball": BALL}, {"block": BALL}
+"""
+
+
+@pytest.mark.parametrize("offered", ["PACK", "CLASH"])
+def test_an_asset_of_another_package_is_found_and_replaces_none(
+    offered: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "ball_pack.py").write_text(BALLS)
+    installed(tmp_path, {"robospa.assets": {"balls": f"ball_pack:{offered}"}})
+    monkeypatch.syspath_prepend(tmp_path)
+    if offered == "CLASH":
+        with pytest.raises(ValueError, match=r"'balls' offers 'block'.* a name that is taken"):
+            object_model("ball")
+    else:
+        assert object_model("ball").asset == "ball" and "ball" not in objects.assets()
+
+
+def test_an_asset_that_nobody_offers_is_unknown() -> None:
+    with pytest.raises(KeyError, match="no asset 'bal'; "):
+        object_model("bal")

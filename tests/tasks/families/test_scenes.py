@@ -35,9 +35,7 @@ COUNTED = {"while len(drawn) < count - 1"}
 
 
 @pytest.mark.parametrize(
-    "path",
-    sorted((ROOT / "tasks/families").glob("*.py")),
-    ids=lambda p: p.stem,
+    "path", sorted((ROOT / "tasks/families").glob("*.py")), ids=lambda p: p.stem
 )
 def test_no_draw_is_repeated_without_a_bound(path: Path) -> None:
     loops = [n for n in ast.walk(ast.parse(path.read_text())) if isinstance(n, ast.While)]

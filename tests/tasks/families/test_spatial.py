@@ -163,12 +163,7 @@ def test_blocks_keep_their_margin_and_large_ones_lie_where_small_ones_do(level: 
 
 DISTANCES = {pick_name(f.name, "Distance"): f for f in distance.FAMILIES}
 BREAD = "bread|bun|loaf|roll|baguette|pastry|croissant|toast|crescent"
-NOUNS = {
-    "payment_sign": "sign|stand",
-    "cup": "cup|tumbler",
-    "bread": BREAD,
-    "apple": "apple|fruit",
-}
+NOUNS = {"payment_sign": "sign|stand", "cup": "cup|tumbler", "bread": BREAD, "apple": "apple|fruit"}
 
 
 def color_word(item: SceneObject) -> str:

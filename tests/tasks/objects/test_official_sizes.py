@@ -57,10 +57,7 @@ def test_every_look_is_as_large_as_its_official_model(asset: str) -> None:
 
 @pytest.mark.parametrize(
     ("look", "hinge", "taken"),
-    [
-        (0, (-0.1084, -0.0634), (0.0568, -0.0918)),
-        (1, (-0.0965, -0.0822), (0.0487, -0.0980)),
-    ],
+    [(0, (-0.1084, -0.0634), (0.0568, -0.0918)), (1, (-0.0965, -0.0822), (0.0487, -0.0980))],
 )
 def test_microwaves_have_hinge_and_handle_where_officially(
     look: int, hinge: tuple[float, float], taken: tuple[float, float]

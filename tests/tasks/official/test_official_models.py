@@ -6,13 +6,7 @@ import pytest
 
 from robospa.tasks import catalog
 from robospa.tasks.objects import assets, object_model, variant_count
-from robospa.tasks.official import (
-    POINTS,
-    needs,
-    official_assets,
-    official_model,
-    official_models,
-)
+from robospa.tasks.official import POINTS, needs, official_assets, official_model, official_models
 
 BUILT_IN = {"block", "cover", "garbage", "pad", "t_block"}
 """Boxes and balls officially too, or not published."""
