@@ -45,9 +45,13 @@ SECTIONS = {
 """Subcommands by the sections of `robospa --help`."""
 COMMANDS = {name: text for part in SECTIONS.values() for name, text in part.items()}
 """Subcommand -> summary; each is a function, or a group of commands, of that name in
-`robospa.harness.cli.<name>`."""
-NAMES = {"eval": "evaluate"}
-"""Functions that cannot be called like their subcommand."""
+`robospa.harness.cli.<name>`, but for those of PLACES."""
+PLACES = {
+    "eval": "robospa.harness.cli.eval:evaluate",
+    "submit": "robospa.leaderboard.commands:submit",
+    "leaderboard": "robospa.leaderboard.commands:leaderboard",
+}
+"""`module:function` of subcommands that lie elsewhere."""
 CONTEXT = {"max_content_width": 120}
 """Settings of every command; without them help ends at 80 columns on any terminal."""
 COMPLETION = "_ROBOSPA_COMPLETE"
@@ -101,14 +105,18 @@ def _run(words: list[str]) -> None:
         if name != chosen:
             app.command(name, short_help=summary)(_unloaded)
             continue
-        found = getattr(
-            importlib.import_module(f"robospa.harness.cli.{name}"), NAMES.get(name, name)
-        )
+        found = command_of(name)
         if isinstance(found, typer.Typer):
             app.add_typer(found, name=name)
         else:
             app.command(name, cls=SectionedCommand, context_settings=CONTEXT)(found)
     typer.main.get_command(app).main(words, prog_name="robospa")
+
+
+def command_of(name: str) -> Any:
+    """The function, or the group of commands, of a subcommand."""
+    module, _, function = PLACES.get(name, f"robospa.harness.cli.{name}:{name}").partition(":")
+    return getattr(importlib.import_module(module), function)
 
 
 def completed_line(environment: Mapping[str, str]) -> list[str]:

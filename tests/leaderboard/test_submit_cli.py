@@ -13,10 +13,10 @@ from bundle_fakes import REFERENCE as FAKE
 from command_line import Done, robospa
 from run_fakes import KEYED, parts
 
-from robospa.harness.cli.submit import scene_progress
 from robospa.harness.running.evaluate import evaluate
 from robospa.harness.running.request import make_request
 from robospa.harness.settings import EvaluationSettings, updated
+from robospa.leaderboard.commands import scene_progress
 from robospa.leaderboard.reproduce import FIRST, Block, write_block
 from robospa.leaderboard.verify import verify
 from robospa.protocol.server import ServerThread

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import json
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,7 +13,7 @@ from checkouts import write_checkout
 from command_line import robospa
 from fake_runs import outcomes, write
 
-from robospa.harness.cli.main import COMMANDS, NAMES
+from robospa.harness.cli.main import COMMANDS, command_of
 
 TASK = "Pick_Blocks_Size"
 SILENT = {
@@ -53,8 +52,7 @@ HERE = {
 def commands() -> Iterator[tuple[str, Any]]:
     """Every command with its name, such as `submit verify`."""
     for name in COMMANDS:
-        module = importlib.import_module(f"robospa.harness.cli.{name}")
-        found = getattr(module, NAMES.get(name, name))
+        found = command_of(name)
         app = found if isinstance(found, typer.Typer) else typer.Typer()
         if app is not found:
             app.command(name)(found)

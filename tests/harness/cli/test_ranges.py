@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import inspect
 import typing
 from collections.abc import Callable, Iterator
@@ -11,7 +10,7 @@ import pytest
 import typer
 
 from robospa.clients import check_options
-from robospa.harness.cli.main import COMMANDS, NAMES, main
+from robospa.harness.cli.main import COMMANDS, command_of, main
 
 CHECKED_LATER = ("level", "fraction")  # where it is known what there is
 
@@ -19,8 +18,7 @@ CHECKED_LATER = ("level", "fraction")  # where it is known what there is
 def functions() -> Iterator[tuple[str, Callable[..., object]]]:
     """Every command of the command line, by name."""
     for name in COMMANDS:
-        module = importlib.import_module(f"robospa.harness.cli.{name}")
-        found = getattr(module, NAMES.get(name, name))
+        found = command_of(name)
         if isinstance(found, typer.Typer):
             for each in found.registered_commands:
                 assert each.callback is not None

@@ -1,38 +1,60 @@
-"""`robospa submit`: make a bundle of a run, verify one, have one reproduced.
+"""`robospa submit` and `robospa leaderboard`: make a bundle of a run, verify one, have one
+reproduced; keep a verified bundle as a submission, build the site.
 
-What these commands do lies in `robospa.leaderboard`, which is reached by name: the harness is
-below it and imports nothing of it.
+The command line reaches these commands by name: the harness is below the leaderboard and imports
+nothing of it.
 """
 
 from __future__ import annotations
 
+import json
+import sys
+import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
+from msgspec import to_builtins
 
-from robospa.harness.cli.options import PROCESSES, SHARE, TRIALS, AsJson, Token, aside, print_json
+from robospa.harness.cli.options import PROCESSES, TRIALS, AsJson, Token, aside, print_json
+from robospa.harness.progress import Progress
+from robospa.harness.running.atomic_file import replace_file
+from robospa.harness.running.evaluate import evaluate
+from robospa.harness.running.request import make_request
+from robospa.harness.running.status import cores
+from robospa.harness.settings import EvaluationSettings, updated
+from robospa.leaderboard import card, evidence, packing, replay, reproduce, rules, site, submission
+from robospa.leaderboard.untrusted import parse_map
+from robospa.leaderboard.verify import Valid, verify
+from robospa.results.records.runs import read_run
 
-LEADERBOARD = "robospa.leaderboard"
+SUBMISSIONS = Path("leaderboard/submissions")
+MOST = 16 * 1024 * 1024
+"""Bytes of a file of evidence."""
 submit = typer.Typer(
     help="Pack a run as a bundle, verify a bundle, have it reproduced.",
     no_args_is_help=True,
     rich_markup_mode=None,
 )
+leaderboard = typer.Typer(
+    help="Keep a verified bundle as a submission, build the site.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+)
 Hidden = Annotated[str | None, typer.Option(hidden=True)]
-
-
-def _load(path: str) -> Callable[..., Any]:
-    from robospa.harness.factory import load_function
-
-    return load_function(f"{LEADERBOARD}.{path}")
+Workers = Annotated[int, typer.Option(callback=PROCESSES, help="processes; 0 for one per core")]
+Practice = Annotated[bool, typer.Option("--practice", help="accept bundles for practice")]
+Evidence = Annotated[
+    Path | None, typer.Option("--evidence", help="write the evidence for the badges there, JSON")
+]
+Home = Annotated[Path, typer.Option(help="folder of the submissions")]
 
 
 @submit.command()
 def template() -> None:
     """Print a model card to fill in: robospa submit template > model.toml"""
-    print(_load("card:template")(), end="")
+    print(card.template(), end="")
 
 
 @submit.command()
@@ -60,9 +82,9 @@ def pack(
 
     Of runs of several robots a bundle each, NAME-ROBOT.zip.
     """
-    reference = _load("rules:shipped")(world, parts)
-    card = _load("card:read_card")(model)
-    how = _load("packing:Packing")(
+    reference = rules.shipped(world, parts)
+    about = card.read_card(model)
+    how = packing.Packing(
         practice=practice,
         videos=videos,
         replace_old=force,
@@ -70,27 +92,27 @@ def pack(
         done=scene_progress(),
     )
     bundles = []
-    for packed in _load("packing:pack")(run, card, out, reference, how):
-        evidence = packed.valid.evidence
+    for packed in packing.pack(run, about, out, reference, how):
+        validity = packed.valid.evidence
         if as_json:
-            about = {"path": packed.valid.path, "bytes": packed.size, "parts": packed.parts}
-            bundles.append({**about, "evidence": evidence})
+            size = {"path": packed.valid.path, "bytes": packed.size, "parts": packed.parts}
+            bundles.append({**size, "evidence": validity})
             continue
-        print(f"{packed.valid.path}: {packed.size / 1e6:.1f} MB, {evidence.trials} trials")
+        print(f"{packed.valid.path}: {packed.size / 1e6:.1f} MB, {validity.trials} trials")
         total = sum(packed.parts.values())
         shares = [
             f"{n} {100 * s / total:.0f} %" for n, s in packed.parts.items() if s > total / 100
         ]
         print("of which " + ", ".join(shares))
-        for warning in evidence.warnings:
+        for warning in validity.warnings:
             print(warning)
-        print(f"bundle {evidence.bundle}")
+        print(f"bundle {validity.bundle}")
     if as_json:
         print_json(bundles)
 
 
-@submit.command()
-def verify(
+@submit.command("verify")
+def verify_bundle(
     bundle: Annotated[Path, typer.Argument(help="the bundle")],
     challenge: Annotated[
         str | None,
@@ -106,30 +128,21 @@ def verify(
             "999 times in a thousand"
         ),
     ] = 0.01,
-    workers: Annotated[int, typer.Option(callback=PROCESSES, help="0 for one per core")] = 0,
-    practice: Annotated[
-        bool, typer.Option("--practice", help="accept bundles for practice")
-    ] = False,
-    evidence: Annotated[
-        Path | None, typer.Option(help="write the evidence for the badges there, JSON")
-    ] = None,
+    workers: Workers = 0,
+    practice: Practice = False,
+    evidence_file: Evidence = None,
     as_json: AsJson = False,
     world: Hidden = None,
     parts: Hidden = None,
 ) -> None:
     """Check a bundle; with --challenge also replay a sample. Offline; nothing is unpacked."""
-    import time
-
-    from msgspec import to_builtins
 
     if challenge is not None:
-        _load("evidence:check_challenge")(challenge)
-        _load("evidence:check_fraction")(fraction)
-    reference = _load("rules:shipped")(world, parts)
+        evidence.check_challenge(challenge)
+        evidence.check_fraction(fraction)
+    reference = rules.shipped(world, parts)
     started = time.perf_counter()
-    valid = _load("verify:verify")(
-        bundle, reference, practice, workers=workers, done=scene_progress()
-    )
+    valid = verify(bundle, reference, practice, workers=workers, done=scene_progress())
     found: dict[str, object] = {"valid": to_builtins(valid.evidence)}
     seconds = time.perf_counter() - started
     say = aside if as_json else print
@@ -145,8 +158,8 @@ def verify(
     say(f"bundle {valid.manifest.bundle}")
     if as_json:
         print_json({"holds": holds, **found})
-    if evidence is not None:
-        _write(evidence, found)
+    if evidence_file is not None:
+        _write(evidence_file, found)
     if not holds:
         raise typer.Exit(1)
 
@@ -161,27 +174,22 @@ def block(
             callback=TRIALS, help="hidden trials per variant; default: as few as a badge needs"
         ),
     ] = None,
-    alpha: Annotated[float, typer.Option(callback=SHARE, help="level of the test")] = 0.01,
-    workers: Annotated[int, typer.Option(callback=PROCESSES, help="0 for one per core")] = 0,
-    practice: Annotated[
-        bool, typer.Option("--practice", help="accept bundles for practice, and few trials")
-    ] = False,
+    workers: Workers = 0,
+    practice: Practice = False,
     as_json: AsJson = False,
     world: Hidden = None,
     parts: Hidden = None,
 ) -> None:
     """Draw hidden scenes that the expert solves, and print the commitment to publish beforehand."""
-    from robospa.harness.running.status import cores
 
-    valid = _load("verify:verify")(bundle, _load("rules:shipped")(world, parts), practice)
-    count = _load("reproduce:plan")(valid, trials, alpha)
+    valid = verify(bundle, rules.shipped(world, parts), practice)
+    count = reproduce.plan(valid, trials)
     variants = list(dict.fromkeys(key.variant for key in valid.keys))
     say = aside if as_json else print
     say(f"{count} hidden trials of each of {len(variants)} variants: {count * len(variants)}")
     robot, mode = valid.keys[0].embodiment, valid.keys[0].mode
-    draw = _load("reproduce:draw_block")
-    drawn = draw(variants, count, workers or cores(), say, robot, mode)
-    _load("reproduce:write_block")(drawn, out)
+    drawn = reproduce.draw_block(variants, count, workers or cores(), say, robot, mode)
+    reproduce.write_block(drawn, out)
     say(f"Keep {out} secret until the trials are over. Publish now:")
     if as_json:
         known = {"block": out, "trials": count, "variants": len(variants)}
@@ -190,42 +198,29 @@ def block(
         print(f"commitment {drawn.commitment}")
 
 
-@submit.command()
-def reproduce(
+@submit.command("reproduce")
+def reproduce_bundle(
     bundle: Annotated[Path, typer.Argument(help="the bundle")],
     policy: Annotated[str, typer.Argument(help="the submitter's server, such as ws://host:port")],
     block: Annotated[Path, typer.Option(help="the secret block of hidden scenes")],
     commitment: Annotated[str, typer.Option(help="as published before")],
     out: Annotated[Path, typer.Option(help="folder for the run on the hidden scenes")],
     resume: Annotated[bool, typer.Option("--resume", help="go on with the run in --out")] = False,
-    workers: Annotated[
-        int, typer.Option(callback=PROCESSES, help="worker processes; 0 for one per core")
-    ] = 0,
-    alpha: Annotated[float, typer.Option(callback=SHARE, help="level of the test")] = 0.01,
+    workers: Workers = 0,
     token: Token = None,
-    practice: Annotated[
-        bool, typer.Option("--practice", help="accept bundles for practice")
-    ] = False,
-    evidence: Annotated[
-        Path | None, typer.Option(help="write the evidence for the badge there, JSON")
-    ] = None,
+    practice: Practice = False,
+    evidence_file: Evidence = None,
     as_json: AsJson = False,
     world: Hidden = None,
     parts: Hidden = None,
 ) -> None:
     """Run hidden scenes on the submitter's server and test exactly whether they agree."""
-    from msgspec import to_builtins
 
-    from robospa.harness.running.evaluate import evaluate
-    from robospa.harness.running.request import make_request
-    from robospa.harness.settings import EvaluationSettings, updated
-    from robospa.results.records.runs import read_run
-
-    reference = _load("rules:shipped")(world, parts)
-    valid = _load("verify:verify")(bundle, reference, practice)
-    seeds = _load("reproduce:read_block")(block, commitment)
-    keys = _load("reproduce:hidden_keys")(valid, seeds, reference)
-    _load("reproduce:plan")(valid, min(map(len, seeds.seeds.values())), alpha)
+    reference = rules.shipped(world, parts)
+    valid = verify(bundle, reference, practice)
+    seeds = reproduce.read_block(block, commitment)
+    keys = reproduce.hidden_keys(valid, seeds, reference)
+    reproduce.plan(valid, min(map(len, seeds.seeds.values())))
     run_seed = valid.run.manifest.settings.run_seed
     asked = {"policy": policy, "out": out, "workers": workers, "run_seed": run_seed}
     request = make_request(
@@ -236,9 +231,9 @@ def reproduce(
         arguments={"command": "submit reproduce", "commitment": commitment},
         salt=seeds.salt,
     )
-    _load("reproduce:check_policy")(valid, request)
+    reproduce.check_policy(valid, request)
     evaluate(request)
-    compared = _load("reproduce:compare")(valid, read_run(out), keys, seeds, alpha)
+    compared = reproduce.compare(valid, read_run(out), keys, seeds)
     earned = "reproduced" if compared.enough else "agrees, but earns no badge"
     verdict = earned if compared.holds else "NOT REPRODUCED"
     if as_json:
@@ -246,22 +241,67 @@ def reproduce(
         print_json({**held, "reproduced": to_builtins(compared)})
     else:
         print(f"{verdict}: " + " ".join(compared.sentences()))
-    if evidence is not None:
-        _write(evidence, {"reproduced": to_builtins(compared)})
+    if evidence_file is not None:
+        _write(evidence_file, {"reproduced": to_builtins(compared)})
     if not compared.holds:
         raise typer.Exit(1)
 
 
-def _lines(evidence: Any, seconds: float) -> list[str]:
+@leaderboard.command()
+def build(
+    submissions: Home = SUBMISSIONS,
+    out: Annotated[Path, typer.Option("--out", "-o", help="folder of the site")] = Path("site"),
+    as_json: AsJson = False,
+) -> None:
+    """Write the leaderboard as static pages."""
+    note = aside if as_json else print
+    if not submissions.is_dir():
+        note(f"There is no folder {submissions}: the site has the published models only.")
+    index = site.build(submissions, out, note)
+    if as_json:
+        print_json({"index": index})
+    else:
+        print(f"Leaderboard: {index}")
+
+
+@leaderboard.command()
+def add(
+    bundle: Annotated[Path, typer.Argument(help="the bundle")],
+    evidence: Annotated[
+        list[Path] | None, typer.Option(help="files that verify and reproduce wrote")
+    ] = None,
+    address: Annotated[
+        str, typer.Option(help="https address of the bundle, unless the folder has a bundle.txt")
+    ] = "",
+    name: Annotated[str, typer.Option(help="the folder; else made from the model's name")] = "",
+    submissions: Home = SUBMISSIONS,
+    as_json: AsJson = False,
+    world: Hidden = None,
+    parts: Hidden = None,
+) -> None:
+    """Verify a bundle and keep what the leaderboard needs of it in the submission's folder."""
+    valid = verify(bundle, rules.shipped(world, parts))
+    found = []
+    for path in evidence or []:
+        if path.stat().st_size > MOST:
+            raise ValueError(f"{path} is larger than evidence can be")
+        found.append(parse_map(path.read_bytes(), str(path)))
+    folder = submission.add(valid, found, submissions, name, address)
+    if as_json:
+        print_json({"submission": folder, "evidence": valid.evidence})
+    else:
+        print(f"Submission: {folder}")
+
+
+def _lines(found: evidence.Validity, seconds: float) -> list[str]:
     """What of a bundle was found valid, in sentences."""
-    counts = f"valid: {evidence.trials} trials of {evidence.variants} variants"
+    counts = f"valid: {found.trials} trials of {found.variants} variants"
     what = "structure, hashes, chain, seeds, records, actions, scores, tables and scenes hold"
-    return [f"{counts}; {what} ({seconds:.1f} s)", *evidence.warnings]
+    return [f"{counts}; {what} ({seconds:.1f} s)", *found.warnings]
 
 
 def scene_progress() -> Callable[[int, int], None]:
     """A function that says on stderr how many scenes of a large bundle were made again."""
-    import sys
 
     tenths = 0
 
@@ -274,27 +314,24 @@ def scene_progress() -> Callable[[int, int], None]:
     return show
 
 
-def _replay(valid: Any, challenge: str, fraction: float, workers: int, reference: Any) -> Any:
+def _replay(
+    valid: Valid, challenge: str, fraction: float, workers: int, reference: rules.Reference
+) -> replay.SampleReplay:
     """Replay a sample of the trials, with a progress bar."""
-    from robospa.harness.progress import Progress
-    from robospa.harness.running.status import cores
 
-    count = _load("evidence:sample_size")(fraction, len(valid.keys))
+    count = evidence.sample_size(fraction, len(valid.keys))
     with Progress(count) as progress:
 
-        def show(trial: Any) -> None:
+        def show(trial: replay.Replayed) -> None:
             if trial.kind == "different":
                 reason = trial.trouble or "other " + ", ".join(trial.differs)
                 progress.note(f"{trial.key.slug}: {reason}")
             progress.add(trial.record or valid.run.records[trial.key])
             progress.update()
 
-        return _load("replay:replay")(valid, challenge, count, reference, workers or cores(), show)
+        return replay.replay(valid, challenge, count, reference, workers or cores(), show)
 
 
 def _write(path: Path, found: Mapping[str, object]) -> None:
-    import json
-
-    from robospa.harness.running.atomic_file import replace_file
 
     replace_file(path, (json.dumps(found, indent=1) + "\n").encode())
