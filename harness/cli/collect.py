@@ -29,6 +29,30 @@ FIRST = ("tasks", "levels", "episodes", "embodiment", "mode", "images", "cameras
 """Settings that stand in the help."""
 
 
+Imported = Annotated[
+    Path | None,
+    typer.Option(
+        "--import",
+        help="only read the recordings (HDF5) below this folder and play them again: how often "
+        "they meet their goal here; with --out, make a data set of the official ones",
+    ),
+]
+Recorded = Annotated[
+    str | None,
+    typer.Option(
+        metavar="TASK",
+        help="only record one demonstration, at --levels (default 1), to the file --out",
+    ),
+]
+Replays = Annotated[
+    int,
+    typer.Option(
+        callback=TRIALS,
+        help="with --verify: episodes to replay, of each robot; with --import: of each folder",
+    ),
+]
+
+
 @with_flags([Collection, Compute], first=FIRST)
 def collect(
     out: Annotated[Path | None, typer.Option(help="folder of the data set")] = None,
@@ -45,31 +69,12 @@ def collect(
     verify: Annotated[
         Path | None, typer.Option(help="only check the data set in this folder")
     ] = None,
-    replays: Annotated[
-        int,
-        typer.Option(
-            callback=TRIALS,
-            help="with --verify: episodes to replay, of each robot; with --import: of each folder",
-        ),
-    ] = REPLAYS,
-    imported: Annotated[
-        Path | None,
-        typer.Option(
-            "--import",
-            help="only read the recordings (HDF5) below this folder and play them again: how often "
-            "they meet their goal here; with --out, make a data set of the official ones",
-        ),
-    ] = None,
+    replays: Replays = REPLAYS,
+    imported: Imported = None,
     world: Annotated[
         str | None, typer.Option(help="with --import: checkout:DIR, which has official scenes")
     ] = None,
-    record: Annotated[
-        str | None,
-        typer.Option(
-            metavar="TASK",
-            help="only record one demonstration, at --levels (default 1), to the file --out",
-        ),
-    ] = None,
+    record: Recorded = None,
     seed: Annotated[
         int | None,
         typer.Option(callback=SEED, help="with --record: the scene; default: first accepted one"),

@@ -21,6 +21,22 @@ if TYPE_CHECKING:
 PAPER = "paper"
 
 
+HiddenRun = Annotated[
+    Path | None, typer.Option(help="with --audit: the same policy's run on hidden scenes")
+]
+Server = Annotated[
+    str | None,
+    typer.Option(help="with --audit: URL of the server, to be asked with exchanged sentences"),
+]
+Samples = Annotated[
+    int,
+    typer.Option(
+        callback=between(0, 10_000),
+        help="with --audit: trials to hold against the expert's, and to ask --policy for",
+    ),
+]
+
+
 def report(
     run: Annotated[list[Path], typer.Argument(help="folders of runs, side by side")],
     with_published: Annotated[
@@ -59,20 +75,9 @@ def report(
             "--audit", help="only look for signs that a run or bundle is not what it says; 1 if any"
         ),
     ] = False,
-    reproduction: Annotated[
-        Path | None, typer.Option(help="with --audit: the same policy's run on hidden scenes")
-    ] = None,
-    policy: Annotated[
-        str | None,
-        typer.Option(help="with --audit: URL of the server, to be asked with exchanged sentences"),
-    ] = None,
-    samples: Annotated[
-        int,
-        typer.Option(
-            callback=between(0, 10_000),
-            help="with --audit: trials to hold against the expert's, and to ask --policy for",
-        ),
-    ] = 10,
+    reproduction: HiddenRun = None,
+    policy: Server = None,
+    samples: Samples = 10,
     token: Token = None,
     as_json: AsJson = False,
 ) -> None:

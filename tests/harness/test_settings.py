@@ -32,6 +32,8 @@ from robospa.harness.settings import (
 )
 
 DEFAULTS = EvaluationSettings()
+OWN = {"more", "config", "resume", "token", "latency", "as_json", "help_all"}
+"""Flags of `robospa eval` that are no settings."""
 
 
 def write(folder: Path, text: str, name: str = "run.toml") -> Path:
@@ -56,7 +58,7 @@ def test_every_setting_is_a_flag_with_its_default() -> None:
         if name != "policy":
             assert flags[name].default == value
             assert flags[name].opts[0] == "--" + name.replace("_", "-")
-    assert set(flags) - set(group_of()) == {"more", "config", "resume", "token", "as_json"}
+    assert set(flags) - set(group_of()) == OWN
 
 
 def test_several_splits_are_a_list_whose_entries_are_checked() -> None:
