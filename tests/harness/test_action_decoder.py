@@ -148,11 +148,6 @@ def test_a_quaternion_of_no_length_is_refused() -> None:
         DECODER.decode(action, "ee", START)
 
 
-@pytest.mark.parametrize(("space", "length"), [("joint", 14), ("ee", 16), ("delta_ee", 16)])
-def test_every_number_has_a_name(space: str, length: int) -> None:
-    assert ROBOT.action_space(space).width == length
-
-
 def test_arms_may_have_different_joint_counts() -> None:
     decoder = ActionDecoder(unequal_arms())
     action = np.array([*READY, 0.25, *READY, 0.1, 0.75])

@@ -7,7 +7,6 @@ import inspect
 import json
 from dataclasses import fields
 from pathlib import Path
-from typing import Any
 
 import pytest
 import typer
@@ -107,22 +106,6 @@ def test_no_number_is_without_bounds(tmp_path: Path, name: str, value: float) ->
         kind(**{name: value})
 
 
-@pytest.mark.parametrize(
-    ("name", "value", "sentence"),
-    [
-        ("timeout", 0, "timeout is 0, and must be more than 0 and at most 604800"),
-        ("timeout", "nan", "timeout is nan, and must be more than 0 and at most 604800"),
-        ("attempts", 0, "attempts is 0, and must be at least 1 and at most 10"),
-        ("stuck_timeout", 1, "stuck_timeout is 1, and must be at least 3 and at most 604800"),
-        ("step_scale", 101, "step_scale is 101, and must be more than 0 and at most 100"),
-    ],
-)
-def test_a_refusal_says_the_range(name: str, value: object, sentence: str) -> None:
-    with pytest.raises(SettingsError) as refusal:
-        updated(DEFAULTS, {name: value})
-    assert str(refusal.value) == sentence
-
-
 @examples(deadline=None)
 @given(st.text())
 def test_any_text_survives_the_file(tmp_path_factory: pytest.TempPathFactory, text: str) -> None:
@@ -171,16 +154,8 @@ def test_a_file_that_is_not_there_is_named(tmp_path: Path) -> None:
         read_settings(tmp_path / "none.toml")
 
 
-@pytest.mark.parametrize(
-    "wrong",
-    [
-        {"trials": 0}, {"workers": -1}, {"attempts": 0}, {"backoff": -1}, {"trial_timeout": 0},
-        {"stuck_timeout": 1}, {"step_scale": 0}, {"step_scale": 101}, {"timeout": 0},
-        {"first_timeout": -1}, {"wait": -1}, {"patience": -1}, {"executor": "slurm"},
-        {"cpus_per_worker": 0}, {"gpus_per_worker": -1}, {"control": "free"}, {"split": "test"},
-    ],
-)  # fmt: skip
-def test_impossible_values_are_refused(wrong: dict[str, Any]) -> None:
+@pytest.mark.parametrize("wrong", [{"executor": "slurm"}, {"control": "free"}, {"split": "test"}])
+def test_values_that_are_no_choice_are_refused(wrong: dict[str, str]) -> None:
     with pytest.raises(SettingsError, match=next(iter(wrong))):
         updated(DEFAULTS, wrong)
 

@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterator
 import pytest
 import typer
 
-from robospa.clients import check_options
 from robospa.harness.cli.main import COMMANDS, command_of, main
 
 CHECKED_LATER = ("level", "fraction")  # where it is known what there is
@@ -67,30 +66,3 @@ def test_a_refusal_says_the_range(capsys: pytest.CaptureFixture[str]) -> None:
         main(["check", "ws://127.0.0.1:9", "--timeout", "-5"])
     assert stop.value.code == 2
     assert "-5 is not from 0.001 to 604800" in capsys.readouterr().err
-
-
-def test_seeds_without_a_choice_begins_nothing(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as stop:
-        main(["seeds"])
-    assert stop.value.code == 2
-    assert "Missing argument" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("url", "sentence"),
-    [
-        (
-            "go1+http://a?ctrl_freq=nan",
-            "ctrl_freq=nan",
-        ),
-        ("go1+http://a?horizon=0", "1 <= execute <= horizon"),
-        ("openpi://a?horizon=-5", "horizon"),
-        ("openpi://a?action_dim=0", "action_dim"),
-        ("robotwin+tcp://a?history=1000", "history=1000"),
-        ("xvla+http://a?domain_id=30", "domain_id=30"),
-        ("xvla+http://a?closed_above=inf", "closed_above is inf, and must be a finite number"),
-    ],
-)
-def test_options_in_a_url_have_bounds(url: str, sentence: str) -> None:
-    with pytest.raises(ValueError, match=sentence):
-        check_options(url)

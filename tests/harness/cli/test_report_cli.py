@@ -1,12 +1,18 @@
-"""`robospa report`: what it refuses, in one sentence."""
+"""`robospa report`: what it refuses, and the failures of a run with their evidence."""
 
 from __future__ import annotations
 
+import json
+from dataclasses import asdict
 from pathlib import Path
 
 import pytest
+from fake_runs import trial_record
 
 from robospa.harness.cli.main import main
+from robospa.results.records.runs import to_line
+from robospa.results.records.trial_record import TrialRecord
+from robospa.trial import TrialKey
 
 pytestmark = pytest.mark.usefixtures("same_figures_once")
 
@@ -17,6 +23,8 @@ pytestmark = pytest.mark.usefixtures("same_figures_once")
         (["a", "--ci", "wald"], "no interval is called 'wald'; there are wilson, exact"),
         (["a", "b"], "belongs to none of them; say where with --out"),
         (["a"], "a is not a run: it has no run.json"),
+        (["a", "--failures"], "a is not a run: it has no run.json"),
+        (["a", "b", "--audit"], "are of one run"),
     ],
 )
 def test_refusals(
@@ -28,3 +36,57 @@ def test_refusals(
     error = capsys.readouterr().err
     assert sentence in error
     assert error.count("\n") == 1
+
+
+LIFT = {"time": 3.0, "kind": "grasped", "object": "b", "index": -1, "note": "", "step": 4}
+
+
+def record(seed: int, end: str) -> TrialRecord:
+    key = TrialKey("Pick_Blocks_Size", 2, seed)
+    return trial_record(
+        key,
+        end == "success",
+        end=end,
+        candidates=3,
+        steps=9,
+        physics_steps=900,
+        events=(LIFT,),
+        diagnostics={"roles": {"a": [0], "b": []}},
+        video="videos/x.mp4",
+    )
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    records = [record(1, "step_limit"), record(2, "success"), record(3, "infrastructure")]
+    (tmp_path / "trials").mkdir()
+    (tmp_path / "trials" / "0000.jsonl").write_text("".join(map(to_line, records)))
+    row = {k: v for k, v in asdict(records[0].key).items() if k != "seed"}
+    (tmp_path / "run.json").write_text(json.dumps({"trials": [{**row, "seeds": [1, 2, 3]}]}))
+    return tmp_path
+
+
+def printed(capsys: pytest.CaptureFixture[str], *words: str) -> str:
+    with pytest.raises(SystemExit) as end:
+        main(["report", *words, "--failures"])
+    out, err = capsys.readouterr()
+    return out if end.value.code == 0 else err
+
+
+def test_failures_are_counted(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = printed(capsys, str(folder))
+    assert "| Pick_Blocks_Size | 1 | 1 |" in out
+    assert "1 failed trials of 3, 1 missing" in out
+
+
+def test_every_failed_trial_with_its_evidence(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (row,) = json.loads(printed(capsys, str(folder), "--trials", "--json"))
+    assert (row["seed"], row["type"], row["step"]) == (1, "target grounding", 4)
+    assert (row["time"], row["video_seconds"]) == (3.0, 1.5)
+    assert "took b" in row["evidence"]
+
+
+def test_an_unknown_grouping_is_refused(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert "not by 'robot'" in printed(capsys, str(folder), "--by", "robot")
