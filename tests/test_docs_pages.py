@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import pkgutil
 import re
 import shlex
@@ -17,7 +16,7 @@ import typer
 import robospa
 from robospa import registry
 from robospa.clients import check_options
-from robospa.harness.cli.main import COMMANDS, NAMES
+from robospa.harness.cli.main import COMMANDS, command_of
 from robospa.harness.cli.serve import options_class
 from robospa.harness.factory import load_function
 from robospa.protocol.options import option_table, read_options
@@ -135,8 +134,7 @@ def commands(page: Path) -> Iterator[list[str]]:
 def app(name: str, rest: list[str]) -> Any:
     """The click command behind `robospa NAME`, without running it; of a group, that which the first
     of the words `rest` names, which is taken away."""
-    module = importlib.import_module(f"robospa.harness.cli.{name}")
-    found = getattr(module, NAMES.get(name, name))
+    found = command_of(name)
     if isinstance(found, typer.Typer):
         group: Any = typer.main.get_command(found)
         return group.commands[rest.pop(0)] if rest else group
