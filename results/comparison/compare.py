@@ -365,7 +365,7 @@ def by_axis(models: Sequence[ModelResults], metric: str = "sr") -> Table | None:
         if variants:
             weights = weights_of(variants, category)
             own = [interval_of([s[v] for v in variants], weights) for s in samples]
-            gaps = [_gap([found[v] for v in variants], weights) for found in pairs]
+            gaps = [_estimate([found[v] for v in variants], weights, METHODS[0]) for found in pairs]
             cells = (*map(estimate_cell, own), *(estimate_cell(gap, "+z.1f") for gap in gaps))
             rows.append(TableRow(label, cells, "row" if kind == "category" else "average"))
     paired = all(pair.gap is not None for found in pairs for pair in found.values())
@@ -377,15 +377,6 @@ def by_axis(models: Sequence[ModelResults], metric: str = "sr") -> Table | None:
         tuple(rows),
         notes=(_axis_note(shared, paired),),
     )
-
-
-def _gap(pairs: Sequence[VariantPair], weights: Sequence[float]) -> Estimate:
-    """The weighted difference: of pairs of trials, or of unrelated samples."""
-    gaps = [pair.gap for pair in pairs if pair.gap is not None]
-    if len(gaps) == len(pairs):
-        return paired_mean(gaps, weights)
-    first, second = ([getattr(pair, side) for pair in pairs] for side in ("first", "second"))
-    return difference(interval_of(first, weights), interval_of(second, weights))
 
 
 def estimate_cell(estimate: Estimate, style: str = "z.1f") -> TableCell:

@@ -77,17 +77,6 @@ def trials_paired(
     return math.ceil((reach / gap) ** 2)
 
 
-def power_paired(
-    base: float, other: float, correlation: float, seeds: int, alpha: float = ALPHA
-) -> float:
-    """Probability that McNemar's test on `seeds` common seeds tells the rates apart."""
-    normal, gap = NormalDist(), abs(other - base)
-    apart = discordant(base, other, correlation)
-    spread = math.sqrt(max(1e-12, apart - gap * gap))
-    need = normal.inv_cdf(1 - alpha / 2) * math.sqrt(apart)
-    return normal.cdf((gap * math.sqrt(seeds) - need) / spread)
-
-
 def discordant(base: float, other: float, correlation: float) -> float:
     """Share of seeds on which only one of two succeeds; ValueError if no such pair of rates is."""
     together = base * other + correlation * math.sqrt(base * (1 - base) * other * (1 - other))

@@ -8,17 +8,18 @@ from typing import TYPE_CHECKING
 
 from robospa.results.figures.series import (
     COLOURS,
-    DASHES,
     GRID,
     INK,
     MARKERS,
     Series,
     label_of,
     legend_below,
+    look,
     new_figure,
     percent_of,
     plain,
     series_handles,
+    whiskers,
 )
 from robospa.results.scoring.scores import Scores
 from robospa.trial import CATEGORIES, CATEGORY_NAMES, PROCEDURAL, SPATIAL
@@ -95,19 +96,7 @@ def _level_panel(
         if not points:
             continue
         aside = (index - (len(all_series) - 1) / 2) * min(0.09, 0.4 / len(all_series))
-        down = [max(0.0, 100 * (e.value - e.low)) for _, e in points]
-        up = [max(0.0, 100 * (e.high - e.value)) for _, e in points]
-        axis.errorbar(
-            [n + aside for n, _ in points],
-            [100 * e.value for _, e in points],
-            yerr=[down, up],
-            color=COLOURS[index % len(COLOURS)],
-            marker=MARKERS[index % len(MARKERS)],
-            ls=DASHES[index % len(DASHES)],
-            ms=2.6,
-            elinewidth=0.6,
-            capsize=1.2,
-        )
+        whiskers(axis, [(n + aside, e) for n, e in points], index)
     axis.set_title(CATEGORY_NAMES[category], fontsize=6.2, pad=3)
     axis.text(0.99, 0.98, category, transform=axis.transAxes, ha="right", va="top", weight="bold")
     axis.set_ylim(-6, 132)  # room for the code
@@ -159,9 +148,7 @@ def _radar(axis: PolarAxes, all_series: Sequence[Series], level: int, top: float
         axis.plot(
             [*angles, 0.0],
             [*known, known[0]],
-            color=colour,
-            ls=DASHES[index % len(DASHES)],
-            marker=MARKERS[index % len(MARKERS)],
+            **look(index),
             ms=2.4,
             lw=1.0,
             clip_on=False,

@@ -19,6 +19,7 @@ from robospa.results.figures.series import (
     new_figure,
     plain,
     styled,
+    whiskers,
 )
 from robospa.results.scoring.scores import Scores
 from robospa.results.statistics.intervals import Estimate
@@ -138,20 +139,7 @@ def draw_learning_curve(points: Sequence[CurvePoint], metric: str = "sr") -> Fig
 def _line(axis: Axes, index: int, name: str, values: Sequence[tuple[int, Estimate]]) -> None:
     if not values:
         return
-    down = [max(0.0, 100 * (e.value - e.low)) for _, e in values]
-    up = [max(0.0, 100 * (e.high - e.value)) for _, e in values]
-    axis.errorbar(
-        [x for x, _ in values],
-        [100 * e.value for _, e in values],
-        yerr=[down, up],
-        label=name,
-        ms=2.6,
-        elinewidth=0.6,
-        capsize=1.2,
-        color=COLOURS[index % len(COLOURS)],
-        marker=MARKERS[index % len(MARKERS)],
-        ls=DASHES[index % len(DASHES)],
-    )
+    whiskers(axis, values, index, name)
 
 
 PANEL = 1.4

@@ -10,10 +10,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, TypedDict
 
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.scoring.scores import AverageScore, Scores, VariantScore
+from robospa.results.statistics.intervals import Estimate
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -30,7 +31,8 @@ GRID = "#d9dde3"
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7f7f7f")
 """Okabe and Ito's palette, told apart with every common colour vision deficiency."""
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
-DASHES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (1, 1)), (0, (3, 1, 1, 1)))
+Dash = str | tuple[int, tuple[int, ...]]
+DASHES: tuple[Dash, ...] = ("-", "--", "-.", ":", (0, (5, 1)), (0, (1, 1)), (0, (3, 1, 1, 1)))
 FORMATS = ("svg", "png", "pdf")
 LEGEND_HANDLE = 0.42
 """Width of a legend's line with the space around it [inch]."""
@@ -159,19 +161,44 @@ def legend_below(figure: Figure, handles: Sequence[Artist], columns: int = 3) ->
         )
 
 
+class Look(TypedDict):
+    """How a series is told from others."""
+
+    color: str
+    marker: str
+    ls: Dash
+
+
+def look(index: int) -> Look:
+    """The look of the series number `index`."""
+    places = (index % len(COLOURS), index % len(MARKERS), index % len(DASHES))
+    return {"color": COLOURS[places[0]], "marker": MARKERS[places[1]], "ls": DASHES[places[2]]}
+
+
+def whiskers(
+    axis: Axes, points: Sequence[tuple[float, Estimate]], index: int, label: str | None = None
+) -> None:
+    """A line through the estimates (in percent) at some places, with their intervals."""
+    axis.errorbar(
+        [x for x, _ in points],
+        [100 * e.value for _, e in points],
+        yerr=[
+            [max(0.0, 100 * (e.value - e.low)) for _, e in points],
+            [max(0.0, 100 * (e.high - e.value)) for _, e in points],
+        ],
+        label=label,
+        ms=2.6,
+        elinewidth=0.6,
+        capsize=1.2,
+        **look(index),
+    )
+
+
 def series_handles(all_series: Sequence[Series]) -> list[Line2D]:
     """A legend entry for every series."""
     from matplotlib.lines import Line2D
 
     return [
-        Line2D(
-            [],
-            [],
-            color=COLOURS[i % len(COLOURS)],
-            marker=MARKERS[i % len(MARKERS)],
-            ls=DASHES[i % len(DASHES)],
-            ms=3.2,
-            label=label_of(s.name),
-        )
-        for i, s in enumerate(all_series)
+        Line2D([], [], ms=3.2, label=label_of(series.name), **look(i))
+        for i, series in enumerate(all_series)
     ]

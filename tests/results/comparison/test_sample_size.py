@@ -1,18 +1,36 @@
-"""Sample sizes: known numbers, and simulations that keep their promise."""
+"""How many trials an average takes, against the published rates counted by hand."""
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 
 from robospa.results.comparison.sample_size import (
     discordant,
-    power_paired,
+    half_width,
+    published_variances,
     sample_size,
+    trials_for,
     trials_paired,
     trials_unpaired,
 )
-from robospa.results.statistics.significance import mcnemar_mid_p
+from robospa.results.paper.published import LEVELS, load
+
+
+def test_of_one_variant_it_is_the_binomial_formula() -> None:
+    assert published_variances([("Pick_Blocks_Size", 1)])["RDT"] == pytest.approx(0.03 * 0.97)
+    assert half_width(0.25, 100) == pytest.approx(0.098, abs=1e-3)
+    assert trials_for(0.25, 0.05) == 385
+
+
+def test_a_tenth_of_the_benchmark_tells_the_overall_rate_to_two_points() -> None:
+    found = published_variances([(task, level) for task in load().tasks for level in LEVELS])
+    assert all(half_width(variance, 10) < 0.02 for variance in found.values())
+    enough = {model: trials_for(variance, 0.025) for model, variance in found.items()}
+    assert enough == {"RDT": 2, "GO-1": 3, "pi0.5": 4, "X-VLA": 4}
+
+
+def test_variants_that_are_not_published_say_nothing() -> None:
+    assert published_variances([("Pick_Fake", 1)]) == {}
 
 
 def test_unrelated_seeds() -> None:
@@ -29,15 +47,6 @@ def test_equal_seeds_save_trials_where_outcomes_correlate() -> None:
 def test_discordant_share_by_hand() -> None:
     assert discordant(0.2, 0.3, 0.0) == pytest.approx(0.2 * 0.7 + 0.8 * 0.3)
     assert discordant(0.5, 0.5, 1.0) == pytest.approx(0.0)
-
-
-def test_the_power_formula_agrees_with_simulated_tests() -> None:
-    apart = discordant(0.2, 0.3, 0.45)
-    b, c = (apart - 0.1) / 2, (apart + 0.1) / 2
-    draws = np.random.default_rng(0).multinomial(100, [b, c, 1 - b - c], size=2000)
-    found = float(np.mean([mcnemar_mid_p(int(x), int(y)) < 0.05 for x, y, _ in draws]))
-    assert power_paired(0.2, 0.3, 0.45, 100) == pytest.approx(0.58, abs=0.005)
-    assert found == pytest.approx(0.58, abs=0.03)
 
 
 def test_a_sample_size_leaves_out_correlations_that_cannot_be() -> None:
