@@ -333,7 +333,7 @@ def _latex_sign(sign: str) -> str:
 def latex_document(tables: Sequence[Table]) -> str:
     """All tables as one latex_document."""
     body = "\n\\clearpage\n".join(to_latex(table) for table in tables)
-    return f"{PREAMBLE}\\begin{{latex_document}}\n{body}\n\\end{{latex_document}}\n"
+    return f"{PREAMBLE}\\begin{{document}}\n{body}\n\\end{{document}}\n"
 
 
 def escape_markdown(text: str) -> str:

@@ -295,4 +295,5 @@ def _laid_out(head: list[str], body: list[list[str]], layout: str) -> str:
         return text.getvalue().rstrip("\n")
     if layout != "markdown":
         raise ValueError(f"no layout {layout!r}; there are {', '.join(FORMATS)}")
-    return markdown_table(head, ([cell.replace("|", "\\|") for cell in line] for line in body))
+    rows = ([cell.replace("|", "\\|") for cell in line] for line in body)
+    return markdown_table(head, rows, [" --- "] * len(head))
