@@ -30,8 +30,7 @@ from robospa.tasks.shapes import ObjectModel
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "official-world.md"
 HEAD = (
-    "task", "objects of the archive", "built in", "at points of the archive", "by likeness",
-    "rule", "switches", "filled with",
+    "task", "objects of the archive", "built in", "by likeness", "rule", "switches", "filled with",
 )  # fmt: skip
 NONE = "–"
 SEED = 100_000
@@ -145,7 +144,6 @@ class Pieces:
 
     archive: tuple[str, ...]
     built_in: tuple[str, ...]
-    at_points: Mapping[str, tuple[str, ...]]
     by_likeness: Mapping[str, tuple[str, ...]]
     rules: tuple[str, ...]
     switches: tuple[str, ...]
@@ -155,10 +153,8 @@ class Pieces:
         """The row's cells after the task's name."""
         return (
             *map(_listed, (self.archive, self.built_in)),
-            *(
-                "; ".join(f"{frame}: {_listed(assets)}" for frame, assets in frames.items()) or NONE
-                for frames in (self.at_points, self.by_likeness)
-            ),
+            "; ".join(f"{at}: {_listed(assets)}" for at, assets in self.by_likeness.items())
+            or NONE,
             *map(_listed, (self.rules, self.switches)),
             self.filled,
         )
@@ -190,7 +186,6 @@ def pieces(task: str) -> Pieces:
     return Pieces(
         archive=tuple(sorted({*needs()[task]} | held & official)),
         built_in=tuple(sorted(held - official)),
-        at_points=_by_frame(at),
         by_likeness=_by_frame(others),
         rules=tuple(rule.name for rule in RULES if rule.holds(task, parts)),
         switches=tuple(switch.name for switch in SWITCHES if switch.name in switches),

@@ -53,7 +53,7 @@ def test_a_rule_is_explained_and_is_a_departure(rule: Rule) -> None:
     for row in rule.rows:
         for pattern in re.findall(r"[A-Z][a-z]+_[\w*]+", row.split(" | ")[0]):
             of = [task for task in needs() if fnmatch(task, pattern)]
-            assert of and all(rule.name in rows()[task][4].split(", ") for task in of), row
+            assert of and all(rule.name in rows()[task][3].split(", ") for task in of), row
 
 
 def test_every_departure_of_a_rule_is_one_of_the_table() -> None:
