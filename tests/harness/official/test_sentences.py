@@ -213,17 +213,8 @@ def test_the_command_shows_what_fits_and_what_is_trained_on(
 ) -> None:
     write_checkout(tmp_path)
     with pytest.raises(SystemExit) as ended:
-        main(
-            [
-                "official",
-                "instructions",
-                str(tmp_path),
-                "--tasks",
-                "Rank_Blocks_Color",
-                "--levels",
-                "2",
-            ]
-        )
+        main(["official", "instructions", str(tmp_path), "--tasks", "Rank_Blocks_Color",
+              "--levels", "2"])  # fmt: skip
     shown = capsys.readouterr().out
     assert ended.value.code == 0
     assert "Rank_Blocks_Color 2: fit 1 of 1, 1 of 1; 0 equal, 0 alike of 1" in shown

@@ -1,12 +1,15 @@
-"""Where the user's official assets are, and which files belong to a model."""
+"""Where the user's official assets are, which files belong to a model, and the cache of them."""
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
+import numpy as np
 import pytest
 from made_archive import THINGS, make_archive
 
+from robospa.harness.packs import archive as cache
 from robospa.harness.packs.archive import Archive, ArchiveError, note, open_archive
 from robospa.tasks.official import OfficialModel
 
@@ -128,3 +131,59 @@ def test_the_other_parts_are_found(tmp_path: Path) -> None:
     assert archive.textures("seen") == tmp_path / "background_texture" / "seen"
     assert archive.clutter() == THINGS
     assert archive.embodiment("piper") is None
+
+
+class Maker:
+    """Counts how often something is made."""
+
+    def __init__(self) -> None:
+        self.count = 0
+
+    def __call__(self) -> cache.Arrays:
+        self.count += 1
+        return {"a": np.full(3, self.count), "b": np.zeros(2)}
+
+
+def test_equal_content_is_made_once_wherever_it_lies(tmp_path: Path) -> None:
+    make, files = Maker(), [tmp_path / name for name in "ab"]
+    for file in files:
+        file.write_bytes(b"mesh")
+    first, second = (cache.cached((file,), "how", make) for file in files)
+    assert first == second and make.count == 1
+    assert cache.load_arrays(first)["a"].tolist() == [1, 1, 1]
+    assert [*cache.load_arrays(first, "b")] == ["b"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "b", "cache"]
+
+
+def test_other_content_or_another_way_is_made_anew(tmp_path: Path) -> None:
+    make, file = Maker(), tmp_path / "a"
+    file.write_bytes(b"mesh")
+    entries = {cache.cached((file,), "how", make), cache.cached((file,), "else", make)}
+    file.write_bytes(b"mess")
+    os.utime(file, ns=(0, 0))
+    entries.add(cache.cached((file,), "how", make))
+    assert len(entries) == make.count == 3
+
+
+def test_a_damaged_entry_is_thrown_away(tmp_path: Path) -> None:
+    make, file = Maker(), tmp_path / "a"
+    file.write_bytes(b"mesh")
+    entry = cache.cached((file,), "how", make)
+    entry.write_bytes(entry.read_bytes()[:50])
+    with pytest.raises(ValueError, match="was damaged: start again"):
+        cache.load_arrays(entry)
+    assert cache.load_arrays(cache.cached((file,), "how", make))["a"].tolist() == [2, 2, 2]
+
+
+def test_nothing_half_written_is_left_under_the_entry(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "a"
+    file.write_bytes(b"mesh")
+
+    def broken() -> cache.Arrays:
+        raise OSError("no space left")
+
+    with pytest.raises(OSError, match="no space"):
+        cache.cached((file,), "how", broken)
+    assert list(cache.cache_folder().glob("*.npz")) == []
