@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import tomllib
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
@@ -41,19 +42,6 @@ REFUSED = 99
 PICK, PRESS = "Pick_Blocks_Size", "Press_Stapler_Repeat"
 SEEDS = tuple(range(100000, 100004))
 MEMBERS = {"GAC": (PICK,), "RPF": (PRESS,)}
-CARD_DATA: dict[str, Any] = {
-    "name": "Fake 1",
-    "team": "Nobody",
-    "licence": "MIT",
-    "parameters": 3,
-    "link": "https://example.org/fake",
-    "training": {"tasks": "multi", "scenes": "clean", "demonstrations": [50, 50, 50, 50, 50]},
-    "actions": {"space": "joint", "chunk": 4, "rate": 10.0},
-    "checkpoints": {"all": {"reference": "https://example.org/w", "sha256": "0" * 64}},
-}
-CARD = to_card(CARD_DATA)
-FAKES = ["--world", "bundle_fakes:World", "--parts", "run_fakes:parts"]
-"""Options of the command line that stand for the fake world."""
 CARD_TEXT = """
 name = "Fake 1"
 team = "Nobody"
@@ -72,6 +60,10 @@ rate = 10.0
 reference = "https://example.org/w"
 sha256 = "0000000000000000000000000000000000000000000000000000000000000000"
 """
+CARD_DATA: dict[str, Any] = tomllib.loads(CARD_TEXT)
+CARD = to_card(CARD_DATA)
+FAKES = ["--world", "bundle_fakes:World", "--parts", "run_fakes:parts"]
+"""Options of the command line that stand for the fake world."""
 
 
 class World(FakeWorld):

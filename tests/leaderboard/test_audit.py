@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -9,6 +10,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from bundle_fakes import PICK, SEEDS, make_run
+from command_line import robospa
 from run_fakes import FakePolicy, FakeWorld, parts
 
 from robospa.harness.trial import run_trial
@@ -100,3 +103,13 @@ def test_the_other_sentence_never_fits_the_scene() -> None:
     text = other_sentence(key)
     assert text is not None
     assert text not in sentences(build_scene(key.task, key.level, key.seed), key.split)
+
+
+def test_findings_as_json(tmp_path: Path) -> None:
+    make_run(tmp_path / "run", [TrialKey(PICK, 1, seed) for seed in SEEDS])
+    done = robospa("report", tmp_path / "run", "--audit", "--samples", 0, "--json")
+    found = json.loads(done.out)
+    assert done.code == 0 and found and all(one["sentence"] for one in found)
+    assert not any(one["suspicious"] for one in found)
+    plain = robospa("report", tmp_path / "run", "--audit", "--samples", 0).out.splitlines()
+    assert plain == [f"{'ok':10} {one['check']}: {one['sentence']}" for one in found]

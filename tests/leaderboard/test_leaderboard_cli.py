@@ -6,14 +6,13 @@ import json
 from pathlib import Path
 
 import pytest
+from bundle_fakes import FAKES, REFERENCE
 from msgspec import to_builtins
 from site_fakes import REPLAYED, make_valid, of_bundle
 
 from robospa.harness.cli.main import main
 
 pytestmark = pytest.mark.usefixtures("same_figures_once")
-
-FAKES = ["--world", "bundle_fakes:World", "--parts", "run_fakes:parts"]
 
 
 def call(*words: str) -> int:
@@ -25,8 +24,6 @@ def call(*words: str) -> int:
 def test_evidence_of_another_bundle_adds_nothing(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from bundle_fakes import REFERENCE
-
     monkeypatch.setattr("robospa.leaderboard.rules.shipped", lambda world, parts: REFERENCE)
     valid = make_valid(tmp_path)
     path = tmp_path / "evidence.json"

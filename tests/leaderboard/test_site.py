@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from bundle_fakes import CARD, PICK, REFERENCE, SEEDS, make_run
+from bundle_fakes import CARD, CARD_TEXT, PICK, REFERENCE, SEEDS, make_run
 from site_fakes import REPLAYED, REPRODUCED, change, make_submission, make_valid
 
 from robospa.leaderboard.bundle import BundleError
@@ -23,24 +23,6 @@ from robospa.trial import TrialKey
 
 pytestmark = pytest.mark.usefixtures("same_figures_once")
 
-CARD_TEXT = """
-name = "Fake 1"
-team = "Nobody"
-licence = "MIT"
-parameters = 3
-link = "https://example.org/fake"
-[training]
-tasks = "multi"
-scenes = "clean"
-demonstrations = [50, 50, 50, 50, 50]
-[actions]
-space = "joint"
-chunk = 4
-rate = 10.0
-[checkpoints.all]
-reference = "https://example.org/w"
-sha256 = "0000000000000000000000000000000000000000000000000000000000000000"
-"""
 EVIL = '</script><script>alert(1)</script><img src=x onerror="alert(2)">'
 
 
