@@ -21,7 +21,7 @@ from socket import socket
 from tempfile import TemporaryDirectory
 from urllib.parse import unquote
 
-from robospa.results.figures.series import Drawing
+from robospa.results.figures.series import DrawnFigure
 from robospa.results.records.manifest import MANIFEST, RunError
 from robospa.results.records.runs import TRIALS, VIDEOS, Run, read_run
 from robospa.results.report.page import FIGURES, page
@@ -48,7 +48,7 @@ class LiveReport:
         self._inputs: Inputs = ()
         self._page, self._tag = b"", ""
         self._earliest = 0.0
-        self._drawings: list[Drawing] = []
+        self._drawings: list[DrawnFigure] = []
         self._drawn_at = -FIGURES_SECONDS
         self.read()
 

@@ -36,7 +36,7 @@ from robospa.leaderboard.verify import paired, results_of
 from robospa.results.failures.labels import KINDS, NAMES, SIMULATED_PER_FILM
 from robospa.results.figures.charts import draw_failures
 from robospa.results.figures.draw import draw
-from robospa.results.figures.series import Drawing, Series, save, styled
+from robospa.results.figures.series import DrawnFigure, Series, save, styled
 from robospa.results.paper.origin import DIFFERENCES, ORIGIN
 from robospa.results.paper.published import load
 from robospa.results.report.page import FIGURES, card, figure, own_version, render
@@ -231,7 +231,7 @@ def failure_rows(failures: Mapping[str, Mapping[str, int]]) -> list[dict[str, ob
     ]
 
 
-def _figures(entry: Entry, folder: Path) -> list[Drawing]:
+def _figures(entry: Entry, folder: Path) -> list[DrawnFigure]:
     """Draw the entry's figures, unless the folder holds those of the same values already."""
     values = [page_values(entry), entry.failures, entry.name, own_version()]
     state = hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
@@ -239,14 +239,14 @@ def _figures(entry: Entry, folder: Path) -> list[Drawing]:
     if kept.exists():
         known = json.loads(kept.read_text(encoding="utf-8"))
         if known["state"] == state:
-            return [Drawing(**one) for one in known["drawings"]]
+            return [DrawnFigure(**one) for one in known["drawings"]]
     made = draw([Series(entry.name, entry.column.scores)], folder, FORMATS)
     counts = {t: entry.failures[t] for t in load().tasks if any(entry.failures.get(t, {}).values())}
     if counts:
         with styled():
             save(draw_failures(counts, KINDS, NAMES), folder, "failures", FORMATS)
         text = "Share of every failure type among a task's failed trials, and their number."
-        made.append(Drawing("failures", "Failure types", text))
+        made.append(DrawnFigure("failures", "Failure types", text))
     found = {"state": state, "drawings": [asdict(drawing) for drawing in made]}
     replace_file(kept, json.dumps(found).encode())
     return made

@@ -144,7 +144,7 @@ td.best { background: #4a7dff33; font-weight: 700; }
 
 
 def html_fragment(table: Table) -> str:
-    """The table with its title as caption and its notes below, to put into a html_page."""
+    """The table with its title as caption and its notes below, to put into a page."""
     kind = ' class="words"' if table.words else ""
     parts = [
         f'<section id="{_html_text(table.name)}">',
@@ -163,7 +163,7 @@ def html_fragment(table: Table) -> str:
 
 
 def html_page(tables: Sequence[Table], title: str) -> str:
-    """A whole html_page with all tables."""
+    """A whole page with all tables."""
     links = " · ".join(f'<a href="#{_html_text(g.name)}">{_html_text(g.name)}</a>' for g in tables)
     body = "\n".join(html_fragment(table) for table in tables)
     return (
@@ -331,7 +331,7 @@ def _latex_sign(sign: str) -> str:
 
 
 def latex_document(tables: Sequence[Table]) -> str:
-    """All tables as one latex_document."""
+    """All tables as one document."""
     body = "\n\\clearpage\n".join(to_latex(table) for table in tables)
     return f"{PREAMBLE}\\begin{{document}}\n{body}\n\\end{{document}}\n"
 

@@ -12,7 +12,7 @@ import typer
 from robospa.harness.cli.options import SHARE, AsJson, print_json
 
 if TYPE_CHECKING:
-    from robospa.results.comparison.compare import Comparison, Difference
+    from robospa.results.comparison.compare import Difference, RunComparison
     from robospa.results.scoring.models import ModelResults
 
 GAPS = (0.02, 0.05, 0.1, 0.2)
@@ -79,7 +79,7 @@ def compare(
         _print_drops(one, two, metric.value)
 
 
-def _print(found: Comparison, variants: bool) -> None:
+def _print(found: RunComparison, variants: bool) -> None:
     from robospa.results.statistics.significance import ALPHA
     from robospa.trial import METRIC_NAMES
 
@@ -104,7 +104,7 @@ def _print(found: Comparison, variants: bool) -> None:
         print(f"Intervals of averages: {found.groups[-1].estimate.method}; other tasks: bootstrap.")
 
 
-def _table(title: str, rows: Sequence[Difference], found: Comparison) -> None:
+def _table(title: str, rows: Sequence[Difference], found: RunComparison) -> None:
     from robospa.results.comparison.compare import difference_table
     from robospa.results.tables import show
 

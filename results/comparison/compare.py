@@ -87,7 +87,7 @@ class Difference:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class RunComparison:
     """All differences of two sides; `notes` is what a reader has to know before using them, and
     `banner` is not empty where the two are of different suites."""
 
@@ -114,7 +114,7 @@ class Comparison:
 
 def compare_results(
     first: ModelResults, second: ModelResults, metric: str = "sr", method: str = "wilson"
-) -> Comparison:
+) -> RunComparison:
     """All differences `first - second`; IncomparableError if they are of different things."""
     pairs, paired = paired_variants(first, second, metric)
     if not pairs:
@@ -125,7 +125,7 @@ def compare_results(
     }
     rows = [_variant_row(pair, method) for pair in pairs]
     groups = _groups(pairs, listed, category, method)
-    return Comparison(
+    return RunComparison(
         first.name,
         second.name,
         metric,
@@ -260,7 +260,7 @@ HEAD = 18
 """Letters of a side's name over a column."""
 
 
-def difference_table(found: Comparison, rows: Sequence[Difference], title: str) -> Table:
+def difference_table(found: RunComparison, rows: Sequence[Difference], title: str) -> Table:
     """`rows` of the comparison `found`, in percentage points."""
     several = any(row.over_tasks for row in rows)
     names = heads_of(found.first, found.second)
@@ -397,7 +397,7 @@ Side = Run | str | Path
 """A run, its folder (`FOLDER@ROBOT` for a part of it), or the name of a published model."""
 
 
-def compare(first: Side, second: Side, metric: str = "sr", ci: str = "wilson") -> Comparison:
+def compare(first: Side, second: Side, metric: str = "sr", ci: str = "wilson") -> RunComparison:
     """All differences `first - second`, with intervals and tests; paired where seeds are equal.
 
         found = robospa.compare("runs/mine", "runs/before")

@@ -17,7 +17,7 @@ from robospa.results.figures.charts import (
 )
 from robospa.results.figures.series import (
     FORMATS,
-    Drawing,
+    DrawnFigure,
     Series,
     percent_of,
     save,
@@ -39,13 +39,13 @@ def draw(
     folder: Path,
     formats: Sequence[str] = FORMATS,
     beside: Sequence[Series] = (),
-) -> list[Drawing]:
+) -> list[DrawnFigure]:
     """Write the figures of `all_series` into `folder`; a figure without data is left out.
 
     Published models get heat maps only where no run is. `beside` are the same series, cut to what
     all of them have, for the figures that hold one against another.
     """
-    made: list[Drawing] = []
+    made: list[DrawnFigure] = []
     together = beside or all_series
     sizes = [len(s.scores.cells) for s in together]
     cut = sizes != [len(s.scores.cells) for s in all_series]
@@ -55,17 +55,17 @@ def draw(
     with styled():
         if any(s.scores.categories for s in together):
             save(draw_levels(together), folder, "success", formats)
-            made.append(Drawing("success", "Success against level", CAPTIONS["success"] + over))
+            made.append(DrawnFigure("success", "Success against level", CAPTIONS["success"] + over))
             save(draw_radar(together), folder, "radar", formats)
-            made.append(Drawing("radar", "Categories", CAPTIONS["radar"] + over))
+            made.append(DrawnFigure("radar", "Categories", CAPTIONS["radar"] + over))
         if any(percent_of(c, "ps") is not None for s in together for c in s.scores.cells.values()):
             save(draw_progress(together), folder, "progress", formats)
             made.append(
-                Drawing("progress", "Progress against success", CAPTIONS["progress"] + over)
+                DrawnFigure("progress", "Progress against success", CAPTIONS["progress"] + over)
             )
         if runs:
             save(draw_latency(runs), folder, "latency", formats)
-            made.append(Drawing("latency", "Latency", CAPTIONS["latency"]))
+            made.append(DrawnFigure("latency", "Latency", CAPTIONS["latency"]))
         for number, series in enumerate(all_series, 1):
             made += _own_figures(
                 series, number if len(all_series) > 1 else 0, series in mapped, folder, formats
@@ -75,7 +75,7 @@ def draw(
 
 def _own_figures(
     series: Series, number: int, mapped: bool, folder: Path, formats: Sequence[str]
-) -> list[Drawing]:
+) -> list[DrawnFigure]:
     """The figures that show one series only."""
     made = []
     ending = f"-{number}" if number else ""
@@ -88,10 +88,10 @@ def _own_figures(
         name = f"failures{ending}"
         save(draw_failures(counts, KINDS, NAMES), folder, name, formats)
         caption = "Share of every failure type among a task's failed trials, and their number."
-        made.append(Drawing(name, f"Failure types{of}", caption))
+        made.append(DrawnFigure(name, f"Failure types{of}", caption))
     if series.scores.cells and mapped:
         name = f"heat{ending}"
         save(draw_heat(series), folder, name, formats)
         caption = "Success rate [%] of every task at every level; a hatched cell has no result."
-        made.append(Drawing(name, f"Tasks and levels{of}", caption))
+        made.append(DrawnFigure(name, f"Tasks and levels{of}", caption))
     return made

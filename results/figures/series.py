@@ -55,7 +55,7 @@ class Series:
 
 
 @dataclass(frozen=True)
-class Drawing:
+class DrawnFigure:
     """A figure on disk: `name` without ending, its title, and what it shows in a sentence."""
 
     name: str

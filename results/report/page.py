@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from robospa.results.failures.labels import NAMES, SIMULATED_PER_FILM
-from robospa.results.figures.series import FORMATS, GRID, INK, Drawing
+from robospa.results.figures.series import FORMATS, GRID, INK, DrawnFigure
 from robospa.results.paper.origin import origin_of
 from robospa.results.records.action_problems import problem_data
 from robospa.results.records.manifest import departures
@@ -62,7 +62,7 @@ class PageFigure:
 
 def page(
     report: Report,
-    drawings: Sequence[Drawing],
+    drawings: Sequence[DrawnFigure],
     folder: Path,
     drawn: Path | None = None,
     formats: Sequence[str] = FORMATS,
@@ -189,7 +189,7 @@ def _bar(estimate: Estimate | None) -> tuple[float, float, float] | None:
     return value, max(0.0, low), min(100.0, high)
 
 
-def figure(drawing: Drawing, folder: Path, formats: Sequence[str] = FORMATS) -> PageFigure:
+def figure(drawing: DrawnFigure, folder: Path, formats: Sequence[str] = FORMATS) -> PageFigure:
     """A figure for the page: its SVG as markup, and where its files are."""
     from markupsafe import Markup
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from robospa.results.comparison.compare import by_axis
 from robospa.results.failures.labels import Failure, distribution, failures_of
 from robospa.results.figures.draw import draw
-from robospa.results.figures.series import FORMATS, Drawing, Series
+from robospa.results.figures.series import FORMATS, DrawnFigure, Series
 from robospa.results.lint import lint_run, lint_runs
 from robospa.results.paper.columns import Column, check_columns, column_of, results_beside_runs
 from robospa.results.paper.origin import banner, origin_of
@@ -136,7 +136,7 @@ def draw_figures(
     folder: Path,
     formats: Sequence[str] = FORMATS,
     failures: Sequence[Mapping[TrialKey, Failure]] | None = None,
-) -> list[Drawing]:
+) -> list[DrawnFigure]:
     """The figures of `columns`, of which the first belong to `runs` with these `failures`."""
     series = []
     together = over_shared([column.results for column in columns])

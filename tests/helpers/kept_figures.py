@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 
 from robospa.results.figures.draw import draw
-from robospa.results.figures.series import FORMATS, Drawing, Series
+from robospa.results.figures.series import FORMATS, DrawnFigure, Series
 
 PLACES = ("robospa.leaderboard.site.draw", "robospa.results.report.report.draw")
 
@@ -29,7 +29,7 @@ def keep_figures(monkeypatch: pytest.MonkeyPatch, home: Path) -> None:
         folder: Path,
         formats: Sequence[str] = FORMATS,
         beside: Sequence[Series] = (),
-    ) -> list[Drawing]:
+    ) -> list[DrawnFigure]:
         values = pickle.dumps((list(all_series), tuple(formats), list(beside)))
         drawn = home / hashlib.sha256(values).hexdigest()
         if not (drawn / "drawings").exists():
@@ -42,7 +42,7 @@ def keep_figures(monkeypatch: pytest.MonkeyPatch, home: Path) -> None:
         for path in drawn.iterdir():
             if path.name != "drawings":
                 shutil.copyfile(path, folder / path.name)
-        found: list[Drawing] = pickle.loads((drawn / "drawings").read_bytes())
+        found: list[DrawnFigure] = pickle.loads((drawn / "drawings").read_bytes())
         return found
 
     for place in PLACES:

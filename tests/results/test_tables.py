@@ -107,6 +107,8 @@ def test_latex_is_balanced_and_every_row_fills_its_columns(tables: list[Table]) 
         rows = [x for x in text.splitlines() if x.endswith(r"\\")]
         assert {latex_columns(row) for row in rows} == {len(table.heads) + 1}, table.name
         assert text.isascii(), table.name
+    whole = latex_document(tables)
+    assert all(whole.count(rf"\{word}{{document}}") == 1 for word in ("begin", "end"))
 
 
 @pytest.mark.skipif(shutil.which("pdflatex") is None, reason="needs pdflatex")

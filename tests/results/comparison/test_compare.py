@@ -9,8 +9,8 @@ import pytest
 from fake_runs import make_run, outcomes, record, shown, write
 
 from robospa.results.comparison.compare import (
-    Comparison,
     Difference,
+    RunComparison,
     by_axis,
     compare_results,
     drops,
@@ -31,7 +31,7 @@ def side(folder: Path, records: list[TrialRecord], **more: object) -> ModelResul
     return results_of_run(write(folder, records, **more))  # type: ignore[arg-type]
 
 
-def group(found: Comparison, label: str, level: int) -> Difference:
+def group(found: RunComparison, label: str, level: int) -> Difference:
     return next(g for g in found.groups if (g.label, g.level) == (label, level))
 
 
