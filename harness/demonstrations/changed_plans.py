@@ -84,7 +84,17 @@ class ActBeside:
         name, seen = self.call.object, ws.snapshot
         x, y, z = seen.poses[name].position
         shifted = Pose((x + self.by[0], y + self.by[1], z), seen.poses[name].rotation)
-        ws.snapshot = replace(seen, poses={**seen.poses, name: shifted})
+        ws.snapshot = Snapshot(
+            seen.time,
+            {**seen.poses, name: shifted},
+            seen.gripper,
+            seen.end_effector,
+            seen.joints,
+            seen.measured,
+            seen.contacts,
+            seen.hinges,
+            grasp_points=seen.grasp_points,
+        )
         steps = pick(ws, self.call) if isinstance(self.call, Pick) else press(ws, self.call)
         try:
             rows = next(steps)

@@ -166,6 +166,16 @@ def test_a_mistake_fails_as_it_should_and_says_where() -> None:
 
 
 @pytest.mark.sim
+@pytest.mark.parametrize("name", ["beside", "drops", "hovers"])
+def test_skills_that_go_wrong_touch_the_right_thing_or_nothing(name: str) -> None:
+    made, _, label, _, record = shown(f"mistake:{name}", "Pick_Blocks_Size")
+    failure = failure_type(record)
+    assert not record.success and not made.demonstration.failures and MISTAKE in label
+    expected = "no_contact_grasp" if name == "beside" else "target_execution"
+    assert failure is not None and failure.kind == expected
+
+
+@pytest.mark.sim
 def test_a_midstate_begins_later_and_elsewhere_and_is_replayed_from_the_start() -> None:
     made, recorder, label, _, record = shown("midstate", "Pick_Blocks_Size")
     first = recorder.frames[0]
