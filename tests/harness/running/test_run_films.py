@@ -335,7 +335,8 @@ def filmable(folder: Path, **settings: object) -> Run:
     make_run(folder, RECORDS)
     path = folder / "run.json"
     manifest = json.loads(path.read_text())
-    world = {"name": "sapien", "render": None, "control": "rest_to_rest"}
+    arguments = {"render": None, "control": "rest_to_rest"}
+    world = {"name": "sapien", "arguments": arguments}
     manifest["settings"] |= {"world": world, "step_scale": 0.5, **settings}
     path.write_text(json.dumps(manifest))
     return read_run(folder)
@@ -370,8 +371,8 @@ def test_afterwards_films_show_the_cameras_that_the_run_names(tmp_path: Path) ->
     ("settings", "words"),
     [
         ({"salt_sha256": "x"}, "are hidden"),
-        ({"world": {"name": "os:system", "command": "true"}}, "another world"),
-        ({"world": {"name": "sapien", "models": "x"}}, "another world"),
+        ({"world": {"name": "os:system", "arguments": {"command": "true"}}}, "another world"),
+        ({"world": {"name": "sapien", "arguments": {"models": "x"}}}, "another world"),
     ],
 )
 def test_a_run_that_cannot_be_filmed_from_its_folder_is_refused(
