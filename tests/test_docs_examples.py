@@ -20,9 +20,7 @@ from robospa.action_space import ActionSpace
 from robospa.clients import connect
 from robospa.clients.go1 import Go1Conventions
 from robospa.clients.xvla import XvlaConventions
-from robospa.harness.action_decoder import ActionDecoder
 from robospa.harness.convention_check.episodes import VIEWS, Episode, write_episode
-from robospa.harness.robots import embodiment
 from robospa.observation import CAMERAS
 from robospa.protocol.policy import TrialInfo
 from robospa.protocol.server import ServerThread
@@ -64,16 +62,6 @@ def test_the_example_policy_is_served_repeats_itself_and_stands_on_its_page() ->
     assert np.array_equal(chunks[0][:, arms], np.tile(seen["state"][arms], (8, 1)))
     code = (EXAMPLES / "my_policy.py").read_text().split("\n\n\n", 1)[1].strip()
     assert code in (DOCS / "adding-a-policy.md").read_text()
-
-
-def test_the_chunk_of_poses_on_the_page_is_executed_as_sent() -> None:
-    text = (DOCS / "adding-a-policy.md").read_text().split("### Units and frames")[1]
-    names: dict[str, Any] = {"np": np}
-    exec(text.split("```python\n")[1].split("```")[0], names)
-    assert names["chunk"].shape == (1, 16)
-    decoder = ActionDecoder(embodiment("aloha-agilex"))
-    targets = decoder.decode(names["chunk"][0], "ee", np.zeros((2, 6)))
-    assert targets.problems == () and np.abs(targets.joints[1]).max() < 0.03, "right arm stays"
 
 
 @dataclass

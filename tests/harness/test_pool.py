@@ -189,9 +189,9 @@ from fake_runs import trial_record
 from film_fakes import KEYS
 replay.drawn = lambda *_: KEYS[:1]
 replay.read_traces = lambda *_: {KEYS[0]: ()}
-spec = SimpleNamespace(action="joint")
+replay.spec_of = lambda *_: SimpleNamespace(action="joint")
 valid = SimpleNamespace(
-    manifest=SimpleNamespace(bundle="b"), keys=KEYS, settings=SimpleNamespace(spec=lambda _: spec),
+    manifest=SimpleNamespace(bundle="b"), keys=KEYS, settings=None,
     run=SimpleNamespace(records={KEYS[0]: trial_record(KEYS[0])}))
 where = SimpleNamespace(world="sapien", parts="robospa.harness.trial:task_parts")
 replay.replay(valid, "challenge", 1, where)""",
