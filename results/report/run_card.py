@@ -119,7 +119,7 @@ def facts(run: Run) -> list[tuple[str, str]]:
                         for c in policy.cameras) or "no camera"  # fmt: skip
     found = [
         ("policy", policy.name or "unknown"),
-        ("sees", f"observations: {cameras}"),
+        ("sees", "the exact state" if settings.privileged else f"observations: {cameras}"),
         ("actions", _words(f"{words}{spec[n]}" for n, words in ACTIONS.items() if spec.get(n))),
         ("seeding", f"{seeded}; seed {settings.run_seed}" if spec else ""),
         ("trials", _trials(run)),
