@@ -89,11 +89,11 @@ def same_figures_once(monkeypatch: pytest.MonkeyPatch, drawn_figures: Path) -> N
 @pytest.fixture
 def world_asked_here(monkeypatch: pytest.MonkeyPatch) -> None:
     """Evaluations ask their world about itself in this process: one of its own costs a second."""
-    from robospa.harness.factory import load_function
     from robospa.harness.running import evaluate
+    from robospa.harness.worlds import open_world
 
     monkeypatch.setattr(
         evaluate,
         "probe_world",
-        lambda config, render: dict(load_function(config.world)(**config.world_arguments).info()),
+        lambda config, render: dict(open_world(config.world, config.world_arguments).info()),
     )
