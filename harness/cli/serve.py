@@ -35,8 +35,8 @@ def serve(
     policy: Annotated[
         str,
         typer.Argument(
-            help="learned, rdt, lerobot, go1, xvla, openpi, oracle, random, hold, replay, or "
-            "module:function"
+            help="learned, rdt, lerobot, go1, xvla, openpi, oracle, reactive, random, hold, "
+            "replay, or module:function"
         ),
     ],
     checkpoint: Annotated[

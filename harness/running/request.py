@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import secrets
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -124,7 +125,8 @@ def run_folder(settings: EvaluationSettings, resume: bool = False) -> Path:
     first = settings.policy[0] if settings.policy else (settings.policy_map or Path()).stem
     name = first.rpartition("/")[2] if is_url(first) else first
     safe = "".join(c if c.isalnum() else "-" for c in name)
-    return RUNS / f"{safe}-{time.strftime('%Y%m%d-%H%M%S')}"
+    # Runs of one policy may start in the same second: the cells of a sweep, the jobs of an array.
+    return RUNS / f"{safe}-{time.strftime('%Y%m%d-%H%M%S')}-{secrets.token_hex(2)}"
 
 
 def connect_arguments(
