@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -23,7 +23,7 @@ from standins import (
     observation,
 )
 
-from robospa.clients import connect
+from robospa.clients import connect, detect
 from robospa.protocol.client import RemotePolicy
 from robospa.protocol.errors import (
     PolicyError,
@@ -197,9 +197,12 @@ def test_a_server_that_restarts_between_trials(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", SERVERS)
-def test_a_door_that_closes_later_is_not_taken_for_another_dialect(name: str) -> None:
+def test_a_door_that_closes_later_is_not_taken_for_another_dialect(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """What is there after a first success is in trouble; that is no reason to stop the run."""
-    with talking(name, lambda seen: joint_chunk(), LIMIT) as (policy, line):
+    monkeypatch.setattr(detect, "SECONDS", 0.5)
+    with talking(name, lambda seen: joint_chunk(), replace(LIMIT, wait=0.5)) as (policy, line):
         line.mode = "cut"
         line.cut()
         with pytest.raises(TransportError) as caught:
