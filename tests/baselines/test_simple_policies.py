@@ -38,6 +38,15 @@ def test_random_depends_on_the_policy_seed_and_the_step_only() -> None:
     assert not np.array_equal(policy.infer(seen(20)), policy.infer(seen(30)))
 
 
+def test_random_moves_otherwise_with_another_policy_seed() -> None:
+    chunks = []
+    for seed in (1, 2):
+        policy = random.create()
+        policy.reset(TrialInfo("T", "aloha-agilex", "Go.", seed))
+        chunks.append(policy.infer(seen()))
+    assert not np.array_equal(*chunks)
+
+
 def test_random_keeps_grippers_in_range() -> None:
     chunk = random.create().infer(seen())
     assert chunk.shape == (random.CHUNK, 14)
