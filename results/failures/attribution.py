@@ -263,6 +263,15 @@ class _Reader:
 
 def root_of(record: TrialRecord) -> Cause | None:
     """The cause of failure of a long-horizon trial; None if nothing was tried."""
+    return _read(record).root()
+
+
+def mistakes_of(record: TrialRecord) -> list[Cause]:
+    """All mistakes of a long-horizon trial, also those that were put right."""
+    return [mistake.cause for mistake in _read(record).mistakes]
+
+
+def _read(record: TrialRecord) -> _Reader:
     reader = _Reader(
         record.category,
         record.total,
@@ -272,4 +281,4 @@ def root_of(record: TrialRecord) -> Cause | None:
     )
     for event in record.events:
         reader.read(event)
-    return reader.root()
+    return reader

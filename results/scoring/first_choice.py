@@ -1,0 +1,76 @@
+"""Whether a trial succeeded by its first choice.
+
+The official rule lets a policy try one thing after the other until the right one comes. What else
+it took, pressed, did too early or did once more is in the events of every record.
+"""
+
+from __future__ import annotations
+
+from robospa.results.failures.attribution import MEMORY, Cause, mistakes_of, roles_of
+from robospa.results.records.trial_record import TrialRecord
+from robospa.trial import BASIC, PROCEDURAL, SPATIAL
+
+EARLY = ("temporal_ordering", "memory")
+OF_CHOICE = ("redundant_repetition", *EARLY)
+"""Kinds of mistakes of a procedure that are about what is done, not about how well."""
+ANY_ORDER = ("Observe_Blocks_Move_Memory", "Remember_Orientation_Restore")
+"""Memory tasks that are asked for in no order."""
+PASSING = 1.0
+"""Seconds between a press and the approach of what is due that make it a press in passing."""
+
+
+def first_choice(record: TrialRecord) -> bool:
+    """Whether the trial succeeded, and nothing shows that anything else was chosen before.
+
+    Spatial tasks and basic grounding: no other object rose, was lifted, or had a gripper close on
+    it. Procedures and memory: nothing was done that was not asked for, too early, or once more.
+    """
+    if not record.success:
+        return False
+    if took_another(record):
+        return False
+    if record.category in (*SPATIAL, *BASIC):
+        return True
+    memory, free = record.category == MEMORY, record.key.task in ANY_ORDER
+    if memory and not free and record.diagnostics.get("out_of_order", 0):
+        return False
+    wrong = set(OF_CHOICE) - (set(EARLY) if free else set())
+    causes = mistakes_of(record)
+    return not any(cause.kind in wrong and not _in_passing(cause, record) for cause in causes)
+
+
+def took_another(record: TrialRecord) -> bool:
+    """Whether an object that was not asked for rose, was lifted, pressed, or closed on.
+
+    Procedures but memory tasks have no such objects: what has no subtask there is a place, and a
+    gripper that closes against it chooses nothing.
+    """
+    roles, places = roles_of(record), record.category in PROCEDURAL and record.category != MEMORY
+    for event in record.events:
+        kind = event["kind"]
+        taken = kind == "grasped" or (kind == "closed" and event.get("note") == "touching")
+        if kind == "wrong_object" or (taken and not places and not roles.get(event["object"])):
+            return True
+    return False
+
+
+def _in_passing(cause: Cause, record: TrialRecord) -> bool:
+    """Whether an early press in a composite action came about on the way to what was due.
+
+    A finger that flies past closely enough presses, by the official rule; it happens to the expert.
+    """
+    press = cause.event
+    if record.category != "CAC" or press["kind"] != "wrong_order":
+        return False
+    if press["object"] not in record.diagnostics.get("pressed", ()):
+        return False
+    before = [e for e in record.events if e["time"] < press["time"]]
+    done = {e["index"] for e in before if e["kind"] == "subtask_done"}
+    due = next((i for i in range(record.total) if i not in done), -1)
+    roles = roles_of(record)
+    return any(
+        event["kind"] == "approached"
+        and abs(event["time"] - press["time"]) < PASSING
+        and due in roles.get(event["object"], ())
+        for event in record.events
+    )
