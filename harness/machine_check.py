@@ -13,6 +13,8 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
+from robospa.harness.running.manifest import this_processor
+
 SETUP = "run `make install` in the repository (it installs what is missing)"
 DRIVER = (
     "install a Vulkan driver: `sudo apt-get install mesa-vulkan-drivers` (Mesa 24.3 or newer; on "
@@ -37,6 +39,8 @@ def run_checks() -> Iterator[SystemCheck]:
 
     After a failed "simulator" check the ones that need it are left out.
     """
+    processor = this_processor()
+    yield SystemCheck("processor", True, f"{processor.name or 'unnamed'}, {processor}")
     simulator = _run("simulator", "check_simulator", SETUP)
     yield simulator
     if simulator.ok:

@@ -21,6 +21,7 @@ from robospa.protocol.client import Identity, identity_of
 from robospa.results.records.manifest import (
     MANIFEST,
     GitState,
+    Processor,
     RunAbout,
     RunError,
     RunManifest,
@@ -60,6 +61,22 @@ def git_state(folder: Path) -> GitState | None:
         return None
 
 
+def this_processor() -> Processor:
+    """The kind of processor of this machine."""
+    try:
+        rows = Path("/proc/cpuinfo").read_text().partition("\n\n")[0].splitlines()
+    except OSError:
+        rows = []
+    facts = {name.strip(): value.strip() for name, _, value in (r.partition(":") for r in rows)}
+    family, model = (facts.get(name, "") for name in ("cpu family", "model"))
+    return Processor(
+        facts.get("vendor_id", platform.machine())[:100],
+        int(family) if family.isdecimal() else 0,
+        int(model) if model.isdecimal() else 0,
+        facts.get("model name", "")[:100],
+    )
+
+
 def about_machine(world: Mapping[str, object]) -> RunAbout:
     """Versions, checkout and machine, with what the `world` says about itself."""
     return RunAbout(
@@ -76,6 +93,7 @@ def about_machine(world: Mapping[str, object]) -> RunAbout:
             "processor": platform.machine(),
             "cores": os.cpu_count(),
         },
+        processors=(this_processor(),),
         world=dict(world),
     )
 
@@ -210,5 +228,9 @@ def open_run(
             "first one again to resume it or choose another --out"
         )
     mended = changed_policies(old.about, manifest.about)
-    if mended or changed_settings(old.settings, settings):
-        write_manifest(folder, manifest)
+    kept = manifest if mended or changed_settings(old.settings, settings) else old
+    processors = (*old.about.processors, *manifest.about.processors)
+    about = structs.replace(
+        kept.about, processors=tuple(dict.fromkeys(processors)), drivers=old.about.drivers + 1
+    )
+    write_manifest(folder, structs.replace(kept, about=about))

@@ -17,7 +17,7 @@ from typing import Annotated
 
 from msgspec import Meta, Struct, to_builtins
 
-from robospa.schema import Count, Name, Number, SettingName, parse_json, read
+from robospa.schema import MAX_INTEGER, Count, Name, Number, SettingName, parse_json, read
 from robospa.trial import TrialKey
 
 MANIFEST = "run.json"
@@ -176,13 +176,30 @@ class GitState(Struct, frozen=True):
     dirty: bool = False
 
 
+class Processor(Struct, frozen=True):
+    """A kind of processor, as it calls itself. Equal actions end in equal bits on one kind alone;
+    `name` is not always told."""
+
+    vendor: Annotated[str, Meta(max_length=100)] = ""
+    family: Count = 0
+    model: Count = 0
+    name: Annotated[str, Meta(max_length=100)] = ""
+
+    def __str__(self) -> str:
+        return f"{self.vendor} family {self.family} model {self.model}"
+
+
 class RunAbout(Struct, frozen=True):
-    """What made a run: `code` is a hash. `seeds`: where the lists of seeds come from."""
+    """What made a run: `code` is a hash. `processors`: of all kinds that ran its trials, none in a
+    run of an older version. `drivers`: how often it was started or gone on with. `seeds`: where
+    the lists of seeds come from."""
 
     versions: dict[str, str] = {}
     git: GitState | None = None
     code: str = ""
     machine: Facts = {}
+    processors: tuple[Processor, ...] = ()
+    drivers: Annotated[int, Meta(ge=1, le=MAX_INTEGER)] = 1
     world: Facts = {}
     policy: ServerFacts | None = None
     policies: dict[str, ServerFacts] = {}

@@ -132,6 +132,7 @@ def facts(run: Run) -> list[tuple[str, str]]:
         ("list of trials", f"hash {manifest.seed_hash}" if manifest.seed_hash else ""),
         ("software", _software(about)),
         ("machine", _pairs(about.machine)),
+        ("processor", "; ".join(map(str, about.processors))),
         ("world", _pairs(about.world)),
         ("policy latency", _latency(run)),
         ("time spent on", _words(f"{name} {100 * share:.0f} %" for name, share in

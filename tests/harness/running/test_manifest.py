@@ -21,6 +21,7 @@ from robospa.harness.running.runner import Runner, RunOptions
 from robospa.harness.running.worker import WorkerConfig
 from robospa.results.records.manifest import (
     PolicySettings,
+    Processor,
     RunAbout,
     RunError,
     RunSettings,
@@ -54,12 +55,14 @@ def test_the_seed_hash_ignores_order_and_nothing_else() -> None:
     assert seed_hash(KEYS) != seed_hash(KEYS[:-1])
 
 
-def test_resuming_with_the_same_settings_leaves_the_manifest_alone(tmp_path: Path) -> None:
+def test_resuming_only_counts_drivers_and_kinds_of_processors(tmp_path: Path) -> None:
     open_run(tmp_path, MANIFEST, resume=False)
-    before = (tmp_path / "run.json").read_bytes()
-    about = structs.replace(MANIFEST.about, machine={"name": "another"})
-    open_run(tmp_path, structs.replace(MANIFEST, about=about), resume=True)
-    assert (tmp_path / "run.json").read_bytes() == before
+    two = tuple(Processor(vendor) for vendor in ("A", "B"))
+    for there in (two[:1], two, two[:1]):
+        about = structs.replace(MANIFEST.about, machine={"name": "another"}, processors=there)
+        open_run(tmp_path, structs.replace(MANIFEST, about=about), resume=True)
+    about = structs.replace(MANIFEST.about, drivers=4, processors=two)
+    assert read_manifest(tmp_path) == structs.replace(MANIFEST, about=about)
 
 
 @pytest.mark.parametrize(
@@ -146,6 +149,7 @@ def test_the_machine_is_described() -> None:
     about = about_machine({"simulator": "fake"})
     assert about.world == {"simulator": "fake"}
     assert set(about.versions) == {"robospa", "python", "numpy", "sapien"}
+    assert about.processors[0].vendor in str(about.processors[0])
 
 
 def test_a_clock_that_goes_backwards_changes_nothing(
