@@ -23,7 +23,7 @@ from robospa.observation import Observation
 from robospa.protocol.policy import PolicySpec, TrialInfo
 from robospa.tasks.catalog import build_scene
 from robospa.tasks.scene import Scene
-from robospa.tasks.snapshot import snapshot_from_json
+from robospa.tasks.snapshot import Snapshot, snapshot_from_json
 
 HORIZON = 200
 
@@ -62,15 +62,19 @@ class Oracle:
     def infer(self, observation: Observation) -> NDArray[np.float32]:
         """The next skill's actions, float32 (T, D)."""
         if self._scene is None:
-            raise RuntimeError("the oracle was asked for actions before a reset")
+            raise RuntimeError("the policy was asked for actions before a reset")
         snapshot = snapshot_from_json(
             observation["privileged"], embodiment(self._scene.embodiment).grippers
         )
         if self._expert is None:
             told = observation["privileged"].get("scene")  # by a world whose scenes have no key
             scene = self._scene if told is None else Scene.from_json(told)
-            self._expert = Expert(scene, snapshot)
+            self._expert = self._planned(scene, snapshot)
         return self._expert.next(snapshot)
+
+    def _planned(self, scene: Scene, snapshot: Snapshot) -> Expert:
+        """Who acts in this trial."""
+        return Expert(scene, snapshot)
 
     @property
     def failures(self) -> tuple[str, ...]:
@@ -94,22 +98,13 @@ class FailingOracle(Oracle):
         self.spec = replace(Oracle.spec, name=f"mistakes:{kind}")
         self.applies = True
 
-    def infer(self, observation: Observation) -> NDArray[np.float32]:
-        """The next actions, float32 (T, D)."""
-        if self._scene is None:
-            raise RuntimeError("the policy was asked for actions before a reset")
-        snapshot = snapshot_from_json(
-            observation["privileged"], embodiment(self._scene.embodiment).grippers
-        )
-        if self._expert is None:
-            expert = ChangedExpert(self._scene, snapshot, ())
-            try:
-                plan = wrong_plan(self.kind, self._scene, expert.workspace)
-                self.applies = True
-            except ValueError:
-                plan, self.applies = (), False
-            self._expert = ChangedExpert(self._scene, snapshot, plan)
-        return self._expert.next(snapshot)
+    def _planned(self, scene: Scene, snapshot: Snapshot) -> Expert:
+        expert = ChangedExpert(scene, snapshot, ())
+        try:
+            plan, self.applies = wrong_plan(self.kind, scene, expert.workspace), True
+        except ValueError:
+            plan, self.applies = (), False
+        return ChangedExpert(scene, snapshot, plan)
 
 
 def create_failing(kind: str = "neighbour") -> FailingOracle:
