@@ -13,6 +13,8 @@ from robospa.results.records.action_problems import KINDS, described
 from robospa.results.records.runs import Run, finished, read_run
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.report.score_table import run_html, run_table
+from robospa.results.scoring.first_choice import first_choice, held_at_start
+from robospa.results.scoring.scores import Scores, score_run
 from robospa.results.tables import Table
 from robospa.trial import TrialKey
 
@@ -36,6 +38,11 @@ class LoadedRun(Run):
         notebook as HTML."""
         return run_table(self)
 
+    def scores(self, ci: str = "wilson") -> Scores:
+        """All scores with their intervals, by variant, task, category, dimension and over all:
+        `run.scores().overall[0].values["sr1"]` is the mean over levels of SR@1."""
+        return score_run(self, ci)
+
     def failures(self) -> FailedTrials:
         """A list of every failed trial with the type of its failure and the evidence for it;
         `print` and a notebook show a line of each."""
@@ -49,7 +56,7 @@ class LoadedRun(Run):
         pandas, which the extra `notebook` brings.
         """
         frame = need("pandas").DataFrame(trial_columns(self))
-        kinds = {"success": "boolean", **dict.fromkeys((*COUNTS, *PROBLEMS), "Int64")}
+        kinds = dict.fromkeys(FLAGS, "boolean") | dict.fromkeys((*COUNTS, *PROBLEMS), "Int64")
         kinds |= dict.fromkeys(NUMBERS, "float64")
         return frame.astype(kinds)
 
@@ -62,7 +69,7 @@ class LoadedRun(Run):
         texts = dict.fromkeys((*KEY_COLUMNS, "end", *TEXTS), arrow.string())
         numbers = dict.fromkeys(NUMBERS, arrow.float64())
         counts = dict.fromkeys(("level", "seed", *COUNTS, *PROBLEMS), arrow.int64())
-        kinds = {**texts, **numbers, **counts, "success": arrow.bool_()}
+        kinds = {**texts, **numbers, **counts, **dict.fromkeys(FLAGS, arrow.bool_())}
         columns = trial_columns(self)
         schema = arrow.schema([(name, kinds[name]) for name in columns])
         parquet.write_table(arrow.table(columns, schema=schema), Path(path))
@@ -112,6 +119,10 @@ def _evidence(record: TrialRecord) -> str:
     return "" if found is None else described(found.evidence, record)
 
 
+FLAGS: Mapping[str, Callable[[TrialRecord], Cell]] = {
+    "success": lambda record: record.success,
+    "first_choice": first_choice,
+}
 TEXTS: Mapping[str, Callable[[TrialRecord], Cell]] = {
     "category": lambda record: record.category,
     "instruction": lambda record: record.instruction,
@@ -124,11 +135,13 @@ TEXTS: Mapping[str, Callable[[TrialRecord], Cell]] = {
 }
 NUMBERS: Mapping[str, Callable[[TrialRecord], Cell]] = {
     "progress": lambda record: record.done / record.total if record.total else None,
+    "idle_progress": lambda record: held_at_start(record) / record.total if record.total else None,
     "wall_time": lambda record: float(record.wall_time),
     "latency_p50": lambda record: _latency(record, "p50"),
     "latency_p95": lambda record: _latency(record, "p95"),
 }
-"""`progress`: the share of subtasks that hold at the end; `wall_time` [s]; latencies [ms]."""
+"""`progress`: the share of subtasks that hold at the end, `idle_progress`: before the first action;
+`wall_time` [s]; latencies [ms]."""
 PROBLEMS = {kind.name: _problem(kind.name) for kind in KINDS}
 """How many actions were executed otherwise than they were sent, by kind."""
 
@@ -141,8 +154,8 @@ def _latency(record: TrialRecord, name: str) -> float | None:
 def trial_columns(run: Run) -> dict[str, list[Cell]]:
     """The listed trials of `run` by column, in their order.
 
-    Columns: the fields of the key, `end`, `success`, COUNTS, PROBLEMS, NUMBERS, TEXTS. A trial
-    without a result (`end` is "infrastructure" or "not run") has None in all but its key.
+    Columns: the fields of the key, `end`, FLAGS, COUNTS, PROBLEMS, NUMBERS, TEXTS. A trial without
+    a result (`end` is "infrastructure" or "not run") has None in all but its key.
     """
     records = [_result(run, key) for key in run.keys]
     columns: dict[str, list[Cell]] = {
@@ -150,7 +163,7 @@ def trial_columns(run: Run) -> dict[str, list[Cell]]:
     }
     columns["end"] = [_end(run, key) for key in run.keys]
     fields: dict[str, Callable[[TrialRecord], Cell]] = {
-        "success": lambda record: record.success,
+        **FLAGS,
         **{name: _count(name) for name in COUNTS},
         **PROBLEMS,
         **NUMBERS,

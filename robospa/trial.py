@@ -66,8 +66,16 @@ CATEGORY_NAMES = {
     "SOI": "Simple Ordinal Indexing",
 }
 DIMENSIONS = {"spatial": SPATIAL, "procedural": PROCEDURAL}
-METRICS = ("sr", "onta", "ps")
-"""Success rate, object-normalized target accuracy, progress score."""
-METRIC_NAMES = {"sr": "SR", "onta": "ONTA", "ps": "PS"}
-METRIC_CATEGORIES = {"sr": CATEGORIES, "onta": SPATIAL, "ps": PROCEDURAL}
+METRIC_NAMES = {"sr": "SR", "sr1": "SR@1", "onta": "ONTA", "onta1": "ONTA@1", "ps": "PS"}
+"""Success rate, object-normalized target accuracy, progress score; @1: by the first choice."""
+METRICS = tuple(METRIC_NAMES)
+METRIC_CATEGORIES = {
+    "sr": CATEGORIES,
+    "sr1": CATEGORIES,
+    "onta": SPATIAL,
+    "onta1": SPATIAL,
+    "ps": PROCEDURAL,
+}
 """The categories that a metric is averaged over."""
+RATES = {"sr": "sr", "sr1": "sr1", "onta": "sr", "onta1": "sr1"}
+"""The rate of trials that a metric is computed from."""

@@ -27,7 +27,9 @@ class Metric(StrEnum):
     """What is compared."""
 
     sr = "sr"
+    sr1 = "sr1"
     onta = "onta"
+    onta1 = "onta1"
     ps = "ps"
 
 

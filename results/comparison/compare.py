@@ -134,7 +134,7 @@ def compare_results(
         _corrected([g for g in groups if g.kind == "category"])
         + tuple(replace(g, q=g.p) for g in groups if g.kind != "category"),
         tuple(notes(first, second, [pair.variant for pair in pairs], listed, paired))
-        + (tuple(worst_and_best(first, second, metric)) if metric != "onta" else ()),
+        + (tuple(worst_and_best(first, second, metric)) if metric not in ("onta", "onta1") else ()),
         banner_of(first, second),
     )
 
@@ -371,7 +371,7 @@ def by_axis(models: Sequence[ModelResults], metric: str = "sr") -> Table | None:
     paired = all(pair.gap is not None for found in pairs for pair in found.values())
     return Table(
         f"{metric}-by-{'-'.join(axes)}",
-        f"{metric.upper()} by {' and '.join(AXES[part] for part in axes)}",
+        f"{METRIC_NAMES[metric]} by {' and '.join(AXES[part] for part in axes)}",
         "",
         (*names, *(f"{name} minus {names[0]}" for name in names[1:])),
         tuple(rows),
@@ -406,7 +406,7 @@ def compare(first: Side, second: Side, metric: str = "sr", ci: str = "wilson") -
     Args:
         first: A run, its folder, `FOLDER@ROBOT` for one robot of it, or a published model's name.
         second: What it is compared with.
-        metric: "sr", "onta" or "ps".
+        metric: "sr", "sr1", "onta", "onta1" or "ps".
         ci: How intervals of single rates are made: "wilson", "exact", "jeffreys" or "bootstrap".
 
     Raises:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from robospa.results.paper.origin import banner
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.scoring.models import COMPARISON, IncomparableError, ModelResults, check_alike
-from robospa.results.scoring.scores import Variant, sample_of, weights_of
+from robospa.results.scoring.scores import Variant, sample_of, succeeded, weights_of
 from robospa.results.statistics.samples import Sample
 from robospa.trial import METRIC_CATEGORIES
 
@@ -76,7 +76,7 @@ def _gap(pairs: Sequence[tuple[TrialRecord, TrialRecord]], metric: str, one: Sam
         top = max(len(one.counts) - 1, 1)
         gaps = [a.done * top // a.total - b.done * top // b.total for a, b in pairs]
     else:
-        top, gaps = 1, [int(a.success) - int(b.success) for a, b in pairs]
+        top, gaps = 1, [succeeded(a, metric) - succeeded(b, metric) for a, b in pairs]
     counts = [0] * (2 * top + 1)
     for gap in gaps:
         counts[gap + top] += 1

@@ -23,6 +23,7 @@ from robospa.results.figures.series import (
 )
 from robospa.results.scoring.scores import Scores
 from robospa.results.statistics.intervals import Estimate
+from robospa.trial import METRIC_NAMES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -87,7 +88,7 @@ def _curve_name(curve: LatencyCurve) -> str:
     return f"{name}: half at {curve.half.value:.0f} ms"
 
 
-NAMES = {"sr": "SR [%]", "onta": "ONTA [%]", "ps": "PS [%]"}
+NAMES = {metric: f"{name} [%]" for metric, name in METRIC_NAMES.items()}
 MEAN = 0
 """The level that is the mean over levels, as in `Scores`."""
 

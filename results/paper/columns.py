@@ -26,7 +26,7 @@ from robospa.results.scoring.models import (
     results_of_run,
     suite_of,
 )
-from robospa.results.scoring.scores import AverageScore, Scores, VariantScore, combine
+from robospa.results.scoring.scores import IDLE, AverageScore, Scores, VariantScore, combine
 from robospa.results.statistics.intervals import (
     METHODS,
     Estimate,
@@ -37,7 +37,7 @@ from robospa.results.statistics.intervals import (
 )
 from robospa.results.statistics.samples import Sample, onta_of_percent, rate
 from robospa.results.tables import MISSING, TableCell
-from robospa.trial import BASIC, DIMENSIONS, METRIC_CATEGORIES, SPATIAL
+from robospa.trial import BASIC, CATEGORIES, DIMENSIONS, METRIC_CATEGORIES, RATES, SPATIAL
 
 
 def published_cell(published: Published, model: str, task: str, level: int) -> VariantScore:
@@ -96,6 +96,8 @@ class Column:
     """
 
     results: ModelResults
+    idle: bool = False
+    """Whether it is what holds on a run's scenes before the first action, as progress."""
 
     @property
     def title(self) -> str:
@@ -105,7 +107,7 @@ class Column:
     @cached_property
     def departures(self) -> tuple[Departure, ...]:
         """Those of its run; none of a published model."""
-        return departures(self.results.manifest)
+        return () if self.idle else departures(self.results.manifest)
 
     @property
     def scores(self) -> Scores:
@@ -120,7 +122,7 @@ class Column:
     @property
     def ranked(self) -> bool:
         """Whether it is marked and ranked among others."""
-        return all(one.ranked for one in self.departures)
+        return not self.idle and all(one.ranked for one in self.departures)
 
     @property
     def embodiment(self) -> str:
@@ -154,17 +156,16 @@ class Column:
         part = self.part(row, level)
         if part is None or self.value(metric, row, level) is None:
             return None
-        if metric == "sr" or isinstance(part, VariantScore) or row in METRIC_CATEGORIES[metric]:
-            return part.values.get(metric)
-        dimension = "spatial" if metric == "onta" else "procedural"
-        return part.values.get(metric) if row == dimension else None
+        if row == rounding.OVERALL and METRIC_CATEGORIES[metric] != CATEGORIES:
+            return None
+        return part.values.get(metric)
 
     def sample(self, metric: str, row: str, level: int) -> Sample | Estimate | None:
         """The input of a test: counts of a variant's success rate, else value and interval, which
         is not the bootstrap's: that can be a point."""
         part = self.part(row, level)
-        if metric == "sr" and isinstance(part, VariantScore) and part.trials:
-            return rate(part.successes, part.trials)
+        if metric in ("sr", "sr1") and isinstance(part, VariantScore):
+            return part.samples.get(metric)
         found = self.estimate(metric, row, level)
         if found is None or part is None or self.scores.ci != "bootstrap":
             return found
@@ -226,10 +227,11 @@ def cell_percent(cell: VariantScore | None, metric: str) -> float | None:
     estimate = None if cell is None else cell.values.get(metric)
     if cell is None or estimate is None:
         return None
-    if metric == "ps":
+    count = cell.count(metric) if metric in RATES else None
+    if count is None:
         return 100 * estimate.value
-    success = 100 * cell.successes / cell.trials
-    return success if metric == "sr" else onta_of_percent(success, cell.candidates)
+    success = 100 * count / cell.trials
+    return success if metric == RATES[metric] else onta_of_percent(success, cell.candidates)
 
 
 def table_values(
@@ -278,6 +280,24 @@ def _untied(values: Mapping[str, dict[tuple[str, int], float | None]], model: st
                     1e-6 if printed_value > value else -1e-6
                 )
     return values
+
+
+def idle_column(runs: Sequence[Column]) -> Column | None:
+    """The progress of a policy that does nothing, on the scenes of that of `runs` which has most
+    variants; None if none has progress."""
+    best = max(runs, key=lambda run: len(run.scores.cells))
+    cells = {
+        variant: replace(
+            cell,
+            listed=cell.trials,
+            values={"ps": cell.values[IDLE]},
+            samples={"ps": cell.samples[IDLE]},
+        )
+        for variant, cell in best.scores.cells.items()
+        if IDLE in cell.samples
+    }
+    results = replace(best.results, name="doing nothing", scores=Scores(cells, best.scores.ci))
+    return Column(results, idle=True) if cells else None
 
 
 def published_column(model: str, name: str = "", ci: str = METHODS[0]) -> Column:

@@ -36,6 +36,11 @@ _MARK_NOTES = {
     "highest": "Bold: the highest value of a row and level.",
     "none": "",
 }
+FIRST = (
+    "The official rule (SR, ONTA) lets a policy try one thing after the other, so that one which "
+    "never reads the instruction can reach 100 % of the spatial tasks; SR@1 and ONTA@1 count only "
+    "successes before which nothing else was taken, pressed, done too early or done once more."
+)
 DASH = TableCell("–")
 Marked = Mapping[tuple[str, int], set[str]]
 """Titles of the columns to mark, by row and level."""
@@ -90,6 +95,7 @@ def task_table(
         key: check
         for column in columns
         if column.published
+        if (column.published, metric) in data.per_task
         for key, check in _wrong(data.per_task[column.published, metric].source).items()
     }
 
@@ -165,15 +171,18 @@ class _Made:
 
 
 def _source(name: str) -> str:
-    """The label of the paper's table that the summary table `name` redraws."""
+    """The label of the paper's table that the summary table `name` redraws; "" of ours."""
     data = load()
-    return {"main": data.main, "onta": data.onta, "ps": data.ps}[name].source
+    found = {"main": data.main, "onta": data.onta, "ps": data.ps}.get(name)
+    return found.source if found else ""
 
 
 def _long_name(metric: str) -> str:
     full = {
         "sr": "Success rate",
+        "sr1": "Success rate by the first choice",
         "onta": "Object-normalized target accuracy",
+        "onta1": "Object-normalized target accuracy by the first choice",
         "ps": "Progress score",
     }
     return f"{full[metric]} ({METRIC_NAMES[metric]})"
@@ -267,9 +276,10 @@ def _notes(
     mark: str,
     wrong: Mapping[tuple[str, str, str], Check],
 ) -> tuple[str, ...]:
-    own = _one_suite(columns)
+    own = [column for column in _one_suite(columns) if not column.idle]
     runs = [c.results for c in columns if not c.published]
-    notes = [table_note(runs)] if 0 < len(runs) < len(columns) else []
+    notes = [FIRST] if metric == "sr1" else []
+    notes += [table_note(runs)] if 0 < len(runs) < len(columns) else []
     notes += [_MARK_NOTES[mark]] if mark != "none" and len(own) > 1 else []
     models = {c.published for c in columns if c.published}
     listed = [
@@ -283,7 +293,7 @@ def _notes(
         notes.append(f"{PRINTED_OTHERWISE} The paper prints: {'; '.join(listed)}.")
     trials = load().trials
     for column in columns:
-        if column.published:
+        if column.published or column.idle:
             continue
         if column.trials != trials:
             theirs = f", the published models {trials}" if models else ""

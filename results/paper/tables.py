@@ -30,7 +30,7 @@ from robospa.results.tables import (
     to_markdown,
 )
 from robospa.text import interval_text
-from robospa.trial import BASIC, CATEGORY_NAMES, DIMENSIONS
+from robospa.trial import BASIC, CATEGORY_NAMES, DIMENSIONS, METRIC_NAMES
 
 INTERVAL_METHODS = (("bootstrap", "Stratified bootstrap"), ("wilson", "MOVER on Wilson limits"))
 
@@ -148,28 +148,30 @@ def _words(*texts: object) -> tuple[TableCell, ...]:
     return tuple(TableCell(str(text)) for text in texts)
 
 
-def basic_table(columns: Sequence[Column] = ()) -> Table:
+def basic_table(columns: Sequence[Column] = (), metrics: Sequence[str] = ("sr",)) -> Table:
     """Basic grounding tasks, which are no part of the 56: the printed values, and those of runs.
 
     A run's value is the mean over the sets of objects; it stays open unless all were run.
     """
     table = load().basic_grounding
-    runs = [c for c in columns if c.covers_basic]
+    runs = [(c, metric) for c in columns if c.covers_basic for metric in metrics]
     heads = table.columns
     names = {CATEGORY_NAMES[category]: category for category in BASIC}
     lines = []
     for name, printed in table.rows.items():
         entries = [TableCell(rounding.text(x), x) for x in printed]
-        for run in runs:
-            entries += [_grounding(run, names[name], int(h[1]), table.tasks) for h in heads]
+        for run, metric in runs:
+            category = names[name]
+            entries += [_grounding(run, metric, category, int(h[1]), table.tasks) for h in heads]
         lines.append(TableRow(name, tuple(entries)))
-    groups = (("Printed", len(heads)), *((c.title, len(heads)) for c in runs)) if runs else ()
+    titles = ["Printed", *(c.title + (m != "sr") * f" {METRIC_NAMES[m]}" for c, m in runs)]
+    groups = tuple((name, len(heads)) for name in titles) if runs else ()
     notes = [
         f"Means over {table.tasks} tasks of {table.trials} trials; "
         "the paper does not name the model."
     ]
     if runs:
-        notes.append(printed_note([run.results for run in runs]))
+        notes.append(printed_note([run.results for run, metric in runs if metric == "sr"]))
         notes.append(
             "Intervals of runs are 95 % intervals of the mean over the tasks; it stays open where "
             "not all of them were run."
@@ -180,10 +182,10 @@ def basic_table(columns: Sequence[Column] = ()) -> Table:
     return Table("basic", name, "Task", heads * (1 + len(runs)), tuple(lines), groups, tuple(notes))
 
 
-def _grounding(run: Column, category: str, level: int, sets: int) -> TableCell:
+def _grounding(run: Column, metric: str, category: str, level: int, sets: int) -> TableCell:
     """A run's mean over the `sets` of a basic category at `level`."""
     part = run.scores.categories.get((category, level))
-    found = None if part is None else part.values.get("sr")
+    found = None if part is None else part.values.get(metric)
     if part is None or found is None:
         return DASH
     cells = run.scores.cells.items()

@@ -29,7 +29,7 @@ from robospa.results.report.trials import failure_counts, trial_rows
 from robospa.results.scoring.scores import Scores, to_json
 from robospa.results.statistics.intervals import Estimate
 from robospa.results.tables import escape_markdown, to_markdown
-from robospa.trial import BASIC, CATEGORY_NAMES
+from robospa.trial import BASIC, CATEGORY_NAMES, DIMENSIONS, METRIC_NAMES
 
 if TYPE_CHECKING:
     from markupsafe import Markup
@@ -157,14 +157,13 @@ def card(name: str, scores: Scores, listed: int = 0, progress: str = "") -> Scor
     overall = scores.overall.get(0)
     value, _, interval = percent(overall.values.get("sr") if overall else None).partition(" ")
     lines = []
-    for dimension in ("spatial", "procedural"):
-        part = scores.dimensions.get((dimension, 0))
+    names = {d: scores.dimensions.get((d, 0)) for d in DIMENSIONS}
+    names |= {CATEGORY_NAMES[c]: scores.categories.get((c, 0)) for c in BASIC}
+    for name_of, part in {"": overall, **names}.items():
         if part is not None:
-            lines.append(f"{dimension}: {percent(part.values.get('sr'))}")
-    for category in BASIC:
-        part = scores.categories.get((category, 0))
-        if part is not None:
-            lines.append(f"{CATEGORY_NAMES[category]}: {percent(part.values.get('sr'))}")
+            known = [m for m in ("sr", "sr1") if part.values.get(m) and (name_of or m != "sr")]
+            texts = [f"{METRIC_NAMES[m]} {percent(part.values[m])}" for m in known]
+            lines += [(f"{name_of}: " if name_of else "") + ", ".join(texts)] * bool(texts)
     if overall is not None:
         count = sum(cell.category not in BASIC for cell in scores.cells.values())
         covered = f"{count} variant{'' if count == 1 else 's'}"

@@ -14,7 +14,14 @@ from robospa.results.records.manifest import departures
 from robospa.results.records.runs import Run, by_setting, setting_name
 from robospa.results.report.run_card import ends
 from robospa.results.scoring.repeats import policy_error_lines, repeat_lines
-from robospa.results.scoring.scores import AverageScore, Scores, VariantScore, level_name, score_run
+from robospa.results.scoring.scores import (
+    IDLE,
+    AverageScore,
+    Scores,
+    VariantScore,
+    level_name,
+    score_run,
+)
 from robospa.results.statistics.intervals import Estimate
 from robospa.results.tables import MISSING, Table, TableCell, TableRow, html_fragment, show
 from robospa.text import interval_text, plain_console
@@ -102,6 +109,10 @@ def category_size(scores: Scores, row: ScoreRow) -> int:
     return [*scores.category_of.values()].count(row.category) if row.kind == "category" else 0
 
 
+TAIL = ("SR [95 %]", "SR@1 [95 %]", "ONTA", "ONTA@1", "PS", "idle PS", "trials")
+"""Heads of what is told of the mean over levels."""
+
+
 def score_table(run: Run, scores: Scores) -> Table:
     """The success rates of `run` by level, with the metrics of the mean over levels."""
     table_rows = rows(scores)
@@ -110,7 +121,7 @@ def score_table(run: Run, scores: Scores) -> Table:
             row for row in table_rows if row.kind != "category"
         ]  # they would repeat their task
     departs = "".join(f" ({one})" for one in departures(run.manifest))
-    heads = (*map(level_name, scores.levels), "SR [95 %]", "ONTA", "PS", "trials")
+    heads = (*map(level_name, scores.levels), *TAIL)
     return Table(
         "scores",
         f"{run.manifest.policy.name or 'policy'}{departs}{_where(run)}",
@@ -129,15 +140,13 @@ def _where(run: Run) -> str:
 def _table_row(row: ScoreRow) -> TableRow:
     cells = [_level_cell(part) for level, part in row.parts if level]
     mean = dict(row.parts)[0]
-    tail = ["", "", "", ""]
+    tail = [""] * len(TAIL)
     if mean is not None:
         lost = f" -{mean.missing}" if mean.missing else ""
-        tail = [
-            percent(mean.values.get("sr")),
-            short(mean.values["onta"]) if "onta" in mean.values else "",
-            short(mean.values["ps"]) if "ps" in mean.values else "",
-            f"{mean.trials}{lost}",
-        ]
+        rates = [percent(mean.values.get(metric)) for metric in ("sr", "sr1")]
+        others = ("onta", "onta1", "ps", IDLE)
+        shorts = [short(mean.values[m]) if m in mean.values else "" for m in others]
+        tail = [*rates, *shorts, f"{mean.trials}{lost}"]
     label = f"{row.category} {row.label}" if row.kind == "task" else row.label
     kind = "row" if row.kind == "task" else "average"
     return TableRow(label, (*cells, *map(TableCell, tail)), kind)
@@ -180,9 +189,7 @@ def _scores(run: Run) -> Table:
     tables = [score_table(part, score_run(part)) for part in parts]
     if len(tables) == 1:
         return tables[0]
-    *_, tail = (table.heads[-4:] for table in tables)
-    levels = sorted({head for table in tables for head in table.heads[:-4]})
-    heads = (*levels, *tail)
+    heads = (*sorted({head for t in tables for head in t.heads[: -len(TAIL)]}), *TAIL)
     rows: list[TableRow] = []
     for part, table in zip(parts, tables, strict=True):
         rows.append(TableRow(setting_name(part), kind="section"))

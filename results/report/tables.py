@@ -11,13 +11,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from robospa.results.paper.columns import Column
+from robospa.results.paper.columns import Column, idle_column
 from robospa.results.paper.result_tables import summary_table, task_table
 from robospa.results.paper.tables import basic_table, write_tables
 from robospa.results.scoring.models import ModelResults, restricted
 from robospa.results.scoring.scores import Variant
 from robospa.results.tables import Table, html_fragment
-from robospa.trial import BASIC, METRIC_CATEGORIES
+from robospa.trial import BASIC, METRIC_CATEGORIES, METRICS
 
 if TYPE_CHECKING:
     from markupsafe import Markup
@@ -55,7 +55,6 @@ MOST_OPEN_ROWS = 30
 """Of a table of tasks beside others; a longer one is opened by hand."""
 LONG = 250
 """Characters of a note; longer ones are opened by hand."""
-SUMMARIES = (("main", "sr"), ("onta", "onta"), ("ps", "ps"))
 
 
 @dataclass(frozen=True)
@@ -71,24 +70,31 @@ def report_tables(columns: Sequence[Column]) -> list[ReportTable]:
     runs = [c for c in columns if not c.published] or list(columns)
     levels = sorted({level for c in runs for _, level in c.scores.cells})
     made = []
-    for name, metric in SUMMARIES:
-        if any(_has(c, metric) for c in runs):
-            heads = _heads(columns, levels, metric)
-            made.append(
-                ReportTable(summary_table(columns, name, metric, heads, covering=runs), False)
-            )
+    shown = {m: _beside(columns, runs, m) for m in METRICS if any(_has(c, m) for c in runs)}
+    for metric, beside in shown.items():
+        heads, name = _heads(beside, levels, metric), "main" if metric == "sr" else metric
+        made.append(ReportTable(summary_table(beside, name, metric, heads, covering=runs), False))
     if any(c.covers_basic for c in runs):
-        made.append(ReportTable(basic_table(columns), False))
-    for _, metric in SUMMARIES:
-        if any(_has(c, metric) for c in runs):
-            table = task_table(columns, f"{metric}-tasks", metric, covering=runs)
-            made.append(ReportTable(table, len(columns) > 1 and len(table.rows) > MOST_OPEN_ROWS))
+        made.append(ReportTable(basic_table(columns, ("sr", "sr1")), False))
+    for metric, beside in shown.items():
+        table = task_table(beside, f"{metric}-tasks", metric, covering=runs)
+        made.append(ReportTable(table, len(columns) > 1 and len(table.rows) > MOST_OPEN_ROWS))
     return [one for one in made if any(line.cells for line in one.table.rows)]
 
 
 def _has(column: Column, metric: str) -> bool:
     categories = METRIC_CATEGORIES[metric]
-    return any(cell.category in categories and cell.trials for cell in column.scores.cells.values())
+    cells = column.scores.cells.values()
+    return any(cell.category in categories and metric in cell.samples for cell in cells)
+
+
+def _beside(columns: Sequence[Column], runs: Sequence[Column], metric: str) -> Sequence[Column]:
+    """The columns of a table: what is not published of a model is no column, and progress stands
+    beside that of doing nothing."""
+    if metric in ("sr1", "onta1"):
+        return runs
+    idle = idle_column(runs) if metric == "ps" else None
+    return [*columns, idle] if idle else columns
 
 
 def _heads(columns: Sequence[Column], levels: Sequence[int], metric: str) -> tuple[str, ...]:

@@ -74,3 +74,12 @@ def _in_passing(cause: Cause, record: TrialRecord) -> bool:
         and due in roles.get(event["object"], ())
         for event in record.events
     )
+
+
+def held_at_start(record: TrialRecord) -> int:
+    """How many subtasks held before the first action."""
+    held: set[int] = set()
+    for event in record.events:
+        if event["kind"] == "subtask_done" and event["time"] <= 0:
+            held.add(event["index"])
+    return len(held)

@@ -12,7 +12,7 @@ from robospa.results.records.trial_record import TrialRecord
 from robospa.results.scoring.scores import Scores, Variant, score
 from robospa.results.statistics.intervals import METHODS
 from robospa.results.statistics.samples import Sample
-from robospa.trial import BASIC, METRIC_CATEGORIES, TrialKey
+from robospa.trial import BASIC, METRIC_CATEGORIES, METRIC_NAMES, RATES, TrialKey
 
 TABLE = ("embodiment", "mode", "suite", "split")
 COMPARISON = (*TABLE, "step_scale")
@@ -139,13 +139,13 @@ class ModelResults:
                 continue
             if metric not in cell.samples and self.published:
                 raise IncomparableError(
-                    f"of {self.name} only the mean progress is published, without the trials: "
-                    "compare sr or onta"
+                    f"of {self.name} only success rates and mean progress are published, without "
+                    "the trials: compare sr or onta"
                 )
             if metric not in cell.samples:
                 raise IncomparableError(
                     f"{self.name}, {task} L{level}: trials differ in their number of candidates, "
-                    "so there is no ONTA: compare sr"
+                    f"so there is no {METRIC_NAMES[metric]}: compare {RATES[metric]}"
                 )
             found[task, level] = cell.samples[metric]
         return found
@@ -153,7 +153,7 @@ class ModelResults:
 
 def categories_of(metric: str) -> tuple[str, ...]:
     """The categories that have `metric`; basic grounding has success rates too."""
-    return METRIC_CATEGORIES[metric] + (BASIC if metric == "sr" else ())
+    return METRIC_CATEGORIES[metric] + (BASIC if metric in ("sr", "sr1") else ())
 
 
 def restricted(results: ModelResults, variants: Collection[Variant]) -> ModelResults:

@@ -12,12 +12,14 @@ import zlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from operator import attrgetter
 from typing import TypedDict
 
 import numpy as np
 
 from robospa.results.records.runs import Run, finished
 from robospa.results.records.trial_record import TrialRecord
+from robospa.results.scoring.first_choice import first_choice, held_at_start
 from robospa.results.statistics.intervals import (
     METHODS,
     Estimate,
@@ -27,10 +29,21 @@ from robospa.results.statistics.intervals import (
     wilson,
 )
 from robospa.results.statistics.samples import Sample, onta_of_bound, progress, rate
-from robospa.trial import BASIC, CATEGORIES, DIMENSIONS, METRICS, PROCEDURAL, SPATIAL, TrialKey
+from robospa.trial import (
+    BASIC,
+    CATEGORIES,
+    DIMENSIONS,
+    METRICS,
+    PROCEDURAL,
+    RATES,
+    SPATIAL,
+    TrialKey,
+)
 
 Variant = tuple[str, int]
 """Task and level."""
+IDLE = "idle"
+"""The progress score of a policy that does nothing: what holds before the first action."""
 
 
 def weights_of(variants: Sequence[Variant], category: Mapping[str, str]) -> list[float]:
@@ -50,7 +63,8 @@ Range = tuple[float, float]
 
 @dataclass(frozen=True)
 class VariantScore:
-    """One variant: `listed` trials, of which `trials` have a result and `successes` succeeded.
+    """One variant: `listed` trials, of which `trials` have a result, `successes` succeeded and
+    `firsts` did by their first choice (`first_choice`; None where that is not known).
 
     `values` has the metrics that apply to it, None where there is no result to compute them from.
     """
@@ -66,6 +80,11 @@ class VariantScore:
     """The n of ONTA; 0 where it does not apply or trials disagree on it."""
     samples: Mapping[str, Sample] = field(default_factory=dict)
     """What the metrics' intervals are made from; none of a published mean."""
+    firsts: int | None = None
+
+    def count(self, metric: str) -> int | None:
+        """The trials that count for `metric`, which is a rate; None where that is not known."""
+        return self.successes if RATES[metric] == "sr" else self.firsts
 
     @property
     def missing(self) -> int:
@@ -87,17 +106,17 @@ class VariantScore:
         it does not apply or cannot be known."""
         if metric not in self.values:
             return None
-        if metric == "onta":
-            if self.candidates < 2:
-                return None
-            low, high = (onta_of_bound(rate, self.candidates) for rate in (self.worst, self.best))
-            return low, high
-        if metric == "ps":
-            known = self.values["ps"]
+        known, whole = self.values[metric], max(self.listed, 1)
+        if metric in RATES:
+            held: float = self.count(metric) or 0
+        else:
             held = known.value * self.trials if known is not None else 0.0
-            whole = max(self.listed, 1)
-            return held / whole, (held + self.missing) / whole
-        return self.worst, self.best
+        low, high = held / whole, (held + self.missing) / whole
+        if RATES.get(metric) in (None, metric):
+            return low, high
+        if self.candidates < 2:
+            return None
+        return onta_of_bound(low, self.candidates), onta_of_bound(high, self.candidates)
 
 
 @dataclass(frozen=True)
@@ -205,19 +224,26 @@ def score_cell(
     task: str, level: int, category: str, listed: int, records: Sequence[TrialRecord]
 ) -> VariantScore:
     """The cell of one variant from its results (`records` without lost ones)."""
-    metrics = ["sr"] + ["onta"] * (category in SPATIAL) + ["ps"] * (category in PROCEDURAL)
-    samples = {m: sample for m in metrics if (sample := sample_of(records, m)) is not None}
+    spatial, procedural = category in SPATIAL, category in PROCEDURAL
+    metrics = ["sr", "sr1"] + ["onta", "onta1"] * spatial + ["ps", IDLE] * procedural
+    won = {"sr": sum(r.success for r in records), "sr1": sum(map(first_choice, records))}
     values: dict[str, Estimate | None] = dict.fromkeys(metrics)
-    count, successes = len(records), sum(r.success for r in records)
-    candidates = candidates_of(records) if category in SPATIAL else 0
-    if count:
-        values["sr"] = sr = wilson(successes, count)
-        if "onta" in samples:
-            values["onta"] = chance_corrected(sr, candidates)
-        if "ps" in samples:
-            values["ps"] = interval_of([samples["ps"]], seed=_seed(task, level))
+    samples: dict[str, Sample] = {}
+    candidates = candidates_of(records) if spatial else 0
+    for metric in metrics if records else ():
+        if metric in RATES:
+            found = wilson(won[RATES[metric]], len(records))
+            if metric == RATES[metric]:
+                values[metric], samples[metric] = found, rate(won[metric], len(records))
+            elif candidates > 1:
+                values[metric] = chance_corrected(found, candidates)
+                samples[metric] = rate(won[RATES[metric]], len(records), candidates)
+        elif (sample := sample_of(records, metric)) is not None:
+            samples[metric] = sample
+            values[metric] = interval_of([sample], seed=_seed(task, level))
     return VariantScore(
-        task, level, category, listed, count, successes, values, candidates, samples
+        *(task, level, category, listed, len(records), won["sr"], values, candidates, samples),
+        firsts=won["sr1"],
     )
 
 
@@ -231,13 +257,19 @@ def sample_of(records: Sequence[TrialRecord], metric: str) -> Sample | None:
     """The results of one variant by `metric`, None where it cannot be computed."""
     if not records:
         return None
-    if metric == "ps":
-        return progress((r.done, r.total) if r.total else (int(r.success), 1) for r in records)
-    successes, count = sum(r.success for r in records), len(records)
-    if metric == "sr":
-        return rate(successes, count)
-    candidates = candidates_of(records)
-    return rate(successes, count, candidates) if candidates > 1 else None
+    if metric in RATES:
+        won, count = sum(succeeded(record, metric) for record in records), len(records)
+        if metric == RATES[metric]:
+            return rate(won, count)
+        candidates = candidates_of(records)
+        return rate(won, count, candidates) if candidates > 1 else None
+    done = held_at_start if metric == IDLE else attrgetter("done")
+    return progress((done(r), r.total) if r.total else (int(r.success), 1) for r in records)
+
+
+def succeeded(record: TrialRecord, metric: str) -> bool:
+    """Whether a trial counts for `metric`, which is a rate."""
+    return record.success if RATES[metric] == "sr" else first_choice(record)
 
 
 def with_intervals(cell: VariantScore, ci: str) -> VariantScore:
@@ -262,7 +294,7 @@ def _join(parts: Sequence[VariantScore | AverageScore], ci: str = METHODS[0]) ->
     values: dict[str, Estimate | None] = {}
     samples: dict[str, Weighted] = {}
     ranges: dict[str, Range] = {}
-    for metric in METRICS:
+    for metric in (*METRICS, IDLE):
         fit = [p for p in parts if metric in p.values]
         ends = [span for p in fit if (span := p.bounds(metric)) is not None]
         if fit and len(ends) == len(fit):
@@ -364,6 +396,8 @@ def to_json(scores: Scores) -> ScoresData:
         data: ScoreData = {"trials": item.trials, "missing": item.missing}
         if isinstance(item, VariantScore):
             data["successes"] = item.successes
+            if item.firsts is not None:
+                data["first_choices"] = item.firsts
         for metric, found in item.values.items():
             data[metric] = None if found is None else [found.value, found.low, found.high]
             if item.missing and (ends := item.bounds(metric)) is not None:

@@ -215,7 +215,7 @@ def test_what_cannot_be_compared_is_one_sentence(tmp_path: Path) -> None:
         compare_results(first, empty)
     with pytest.raises(ValueError, match="no published model is called 'pi9'; there are RDT"):
         published_results("pi9")
-    with pytest.raises(IncomparableError, match="only the mean progress"):
+    with pytest.raises(IncomparableError, match="without the trials"):
         compare_results(published_results("RDT"), published_results("GO-1"), "ps")
     mixed = side(tmp_path / "d", [record(SIZE, 1, 0, 1), record(SIZE, 1, 1, 1, candidates=5)])
     with pytest.raises(IncomparableError, match="differ in their number of candidates"):
