@@ -24,7 +24,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=100_000)
     parser.add_argument("--mode", default="clean", help="or randomized")
     parser.add_argument("--cameras", default="head,left_wrist,right_wrist")
-    parser.add_argument("--out", default="scene.png")
+    parser.add_argument("--out", default="scene.png", help="a picture, or a folder for one")
     words = parser.parse_args()
 
     # A pure function: the same arguments give the same scene, everywhere.
@@ -39,8 +39,11 @@ def main() -> None:
     cameras = [robospa.CameraSpec(name) for name in words.cameras.split(",")]
     pictures = [world.render(camera) for camera in cameras]
     world.close()
-    Image.fromarray(np.concatenate(pictures, axis=1)).save(Path(words.out))
-    print(f"{words.out}: {words.cameras}")
+    out = Path(words.out)
+    out = out if out.suffix else out / "scene.png"
+    out.parent.mkdir(parents=True, exist_ok=True)
+    Image.fromarray(np.concatenate(pictures, axis=1)).save(out)
+    print(f"{out}: {words.cameras}")
 
 
 main()

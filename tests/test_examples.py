@@ -45,7 +45,7 @@ def test_evaluate_my_policy(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
 
 @pytest.mark.sim
 def test_look_at_a_scene(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    run("look_at_a_scene", "--cameras=head", f"--out={tmp_path / 'scene.png'}")
+    run("look_at_a_scene", "--cameras=head", f"--out={tmp_path}")
     out = capsys.readouterr().out
     assert "Pick_Blocks_Size, level 3, seed 100000: " in out and "object_3: block at x" in out
     with Image.open(tmp_path / "scene.png") as picture:
@@ -60,7 +60,7 @@ def test_collect_data(
         yield FakePool
 
     monkeypatch.setattr(api, "pool_opener", opener)
-    monkeypatch.setattr(api, "versions", dict)
+    monkeypatch.setattr(collect, "versions", dict)
     monkeypatch.setattr(collect, "pack", fake_pack)
     run("collect_data", str(tmp_path / "data"), "--episodes=2", "--cameras=head")
     assert f"2 episodes in {tmp_path / 'data'}" in capsys.readouterr().out

@@ -4,10 +4,10 @@ a data set."""
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
@@ -18,7 +18,6 @@ from robospa.harness.running.atomic_file import StorageError
 from robospa.harness.settings import Compute, SettingsError
 
 if TYPE_CHECKING:
-    from robospa.harness.datasets.collect import CollectionResult, Order
     from robospa.trial import TrialKey
 
 T = TypeVar("T")
@@ -29,55 +28,54 @@ FIRST = ("tasks", "levels", "episodes", "embodiment", "mode", "images", "cameras
 """Settings that stand in the help."""
 
 
-Imported = Annotated[
-    Path | None,
-    typer.Option(
-        "--import",
-        help="only read the recordings (HDF5) below this folder and play them again: how often "
-        "they meet their goal here; with --out, make a data set of the official ones",
-    ),
-]
-Recorded = Annotated[
-    str | None,
-    typer.Option(
-        metavar="TASK",
-        help="only record one demonstration, at --levels (default 1), to the file --out",
-    ),
-]
-Replays = Annotated[
-    int,
-    typer.Option(
-        callback=TRIALS,
-        help="with --verify: episodes to replay, of each robot; with --import: of each folder",
-    ),
-]
+def _more(*flags: str, **given: Any) -> Any:
+    """An option that stands under --help-all alone."""
+    return typer.Option(*flags, hidden=True, rich_help_panel="More", **given)
 
 
 @with_flags([Collection, Compute], first=FIRST)
 def collect(
     out: Annotated[Path | None, typer.Option(help="folder of the data set")] = None,
     layout: Annotated[
-        str,
-        typer.Option("--format", help="lerobot-v3, lerobot-v2.1 or robotwin-hdf5"),
+        str, typer.Option("--format", help="lerobot-v3, lerobot-v2.1 or robotwin-hdf5")
     ] = "lerobot-v3",
     resume: Annotated[
         bool, typer.Option("--resume", help="go on with the data set in --out")
     ] = False,
     keep_episodes: Annotated[
-        bool, typer.Option("--keep-episodes", help="keep the file of every episode as well")
+        bool, _more("--keep-episodes", help="keep the file of every episode as well")
     ] = False,
     verify: Annotated[
         Path | None, typer.Option(help="only check the data set in this folder")
     ] = None,
-    replays: Replays = REPLAYS,
-    imported: Imported = None,
-    world: Annotated[
-        str | None, typer.Option(help="with --import: checkout:DIR, which has official scenes")
+    replays: Annotated[
+        int,
+        _more(
+            callback=TRIALS,
+            help="with --verify: episodes to replay, of each robot; with --import: of each folder",
+        ),
+    ] = REPLAYS,
+    imported: Annotated[
+        Path | None,
+        typer.Option(
+            "--import",
+            help="only play the recordings (HDF5) below this folder again; with --out, make a "
+            "data set of the official ones",
+        ),
     ] = None,
-    record: Recorded = None,
+    world: Annotated[
+        str | None, _more(help="with --import: checkout:DIR, which has official scenes")
+    ] = None,
+    record: Annotated[
+        str | None,
+        typer.Option(
+            metavar="TASK",
+            help="only record one demonstration, at --levels (default 1), to the file --out",
+        ),
+    ] = None,
     seed: Annotated[
         int | None,
-        typer.Option(callback=SEED, help="with --record: the scene; default: first accepted one"),
+        _more(callback=SEED, help="with --record: the scene; default: first accepted one"),
     ] = None,
     as_json: AsJson = False,
     **given: object,
@@ -103,20 +101,22 @@ def collect(
         return
     if out is None:
         raise SettingsError("name a folder for the data set with --out")
-    order = _order(_group(Collection, given), layout, out)
-    _make(order, _group(Compute, given), resume, keep_episodes, as_json)
-
-
-def _make(order: Order, compute: Compute, resume: bool, keep: bool, as_json: bool) -> None:
-    """Make the data set of `order`, or go on with it, and say what came of it."""
     from robospa.harness.cli.eval import terminable
+    from robospa.harness.datasets import api
+    from robospa.harness.datasets.collect import Order
     from robospa.harness.running.executor import RunAborted
 
-    out = order.out
+    order, compute = Order(_group(Collection, given), layout, out), _group(Compute, given)
     again = f"the same command with --out {out} --resume goes on from here"
     try:
         with terminable():
-            result = _collected(order, compute, resume, keep, aside if as_json else print)
+            result = api.collect_order(
+                order,
+                compute,
+                resume=resume,
+                keep_episodes=keep_episodes,
+                say=aside if as_json else print,
+            )
     except KeyboardInterrupt:
         print(f"robospa: interrupted; {again}", file=sys.stderr)
         raise typer.Exit(130) from None
@@ -140,23 +140,6 @@ def _make(order: Order, compute: Compute, resume: bool, keep: bool, as_json: boo
 def _group(kind: type[T], given: Mapping[str, object]) -> T:
     """The settings of one group among all that were given."""
     return kind(**{field.name: given[field.name] for field in fields(kind)})  # type: ignore[arg-type]
-
-
-def _order(settings: Collection, layout: str, out: Path) -> Order:
-    from robospa.harness.datasets.collect import Order
-    from robospa.harness.datasets.settings import command_of, versions
-
-    return Order(settings, layout, out, command_of(settings, layout), versions())
-
-
-def _collected(
-    order: Order, compute: Compute, resume: bool, keep: bool, say: Callable[[str], None]
-) -> CollectionResult | None:
-    from robospa.harness.datasets.api import pool_opener
-    from robospa.harness.datasets.collect import collect as make
-
-    with pool_opener(compute) as open_pool:
-        return make(order, open_pool, resume=resume, keep_episodes=keep, say=say)
 
 
 def _import(folder: Path, most: int, world: str | None, as_json: bool) -> None:

@@ -13,9 +13,10 @@ from typing import Any
 from robospa.harness.datasets import jobs
 from robospa.harness.datasets.collect import CollectionResult, OpenPool, Order
 from robospa.harness.datasets.collect import collect as make
-from robospa.harness.datasets.settings import Collection, command_of, versions
+from robospa.harness.datasets.settings import Collection
 from robospa.harness.pool import JobProcess, JobWorker, Pool, WorkerDied
 from robospa.harness.running.ray_executor import NoCluster, error_line, fitting, join_cluster
+from robospa.harness.running.ray_executor import versions as packages
 from robospa.harness.running.status import cores
 from robospa.harness.seeds.attempt import Attempt
 from robospa.harness.settings import Compute, SettingsError, changed
@@ -64,30 +65,29 @@ def collect(
             written. What is done is kept, and `resume` goes on.
     """
     named = {"tasks": tasks, "levels": levels, "episodes": episodes, "workers": workers}
-    return _collect(out, {**named, **settings}, format, resume)
-
-
-def _collect(
-    out: str | Path,
-    given: dict[str, object],
-    layout: str,
-    resume: bool = False,
-    maker: str = jobs.MAKER,
-) -> CollectionResult | None:
-    """`collect` with all settings by name; `maker` makes the episodes."""
-    kinds = (Collection, Compute)
-    known = [field.name for kind in kinds for field in fields(kind)]
-    if unknown := next((name for name in given if name not in known), None):
+    given = {**named, **settings}
+    names = [{field.name for field in fields(kind)} for kind in (Collection, Compute)]
+    if unknown := next((name for name in given if not any(name in of for of in names)), None):
+        known = [field.name for kind in (Collection, Compute) for field in fields(kind)]
         near = did_you_mean(unknown, known)
-        listed = ", ".join(known)
-        raise SettingsError(f"there is no setting {unknown!r}; {near}known are {listed}")
-    names = {field.name for field in fields(Compute)}
-    compute = changed(Compute(), Compute, {k: v for k, v in given.items() if k in names})
-    own = {name: value for name, value in given.items() if name not in names}
-    collection = changed(Collection(), Collection, own)
-    order = Order(collection, layout, Path(out), command_of(collection, layout), versions())
-    with pool_opener(compute, maker) as open_pool:
-        return make(order, open_pool, resume=resume)
+        raise SettingsError(f"there is no setting {unknown!r}; {near}known are {', '.join(known)}")
+    own, machine = ({n: v for n, v in given.items() if n in of} for of in names)
+    compute = changed(Compute(), Compute, machine)
+    order = Order(changed(Collection(), Collection, own), format, Path(out))
+    return collect_order(order, compute, resume=resume)
+
+
+def collect_order(
+    order: Order,
+    compute: Compute,
+    *,
+    resume: bool = False,
+    keep_episodes: bool = False,
+    say: Callable[[str], None] = print,
+) -> CollectionResult | None:
+    """Make the data set of `order` with the workers that `compute` asks for, as `collect`."""
+    with pool_opener(compute) as open_pool:
+        return make(order, open_pool, resume=resume, keep_episodes=keep_episodes, say=say)
 
 
 @contextmanager
@@ -100,8 +100,24 @@ def pool_opener(compute: Compute, maker: str = jobs.MAKER) -> Iterator[OpenPool]
         start = partial(JobProcess, jobs.maker_at, maker, seconds=EPISODE_SECONDS, name="maker")
         yield lambda episodes: _pool(start, min(compute.workers or cores(), episodes))
         return
-    with ray_makers(compute, maker) as on_node:
-        yield lambda episodes: _pool(on_node, min(on_node.capacity(), episodes))
+    ray = join_cluster(compute.address)
+    try:
+        room = {"CPU": compute.cpus_per_worker, "GPU": compute.gpus_per_worker}
+        actor = ray.remote(MakerActor).options(num_cpus=room["CPU"], num_gpus=room["GPU"])
+
+        def opened(episodes: int) -> Pool[jobs.EpisodeJob, Attempt]:
+            found = fitting(ray.cluster_resources(), room)
+            if not found:
+                raise NoCluster("the Ray cluster has no room for a worker; lower --cpus-per-worker")
+            here = packages()
+            return _pool(
+                lambda: RayMaker(ray, actor.remote(here, maker)),
+                min(found, compute.workers or found, episodes),
+            )
+
+        yield opened
+    finally:
+        ray.shutdown()
 
 
 def _pool(start: StartWorker, workers: int) -> Pool[jobs.EpisodeJob, Attempt]:
@@ -152,37 +168,3 @@ class RayMaker:
         """End it now."""
         with suppress(Exception):  # it may be gone already
             self._ray.kill(self._actor)
-
-
-class RayMakers:
-    """Starts makers on a cluster."""
-
-    def __init__(self, ray: Any, settings: Compute, path: str) -> None:
-        from robospa.harness.running.ray_executor import versions
-
-        self._ray, self._settings, self._path = ray, settings, path
-        self._versions = versions()
-        self._needs = {"CPU": settings.cpus_per_worker, "GPU": settings.gpus_per_worker}
-
-    def capacity(self) -> int:
-        """How many workers fit into the cluster; raises NoCluster if none does."""
-        found = fitting(self._ray.cluster_resources(), self._needs)
-        if not found:
-            raise NoCluster("the Ray cluster has no room for a worker; lower --cpus-per-worker")
-        return min(found, self._settings.workers or found)
-
-    def __call__(self) -> RayMaker:
-        """One more, where there is room."""
-        needs = {"num_cpus": self._needs["CPU"], "num_gpus": self._needs["GPU"]}
-        actor = self._ray.remote(MakerActor).options(**needs).remote(self._versions, self._path)
-        return RayMaker(self._ray, actor)
-
-
-@contextmanager
-def ray_makers(settings: Compute, path: str) -> Iterator[RayMakers]:
-    """The makers of the cluster of `settings`, which is left afterwards; raises NoCluster."""
-    ray = join_cluster(settings.address)
-    try:
-        yield RayMakers(ray, settings, path)
-    finally:
-        ray.shutdown()

@@ -15,15 +15,16 @@ from __future__ import annotations
 
 import json
 import shutil
+import time
 import zipfile
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import AbstractContextManager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from functools import partial
 from pathlib import Path
 
-from robospa.harness.datasets.collection_progress import CollectionProgress
 from robospa.harness.datasets.jobs import EpisodeAttempt, EpisodeJob
 from robospa.harness.datasets.manifest import MANIFEST, DatasetManifest, SeedFailure, read_record
 from robospa.harness.datasets.pack import FORMATS, check_packages, pack
@@ -32,12 +33,16 @@ from robospa.harness.datasets.settings import (
     KEYFRAMES,
     Collection,
     check_room,
+    command_of,
     expected_bytes,
     frames_of,
     lists_of,
+    size_text,
     trial_of,
+    versions,
 )
 from robospa.harness.pool import Pool
+from robospa.harness.progress import Bar
 from robospa.harness.running.atomic_file import PARTIAL, replace_file, run_lock, storage_errors
 from robospa.harness.seeds.attempt import Attempt, Evidence
 from robospa.harness.seeds.sweep import Search, sweep
@@ -45,6 +50,7 @@ from robospa.harness.settings import SettingsError
 from robospa.registry import did_you_mean
 from robospa.results.records.runs import LOCK
 from robospa.tasks.seeds import FIRST_TRAINING_SEED, ListKey
+from robospa.text import clock_text
 from robospa.trial import path_part
 
 EPISODES, SETTINGS = "episodes", "settings.json"
@@ -125,6 +131,62 @@ class EpisodeStore:
             shutil.rmtree(self.folder)
 
 
+class CollectionProgress(Bar):
+    """Counts what comes in and shows it.
+
+    Episodes of one task take twenty times as long as those of another, so the time left follows
+    from frames: `work` is that of all episodes that are left, in frames.
+    """
+
+    def __init__(self, total: int, done: int, work: float) -> None:
+        super().__init__("episodes", total, done)
+        self.replaced = self.frames = self.bytes = self.made = 0
+        self.times: Counter[str] = Counter()
+        self._left, self._worked = work, 0.0
+        self._began = time.monotonic()
+
+    def add(self, made: EpisodeAttempt, work: float) -> None:
+        """Count what came of a seed; an episode like it has `work` frames."""
+        self.times.update(made.times)
+        if made.accepted:
+            self.done += 1
+            self.made += 1
+            self.frames += made.frames
+            self.bytes += len(made.data)
+            self._worked += work
+        else:
+            self.replaced += 1
+        self.show(self.text())
+
+    def give_up(self, episodes: int, work: float) -> None:
+        """Expect so many episodes less, of `work` frames together."""
+        self.total -= episodes
+        self._left -= work
+
+    def text(self) -> str:
+        """Rate, time left, size, seeds that were replaced."""
+        passed = max(time.monotonic() - self._began, 1e-9)
+        parts = [f"{3600 * self.made / passed:.0f} an hour"]
+        if self._worked and self.done < self.total:
+            parts.append(f"{clock_text((self._left - self._worked) * passed / self._worked)} left")
+        parts.append(size_text(self.bytes))
+        if self.replaced:
+            parts.append(f"{self.replaced} seeds replaced")
+        return ", ".join(parts)
+
+    def cost_text(self) -> str:
+        """Where the processor time of an episode went; empty if none was made."""
+        if not self.made:
+            return ""
+        total = sum(self.times.values())
+        parts = [f"{name} {100 * spent / max(total, 1e-9):.0f} %" for name, spent in
+                 self.times.most_common()]  # fmt: skip
+        return (
+            f"{total / self.made:.1f} s of processor time and {size_text(self.bytes / self.made)} "
+            f"an episode of {self.frames / self.made:.0f} frames: {', '.join(parts)}"
+        )
+
+
 OpenPool = Callable[[int], AbstractContextManager[Pool[EpisodeJob, Attempt]]]
 """Opens the workers, at most as many as there are episodes left."""
 
@@ -133,14 +195,13 @@ OpenPool = Callable[[int], AbstractContextManager[Pool[EpisodeJob, Attempt]]]
 class Order:
     """What is to be collected: `settings` in the format `layout`, into `out`.
 
-    `command` is what the user typed; `versions` what the result depends on besides.
+    `versions` is what the result depends on besides.
     """
 
     settings: Collection
     layout: str
     out: Path
-    command: str
-    versions: dict[str, str]
+    versions: dict[str, str] = field(default_factory=lambda: versions())
 
     @property
     def images(self) -> str:
@@ -297,8 +358,7 @@ def _make(
     progress = CollectionProgress(
         count * len(wanted),
         sum(done.values()),
-        sum(count * frames(s.key) for s in wanted),
-        sum(done[s.key] * frames(s.key) for s in wanted),
+        sum((count - done[s.key]) * frames(s.key) for s in wanted),
     )
 
     def note(search: Search, item: Attempt) -> None:
@@ -339,7 +399,9 @@ def _pack(
             SeedFailure(trial_of(s.key, a.seed), a.reason) for s in some for a in s.refused
         )
         settings = dict(order.facts["settings"])
-        manifest = DatasetManifest(order.command, settings, tuple(failures))
+        manifest = DatasetManifest(
+            command_of(order.settings, order.layout), settings, tuple(failures)
+        )
         pack(order.layout, folder, files, manifest)
     return CollectionResult(tuple(folders.values()), episodes, tuple(_missing(wanted)))
 

@@ -29,7 +29,6 @@ from msgspec import Meta
 from numpy.typing import NDArray
 
 from robospa.action_space import ActionSpace
-from robospa.harness.running.atomic_file import replace_file
 from robospa.observation import WIDTH, Pixels
 from robospa.schema import one_of, parse_json, read
 from robospa.tasks.events import Event
@@ -236,11 +235,6 @@ def episode_bytes(episode: DatasetEpisode) -> bytes:
                 for t, frame in enumerate(seen.frames):
                     put(_still_name(camera, t, seen.codec), frame)
     return stream.getvalue()
-
-
-def write_episode_file(path: Path, episode: DatasetEpisode) -> None:
-    """Write `episode` at once or not at all; raises StorageError."""
-    replace_file(path, episode_bytes(episode))
 
 
 def read_episode_file(path: Path, pictures: bool = True) -> DatasetEpisode:

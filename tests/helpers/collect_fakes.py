@@ -73,7 +73,7 @@ def fake_pack(
 def order(out: Path, **changes: object) -> Order:
     """Three episodes of each of two variants."""
     given = {"tasks": TASKS, "levels": "1", "episodes": 3, **changes}
-    return Order(Collection(**given), "lerobot-v3", out, "robospa collect", {"suite": "s"})  # type: ignore[arg-type]
+    return Order(Collection(**given), "lerobot-v3", out, {"suite": "s"})  # type: ignore[arg-type]
 
 
 def contents(folder: Path) -> dict[str, bytes]:

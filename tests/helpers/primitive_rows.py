@@ -14,7 +14,7 @@ from PIL import Image
 
 from robospa.baselines.learned.maps.lowering import lowered
 from robospa.baselines.learned.maps.primitives import Primitive
-from robospa.harness.datasets.episode import DatasetEpisode, Stills, write_episode_file
+from robospa.harness.datasets.episode import DatasetEpisode, Stills, episode_bytes
 from robospa.harness.demonstrations.recorder import KEYFRAMES
 from robospa.harness.robots import embodiment
 from robospa.trial import TrialKey
@@ -74,5 +74,5 @@ def written_set(folder: Path, episodes: Sequence[DatasetEpisode]) -> Path:
     for episode in episodes:
         path = folder / "episodes" / episode.key.task / f"{episode.key.seed}.zip"
         path.parent.mkdir(parents=True, exist_ok=True)
-        write_episode_file(path, episode)
+        path.write_bytes(episode_bytes(episode))
     return folder

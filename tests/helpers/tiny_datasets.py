@@ -17,11 +17,12 @@ from robospa.harness.datasets.episode import (
     EpisodeFilm,
     Pictures,
     Stills,
-    write_episode_file,
+    episode_bytes,
 )
 from robospa.harness.datasets.manifest import DatasetManifest, SeedFailure
 from robospa.harness.datasets.pack import pack
 from robospa.harness.datasets.pictures import FPS
+from robospa.harness.running.atomic_file import replace_file
 from robospa.trial import TrialKey
 
 CAMERAS = ("head", "left_wrist", "right_wrist")
@@ -106,7 +107,7 @@ def written(folder: Path, episodes: Sequence[DatasetEpisode]) -> list[Path]:
     files = []
     for episode in episodes:
         path = folder / f"{episode.key.slug}.zip"
-        write_episode_file(path, episode)
+        replace_file(path, episode_bytes(episode))
         files.append(path)
     return files
 

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from command_line import robospa
 from tiny_datasets import tiny_dataset
 
-from robospa.harness.cli import collect
 from robospa.harness.convention_check.episodes import read_episode
+from robospa.harness.datasets import api
 from robospa.harness.datasets.collect import CollectionResult
 from robospa.harness.datasets.verify import ReplayEnding
 
@@ -18,19 +19,15 @@ from robospa.harness.datasets.verify import ReplayEnding
 def test_what_was_made_as_json(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     out, lines = tmp_path / "set", ("too few of Pick_Blocks_Size L1",)
 
-    def made(
-        order: object, compute: object, resume: bool, keep: bool, say: object
-    ) -> CollectionResult:
-        assert callable(say)
+    def made(*_: object, say: Callable[[str], None], **given: object) -> CollectionResult | None:
         say("6 episodes of 2 variants")
-        return CollectionResult((out,), 5, lines)
+        return None if given["resume"] else CollectionResult((out,), 5, lines)
 
-    monkeypatch.setattr(collect, "_collected", made)
+    monkeypatch.setattr(api, "collect_order", made)
     done = robospa("collect", "--tasks", "Pick_Blocks_Size", "--out", out, "--json")
     wanted = {"out": str(out), "finished_before": False, "folders": [str(out)], "episodes": 5}
     assert done.code == 1 and json.loads(done.out) == {**wanted, "missing": list(lines)}
     assert done.err.splitlines() == ["6 episodes of 2 variants", f"robospa: {lines[0]}"]
-    monkeypatch.setattr(collect, "_collected", lambda *_: None)
     done = robospa("collect", "--tasks", "Pick_Blocks_Size", "--out", out, "--resume", "--json")
     assert json.loads(done.out) == {"out": str(out), "finished_before": True}
 

@@ -173,7 +173,7 @@ def test_one_that_is_not_finished_wants_resume_and_the_same_settings(tmp_path: P
     refused(order(tmp_path), "--resume")
     text = "episodes was 3 and is 4; images was 'h264' and is 'png'"
     refused(order(tmp_path, episodes=4, images="png"), text, resume=True)
-    other = Order(Collection(), "lerobot-v3", tmp_path, "", {"suite": "other"})
+    other = Order(Collection(), "lerobot-v3", tmp_path, {"suite": "other"})
     refused(other, "suite was 's'", resume=True)
     (tmp_path / EPISODES / "settings.json").write_text("[]")
     refused(order(tmp_path), "cannot be read", resume=True)
@@ -265,12 +265,12 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[Compute]:
     found: list[Compute] = []
 
     @contextmanager
-    def opener(compute: Compute, maker: str) -> Iterator[type[FakePool]]:
+    def opener(compute: Compute) -> Iterator[type[FakePool]]:
         found.append(compute)
         yield FakePool
 
     monkeypatch.setattr(api, "pool_opener", opener)
-    monkeypatch.setattr(api, "versions", dict)
+    monkeypatch.setattr(module, "versions", dict)
     return found
 
 
