@@ -48,6 +48,12 @@ class Pose:
         return Pose((-px, -py, -pz), back)
 
 
+def vec3(values: ArrayLike) -> Vec3:
+    """Three numbers as a tuple."""
+    x, y, z = np.asarray(values, dtype=np.float64).tolist()
+    return (x, y, z)
+
+
 def multiply(
     a: tuple[Number, Number, Number, Number], b: tuple[Number, Number, Number, Number]
 ) -> tuple[Number, Number, Number, Number]:

@@ -10,17 +10,13 @@ Other packages add packs by an entry point (`robospa.registry.PACKS`).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
-from typing import TYPE_CHECKING, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Protocol
 
 from robospa.registry import PACKS, find
 
 if TYPE_CHECKING:
-    import numpy as np
-
-    from robospa.tasks.modes.clutter import ClutterKind
     from robospa.tasks.scene import Scene, SceneObject
     from robospa.tasks.shapes import ObjectModel, Params
 
@@ -48,60 +44,12 @@ class Pack(Protocol):
         """Hash of the files that models are made of, for manifests; empty without files."""
 
 
-class Builtin:
-    """The pack that needs no files: the assets of `robospa.tasks.objects`."""
-
-    name = "builtin"
-
-    def has(self, asset: str, params: Params) -> bool:
-        """Whether there is such an asset."""
-        from robospa.tasks.objects import assets
-
-        return asset in assets()
-
-    def model(self, asset: str, params: Params) -> ObjectModel:
-        """As `robospa.tasks.objects.object_model` without a pack."""
-        from robospa.tasks.objects import object_model
-
-        return object_model(asset, params)
-
-    def digest(self) -> str:
-        """Empty: there are no files."""
-        return ""
-
-
-@runtime_checkable
-class PackWithClutter(Pack, Protocol):
-    """A pack that has things of its own to lie about in randomised scenes."""
-
-    def clutter(self, scene: Scene) -> Sequence[ClutterKind]:
-        """Kinds of things, the library's and its own, that may lie about in `scene`; none if the
-        library's are all. Nothing that the scene's sentences may mean."""
-
-
-@runtime_checkable
-class PackWithFaults(Pack, Protocol):
-    """A pack that can say, before anything is made, what of its files cannot be used."""
-
-    def faults(self, tasks: Collection[str]) -> Mapping[str, str]:
-        """For each of `tasks` that cannot run with the files a sentence that says why."""
-
-
 @cache
 def pack(name: str) -> Pack:
-    """The pack called `name`, opened once in a process.
-
-    Raises:
-        UnknownName: There is none; the message says which there are.
-        ValueError: It cannot be opened.
-    """
+    """The pack called `name`, opened once in a process. UnknownName, saying which there are, or
+    ValueError if it cannot be opened."""
     opened: Pack = find(PACKS, name, "asset pack")()
     return opened
-
-
-def without_pack(params: Params) -> Params:
-    """`params` of the built-in model."""
-    return {key: value for key, value in params.items() if key != "pack"}
 
 
 def with_pack(scene: Scene, name: str) -> Scene:
@@ -109,21 +57,10 @@ def with_pack(scene: Scene, name: str) -> Scene:
     chosen = pack(name)
 
     def packed(item: SceneObject) -> SceneObject:
-        params = without_pack(item.params)
-        if name != Builtin.name and chosen.has(item.asset, params):
-            params = {**params, "pack": name}
-        return replace(item, params=params)
+        if not chosen.has(item.asset, item.params):
+            return item
+        return replace(item, params={**item.params, "pack": name})
 
     return replace(
         scene, objects=tuple(map(packed, scene.objects)), clutter=tuple(map(packed, scene.clutter))
     )
-
-
-def with_clutter(scene: Scene, name: str, rng: Callable[[], np.random.Generator]) -> Scene:
-    """`scene` with other clutter, drawn by `rng` from the kinds of the pack called `name`; as it is
-    if its mode draws none, or the pack has none."""
-    from robospa.tasks.modes.clutter import clutter
-
-    most, chosen = int(scene.strengths.get("clutter", 0)), pack(name)
-    kinds = chosen.clutter(scene) if most and isinstance(chosen, PackWithClutter) else ()
-    return replace(scene, clutter=clutter(scene, rng(), most, kinds)) if kinds else scene

@@ -5,24 +5,27 @@ with official objects.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import Any
 
 from robospa.harness.official.checkout import Episodes, episodes_of
 from robospa.harness.official.sentences import SPLITS, OfficialSentences
 from robospa.harness.official.switches import chosen, switched
+from robospa.harness.packs import archive
+from robospa.harness.packs.official import OfficialPack
+from robospa.harness.packs.visuals import check_robot
+from robospa.harness.robots import embodiment
 from robospa.harness.settings import EvaluationSettings, Selection, SettingsError, Simulation
 from robospa.harness.textures import VARIABLE
 from robospa.harness.trial import TrialSetup
 from robospa.harness.worlds import Parts, SapienKind
 from robospa.protocol.options import option, read_options, url_options
-from robospa.registry import UnknownName, load
+from robospa.registry import UnknownName
 from robospa.results.records.manifest import LayoutSettings
 from robospa.tasks import packs
-from robospa.tasks.catalog import build_scene
+from robospa.tasks.catalog import build_scene, generator
 from robospa.tasks.catalog import task as find_task
+from robospa.tasks.modes.clutter import clutter
 from robospa.tasks.scene import Scene
 from robospa.tasks.sentences import instruction
 from robospa.trial import TrialKey
@@ -32,16 +35,10 @@ PARTS = "robospa.harness.official.layout:official_world_parts"
 SUITE = "official-1"
 BUILTIN_SUITE = "official-1-builtin"
 """The suite of results with official objects, and with our own in their place."""
-ASSETS = "ROBOSPA_ASSETS"
-"""Environment variable that names the archive."""
-TEXTURES = "background_texture"
-"""Its folder of textures, whose layout is that of ROBOSPA_TEXTURES."""
 OWN_SENTENCES = (
     "sentences are our own and name looks of built-in objects, such as a blue stapler, which the "
     "archive's models need not have; add --instructions CHECKOUT for the official ones"
 )
-WITH_PACK = "robospa.tasks.packs:with_pack"
-PACK = "robospa.tasks.packs:pack"
 
 
 @dataclass(frozen=True)
@@ -88,20 +85,17 @@ class OfficialLayout:
         return LayoutSettings(assets, self.digest, names)
 
     def pack(self, scene: Scene) -> Scene:
-        """`scene` with the archive's objects, if they are packed."""
+        """`scene` with the archive's objects, if they are packed, and, if its mode draws clutter,
+        with the archive's too."""
         if not self.packed:
             return scene
-        with_pack: Callable[[Scene, str], Scene] = load(WITH_PACK)
-        return with_pack(scene, NAME)
-
-    def scatter(self, scene: Scene) -> Scene:
-        """`scene` with clutter of the archive too, if it has some and the mode draws any."""
-        if not (self.packed and scene.strengths):
+        scene, opened = packs.with_pack(scene, NAME), archive_pack()
+        most = int(scene.strengths.get("clutter", 0))
+        kinds = opened.clutter(scene) if most else ()
+        if not kinds:
             return scene
-        from robospa.tasks.catalog import generator
-
-        text = f"{self.suite}/{scene.task}/{scene.level}/{scene.seed}/clutter"
-        return packs.with_clutter(scene, NAME, lambda: generator(text))
+        rng = generator(f"{self.suite}/{scene.task}/{scene.level}/{scene.seed}/clutter")
+        return replace(scene, clutter=clutter(scene, rng, most, kinds))
 
 
 def use_archive(simulation: Simulation) -> None:
@@ -114,8 +108,15 @@ def use_archive(simulation: Simulation) -> None:
         return
     if not folder.is_dir():
         raise SettingsError(f"there is no folder {folder}: assets has objects/ and embodiments/")
-    os.environ[ASSETS] = str(folder.absolute())
+    os.environ[archive.VARIABLE] = str(folder.absolute())
     packs.pack.cache_clear()  # this process may have opened another archive
+
+
+def archive_pack() -> OfficialPack:
+    """The pack of the archive. UnknownName or ValueError if it cannot be opened."""
+    opened = packs.pack(NAME)
+    assert isinstance(opened, OfficialPack)
+    return opened
 
 
 def parse_official(
@@ -134,9 +135,8 @@ def parse_official(
     if options.assets == "builtin":
         return options, OfficialLayout(False, options.switches)
     try:
-        opened: Any = load(PACK)(NAME)
-        _use_textures(opened)
-        layout = OfficialLayout(True, options.switches, str(opened.digest()))
+        opened = archive_pack()
+        layout = OfficialLayout(True, options.switches, opened.digest())
     except (UnknownName, ValueError, OSError) as error:
         if named or options.assets == NAME:
             raise SettingsError(
@@ -144,35 +144,26 @@ def parse_official(
             ) from error
         trouble = f"objects are built in, because there are no official ones: {error}"
         return options, OfficialLayout(False, options.switches, trouble=trouble)
-    faults = opened.faults(tasks) if tasks and isinstance(opened, packs.PackWithFaults) else {}
+    textures = opened.archive.root / "background_texture"
+    if textures.is_dir():  # unless the user has named others
+        os.environ.setdefault(VARIABLE, str(textures))
+    faults = opened.faults(tasks)
     for task, fault in faults.items():
         raise SettingsError(
             f"{len(faults)} of {len(tasks)} tasks cannot run with this archive, {task} because "
-            f"{fault}; leave it out with --tasks; `robospa "
-            "assets` lists all"
+            f"{fault}; leave it out with --tasks; `robospa official assets` lists all"
         )
     return options, layout
 
 
 def check_robots(names: Collection[str]) -> None:
     """Raises SettingsError if the archive lacks the meshes of one of these robots."""
-    from robospa.harness.packs.archive import open_archive
-    from robospa.harness.packs.visuals import check_robot
-    from robospa.harness.robots import embodiment
-
     try:
-        archive = open_archive()
+        opened = archive.open_archive()
         for name in sorted(names):
-            check_robot(archive, embodiment(name))
+            check_robot(opened, embodiment(name))
     except (ValueError, OSError) as error:
         raise SettingsError(f"robots cannot be drawn with the official meshes: {error}") from error
-
-
-def _use_textures(pack: Any) -> None:
-    """Randomised scenes have the archive's textures, unless the user has named others."""
-    folder = Path(getattr(getattr(pack, "archive", None), "root", "")) / TEXTURES
-    if folder.is_dir():
-        os.environ.setdefault(VARIABLE, str(folder))
 
 
 class _OfficialKind(SapienKind):
@@ -243,6 +234,6 @@ def official_scenes(
     switches = chosen(layout.switches)
     number = list(episodes.get(key.variant, (key.seed,))).index(key.seed)
     drawn = build_scene(key.task, key.level, key.seed, key.embodiment, key.mode)
-    told = layout.scatter(layout.pack(switched(drawn, number, switches)))
+    told = layout.pack(switched(drawn, number, switches))
     shown = switched(told, number, switches, unsaid=True)
     return told, replace(shown, suite=layout.suite)

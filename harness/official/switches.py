@@ -8,7 +8,7 @@ and keep everything in view and in reach. What follows from the draw itself cann
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -30,12 +30,9 @@ IDS: Mapping[str, tuple[int, ...]] = {
     "Pick_Breads_Multi_View": (0, 1, 2, 3, 4, 5, 6),
 }
 """Official models of the tasks with equal things, in the order of episodes."""
-MULTI_VIEW = tuple(
-    f"Pick_{kind}_Multi_View{end}"
-    for kind, end in (
-        ("Sauce_Can", ""), ("Seals", ""), ("Breads", ""), ("Mixed_Objects", "_A"),
-        ("Mixed_Objects", "_B"),
-    )
+MULTI_VIEW = (
+    "Pick_Sauce_Can_Multi_View", "Pick_Seals_Multi_View", "Pick_Breads_Multi_View",
+    "Pick_Mixed_Objects_Multi_View_A", "Pick_Mixed_Objects_Multi_View_B",
 )  # fmt: skip
 MICROWAVE = "Click_Bell_Open_Microwave_Place_Object"
 MICROWAVE_RISE = 0.06
@@ -69,11 +66,10 @@ Change = Callable[[Scene, int], Scene]
 
 @dataclass(frozen=True)
 class Switch:
-    """A quirk of `tasks`. `row` begins the line of docs/fidelity.md about it (task | official);
-    `unsaid`: it only shows, and is switched after the sentence was made."""
+    """A quirk of `tasks`, of all if there are none. `unsaid`: it only shows, and is switched after
+    the sentence was made."""
 
     name: str
-    row: str
     tasks: tuple[str, ...]
     change: Change
     unsaid: bool = False
@@ -125,16 +121,13 @@ def _by_episode(scene: Scene, episode: int) -> Scene:
 
 
 def _model_by_episode(scene: Scene, episode: int) -> Scene:
-    ids: Sequence[int] = IDS[scene.task]
+    ids = IDS[scene.task]
     model = str(ids[episode % len(ids)])
-    looks = [
-        look
-        for look, one in enumerate(official_models(scene.objects[0].asset))
-        if one.model == model
-    ]
-    if not looks:  # no look of ours stands for it
+    models = [one.model for one in official_models(scene.objects[0].asset)]
+    if model not in models:  # no look of ours stands for it
         return scene
-    return replace(scene, objects=tuple(_with(item, look=looks[0]) for item in scene.objects))
+    look = models.index(model)
+    return replace(scene, objects=tuple(_with(item, look=look) for item in scene.objects))
 
 
 def _microwave(scene: Scene, episode: int) -> Scene:
@@ -186,49 +179,12 @@ def _colors(scene: Scene, episode: int) -> Scene:
 
 
 SWITCHES = (
-    Switch(
-        "extreme-by-episode",
-        "| Pick_*_Multi_View | extreme and viewpoint follow the episode number |",
-        MULTI_VIEW,
-        _by_episode,
-    ),
-    Switch(
-        "model-by-episode",
-        "| Pick_*_Relational, Pick_*_Multi_View | look / id follows the episode number,",
-        tuple(IDS),
-        _model_by_episode,
-    ),
-    Switch(
-        "left-thing-moves",
-        f"| {MICROWAVE} | thing to move is always the one farther left of the two,",
-        (MICROWAVE,),
-        _left_one,
-    ),
-    Switch(
-        "floating-microwave",
-        f"| {MICROWAVE} | the microwave floats 6 cm above the table",
-        (MICROWAVE,),
-        _microwave,
-    ),
-    Switch(
-        "gap-under-wall",
-        "| the same three | a gap of 1 cm under the wall shows what it hides |",
-        HIDING,
-        _wall,
-    ),
-    Switch(
-        "pale-stand",
-        "| stand of Observe_Blocks_Move_Memory, Observe_Objects_Click_Memory | pale grey |",
-        tuple(STANDS),
-        _stand,
-        unsaid=True,
-    ),
-    Switch(
-        "pure-colors",
-        "| named colours of blocks, pads and tints | pure values as a renderer's linear input:",
-        (),
-        _colors,
-        unsaid=True,
-    ),
+    Switch("extreme-by-episode", MULTI_VIEW, _by_episode),
+    Switch("model-by-episode", tuple(IDS), _model_by_episode),
+    Switch("left-thing-moves", (MICROWAVE,), _left_one),
+    Switch("floating-microwave", (MICROWAVE,), _microwave),
+    Switch("gap-under-wall", HIDING, _wall),
+    Switch("pale-stand", tuple(STANDS), _stand, unsaid=True),
+    Switch("pure-colors", (), _colors, unsaid=True),
 )
 """In the order in which they are switched."""

@@ -95,7 +95,8 @@ def object_model(asset: str, params: Params = MappingProxyType({})) -> ObjectMod
     assets of its own.
     """
     if "pack" in params:
-        return packs.pack(params["pack"]).model(asset, packs.without_pack(params))
+        rest = {key: value for key, value in params.items() if key != "pack"}
+        return packs.pack(params["pack"]).model(asset, rest)
     _asset(asset)
     look = params.get("look")
     if len(params) == 1 and type(look) is int:  # by far the most frequent: what dumps would say

@@ -7,13 +7,13 @@ and balls officially too, or are not published: they are always built in.
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-from robospa.geometry import Vec3
+from robospa.geometry import Vec3, vec3
 
 POINTS = frozenset({"press", "touched", "support", "left", "right", "tip", "handle"})
 """Our frames that may lie at a point of the archive."""
@@ -56,56 +56,57 @@ class OfficialSize:
 
 
 def official_model(asset: str, look: int) -> OfficialModel | None:
-    """The archive's model of that look; None if `asset` is none of the archive's.
-
-    ValueError if the asset has no such look.
-    """
-    row = _table().get(asset)
-    if row is None:
-        return None
-    models = row["models"]
-    if not 0 <= look < len(models):
+    """The archive's model of that look; None if `asset` is none of the archive's. ValueError if
+    the asset has no such look."""
+    models = official_models(asset)
+    if models and not 0 <= look < len(models):
         raise ValueError(f"asset {asset!r} has official models of looks 0 to {len(models) - 1}")
-    return OfficialModel(
-        row["folder"],
-        str(models[look]),
-        row.get("turns", (0,) * len(models))[look],
-        row.get("lies", False),
-        row.get("faces", ""),
-        row.get("hinge", False),
-        row.get("hollow", False),
-        isinstance(models[look], str),
-        {frame: point for frame, point in row.items() if frame in POINTS},
-    )
-
-
-def official_assets() -> tuple[str, ...]:
-    """Our assets that have models in the archive, sorted."""
-    return tuple(sorted(_table()))
+    return models[look] if models else None
 
 
 def official_models(asset: str) -> tuple[OfficialModel, ...]:
     """The archive's model of each look of `asset`; none for one that is always built in."""
-    looks = len(_table()[asset]["models"]) if asset in _table() else 0
-    found = (official_model(asset, look) for look in range(looks))
-    return tuple(model for model in found if model is not None)
+    return _models().get(asset, ())
+
+
+def official_assets() -> tuple[str, ...]:
+    """Our assets that have models in the archive, sorted."""
+    return tuple(sorted(_models()))
 
 
 @cache
-def _table() -> Mapping[str, Mapping[str, Any]]:
-    return tomllib.loads((Path(__file__).parent / "models.toml").read_text("utf-8"))
+def _models() -> Mapping[str, tuple[OfficialModel, ...]]:
+    return {
+        asset: tuple(
+            OfficialModel(
+                row["folder"],
+                str(model),
+                turns,
+                jointed=isinstance(model, str),
+                points={frame: point for frame, point in row.items() if frame in POINTS},
+                **{name: row[name] for name in ("lies", "faces", "hinge", "hollow") if name in row},
+            )
+            for model, turns in zip(
+                row["models"], row.get("turns", [0] * len(row["models"])), strict=True
+            )
+        )
+        for asset, row in _rows("models").items()
+    }
+
+
+def _rows(name: str) -> dict[str, Any]:
+    return tomllib.loads((Path(__file__).parent / f"{name}.toml").read_text("utf-8"))
 
 
 @cache
 def needs() -> Mapping[str, tuple[str, ...]]:
     """For each of the benchmark's tasks, the assets of `official_assets` that its scenes hold."""
-    rows = tomllib.loads((Path(__file__).parent / "needs.toml").read_text("utf-8"))
-    return {task: tuple(assets) for task, assets in rows.items()}
+    return {task: tuple(assets) for task, assets in _rows("needs").items()}
 
 
 @cache
 def _sizes() -> Mapping[str, Mapping[str, Mapping[str, Any]]]:
-    return tomllib.loads((Path(__file__).parent / "sizes.toml").read_text("utf-8"))
+    return _rows("sizes")
 
 
 def official_size(model: OfficialModel) -> OfficialSize | None:
@@ -113,17 +114,11 @@ def official_size(model: OfficialModel) -> OfficialSize | None:
     row = _sizes().get(model.folder, {}).get(model.model)
     if row is None:
         return None
-    return OfficialSize(
-        _vector(row["size"]), _vector(row["centre"]), row["contacts"], row["functional"]
-    )
+    size, centre = vec3(row["size"]), vec3(row["centre"])
+    return OfficialSize(size, centre, row["contacts"], row["functional"])
 
 
 @cache
 def clutter_alike() -> Mapping[str, frozenset[str]]:
     """For each category of things that only lie about, our assets that it may be taken for."""
-    rows = tomllib.loads((Path(__file__).parent / "clutter.toml").read_text("utf-8"))
-    return {category: frozenset(assets) for category, assets in rows.items()}
-
-
-def _vector(row: Sequence[float]) -> Vec3:
-    return (row[0], row[1], row[2])
+    return {category: frozenset(assets) for category, assets in _rows("clutter").items()}

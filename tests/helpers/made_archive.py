@@ -7,18 +7,22 @@ than metres and turned as official ones are, so that scale and frame matter.
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import pytest
 from mesh_writers import Piece, palette_png, write_glb, write_obj, write_textured_obj
 from numpy.typing import NDArray
 
 from robospa.geometry import Vec3, to_matrix
 from robospa.harness.packs.placing import Y_UP
+from robospa.tasks import packs
 from robospa.tasks.objects import meshes as m
 from robospa.tasks.objects import object_model
 from robospa.tasks.objects.build import points_of
@@ -39,6 +43,24 @@ THINGS = ("bottle/0", "marker/0", "plush/0", "toothbrush/0", "toothbrush/12", "t
 """Of objaverse; the last is not in the list, and of "plush" nothing is known."""
 TURNED = 0.7
 """By how much [rad] models stand turned whose direction has to be found."""
+
+
+READS_MESHES = pytest.mark.skipif(
+    importlib.util.find_spec("trimesh") is None,
+    reason="reading meshes needs trimesh: pip install 'robospa[assets]'",
+)
+
+
+@contextmanager
+def official_pack_in(root: Path, cache: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Until the end the official pack is that of the archive in `root`, with its own cache."""
+    monkeypatch.setenv("ROBOSPA_ASSETS", str(root))
+    monkeypatch.setenv("ROBOSPA_CACHE", str(cache))
+    packs.pack.cache_clear()
+    try:
+        yield
+    finally:
+        packs.pack.cache_clear()
 
 
 def make_archive(

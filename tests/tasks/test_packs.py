@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -13,7 +12,7 @@ from robospa.registry import UnknownName
 from robospa.tasks import objects, packs
 from robospa.tasks.catalog import build_scene
 from robospa.tasks.objects import object_model
-from robospa.tasks.packs import pack, with_pack
+from robospa.tasks.packs import with_pack
 from robospa.tasks.scene import Scene
 
 
@@ -46,14 +45,6 @@ class BigCans:
 """
 
 
-def test_the_built_in_pack_changes_nothing(scene: Scene) -> None:
-    assert with_pack(scene, "builtin").digest == scene.digest
-    can = object_model("can", {"look": 2})
-    assert pack("builtin").model("can", {"look": 2}) is can
-    assert object_model("can", {"look": 2, "pack": "builtin"}) is can
-    assert pack("builtin").has("can", {}) and not pack("builtin").has("tin", {})
-
-
 def test_a_pack_of_another_package_is_found_by_name(
     scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -66,13 +57,7 @@ def test_a_pack_of_another_package_is_found_by_name(
     can = next(item for item in big.objects if item.asset == "can")
     assert object_model(can.asset, can.params).mass == 7.0
     assert big.digest != scene.digest
-    assert with_pack(big, "builtin") == scene
     assert Scene.from_json(big.to_json()) == big
-
-
-def test_only_the_objects_models_change(scene: Scene) -> None:
-    dressed = replace(scene, objects=with_pack(scene, "builtin").objects)
-    assert dressed == scene
 
 
 def test_an_unknown_pack_is_named_with_those_there_are(scene: Scene) -> None:

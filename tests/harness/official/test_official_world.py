@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import os
 import pickle
-from collections.abc import Collection
+from collections.abc import Iterator
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 from checkouts import write_checkout
+from made_archive import make_archive, official_pack_in
 
-from robospa.harness.official import layout as layout_module
+from robospa.baselines.oracle import create
 from robospa.harness.official import official_world
 from robospa.harness.official.layout import (
     BUILTIN_SUITE,
@@ -29,9 +29,11 @@ from robospa.harness.running.policy_probe import ProbedPolicy
 from robospa.harness.running.request import make_request
 from robospa.harness.running.worker import load_parts
 from robospa.harness.settings import EvaluationSettings, SettingsError, updated
-from robospa.harness.trial import task_parts
+from robospa.harness.trial import run_trial, task_parts
 from robospa.harness.world import SceneUnstable
 from robospa.protocol.policy import PolicySpec
+from robospa.tasks import packs
+from robospa.tasks.objects import object_model
 from robospa.tasks.scene import SUITE as OURS
 from robospa.trial import TrialKey
 
@@ -55,83 +57,70 @@ def test_colours_are_named_by_their_words_and_shown_pure() -> None:
     assert colors == {(1.0, 0.0, 0.0), (0.0, 1.0, 0.0)}
 
 
-def test_objects_are_of_the_archive_where_there_is_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    def load(path: str) -> Any:
-        if path == layout_module.PACK:
-            return lambda name: SimpleNamespace(digest=lambda: f"hash of {name}")
-        return lambda scene, name: SimpleNamespace(scene=scene, name=name)
+@pytest.fixture
+def cans(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A folder of cans and seals, whose environment is as before afterwards."""
+    root = make_archive(tmp_path / "assets", ["can", "seal"], ("objects", "background_texture"))
+    monkeypatch.setenv("ROBOSPA_TEXTURES", "before")
+    monkeypatch.delenv("ROBOSPA_TEXTURES")
+    with official_pack_in(root, tmp_path / "cache", monkeypatch):
+        yield root
 
-    monkeypatch.setattr(layout_module, "load", load)
-    options, layout = parse_official("official")
-    assert (options, layout.suite, layout.digest) == (OfficialOptions(), SUITE, "hash of official")
+
+def test_objects_are_of_the_archive_where_there_is_one(cans: Path) -> None:
+    options, layout = parse_official("official", tasks=["Pick_Cans_Relational"])
+    assert (options, layout.suite) == (OfficialOptions(), SUITE)
+    assert layout.digest == packs.pack("official").digest()
     assert layout.manifest_settings().assets == "official"
     assert layout.warnings(official_sentences=True) == []
     (said,) = layout.warnings(official_sentences=False)
-    assert "add --instructions CHECKOUT" in said
-    packed: Any = layout.pack(task_parts(KEY).scene)
-    assert packed.name == "official"
+    assert "--instructions" in said
+    scene = official_world_parts(TrialKey("Pick_Cans_Relational", 2, 100000), layout, {}).scene
+    assert {item.params["pack"] for item in scene.objects} == {"official"}
     assert parse_official("official?assets=builtin")[1].suite == BUILTIN_SUITE
+    with pytest.raises(SettingsError, match=r"1 of 2 tasks cannot run .*Press_Stapler_Repeat"):
+        parse_official("official", tasks=["Pick_Cans_Relational", "Press_Stapler_Repeat"])
 
 
-def test_the_archive_that_is_named_is_found_by_workers_with_its_textures(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    for name in ("ROBOSPA_ASSETS", "ROBOSPA_TEXTURES"):
-        monkeypatch.setenv(name, "before")
-        monkeypatch.delenv(name)
-    (tmp_path / "background_texture").mkdir()
-    archive = SimpleNamespace(root=tmp_path)
-    opened = SimpleNamespace(digest=lambda: "h", archive=archive)
-    monkeypatch.setattr(layout_module, "load", lambda path: lambda name: opened)
-    made = request(tmp_path, assets=str(tmp_path), world="official")
-    assert made.config.parts_arguments["layout"].digest == "h"
-    assert os.environ["ROBOSPA_ASSETS"] == str(tmp_path)
-    assert os.environ["ROBOSPA_TEXTURES"] == str(tmp_path / "background_texture")
-    with pytest.raises(SettingsError, match="add --world official"):
-        request(tmp_path, assets=str(tmp_path), world="sapien")
+def test_the_archive_that_is_named_is_found_by_workers_with_its_textures(cans: Path) -> None:
+    os.environ["ROBOSPA_ASSETS"] = "elsewhere"
+    made = request(cans, assets=str(cans), world="official")
+    assert made.config.parts_arguments["layout"].digest
+    assert os.environ["ROBOSPA_ASSETS"] == str(cans)
+    assert os.environ["ROBOSPA_TEXTURES"] == str(cans / "background_texture")
+    with pytest.raises(SettingsError, match="--world official"):
+        request(cans, assets=str(cans), world="sapien")
     with pytest.raises(SettingsError, match="there is no folder"):
-        request(tmp_path, assets=str(tmp_path / "no"))
+        request(cans, assets=str(cans / "no"))
+    with pytest.raises(SettingsError, match="holds none of objects"):
+        request(cans, assets=str(cans / "objects"), world="official")  # nobody wants ours instead
 
 
-def test_without_an_archive_it_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    def missing(path: str) -> Any:
-        def opened(name: str) -> Any:
-            raise ValueError("there is no archive")
-
-        return opened
-
-    monkeypatch.setattr(layout_module, "load", missing)
-    _, layout = parse_official("official?switches=pure-colors")
+def test_without_an_archive_it_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with official_pack_in(tmp_path, tmp_path, monkeypatch):
+        _, layout = parse_official("official?switches=pure-colors")
+        with pytest.raises(SettingsError, match="no official objects"):
+            parse_official("official?assets=official")
     assert layout.suite == BUILTIN_SUITE and layout.manifest_settings().switches == ["pure-colors"]
     (said,) = layout.warnings(official_sentences=False)
-    assert said.startswith("objects are built in") and "no archive" in said
-    with pytest.raises(SettingsError, match="no official objects: there is no archive"):
-        parse_official("official?assets=official")
+    assert said.startswith("objects are built in") and str(tmp_path) in said
     for wrong in ("switches=gap", "settle=long", "speed=2"):
         with pytest.raises(SettingsError, match=r"--world official\?"):
             parse_official(f"official?{wrong}")
 
 
-def test_an_archive_that_is_named_has_to_be_one(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Nobody who names one wants our own objects instead."""
-    monkeypatch.setenv("ROBOSPA_ASSETS", "before")
-    with pytest.raises(SettingsError, match="holds none of objects, embodiments"):
-        request(tmp_path, assets=str(tmp_path), world="official")
-
-
-def test_an_archive_that_lacks_what_a_task_needs_is_refused_at_the_start(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    def faults(tasks: Collection[str]) -> dict[str, str]:
-        return {task: "a file is missing" for task in tasks if task != TASK}
-
-    torn = SimpleNamespace(name="x", has=str, model=str, digest=lambda: "h", faults=faults)
-    monkeypatch.setattr(layout_module, "load", lambda path: lambda name: torn)
-    assert parse_official("official", tasks=[TASK])[1].packed
-    with pytest.raises(SettingsError, match=r"1 of 2 tasks cannot run .*, Other because"):
-        parse_official("official", tasks=[TASK, "Other"])
+@pytest.mark.sim
+def test_a_trial_with_the_archives_objects_is_solved_in_its_own_suite(cans: Path) -> None:
+    pytest.importorskip("trimesh", reason="meshes need trimesh: pip install 'robospa[assets]'")
+    options, layout = parse_official("official?assets=official&settle=official")
+    key = TrialKey("Pick_Seals_Multi_View", 2, 100000)
+    parts = official_world_parts(key, layout, {})
+    assert parts.scene.suite == "official-1" and layout.digest
+    item = parts.scene.objects[0]
+    assert object_model(item.asset, item.params).shapes != object_model(item.asset).shapes
+    world = official_world.OfficialWorld(render=False, settle=options.settle)
+    record = run_trial(world, create(), key, policy_seed=0, parts=lambda _: parts)
+    assert record.success, record.message
 
 
 def request(folder: Path, **more: object) -> Any:

@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import pytest
 
 from robospa.geometry import Pose
-from robospa.harness.official.switches import IDS, SWITCHES, Switch, chosen, switched
+from robospa.harness.official.switches import IDS, SWITCHES, chosen, switched
 from robospa.tasks.catalog import build_scene, tasks
 from robospa.tasks.colors import NAMED
 from robospa.tasks.official import official_model
 from robospa.tasks.scene import Scene, SceneObject
-
-FIDELITY = Path(__file__).resolve().parents[3] / "docs" / "fidelity.md"
-EACH = pytest.mark.parametrize("switch", SWITCHES, ids=lambda switch: switch.name)
 
 
 def block(name: str, word: str, x: float = 0.0, **more: Any) -> SceneObject:
@@ -28,20 +24,9 @@ def scene(task: str, *objects: SceneObject, level: int = 4, **facts: Any) -> Sce
     return Scene(task, level, 100000, "aloha-agilex", "clean", objects, facts)
 
 
-def only(name: str) -> tuple[Switch, ...]:
-    return chosen(name)
-
-
-@EACH
-def test_a_switch_is_about_official_tasks_and_a_line_of_fidelity(switch: Switch) -> None:
-    assert set(switch.tasks) <= set(tasks())
-    lines = [line for line in FIDELITY.read_text().splitlines() if line.startswith(switch.row)]
-    assert len(lines) == 1, switch.row
-    assert lines[0].rstrip(" |").endswith("| 1")
-
-
 def test_switches_are_chosen_by_name() -> None:
     assert chosen("all") == SWITCHES and chosen("none") == ()
+    assert {task for switch in SWITCHES for task in switch.tasks} <= set(tasks())
     assert [s.name for s in chosen("pure-colors,gap-under-wall")] == [
         "gap-under-wall", "pure-colors"
     ]  # fmt: skip
@@ -52,7 +37,7 @@ def test_switches_are_chosen_by_name() -> None:
 def test_other_tasks_and_other_halves_of_the_switches_change_nothing() -> None:
     made = scene("Press_Stapler_Repeat", block("object_0", "red"))
     assert switched(made, 3, SWITCHES) is made
-    assert switched(made, 3, only("pure-colors")) is made
+    assert switched(made, 3, chosen("pure-colors")) is made
     assert switched(made, 3, SWITCHES, unsaid=True).objects[0].params["color"] == [1.0, 0.0, 0.0]
 
 
@@ -61,7 +46,7 @@ def test_the_extreme_asked_for_follows_the_episode() -> None:
     items = [SceneObject(n, "seal", Pose((*at, 0.74)), {"look": 0}) for n, at in places.items()]
     made = scene("Pick_Seals_Multi_View", *items, target="far", extreme="frontmost",
                  viewpoint="left", position="leftmost")  # fmt: skip
-    found = [switched(made, n, only("extreme-by-episode")).facts for n in range(8)]
+    found = [switched(made, n, chosen("extreme-by-episode")).facts for n in range(8)]
     assert [f["target"] for f in found] == ["west", "east", "far", "near"] * 2
     assert [f["extreme"] for f in found[:4]] == ["leftmost", "rightmost", "frontmost", "backmost"]
     for views in (found[:4], found[4:]):
@@ -81,7 +66,7 @@ def test_the_model_follows_the_episode(task: str, asset: str) -> None:
     made = scene(task, *items)
     for episode in range(2 * len(IDS[task])):
         looks = {
-            o.params["look"] for o in switched(made, episode, only("model-by-episode")).objects
+            o.params["look"] for o in switched(made, episode, chosen("model-by-episode")).objects
         }
         assert len(looks) == 1
         model = official_model(asset, looks.pop())
@@ -92,7 +77,7 @@ def test_the_thing_farther_left_moves() -> None:
     items = block("a", "red", 0.2), block("b", "blue", -0.1)
     for one, other in (("a", "b"), ("b", "a")):
         made = scene("Click_Bell_Open_Microwave_Place_Object", *items, object=one, reference=other)
-        facts = switched(made, 0, only("left-thing-moves")).facts
+        facts = switched(made, 0, chosen("left-thing-moves")).facts
         assert (facts["object"], facts["reference"]) == ("b", "a")
     early = scene("Click_Bell_Open_Microwave_Place_Object", *items, level=1, bell="a")
     assert switched(early, 0, SWITCHES) is early
@@ -101,7 +86,7 @@ def test_the_thing_farther_left_moves() -> None:
 def test_the_microwave_floats() -> None:
     items = block("a", "red"), SceneObject("m", "microwave", Pose((0.0, 0.1, 0.74)), fixed=True)
     made = scene("Click_Bell_Open_Microwave_Place_Object", *items, microwave="m")
-    found = switched(made, 0, only("floating-microwave"))
+    found = switched(made, 0, chosen("floating-microwave"))
     assert found.objects[0] is items[0]
     assert found.objects[1].pose.position == pytest.approx((0.0, 0.1, 0.80))
 

@@ -6,9 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_archive import make_archive
+from made_archive import READS_MESHES, make_archive
 from mesh_writers import Piece, hollow_staves, merged, write_glb
-from pack_fixtures import READS_MESHES
 
 from robospa.harness.packs import convex
 from robospa.harness.packs.archive import ArchiveError, open_archive

@@ -7,9 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_archive import SCALE, make_archive
+from made_archive import READS_MESHES, SCALE, make_archive, official_pack_in
 from mesh_writers import Piece, glb, glb_bytes, hollow_staves, merged, write_glb, write_obj
-from pack_fixtures import READS_MESHES, official_pack_in
 from sapien import physx
 
 from robospa.geometry import Pose

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from made_archive import READS_MESHES
 from mesh_writers import Piece, glb, glb_bytes, palette_png, write_glb, write_obj
-from pack_fixtures import READS_MESHES
 
 from robospa.harness.packs import mesh_files as checks
 from robospa.harness.packs.archive import Archive, ArchiveError

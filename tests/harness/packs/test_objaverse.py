@@ -8,10 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_archive import make_archive
-from pack_fixtures import READS_MESHES, official_pack_in
+from made_archive import READS_MESHES, make_archive, official_pack_in
 
-from robospa.harness.official.layout import OfficialLayout, official_world_parts
+from robospa.harness.official.layout import OfficialLayout, archive_pack, official_world_parts
 from robospa.harness.packs.archive import ArchiveError, open_archive
 from robospa.harness.packs.index import THING, clutter_things, digest_of, index
 from robospa.harness.packs.official import OfficialPack
@@ -40,10 +39,9 @@ def pack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[OfficialPack]:
     root = make_archive(folder / "assets", ["stapler"], ("objects", "clutter"))
     with (
         pytest.MonkeyPatch.context() as patch,
-        official_pack_in(root, folder / "cache", patch) as opened,
+        official_pack_in(root, folder / "cache", patch),
     ):
-        assert isinstance(opened, OfficialPack)
-        yield opened
+        yield archive_pack()
 
 
 def official(key: TrialKey) -> Scene:

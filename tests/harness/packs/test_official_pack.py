@@ -8,11 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_archive import SCALE, make_archive
+from made_archive import READS_MESHES, SCALE, make_archive, official_pack_in
 from mesh_writers import Piece, write_glb
-from pack_fixtures import READS_MESHES, official_pack_in
 
-from robospa.harness.official.layout import use_archive
+from robospa.harness.official.layout import archive_pack, use_archive
 from robospa.harness.packs.archive import ArchiveError
 from robospa.harness.packs.index import index
 from robospa.harness.packs.official import OfficialPack
@@ -32,9 +31,8 @@ def pack(tmp_path_factory: pytest.TempPathFactory) -> Iterator[OfficialPack]:
     folder = tmp_path_factory.mktemp("official")
     with pytest.MonkeyPatch.context() as patch:
         root = make_archive(folder / "assets", ASSETS)
-        with official_pack_in(root, folder / "cache", patch) as opened:
-            assert isinstance(opened, OfficialPack)
-            yield opened
+        with official_pack_in(root, folder / "cache", patch):
+            yield archive_pack()
 
 
 def model(pack: OfficialPack, asset: str, look: int = 0) -> ObjectModel:

@@ -8,9 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_archive import make_archive
+from made_archive import READS_MESHES, make_archive, official_pack_in
 from made_robots import make_robot
-from pack_fixtures import READS_MESHES, official_pack_in
 
 from robospa.baselines.oracle import Oracle
 from robospa.geometry import Pose
@@ -77,8 +76,8 @@ def test_objects_are_drawn_with_their_pictures() -> None:
     except RenderUnavailable as error:
         pytest.fail(f"nothing can be drawn here, see `robospa check`: {error}")
     red = []
-    for name in ("builtin", "official"):
-        world.load(with_pack(scene, name))
+    for shown in (scene, with_pack(scene, "official")):
+        world.load(shown)
         image = world.render(HEAD).astype(int)
         red.append((image[..., 0] > 2 * image[..., 1]).sum())
     world.close()

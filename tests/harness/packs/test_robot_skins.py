@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from made_archive import READS_MESHES
 from made_robots import MOVED, make_robot
-from pack_fixtures import READS_MESHES
 
 from robospa.harness.official.layout import check_robots
 from robospa.harness.packs import archive as cache
