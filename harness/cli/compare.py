@@ -164,4 +164,5 @@ def _power(tasks: str, levels: str, base: float, as_json: bool) -> None:
             f"  {100 * gap:.0f} points: {needed.unpaired} on unrelated seeds; "
             f"on equal seeds {paired or 'no such correlation is possible'}"
         )
+    print("SR@1 takes what an SR of its value takes.")
     print("For a mean over k variants divide by k: that many trials a variant.")

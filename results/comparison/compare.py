@@ -134,9 +134,32 @@ def compare_results(
         _corrected([g for g in groups if g.kind == "category"])
         + tuple(replace(g, q=g.p) for g in groups if g.kind != "category"),
         tuple(notes(first, second, [pair.variant for pair in pairs], listed, paired))
+        + _by_first_choice(first, second, metric, category, method)
         + (tuple(worst_and_best(first, second, metric)) if metric not in ("onta", "onta1") else ()),
         banner_of(first, second),
     )
+
+
+def _by_first_choice(
+    first: ModelResults,
+    second: ModelResults,
+    metric: str,
+    category: Mapping[str, str],
+    method: str,
+) -> tuple[str, ...]:
+    """The whole difference of two runs in SR@1, as a note beside that in SR."""
+    if metric != "sr" or first.published or second.published:
+        return ()
+    pairs = [
+        c for c in paired_variants(first, second, "sr1")[0] if category[c.variant[0]] not in BASIC
+    ]
+    if not pairs:
+        return ()
+    row = _group_row("overall", "overall", 0, pairs, len(pairs), category, method)
+    e = row.estimate
+    ends = (100 * e.value, 100 * e.low, 100 * e.high)
+    text = interval_text(*ends, style="+z.1f")
+    return (f"By the first choice: SR@1 {text} over all, p {chance(row.p)} (--metric sr1).",)
 
 
 def over_levels(

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from html import escape
+from itertools import compress
 
 from robospa.results.failures.labels import NAMES, failures_of
 from robospa.results.paper.rounding import rounded, text
@@ -114,21 +115,19 @@ TAIL = ("SR [95 %]", "SR@1 [95 %]", "ONTA", "ONTA@1", "PS", "idle PS", "trials")
 
 
 def score_table(run: Run, scores: Scores) -> Table:
-    """The success rates of `run` by level, with the metrics of the mean over levels."""
+    """The success rates of `run` by level, with the metrics of the mean over levels that it has."""
     table_rows = rows(scores)
     if all(category_size(scores, row) < 2 for row in table_rows):
         table_rows = [
             row for row in table_rows if row.kind != "category"
         ]  # they would repeat their task
     departs = "".join(f" ({one})" for one in departures(run.manifest))
+    title = f"{run.manifest.policy.name or 'policy'}{departs}{_where(run)}"
     heads = (*map(level_name, scores.levels), *TAIL)
-    return Table(
-        "scores",
-        f"{run.manifest.policy.name or 'policy'}{departs}{_where(run)}",
-        "",
-        heads,
-        tuple(_table_row(row) for row in table_rows),
-    )
+    lines = [_table_row(row) for row in table_rows]
+    filled = [any(line.cells[i].text for line in lines) for i in range(len(heads))]
+    lines = [replace(line, cells=tuple(compress(line.cells, filled))) for line in lines]
+    return Table("scores", title, "", tuple(compress(heads, filled)), tuple(lines))
 
 
 def _where(run: Run) -> str:
@@ -189,7 +188,8 @@ def _scores(run: Run) -> Table:
     tables = [score_table(part, score_run(part)) for part in parts]
     if len(tables) == 1:
         return tables[0]
-    heads = (*sorted({head for t in tables for head in t.heads[: -len(TAIL)]}), *TAIL)
+    found = {head for table in tables for head in table.heads}
+    heads = (*sorted(found.difference(TAIL)), *(head for head in TAIL if head in found))
     rows: list[TableRow] = []
     for part, table in zip(parts, tables, strict=True):
         rows.append(TableRow(setting_name(part), kind="section"))

@@ -105,6 +105,19 @@ def test_onta_is_the_difference_of_rates_on_its_own_scale(tmp_path: Path) -> Non
     assert (cell.first, cell.second) == (pytest.approx(0.0), pytest.approx(-0.5))
 
 
+def test_first_choices_are_paired_like_successes(tmp_path: Path) -> None:
+    took = ({"time": 1.0, "kind": "wrong_object", "object": "other", "index": -1},)
+    one = [
+        replace(r, events=took) if r.key.seed < 2 else r for r in outcomes(SIZE, 1, [1, 1, 1, 0])
+    ]
+    sides = side(tmp_path / "a", one), side(tmp_path / "b", outcomes(SIZE, 1, [1, 0, 0, 0]))
+    (cell,) = compare_results(*sides, "sr1").cells
+    assert (cell.first, cell.second, cell.only_first, cell.only_second) == (0.25, 0.25, 1, 1)
+    assert any("SR@1 +0.0" in note for note in compare_results(*sides).notes)
+    with pytest.raises(IncomparableError, match="without the trials"):
+        compare_results(sides[0], published_results("RDT"), "sr1")
+
+
 def test_progress_compares_shares_of_subtasks(tmp_path: Path) -> None:
     one = [record(BOTTLES, 3, n, d, 3) for n, d in enumerate((3, 2, 1, 2))]
     two = [record(BOTTLES, 3, n, d, 3) for n, d in enumerate((3, 1, 1, 0))]

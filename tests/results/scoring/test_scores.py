@@ -18,8 +18,8 @@ from robospa.results.report.page import write_report
 from robospa.results.report.report import make_report
 from robospa.results.report.score_table import loss_lines, print_scores
 from robospa.results.scoring.models import results_of_run
-from robospa.results.scoring.scores import Scores, score, score_run, to_json
-from robospa.results.statistics.intervals import METHODS
+from robospa.results.scoring.scores import IDLE, Scores, score, score_run, to_json
+from robospa.results.statistics.intervals import METHODS, wilson
 from robospa.trial import TrialKey
 
 BASE = trial_record(TrialKey("A", 1, 0))
@@ -54,6 +54,24 @@ def test_onta_and_rate_of_a_spatial_variant() -> None:
     assert values(cell, "sr") == 0.75
     assert values(cell, "onta") == pytest.approx(0.5)
     assert "ps" not in cell.values
+
+
+def test_the_first_choice_counts_beside_the_official_rule() -> None:
+    records = [trial("A", "GAC", n, int(n < 3)) for n in range(4)]
+    took = {"time": 1.0, "kind": "wrong_object", "object": "other", "index": -1}
+    records[0] = replace(records[0], events=(took,))
+    lost = replace(trial("A", "GAC", 9, 0), end="infrastructure")
+    cell = scores([*records, lost]).cells["A", 1]
+    assert (cell.successes, cell.firsts) == (3, 2)
+    assert [values(cell, m) for m in ("sr", "sr1", "onta", "onta1")] == [0.75, 0.5, 0.5, 0.0]
+    assert cell.values["sr1"] == wilson(2, 4)
+    assert [cell.bounds(m) for m in ("sr1", "onta1")] == [(0.4, 0.6), pytest.approx((-0.2, 0.2))]
+
+
+def test_progress_stands_beside_that_of_doing_nothing() -> None:
+    given = tuple({"time": t, "kind": "subtask_done", "object": "a", "index": t} for t in range(3))
+    cell = scores([replace(trial("B", "OFE", 0, 3, total=4), events=given)]).cells["B", 1]
+    assert (values(cell, "ps"), values(cell, IDLE)) == (0.75, 0.25)
 
 
 def test_progress_is_the_mean_share_of_subtasks_done_at_the_end() -> None:
