@@ -25,6 +25,7 @@ from robospa.results.records.action_problems import (
 from robospa.results.records.manifest import LIMITS, REAL_TIME, departures
 from robospa.results.records.runs import Run, finished, lost_actions
 from robospa.results.records.trial_record import TrialRecord
+from robospa.results.scoring.first_choice import after_others
 from robospa.results.scoring.repeats import (
     FEW,
     MOST_AT_LEVEL,
@@ -158,6 +159,8 @@ def lint_run(run: Run, variants: Collection[tuple[str, int]] | None = None) -> l
     found = [*_lint_listing(run, name, variants), *_lint_files(run, name), *_lint_limits(run, name)]
     found += _lint_actions(run, name)
     found += lint_faults(results, name)
+    if text := after_others(results):
+        found.append(Finding("after-other-choices", "warning", name, text))
     groups: dict[tuple[str, int], list[TrialRecord]] = defaultdict(list)
     for record in results:
         groups[record.key.variant].append(record)

@@ -6,8 +6,13 @@ it took, pressed, did too early or did once more is in the events of every recor
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Sequence
+
 from robospa.results.failures.attribution import MEMORY, Cause, mistakes_of, roles_of
 from robospa.results.records.trial_record import TrialRecord
+from robospa.results.statistics.significance import at_least
+from robospa.text import some
 from robospa.trial import BASIC, PROCEDURAL, SPATIAL
 
 EARLY = ("temporal_ordering", "memory")
@@ -83,3 +88,39 @@ def held_at_start(record: TrialRecord) -> int:
         if event["kind"] == "subtask_done" and event["time"] <= 0:
             held.add(event["index"])
     return len(held)
+
+
+SHARE = 0.1
+"""So many of a run's successes may come after another choice without a remark: a policy that reads
+may miss, and try again."""
+SURE = 0.01
+"""The chance that one run whose share is no larger is remarked on all the same."""
+
+
+def after_others(results: Sequence[TrialRecord]) -> str:
+    """What a reader has to know where many successes of a run came after another choice; else "".
+
+    Binomial tests of SHARE, of all successes and (Bonferroni) of each task's. The first choices of
+    spatial trials are held against those of a blind policy, right once among the candidates.
+    """
+    won = [record for record in results if record.success]
+    later = [record for record in won if not first_choice(record)]
+    tasks, of_task = Counter(r.key.task for r in won), Counter(r.key.task for r in later)
+    odd = [t for t, n in of_task.items() if at_least(n, {SHARE: tasks[t]}) < SURE / len(tasks)]
+    if not odd and (not later or at_least(len(later), {SHARE: len(won)}) >= SURE):
+        return ""
+    text = (
+        f"{len(later)} of {len(won)} successes came after something else was taken, pressed, done "
+        f"too early or once more (significantly more than {SHARE:.0%}"
+        + (f" in {some(sorted(odd))}" if odd else "")
+        + "): SR@1 says what the first choices were worth"
+    )
+    spatial = [r for r in results if r.category in SPATIAL and r.candidates > 1]
+    right, by_chance = sum(map(first_choice, spatial)), Counter(1 / r.candidates for r in spatial)
+    if spatial and at_least(right, by_chance) > SURE:
+        guessed = sum(chance * n for chance, n in by_chance.items())
+        text += (
+            f". Of {len(spatial)} spatial trials {right} succeeded by the first choice, where "
+            f"guessing gives {guessed:.0f}: nothing shows that the policy reads its instruction"
+        )
+    return text

@@ -7,7 +7,7 @@ others, and worse than none. Nothing here needs SciPy, and nothing is random.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from itertools import combinations
 
@@ -122,6 +122,14 @@ def _both_rates(first: Sample, second: Sample) -> bool:
     same = (first.scale, first.shift) == (second.scale, second.shift)
     small = max(first.trials, second.trials) <= LARGEST
     return first.binary and second.binary and same and small
+
+
+def at_least(count: int, trials: Mapping[float, int]) -> float:
+    """The chance of `count` successes or more, in so many `trials` by each chance of success."""
+    whole = np.ones(1)
+    for chance, n in trials.items():
+        whole = np.convolve(whole, np.diff(-_tables(n, chance, chance, 1)[1][0]))
+    return float(min(1.0, whole[count:].sum()))
 
 
 def _log_choose(n: int, k: int) -> float:

@@ -255,5 +255,18 @@ def test_many_policy_errors_ask_for_a_look_and_name_the_reason() -> None:
     assert severities([*results(100, 0)[10:], *broken]) == []
 
 
+@pytest.mark.parametrize(
+    ("others", "reads", "found"),
+    [(0, 30, ""), (3, 27, ""), (12, 18, "12 of 30"), (27, 3, "guessing gives 6")],
+)
+def test_successes_after_other_choices(tmp_path: Path, others: int, reads: int, found: str) -> None:
+    took = ({"time": 1.0, "kind": "grasped", "object": "other", "index": -1},)
+    records = [replace(r, candidates=5) for r in outcomes(SIZE, 1, [1] * (others + reads))]
+    run = linted(tmp_path, *(replace(r, events=took) for r in records[:others]), *records[others:])
+    assert [f.rule for f in run] == ["after-other-choices"] * bool(found)
+    assert all(found in f.text for f in run)
+    assert ("guessing" in "".join(f.text for f in run)) == (reads == 3)
+
+
 def test_nothing_is_found_in_an_empty_run() -> None:
     assert severities([]) == []

@@ -8,6 +8,7 @@ from robospa.results.paper.published import load
 from robospa.results.statistics.intervals import Estimate, interval_of, paired_difference
 from robospa.results.statistics.samples import Sample, rate
 from robospa.results.statistics.significance import (
+    at_least,
     benjamini_hochberg,
     boschloo,
     mcnemar_mid_p,
@@ -132,3 +133,9 @@ def test_half_of_the_papers_best_cells_are_supported() -> None:
     assert len(marked) == 280
     assert sum(len(places) == 1 for places in marked) == 142
     assert sum(len(places) == 0 for places in marked) == 33
+
+
+def test_so_many_successes_or_more_of_trials_of_several_kinds() -> None:
+    assert at_least(3, {0.5: 4}) == pytest.approx(5 / 16)
+    assert at_least(3, {0.5: 2, 0.25: 1}) == pytest.approx(1 / 16)
+    assert at_least(0, {}) == 1.0
