@@ -268,7 +268,6 @@ def _plain_block(half: Vec3) -> ObjectModel:
         (),
         _block_grasps(half),
         mass=0.01,
-        press=(0.0, 0.0, half[2]),
         support=(0.0, 0.0, half[2]),
     )
 

@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from robospa.geometry import Array, Pose, Quat, Vec3, to_matrix
-from robospa.tasks.objects import meshes
 from robospa.tasks.objects import meshes as m
 from robospa.tasks.shapes import (
     Box,
@@ -115,25 +114,6 @@ def solid(
 ) -> Shape:
     """A shape that is drawn and collides."""
     return Shape(geometry, Pose(at, rotation), color, True, True, roughness, metallic)
-
-
-def stretched(parts: Iterable[Shape], x: float, y: float, z: float) -> list[Shape]:
-    """`parts`, none of them turned, scaled along the axes; cylinders only by equal `x` and `y`."""
-    found = []
-    for part in parts:
-        geometry = part.geometry
-        if isinstance(geometry, Mesh):
-            geometry = meshes.stretched(geometry, x, y, z)
-        elif isinstance(geometry, Box):
-            a, b, c = geometry.half
-            geometry = Box((a * x, b * y, c * z))
-        elif isinstance(geometry, Cylinder) and x == y:
-            geometry = Cylinder(geometry.radius * x, geometry.half_length * z)
-        else:
-            raise ValueError(f"a {type(geometry).__name__.lower()} cannot be scaled by {x}, {y}")
-        a, b, c = part.pose.position
-        found.append(replace(part, geometry=geometry, pose=Pose((a * x, b * y, c * z))))
-    return found
 
 
 def points_of(shape: Shape) -> Array:
@@ -327,6 +307,16 @@ def fitted(shapes: Sequence[Shape], size: Vec3) -> Fitted:
     span = points.max(axis=0) - points.min(axis=0)
     x, y, z = (float(f) for f in np.asarray(size) / span)
     return Fitted(tuple(_stretched(s, (x, y, z)) for s in shapes), (x, y, z))
+
+
+def stretched(parts: Iterable[Shape], x: float, y: float, z: float) -> list[Shape]:
+    """`parts`, whose meshes stand where they are drawn, scaled along the axes."""
+    return [
+        replace(part, geometry=m.stretched(part.geometry, x, y, z))
+        if isinstance(part.geometry, Mesh)
+        else _stretched(part, (x, y, z))
+        for part in parts
+    ]
 
 
 def _stretched(shape: Shape, factors: Vec3) -> Shape:

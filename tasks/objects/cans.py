@@ -47,9 +47,8 @@ def sauce_can(look: int, params: Params) -> ObjectModel:
     ]
     phrases = build.fill_phrases(
         word, "{} sauce can", "{} tin of sauce", "can of sauce with a {} label", "{} sauce tin",
-        "sauce can wrapped in {}", "{}-labelled can of sauce",
+        "sauce can wrapped in {}", "{}-labelled can of sauce", f"{word} can of {content}",
     )  # fmt: skip
-    phrases += (f"{word} can of {content}",)
     grasps = build.round_grasps(2 * r, SAUCE_GRIP, 0.9)
     return build.model("sauce_can", parts, "sauce can", phrases, grasps, support=(0.0, 0.0, h))
 
@@ -97,9 +96,13 @@ def can(look: int, params: Params) -> ObjectModel:
         "{} aluminium can", "can of soda with a {} body",
     )  # fmt: skip
     return build.model(
-        "can", parts, "can", phrases, build.round_grasps(2 * r, CAN_GRIP, 1.2),
-        press=(0.0, 0.0, h), support=(0.0, 0.0, h),
-    )  # fmt: skip
+        "can",
+        parts,
+        "can",
+        phrases,
+        build.round_grasps(2 * r, CAN_GRIP, 1.2),
+        support=(0.0, 0.0, h),
+    )
 
 
 def _sign(sign: str, r: float, h: float) -> Mesh:
@@ -164,9 +167,8 @@ def bottle(look: int, params: Params) -> ObjectModel:
     ]
     phrases = build.fill_phrases(
         word, "{} bottle", "{} drink bottle", "bottle in {}", "{} plastic bottle",
-        "{} bottle with a cap", "tall {} bottle",
+        f"{word} bottle with a {detail}", "{} bottle with a cap", "tall {} bottle",
     )  # fmt: skip
-    phrases = (*phrases[:4], f"{word} bottle with a {detail}", *phrases[4:])
     grasps = build.side_grasps(2 * r, grip)
     top = (0.0, 0.0, h)
     return build.model("bottle", parts, "bottle", phrases, grasps, support=top)
@@ -210,9 +212,8 @@ def pill_bottle(look: int, params: Params) -> ObjectModel:
     ]
     phrases = build.fill_phrases(
         word, "{} pill bottle", "{} medicine bottle", "{} bottle of pills", "pill bottle in {}",
-        "{} plastic medicine bottle", "{} pill container",
+        "{} plastic medicine bottle", "{} pill container", f"{word} pill bottle with a {cap} cap",
     )  # fmt: skip
-    phrases = (*phrases, f"{word} pill bottle with a {cap} cap")
     grasps = build.round_grasps(2 * r, PILL_GRIP, 1.0)
     return build.model("pill_bottle", parts, "pill bottle", phrases, grasps, support=(0.0, 0.0, h))
 

@@ -72,10 +72,7 @@ def bowl(look: int, params: Params) -> ObjectModel:
     grasps = build.rim_grasps(
         wall(grip) * flat - thick / 2, build.RIM, grip, BOWL_SIDES, lean=round(high, 4)
     )
-    made = build.model(
-        "bowl", parts, "bowl", phrases, grasps, mass=0.01,
-        support=(0.0, 0.0, floor), press=(0.0, 0.0, floor),
-    )  # fmt: skip
+    made = build.model("bowl", parts, "bowl", phrases, grasps, mass=0.01, support=(0.0, 0.0, floor))
     return build.with_frames(made, nest=Pose((0.0, 0.0, floor)))
 
 
@@ -124,16 +121,12 @@ def mug(look: int, params: Params) -> ObjectModel:
         collision(reaching, (r + wide / 2, 0.0, ear - half)),
     ]
     phrases = build.fill_phrases(
-        base, "{} mug", "{} coffee mug", "mug in {}", "{} cup with a handle", "{} ceramic mug",
-        "{} tea mug",
+        base, "{} mug", "{} coffee mug", "mug in {}", "{} cup with a handle",
+        f"{base} mug with a {mark} stripe", "{} ceramic mug", "{} tea mug",
     )  # fmt: skip
-    phrases = (*phrases[:4], f"{base} mug with a {mark} stripe", *phrases[4:])
     middle_of_wall = inside * math.cos(math.pi / 12) + build.RIM / 2
     rims = build.rim_grasps(middle_of_wall, build.RIM, h - 0.007, 12)[2:11]
-    made = build.model(
-        "mug", parts, "mug", phrases, rims,
-        support=(0.0, 0.0, 0.006), press=(0.0, 0.0, 0.006),
-    )  # fmt: skip
+    made = build.model("mug", parts, "mug", phrases, rims, support=(0.0, 0.0, 0.006))
     return build.with_frames(made, handle=Pose((round(middle, 5), 0.0, ear)))
 
 
@@ -189,10 +182,7 @@ def bread_basket(look: int, params: Params) -> ObjectModel:
     phrases = (*phrases[:4], lining, *phrases[4:], f"{word} woven basket")
     made = build.fitted(parts, (length, width, high))
     on_floor = made.at(0.0, 0.0, floor)
-    return build.model(
-        "bread_basket", made.shapes, "bread basket", phrases,
-        support=on_floor, press=on_floor,
-    )  # fmt: skip
+    return build.model("bread_basket", made.shapes, "bread basket", phrases, support=on_floor)
 
 
 BINS = (
@@ -240,10 +230,7 @@ def dustbin(look: int, params: Params) -> ObjectModel:
         word, "{} dustbin", "{} trash bin", "{} waste bin", "dustbin in {}", "open {} bin",
         "{} rubbish bin", "{} garbage bin",
     )  # fmt: skip
-    return build.model(
-        "dustbin", parts, "dustbin", phrases,
-        support=(0.0, 0.0, floor), press=(0.0, 0.0, floor),
-    )  # fmt: skip
+    return build.model("dustbin", parts, "dustbin", phrases, support=(0.0, 0.0, floor))
 
 
 def _pleats(hx: float, hy: float, high: float, low: float) -> list[Mesh]:
@@ -396,10 +383,7 @@ def table_trash_bin(look: int, params: Params) -> ObjectModel:
     thick = wall * made.factors[0]
     rims = [build.top_grasp(p, thick, a, 0.5) for p, a in zip(points, angles, strict=True)]
     inside = made.at(0.0, 0.0, floor)
-    return build.model(
-        "table_trash_bin", made.shapes, "trash bin", phrases, rims,
-        support=inside, press=inside,
-    )  # fmt: skip
+    return build.model("table_trash_bin", made.shapes, "trash bin", phrases, rims, support=inside)
 
 
 def _can_icons(out: float, lean: float) -> list[Mesh]:

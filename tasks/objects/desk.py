@@ -119,9 +119,8 @@ def seal(look: int, params: Params) -> ObjectModel:
     ]
     phrases = build.fill_phrases(
         word, "{} stamp", "{} hand stamp", "{} seal", "stamp with a {} handle", "{} stamper",
-        "{} rubber stamp",
+        "{} rubber stamp", f"{word} stamp with a {ink} base",
     )  # fmt: skip
-    phrases = (*phrases, f"{word} stamp with a {ink} base")
     made = build.fitted(parts, SEAL_SIZES[look])
     wide, deep, tall = made.factors
     ways = ((0.0, wide), (math.pi / 2, deep)) if wide != deep else ()
@@ -233,9 +232,8 @@ def bell(look: int, params: Params) -> ObjectModel:
     made = build.fitted(parts, (wide, wide, tall))
     phrases = build.fill_phrases(
         word, "{} bell", "{} call bell", "{} desk bell", "bell with a {} dome", "{} service bell",
-        "{} reception bell",
+        "{} reception bell", f"{word} bell on a {low} base",
     )  # fmt: skip
-    phrases = (*phrases, f"{word} bell on a {low} base")
     grasps = build.round_grasps(2 * body * made.factors[0], 0.024 * made.factors[2], 0.6)
     bell = build.model("bell", made.shapes, "bell", phrases, grasps, press=(0.0, 0.0, tall))
     touched = (0.0380, 0.0258)[look % 2]
@@ -290,9 +288,8 @@ def fan(look: int, params: Params) -> ObjectModel:
     ]
     phrases = build.fill_phrases(
         frame, "{} fan", "small {} fan", "{} desk fan", "fan with a {} frame", "{} electric fan",
-        "{} table fan",
+        "{} table fan", f"{frame} fan with {blade} blades",
     )  # fmt: skip
-    phrases = (*phrases, f"{frame} fan with {blade} blades")
     made = build.fitted(parts, FAN_SIZES[look])
     grasps = (
         build.top_grasp(made.at(0.0, 0.0, z + 0.032), 2 * deep * made.factors[1], math.pi / 2, 0.8),

@@ -125,8 +125,8 @@ def french_fries(look: int, params: Params) -> ObjectModel:
     phrases = build.fill_phrases(
         base, "box of french fries in {}", "{} box of french fries", "french fries in a {} box",
         "{} carton of fries", "fries in a {} carton", "{} packet of french fries",
+        f"french fries box with a {mark} spot on {base}",
     )  # fmt: skip
-    phrases = (*phrases, f"french fries box with a {mark} spot on {base}")
     x, y, z = (round(s / drawn, 4) for s, drawn in zip(size, FRIES_BOX, strict=True))
     parts = build.stretched(parts, x, y, z)
     grip = (0.0, 0.0, round(0.034 * z, 4))

@@ -155,9 +155,7 @@ def alarm_clock(look: int, params: Params) -> ObjectModel:
     z = 0.55 * CLOCK_SIZES[look][2]
     grasps = (build.top_grasp((0.0, 0.0, z), deep, math.pi / 2, 0.7),)
     press = made.at(0.0, 0.0, top)
-    clock = build.model(
-        "alarm_clock", made.shapes, "alarm clock", phrases, grasps, press=press, support=press
-    )
+    clock = build.model("alarm_clock", made.shapes, "alarm clock", phrases, grasps, support=press)
     return build.with_frames(clock, touched=Pose((0.0, 0.0, CLOCK_TOUCHED[look])))
 
 
@@ -321,9 +319,8 @@ def toycar(look: int, params: Params) -> ObjectModel:
     ]
     phrases = build.fill_phrases(
         body, "{} toy car", "{} car", "small {} car", "toy car in {}", "{} model car",
-        "{} racing car",
+        "{} racing car", f"{body} toy car with a {stripe} stripe",
     )  # fmt: skip
-    phrases = (*phrases, f"{body} toy car with a {stripe} stripe")
     made = build.fitted(parts, CAR_SIZES[look])
     width = 0.0366 * made.factors[0]
     grasps = tuple(build.top_grasp(made.at(0.0, y, 0.012), width, 0.0, 0.6) for y in (0.0, 0.010))

@@ -57,15 +57,12 @@ def cup(look: int, params: Params) -> ObjectModel:
     word = {"dots": "dotted", "bands": "striped"}[style]
     phrases = build.fill_phrases(
         base, "{} cup", "{} drinking cup", "cup in {}", "{} cup without a handle",
-        "{} tumbler", "round {} drinking cup",
+        f"{word} {base} cup", "{} tumbler", "round {} drinking cup",
+        f"{base} cup with {mark} {style}",
     )  # fmt: skip
-    phrases = (*phrases[:4], f"{word} {base} cup", *phrases[4:], f"{base} cup with {mark} {style}")
     z = h - 0.007
     grasps = build.rim_grasps(radius(z) - wall / 2, wall, z, 12, lean=CUP_LEAN)
-    return build.model(
-        "cup", parts, "cup", phrases, grasps,
-        support=(0.0, 0.0, floor), press=(0.0, 0.0, floor),
-    )  # fmt: skip
+    return build.model("cup", parts, "cup", phrases, grasps, support=(0.0, 0.0, floor))
 
 
 APPLES = (
@@ -155,9 +152,8 @@ def perfume(look: int, params: Params) -> ObjectModel:
     ]
     phrases = build.fill_phrases(
         word, "{} perfume", "{} perfume bottle", "bottle of {} perfume", "{} fragrance bottle",
-        "perfume in {} glass", "{} scent bottle",
+        f"{word} perfume with a {cap} cap", "perfume in {} glass", "{} scent bottle",
     )  # fmt: skip
-    phrases = (*phrases[:4], f"{word} perfume with a {cap} cap", *phrases[4:])
     return build.model("perfume", parts, "perfume bottle", phrases, grasps)
 
 

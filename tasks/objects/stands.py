@@ -81,9 +81,8 @@ def phone_stand(look: int, params: Params) -> ObjectModel:
     tilt = axis_rotation((1.0, 0.0, 0.0), slope)
     phrases = build.fill_phrases(
         body, "{} phone stand", "{} phone holder", "{} stand for a phone", "phone stand in {}",
-        "{} mobile phone stand", "{} smartphone stand",
+        f"{body} phone stand with a {pad} pad", "{} mobile phone stand", "{} smartphone stand",
     )  # fmt: skip
-    phrases = (*phrases[:4], f"{body} phone stand with a {pad} pad", *phrases[4:])
     rest = (0.0, fy * low_y, fz * low_z)
     at = PHONE_LENGTH / 2 + 0.0015  # the phone's lower end is against the lip
     support = (
@@ -93,9 +92,7 @@ def phone_stand(look: int, params: Params) -> ObjectModel:
     )
     grip_y, grip_z = on_back(long - 0.016, -thick)
     grasps = (build.top_grasp(made.at(0.0, grip_y, grip_z), 2 * wide * made.factors[0], 0.0, 0.7),)
-    stand = build.model(
-        "phone_stand", made.shapes, "phone stand", phrases, grasps, press=rest, support=rest
-    )
+    stand = build.model("phone_stand", made.shapes, "phone stand", phrases, grasps, support=rest)
     leaning = Pose(support, tilt)
     end = leaning.apply((0.0, -PHONE_LENGTH / 2, 0.0))
     return build.with_frames(stand, support=leaning, end=Pose(end, tilt))
@@ -131,9 +128,8 @@ def display_stand(look: int, params: Params) -> ObjectModel:
     ]  # fmt: skip
     phrases = build.fill_phrases(
         word, "{} display stand", "{} display platform", "wide {} display stand", "{} plinth",
-        "{} pedestal", "{} exhibition stand",
+        f"{word} display stand with a {felt} top", "{} pedestal", "{} exhibition stand",
     )  # fmt: skip
-    phrases = (*phrases[:4], f"{word} display stand with a {felt} top", *phrases[4:])
     made = build.fitted(parts, DISPLAY_SIZES[look])
     top = made.at(0.0, 0.0, h)
     return build.model("display_stand", made.shapes, "display stand", phrases, support=top)
@@ -184,10 +180,7 @@ def electronic_scale(look: int, params: Params) -> ObjectModel:
     )  # fmt: skip
     made = build.fitted(parts, SCALE_SIZES[look])
     on_top = made.at(0.0, plate_y, top)
-    return build.model(
-        "electronic_scale", made.shapes, "electronic scale", phrases,
-        support=on_top, press=on_top,
-    )  # fmt: skip
+    return build.model("electronic_scale", made.shapes, "electronic scale", phrases, support=on_top)
 
 
 def _digit(digit: str, z: float, x: float, y: float, w: float, h: float) -> Mesh:

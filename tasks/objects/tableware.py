@@ -61,9 +61,8 @@ def kitchen_pot(look: int, params: Params) -> ObjectModel:
     points = {"left": (-hold, 0.0, HANDLE_HEIGHT), "right": (hold, 0.0, HANDLE_HEIGHT)}
     grasps = [build.top_grasp(p, 2 * HANDLE_THICK, 0.0, 0.7) for p in points.values()]
     made = build.model(
-        "kitchen_pot", parts, "pot", phrases, grasps, mass=0.12,
-        support=(0.0, 0.0, floor), press=(0.0, 0.0, floor),
-    )  # fmt: skip
+        "kitchen_pot", parts, "pot", phrases, grasps, mass=0.12, support=(0.0, 0.0, floor)
+    )
     return build.with_frames(made, **{side: Pose(p) for side, p in points.items()})
 
 
@@ -98,14 +97,10 @@ def plate(look: int, params: Params) -> ObjectModel:
         *build.wall_ring(0.0632, 0.0035, low, h - 0.001, 24, math.pi / 2 - slope),
     ]
     phrases = build.fill_phrases(
-        word, "{} plate", "{} dinner plate", "round {} plate", "plate in {}", "{} dish",
-        "{} ceramic plate",
+        word, "{} plate", "{} dinner plate", "round {} plate", "plate in {}",
+        f"{word} plate with {stripe} rings", "{} dish", "{} ceramic plate",
     )  # fmt: skip
-    phrases = (*phrases[:4], f"{word} plate with {stripe} rings", *phrases[4:])
-    return build.model(
-        "plate", parts, "plate", phrases,
-        support=(0.0, 0.0, low), press=(0.0, 0.0, low),
-    )  # fmt: skip
+    return build.model("plate", parts, "plate", phrases, support=(0.0, 0.0, low))
 
 
 COASTERS = (
@@ -182,13 +177,12 @@ def tray(look: int, params: Params) -> ObjectModel:
         front = (0.0, sign * (hy - wall / 2 - 0.001), h / 2)
         parts.append(collision(Box((hx - 0.008, wall / 2, h / 2)), front))
     phrases = build.fill_phrases(
-        base, "{} tray", "{} serving tray", "tray in {}", "{} food tray", "wide {} tray",
-        "{} meal tray",
+        base, "{} tray", "{} serving tray", "tray in {}", "{} food tray",
+        f"{base} tray with a {lining} lining", "wide {} tray", "{} meal tray",
     )  # fmt: skip
-    phrases = (*phrases[:4], f"{base} tray with a {lining} lining", *phrases[4:])
     sized = build.fitted(parts, TRAY_SIZES[look])
     middle = sized.at(0.0, 0.0, floor)
-    made = build.model("tray", sized.shapes, "tray", phrases, support=middle, press=middle)
+    made = build.model("tray", sized.shapes, "tray", phrases, support=middle)
     places = {"left": sized.at(-0.068, 0.0, floor), "right": sized.at(0.068, 0.0, floor)}
     return build.with_frames(made, **{side: Pose(p) for side, p in places.items()})
 

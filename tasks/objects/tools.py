@@ -60,9 +60,8 @@ def hammer(look: int, params: Params) -> ObjectModel:
     ]  # fmt: skip
     phrases = build.fill_phrases(
         word, "{} hammer", "{} mallet", "{} hammer with a handle", "hammer with a {} head",
-        "small {} hammer", "{} hand hammer",
+        "small {} hammer", "{} hand hammer", f"{word} hammer with a {shaft} handle",
     )  # fmt: skip
-    phrases = (*phrases, f"{word} hammer with a {shaft} handle")
     grasps = tuple(build.top_grasp((0.0, at, z), 2 * bar, 0.0, 0.7) for at in (0.0, -0.018, -0.036))
     made = build.model("hammer", parts, "hammer", phrases, grasps, mass=0.035, support=(0.0, y, h))
     return build.with_frames(made, head=Pose((0.0, y, 0.0)))
