@@ -32,7 +32,7 @@ from robospa.results.records.manifest import (
 )
 from robospa.results.records.trial_record import TrialRecord
 from robospa.schema import read
-from robospa.tasks.instructions.grammar import SPLITS
+from robospa.tasks.instructions import SPLITS
 from robospa.tasks.scene import SUITE
 from robospa.trial import REFERENCE, TrialKey
 

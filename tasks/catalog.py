@@ -45,11 +45,11 @@ DEFINED = (
     "chain_clicks.CAN",
     "chain_stapler.SEALS",
     "chain_clicks.MICROWAVE",
-    "memory_wall.BLOCKS",
-    "memory_wall.OBJECTS",
-    "memory_cover.TASK",
-    "memory_wall.ORIENTATION",
-    "memory_counts.TASK",
+    "memory.BLOCKS",
+    "memory.OBJECTS",
+    "memory.COVER",
+    "memory.ORIENTATION",
+    "memory.COUNTS",
 )
 """Tasks in the paper's order: a module of `robospa.tasks.families` and its Task, or a tuple of
 several that differ in data alone."""

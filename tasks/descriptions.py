@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 from robospa.tasks.colors import NAMED
-from robospa.tasks.families import memory_wall
+from robospa.tasks.families import memory
 from robospa.tasks.objects import object_model
 from robospa.tasks.scene import Scene, SceneObject
 
@@ -74,7 +74,7 @@ def _by_size(phrase: str, group: Sequence[SceneObject]) -> dict[str, str]:
 
 def _phrase(item: SceneObject) -> str:
     """What the object is; without its colour where no named colour is right."""
-    if scenery := memory_wall.noun_of(item):
+    if scenery := memory.noun_of(item):
         return scenery
     model = object_model(item.asset, item.params)
     color = item.params.get("color")

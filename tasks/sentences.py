@@ -23,7 +23,7 @@ from itertools import product
 import numpy as np
 
 from robospa.tasks import catalog
-from robospa.tasks.instructions.grammar import SENTENCES, SPLITS, Templates, fill, slot_names
+from robospa.tasks.instructions import SENTENCES, SPLITS, Templates, fill, slot_names
 from robospa.tasks.objects import object_model
 from robospa.tasks.scene import Scene
 

@@ -9,7 +9,7 @@ from typing import Any, Protocol, Self
 import numpy as np
 
 from robospa.tasks.events import Event, ObjectRole
-from robospa.tasks.instructions.grammar import Phrasings, Templates
+from robospa.tasks.instructions import Phrasings, Templates
 from robospa.tasks.plan import Skill
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.snapshot import Snapshot

@@ -31,7 +31,7 @@ from robospa.protocol.policy import TrialInfo
 from robospa.registry import ROBOTS, SCENE_MODES
 from robospa.tasks import catalog, modes
 from robospa.tasks.catalog import build_scene, tasks
-from robospa.tasks.instructions.grammar import similarity
+from robospa.tasks.instructions import similarity
 from robospa.tasks.scene import Scene
 from robospa.tasks.sentences import instruction, sentences, templates
 from robospa.trial import TrialKey

@@ -98,7 +98,7 @@ def __getattr__(name: str) -> Callable[[], object]:
 def write_scenes(folder: Path) -> None:
     """One line per scene: its digest and a hash of its sentences."""
     from robospa.tasks import catalog
-    from robospa.tasks.instructions.grammar import SPLITS
+    from robospa.tasks.instructions import SPLITS
     from robospa.tasks.sentences import instruction, sentences
 
     lines = []

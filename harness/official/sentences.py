@@ -33,7 +33,7 @@ from robospa.harness.trial import TrialSetup, task_parts
 from robospa.schema import parse_json
 from robospa.tasks.catalog import build_scene
 from robospa.tasks.catalog import task as find_task
-from robospa.tasks.instructions.grammar import similarity
+from robospa.tasks.instructions import similarity
 from robospa.tasks.official import official_assets, official_model, official_models
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.trial import TrialKey

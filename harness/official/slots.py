@@ -12,7 +12,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from fnmatch import fnmatchcase
 
 from robospa.tasks.colors import nearest
-from robospa.tasks.instructions.text import ordinal
+from robospa.tasks.instructions import ordinal
 from robospa.tasks.scene import Scene, SceneObject
 
 Value = str | SceneObject

@@ -17,7 +17,7 @@ import numpy as np
 from robospa.geometry import Pose
 from robospa.tasks.colors import NAMED
 from robospa.tasks.families.cross_view import EXTREMES, SEEN_AS, VIEWS, leaders
-from robospa.tasks.families.memory_wall import STAND_Z
+from robospa.tasks.families.memory import STAND_Z
 from robospa.tasks.official import official_models
 from robospa.tasks.scene import Scene, SceneObject
 

@@ -79,7 +79,6 @@ _MIDDLE = 0.028
 
 
 def _finger(side: float) -> tuple[Shape, ...]:
-    """The finger whose inner face looks to -`side` y."""
     inner = -side * 0.0205
     return (
         Shape(Box(_FINGER_HALF), Pose((_MIDDLE, inner, 0.0)), BLACK, visual=False),

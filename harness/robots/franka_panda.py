@@ -35,12 +35,10 @@ HAND = look_rotation((0, 0, 1), (-1, -1, 0))
 
 
 def _housing(start: Vec3, end: Vec3, radius: float) -> tuple[Shape, ...]:
-    """A joint seen from its ends: white, with a light cap in a dark ring."""
     return capped(start, end, radius, WHITE, CAP, DARK)
 
 
 def _seam(x: float, y: float, z: float, radius: float) -> Shape:
-    """The dark ring where a link turns about the z axis on the one before it."""
     return rod((x, y, z), (x, y, z + 0.014), radius, DARK)
 
 

@@ -38,7 +38,6 @@ FORE_HEADING = 2.8659
 
 
 def _joint(start: Vec3, end: Vec3, radius: float) -> tuple[Shape, ...]:
-    """A joint across the arm: dark, with white lids."""
     return capped(start, end, radius, DARK, WHITE, STEEL)
 
 

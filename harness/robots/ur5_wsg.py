@@ -38,7 +38,6 @@ def stand(height: float) -> tuple[Shape, ...]:
 
 
 def _cap(start: Vec3, end: Vec3, radius: float) -> tuple[Shape, ...]:
-    """A joint's lid: light blue, behind a dark seam."""
     x, y, z = (a + 0.25 * (b - a) for a, b in zip(start, end, strict=True))
     return (
         rod(start, (x, y, z), 0.97 * radius, DARK),

@@ -283,7 +283,6 @@ class Drives:
         return path.gripper[:, row]
 
     def _go_home(self) -> None:
-        """Joints at home, grippers open, at rest, and every target where its joint is."""
         for a, arm in enumerate(self._arms):
             qpos = np.zeros(arm.articulation.dof, dtype=np.float32)
             side = self._embodiment.arms[a]
@@ -351,7 +350,6 @@ class Drives:
 
 
 def _bind(arm: Arm, articulation: physx.PhysxArticulation) -> _ArmDrives:
-    """Look up the joints of `arm` once."""
     active = articulation.active_joints
     column = {joint.name: i for i, joint in enumerate(active)}
     joints = [column[joint.name] for joint in arm.joints]

@@ -216,7 +216,6 @@ class Renderer:
     def _take(
         self, views: Sequence[CameraView], cameras: Sequence[CameraSpec]
     ) -> list[NDArray[np.uint8]]:
-        """The pictures of what is posed by now."""
         sky, taken = self._room.sky(), dict[int, NDArray[np.uint8]]()
         alone = {}
         for row in rows(cameras):
@@ -257,7 +256,6 @@ class Renderer:
                         copy.visibility = visibility(picture) if visible else 0.0
 
     def _remove(self, name: str) -> None:
-        """Draw the object `name` no more."""
         for entity in (self._objects.pop(name), self._parts.pop(name, (None,))[0]):
             if entity is not None:
                 self._scene.remove_entity(entity)
@@ -280,7 +278,6 @@ class Renderer:
         entity.pose = to_sapien(pose)
 
     def _view(self, spec: CameraSpec, links: Links) -> CameraView:
-        """Where the camera of `spec` is now."""
         assert self._embodiment is not None
         if not (0 < spec.width <= LARGEST and 0 < spec.height <= LARGEST):
             raise ValueError(

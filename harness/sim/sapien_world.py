@@ -154,7 +154,6 @@ class SapienWorld:
         return self._models(asset, params)
 
     def _appear(self, physics: Physics) -> None:
-        """Create the objects whose time has come."""
         while self._later and self._later[0][0] <= self._steps:
             self._create(physics, self._later.pop(0)[1])
 
@@ -387,7 +386,6 @@ class SapienState:
         return self.draw((camera,))[0]
 
     def draw(self, cameras: Sequence[CameraSpec]) -> list[NDArray[np.uint8]]:
-        """Its images."""
         return self.world.draw(self, cameras)
 
 

@@ -63,7 +63,6 @@ class Boxes:
 
 
 def _boxes(parts: Sequence[tuple[Pose, Array]]) -> Boxes:
-    """Boxes at these poses with these half sizes."""
     return Boxes(
         np.array([pose.position for pose, _ in parts]).reshape(-1, 3),
         np.array([to_matrix(pose.rotation) for pose, _ in parts]).reshape(-1, 3, 3),

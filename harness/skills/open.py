@@ -83,7 +83,6 @@ def _pull(ws: Workspace, way: Pull) -> Steps:
 
 
 def _ways(ws: Workspace, call: Open, hinge: Hinge) -> Iterator[Pull]:
-    """All ways that an arm can go, from the door's present angle to the one wanted."""
     body = ws.pose(call.object)
     handle = ws.models[call.object].frames["handle"]
     angle = ws.snapshot.hinges[call.object]

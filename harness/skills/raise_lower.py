@@ -78,7 +78,6 @@ def raise_lower(ws: Workspace, call: RaiseLower) -> Steps:
 
 
 def _approach(ws: Workspace, holds: Sequence[ArmLift]) -> Steps:
-    """Open and go to where the grippers close."""
     if len(holds) == 1:
         go(ws, holds[0].arm, holds[0].way_in[0], holds[0].opening)
     else:
@@ -91,20 +90,17 @@ def _approach(ws: Workspace, holds: Sequence[ArmLift]) -> Steps:
 
 
 def _set_out(ws: Workspace, hold: ArmLift) -> None:
-    """Open and travel to the beginning of the way in."""
     ws.gripper[hold.arm] = hold.opening
     travel(ws, hold.arm, hold.way_in[0])
 
 
 def _together(ws: Workspace, holds: Sequence[ArmLift], joints: Sequence[Array]) -> None:
-    """One action in which every holding arm goes to its joints."""
     for hold, goal in zip(holds, joints, strict=True):
         ws.joints[hold.arm] = np.asarray(goal, dtype=float)
     ws.add(holds[0].arm)
 
 
 def _grip(ws: Workspace, holds: Sequence[ArmLift], openings: Sequence[float]) -> None:
-    """One action in which every holding gripper goes to its opening."""
     for hold, opening in zip(holds, openings, strict=True):
         ws.gripper[hold.arm] = opening
     ws.add(holds[0].arm)

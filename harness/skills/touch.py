@@ -192,7 +192,6 @@ def hit(ws: Workspace, call: Hit) -> Steps:
 
 
 def _back(ws: Workspace, arm: int, tool: str, home: Pose) -> Place:
-    """The call that puts the tool back: turned as it lay, if that can be done."""
     w, _, _, z = home.rotation
     call = Place(tool, home.position, yaw=2 * math.atan2(z, w))
     offset = grip_offset(ws, arm, tool)

@@ -15,9 +15,8 @@ from robospa.geometry import Array
 from robospa.tasks.colors import nearest
 from robospa.tasks.families import distance
 from robospa.tasks.families.picking import PickFacts, lifted, pick_target
-from robospa.tasks.goals.pick import Lift
-from robospa.tasks.instructions.grammar import Slots
-from robospa.tasks.instructions.text import TaskText
+from robospa.tasks.goals.lifting import Lift
+from robospa.tasks.instructions import Slots, TaskText
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import SceneSample, Task
 from robospa.workcell import Workcell

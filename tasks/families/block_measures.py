@@ -18,9 +18,8 @@ import numpy as np
 from robospa.geometry import Array, Pose, Vec3, yaw_rotation
 from robospa.tasks.families.picking import PickFacts, lifted, pick_target
 from robospa.tasks.families.table import drawn_color
-from robospa.tasks.goals.pick import Lift
-from robospa.tasks.instructions.grammar import Slots
-from robospa.tasks.instructions.text import TaskText, ordinal
+from robospa.tasks.goals.lifting import Lift
+from robospa.tasks.instructions import Slots, TaskText, ordinal
 from robospa.tasks.sampling.places import Area, Mask, Points, Range, scatter, spread
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.task import Level, SceneSample, Task

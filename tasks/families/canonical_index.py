@@ -19,9 +19,8 @@ import numpy as np
 
 from robospa.tasks.families.picking import PickFacts, lifted, pick_name, pick_target
 from robospa.tasks.families.table import draw_variant, drawn_color, standing
-from robospa.tasks.goals.pick import Lift
-from robospa.tasks.instructions.grammar import Slots
-from robospa.tasks.instructions.text import TaskText, ordinal
+from robospa.tasks.goals.lifting import Lift
+from robospa.tasks.instructions import Slots, TaskText, ordinal
 from robospa.tasks.sampling.grid import GapGrid, Grid, GridLayout
 from robospa.tasks.sampling.places import retry
 from robospa.tasks.sampling.turns import Turnable, between

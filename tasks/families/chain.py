@@ -17,7 +17,7 @@ from robospa.tasks.families.table import Item, frame_of, named, side, side_of
 from robospa.tasks.goals.checklist import CHAIN, Checklist, Subtask, by_turns
 from robospa.tasks.goals.conditions import Condition
 from robospa.tasks.goals.counters import PRESS_BOX, PressCounter
-from robospa.tasks.instructions.grammar import Slots, Templates
+from robospa.tasks.instructions import Slots, Templates
 from robospa.tasks.plan import Pick, Place, Press, Skill
 from robospa.tasks.sampling.places import Point, Range, retry
 from robospa.tasks.sampling.turns import Turnable, free_beside
@@ -94,7 +94,6 @@ class ActionChain:
         )
 
     def draw(self, level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
-        """The things of this level, each in its region."""
         items = retry(
             lambda: self.items(level, rng, workcell), f"objects of {self.name} level {level}"
         )
@@ -102,7 +101,6 @@ class ActionChain:
         return SceneSample(scene_objects, self.facts(**names), self.table_shift)
 
     def goal(self, scene: Scene) -> Checklist:
-        """The subtasks of the steps in the asked order."""
         steps = self.steps[scene.level]
         stations = {step: self.station(scene, step) for step in dict.fromkeys(steps)}
         return Checklist(
@@ -115,7 +113,6 @@ class ActionChain:
         )
 
     def plan(self, scene: Scene) -> tuple[Skill, ...]:
-        """The asked steps in the asked order."""
         skills: list[Skill] = []
         steps = self.steps[scene.level]
         for i, step in enumerate(steps):

@@ -19,8 +19,7 @@ from robospa.tasks import objects
 from robospa.tasks.families import chain, table
 from robospa.tasks.families.chain import ActionChain, Region, Station
 from robospa.tasks.goals.conditions import Rests, on_spot
-from robospa.tasks.instructions.grammar import Slots
-from robospa.tasks.instructions.text import TaskText
+from robospa.tasks.instructions import Slots, TaskText
 from robospa.tasks.plan import Place
 from robospa.tasks.sampling.places import Point, free_point
 from robospa.tasks.sampling.turns import Turnable
@@ -97,7 +96,6 @@ def _scale_items(
 
 
 def _lower(pose: Pose, start: Pose) -> bool:
-    """The object is as high as at the start."""
     return abs(pose.position[2] - start.position[2]) < BACK
 
 
@@ -167,7 +165,6 @@ class TrayFacts(SceneFacts):
 def _tray_items(
     level: int, rng: np.random.Generator, workcell: Workcell
 ) -> list[table.Item] | None:
-    """The tray in the middle, food beside it, the bell behind."""
     variant = table.draw_variant(rng, "tray")
     middle = (0.0, float(rng.uniform(*TRAY_Y)))
     items = [table.Item("tray", "tray", table.standing(middle), variant, fixed=True)]
@@ -201,7 +198,6 @@ def _tray_items(
 
 
 def _at_home(pose: Pose, start: Pose) -> bool:
-    """The object lies where it lay at the start."""
     (x, y, z), (sx, sy, sz) = pose.position, start.position
     return math.hypot(x - sx, y - sy) < HOME and abs(z - sz) < HOME_HEIGHT
 

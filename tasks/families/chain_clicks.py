@@ -21,8 +21,7 @@ from robospa.tasks.families import table
 from robospa.tasks.families.chain import ActionChain, Station, button
 from robospa.tasks.goals.conditions import Opened, Rests, level_with
 from robospa.tasks.goals.counters import PressCounter
-from robospa.tasks.instructions.grammar import Slots
-from robospa.tasks.instructions.text import TaskText
+from robospa.tasks.instructions import Slots, TaskText
 from robospa.tasks.plan import Home, Open, Pick, Place, Press
 from robospa.tasks.sampling.places import Point, Range, free_point
 from robospa.tasks.scene import Scene
@@ -178,7 +177,6 @@ class MicrowaveFacts(SceneFacts):
 
 
 def _items(level: int, rng: np.random.Generator, workcell: Workcell) -> list[table.Item] | None:
-    """Bell, microwave and things, each in its region, none where the door swings."""
     bell, variant = _point(rng, BELL_X, BELL_Y), table.draw_variant(rng, "bell")
     items = [table.Item("bell", "bell", table.standing(bell), variant, fixed=True)]
     if level >= 2:

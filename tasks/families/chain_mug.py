@@ -18,8 +18,7 @@ from robospa.tasks.families import table
 from robospa.tasks.families.chain import ActionChain, Station
 from robospa.tasks.families.dustbin import reachable
 from robospa.tasks.goals.conditions import Near, Rests
-from robospa.tasks.instructions.grammar import Slots
-from robospa.tasks.instructions.text import TaskText
+from robospa.tasks.instructions import Slots, TaskText
 from robospa.tasks.plan import Hang, Pick, Place
 from robospa.tasks.sampling.places import Point, Range, free_point
 from robospa.tasks.scene import Scene
@@ -71,7 +70,6 @@ class Facts(SceneFacts):
 
 
 def _items(level: int, rng: np.random.Generator, workcell: Workcell) -> list[table.Item] | None:
-    """Mug and rack on the right, blocks on the left."""
     mug, rack = table.draw_variant(rng, "mug"), table.draw_variant(rng, "mug_rack")
     at = free_point(rng, MUG_X, MUG_Y, [], allowed=table.in_view(workcell, "mug", mug))
     stand = free_point(rng, RACK_X, RACK_Y, [], allowed=partial(_rack_seen, workcell))
@@ -89,8 +87,8 @@ def _items(level: int, rng: np.random.Generator, workcell: Workcell) -> list[tab
         if point is None:
             return None
         points.append(point)
-        pose = table.standing(point, float(rng.uniform(-BLOCK_YAW, BLOCK_YAW)), HALF)
-        items.append(table.Item(color, "block", pose, table.cube(HALF, COLORS[color])))
+        yaw = float(rng.uniform(-BLOCK_YAW, BLOCK_YAW))
+        items.append(table.block(color, point, HALF, COLORS[color], yaw))
     return items
 
 
@@ -125,7 +123,6 @@ def _hangs(handle: Pose, peg: Pose, above: float) -> Near:
 
 
 def _in_area(level: int, table_top: float) -> Near:
-    """The object lies in the near left area, on the table."""
     right, far = AREA[level]
 
     def near(pose: Pose, start: Pose) -> bool:
@@ -136,13 +133,11 @@ def _in_area(level: int, table_top: float) -> Near:
 
 
 def _on_top(pose: Pose, below: Pose) -> bool:
-    """A block straight on another one."""
     offsets = zip(pose.position, below.position, (0.0, 0.0, 2 * HALF), STACKED, strict=True)
     return all(abs(a - b - up) < most for a, b, up, most in offsets)
 
 
 def _station(scene: Scene, step: str) -> Station:
-    """The right arm hangs the mug, the left one builds."""
     facts = Facts.of(scene)
     if step == "m":
         handle, peg = (

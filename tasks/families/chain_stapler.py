@@ -20,8 +20,7 @@ from robospa.tasks.families.dustbin import BIN, TABLE_SHIFT, container
 from robospa.tasks.families.table import Item, draw_variant, frame_of, radius, standing
 from robospa.tasks.goals.conditions import Inside, Near, Rests
 from robospa.tasks.goals.counters import StampCounter, inside_box
-from robospa.tasks.instructions.grammar import Slots
-from robospa.tasks.instructions.text import TaskText, times
+from robospa.tasks.instructions import Slots, TaskText, times
 from robospa.tasks.plan import Dock, Home, Pour, Press, Stamp
 from robospa.tasks.sampling.places import Point, free_point
 from robospa.tasks.sampling.turns import Turnable
@@ -89,7 +88,6 @@ def _phone_items(level: int, rng: np.random.Generator, workcell: Workcell) -> li
 
 
 def _within(box: tuple[float, float, float], own: Pose, frame: Pose) -> Near:
-    """The object's frame `own` lies in the box around `frame` of the target."""
 
     def near(pose: Pose, target: Pose) -> bool:
         return inside_box(pose.apply(own.position), target.apply(frame.position), box)
@@ -161,7 +159,6 @@ class SealsFacts(SceneFacts):
 
 
 def _seals_items(level: int, rng: np.random.Generator, workcell: Workcell) -> list[Item] | None:
-    """Seals and pads of this level's sides, and the stapler between them."""
     items: list[Item] = []
     taken: list[tuple[Point, float]] = []
     for at in ("left", "right")[: 1 + ("r" in SEALS_STEPS[level])]:
@@ -189,7 +186,6 @@ def _seals_items(level: int, rng: np.random.Generator, workcell: Workcell) -> li
 
 
 def _seals_station(scene: Scene, step: str) -> Station:
-    """Each seal by the arm on its side, all its stamps with one grasp."""
     facts = SealsFacts.of(scene)
     if step == "s":
         press = Press(facts.stapler, arm=pressing_arm(scene, facts.stapler))

@@ -20,8 +20,14 @@ from robospa.tasks.families import table
 from robospa.tasks.families.table import standing
 from robospa.tasks.goals.clicks import ClickInOrder
 from robospa.tasks.goals.counters import PRESS_BOX, PressCounter
-from robospa.tasks.instructions.grammar import Slots, Templates
-from robospa.tasks.instructions.text import NUMBERS, TaskText, acting_arm, one_after_another
+from robospa.tasks.instructions import (
+    NUMBERS,
+    Slots,
+    TaskText,
+    Templates,
+    acting_arm,
+    one_after_another,
+)
 from robospa.tasks.plan import Press, Skill
 from robospa.tasks.sampling.places import (
     Area,
@@ -35,13 +41,12 @@ from robospa.tasks.sampling.places import (
 from robospa.tasks.sampling.turns import Turnable, free_turns, outline
 from robospa.tasks.scene import Scene
 from robospa.tasks.shapes import Params
-from robospa.tasks.task import Level, SceneFacts, SceneSample, Task
+from robospa.tasks.task import SceneFacts, SceneSample, Task
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "click_order.toml")
 BELLS_TEXT = TaskText.beside(__file__, "click_order_bells.toml")
 
-LEVELS = {n: Level(candidates=n, subtasks=n, steps=200 * n) for n in range(1, 6)}
 TRIES = 60
 """Candidate places per object and draw."""
 BOXES: Mapping[str, Vec3] = {"can": (0.03, 0.03, 0.04), "bell": (0.025, 0.025, 0.03)}
@@ -122,7 +127,6 @@ def in_order(scene: Scene, order: Sequence[str], standing: bool) -> ClickInOrder
 
 
 def plan(scene: Scene) -> tuple[Skill, ...]:
-    """One press each."""
     return clicks(scene, Facts.of(scene).order)
 
 
@@ -131,7 +135,6 @@ AREA, MIDDLE, DISTANCE = Area((-0.25, 0.25), (-0.20, 0.0)), 0.05, 0.14
 
 
 def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
-    """The first things of the order, at random places off the middle."""
     things = [(asset, clickable(rng, asset)) for asset in ORDER[:level]]
     places = laid_out(rng, workcell, AREA, MIDDLE, DISTANCE, things)
     items = [
@@ -143,7 +146,6 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSampl
 
 
 def slots(scene: Scene) -> Slots:
-    """Phrasings for the things, and the arm on the side of the first."""
     order = [scene.object(name) for name in Facts.of(scene).order]
     arm = acting_arm(table.side_of(scene, order[0].name))
     if len(order) == 1:
@@ -155,7 +157,7 @@ def slots(scene: Scene) -> Slots:
 OBJECTS = Task(
     name="Click_Objects_Order",
     category="OCE",
-    levels=LEVELS,
+    levels=table.LEVELS,
     draw=draw,
     # one that is touched when its turn comes is clicked (official)
     goal=lambda scene: in_order(scene, Facts.of(scene).order, standing=True),
@@ -206,7 +208,6 @@ def _ring(level: int, rng: np.random.Generator, seen: Callable[[Point], bool]) -
 
 
 def _pair(rng: np.random.Generator) -> list[Point]:
-    """One bell far, one near."""
     base = float(rng.uniform(0.10, 0.15))
     return [
         (float(rng.uniform(-0.015, 0.015)), way * base * float(rng.uniform(0.92, 1.10)))
@@ -215,7 +216,6 @@ def _pair(rng: np.random.Generator) -> list[Point]:
 
 
 def _round(level: int, rng: np.random.Generator) -> list[Point]:
-    """Bells around the origin, clockwise from the far side."""
     base = float(rng.uniform(*BASE[level]))
     wide, deep = float(rng.uniform(0.80, 1.18)), float(rng.uniform(0.80, 1.14))
     ring = []
@@ -259,14 +259,13 @@ def _bell_slots(scene: Scene) -> Slots:
 
 
 def _bell_templates(level: int) -> Templates:
-    """One bell, two bells by distance, a ring."""
     return (TEXT if level < 3 else BELLS_TEXT).templates(level)
 
 
 BELLS = Task(
     name="Click_Bell_Clockwise_Order",
     category="OCE",
-    levels=LEVELS,
+    levels=table.LEVELS,
     draw=_draw_bells,
     goal=lambda scene: in_order(scene, Facts.of(scene).order, standing=False),
     plan=plan,

@@ -28,11 +28,9 @@ from robospa.tasks.families.picking import (
     pick_target,
 )
 from robospa.tasks.families.table import standing
-from robospa.tasks.goals.pick import Lift
-from robospa.tasks.instructions.grammar import Slots
-from robospa.tasks.instructions.text import TaskText
-from robospa.tasks.sampling.markov import Fits, pool, walk
-from robospa.tasks.sampling.places import LayoutError, Mask
+from robospa.tasks.goals.lifting import Lift
+from robospa.tasks.instructions import Slots, TaskText
+from robospa.tasks.sampling.places import Fits, LayoutError, Mask, pool, walk
 from robospa.tasks.sampling.turns import Turnable, free_turns
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.shapes import Params

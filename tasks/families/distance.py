@@ -19,12 +19,10 @@ from robospa.geometry import Array
 from robospa.tasks.colors import NAMED, nearest
 from robospa.tasks.families.picking import PickFacts, lifted, pick_name, pick_target
 from robospa.tasks.families.table import draw_variant, standing, variant_phrasings
-from robospa.tasks.goals.pick import Lift
-from robospa.tasks.instructions.grammar import Phrasings, Slots
-from robospa.tasks.instructions.text import TaskText, ordinal
+from robospa.tasks.goals.lifting import Lift
+from robospa.tasks.instructions import Phrasings, Slots, TaskText, ordinal
 from robospa.tasks.objects import object_model
-from robospa.tasks.sampling.markov import Fits, keeps_apart, pool, walk
-from robospa.tasks.sampling.places import LayoutError, Mask, retry
+from robospa.tasks.sampling.places import Fits, LayoutError, Mask, keeps_apart, pool, retry, walk
 from robospa.tasks.sampling.turns import Turnable, free_turns
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.shapes import Params
@@ -270,7 +268,6 @@ class Facts(PickFacts):
 def draw(
     level: int, rng: np.random.Generator, workcell: Workcell, family: ObjectSet
 ) -> SceneSample:
-    """A layout with clear distances, a uniform rank, then what lies where."""
     rules = family.rules
     found = clear_layouts(workcell, rules, level)
     things = family.things(level, rng)
@@ -423,7 +420,6 @@ PILL_BOTTLES = ObjectSet(
 
 
 def _mixed(assets: tuple[str, ...], level: int, rng: np.random.Generator) -> list[Thing]:
-    """One object each of the level's first categories."""
     return [(assets[int(i)], None) for i in rng.permutation(COUNTS[level - 1])]
 
 

@@ -19,8 +19,7 @@ from robospa.tasks import objects
 from robospa.tasks.families import chain, table
 from robospa.tasks.goals.conditions import Container, Inside, Rests, on_spot
 from robospa.tasks.goals.placing import collect
-from robospa.tasks.instructions.grammar import Slots, Templates
-from robospa.tasks.instructions.text import NUMBERS, TaskText, by_count
+from robospa.tasks.instructions import NUMBERS, Slots, TaskText, Templates, by_count
 from robospa.tasks.plan import Drop, Pick, Place, Skill
 from robospa.tasks.sampling.places import Point, Range, apart, free_point, scatter_points
 from robospa.tasks.scene import Scene, SceneObject
@@ -104,7 +103,6 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSampl
 
 
 def goal(scene: Scene) -> Tracker:
-    """All bottles inside the bin's walls."""
     dustbin = scene.object(Facts.of(scene).dustbin)
     names = Facts.of(scene).bottles
     return collect(names, container(dustbin), lost_below=scene.table_top - 0.1)
@@ -130,7 +128,6 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
 
 
 def _bottle_slots(count: int) -> Slots:
-    """Phrasings for so many bottles and the bin."""
     bottles = f"bottles.{by_count(count)}"
     return TEXT.slots(bottles, "bin", "side", count=count, word=NUMBERS[count])
 
@@ -191,7 +188,6 @@ class CupFacts(SceneFacts):
 
 
 def _items(level: int, rng: np.random.Generator, workcell: Workcell) -> list[table.Item] | None:
-    """Bottles on the far half, cups and coasters on the near one."""
     items = [table.Item("dustbin", "dustbin", BIN, {"look": 0}, fixed=True)]
     points: list[Point] = []
 

@@ -17,8 +17,7 @@ from robospa.tasks import objects
 from robospa.tasks.families import table
 from robospa.tasks.goals.conditions import Region
 from robospa.tasks.goals.placing import Destination, bring
-from robospa.tasks.instructions.grammar import Phrasings, Slots
-from robospa.tasks.instructions.text import NUMBERS, TaskText, by_count
+from robospa.tasks.instructions import NUMBERS, Phrasings, Slots, TaskText, by_count
 from robospa.tasks.plan import Skill
 from robospa.tasks.sampling.places import (
     LAYOUTS,
@@ -29,14 +28,13 @@ from robospa.tasks.sampling.places import (
 )
 from robospa.tasks.sampling.turns import Turnable, free_turns
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Level, SceneFacts, SceneSample, Task, Tracker
+from robospa.tasks.task import SceneFacts, SceneSample, Task, Tracker
 from robospa.workcell import Workcell
 
 BLOCKS_TEXT = TaskText.beside(__file__, "move_apart_blocks.toml")
 CARDS_TEXT = TaskText.beside(__file__, "move_apart_cards.toml")
 FOOD_TEXT = TaskText.beside(__file__, "move_apart_food.toml")
 
-LEVELS = {n: Level(candidates=n, subtasks=n, steps=200 * n) for n in range(1, 6)}
 
 COLORS = table.first_colors(7)
 TO_RIGHT = {2: 1, 3: 1, 4: 2, 5: 2}
@@ -86,7 +84,6 @@ class Square:
 
 
 def _squares(rng: np.random.Generator, count: int, half: float) -> list[Square]:
-    """Free footprints, in random order."""
     for _ in range(LAYOUTS):
         found: list[Square] = []
         for _ in range(TRIES_PER_POINT * count):
@@ -106,12 +103,7 @@ def _draw_blocks(level: int, rng: np.random.Generator, workcell: Workcell) -> Sc
     words = [first] * right + [second] * (level - right)
     half = float(rng.uniform(*HALF))
     items = [
-        table.Item(
-            str(i),
-            "block",
-            table.standing((square.x, square.y), square.yaw, half),
-            table.cube(half, COLORS[word]),
-        )
+        table.block(str(i), (square.x, square.y), half, COLORS[word], square.yaw)
         for i, (word, square) in enumerate(zip(words, _squares(rng, level, half), strict=True))
     ]
     scene_objects, names = table.named(rng, items)
@@ -147,7 +139,6 @@ def _blocks_plan(scene: Scene) -> tuple[Skill, ...]:
 
 
 def _blocks_slots(scene: Scene) -> Slots:
-    """Phrasings for the colours and sides."""
     facts = BlocksFacts.of(scene)
     if scene.level == 1:
         at, color = ("right" if facts.right else "left"), facts.right_color or facts.left_color
@@ -159,7 +150,6 @@ def _blocks_slots(scene: Scene) -> Slots:
 
 
 def _some(text: TaskText, entry: str, count: int, **values: object) -> Phrasings:
-    """Phrasings for one or many things."""
     entry = f"{entry}.one" if count == 1 else f"{entry}.many"
     return text.phrasings(entry, count=count, word=NUMBERS[count], **values)
 
@@ -167,7 +157,7 @@ def _some(text: TaskText, entry: str, count: int, **values: object) -> Phrasings
 BLOCKS = Task(
     name="Move_Blocks_Apart",
     category="OFE",
-    levels=LEVELS,
+    levels=table.LEVELS,
     draw=_draw_blocks,
     goal=_blocks_goal,
     plan=_blocks_plan,
@@ -196,7 +186,6 @@ class CardsFacts(SceneFacts):
 
 
 def _draw_cards(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
-    """Boxes anywhere in the region, each turned any way that a gripper can take."""
     found = scatter_points(rng, level, CARDS_X, CARDS_Y, CARDS_DISTANCE, tries=10)
     points = shuffled(rng, found)
     variants = [table.draw_variant(rng, "playing_cards") for _ in points]
@@ -242,7 +231,6 @@ def _rows(wanted: list[float]) -> list[float]:
 
 
 def _cards_slots(scene: Scene) -> Slots:
-    """Phrasings for the boxes."""
     boxes = CardsFacts.of(scene).boxes
     count = len(boxes)
     if count > 1:
@@ -255,7 +243,7 @@ def _cards_slots(scene: Scene) -> Slots:
 CARDS = Task(
     name="Move_Playing_Cards_Away",
     category="OFE",
-    levels=LEVELS,
+    levels=table.LEVELS,
     draw=_draw_cards,
     goal=_cards_goal,
     plan=_cards_plan,
@@ -318,7 +306,6 @@ def _draw_food(level: int, rng: np.random.Generator, workcell: Workcell) -> Scen
 
 
 def _food_goal(scene: Scene) -> Tracker:
-    """Every object beyond its line, and both grippers open."""
     facts = FoodFacts.of(scene)
     parts = [Destination(name, (FORWARD,), (BACKWARD,)) for name in facts.forward]
     parts += [Destination(name, (BACKWARD,), (FORWARD,)) for name in facts.backward]
@@ -340,7 +327,6 @@ def _food_plan(scene: Scene) -> tuple[Skill, ...]:
 
 
 def _food_slots(scene: Scene) -> Slots:
-    """Phrasings for the kinds and the directions."""
     facts = FoodFacts.of(scene)
     if scene.level == 1:
         way = "forward" if facts.forward else "backward"
@@ -357,7 +343,7 @@ def _food_slots(scene: Scene) -> Slots:
 FOOD = Task(
     name="Separate_Fries_Bread",
     category="OFE",
-    levels=LEVELS,
+    levels=table.LEVELS,
     draw=_draw_food,
     goal=_food_goal,
     plan=_food_plan,

@@ -13,13 +13,12 @@ import numpy as np
 from robospa.geometry import Array, Vec3
 from robospa.tasks import objects
 from robospa.tasks.families import table
-from robospa.tasks.goals.arranging import nest
-from robospa.tasks.instructions.grammar import Slots
-from robospa.tasks.instructions.text import NUMBERS, TaskText, by_count
+from robospa.tasks.goals.placing import nest
+from robospa.tasks.instructions import NUMBERS, Slots, TaskText, by_count
 from robospa.tasks.plan import Pick, Place, Skill
 from robospa.tasks.sampling.places import Area, Mask, candidates, scatter, shuffled
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Level, SceneFacts, SceneSample, Task, Tracker
+from robospa.tasks.task import SceneFacts, SceneSample, Task, Tracker
 from robospa.workcell import Workcell
 
 TEXT = TaskText.beside(__file__, "nest_bowls.toml")
@@ -32,8 +31,6 @@ DISTANCE = 0.13
 BOWL = {"look": 2}
 """All bowls are of the one official model."""
 
-LEVELS = {n: Level(candidates=n, subtasks=n, steps=200 * n) for n in range(1, 6)}
-
 
 @dataclass(frozen=True)
 class Facts(SceneFacts):
@@ -44,7 +41,6 @@ class Facts(SceneFacts):
 
 
 def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
-    """The plate on either side, then bowls, off the middle, in view and in reach."""
     left = rng.random() < 0.5
     plate_x = (-PLATE_X if left else PLATE_X) + float(rng.uniform(-PLATE_SPREAD, PLATE_SPREAD))
     plate = (plate_x, float(rng.uniform(*PLATE_Y)))
@@ -72,12 +68,10 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSampl
 
 
 def goal(scene: Scene) -> Tracker:
-    """All bowls in one stack on the plate."""
     return nest(Facts.of(scene).bowls, Facts.of(scene).plate)
 
 
 def plan(scene: Scene) -> tuple[Skill, ...]:
-    """One bowl after the other, those on the plate's side and the near ones first."""
     plate = Facts.of(scene).plate
     at = {name: scene.object(name).pose.position for name in Facts.of(scene).bowls}
     here = table.side_of(scene, plate)
@@ -95,13 +89,11 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
 
 
 def _nested(scene: Scene, below: str) -> Vec3:
-    """Where the next bowl's origin goes, from the "support" frame of the one below."""
     frames = objects.model_of(scene.object(below)).frames
     return (0.0, 0.0, frames["nest"].position[2] - frames["support"].position[2])
 
 
 def slots(scene: Scene) -> Slots:
-    """Phrasings for the bowls and the plate."""
     count = len(Facts.of(scene).bowls)
     bowls = "bowl" if count == 1 else f"bowls.{by_count(count)}"
     return TEXT.slots("plate", bowls, count=count, word=NUMBERS[count])
@@ -110,7 +102,7 @@ def slots(scene: Scene) -> Slots:
 TASK = Task(
     name="Place_Bowls_Plates",
     category="OFE",
-    levels=LEVELS,
+    levels=table.LEVELS,
     draw=draw,
     goal=goal,
     plan=plan,

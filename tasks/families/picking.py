@@ -9,7 +9,7 @@ import numpy as np
 
 from robospa.tasks.colors import NAMED
 from robospa.tasks.families.table import draw_variant
-from robospa.tasks.goals.pick import Lift, PickTracker
+from robospa.tasks.goals.lifting import Lift, PickTracker
 from robospa.tasks.objects import model_of
 from robospa.tasks.plan import Pick, Skill
 from robospa.tasks.scene import Scene

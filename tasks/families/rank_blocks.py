@@ -17,10 +17,8 @@ import numpy as np
 from robospa.geometry import Vec3
 from robospa.tasks.families import table
 from robospa.tasks.families.stack_blocks import NEAR_BAND
-from robospa.tasks.goals.arranging import row
-from robospa.tasks.goals.placing import bring_alone
-from robospa.tasks.instructions.grammar import Phrasings, Slots
-from robospa.tasks.instructions.text import COMMON, NUMBERS, TaskText, by_count
+from robospa.tasks.goals.placing import bring_alone, row
+from robospa.tasks.instructions import COMMON, NUMBERS, Phrasings, Slots, TaskText, by_count
 from robospa.tasks.plan import Skill
 from robospa.tasks.sampling.places import (
     LAYOUTS,
@@ -31,7 +29,7 @@ from robospa.tasks.sampling.places import (
     shuffled,
 )
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Level, SceneFacts, SceneSample, Task, Tracker
+from robospa.tasks.task import SceneFacts, SceneSample, Task, Tracker
 from robospa.text import listed
 from robospa.workcell import Workcell
 
@@ -64,8 +62,6 @@ ROWS = {
 }
 ROW_Y = -0.175
 """Where the expert lines them up; not part of the rule."""
-
-LEVELS = {n: Level(candidates=n, subtasks=n, steps=200 * n) for n in range(1, 6)}
 
 
 @dataclass(frozen=True)
@@ -131,12 +127,7 @@ def _places(looks: Sequence[Block], rng: np.random.Generator, workcell: Workcell
 
 def _draw(looks: Sequence[Block], rng: np.random.Generator, workcell: Workcell) -> SceneSample:
     items = [
-        table.Item(
-            str(rank),
-            "block",
-            table.standing(point, float(rng.uniform(-YAW, YAW)), half[2]),
-            {"half": list(half), "color": list(color)},
-        )
+        table.block(str(rank), point, half, color, float(rng.uniform(-YAW, YAW)))
         for rank, ((half, color), point) in enumerate(
             zip(looks, _places(looks, rng, workcell), strict=True)
         )
@@ -244,7 +235,7 @@ def _task(ranking: Ranking) -> Task:
     return Task(
         name=f"Rank_Blocks_{ranking.name}",
         category="OFE",
-        levels=LEVELS,
+        levels=table.LEVELS,
         draw=lambda level, rng, workcell: _draw(ranking.looks(level, rng), rng, workcell),
         goal=lambda scene: _goal(ranking, scene),
         plan=plan,

@@ -25,9 +25,8 @@ from robospa.tasks.families.picking import (
     pick_target,
 )
 from robospa.tasks.families.table import standing
-from robospa.tasks.goals.pick import Lift
-from robospa.tasks.instructions.grammar import Slots
-from robospa.tasks.instructions.text import TaskText
+from robospa.tasks.goals.lifting import Lift
+from robospa.tasks.instructions import Slots, TaskText
 from robospa.tasks.sampling.grid import StraightLines
 from robospa.tasks.sampling.places import LayoutError
 from robospa.tasks.sampling.turns import Turnable, free_turns
@@ -187,7 +186,6 @@ def _lying(
 
 
 def _seen(workcell: Workcell, points: Array) -> bool:
-    """Whether centres keep the margin."""
     return bool(workcell.in_view(points[:, 0], points[:, 1], 0.0, 0.0, MARGIN).all())
 
 
@@ -206,7 +204,6 @@ def _label(shape: SlotGrid, slot: tuple[int, int], used: list[tuple[int, int]]) 
 
 
 def _in_line(a: tuple[int, int], b: tuple[int, int]) -> bool:
-    """Whether two slots share a column or a row."""
     return a[0] == b[0] or a[1] == b[1]
 
 

@@ -18,11 +18,9 @@ from robospa.geometry import Vec3
 from robospa.tasks import objects
 from robospa.tasks.families import table
 from robospa.tasks.families.chain import button, pressing_arm
-from robospa.tasks.goals import lift_cycles
+from robospa.tasks.goals import counters
 from robospa.tasks.goals.checklist import Checklist
-from robospa.tasks.goals.counters import FIGURES, PRESS_BOX
-from robospa.tasks.instructions.grammar import Slots
-from robospa.tasks.instructions.text import NUMBERS, TaskText, acting_arm, by_count
+from robospa.tasks.instructions import NUMBERS, Slots, TaskText, acting_arm, by_count
 from robospa.tasks.plan import Press, RaiseLower, Skill
 from robospa.tasks.sampling.places import Range
 from robospa.tasks.scene import Scene
@@ -37,19 +35,22 @@ LEVELS = {n: Level(candidates=1, subtasks=n, steps=200 * n) for n in range(1, 6)
 
 
 def presses(
-    scene: Scene, name: str, times: int, box: Vec3 = PRESS_BOX, own_side_closed: bool = False
+    scene: Scene,
+    name: str,
+    times: int,
+    box: Vec3 = counters.PRESS_BOX,
+    own_side_closed: bool = False,
 ) -> Checklist:
     """The goal of so many presses; subtask i is press i + 1, latched.
 
     Success latches at the last one asked for, so one press too many cannot happen, and it needs no
     retreat (official).
     """
-    counter = button(scene, name, box, own_side_closed)
-    return Checklist([counter] * times, figures=FIGURES)
+    presses = button(scene, name, box, own_side_closed)
+    return Checklist([presses] * times, figures=counters.FIGURES)
 
 
 def _words(text: TaskText, count: int, own: Sequence[str], many: str) -> Slots:
-    """Phrasings of `own` entries and, for several times, of the count."""
     if count == 1:
         return text.slots(*own)
     return text.slots(*own, f"times.{by_count(count)}", many, count=count, word=NUMBERS[count])
@@ -67,7 +68,6 @@ class StaplerFacts(SceneFacts):
 
 
 def _draw_stapler(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
-    """One stapler anywhere in the region, turned any way."""
     point = (float(rng.uniform(*X)), float(rng.uniform(*Y)))
     pose = table.standing(point, float(rng.uniform(-math.pi, math.pi)))
     items = [table.Item("stapler", "stapler", pose, table.draw_variant(rng, "stapler"), fixed=True)]
@@ -81,7 +81,6 @@ def _stapler_goal(scene: Scene) -> Checklist:
 
 
 def _stapler_plan(scene: Scene) -> tuple[Skill, ...]:
-    """As many presses as asked for, by the arm on the press point's side."""
     facts = StaplerFacts.of(scene)
     return (Press(facts.stapler, arm=pressing_arm(scene, facts.stapler)),) * facts.count
 
@@ -138,13 +137,11 @@ def _bell_goal(scene: Scene) -> Checklist:
 
 
 def _bell_plan(scene: Scene) -> tuple[Skill, ...]:
-    """As many presses as asked for, by the arm on the bell's side."""
     facts = BellFacts.of(scene)
     return (Press(facts.bell, hover=HOVER, arm=table.side_of(scene, facts.bell)),) * facts.count
 
 
 def _bell_slots(scene: Scene) -> Slots:
-    """Phrasings for the bell, the arm on its side and the count."""
     facts = BellFacts.of(scene)
     words = _words(BELL_TEXT, facts.count, ["bell", "closed"], "clicks")
     return words | acting_arm(table.side_of(scene, facts.bell))
@@ -197,20 +194,20 @@ class Lifted:
     y: Range
     yaw: float
     rise: float
-    tests: Callable[[Scene, str], tuple[lift_cycles.PoseTest, lift_cycles.PoseTest]]
+    tests: Callable[[Scene, str], tuple[counters.PoseTest, counters.PoseTest]]
     both: bool
     variants: Sequence[int] | None
     success: str
 
 
-def _pot_tests(scene: Scene, name: str) -> tuple[lift_cycles.PoseTest, lift_cycles.PoseTest]:
+def _pot_tests(scene: Scene, name: str) -> tuple[counters.PoseTest, counters.PoseTest]:
     handles = [table.frame_of(scene, name, arm).position for arm in ("left", "right")]
-    up = lift_cycles.held_up(name, UP + scene.table_rise, handles)
-    return up, lift_cycles.put_down(name, DOWN, ASIDE)
+    up = counters.held_up(name, UP + scene.table_rise, handles)
+    return up, counters.put_down(name, DOWN, ASIDE)
 
 
-def _fan_tests(scene: Scene, name: str) -> tuple[lift_cycles.PoseTest, lift_cycles.PoseTest]:
-    return lift_cycles.raised(name, FAN_UP), lift_cycles.back_home(name, FAN_WAY, FAN_TURN)
+def _fan_tests(scene: Scene, name: str) -> tuple[counters.PoseTest, counters.PoseTest]:
+    return counters.raised(name, FAN_UP), counters.back_home(name, FAN_WAY, FAN_TURN)
 
 
 THINGS = (
@@ -258,12 +255,13 @@ def _draw_lifted(
 def _lift_goal(thing: Lifted, scene: Scene) -> Checklist:
     facts = LiftFacts.of(scene)
     up, down = thing.tests(scene, facts.thing)
-    counter = lift_cycles.CycleCounter(facts.thing, up, down, THING_RADIUS)
-    return lift_cycles.cycles(counter, facts.count)
+    counter = counters.CycleCounter(facts.thing, up, down, THING_RADIUS)
+    return Checklist(
+        [counter] * facts.count, radius=THING_RADIUS, figures=("lifts", "released", "drops")
+    )
 
 
 def _lift_plan(thing: Lifted, scene: Scene) -> tuple[Skill, ...]:
-    """All cycles in one go: both arms for the pot, the arm on its side for the fan."""
     facts = LiftFacts.of(scene)
     arms = ("left", "right") if thing.both else (table.side_of(scene, facts.thing),)
     return (RaiseLower(facts.thing, thing.rise, facts.count, arms),)

@@ -15,12 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from robospa.tasks.families import table
-from robospa.tasks.goals.arranging import HEIGHT_TOLERANCE, stack
 from robospa.tasks.goals.checklist import Checklist
 from robospa.tasks.goals.conditions import Region
-from robospa.tasks.goals.placing import bring_alone
-from robospa.tasks.instructions.grammar import Slots
-from robospa.tasks.instructions.text import COMMON, NUMBERS, TaskText, by_count, color_orders
+from robospa.tasks.goals.placing import HEIGHT_TOLERANCE, bring_alone, stack
+from robospa.tasks.instructions import COMMON, NUMBERS, Slots, TaskText, by_count, color_orders
 from robospa.tasks.plan import Pick, Place, Skill
 from robospa.tasks.sampling.places import (
     Area,
@@ -33,14 +31,13 @@ from robospa.tasks.sampling.places import (
     spread,
 )
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Draw, Level, SceneFacts, SceneSample, Task
+from robospa.tasks.task import Draw, SceneFacts, SceneSample, Task
 from robospa.text import listed
 from robospa.workcell import Workcell
 
 COLOR_TEXT = TaskText.beside(__file__, "stack_blocks_color.toml")
 TEXT = TaskText.beside(__file__, "stack_blocks.toml")
 
-LEVELS = {n: Level(candidates=n, subtasks=n, steps=200 * n) for n in range(1, 6)}
 NEAR_BAND = Region((-0.05, 0.05), (-1.0, -0.08))
 """Level 1: the block's centre must come here."""
 CLEARANCE = 0.09
@@ -65,7 +62,6 @@ def _sample(
     points: Sequence[Point],
     colors: tuple[str, ...] = (),
 ) -> SceneSample:
-    """The blocks from bottom to top, at `points`, and the expert's place."""
     place = _building_place(level, rng, points)
     scene_objects, names = table.named(rng, items)
     order = tuple(names[item.role] for item in items)
@@ -122,7 +118,7 @@ def _task(
     return Task(
         name=f"Stack_Blocks_{name}_Order",
         category="OCE",
-        levels=LEVELS,
+        levels=table.LEVELS,
         draw=draw,
         goal=goal,
         plan=plan,
@@ -151,19 +147,13 @@ def _draw_colors(level: int, rng: np.random.Generator, workcell: Workcell) -> Sc
 
     points = scatter_points(rng, level, X, Y, DISTANCE, allowed, near_middle=True)
     items = [
-        table.Item(
-            color,
-            "block",
-            table.standing(point, float(rng.uniform(-YAW, YAW)), COLOR_HALF),
-            table.cube(COLOR_HALF, rgb),
-        )
+        table.block(color, point, COLOR_HALF, rgb, float(rng.uniform(-YAW, YAW)))
         for (color, rgb), point in zip(table.ORDERED.items(), points, strict=False)
     ]
     return _sample(level, rng, items, points, tuple(item.role for item in items))
 
 
 def _color_slots(scene: Scene) -> Slots:
-    """Phrasings for the order of the colours."""
     colors = TowerFacts.of(scene).colors
     count = len(colors)
     if count == 1:
@@ -216,7 +206,6 @@ LENGTHS = Scale(
 
 
 def _tower_slots(scale: Scale, scene: Scene) -> Slots:
-    """Phrasings for a tower by size or length, largest or longest at the bottom."""
     count = len(TowerFacts.of(scene).order)
     if count == 1:
         return TEXT.slots("block") | {"middle": COMMON.phrasings("middle.near")}
@@ -251,16 +240,15 @@ AREA, MIDDLE = Area((-0.28, 0.28), (-0.08, 0.05), clear_middle=True), (0.0, -0.1
 
 
 def _draw_sizes(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
-    """Scattered cubes, away from the middle of the near edge."""
     halves = HALVES.get(level) or (round(float(rng.uniform(*ONE)), 5),)
     cubes = [(half, half, half) for half in halves]
     ground = Ground(AREA, 0.05, MIDDLE, 0.10 if level == 1 else 0.15)
     points = scatter_blocks(rng, workcell, ground, cubes, lambda i, j: DISTANCE)
     color = table.drawn_color(rng)
-    items = []
-    for i, (half, point) in enumerate(zip(halves, points, strict=True)):
-        pose = table.standing(point, float(rng.uniform(-YAW, YAW)), half)
-        items.append(table.Item(f"block {i}", "block", pose, table.cube(half, color)))
+    items = [
+        table.block(f"block {i}", point, half, color, float(rng.uniform(-YAW, YAW)))
+        for i, (half, point) in enumerate(zip(halves, points, strict=True))
+    ]
     return _sample(level, rng, items, points)
 
 
@@ -297,7 +285,6 @@ GAP, BAR_YAW = 0.045, 0.20
 
 
 def _draw_lengths(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
-    """Scattered bars, away from the middle of the near edge."""
     half_y, half_z = (round(float(v), 5) for v in rng.uniform(*SECTION, 2))
     halves = [(round(float(rng.uniform(*ends)), 5), half_y, half_z) for ends in HALF_LENGTHS[level]]
     reach = [math.hypot(half[0], half_y) for half in halves]
@@ -311,10 +298,10 @@ def _draw_lengths(level: int, rng: np.random.Generator, workcell: Workcell) -> S
 
     points = scatter_blocks(rng, workcell, GROUNDS[min(level, 2)], halves, gap, wide)
     color = table.drawn_color(rng)
-    items = []
-    for i, half in enumerate(halves):
-        pose = table.standing(points[i], float(rng.uniform(-BAR_YAW, BAR_YAW)), half_z)
-        items.append(table.Item(f"block {i}", "block", pose, {"half": list(half), "color": color}))
+    items = [
+        table.block(f"block {i}", point, half, color, float(rng.uniform(-BAR_YAW, BAR_YAW)))
+        for i, (half, point) in enumerate(zip(halves, points, strict=True))
+    ]
     return _sample(level, rng, items, points)
 
 

@@ -10,11 +10,12 @@ import numpy as np
 from robospa.geometry import Pose, Vec3, yaw_rotation
 from robospa.tasks import objects
 from robospa.tasks.colors import NAMED, stands_out
-from robospa.tasks.instructions.grammar import Phrasings
+from robospa.tasks.instructions import Phrasings
 from robospa.tasks.plan import Pick, Place
 from robospa.tasks.sampling.places import LayoutError, Point
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.shapes import Color, ObjectModel, Params
+from robospa.tasks.task import Level
 from robospa.workcell import TABLE_TOP, Workcell
 
 COLORS: dict[str, Color] = {
@@ -29,6 +30,8 @@ COLORS: dict[str, Color] = {
 ORDERED = {**dict(list(COLORS.items())[:4]), "purple": NAMED["purple"]}
 """The colours of tasks that ask for blocks in a fixed order of colours."""
 
+LEVELS = {n: Level(candidates=n, subtasks=n, steps=200 * n) for n in range(1, 6)}
+"""Levels of most tasks: as many subtasks as things."""
 TRIES = 60
 
 
@@ -61,6 +64,21 @@ class Item:
     appears_at: float | None = None
 
 
+def block(
+    role: str,
+    point: Point,
+    half: float | Vec3,
+    color: Sequence[float],
+    yaw: float = 0.0,
+    fixed: bool = False,
+    top: float = TABLE_TOP,
+) -> Item:
+    """A block of `half` sizes [m], a cube if that is a number, at height `top` [m]."""
+    x, y, z = half if isinstance(half, tuple) else (half, half, half)
+    params = {"half": [x, y, z], "color": list(color)}
+    return Item(role, "block", Pose((*point, top + z), yaw_rotation(yaw)), params, fixed)
+
+
 def named(
     rng: np.random.Generator, items: Sequence[Item]
 ) -> tuple[tuple[SceneObject, ...], dict[str, str]]:
@@ -82,11 +100,6 @@ def draw_variant(
     """Parameters of one of the asset's variants (of `some` of them), each equally likely."""
     some = range(objects.variant_count(asset)) if some is None else some
     return {"look": int(some[int(rng.integers(len(some)))])}
-
-
-def cube(half: float, color: Sequence[float]) -> dict[str, list[float]]:
-    """Parameters of a block with equal edges, `half` [m] each."""
-    return {"half": [half, half, half], "color": list(color)}
 
 
 def radius(asset: str, params: Params) -> float:

@@ -19,8 +19,7 @@ from robospa.tasks.colors import LOOK_ALIKES
 from robospa.tasks.families import table
 from robospa.tasks.goals.clicks import UseInOrder
 from robospa.tasks.goals.counters import HitCounter, StampCounter
-from robospa.tasks.instructions.grammar import Phrasings, Slots
-from robospa.tasks.instructions.text import NUMBERS, TaskText, by_count, color_orders
+from robospa.tasks.instructions import NUMBERS, Phrasings, Slots, TaskText, by_count, color_orders
 from robospa.tasks.objects.tools import PADS
 from robospa.tasks.plan import Hit, Pick, Place, Skill
 from robospa.tasks.sampling.places import (
@@ -34,14 +33,13 @@ from robospa.tasks.sampling.places import (
 )
 from robospa.tasks.scene import Scene
 from robospa.tasks.shapes import ObjectModel
-from robospa.tasks.task import Level, SceneFacts, SceneSample, Task
+from robospa.tasks.task import SceneFacts, SceneSample, Task
 from robospa.text import listed
 from robospa.workcell import Workcell
 
 HAMMER_TEXT = TaskText.beside(__file__, "tool_order_hammer.toml")
 SEAL_TEXT = TaskText.beside(__file__, "tool_order_seal.toml")
 
-LEVELS = {n: Level(candidates=n, subtasks=n, steps=200 * n) for n in range(1, 6)}
 
 HALF, YAW, DISTANCE, TRIES = 0.025, 0.5, 0.12, 60
 HAMMER_AT: Point = (0.0, -0.06)
@@ -62,7 +60,6 @@ class HammerFacts(SceneFacts):
 
 
 def _draw_hammer(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
-    """The first block on a random side, the others where the same arm gets to."""
     left = bool(rng.random() < 0.5)
     arm = workcell.arms[0 if left else 1]
     nearest, farthest = arm.tool_reach
@@ -82,8 +79,8 @@ def _draw_hammer(level: int, rng: np.random.Generator, workcell: Workcell) -> Sc
         table.Item("hammer", "hammer", table.standing(HAMMER_AT), table.draw_variant(rng, "hammer"))
     ]
     for (color, rgb), point in zip(table.ORDERED.items(), points, strict=False):
-        pose = table.standing(point, float(rng.uniform(-YAW, YAW)), HALF)
-        items.append(table.Item(color, "block", pose, table.cube(HALF, rgb), fixed=True))
+        yaw = float(rng.uniform(-YAW, YAW))
+        items.append(table.block(color, point, HALF, rgb, yaw, fixed=True))
     scene_objects, names = table.named(rng, items)
     colors = tuple(table.ORDERED)[:level]
     facts = HammerFacts(names["hammer"], colors, tuple(names[c] for c in colors))
@@ -91,7 +88,6 @@ def _draw_hammer(level: int, rng: np.random.Generator, workcell: Workcell) -> Sc
 
 
 def _beside_hammer(x: Array, y: Array) -> Mask:
-    """Whether blocks at these places leave the hammer free."""
     half = objects.object_model("hammer").size[1] / 2
     dx, dy = x - HAMMER_AT[0], y - HAMMER_AT[1]
     free: Mask = np.hypot(dx, dy - np.clip(dy, -half, half)) >= FREE
@@ -99,7 +95,6 @@ def _beside_hammer(x: Array, y: Array) -> Mask:
 
 
 def _hammer_goal(scene: Scene) -> UseInOrder:
-    """The blocks in their order."""
     facts = HammerFacts.of(scene)
     head = table.frame_of(scene, facts.hammer, "head")
     counters = [
@@ -110,13 +105,11 @@ def _hammer_goal(scene: Scene) -> UseInOrder:
 
 
 def _hammer_plan(scene: Scene) -> tuple[Skill, ...]:
-    """All hits by the arm on the first block's side."""
     facts = HammerFacts.of(scene)
     return (Hit(facts.hammer, facts.order, arm=table.side_of(scene, facts.order[0])),)
 
 
 def _hammer_slots(scene: Scene) -> Slots:
-    """Phrasings for the order of the colours."""
     colors = HammerFacts.of(scene).colors
     if len(colors) == 1:
         return HAMMER_TEXT.slots("hammer", "block", color=colors[0])
@@ -126,7 +119,7 @@ def _hammer_slots(scene: Scene) -> Slots:
 HAMMER = Task(
     name="Hit_Blocks_Hammer_Order",
     category="OCE",
-    levels=LEVELS,
+    levels=table.LEVELS,
     draw=_draw_hammer,
     goal=_hammer_goal,
     plan=_hammer_plan,
@@ -165,7 +158,6 @@ class SealFacts(SceneFacts):
 
 
 def _draw_seal(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
-    """Pads of different colours, the seal not too near to any."""
     groups = [COLORS[int(i)] for i in rng.permutation(len(COLORS))[:level]]
     colors = tuple(group[int(rng.integers(len(group)))] for group in groups)
     variant = table.draw_variant(rng, "seal")
@@ -183,7 +175,6 @@ def _draw_seal(level: int, rng: np.random.Generator, workcell: Workcell) -> Scen
 def _layout(
     level: int, rng: np.random.Generator, workcell: Workcell, variant: dict[str, int]
 ) -> tuple[list[Point], Point]:
-    """Places of the pads from right to left, and of the seal."""
     pad_seen, seal_seen = (
         table.in_view(workcell, "pad", {}),
         table.in_view(workcell, "seal", variant),
@@ -228,7 +219,6 @@ def _seal_plan(scene: Scene) -> tuple[Skill, ...]:
 
 
 def _seal_slots(scene: Scene) -> Slots:
-    """Phrasings for the seal, the pads and their order."""
     facts = SealFacts.of(scene)
     colors, count = facts.colors, len(facts.colors)
     own: Slots = {"seal": _seal_names(objects.model_of(scene.object(facts.seal)))}
@@ -252,7 +242,7 @@ def _seal_names(model: ObjectModel) -> Phrasings:
 SEAL = Task(
     name="Stamp_Seals_Order",
     category="OCE",
-    levels=LEVELS,
+    levels=table.LEVELS,
     draw=_draw_seal,
     goal=_seal_goal,
     plan=_seal_plan,

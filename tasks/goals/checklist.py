@@ -12,7 +12,7 @@ from robospa.geometry import Vec3
 from robospa.tasks.events import Event, ObjectRole
 from robospa.tasks.goals.conditions import Condition, Inside
 from robospa.tasks.goals.counters import FIGURES, ActionCounter
-from robospa.tasks.goals.lift_tracker import LiftTracker, grippers_open
+from robospa.tasks.goals.lifting import LiftTracker, grippers_open
 from robospa.tasks.snapshot import Snapshot
 
 
@@ -143,7 +143,6 @@ class Checklist:
         return found
 
     def start(self, snapshot: Snapshot) -> tuple[Event, ...]:
-        """Subtasks that hold before the first action."""
         self._lift_tracker.start(snapshot)
         for counter in self._counters.values():
             counter.start(snapshot)
@@ -176,7 +175,6 @@ class Checklist:
         return self._set(indices[count - 1], True, time, name)
 
     def _test(self, snapshot: Snapshot) -> tuple[Event, ...]:
-        """Look at every condition."""
         events: tuple[Event, ...] = ()
         for i, condition in self._conditions.items():
             before = self._flags.held[i]
@@ -199,7 +197,6 @@ class Checklist:
         return events
 
     def diagnostics(self) -> dict[str, float | bool]:
-        """Free progress, the chosen figures (counters' summed up), and what is watched."""
         found: dict[str, float | bool] = {
             "order_obeyed": self._out_of_order == 0,
             "out_of_order": self._out_of_order,

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from robospa.tasks.events import Event, ObjectRole
 from robospa.tasks.goals.checklist import SubtaskFlags
 from robospa.tasks.goals.counters import FIGURES, ActionCounter, PressCounter
-from robospa.tasks.goals.lift_tracker import LiftTracker
+from robospa.tasks.goals.lifting import LiftTracker
 from robospa.tasks.snapshot import Snapshot
 
 
@@ -44,14 +44,12 @@ class ClickInOrder:
 
     @property
     def roles(self) -> dict[str, ObjectRole]:
-        """The objects in their order, and those that are not asked for."""
         wrong = {c.name: ObjectRole(pressed=True) for c in self._others}
         return wrong | {
             c.name: ObjectRole((i,), pressed=True) for i, c in enumerate(self._counters)
         }
 
     def start(self, snapshot: Snapshot) -> tuple[Event, ...]:
-        """Nothing is clicked yet."""
         for counter in (*self._counters, *self._others):
             counter.start(snapshot)
         return ()
@@ -113,11 +111,9 @@ class UseInOrder(ClickInOrder):
         return super().start(snapshot)
 
     def update(self, snapshot: Snapshot) -> tuple[Event, ...]:
-        """Grasps and drops of the tool, and what the order says."""
         return (*self._lift_tracker.update(snapshot), *super().update(snapshot))
 
     def diagnostics(self) -> dict[str, float]:
-        """Those of the order, and drops of the tool."""
         return {**super().diagnostics(), "drops": self._lift_tracker.drops}
 
 
@@ -140,7 +136,6 @@ class PressCounts:
 
     @property
     def roles(self) -> dict[str, ObjectRole]:
-        """Every object."""
         return {c.name: ObjectRole((i,), pressed=True) for i, c in enumerate(self._counters)}
 
     def start(self, snapshot: Snapshot) -> tuple[Event, ...]:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY, dataclass
 
 from robospa.geometry import Pose, Vec3
-from robospa.tasks.goals.lift_tracker import closed_near, grippers_open
+from robospa.tasks.goals.lifting import closed_near, grippers_open
 from robospa.tasks.snapshot import Snapshot
 
 HELD_RADIUS = 0.07
@@ -55,11 +55,9 @@ class Given(Condition):
 
     @property
     def movers(self) -> tuple[str, ...]:
-        """The object, if it is moved."""
         return (self.name,) if self.moved else ()
 
     def holds(self, snapshot: Snapshot, before: bool) -> bool:
-        """Always."""
         return True
 
 
@@ -83,7 +81,6 @@ class Rests(Condition):
     _home: Pose = Pose()
 
     def start(self, snapshot: Snapshot) -> None:
-        """Remember where the object was."""
         self._home = snapshot.poses[self.name]
 
     def holds(self, snapshot: Snapshot, before: bool) -> bool:
@@ -147,7 +144,6 @@ class Inside(Condition):
     _time: float = 0.0
 
     def start(self, snapshot: Snapshot) -> None:
-        """Remember where it was, to tell how fast it is."""
         self._last, self._time = snapshot.position(self.name), snapshot.time
 
     def holds(self, snapshot: Snapshot, before: bool) -> bool:

@@ -1,4 +1,4 @@
-"""Counting what is done to an object: presses, hits with a tool, stamps.
+"""Counting what is done to an object: presses, hits with a tool, stamps, lifts and back.
 
 Officially a gripper is in contact with an object at every point that the simulator reports between
 its fingers and the object, from about 2 cm of separation on and whatever the impulse. A press
@@ -8,14 +8,19 @@ object is no leaving (official). Presses that push on the object are counted bes
 
 The official rule counts a stamp within 1 cm and re-arms beyond 1 cm in height, so that a bounce at
 that height counts again and again; here re-arming takes 2 cm in every direction.
+
+A cycle counts when the object is back home after it was up. Whether it was let go of in between is
+not asked (official); the figures count the cycles after which nothing held it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
-from robospa.geometry import Pose, Vec3
+from robospa.geometry import Pose, Vec3, rotate
+from robospa.tasks.goals.lifting import closed_near
 from robospa.tasks.snapshot import GRIPPER_CLOSED, Contact, Snapshot
 
 PRESS_BOX: Vec3 = (0.03, 0.03, 0.03)
@@ -70,7 +75,6 @@ class _Touches:
         self._last = float("-inf")
 
     def start(self, touching: bool, time: float) -> None:
-        """Begin with what is touched now not counting."""
         self._left = not touching
         if touching:
             self._last = time
@@ -114,7 +118,6 @@ class PressCounter:
         return self._reported.count
 
     def figures(self) -> dict[str, int]:
-        """Presses, those that pushed on the object, and those without re-arming."""
         return figures(self.count, self._pushed.count, self.raw_count)
 
     def contacts(self, snapshot: Snapshot) -> list[Contact]:
@@ -128,7 +131,6 @@ class PressCounter:
         return [c for c in found if inside_box(c.point, centre, self.box)]
 
     def start(self, snapshot: Snapshot) -> None:
-        """Begin with what is touched now not counting as a press."""
         found = self.contacts(snapshot)
         self.pressing = bool(found) and self._closed(snapshot)
         self._reported.start(bool(found), snapshot.time)
@@ -197,7 +199,6 @@ class StampCounter:
         self._raw_armed = True
 
     def figures(self) -> dict[str, int]:
-        """Stamps, all of which come onto their target, and those without re-arming."""
         return figures(self.count, self.count, self.raw_count)
 
     def offset(self, snapshot: Snapshot) -> tuple[float, float]:
@@ -207,7 +208,6 @@ class StampCounter:
         return max(abs(x - tx), abs(y - ty)), abs(z - tz)
 
     def start(self, snapshot: Snapshot) -> None:
-        """Standing on the target from the start is no stamp."""
         level, height = self.offset(snapshot)
         self.pressing = level < ON and height < ON
         self._armed = self._raw_armed = not self.pressing
@@ -235,3 +235,120 @@ def inside_box(point: Vec3, centre: Vec3, half: Vec3) -> bool:
         and abs(point[1] - centre[1]) < half[1]
         and abs(point[2] - centre[2]) < half[2]
     )
+
+
+UPRIGHT = math.cos(math.radians(36.87))
+"""Least height of an upright object's own unit z axis (official: 0.8)."""
+
+AT_HANDLE = 0.03
+"""A grasp centre this near [m] to a handle is at it."""
+
+PoseTest = Callable[[Snapshot, Pose], bool]
+"""True if the condition holds, given the pose that the object had at the start."""
+
+
+def held_up(name: str, above: float, handles: Sequence[Vec3]) -> PoseTest:
+    """Upright, origin above `above` [m, world], left and right grasp centre at the two handles.
+
+    `handles` are given in the object's frame.
+    """
+
+    def test(snapshot: Snapshot, home: Pose) -> bool:
+        pose = snapshot.poses[name]
+        if pose.position[2] <= above or not upright(pose):
+            return False
+        return all(
+            math.dist(point, pose.apply(handle)) < AT_HANDLE
+            for point, handle in zip(snapshot.grasp_points, handles, strict=True)
+        )
+
+    return test
+
+
+def put_down(name: str, height: tuple[float, float], aside: float) -> PoseTest:
+    """Upright, origin between so many metres over its first height, and nearly where it was.
+
+    `aside` [m] bounds the way on the plan.
+    """
+
+    def test(snapshot: Snapshot, home: Pose) -> bool:
+        pose = snapshot.poses[name]
+        rise = pose.position[2] - home.position[2]
+        away = math.dist(pose.position[:2], home.position[:2])
+        return height[0] < rise < height[1] and away < aside and upright(pose)
+
+    return test
+
+
+def raised(name: str, rise: float) -> PoseTest:
+    """The origin is more than `rise` [m] over its first height."""
+
+    def test(snapshot: Snapshot, home: Pose) -> bool:
+        return snapshot.height(name) > home.position[2] + rise
+
+    return test
+
+
+def back_home(name: str, way: float, turn: float) -> PoseTest:
+    """Each coordinate within `way` [m], each quaternion component within `turn` of the start."""
+
+    def test(snapshot: Snapshot, home: Pose) -> bool:
+        pose = snapshot.poses[name]
+        if any(abs(a - b) >= way for a, b in zip(pose.position, home.position, strict=True)):
+            return False
+        pairs = list(zip(pose.rotation, home.rotation, strict=True))
+        sign = 1.0 if sum(a * b for a, b in pairs) >= 0 else -1.0
+        return all(abs(a * sign - b) < turn for a, b in pairs)
+
+    return test
+
+
+def upright(pose: Pose) -> bool:
+    """True if the object stands within about 37 degrees of upright."""
+    return rotate(pose.rotation, (0.0, 0.0, 1.0))[2] > UPRIGHT
+
+
+class CycleCounter:
+    """Counts cycles of `up`, then `down` while not `up`, of object `name`.
+
+    A gripper that is not open holds the object while its grasp centre is within `radius` [m] of the
+    origin.
+    """
+
+    carried = True
+
+    def __init__(self, name: str, up: PoseTest, down: PoseTest, radius: float = 0.12) -> None:
+        self.name = name
+        self.count = 0
+        self.pressing = False
+        """Whether the object is up or on its way down."""
+        self.radius = radius
+        self._up = up
+        self._down = down
+        self._home = Pose()
+        self._lifts = 0
+        self._pending = False
+        self._released = 0
+
+    def start(self, snapshot: Snapshot) -> None:
+        self._home = snapshot.poses[self.name]
+
+    def update(self, snapshot: Snapshot) -> bool:
+        """True if a cycle ends at this instant."""
+        if self._pending and not closed_near(snapshot, snapshot.position(self.name), self.radius):
+            self._pending, self._released = False, self._released + 1
+        if self._up(snapshot, self._home):
+            self._lifts += not self.pressing
+            self.pressing, self._pending = True, False
+        elif self.pressing and self._down(snapshot, self._home):
+            self.pressing, self._pending = False, True
+            self.count += 1
+            return True
+        return False
+
+    def figures(self) -> dict[str, int]:
+        """Lifts, and cycles before the last that ended in a release.
+
+        The last cycle ends the trial, so that its release is not seen.
+        """
+        return {"lifts": self._lifts, "released": self._released}

@@ -14,7 +14,7 @@ from robospa.geometry import Pose, Quat, Vec3
 from robospa.tasks.events import Event, ObjectRole
 from robospa.tasks.goals.checklist import Checklist, Watch
 from robospa.tasks.goals.conditions import Near, Rests
-from robospa.tasks.goals.lift_tracker import closed_near
+from robospa.tasks.goals.lifting import closed_near
 from robospa.tasks.goals.placing import Bystanders
 from robospa.tasks.snapshot import Snapshot
 from robospa.tasks.task import Tracker
@@ -33,7 +33,6 @@ class Stillness:
         self._origins: tuple[Vec3, ...] = ()
 
     def start(self, snapshot: Snapshot) -> None:
-        """Remember where the end effectors are."""
         self._origins = tuple(pose.position for pose in snapshot.end_effector)
 
     def broken(self, snapshot: Snapshot) -> bool:
@@ -57,11 +56,9 @@ class AfterCue:
 
     @property
     def roles(self) -> Mapping[str, ObjectRole]:
-        """Those of the goal."""
         return self._goal.roles
 
     def start(self, snapshot: Snapshot) -> tuple[Event, ...]:
-        """Remember where the end effectors are."""
         self._still.start(snapshot)
         return ()
 

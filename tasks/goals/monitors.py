@@ -106,7 +106,6 @@ class GraspMonitor:
         return events
 
     def diagnostics(self) -> dict[str, object]:
-        """Subtasks by object and which objects are pressed, for the failure analysis."""
         roles = self._roles.items()
         return {
             "roles": {name: list(role.subtasks) for name, role in roles},
@@ -114,7 +113,6 @@ class GraspMonitor:
         }
 
     def _note_contacts(self, arm: int, state: _Arm) -> None:
-        """Note which objects the gripper touches now."""
         mine = f"{ARMS[arm]}_gripper"
         for contact in self._touching():
             if contact.touching and mine in (contact.first, contact.second):
@@ -123,7 +121,6 @@ class GraspMonitor:
                     state.touched[name] = state.touched.get(name, 0) + 1
 
     def _closed(self, state: _Arm, time: float) -> tuple[Event, ...]:
-        """The event of a closing that has ended."""
         state.since = -1.0
         name, note = state.nearest, BESIDE
         if state.touched:
@@ -147,7 +144,6 @@ class GraspMonitor:
         return found
 
     def _approaches(self, snapshot: Snapshot, arm: int, state: _Arm) -> tuple[Event, ...]:
-        """Objects that a moving arm has come near to since the last sample."""
         at = snapshot.end_effector[arm].position
         if math.dist(at, state.seen) < AT_REST:
             return ()
@@ -204,7 +200,6 @@ class ClutterMonitor:
         self._due = 0.0
 
     def update(self, snapshot: Snapshot) -> tuple[Event, ...]:
-        """The things that were moved since the last look, each once."""
         if snapshot.time < self._due - 1e-9:
             return ()
         self._due = snapshot.time + SAMPLE_INTERVAL
@@ -219,5 +214,4 @@ class ClutterMonitor:
         return tuple(Event(snapshot.time, "clutter_moved", name) for name in moved)
 
     def diagnostics(self) -> dict[str, object]:
-        """How many things there were, and which were moved."""
         return {"clutter": len(self._there) + len(self._moved), "clutter_moved": list(self._moved)}

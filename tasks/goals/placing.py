@@ -1,31 +1,36 @@
-"""Bringing objects to places, in any order: the table's regions, a container, a guarded strip.
+"""Bringing objects to places, and arranging them: a row, a tower, equal vessels in each other.
 
-Each is a `Checklist` of conditions, most of which do not latch, with something watched beside it.
+Places are the table's regions, a container, a guarded strip. Each goal is a `Checklist` of
+conditions, most of which do not latch, with something watched beside it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from itertools import pairwise
 
-from robospa.geometry import Pose
+from robospa.geometry import Pose, Vec3
 from robospa.tasks.events import Event, ObjectRole
 from robospa.tasks.goals.checklist import Checklist, Watch
 from robospa.tasks.goals.conditions import (
     HELD_RADIUS,
+    Condition,
     Container,
+    Given,
     Inside,
     Region,
     Rests,
     lying_in,
     put_into,
 )
+from robospa.tasks.goals.lifting import closed_near
 from robospa.tasks.snapshot import Snapshot
 
 FALLEN = 0.05
 """An origin so far [m] below the top of the table has left it."""
 HEIGHT_TOLERANCE = 0.02
-"""An object put down may be this much higher [m] than at the start."""
+"""Allowed error [m] of the height of an object put down, and of a part above the bottom part."""
 CLOSE = 0.03
 """A gripper that is not open and whose grasp centre is nearer [m] than this holds a block."""
 
@@ -169,3 +174,202 @@ class _Lost(Watch):
 
     def diagnostics(self) -> dict[str, float]:
         return {"lost": len(self._lost)}
+
+
+ALIGNED = 0.03
+"""Neighbours of the row differ by at most this [m] in y."""
+
+RAISED = 0.01
+"""An object this much higher [m] than at the start stands on something or hangs in the air."""
+
+
+@dataclass
+class Pair(Condition):
+    """`left` and `name` are neighbours of the row: down, in line, nothing holding either."""
+
+    left: str
+    _ceilings: list[float] = field(default_factory=list)
+
+    @property
+    def movers(self) -> tuple[str, ...]:
+        return (self.left, self.name)
+
+    def start(self, snapshot: Snapshot) -> None:
+        self._ceilings = [snapshot.height(name) + RAISED for name in self.movers]
+
+    def holds(self, snapshot: Snapshot, before: bool) -> bool:
+        """True if both are in place; `before` is the last value."""
+        left, right = places = [snapshot.position(name) for name in self.movers]
+        in_place = (
+            right[0] > left[0]
+            and abs(right[1] - left[1]) <= ALIGNED
+            and left[2] < self._ceilings[0]
+            and right[2] < self._ceilings[1]
+        )
+        if not in_place or before:
+            return in_place
+        return not any(closed_near(snapshot, place, HELD_RADIUS) for place in places)
+
+
+class _ChancePairs(Watch):
+    """Counts the pairs that are in place before the first action."""
+
+    def __init__(self, pairs: Sequence[Pair]) -> None:
+        self._pairs = tuple(pairs)
+        self._count = 0
+
+    def start(self, snapshot: Snapshot) -> tuple[Event, ...]:
+        self._count = sum(pair.holds(snapshot, False) for pair in self._pairs)
+        return ()
+
+    def diagnostics(self) -> dict[str, float]:
+        return {"chance_pairs": self._count}
+
+
+def row(order: Sequence[str], released: bool) -> Checklist:
+    """The goal that `order` lies from left to right, with `released` both grippers open too.
+
+    Subtask 0 holds from the start (official: the first of the row is given for free); subtask k is
+    the pair (k - 1, k): its second object lies farther right and hardly nearer or farther away.
+    Pairs do not latch, and some hold by chance before anything was done: `diagnostics` says how
+    many.
+    """
+    pairs = [Pair(right, left) for left, right in pairwise(order)]
+    return Checklist(
+        [Given(order[0]), *pairs],
+        released,
+        radius=HELD_RADIUS,
+        handled=order,
+        watch=_ChancePairs(pairs),
+    )
+
+
+SIDE_TOLERANCE = 0.025
+"""Allowed offset [m] in x and in y from the part below."""
+
+PART_RADIUS = 0.03
+"""A gripper that is not open and whose grasp centre is nearer [m] than this holds the part."""
+
+
+@dataclass
+class Layer(Condition):
+    """`name` is straight above `below`, higher than `bottom` by `rise` [m], and was let go of."""
+
+    below: str
+    bottom: str
+    rise: float
+    within: float
+
+    def holds(self, snapshot: Snapshot, before: bool) -> bool:
+        """True if it rests there; `before` is the last value."""
+        x, y, z = here = snapshot.position(self.name)
+        below = snapshot.position(self.below)
+        in_place = (
+            abs(z - snapshot.height(self.bottom) - self.rise) <= self.within
+            and abs(x - below[0]) < SIDE_TOLERANCE
+            and abs(y - below[1]) < SIDE_TOLERANCE
+        )
+        return in_place and (before or not closed_near(snapshot, here, PART_RADIUS))
+
+
+def stack(
+    order: Sequence[str], thick: Sequence[float], within: float = HEIGHT_TOLERANCE
+) -> Checklist:
+    """A tower of `order` from bottom to top, `thick` [m] parts with their centres as origins.
+
+    One rule for every tower: part i is as high above the bottom part as the parts between them are
+    thick, to `within` [m], and straight above part i - 1. Subtask 0, the bottom part, holds from
+    the start (official). Nothing latches: a collapse takes it away. The order in time is not
+    checked (official); parts that came to rest before the one below them are counted.
+    """
+    rise, layers = 0.0, []
+    for (below, thick_below), (above, thick_above) in pairwise(zip(order, thick, strict=True)):
+        rise += (thick_below + thick_above) / 2
+        layers.append(Layer(above, below, order[0], rise, within))
+    return Checklist(
+        [Given(order[0], moved=True), *layers],
+        released=True,
+        radius=0.06,
+        early=lambda i, flags: i > 0 and not flags.held[i - 1],
+        handled=order,
+        figures=("out_of_order", "drops"),
+    )
+
+
+OVER_BASE, OVER_TOP = 0.05, 0.04
+"""Largest offset [m] in x and in y from the base's centre, and from the vessel below."""
+
+RISE = (0.005, 0.08)
+"""A vessel stands so much higher [m] than the one below it."""
+
+RIM_RADIUS = 0.115
+"""A gripper that is not open and this near [m] to a vessel's origin may hold its rim."""
+
+
+class _Vessels:
+    """The vessels that stand in each other on `base`, found once for every snapshot.
+
+    The lowest one over the base begins; then, again and again, the lowest of the others that stands
+    in the topmost one joins it. They are looked for afresh every time, so that taking the lowest
+    one away takes all others with it.
+    """
+
+    def __init__(self, names: Sequence[str], base: str) -> None:
+        self._base = base
+        self._names = tuple(names)
+        self._seen: Snapshot | None = None
+        self._found: list[str] = []
+
+    def at(self, snapshot: Snapshot) -> list[str]:
+        if snapshot is not self._seen:
+            self._seen, self._found = snapshot, self._stack(snapshot)
+        return self._found
+
+    def _stack(self, snapshot: Snapshot) -> list[str]:
+        at = {name: snapshot.poses[name].position for name in self._names}
+        rest = sorted(self._names, key=lambda name: at[name][2])
+        below, reach = snapshot.poses[self._base].position, OVER_BASE
+        lowest, highest = float("-inf"), float("inf")
+        stack: list[str] = []
+        while True:
+            found = next(
+                (
+                    name
+                    for name in rest
+                    if _over(at[name], below, reach) and lowest < at[name][2] - below[2] < highest
+                ),
+                None,
+            )
+            if found is None:
+                return stack
+            stack.append(found)
+            rest.remove(found)
+            below, reach, (lowest, highest) = at[found], OVER_TOP, RISE
+
+
+@dataclass
+class Nested(Condition):
+    """`name` is one of the vessels that stand in each other, and was let go of there."""
+
+    vessels: _Vessels
+
+    def holds(self, snapshot: Snapshot, before: bool) -> bool:
+        """True if it stands there; `before` is the last value."""
+        if self.name not in self.vessels.at(snapshot):
+            return False
+        return before or not closed_near(snapshot, snapshot.position(self.name), RIM_RADIUS)
+
+
+def nest(names: Sequence[str], base: str) -> Checklist:
+    """The goal that all `names` are in one stack on the fixed object `base`, grippers open."""
+    vessels = _Vessels(names, base)
+    return Checklist(
+        [Nested(name, vessels, targets=(base,)) for name in names],
+        released=True,
+        radius=RIM_RADIUS,
+        handled=names,
+    )
+
+
+def _over(point: Vec3, below: Vec3, reach: float) -> bool:
+    return abs(point[0] - below[0]) < reach and abs(point[1] - below[1]) < reach

@@ -103,7 +103,6 @@ def _on_table(scene: Scene, x: Array, y: Array, model: ObjectModel) -> Mask:
 def _apart(
     x: Array, y: Array, model: ObjectModel, circles: list[tuple[float, float, float]]
 ) -> Mask:
-    """Where a thing keeps its distance from those that are there."""
     if not circles:
         return np.ones(len(x), dtype=bool)
     cx, cy, radius = np.array(circles).T
@@ -241,7 +240,6 @@ class _Rectangles:
         self.halves.append(half)
 
     def add_circle(self, x: float, y: float, radius: float) -> None:
-        """The square around a circle."""
         self.add(x, y, np.eye(2), (radius, radius))
 
 
@@ -283,7 +281,6 @@ def footprint(model: ObjectModel) -> tuple[float, float]:
 
 
 def _add_swing(found: _Rectangles, pose: Pose, model: ObjectModel) -> None:
-    """The circle that a door or lid may sweep."""
     if model.hinge is not None:
         points = np.concatenate([points_of(shape) for shape in model.hinge.shapes])
         x, y, _ = pose.apply(model.hinge.point)

@@ -158,7 +158,6 @@ def _tangible(strengths: Mapping[str, float]) -> dict[str, float]:
 
 
 def _part(text: str, parts: str) -> tuple[str, float]:
-    """Name and strength of one of the `parts`."""
     name, equals, number = text.partition("=")
     found = VARIATIONS.get(name)
     if found is None:

@@ -99,7 +99,6 @@ def microwave(look: int, params: Params) -> ObjectModel:
 def _box(
     x: tuple[float, float], y: tuple[float, float], z: tuple[float, float]
 ) -> tuple[Box, Vec3]:
-    """The box between these planes, and its middle."""
     (a, b), (c, d), (e, f) = x, y, z
     return Box(((b - a) / 2, (d - c) / 2, (f - e) / 2)), ((a + b) / 2, (c + d) / 2, (e + f) / 2)
 
@@ -130,7 +129,6 @@ def _housing(oven: Oven, color: Color, metallic: float) -> list[Shape]:
 
 
 def _inside(oven: Oven) -> list[Shape]:
-    """Pale lining and the glass turntable: seen once the door is open."""
     pale, left, right = srgb("#e9e6da"), oven.left + WALL, oven.panel
     middle, half = (left + right) / 2, (right - left) / 2
     low, high = oven.foot + WALL, oven.top - WALL
@@ -155,7 +153,6 @@ def _inside(oven: Oven) -> list[Shape]:
 
 
 def _controls(oven: Oven, trim: Color) -> list[Shape]:
-    """Display, keys and dial on the panel to the right of the door."""
     x, half = (oven.panel + oven.right) / 2 + 0.001, (oven.right - oven.panel) / 2 - 0.004
     front, top = oven.front, oven.top
     dark_panel = sum(trim) < 0.6
@@ -183,7 +180,6 @@ def _controls(oven: Oven, trim: Color) -> list[Shape]:
 
 
 def _door(oven: Oven, color: Color, metallic: float) -> list[Shape]:
-    """Frame, and a dark window inside and out that ends beside the handle."""
     box, at = _box(
         (oven.left, oven.panel - 0.001), (oven.front, oven.behind), (oven.foot, oven.top)
     )
@@ -202,7 +198,6 @@ def _door(oven: Oven, color: Color, metallic: float) -> list[Shape]:
 
 
 def _handle(oven: Oven, metallic: float) -> list[Shape]:
-    """A bar on two posts."""
     (x, y), (wide, deep), (low, high) = oven.bar, oven.bar_half, oven.bar_ends
     half = (high - low) / 2
     turned = m.lathe(

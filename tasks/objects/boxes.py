@@ -120,7 +120,6 @@ def tissue_box(look: int, params: Params) -> ObjectModel:
 
 
 def _tissue(z: float) -> Mesh:
-    """A crumpled paper fan rising out of the slot."""
     low = [
         (0.021, 0.004),
         (0.0, 0.006),
@@ -226,7 +225,6 @@ def soap(look: int, params: Params) -> ObjectModel:
 
 
 def _letters(z: float) -> list[Mesh]:
-    """Three strokes that read as a stamped word from afar."""
     strokes = ((-0.009, 0.0022), (-0.003, 0.0022), (0.003, 0.0022), (0.009, 0.0022))
     return [m.flat(m.rectangle(w, 0.0026, x), z) for x, w in strokes]
 

@@ -335,7 +335,6 @@ def _stretched(shape: Shape, factors: Vec3) -> Shape:
 
 
 def _baked(shape: Shape, factors: Vec3) -> Mesh:
-    """The shape as a mesh in the body frame, stretched."""
     geometry = shape.geometry
     if isinstance(geometry, Mesh):
         mesh = geometry

@@ -106,7 +106,6 @@ def can(look: int, params: Params) -> ObjectModel:
 
 
 def _sign(sign: str, r: float, h: float) -> Mesh:
-    """The print on a drink can."""
     if sign == "star":
         return around(m.star(0.021, 0.0095), r + 0.0012, h / 2)
     if sign == "bubbles":
@@ -219,7 +218,6 @@ def pill_bottle(look: int, params: Params) -> ObjectModel:
 
 
 def _ribbed(radius: float, low: float, high: float) -> Mesh:
-    """A cap whose rim is notched."""
     n = 24
     rim = [
         (radius * s * math.cos(2 * math.pi * i / n), radius * s * math.sin(2 * math.pi * i / n))

@@ -39,7 +39,6 @@ def bowl(look: int, params: Params) -> ObjectModel:
     thick = build.RIM / math.cos(high)
 
     def wall(z: float) -> float:
-        """Radius of the outside of the upper wall."""
         return belly + (z - middle) * math.tan(high)
 
     outer = [(foot - 0.001, 0.0), (foot, stand), (belly, middle), (rim, h)]
@@ -259,7 +258,6 @@ def _pleats(hx: float, hy: float, high: float, low: float) -> list[Mesh]:
 
 
 def _recycling(hx: float, h: float) -> Mesh:
-    """Three bent arrows on both long walls, leaning as the walls do."""
     arrow = [(-0.034, 0.052), (0.012, 0.052), (0.012, 0.038), (0.042, 0.066), (0.012, 0.094),
              (0.012, 0.080), (-0.034, 0.080)]  # fmt: skip
     pieces = []

@@ -170,7 +170,6 @@ def mouse(look: int, params: Params) -> ObjectModel:
 
 
 def _seams(levels: Sequence[tuple[float, float, float]]) -> list[Mesh]:
-    """The line between the two buttons and the one behind them, laid on the back."""
 
     def height(x: float, y: float) -> float:
         inside = [
@@ -298,7 +297,6 @@ def fan(look: int, params: Params) -> ObjectModel:
 
 
 def _blades() -> Mesh:
-    """Three broad twisted blades around z."""
     parts = []
     petal = [
         (0.006, -0.010), (0.030, -0.030), (0.043, -0.017), (0.0465, 0.004), (0.040, 0.020),

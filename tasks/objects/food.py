@@ -59,7 +59,6 @@ def hamburger(look: int, params: Params) -> ObjectModel:
 
 
 def _lettuce(r: float, z: float) -> Mesh:
-    """A wavy leaf that looks out between bun and patty."""
     wavy = [(r + (0.0028 if i % 2 else 0.0005)) for i in range(20)]
     turns = [2 * math.pi * i / 20 for i in range(20)]
     ring = [(w * math.cos(a), w * math.sin(a)) for w, a in zip(wavy, turns, strict=True)]
@@ -71,7 +70,6 @@ def _lettuce(r: float, z: float) -> Mesh:
 
 
 def _seeds(r: float) -> Mesh:
-    """Sesame on the domed bun."""
     tip = [(0.0, 0.0, 0.0011)]
     foot = [(x, y, 0.0) for x, y in m.ellipse(0.0024, 0.0013, 5)]
     seed = m.loft([foot, tip * 5], False)
@@ -135,7 +133,6 @@ def french_fries(look: int, params: Params) -> ObjectModel:
 
 
 def _sticks(h: float) -> list[Shape]:
-    """Golden sticks of two shades standing out of the carton."""
     draw = random.Random(5)
     shades: dict[str, list[Mesh]] = {"#f6c945": [], "#e3a52c": [], "#fbdc74": []}
     names = list(shades)
@@ -161,7 +158,6 @@ Made = tuple[list[Shape], tuple[Grasp, ...]]
 
 
 def _arch(half: float, wall: float, height: float) -> list[m.Point]:
-    """Cross-section of a tin loaf: straight walls under a bulging top."""
     bulge = half * 1.04
     dome = [
         (bulge * math.cos(a), wall + (height - wall) * math.sin(a))
@@ -192,13 +188,11 @@ def _stroke(hx: float, hy: float, x: float, y: float, z: float, turn: float = 0.
 
 
 def _dome(rx: float, ry: float, h: float) -> list[tuple[float, float, float]]:
-    """Sections of a baked bun: a small flat foot, a bulge, a rounded top."""
     steps = ((0.86, 0.0), (0.985, 0.14), (1.0, 0.34), (0.92, 0.62), (0.70, 0.86), (0.36, 0.98))
     return [(rx * s, ry * s, h * t) for s, t in steps]
 
 
 def _crest(rx: float, ry: float, h: float, x: float, y: float) -> float:
-    """Height of the `_dome` surface above (x, y)."""
     inside = math.hypot(x / rx, y / ry)
     levels = [(0.0, h), *((s[0] / rx, s[2]) for s in reversed(_dome(rx, ry, h)[2:]))]
     for (a, za), (b, zb) in itertools.pairwise(levels):
@@ -219,7 +213,6 @@ def _draped(points: m.Polygon, rx: float, ry: float, h: float, gap: float = 0.00
 def _slash(
     rx: float, ry: float, h: float, x: float, y: float, length: float, width: float, turn: float
 ) -> Mesh:
-    """A pointed cut of `length` through (x, y) in the direction `turn`."""
     c, s = math.cos(turn), math.sin(turn)
     points: list[m.Point] = []
     for k in range(7):

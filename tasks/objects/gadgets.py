@@ -186,7 +186,6 @@ def _digital(body: str, metal: str) -> tuple[list[Shape], float]:
 
 
 def _two_bells(body: str, metal: str) -> tuple[list[Shape], float]:
-    """A drum with a dial showing ten past ten, two bells, a handle and four legs."""
     r, z, deep = 0.0310, 0.0385, 0.0150
     at = (0.0, 0.0, z)
     drum = [(r - 0.002, -deep), (r, -deep + 0.002), (r, deep - 0.0005), (r - 0.0025, deep)]

@@ -261,7 +261,6 @@ def mug_rack(look: int, params: Params) -> ObjectModel:
 
 
 def _middle(a: Vec3, b: Vec3) -> Vec3:
-    """The point halfway between `a` and `b`."""
     return ((a[0] + b[0]) / 2, (a[1] + b[1]) / 2, (a[2] + b[2]) / 2)
 
 

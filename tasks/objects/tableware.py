@@ -80,7 +80,6 @@ def plate(look: int, params: Params) -> ObjectModel:
     inner = [(r - 0.001, h), (flat, low), (0.0, low)]
 
     def ring(a: float, b: float) -> Mesh:
-        """A painted ring on the rim, between two radii."""
         up = (h - low) / (r - 0.001 - flat)
         ends = [(x, low + (x - flat) * up + 0.0005) for x in (b, a)]
         return m.lathe(ends, 28, False)

@@ -138,7 +138,6 @@ def t_block(look: int, params: Params) -> ObjectModel:
 
 
 def _tee(end: float, arm: float, low: float, round_ends: bool) -> list[m.Point]:
-    """Outline of a T, counter-clockwise from the foot of its stem."""
     foot = [(-arm, -end), (arm, -end)]
     right, left = [(end, low), (end, end)], [(-end, end), (-end, low)]
     if round_ends:

@@ -124,7 +124,6 @@ class GapGrid:
         raise LayoutError(f"no grid fits in {BATCHES * DRAWS} draws; skip this seed")
 
     def _drawn(self, rng: np.random.Generator) -> tuple[Array, Array]:
-        """x and y of many grids, each (DRAWS, rows, columns)."""
         shape = (DRAWS, self.rows, self.columns)
         pitch_x, pitch_y, centre_x, centre_y = (
             rng.uniform(low, high, (DRAWS, 1, 1))

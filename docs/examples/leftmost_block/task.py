@@ -9,9 +9,8 @@ import numpy as np
 
 from robospa.geometry import Array, Pose, yaw_rotation
 from robospa.tasks.families.picking import PickFacts
-from robospa.tasks.goals.pick import Lift, PickTracker
-from robospa.tasks.instructions.grammar import Slots
-from robospa.tasks.instructions.text import TaskText
+from robospa.tasks.goals.lifting import Lift, PickTracker
+from robospa.tasks.instructions import Slots, TaskText
 from robospa.tasks.plan import Pick, Skill
 from robospa.tasks.sampling.places import Area, Mask, Points, scatter
 from robospa.tasks.scene import Scene, SceneObject

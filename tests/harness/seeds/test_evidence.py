@@ -59,7 +59,7 @@ def test_inputs_are_of_what_a_task_executes(monkeypatch: pytest.MonkeyPatch) -> 
     for path in ("harness/skills/pick.py", "tasks/objects/boxes.py", "harness/robots/piper.py",
                  "tasks/families/block_measures.py", "baselines/oracle.py"):  # fmt: skip
         assert path in counted
-    for path in ("tasks/families/repeat.py", "tasks/instructions/grammar.py",
+    for path in ("tasks/families/repeat.py", "tasks/instructions/__init__.py",
                  "harness/running/runner.py", "protocol/server.py"):  # fmt: skip
         assert (root / path).exists() and path not in counted
     assert inputs(KEY._replace(level=5)) == first

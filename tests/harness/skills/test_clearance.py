@@ -11,9 +11,9 @@ from robot_at_home import at_home
 from robospa.geometry import Array, Pose, look_rotation
 from robospa.harness.robots import embodiments
 from robospa.harness.robots.kinematics import end_effector, inverse, link_frames
+from robospa.harness.skills.bring_in import NarrowPassage, detour_stop
 from robospa.harness.skills.clearance import TOUCH, arm_depth, edge_depth, part_boxes
 from robospa.harness.skills.motion import blocked, detour, route
-from robospa.harness.skills.narrow_passage import NarrowPassage, detour_stop
 from robospa.harness.skills.pick import pick
 from robospa.harness.skills.touch import press
 from robospa.harness.skills.workspace import Workspace

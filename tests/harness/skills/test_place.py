@@ -16,12 +16,13 @@ from robospa.harness.skills import bring_in, place
 from robospa.harness.skills.bring_in import (
     ASIDE,
     DEEPER,
+    MARGIN,
+    NarrowPassage,
     approach_joints,
     put_down,
     slide_out,
     translated,
 )
-from robospa.harness.skills.narrow_passage import MARGIN, NarrowPassage
 from robospa.harness.skills.place import FAR, reachable_placements, release_opening
 from robospa.harness.skills.workspace import Workspace
 from robospa.tasks.catalog import build_scene

@@ -20,8 +20,8 @@ from undone_cases import CASES as UNDONE
 from robospa.tasks.catalog import build_scene, task
 from robospa.tasks.goals.checklist import Checklist
 from robospa.tasks.goals.conditions import Rests
-from robospa.tasks.goals.lift_cycles import CycleCounter
-from robospa.tasks.goals.pick import CARRY_DISTANCE, PickTracker
+from robospa.tasks.goals.counters import CycleCounter
+from robospa.tasks.goals.lifting import CARRY_DISTANCE, PickTracker
 from robospa.tasks.objects import model_of
 from robospa.tasks.scene import Scene
 

@@ -12,11 +12,12 @@ from robospa.geometry import Pose, Vec3, axis_rotation
 from robospa.tasks.events import outcome
 from robospa.tasks.goals.checklist import CHAIN, Checklist, by_turns
 from robospa.tasks.goals.conditions import Container, Inside, Opened, Rests, level_with, on_spot
-from robospa.tasks.goals.counters import FIGURES, PressCounter, StampCounter
-from robospa.tasks.goals.lift_cycles import (
+from robospa.tasks.goals.counters import (
+    FIGURES,
     CycleCounter,
+    PressCounter,
+    StampCounter,
     back_home,
-    cycles,
     held_up,
     put_down,
     raised,
@@ -283,7 +284,8 @@ HANDLES: tuple[Vec3, Vec3] = ((-0.1, 0.0, 0.05), (0.1, 0.0, 0.05))
 
 
 def fan(times: int) -> Checklist:
-    return cycles(CycleCounter("f", raised("f", 0.05), back_home("f", 0.04, 0.05)), times)
+    counter = CycleCounter("f", raised("f", 0.05), back_home("f", 0.04, 0.05))
+    return Checklist([counter] * times, radius=counter.radius, figures=("lifts", "released"))
 
 
 def at(rise: float, aside: float = 0.0) -> dict[str, Vec3]:

@@ -11,7 +11,7 @@ from robospa.geometry import Pose, Vec3
 from robospa.tasks.catalog import build_scene, tasks
 from robospa.tasks.descriptions import describe_objects
 from robospa.tasks.events import Event, ObjectRole
-from robospa.tasks.goals.lift_tracker import LiftTracker
+from robospa.tasks.goals.lifting import LiftTracker
 from robospa.tasks.goals.monitors import BESIDE, TOUCHING, ClutterMonitor, GraspMonitor
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.snapshot import Contact

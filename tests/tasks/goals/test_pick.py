@@ -8,7 +8,7 @@ import pytest
 from snapshots_by_hand import AWAY, held, kinds, run, snap
 
 from robospa.geometry import Vec3
-from robospa.tasks.goals.pick import Lift, PickTracker
+from robospa.tasks.goals.lifting import Lift, PickTracker
 from robospa.tasks.snapshot import Snapshot
 
 NAMES = ("object_0", "object_1", "object_2")

@@ -9,10 +9,9 @@ from snapshots_by_hand import held, kinds, play, snap
 
 from robospa.geometry import Pose, Vec3
 from robospa.tasks.events import outcome
-from robospa.tasks.goals.arranging import nest, row, stack
 from robospa.tasks.goals.checklist import Checklist
 from robospa.tasks.goals.conditions import Container, Region
-from robospa.tasks.goals.placing import Destination, bring, bring_alone, collect
+from robospa.tasks.goals.placing import Destination, bring, bring_alone, collect, nest, row, stack
 from robospa.tasks.snapshot import Snapshot
 from robospa.workcell import TABLE_TOP
 

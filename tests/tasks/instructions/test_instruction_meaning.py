@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 from robospa.tasks import catalog
-from robospa.tasks.instructions.grammar import SPLITS, slot_names
+from robospa.tasks.instructions import SPLITS, slot_names
 from robospa.tasks.scene import Scene
 from robospa.tasks.sentences import sentences, templates
 

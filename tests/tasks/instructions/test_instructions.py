@@ -10,7 +10,7 @@ from functools import cache
 import pytest
 
 from robospa.tasks import catalog
-from robospa.tasks.instructions.grammar import SPLITS, fill, masked_words, similarity
+from robospa.tasks.instructions import SPLITS, fill, masked_words, similarity
 from robospa.tasks.scene import Scene
 from robospa.tasks.sentences import instruction, sentences, templates
 

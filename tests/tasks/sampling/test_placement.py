@@ -5,8 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from robospa.tasks.sampling.markov import keeps_apart, pool, walk
-from robospa.tasks.sampling.places import Area, LayoutError, scatter, spread
+from robospa.tasks.sampling.places import (
+    Area,
+    LayoutError,
+    keeps_apart,
+    pool,
+    scatter,
+    spread,
+    walk,
+)
 
 A = np.array
 

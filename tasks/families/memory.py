@@ -1,11 +1,16 @@
-"""Observe_Blocks_Move_Memory, Observe_Objects_Click_Memory, Remember_Orientation_Restore.
+"""What has to be remembered: what was seen and is hidden, or what a long sentence says.
 
-Something is shown, and after 2.0 s a wall hides it; before that, motion fails for good.
+In four tasks something is shown, and after 2.0 s a wall or covers hide it; before that, motion
+fails for good.
 
 Blocks: k blocks of different colours on a stand at the back; 2 k blocks on the table, among them
 one of each colour shown. Objects: k objects of different kinds in a row on a stand at the back, and
 one like each of them on the table, all fixed. Orientation: k pairs of T-shaped blocks, one in a far
 and one in a near row, each turned by a quarter turn or none, partners differently.
+
+Colour cover: k blocks of different colours in a row, under equal covers that are opened in the
+asked order of colours. Staplers: k fixed staplers in a row, any variant and turn, and a count from
+1 to 5 for each; one press too many cannot be made good.
 """
 
 from __future__ import annotations
@@ -19,15 +24,25 @@ from robospa.geometry import Pose, yaw_rotation
 from robospa.tasks import objects
 from robospa.tasks.colors import NAMED
 from robospa.tasks.families import click_order, table
+from robospa.tasks.families.chain import pressing_arm
+from robospa.tasks.goals.clicks import PressCounts
 from robospa.tasks.goals.conditions import Region
-from robospa.tasks.goals.memory import AfterCue, OrientationTarget, restore
+from robospa.tasks.goals.memory import AfterCue, Cover, OrientationTarget, restore, uncover
 from robospa.tasks.goals.placing import gather
-from robospa.tasks.instructions.grammar import Slots
-from robospa.tasks.instructions.text import NUMBERS, TaskText, by_count
-from robospa.tasks.plan import Home, Pick, Place, Skill, Wait
-from robospa.tasks.sampling.places import Area, candidates, scatter, shuffled
+from robospa.tasks.instructions import (
+    NUMBERS,
+    Phrasings,
+    Slots,
+    TaskText,
+    by_count,
+    color_orders,
+    ordinal,
+)
+from robospa.tasks.plan import Home, Pick, Place, Press, Skill, Wait
+from robospa.tasks.sampling.places import Area, Point, candidates, scatter, shuffled
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.task import Level, SceneFacts, SceneSample, Task
+from robospa.text import listed
 from robospa.workcell import TABLE_TOP, Workcell
 
 BLOCKS_TEXT = TaskText.beside(__file__, "memory_wall_blocks.toml")
@@ -35,7 +50,7 @@ OBJECTS_TEXT = TaskText.beside(__file__, "memory_wall_objects.toml")
 TURNED_TEXT = TaskText.beside(__file__, "memory_wall_orientation.toml")
 
 HIDDEN_AT = 2.0
-"""When the wall appears [s]."""
+"""When the wall, or a cover, appears [s]."""
 WALL, WALL_COLOR = "wall", (1.0, 0.9, 0.9)
 WALL_HALF = (0.34, 0.005, 0.205)
 WALL_Z = TABLE_TOP + WALL_HALF[2]
@@ -106,27 +121,16 @@ class WallFacts(SceneFacts):
 
 def _draw_blocks(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
     """Colours on the stand; the same and as many others on the table, all places alike."""
-    colors = [list(table.COLORS)[int(i)] for i in rng.permutation(len(table.COLORS))[: 2 * level]]
+    colors = shuffled(rng, list(table.COLORS))[: 2 * level]
     shape, radius = (2 * level, TRIES), HALF * math.sqrt(2)
     propose = candidates(workcell, AREA, shape, radius, 2 * HALF, MIDDLE)
     points = shuffled(rng, scatter(rng, propose, DISTANCE))
     items = [wall(0.12), BLOCKS_STAND]
     for color, x in zip(colors[:level], row(level, SHOWN_X), strict=True):
-        pose = Pose((x, BLOCKS_STAND.pose.position[1], STAND_TOP + HALF))
-        items.append(
-            table.Item(
-                f"{color} shown", "block", pose, table.cube(HALF, table.COLORS[color]), fixed=True
-            )
-        )
+        at, rgb = (x, BLOCKS_STAND.pose.position[1]), table.COLORS[color]
+        items.append(table.block(f"{color} shown", at, HALF, rgb, fixed=True, top=STAND_TOP))
     for color, point in zip(colors, points, strict=True):
-        items.append(
-            table.Item(
-                color,
-                "block",
-                table.standing(point, height=HALF),
-                table.cube(HALF, table.COLORS[color]),
-            )
-        )
+        items.append(table.block(color, point, HALF, table.COLORS[color]))
     scene_objects, names = table.named(rng, items)
     facts = WallFacts(
         colors=tuple(colors[:level]),
@@ -192,8 +196,7 @@ class ObjectsFacts(SceneFacts):
 
 
 def _draw_objects(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
-    """Different kinds, in random order on the stand, at random places on the table."""
-    kinds = [KINDS[int(i)] for i in rng.permutation(len(KINDS))[:level]]
+    kinds = shuffled(rng, KINDS)[:level]
     things = [(kind, click_order.clickable(rng, kind)) for kind in kinds]
     turns = dict.fromkeys(click_order.TURNS, math.pi)
     places = click_order.laid_out(rng, workcell, TABLE_AREA, OFF_MIDDLE, APART, things, turns)
@@ -218,7 +221,6 @@ def _objects_goal(scene: Scene) -> AfterCue:
 
 
 def _objects_plan(scene: Scene) -> tuple[Skill, ...]:
-    """Hold still, then one press each."""
     return (HOLD_STILL, *click_order.clicks(scene, ObjectsFacts.of(scene).order))
 
 
@@ -338,5 +340,189 @@ ORIENTATION = Task(
     success=(
         "After the wall has come, every near block lies within 3 cm of its place and 15 degrees of "
         "its partner's direction, and both grippers are open; moving before fails for good."
+    ),
+)
+
+
+COUNTS_TEXT = TaskText.beside(__file__, "memory_counts.toml")
+
+STAPLER_ROWS = {
+    1: (0.0,),
+    2: (-0.24, 0.24),
+    3: (-0.24, 0.0, 0.24),
+    4: (-0.24, -0.08, 0.08, 0.24),
+    5: (-0.24, -0.12, 0.0, 0.12, 0.24),
+}
+"""x of the staplers [m]."""
+STAPLERS_Y = (-0.03, 0.04)
+"""Range of the row's y [m]: nearer to the robot, the outer staplers would not be in view."""
+MOST = 5
+
+
+@dataclass(frozen=True)
+class CountsFacts(SceneFacts):
+    """The staplers from left to right, and how often each is pressed."""
+
+    row: tuple[str, ...]
+    counts: tuple[int, ...]
+
+
+def _draw_counts(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
+    y = float(rng.uniform(*STAPLERS_Y))
+    items = [
+        table.Item(
+            f"stapler {i}",
+            "stapler",
+            table.standing((x, y), float(rng.uniform(-math.pi, math.pi))),
+            table.draw_variant(rng, "stapler"),
+            fixed=True,
+        )
+        for i, x in enumerate(STAPLER_ROWS[level])
+    ]
+    counts = tuple(int(n) for n in rng.integers(1, MOST + 1, level))
+    scene_objects, names = table.named(rng, items)
+    return SceneSample(
+        scene_objects, CountsFacts(tuple(names[item.role] for item in items), counts)
+    )
+
+
+def _counts_goal(scene: Scene) -> PressCounts:
+    """The row from left to right with its counts; grippers need not be closed (official)."""
+    row = [
+        click_order.click_counter(scene, name, closed=False) for name in CountsFacts.of(scene).row
+    ]
+    return PressCounts(row, CountsFacts.of(scene).counts)
+
+
+def _counts_plan(scene: Scene) -> tuple[Skill, ...]:
+    skills: list[Skill] = []
+    for name, count in zip(CountsFacts.of(scene).row, CountsFacts.of(scene).counts, strict=True):
+        skills += [Press(name, arm=pressing_arm(scene, name))] * count
+    return tuple(skills)
+
+
+def _counts_slots(scene: Scene) -> Slots:
+    counts = CountsFacts.of(scene).counts
+    if len(counts) == 1:
+        return COUNTS_TEXT.slots("stapler") | {"times": _times(counts[0])}
+    words = [_times(n)[0][0] for n in counts]
+    ranks = [f"the {ordinal(i)[1]} {word}" for i, word in enumerate(words, 1)]
+    places = [f"number {i} {word}" for i, word in enumerate(words, 1)]
+    each = [f"the {ordinal(i)[1]} one {word}" for i, word in enumerate(words, 1)]
+    return COUNTS_TEXT.slots("row") | {
+        "counts": (
+            (listed(ranks), ", ".join(ranks)),
+            (listed(places), ", ".join(places), listed(each)),
+        )
+    }
+
+
+def _times(count: int) -> Phrasings:
+    return COUNTS_TEXT.phrasings(f"times.{by_count(count)}", count=count, word=NUMBERS[count])
+
+
+COUNTS = Task(
+    name="Press_Stapler_Memory",
+    category="MIP",
+    levels=table.LEVELS,
+    draw=_draw_counts,
+    goal=_counts_goal,
+    plan=_counts_plan,
+    templates=COUNTS_TEXT.templates,
+    slots=_counts_slots,
+    summary="Press each stapler of the row as often as asked.",
+    success=(
+        "Every stapler was touched by a gripper near its press point exactly as often as asked, "
+        "with at least 0.1 s without a touch between presses."
+    ),
+)
+
+
+COVER_TEXT = TaskText.beside(__file__, "memory_cover.toml")
+
+COVER_COLORS = table.first_colors(10)
+COVER_ROWS = {
+    1: (0.0,),
+    2: (-0.20, 0.20),
+    3: (-0.20, 0.0, 0.20),
+    4: (-0.20, -0.0667, 0.0667, 0.20),
+    5: (-0.27, -0.145, -0.02, 0.105, 0.23),
+}
+"""x of the blocks [m]."""
+COVER_Y, COVER_HALF = -0.18, 0.02
+BEHIND = 0.13
+"""An opened cover's place lies this far [m] behind its block, away from the robot."""
+OPEN_BELOW = 0.005
+"""An opened cover's origin is lower than this [m]."""
+
+
+@dataclass(frozen=True)
+class CoverFacts(SceneFacts):
+    """Colours, covers and blocks in the order in which covers are opened."""
+
+    colors: tuple[str, ...]
+    covers: tuple[str, ...]
+    blocks: tuple[str, ...]
+
+
+def _draw_cover(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
+    chosen = shuffled(rng, list(COVER_COLORS))[:level]
+    items = []
+    for color, x in zip(chosen, COVER_ROWS[level], strict=True):
+        at = (x, COVER_Y)
+        block = table.block(f"{color} block", at, COVER_HALF, COVER_COLORS[color], fixed=True)
+        cover = table.Item(f"{color} cover", "cover", table.standing(at), appears_at=HIDDEN_AT)
+        items += [block, cover]
+    order = tuple(shuffled(rng, chosen))
+    scene_objects, names = table.named(rng, items)
+    facts = CoverFacts(
+        colors=order,
+        covers=tuple(names[f"{color} cover"] for color in order),
+        blocks=tuple(names[f"{color} block"] for color in order),
+    )
+    return SceneSample(scene_objects, facts)
+
+
+def _open_places(scene: Scene) -> dict[str, Point]:
+    """Where each cover goes, in the asked order."""
+    facts, places = CoverFacts.of(scene), {}
+    for cover, block in zip(facts.covers, facts.blocks, strict=True):
+        x, y, _ = scene.object(block).pose.position
+        places[cover] = (x, y + BEHIND)
+    return places
+
+
+def _cover_goal(scene: Scene) -> AfterCue:
+    below = scene.table_top + OPEN_BELOW
+    return uncover([Cover(name, place, below) for name, place in _open_places(scene).items()])
+
+
+def _cover_plan(scene: Scene) -> tuple[Skill, ...]:
+    skills: list[Skill] = [Wait(HIDDEN_AT + 0.6)]
+    for name, (x, y) in _open_places(scene).items():
+        skills += table.moved(name, (x, y, scene.table_top), table.side(x))
+    return (*skills, Home())
+
+
+def _cover_slots(scene: Scene) -> Slots:
+    colors = CoverFacts.of(scene).colors
+    if len(colors) == 1:
+        return COVER_TEXT.slots("where", "block", color=colors[0])
+    return COVER_TEXT.slots("where") | {"order": color_orders(colors)}
+
+
+COVER = Task(
+    name="Remember_Color_Cover",
+    category="MIP",
+    levels=levels(candidates=1),
+    draw=_draw_cover,
+    goal=_cover_goal,
+    plan=_cover_plan,
+    templates=COVER_TEXT.templates,
+    slots=_cover_slots,
+    summary="Remember the colours under the covers and open them in the asked order.",
+    success=(
+        "After the covers have appeared, each was put 13 cm behind its block in the asked order; "
+        "moving before, opening one too early or moving an opened one fails for good."
     ),
 )
