@@ -20,17 +20,8 @@ from numpy.typing import NDArray
 from robospa.action_space import ARMS
 from robospa.geometry import Pose, Vec3
 from robospa.harness.robots.embodiment import Embodiment
-from robospa.harness.sim.cameras import (
-    FAR,
-    MOST,
-    CameraView,
-    TiledRenderer,
-    add_copies,
-    new_camera,
-    pixels,
-    rows,
-    visibility,
-)
+from robospa.harness.sim import cameras as pictures
+from robospa.harness.sim.cameras import CameraView
 from robospa.harness.sim.furniture import DrawnFurniture
 from robospa.harness.world import RenderUnavailable
 from robospa.observation import CameraSpec
@@ -113,7 +104,7 @@ class Renderer:
         import sapien
 
         self._scene: sapien.Scene = sapien.Scene([self._system])
-        self._copies = MOST if self._system.device.name.startswith(SOFTWARE) else 1
+        self._copies = pictures.MOST if self._system.device.name.startswith(SOFTWARE) else 1
         self._cameras: dict[tuple[str, int, int], sapien.render.RenderCameraComponent] = {}
         self._robot: list[dict[str, sapien.Entity]] = []
         self._objects: dict[str, sapien.Entity] = {}
@@ -122,7 +113,7 @@ class Renderer:
         self._embodiment: Embodiment | None = None
         self._stand: sapien.Entity | None = None
         self._room = DrawnFurniture(self._scene, self._copies)
-        self._abreast = TiledRenderer(self._scene)
+        self._abreast = pictures.TiledRenderer(self._scene)
         self._grew = False
 
     def _draw(
@@ -133,7 +124,7 @@ class Renderer:
 
         entity = render_body(shapes, name, self._copies, skin)
         if entity is not None:
-            add_copies(self._scene, entity)
+            pictures.add_copies(self._scene, entity)
             self._grew = True
         return entity
 
@@ -218,7 +209,7 @@ class Renderer:
     ) -> list[NDArray[np.uint8]]:
         sky, taken = self._room.sky(), dict[int, NDArray[np.uint8]]()
         alone = {}
-        for row in rows(cameras):
+        for row in pictures.rows(cameras):
             if len(row) == 1 or self._copies == 1:
                 alone.update({index: self._camera(cameras[index], views[index]) for index in row})
             else:
@@ -229,7 +220,7 @@ class Renderer:
             self._scene.update_render()
         for camera in alone.values():  # the device draws one while the next is handed over
             camera.take_picture()
-        taken.update({index: pixels(camera, sky) for index, camera in alone.items()})
+        taken.update({index: pictures.pixels(camera, sky) for index, camera in alone.items()})
         return [taken[index] for index in range(len(cameras))]
 
     def _leave_out(
@@ -253,7 +244,7 @@ class Renderer:
                 visible = in_frame(seen, model, pose)
                 if bool(drawn.components[0].visibility) != visible:  # a change costs SAPIEN 1 ms
                     for picture, copy in enumerate(drawn.components):
-                        copy.visibility = visibility(picture) if visible else 0.0
+                        copy.visibility = pictures.visibility(picture) if visible else 0.0
 
     def _remove(self, name: str) -> None:
         for entity in (self._objects.pop(name), self._parts.pop(name, (None,))[0]):
@@ -293,9 +284,9 @@ class Renderer:
         """The camera of `spec`, made on first use and put there."""
         key = (spec.name, spec.width, spec.height)
         if key not in self._cameras:
-            camera = new_camera(self._scene, spec.width, spec.height)
+            camera = pictures.new_camera(self._scene, spec.width, spec.height)
             camera.set_fovy(view.fov, compute_x=True)
-            camera.near, camera.far = view.near, FAR
+            camera.near, camera.far = view.near, pictures.FAR
             self._cameras[key] = camera
         camera = self._cameras[key]
         self._place(camera.entity, view.pose)

@@ -17,27 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.geometry import Pose
+from robospa.harness import world
 from robospa.harness.action_decoder import ActionDecoder
 from robospa.harness.robots import embodiment as embodiment_named
+from robospa.harness.sim import motion
 from robospa.harness.sim.bodies import DENSITY
 from robospa.harness.sim.lazy_snapshot import LazySnapshot, Pair, PoseTable, StateLayout, unpack
-from robospa.harness.sim.motion import (
-    ACTION_LIMITS,
-    RATE,
-    SpeedLimits,
-    Trajectory,
-    fixed_rate,
-    rest_to_rest,
-)
 from robospa.harness.sim.physics import Drives, Physics, settle
-from robospa.harness.world import (
-    FROM_MEASURED,
-    ROBOT_ASSETS,
-    Poll,
-    RenderUnavailable,
-    SceneUnstable,
-    StepResult,
-)
 from robospa.observation import CameraSpec, Observation
 from robospa.protocol.policy import PolicySpec
 from robospa.tasks.environment_state import EnvironmentState
@@ -72,11 +58,11 @@ class SapienWorld:
         control: str = "rest_to_rest",
         action_steps: int = 10,
         models: Models | None = None,
-        limits: SpeedLimits = ACTION_LIMITS,
+        limits: motion.SpeedLimits = motion.ACTION_LIMITS,
         robot_assets: str = "builtin",
     ) -> None:
-        if robot_assets not in ROBOT_ASSETS:
-            known = ", ".join(ROBOT_ASSETS)
+        if robot_assets not in world.ROBOT_ASSETS:
+            known = ", ".join(world.ROBOT_ASSETS)
             raise ValueError(f"no robot assets {robot_assets!r}; there are {known}")
         self._robot_assets = robot_assets
         if control not in CONTROLS:
@@ -122,7 +108,7 @@ class SapienWorld:
             self._embodiment.grippers,
         )
         self._later = sorted(
-            (math.ceil(item.appears_at * RATE - 1e-9), i)
+            (math.ceil(item.appears_at * motion.RATE - 1e-9), i)
             for i, item in enumerate(scene.everything)
             if item.appears_at is not None
         )
@@ -131,7 +117,7 @@ class SapienWorld:
                 self._create(physics, i)
         try:
             settle(physics, f"{scene.task} level {scene.level} seed {scene.seed}")
-        except SceneUnstable:
+        except world.SceneUnstable:
             self._drop_physics()
             raise
         self._appear(physics)
@@ -159,7 +145,7 @@ class SapienWorld:
 
     # -- acting -------------------------------------------------------------------------------
 
-    def step(self, action: NDArray[np.float32], space: str, poll: Poll) -> StepResult:
+    def step(self, action: NDArray[np.float32], space: str, poll: world.Poll) -> world.StepResult:
         """Execute one action; see `robospa.harness.action_decoder` for what is clipped and refused.
 
         `poll` gets a snapshot whenever simulated time passes a multiple of POLL_STEPS steps; if it
@@ -168,15 +154,17 @@ class SapienWorld:
         physics = self._loaded()
         drives = self._drives
         goals = self._decoder.decode(action, space, drives.joints)
-        start = self._measured_start(goals.joints) if space in FROM_MEASURED else drives.joints
+        start = (
+            self._measured_start(goals.joints) if space in world.FROM_MEASURED else drives.joints
+        )
         change = (start, goals.joints, drives.gripper, goals.gripper, drives.opening)
         if self._control == "rest_to_rest":
-            path = rest_to_rest(*change, self._limits)
+            path = motion.rest_to_rest(*change, self._limits)
         else:
-            path = fixed_rate(*change, self._action_steps)
+            path = motion.fixed_rate(*change, self._action_steps)
         done, stopped = self._follow(physics, path, poll)
         joints = None if space == "joint" else self._decoder.joint_action(goals)
-        return StepResult(done, stopped, goals.problems, joints)
+        return world.StepResult(done, stopped, goals.problems, joints)
 
     def _measured_start(self, goals: NDArray[np.float64]) -> NDArray[np.float64]:
         """Where the arms are, (2, J) [rad]: pose actions are planned from there (official). An arm
@@ -187,7 +175,9 @@ class SapienWorld:
                 start[a, : len(joints)] = joints
         return start
 
-    def _follow(self, physics: Physics, path: Trajectory, poll: Poll) -> tuple[int, bool]:
+    def _follow(
+        self, physics: Physics, path: motion.Trajectory, poll: world.Poll
+    ) -> tuple[int, bool]:
         """Drive along `path`; physics steps taken and whether `poll` ended it."""
         drives = self._drives
         writers, table = drives.schedule(path)
@@ -312,7 +302,9 @@ class SapienWorld:
 
     def _open_renderer(self) -> Renderer:
         if self._render is False:
-            raise RenderUnavailable("this world was made with render=False and draws no images")
+            raise world.RenderUnavailable(
+                "this world was made with render=False and draws no images"
+            )
         from robospa.harness.sim.renderer import Renderer
 
         if self._robot_assets == "builtin":
@@ -343,7 +335,7 @@ class SapienWorld:
             "simulator": "sapien",
             **versions(),
             "backend": "physx-cpu",
-            "physics_hz": RATE,
+            "physics_hz": motion.RATE,
             "control": self._control,
             **({"action_steps": self._action_steps} if self._control == "fixed_rate" else {}),
             **({} if self._robot_assets == "builtin" else {"robot_assets": self._robot_assets}),

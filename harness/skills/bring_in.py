@@ -24,24 +24,9 @@ from robospa.geometry import (
     yaw_rotation,
 )
 from robospa.harness.robots.kinematics import forward, inverse
-from robospa.harness.skills.clearance import (
-    TOUCH,
-    Boxes,
-    arm_depth,
-    arm_points,
-    finger_points,
-    palm_points,
-    part_boxes,
-    standing,
-)
+from robospa.harness.skills import clearance
+from robospa.harness.skills import pick as grasping
 from robospa.harness.skills.motion import line_poses, retreat_home, rise, route, travel
-from robospa.harness.skills.pick import (
-    GraspCandidate,
-    GraspFilter,
-    arms_for,
-    pick,
-    reachable_grasps,
-)
 from robospa.harness.skills.place import grip_offset, place
 from robospa.harness.skills.workspace import SkillFailed, Steps, Workspace, moved_back
 from robospa.tasks.plan import Dock, Hang, Pick, Place
@@ -168,12 +153,12 @@ def dock(ws: Workspace, call: Dock) -> Steps:
     goal = translated(frame, (x * RELEASED_ABOVE, y * RELEASED_ABOVE, z * RELEASED_ABOVE))
     path = [(x * call.above, y * call.above, z * call.above), (0.0, 0.0, 0.0)]
 
-    def feasible(grasp: GraspCandidate) -> bool:
+    def feasible(grasp: grasping.GraspCandidate) -> bool:
         offset = grasp.pose.inverse() * ws.pose(call.object)
         return approach_joints(ws, grasp.arm, offset, [goal], path, grasp.joints) is not None
 
     for _ in range(DOCK_ATTEMPTS):
-        yield from pick(ws, Pick(call.object, DOCK_LIFT, call.arm), feasible)
+        yield from grasping.pick(ws, Pick(call.object, DOCK_LIFT, call.arm), feasible)
         arm = ws.held.index(call.object)
         offset = grip_offset(ws, arm, call.object)
         way = approach_joints(ws, arm, offset, [goal], path, ws.joints[arm])
@@ -229,18 +214,20 @@ def hang(ws: Workspace, call: Hang) -> Steps:
     paths = [_path(peg, out) for out in OUTS]
     planned, allowed = _targets(peg, handle, (0.0,)), _targets(peg, handle, WOBBLES)
     refused: list[Pose] = []
-    taken: list[GraspCandidate] = []
+    taken: list[grasping.GraspCandidate] = []
     for attempt in range(HANG_ATTEMPTS):
         last = attempt == HANG_ATTEMPTS - 1
         choices: tuple[list[Pose], ...] = (planned, allowed)
         x, y, z = ws.pose(call.object).position
-        grasps = reachable_grasps(ws, call.object, arms_for(call.arm))
+        grasps = grasping.reachable_grasps(ws, call.object, grasping.arms_for(call.arm))
         filters = (
             _grasp_filter(ws, call, targets, paths, narrow, refused)
             for narrow, targets in product((True, False), (planned, allowed))
         )
         feasible = next((f for f in filters if any(f(grasp) for grasp in grasps)), None)
-        taken.append((yield from pick(ws, Pick(call.object, HANG_LIFT, call.arm), feasible, taken)))
+        taken.append(
+            (yield from grasping.pick(ws, Pick(call.object, HANG_LIFT, call.arm), feasible, taken))
+        )
         arm = ws.held.index(call.object)
         gripped = grip_offset(ws, arm, call.object)
         way = _held_way(ws, call, arm, choices, paths)
@@ -366,11 +353,11 @@ def _grasp_filter(
     paths: list[list[Vec3]],
     only_free: bool,
     refused: list[Pose],
-) -> GraspFilter:
+) -> grasping.GraspFilter:
     """Accepts grasps from which a target is reachable, but for those `refused` in the hand."""
     body = ws.pose(call.object)
 
-    def feasible(grasp: GraspCandidate) -> bool:
+    def feasible(grasp: grasping.GraspCandidate) -> bool:
         offset = grasp.pose.inverse() * body
         if any(_alike(offset, other) for other in refused):
             return False
@@ -415,13 +402,16 @@ class NarrowPassage:
     def free(self, way: list[Array]) -> bool:
         """Whether the arm keeps clear of the object on the lines between joints [rad] `way`."""
         line = _along(way)
-        wide = part_boxes(self.ws.models[self.beside], self.ws.pose(self.beside), MARGIN)
-        if (wide.depths(arm_points(self.ws, self.arm, line)) > 0).any():
+        wide = clearance.part_boxes(self.ws.models[self.beside], self.ws.pose(self.beside), MARGIN)
+        if (wide.depths(clearance.arm_points(self.ws, self.arm, line)) > 0).any():
             return False
         frames, _ = forward(self.ws.chains[self.arm], line)
         hand = self.ws.hand(self.arm)
         ends = [from_transform(frame) for frame in frames]
-        parts = [(finger_points(hand, end, 0.0), palm_points(hand, end)) for end in ends]
+        parts = [
+            (clearance.finger_points(hand, end, 0.0), clearance.palm_points(hand, end))
+            for end in ends
+        ]
         depths = wide.depths(np.stack([np.concatenate(both) for both in parts]))
         return not bool((depths > MARGIN / 2).any())
 
@@ -437,7 +427,9 @@ class NarrowPassage:
         Both count as points in the boxes that they are made of.
         """
         bodies = self._carried(way)
-        around = part_boxes(self.ws.models[self.beside], self.ws.pose(self.beside), MARGIN / 2)
+        around = clearance.part_boxes(
+            self.ws.models[self.beside], self.ws.pose(self.beside), MARGIN / 2
+        )
         corners = around.points()
         return not any(around.depth(b.points()) > 0 or b.depth(corners) > 0 for b in bodies)
 
@@ -445,23 +437,25 @@ class NarrowPassage:
         """Whether arm and held object touch nothing but the object on these lines."""
         held = self.ws.held[self.arm]
         but = (self.beside,) if held is None else (self.beside, held)
-        if (arm_depth(self.ws, self.arm, _along(way), *but) > TOUCH).any():
+        if (clearance.arm_depth(self.ws, self.arm, _along(way), *but) > clearance.TOUCH).any():
             return False
-        others = standing(self.ws, *but)
+        others = clearance.standing(self.ws, *but)
         return not any(others.depth(body.points()) > 0 for body in self._carried(way))
 
     def open(self, way: list[Array]) -> bool:
         """Whether arm and held object keep clear of object and table on these lines."""
         return self.free(way) and self.above_table(way) and self.carried_past(way)
 
-    def _carried(self, way: list[Array]) -> list[Boxes]:
+    def _carried(self, way: list[Array]) -> list[clearance.Boxes]:
         """The boxes of what is held, along the lines between joints [rad] `way`."""
         held = self.ws.held[self.arm]
         if held is None:
             return []
         frames, _ = forward(self.ws.chains[self.arm], _along(way))
         model = self.ws.models[held]
-        return [part_boxes(model, from_transform(frame) * self.offset) for frame in frames]
+        return [
+            clearance.part_boxes(model, from_transform(frame) * self.offset) for frame in frames
+        ]
 
 
 def _along(way: list[Array]) -> Array:

@@ -23,22 +23,8 @@ from robospa.harness.skills.place import can_follow, drop, place, place_position
 from robospa.harness.skills.raise_lower import raise_lower
 from robospa.harness.skills.touch import hit, press, stamp
 from robospa.harness.skills.workspace import SkillFailed, Steps, Workspace
+from robospa.tasks import plan as calls
 from robospa.tasks.catalog import task
-from robospa.tasks.plan import (
-    Dock,
-    Drop,
-    Hang,
-    Hit,
-    Home,
-    Open,
-    Pick,
-    Place,
-    Pour,
-    Press,
-    RaiseLower,
-    Stamp,
-    Wait,
-)
 from robospa.tasks.scene import Scene
 from robospa.tasks.snapshot import Snapshot
 
@@ -52,17 +38,17 @@ STUCK_ABOVE = 0.04
 
 
 SKILLS: Mapping[type, Callable[..., Generator[Array, Snapshot, object]]] = {
-    Pick: pick,
-    Place: place,
-    Drop: drop,
-    Press: press,
-    Open: pull_open,
-    Stamp: stamp,
-    Dock: dock,
-    Hang: hang,
-    Hit: hit,
-    Pour: pour,
-    RaiseLower: raise_lower,
+    calls.Pick: pick,
+    calls.Place: place,
+    calls.Drop: drop,
+    calls.Press: press,
+    calls.Open: pull_open,
+    calls.Stamp: stamp,
+    calls.Dock: dock,
+    calls.Hang: hang,
+    calls.Hit: hit,
+    calls.Pour: pour,
+    calls.RaiseLower: raise_lower,
 }
 """What performs each kind of call, from the workspace and the call."""
 
@@ -98,18 +84,18 @@ class Expert:
         return np.asarray(rows, dtype=np.float32)
 
     def _run(self, plan: Sequence[object]) -> Steps:
-        calls = list(plan)
-        while calls:
-            self.plan_done = all(isinstance(call, Home) for call in calls)
-            call = calls.pop(0)
-            follow = calls[0] if calls else None
+        left = list(plan)
+        while left:
+            self.plan_done = all(isinstance(call, calls.Home) for call in left)
+            call = left.pop(0)
+            follow = left[0] if left else None
             try:
                 if (
-                    isinstance(call, Pick)
-                    and isinstance(follow, Place | Drop)
+                    isinstance(call, calls.Pick)
+                    and isinstance(follow, calls.Place | calls.Drop)
                     and follow.object == call.object
                 ):
-                    calls.pop(0)
+                    left.pop(0)
                     yield from self._move(call, follow)
                 else:
                     yield from self._single(call)
@@ -125,17 +111,17 @@ class Expert:
         skill = SKILLS.get(type(call))
         if skill is not None:
             yield from skill(ws, call)
-        elif isinstance(call, Wait):
+        elif isinstance(call, calls.Wait):
             for _ in range(round(call.seconds / HOLD_SECONDS)):
                 ws.add(0)
             yield from ws.flush()
-        elif isinstance(call, Home):
+        elif isinstance(call, calls.Home):
             go_home(ws, arms_for(call.arm))
             yield from ws.flush()
         else:
             raise SkillFailed(f"no skill performs {type(call).__name__}")
 
-    def _move(self, first: Pick, then: Place | Drop) -> Steps:
+    def _move(self, first: calls.Pick, then: calls.Place | calls.Drop) -> Steps:
         """Pick and place as one: done again while the object is not where it should be."""
         ws = self.workspace
         for left in reversed(range(MOVE_ATTEMPTS)):
@@ -143,7 +129,7 @@ class Expert:
             yield from pick(ws, first, partial(can_follow, ws, then))
             arm = ws.held.index(first.object)
             try:
-                yield from place(ws, then) if isinstance(then, Place) else drop(ws, then)
+                yield from place(ws, then) if isinstance(then, calls.Place) else drop(ws, then)
             except SkillFailed:  # it turned in the hand: put it down and take it anew
                 yield from put_down(ws, arm, height)
                 if left == 0:
@@ -151,18 +137,18 @@ class Expert:
                 continue
             if self._arrived(then):
                 return
-        if isinstance(then, Place) and self._hangs(then):
+        if isinstance(then, calls.Place) and self._hangs(then):
             yield from slide_out(ws, arm, then.object, place_position(ws, then)[2])
 
-    def _hangs(self, call: Place) -> bool:
+    def _hangs(self, call: calls.Place) -> bool:
         """Whether the object came up again with the gripper that let it go."""
         goal = place_position(self.workspace, call)
         return self.workspace.pose(call.object).position[2] - goal[2] >= STUCK_ABOVE
 
-    def _arrived(self, call: Place | Drop) -> bool:
+    def _arrived(self, call: calls.Place | calls.Drop) -> bool:
         ws = self.workspace
         here = np.array(ws.pose(call.object).position)
-        if isinstance(call, Place):
+        if isinstance(call, calls.Place):
             goal = np.array(place_position(ws, call))
             off = np.abs(here[:2] - goal[:2]).max()
             return bool(off < PLACED_WITHIN and not self._hangs(call))

@@ -24,16 +24,7 @@ from robospa.geometry import (
     to_matrix,
 )
 from robospa.harness.robots.kinematics import inverse
-from robospa.harness.skills.clearance import (
-    TOUCH,
-    Boxes,
-    arm_depth,
-    bounding_box,
-    finger_points,
-    neighbours,
-    own_boxes,
-    palm_points,
-)
+from robospa.harness.skills import clearance
 from robospa.harness.skills.motion import go, line_poses, retreat_home, rise, route
 from robospa.harness.skills.workspace import (
     SkillFailed,
@@ -170,12 +161,14 @@ def candidate_poses(
     return found
 
 
-def _fitting_opening(hand: Gripper, pose: Pose, width: float, own: Boxes) -> tuple[float, float]:
+def _fitting_opening(
+    hand: Gripper, pose: Pose, width: float, own: clearance.Boxes
+) -> tuple[float, float]:
     """How deep [m] the fingers are in the object's own boxes, and at what opening [m]."""
     best = (math.inf, 0.0)
     for margin in OPENING_MARGINS:
         opening = min(hand.opening, width + margin)
-        depth = own.depth(finger_points(hand, pose, opening))
+        depth = own.depth(clearance.finger_points(hand, pose, opening))
         if depth < best[0]:
             best = (depth, opening)
         if depth == 0.0:
@@ -189,7 +182,11 @@ def reachable_grasps(
     """All grasps of `name` that one of `arms` can take now, best first."""
     model = ws.models[name]
     body = ws.pose(name)
-    near, own, whole = neighbours(ws, name), own_boxes(model, body), bounding_box(model, body)
+    near, own, whole = (
+        clearance.neighbours(ws, name),
+        clearance.own_boxes(model, body),
+        clearance.bounding_box(model, body),
+    )
     front = wall_front(ws)
     found: list[GraspCandidate] = []
     for arm in arms:
@@ -205,12 +202,12 @@ def reachable_grasps(
         if abs(body.position[0]) < 0.04:
             wrong *= abs(body.position[0]) / 0.04
         reached = np.flatnonzero(ok)
-        arm_in = arm_depth(ws, arm, joints[reached], name)
+        arm_in = clearance.arm_depth(ws, arm, joints[reached], name)
         for i, blocked in zip(reached, arm_in.tolist(), strict=True):
             pose, approach, tilt, width = poses[i]
             inside, opening = _fitting_opening(hand, pose, width, own)
-            palm = palm_points(hand, pose)
-            around = np.concatenate([finger_points(hand, pose, opening), palm])
+            palm = clearance.palm_points(hand, pose)
+            around = np.concatenate([clearance.finger_points(hand, pose, opening), palm])
             others = max(near.depth(around), blocked)
             depth = max(inside, whole.depth(palm), others)
             turned = joints[i] - home  # of the last two joints: how far hand and wrist turn
@@ -305,8 +302,11 @@ def _choose(
                 spare = spare or found
                 continue
             free = route(ws, option.arm, back[-1]).free
-            touches = arm_depth(ws, option.arm, np.stack(back), call.object).max() > TOUCH
-            touches |= feasible is not None and option.depth > TOUCH
+            touches = (
+                clearance.arm_depth(ws, option.arm, np.stack(back), call.object).max()
+                > clearance.TOUCH
+            )
+            touches |= feasible is not None and option.depth > clearance.TOUCH
             if free and not touches:
                 return found
             obstructed.append((not free, found))

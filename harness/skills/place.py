@@ -11,14 +11,7 @@ from numpy.typing import NDArray
 
 from robospa.geometry import Array, Pose, Quat, axis_rotation, multiply, rotate, yaw_rotation
 from robospa.harness.robots.kinematics import inverse
-from robospa.harness.skills.clearance import (
-    TOUCH,
-    arm_depth,
-    bounding_box,
-    finger_points,
-    own_boxes,
-    standing,
-)
+from robospa.harness.skills import clearance
 from robospa.harness.skills.motion import detour, line_poses, retreat_home, route, travel
 from robospa.harness.skills.pick import GraspCandidate, pick
 from robospa.harness.skills.workspace import SkillFailed, Steps, Workspace, moved_back, moved_up
@@ -99,7 +92,9 @@ def _best(
     """Placements at those of `joints` (N, J) [rad] that are `ok`, nearest to `near` first."""
     reached = np.flatnonzero(ok)
     held = ws.held[arm]
-    blocked = arm_depth(ws, arm, joints[reached], *([held] if held else [])) > TOUCH
+    blocked = (
+        clearance.arm_depth(ws, arm, joints[reached], *([held] if held else [])) > clearance.TOUCH
+    )
     far = np.abs(joints[reached] - near).max(axis=1)
     order = reached[np.lexsort((far, blocked))]
     found = []
@@ -154,13 +149,13 @@ def release_opening(ws: Workspace, arm: int, pose: Pose, offset: Pose, call: Pla
     `pose`: all the way, or less where a finger would push a neighbour aside and then does not."""
     hand, model = ws.hand(arm), ws.models[call.object]
     boxes = all(isinstance(s.geometry, Box) for s in model.shapes if s.collision)
-    own = (own_boxes if boxes else bounding_box)(model, pose * offset)
+    own = (clearance.own_boxes if boxes else clearance.bounding_box)(model, pose * offset)
     without = [name for name in (call.object, call.on) if name is not None]
     for share in OPENINGS:
-        fingers = finger_points(hand, pose, hand.opening * share)
+        fingers = clearance.finger_points(hand, pose, hand.opening * share)
         if own.depth(fingers) > 0.0:
             break
-        if standing(ws, *without).depth(fingers) <= TOUCH:
+        if clearance.standing(ws, *without).depth(fingers) <= clearance.TOUCH:
             return 1.0 if share == 1.0 else ws.robot.arms[arm].gripper_value(hand.opening * share)
     return 1.0
 

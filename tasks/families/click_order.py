@@ -29,15 +29,7 @@ from robospa.tasks.instructions import (
     one_after_another,
 )
 from robospa.tasks.plan import Press, Skill
-from robospa.tasks.sampling.places import (
-    Area,
-    LayoutError,
-    Point,
-    apart,
-    candidates,
-    retry,
-    scatter,
-)
+from robospa.tasks.sampling import places
 from robospa.tasks.sampling.turns import Turnable, free_turns, outline
 from robospa.tasks.scene import Scene
 from robospa.tasks.shapes import Params
@@ -76,12 +68,12 @@ def clickable(rng: np.random.Generator, asset: str) -> dict[str, int]:
 def laid_out(
     rng: np.random.Generator,
     workcell: Workcell,
-    area: Area,
+    area: places.Area,
     middle: float,
     distance: float,
     items: Sequence[tuple[str, Params]],
     turns: Mapping[str, float] = TURNS,
-) -> list[tuple[Point, float]]:
+) -> list[tuple[places.Point, float]]:
     """A free place [m] and a turn [rad] for each item, seen whole by the head camera.
 
     Off the middle line by `middle` [m], pairwise at least `distance` [m] apart, and not touching;
@@ -91,22 +83,22 @@ def laid_out(
     models = [objects.object_model(*items[i]) for i in order]
     narrow = np.array([[min(outline(*items[i]).reach)] for i in order])
     height = np.array([[m.size[2]] for m in models])
-    propose = candidates(workcell, area, (len(items), TRIES), narrow, height, middle)
+    propose = places.candidates(workcell, area, (len(items), TRIES), narrow, height, middle)
 
-    def lying() -> list[tuple[Point, float]] | None:
-        found = scatter(rng, propose, distance)
+    def lying() -> list[tuple[places.Point, float]] | None:
+        found = places.scatter(rng, propose, distance)
         there = [
             Turnable(*items[i], point, turns.get(items[i][0], 0.0))
             for i, point in zip(order, found, strict=True)
         ]
         try:
             yaws = free_turns(rng, workcell, there)
-        except LayoutError:
+        except places.LayoutError:
             return None
         placed = dict(zip(order, zip(found, yaws, strict=True), strict=True))
         return [placed[i] for i in range(len(items))]
 
-    return retry(lying, f"{len(items)} things to click")
+    return places.retry(lying, f"{len(items)} things to click")
 
 
 def click_counter(scene: Scene, name: str, closed: bool = True) -> PressCounter:
@@ -131,7 +123,7 @@ def plan(scene: Scene) -> tuple[Skill, ...]:
 
 
 ORDER = ("alarm_clock", "stapler", "can", "playing_cards", "bread")
-AREA, MIDDLE, DISTANCE = Area((-0.25, 0.25), (-0.20, 0.0)), 0.05, 0.14
+AREA, MIDDLE, DISTANCE = places.Area((-0.25, 0.25), (-0.20, 0.0)), 0.05, 0.14
 
 
 def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
@@ -192,7 +184,9 @@ def _draw_bells(level: int, rng: np.random.Generator, workcell: Workcell) -> Sce
     return SceneSample(scene_objects, Facts(tuple(names[item.role] for item in items)))
 
 
-def _ring(level: int, rng: np.random.Generator, seen: Callable[[Point], bool]) -> list[Point]:
+def _ring(
+    level: int, rng: np.random.Generator, seen: Callable[[places.Point], bool]
+) -> list[places.Point]:
     """Places [m] in clicking order, all of which are `seen`."""
     for _ in range(LAYOUTS):
         ring = _pair(rng) if level == 2 else _round(level, rng) if level > 2 else [(0.0, 0.0)]
@@ -204,10 +198,10 @@ def _ring(level: int, rng: np.random.Generator, seen: Callable[[Point], bool]) -
             ring = [(x + shift[0], y + shift[1]) for x, y in ring]
             if all(seen(point) for point in ring):
                 return ring
-    raise LayoutError(f"no ring of {level} bells in {LAYOUTS} draws; skip this seed")
+    raise places.LayoutError(f"no ring of {level} bells in {LAYOUTS} draws; skip this seed")
 
 
-def _pair(rng: np.random.Generator) -> list[Point]:
+def _pair(rng: np.random.Generator) -> list[places.Point]:
     base = float(rng.uniform(0.10, 0.15))
     return [
         (float(rng.uniform(-0.015, 0.015)), way * base * float(rng.uniform(0.92, 1.10)))
@@ -215,7 +209,7 @@ def _pair(rng: np.random.Generator) -> list[Point]:
     ]
 
 
-def _round(level: int, rng: np.random.Generator) -> list[Point]:
+def _round(level: int, rng: np.random.Generator) -> list[places.Point]:
     base = float(rng.uniform(*BASE[level]))
     wide, deep = float(rng.uniform(0.80, 1.18)), float(rng.uniform(0.80, 1.14))
     ring = []
@@ -228,9 +222,9 @@ def _round(level: int, rng: np.random.Generator) -> list[Point]:
     return ring
 
 
-def _regular(ring: list[Point], distance: float) -> bool:
+def _regular(ring: list[places.Point], distance: float) -> bool:
     """Whether bells are apart, it fits the region, and nobody can doubt the order."""
-    if not all(apart(p, ring[:i], distance) for i, p in enumerate(ring)):
+    if not all(places.apart(p, ring[:i], distance) for i, p in enumerate(ring)):
         return False
     for k, (low, high) in enumerate((X, Y)):
         if max(p[k] for p in ring) - min(p[k] for p in ring) > high - low:

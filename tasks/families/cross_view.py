@@ -19,14 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.geometry import Array
-from robospa.tasks.families.picking import (
-    BLOCK_HALF,
-    PickFacts,
-    draw_params,
-    lifted,
-    pick_name,
-    pick_target,
-)
+from robospa.tasks.families import picking
 from robospa.tasks.families.table import standing
 from robospa.tasks.goals.lifting import Lift
 from robospa.tasks.instructions import Slots, TaskText
@@ -210,7 +203,7 @@ def layouts(workcell: Workcell, spread: ObjectSpread, level: int) -> Array:
 
 
 @dataclass(frozen=True)
-class Facts(PickFacts):
+class Facts(picking.PickFacts):
     """Target, viewer, and the extreme in the robot's frame and in the viewer's words."""
 
     extreme: str
@@ -252,10 +245,10 @@ def drawer(spread: ObjectSpread, views: tuple[str, ...]) -> Draw:
         view = views[int(rng.integers(len(views)))]
         known = layouts(workcell, spread, level)
         if spread.alike:
-            things = [(spread.assets[0], draw_params(rng, spread.assets[0]))] * count
+            things = [(spread.assets[0], picking.draw_params(rng, spread.assets[0]))] * count
         else:
             kinds = [spread.assets[int(i)] for i in rng.permutation(len(spread.assets))[:count]]
-            things = [(kind, draw_params(rng, kind)) for kind in kinds]
+            things = [(kind, picking.draw_params(rng, kind)) for kind in kinds]
         points, order, yaws = _lying(rng, workcell, spread, level, known, things)
         roles = leaders(points[None])[0]
         asked = int(rng.choice(np.unique(roles)))
@@ -263,7 +256,7 @@ def drawer(spread: ObjectSpread, views: tuple[str, ...]) -> Draw:
         objects = []
         for k, (asset, params) in enumerate(things):
             x, y = points[order[k]].tolist()
-            pose = standing((x, y), yaws[k], BLOCK_HALF if asset == "block" else 0.0)
+            pose = standing((x, y), yaws[k], picking.BLOCK_HALF if asset == "block" else 0.0)
             objects.append(SceneObject(f"object_{k}", asset, pose, params))
         facts = Facts(
             target=f"object_{order.index(asked)}",
@@ -291,12 +284,12 @@ def spread_task(spread: ObjectSpread, basic: bool = False) -> Task:
     kind = spread.kind
     seen = "the robot" if basic else "a named side"
     return Task(
-        name=f"Basic_Position_{kind}" if basic else pick_name(kind, "Multi_View"),
+        name=f"Basic_Position_{kind}" if basic else picking.pick_name(kind, "Multi_View"),
         category="EPG" if basic else "CVR",
         levels={k: Level(min(n, 4), 1, 150) for k, n in OBJECTS.items()},
         draw=drawer(spread, VIEWS[:1] if basic else VIEWS),
-        goal=lifted(Lift(rise=0.06, closed=True, touching=True)),
-        plan=pick_target,
+        goal=picking.lifted(Lift(rise=0.06, closed=True, touching=True)),
+        plan=picking.pick_target,
         templates=TEXT.templates,
         slots=slots,
         summary=f"Pick the extreme one of 3 to 7 {spread.what} as seen from {seen}.",

@@ -19,13 +19,7 @@ from robospa.tasks.goals.conditions import Region
 from robospa.tasks.goals.placing import Destination, bring
 from robospa.tasks.instructions import NUMBERS, Phrasings, Slots, TaskText, by_count
 from robospa.tasks.plan import Skill
-from robospa.tasks.sampling.places import (
-    LAYOUTS,
-    TRIES_PER_POINT,
-    LayoutError,
-    scatter_points,
-    shuffled,
-)
+from robospa.tasks.sampling import places
 from robospa.tasks.sampling.turns import Turnable, free_turns
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import SceneFacts, SceneSample, Task, Tracker
@@ -84,16 +78,18 @@ class Square:
 
 
 def _squares(rng: np.random.Generator, count: int, half: float) -> list[Square]:
-    for _ in range(LAYOUTS):
+    for _ in range(places.LAYOUTS):
         found: list[Square] = []
-        for _ in range(TRIES_PER_POINT * count):
+        for _ in range(places.TRIES_PER_POINT * count):
             x, y, yaw = (float(rng.uniform(*ends)) for ends in (X, Y, (-YAW, YAW)))
             square = Square(x, y, yaw, half)
             if all(square.clear_of(other) for other in found):
                 found.append(square)
                 if len(found) == count:
-                    return shuffled(rng, found)
-    raise LayoutError(f"no free column of {count} blocks in {LAYOUTS} draws; skip this seed")
+                    return places.shuffled(rng, found)
+    raise places.LayoutError(
+        f"no free column of {count} blocks in {places.LAYOUTS} draws; skip this seed"
+    )
 
 
 def _draw_blocks(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
@@ -186,8 +182,8 @@ class CardsFacts(SceneFacts):
 
 
 def _draw_cards(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
-    found = scatter_points(rng, level, CARDS_X, CARDS_Y, CARDS_DISTANCE, tries=10)
-    points = shuffled(rng, found)
+    found = places.scatter_points(rng, level, CARDS_X, CARDS_Y, CARDS_DISTANCE, tries=10)
+    points = places.shuffled(rng, found)
     variants = [table.draw_variant(rng, "playing_cards") for _ in points]
     lying = [Turnable("playing_cards", *thing) for thing in zip(variants, points, strict=True)]
     items = [

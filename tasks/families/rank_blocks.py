@@ -20,14 +20,7 @@ from robospa.tasks.families.stack_blocks import NEAR_BAND
 from robospa.tasks.goals.placing import bring_alone, row
 from robospa.tasks.instructions import COMMON, NUMBERS, Phrasings, Slots, TaskText, by_count
 from robospa.tasks.plan import Skill
-from robospa.tasks.sampling.places import (
-    LAYOUTS,
-    LayoutError,
-    Point,
-    apart,
-    scatter_points,
-    shuffled,
-)
+from robospa.tasks.sampling import places
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import SceneFacts, SceneSample, Task, Tracker
 from robospa.text import listed
@@ -95,7 +88,7 @@ def _sizes(level: int, rng: np.random.Generator) -> list[Block]:
     return [((half, half, half), color) for half in halves]
 
 
-def _scattered(points: Sequence[Point]) -> bool:
+def _scattered(points: Sequence[places.Point]) -> bool:
     """Neither in the right order already nor all in one tight row (one block always passes)."""
     pairs = list(pairwise(points))
     if not pairs:
@@ -105,24 +98,26 @@ def _scattered(points: Sequence[Point]) -> bool:
     return not ordered and not tight
 
 
-def _places(looks: Sequence[Block], rng: np.random.Generator, workcell: Workcell) -> list[Point]:
+def _places(
+    looks: Sequence[Block], rng: np.random.Generator, workcell: Workcell
+) -> list[places.Point]:
     """Free places, all wholly in the head camera's view."""
     reach = max(math.hypot(half[0], half[1]) for half, _ in looks)
     height = max(2 * half[2] for half, _ in looks)
 
-    def allowed(point: Point) -> bool:
+    def allowed(point: places.Point) -> bool:
         x, y = point
-        if abs(x) < BAND or not apart(point, [NEAR_MIDDLE], DISTANCE):
+        if abs(x) < BAND or not places.apart(point, [NEAR_MIDDLE], DISTANCE):
             return False
         low, high = workcell.view_span(y, reach, height)
         return low <= x <= high
 
-    for _ in range(LAYOUTS):
-        found = scatter_points(rng, len(looks), X, Y, DISTANCE, allowed, True, TRIES)
-        points = shuffled(rng, found)
+    for _ in range(places.LAYOUTS):
+        found = places.scatter_points(rng, len(looks), X, Y, DISTANCE, allowed, True, TRIES)
+        points = places.shuffled(rng, found)
         if _scattered(points):
             return points
-    raise LayoutError(f"no mixed-up layout of {len(looks)} blocks; skip this seed")
+    raise places.LayoutError(f"no mixed-up layout of {len(looks)} blocks; skip this seed")
 
 
 def _draw(looks: Sequence[Block], rng: np.random.Generator, workcell: Workcell) -> SceneSample:

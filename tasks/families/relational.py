@@ -16,14 +16,7 @@ from functools import cache
 import numpy as np
 
 from robospa.geometry import Array
-from robospa.tasks.families.picking import (
-    BLOCK_HALF,
-    PickFacts,
-    draw_params,
-    lifted,
-    pick_name,
-    pick_target,
-)
+from robospa.tasks.families import picking
 from robospa.tasks.families.table import standing
 from robospa.tasks.goals.lifting import Lift
 from robospa.tasks.instructions import Slots, TaskText
@@ -208,7 +201,7 @@ def _in_line(a: tuple[int, int], b: tuple[int, int]) -> bool:
 
 
 @dataclass(frozen=True)
-class Facts(PickFacts):
+class Facts(picking.PickFacts):
     """Target, its direction from the reference, and the name of the reference's place."""
 
     reference: str
@@ -240,13 +233,13 @@ def drawer(crowd: Crowd) -> Draw:
             order = rng.permutation(len(crowd.families))[: len(used)]
             families = tuple(crowd.families[int(i)] for i in order)
         families = families[: len(used)]
-        params = [draw_params(rng, f.asset) for f in families[: 1 if crowd.alike else None]]
+        params = [picking.draw_params(rng, f.asset) for f in families[: 1 if crowd.alike else None]]
         params = params * (len(families) if crowd.alike else 1)
         points, yaws = _lying(workcell, crowd, shape, families, params, used, rng)
         objects = []
         for i, (x, y) in enumerate(points):
             asset = families[i].asset
-            pose = standing((x, y), yaws[i], BLOCK_HALF if asset == "block" else 0.0)
+            pose = standing((x, y), yaws[i], picking.BLOCK_HALF if asset == "block" else 0.0)
             objects.append(SceneObject(f"object_{i}", asset, pose, params[i]))
         facts = Facts(
             target=f"object_{used.index(target)}",
@@ -292,12 +285,12 @@ def crowd_task(crowd: Crowd) -> Task:
         return _slots(facts.relation, facts.reference_label, scene.level, crowd.noun)
 
     return Task(
-        name=pick_name(crowd.kind, "Relational"),
+        name=picking.pick_name(crowd.kind, "Relational"),
         category="RRR",
         levels={k: Level(s.count, 1, 150) for k, s in SHAPES.items()},
         draw=drawer(crowd),
-        goal=lifted(Lift(rise=0.06, closed=True)),
-        plan=pick_target,
+        goal=picking.lifted(Lift(rise=0.06, closed=True)),
+        plan=picking.pick_target,
         templates=lambda level: TEXT.templates(level, crowd.wording),
         slots=slots,
         summary=f"Pick the one next to a named one among 2 to 9 {crowd.what}, in one of eight "

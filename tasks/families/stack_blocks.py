@@ -20,16 +20,7 @@ from robospa.tasks.goals.conditions import Region
 from robospa.tasks.goals.placing import HEIGHT_TOLERANCE, bring_alone, stack
 from robospa.tasks.instructions import COMMON, NUMBERS, Slots, TaskText, by_count, color_orders
 from robospa.tasks.plan import Pick, Place, Skill
-from robospa.tasks.sampling.places import (
-    Area,
-    Ground,
-    Point,
-    Points,
-    apart,
-    scatter_blocks,
-    scatter_points,
-    spread,
-)
+from robospa.tasks.sampling import places
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draw, SceneFacts, SceneSample, Task
 from robospa.text import listed
@@ -59,7 +50,7 @@ def _sample(
     level: int,
     rng: np.random.Generator,
     items: Sequence[table.Item],
-    points: Sequence[Point],
+    points: Sequence[places.Point],
     colors: tuple[str, ...] = (),
 ) -> SceneSample:
     place = _building_place(level, rng, points)
@@ -68,12 +59,14 @@ def _sample(
     return SceneSample(scene_objects, TowerFacts(order, place, colors))
 
 
-def _building_place(level: int, rng: np.random.Generator, blocks: Sequence[Point]) -> Point:
+def _building_place(
+    level: int, rng: np.random.Generator, blocks: Sequence[places.Point]
+) -> places.Point:
     """Where the expert builds; not part of the task's rule."""
     x, y = ((-0.01, 0.01), (-0.20, -0.10)) if level == 1 else ((-0.03, 0.03), (-0.15, -0.11))
     for _ in range(100):
         point = (float(rng.uniform(*x)), float(rng.uniform(*y)))
-        if apart(point, blocks, CLEARANCE):
+        if places.apart(point, blocks, CLEARANCE):
             return point
     return (0.0, -0.16)
 
@@ -139,13 +132,13 @@ X, Y, DISTANCE, YAW = (-0.28, 0.28), (-0.08, 0.05), 0.10, 0.75
 def _draw_colors(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
     """Scattered cubes; at level 1 the only one starts away from the place it must go to."""
 
-    def away(point: Point) -> bool:
-        return abs(point[0]) >= 0.05 and apart(point, [(0.0, -0.10)], 0.10)
+    def away(point: places.Point) -> bool:
+        return abs(point[0]) >= 0.05 and places.apart(point, [(0.0, -0.10)], 0.10)
 
-    def allowed(point: Point) -> bool:
+    def allowed(point: places.Point) -> bool:
         return (level > 1 or away(point)) and table.middle_in_view(workcell, point, COLOR_HALF)
 
-    points = scatter_points(rng, level, X, Y, DISTANCE, allowed, near_middle=True)
+    points = places.scatter_points(rng, level, X, Y, DISTANCE, allowed, near_middle=True)
     items = [
         table.block(color, point, COLOR_HALF, rgb, float(rng.uniform(-YAW, YAW)))
         for (color, rgb), point in zip(table.ORDERED.items(), points, strict=False)
@@ -236,14 +229,14 @@ HALVES = {
 """Half sizes [m] from bottom to top."""
 ONE = (0.015, 0.025)
 """Level 1: range of the only cube's half size [m]."""
-AREA, MIDDLE = Area((-0.28, 0.28), (-0.08, 0.05), clear_middle=True), (0.0, -0.10)
+AREA, MIDDLE = places.Area((-0.28, 0.28), (-0.08, 0.05), clear_middle=True), (0.0, -0.10)
 
 
 def _draw_sizes(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
     halves = HALVES.get(level) or (round(float(rng.uniform(*ONE)), 5),)
     cubes = [(half, half, half) for half in halves]
-    ground = Ground(AREA, 0.05, MIDDLE, 0.10 if level == 1 else 0.15)
-    points = scatter_blocks(rng, workcell, ground, cubes, lambda i, j: DISTANCE)
+    ground = places.Ground(AREA, 0.05, MIDDLE, 0.10 if level == 1 else 0.15)
+    points = places.scatter_blocks(rng, workcell, ground, cubes, lambda i, j: DISTANCE)
     color = table.drawn_color(rng)
     items = [
         table.block(f"block {i}", point, half, color, float(rng.uniform(-YAW, YAW)))
@@ -277,8 +270,10 @@ SECTION = (0.0155, 0.0165)
 SPANS = {1: (0.0, 0.0), 2: (0.06, 0.0), 3: (0.10, 0.03), 4: (0.15, 0.04), 5: (0.15, 0.04)}
 """Least spread of the bars in x and y [m]."""
 GROUNDS = {
-    1: Ground(AREA, 0.05, MIDDLE, 0.10),
-    2: Ground(Area((-0.25, 0.25), (-0.15, 0.05), clear_middle=True), 0.02, (0.0, -0.12), 0.1225),
+    1: places.Ground(AREA, 0.05, MIDDLE, 0.10),
+    2: places.Ground(
+        places.Area((-0.25, 0.25), (-0.15, 0.05), clear_middle=True), 0.02, (0.0, -0.12), 0.1225
+    ),
 }
 """Level 1, and all others."""
 GAP, BAR_YAW = 0.045, 0.20
@@ -289,14 +284,17 @@ def _draw_lengths(level: int, rng: np.random.Generator, workcell: Workcell) -> S
     halves = [(round(float(rng.uniform(*ends)), 5), half_y, half_z) for ends in HALF_LENGTHS[level]]
     reach = [math.hypot(half[0], half_y) for half in halves]
 
-    def wide(found: Points) -> bool:
+    def wide(found: places.Points) -> bool:
         least_x, least_y = SPANS[level]
-        return spread([p[0] for p in found]) >= least_x and spread([p[1] for p in found]) >= least_y
+        return (
+            places.spread([p[0] for p in found]) >= least_x
+            and places.spread([p[1] for p in found]) >= least_y
+        )
 
     def gap(i: int, j: int) -> float:
         return reach[i] + reach[j] + GAP
 
-    points = scatter_blocks(rng, workcell, GROUNDS[min(level, 2)], halves, gap, wide)
+    points = places.scatter_blocks(rng, workcell, GROUNDS[min(level, 2)], halves, gap, wide)
     color = table.drawn_color(rng)
     items = [
         table.block(f"block {i}", point, half, color, float(rng.uniform(-BAR_YAW, BAR_YAW)))

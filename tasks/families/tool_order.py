@@ -22,15 +22,7 @@ from robospa.tasks.goals.counters import HitCounter, StampCounter
 from robospa.tasks.instructions import NUMBERS, Phrasings, Slots, TaskText, by_count, color_orders
 from robospa.tasks.objects.tools import PADS
 from robospa.tasks.plan import Hit, Pick, Place, Skill
-from robospa.tasks.sampling.places import (
-    Area,
-    LayoutError,
-    Mask,
-    Point,
-    free_point,
-    scatter,
-    shuffled,
-)
+from robospa.tasks.sampling import places
 from robospa.tasks.scene import Scene
 from robospa.tasks.shapes import ObjectModel
 from robospa.tasks.task import SceneFacts, SceneSample, Task
@@ -42,8 +34,8 @@ SEAL_TEXT = TaskText.beside(__file__, "tool_order_seal.toml")
 
 
 HALF, YAW, DISTANCE, TRIES = 0.025, 0.5, 0.12, 60
-HAMMER_AT: Point = (0.0, -0.06)
-AREA, MIDDLE = Area((-0.25, 0.25), (-0.25, 0.25)), 0.05
+HAMMER_AT: places.Point = (0.0, -0.06)
+AREA, MIDDLE = places.Area((-0.25, 0.25), (-0.25, 0.25)), 0.05
 ACROSS = 0.10
 """How far [m] the further blocks may lie beyond the middle, seen from the first one."""
 FREE = 0.068
@@ -64,7 +56,7 @@ def _draw_hammer(level: int, rng: np.random.Generator, workcell: Workcell) -> Sc
     arm = workcell.arms[0 if left else 1]
     nearest, farthest = arm.tool_reach
 
-    def propose(generator: np.random.Generator) -> tuple[Array, Array, Mask]:
+    def propose(generator: np.random.Generator) -> tuple[Array, Array, places.Mask]:
         x, y = AREA.draw(generator, (level, TRIES))
         inward = -x if left else x  # the first arm's side is positive
         usable = (np.abs(x) >= MIDDLE) & (inward >= -ACROSS) & _beside_hammer(x, y)
@@ -73,8 +65,8 @@ def _draw_hammer(level: int, rng: np.random.Generator, workcell: Workcell) -> Sc
         usable &= (reach >= nearest) & (reach <= farthest)
         return x, y, usable & workcell.in_view(x, y, HALF * math.sqrt(2), 2 * HALF, (0.0, 0.0))
 
-    first, *others = scatter(rng, propose, DISTANCE)
-    points = [first, *shuffled(rng, others)]
+    first, *others = places.scatter(rng, propose, DISTANCE)
+    points = [first, *places.shuffled(rng, others)]
     items = [
         table.Item("hammer", "hammer", table.standing(HAMMER_AT), table.draw_variant(rng, "hammer"))
     ]
@@ -87,10 +79,10 @@ def _draw_hammer(level: int, rng: np.random.Generator, workcell: Workcell) -> Sc
     return SceneSample(scene_objects, facts)
 
 
-def _beside_hammer(x: Array, y: Array) -> Mask:
+def _beside_hammer(x: Array, y: Array) -> places.Mask:
     half = objects.object_model("hammer").size[1] / 2
     dx, dy = x - HAMMER_AT[0], y - HAMMER_AT[1]
-    free: Mask = np.hypot(dx, dy - np.clip(dy, -half, half)) >= FREE
+    free: places.Mask = np.hypot(dx, dy - np.clip(dy, -half, half)) >= FREE
     return free
 
 
@@ -174,7 +166,7 @@ def _draw_seal(level: int, rng: np.random.Generator, workcell: Workcell) -> Scen
 
 def _layout(
     level: int, rng: np.random.Generator, workcell: Workcell, variant: dict[str, int]
-) -> tuple[list[Point], Point]:
+) -> tuple[list[places.Point], places.Point]:
     pad_seen, seal_seen = (
         table.in_view(workcell, "pad", {}),
         table.in_view(workcell, "seal", variant),
@@ -182,19 +174,19 @@ def _layout(
     for _ in range(LAYOUTS):
         if level == 1:
             way = 1 if rng.random() < 0.5 else -1
-            found = free_point(rng, ONE_X, ONE_Y, [], 1)
+            found = places.free_point(rng, ONE_X, ONE_Y, [], 1)
             pads = [(way * found[0], found[1])] if found else []
             x = (ONE_X[0], ONE_X[1]) if way > 0 else (-ONE_X[1], -ONE_X[0])
-            seal = free_point(rng, x, ONE_Y, [(p, ONE_APART) for p in pads])
+            seal = places.free_point(rng, x, ONE_Y, [(p, ONE_APART) for p in pads])
         else:
             y = float(rng.uniform(*ROW_Y))
             pads = [(float(rng.uniform(*span)), y) for span in ROWS[level]]
             if any(a[0] - b[0] < PADS_APART for a, b in pairwise(pads)):
                 continue
-            seal = free_point(rng, SEAL_X, SEAL_Y, [(p, APART) for p in pads], 40)
+            seal = places.free_point(rng, SEAL_X, SEAL_Y, [(p, APART) for p in pads], 40)
         if seal and seal_seen(seal) and all(pad_seen(p) for p in pads):
             return pads, seal
-    raise LayoutError(f"no free place of the seal beside {level} pads; skip this seed")
+    raise places.LayoutError(f"no free place of the seal beside {level} pads; skip this seed")
 
 
 def _seal_goal(scene: Scene) -> UseInOrder:
