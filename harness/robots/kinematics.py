@@ -120,7 +120,7 @@ def forward(chain: Chain, joints: Array) -> tuple[Array, Array]:
     return frame, np.stack(rows, axis=1, out=np.empty((count, 6, width)))
 
 
-def end_effector(chain: Chain, joints: Sequence[float]) -> Pose:
+def end_effector(chain: Chain, joints: Sequence[float] | Array) -> Pose:
     """Pose of the end-effector frame in the world at `joints` [rad]."""
     return from_transform(forward(chain, np.asarray(joints, dtype=float)[None])[0][0])
 

@@ -23,7 +23,7 @@ from robospa.geometry import (
     rotate,
     yaw_rotation,
 )
-from robospa.harness.robots.kinematics import forward, inverse
+from robospa.harness.robots.kinematics import end_effector, forward, inverse
 from robospa.harness.skills import clearance
 from robospa.harness.skills import pick as grasping
 from robospa.harness.skills.motion import line_poses, retreat_home, rise, route, travel
@@ -74,13 +74,11 @@ def approach_joints(
 
 def release(ws: Workspace, arm: int) -> None:
     """Open the gripper, back out along its approach, then rise."""
-    frames, _ = forward(ws.chains[arm], ws.joints[arm][None])
-    pose = from_transform(frames[0])
+    pose = end_effector(ws.chains[arm], ws.joints[arm])
     ws.add(arm)
     ws.add(arm, gripper=1.0)
     away = moved_back(pose, rotate(pose.rotation, (1, 0, 0)), RETREAT)
-    for joints in ws.solve_path(arm, ws.joints[arm], line_poses(pose, away, 2)) or []:
-        ws.add(arm, joints)
+    ws.follow(arm, ws.solve_path(arm, ws.joints[arm], line_poses(pose, away, 2)) or [])
     ws.held[arm] = None
     rise(ws, arm)
 
@@ -89,11 +87,9 @@ def put_down(ws: Workspace, arm: int, height: float) -> Steps:
     """Lower the object that the arm holds until its origin is at `height` [m], and release it."""
     name = ws.held[arm]
     if name is not None:
-        frames, _ = forward(ws.chains[arm], ws.joints[arm][None])
-        here = from_transform(frames[0])
+        here = end_effector(ws.chains[arm], ws.joints[arm])
         down = translated(here, (0.0, 0.0, height - ws.pose(name).position[2]))
-        for joints in ws.solve_path(arm, ws.joints[arm], line_poses(here, down, 2)) or []:
-            ws.add(arm, joints)
+        ws.follow(arm, ws.solve_path(arm, ws.joints[arm], line_poses(here, down, 2)) or [])
     release(ws, arm)
     yield from ws.flush()
 
@@ -103,8 +99,7 @@ def slide_out(ws: Workspace, arm: int, name: str, height: float) -> Steps:
 
     What widens upwards to the gripper's opening comes up with it.
     """
-    frames, _ = forward(ws.chains[arm], ws.joints[arm][None])
-    here = from_transform(frames[0])
+    here = end_effector(ws.chains[arm], ws.joints[arm])
     down = translated(here, (0.0, 0.0, height - ws.pose(name).position[2] - DEEPER))
     x, y, _ = rotate(here.rotation, (0.0, 0.0, 1.0))
     share = math.copysign(ASIDE / max(math.hypot(x, y), 1e-9), -y)
@@ -114,8 +109,7 @@ def slide_out(ws: Workspace, arm: int, name: str, height: float) -> Steps:
         way = [p for a, b in pairwise((here, down, beside, up)) for p in line_poses(a, b, 2)]
         joints = ws.solve_path(arm, ws.joints[arm], way)
         if joints is not None:
-            for stop in joints:
-                ws.add(arm, stop)
+            ws.follow(arm, joints)
             break
     rise(ws, arm)
     yield from ws.flush(exactly=True)
@@ -132,8 +126,7 @@ def bring_in(ws: Workspace, arm: int, path: Sequence[Array], stop: Array | None 
         ws.add(arm, stop)
         ws.add(arm, path[0])
     yield from ws.flush()
-    for joints in path[1:]:
-        ws.add(arm, joints)
+    ws.follow(arm, path[1:])
     release(ws, arm)
     yield from ws.flush()
 
@@ -244,8 +237,7 @@ def hang(ws: Workspace, call: Hang) -> Steps:
             refused.append(gripped)
             yield from place(ws, Place(call.object, (x, y, z)))
             continue
-        for joints in way:
-            ws.add(arm, joints)
+        ws.follow(arm, way)
         yield from ws.flush(exactly=True)  # it comes to rest in its place before it is let go
         release(ws, arm)
         yield from ws.flush()
@@ -308,8 +300,7 @@ def _far_target(
         way = _way(narrow, [target], paths, here, True)
         if way is None:
             continue
-        frames, _ = forward(ws.chains[arm], way[0][None])
-        before = from_transform(frames[0])
+        before = end_effector(ws.chains[arm], way[0])
         for out, up in product(DETOURS, DETOURS):
             x, y, z = rotate(peg.rotation, (0.0, -out, 0.0))
             stop = ws.solve(arm, translated(before, (x, y, z + up)), way[0])

@@ -15,8 +15,8 @@ from itertools import pairwise, product
 import numpy as np
 
 from robospa.action_space import ARMS
-from robospa.geometry import Array, Pose, from_transform, rotate
-from robospa.harness.robots.kinematics import forward
+from robospa.geometry import Array, Pose, rotate
+from robospa.harness.robots.kinematics import end_effector, forward
 from robospa.harness.skills.clearance import TOUCH, arm_depth
 from robospa.harness.skills.workspace import Workspace, moved_back, moved_up, wall_front
 
@@ -118,8 +118,7 @@ def _risen(ws: Workspace, arm: int, to: float | None = None) -> Array | None:
     height = float(tip_heights(ws, arm, ws.joints[arm][None])[0])
     if height >= to - 0.01:
         return None
-    frames, _ = forward(ws.chains[arm], ws.joints[arm][None])
-    here = from_transform(frames[0])
+    here = end_effector(ws.chains[arm], ws.joints[arm])
     for share in (1.0, 0.75, 0.5, 0.25):
         joints = ws.solve(arm, moved_up(here, (to - height) * share), ws.joints[arm])
         if joints is not None:
@@ -146,8 +145,7 @@ def route(ws: Workspace, arm: int, goal: Array) -> Route:
     start = ws.joints[arm] if risen is None else risen
     if risen is not None and not blocked(ws, arm, start, goal):
         return Route(via, True)
-    frames, _ = forward(ws.chains[arm], goal[None])
-    here = from_transform(frames[0])
+    here = end_effector(ws.chains[arm], goal)
     ahead = rotate(here.rotation, (1.0, 0.0, 0.0))
     climb = travel_height(ws, arm) - float(tip_heights(ws, arm, goal[None])[0])
     spare = Route(via, False)
@@ -162,8 +160,7 @@ def route(ws: Workspace, arm: int, goal: Array) -> Route:
 
 def detour(ws: Workspace, arm: int, goal: Array) -> Array | None:
     """Joints nearer to the robot, to which and from which to `goal` the way is free; or None."""
-    frames, _ = forward(ws.chains[arm], ws.joints[arm][None])
-    here = from_transform(frames[0])
+    here = end_effector(ws.chains[arm], ws.joints[arm])
     x, y, z = here.position
     for back, up in product(DETOURS, (0.0, 0.03, 0.06)):
         via = ws.solve(arm, Pose((x, y - back, z + up), here.rotation), ws.joints[arm])
@@ -176,8 +173,7 @@ def detour(ws: Workspace, arm: int, goal: Array) -> Array | None:
 
 def travel(ws: Workspace, arm: int, goal: Array, gripper: float | None = None) -> None:
     """Go to joints `goal` on its `route`. With the last action the gripper goes to `gripper`."""
-    for joints in route(ws, arm, goal).via:
-        ws.add(arm, joints)
+    ws.follow(arm, route(ws, arm, goal).via)
     ws.add(arm, goal, gripper)
 
 

@@ -72,12 +72,10 @@ def _pull(ws: Workspace, way: Pull) -> Steps:
     go(ws, arm, way.before, ws.robot.arms[arm].gripper_value(OPENING))
     ws.add(arm, way.at)
     ws.add(arm, gripper=0.0)
-    for joints in way.arc:
-        ws.add(arm, joints)
+    ws.follow(arm, way.arc)
     ws.add(arm, gripper=1.0)
     away = moved_back(way.last, way.approach_last, STANDOFF)
-    for joints in ws.solve_path(arm, way.arc[-1], line_poses(way.last, away, 2)) or ():
-        ws.add(arm, joints)
+    ws.follow(arm, ws.solve_path(arm, way.arc[-1], line_poses(way.last, away, 2)) or ())
     rise(ws, arm)
     yield from ws.flush(exactly=True)
 

@@ -257,12 +257,10 @@ def pick(
         before = ws.pose(call.object).position[2]
         arm = choice.arm
         go(ws, arm, way_in[0], choice.opening)
-        for joints in way_in[1:]:
-            ws.add(arm, joints)
+        ws.follow(arm, way_in[1:])
         ws.add(arm, gripper=0.0)
         ws.add(arm)
-        for joints in way_up:
-            ws.add(arm, joints)
+        ws.follow(arm, way_up)
         yield from ws.flush()
         if ws.pose(call.object).position[2] - before > 0.4 * call.lift:
             ws.held[arm] = call.object

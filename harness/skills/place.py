@@ -183,8 +183,7 @@ def place(ws: Workspace, call: Place) -> Steps:
     approach = rotate(spot.pose.rotation, (1, 0, 0))
     away = moved_back(spot.pose, approach, call.retreat)
     out = ws.solve_path(arm, spot.joints, line_poses(spot.pose, away, 2)) or [spot.above]
-    for joints in out:
-        ws.add(arm, joints)
+    ws.follow(arm, out)
     if opening < 1.0:
         ws.add(arm, gripper=1.0)
     ws.held[arm] = None

@@ -10,7 +10,7 @@ is left out where the next one's joint line passes by it.
 from __future__ import annotations
 
 import math
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -80,6 +80,11 @@ class Workspace:
         if gripper is not None:
             self.gripper[arm] = gripper
         self.rows.append(self.row())
+
+    def follow(self, arm: int, way: Iterable[Array]) -> None:
+        """Append one action for each of the joints of a way."""
+        for joints in way:
+            self.add(arm, joints)
 
     def row(self) -> Array:
         """The action (D,) that holds what was commanded last."""

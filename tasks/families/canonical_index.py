@@ -17,14 +17,14 @@ from itertools import combinations
 
 import numpy as np
 
-from robospa.tasks.families.picking import PickFacts, lifted, pick_name, pick_target
-from robospa.tasks.families.table import draw_variant, drawn_color, standing
+from robospa.tasks.families.picking import PickFacts, lifted, pick_name, pick_target, put_down
+from robospa.tasks.families.table import draw_variant, drawn_color
 from robospa.tasks.goals.lifting import Lift
 from robospa.tasks.instructions import Slots, TaskText, ordinal
 from robospa.tasks.sampling.grid import GapGrid, Grid, GridLayout
 from robospa.tasks.sampling.places import retry
 from robospa.tasks.sampling.turns import Turnable, between
-from robospa.tasks.scene import Scene, SceneObject
+from robospa.tasks.scene import Scene
 from robospa.tasks.shapes import Params
 from robospa.tasks.task import Draw, Level, SceneSample, Task
 from robospa.workcell import Workcell
@@ -127,11 +127,6 @@ def drawer(line: Line, fixed: bool) -> Draw:
             return (cells, items) if free else None
 
         cells, items = retry(lying, f"grid of {count} {line.noun}s")
-        objects = []
-        for k, (item, yaw) in enumerate(items):
-            height = item.params["half"][2] if "half" in item.params else 0.0
-            pose = standing(item.place, yaw, height)
-            objects.append(SceneObject(f"object_{k}", item.asset, pose, item.params))
         row, column = int(rng.integers(grid.rows)), int(rng.integers(grid.columns))
         from_right, from_far = False, True
         if not fixed:
@@ -147,7 +142,7 @@ def drawer(line: Line, fixed: bool) -> Draw:
                 row=grid.rows - row if from_far else row + 1,
                 row_direction="far_to_near" if from_far else "near_to_far",
             )
-        return SceneSample(tuple(objects), facts)
+        return SceneSample(put_down(*zip(*items, strict=True)), facts)
 
     return draw
 

@@ -30,7 +30,7 @@ from robospa.tasks.instructions import (
 )
 from robospa.tasks.plan import Press, Skill
 from robospa.tasks.sampling import places
-from robospa.tasks.sampling.turns import Turnable, free_turns, outline
+from robospa.tasks.sampling.turns import Turnable, outline, turned
 from robospa.tasks.scene import Scene
 from robospa.tasks.shapes import Params
 from robospa.tasks.task import SceneFacts, SceneSample, Task
@@ -85,20 +85,16 @@ def laid_out(
     height = np.array([[m.size[2]] for m in models])
     propose = places.candidates(workcell, area, (len(items), TRIES), narrow, height, middle)
 
-    def lying() -> list[tuple[places.Point, float]] | None:
+    def lying() -> tuple[places.Points, list[Turnable]]:
         found = places.scatter(rng, propose, distance)
-        there = [
+        return found, [
             Turnable(*items[i], point, turns.get(items[i][0], 0.0))
             for i, point in zip(order, found, strict=True)
         ]
-        try:
-            yaws = free_turns(rng, workcell, there)
-        except places.LayoutError:
-            return None
-        placed = dict(zip(order, zip(found, yaws, strict=True), strict=True))
-        return [placed[i] for i in range(len(items))]
 
-    return places.retry(lying, f"{len(items)} things to click")
+    found, _, yaws = turned(rng, workcell, lying)
+    placed = dict(zip(order, zip(found, yaws, strict=True), strict=True))
+    return [placed[i] for i in range(len(items))]
 
 
 def click_counter(scene: Scene, name: str, closed: bool = True) -> PressCounter:

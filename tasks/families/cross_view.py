@@ -11,7 +11,6 @@ kind where objects differ: the place then tells nothing about what lies there.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -20,13 +19,11 @@ from numpy.typing import NDArray
 
 from robospa.geometry import Array
 from robospa.tasks.families import picking
-from robospa.tasks.families.table import standing
 from robospa.tasks.goals.lifting import Lift
 from robospa.tasks.instructions import Slots, TaskText
 from robospa.tasks.sampling.places import Fits, LayoutError, Mask, pool, walk
-from robospa.tasks.sampling.turns import Turnable, free_turns
-from robospa.tasks.scene import Scene, SceneObject
-from robospa.tasks.shapes import Params
+from robospa.tasks.sampling.turns import Turnable, turned
+from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draw, Level, SceneSample, Task
 from robospa.workcell import TABLE_TOP, Workcell
 
@@ -211,30 +208,6 @@ class Facts(picking.PickFacts):
     position: str
 
 
-def _lying(
-    rng: np.random.Generator,
-    workcell: Workcell,
-    spread: ObjectSpread,
-    level: int,
-    known: Array,
-    things: Sequence[tuple[str, Params]],
-) -> tuple[Array, list[int], list[float]]:
-    """A layout (n, 2) [m], the place of each of `things` in it, and their turns [rad]."""
-    for _ in range(LAYOUTS):
-        points = known[int(rng.integers(len(known)))][None].copy()
-        walk(rng, points, fits(workcell, spread, level, leaders(points)[0]), SHIFT)
-        order = [int(i) for i in rng.permutation(len(things))]
-        items = [
-            Turnable(asset, params, (float(x), float(y)), 0.75 if asset == "block" else math.pi)
-            for (asset, params), (x, y) in zip(things, points[0][order], strict=True)
-        ]
-        try:
-            return points[0], order, free_turns(rng, workcell, items, MARGIN)
-        except LayoutError:
-            continue
-    raise LayoutError(f"no free layout of {len(things)} objects in {LAYOUTS} draws; skip this seed")
-
-
 def drawer(spread: ObjectSpread, views: tuple[str, ...]) -> Draw:
     """The draw of `spread`: a uniform viewpoint of `views`, a layout, what lies where, and one of
     the objects that are extreme there, each equally likely: the scene does not tell which.
@@ -249,22 +222,27 @@ def drawer(spread: ObjectSpread, views: tuple[str, ...]) -> Draw:
         else:
             kinds = [spread.assets[int(i)] for i in rng.permutation(len(spread.assets))[:count]]
             things = [(kind, picking.draw_params(rng, kind)) for kind in kinds]
-        points, order, yaws = _lying(rng, workcell, spread, level, known, things)
+
+        def lying() -> tuple[tuple[Array, list[int]], list[Turnable]]:
+            points = known[int(rng.integers(len(known)))][None].copy()
+            walk(rng, points, fits(workcell, spread, level, leaders(points)[0]), SHIFT)
+            order = [int(i) for i in rng.permutation(count)]
+            return (points[0], order), [
+                Turnable(asset, params, (x, y), 0.75 if asset == "block" else math.pi)
+                for (asset, params), (x, y) in zip(things, points[0][order].tolist(), strict=True)
+            ]
+
+        (points, order), items, yaws = turned(rng, workcell, lying, MARGIN, LAYOUTS)
         roles = leaders(points[None])[0]
         asked = int(rng.choice(np.unique(roles)))
         extreme = int(rng.choice(np.flatnonzero(roles[0] == asked)))
-        objects = []
-        for k, (asset, params) in enumerate(things):
-            x, y = points[order[k]].tolist()
-            pose = standing((x, y), yaws[k], picking.BLOCK_HALF if asset == "block" else 0.0)
-            objects.append(SceneObject(f"object_{k}", asset, pose, params))
         facts = Facts(
             target=f"object_{order.index(asked)}",
             extreme=EXTREMES[extreme],
             viewpoint=view,
             position=SEEN_AS[view][extreme],
         )
-        return SceneSample(tuple(objects), facts)
+        return SceneSample(picking.put_down(items, yaws), facts)
 
     return draw
 

@@ -22,8 +22,8 @@ from robospa.tasks.families.table import draw_variant, standing, variant_phrasin
 from robospa.tasks.goals.lifting import Lift
 from robospa.tasks.instructions import Phrasings, Slots, TaskText, ordinal
 from robospa.tasks.objects import object_model
-from robospa.tasks.sampling.places import Fits, LayoutError, Mask, keeps_apart, pool, retry, walk
-from robospa.tasks.sampling.turns import Turnable, free_turns
+from robospa.tasks.sampling.places import Fits, LayoutError, Mask, keeps_apart, pool, walk
+from robospa.tasks.sampling.turns import Turnable, turned
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.shapes import Params
 from robospa.tasks.task import Level, SceneSample, Task
@@ -237,18 +237,14 @@ def put_down(
     order = [int(i) for i in rng.permutation(len(things))]
     variants = [things[i][1] or draw_variant(rng, things[i][0]) for i in order]
 
-    def lying() -> tuple[Array, list[Turnable], list[float]] | None:
+    def lying() -> tuple[Array, list[Turnable]]:
         points = places()
-        items = [
+        return points, [
             Turnable(things[i][0], params, (float(points[i][0]), float(points[i][1])), yaw)
             for i, params in zip(order, variants, strict=True)
         ]
-        try:
-            return points, items, free_turns(rng, workcell, items, MARGIN)
-        except LayoutError:
-            return None
 
-    points, items, turns = retry(lying, f"{len(things)} things at clear distances")
+    points, items, turns = turned(rng, workcell, lying, MARGIN)
     objects = []
     for k, (item, turn) in enumerate(zip(items, turns, strict=True)):
         height = -object_model(item.asset, item.params).bottom

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from robospa.tasks.colors import NAMED
-from robospa.tasks.families.table import draw_variant
+from robospa.tasks.families.table import draw_variant, standing
 from robospa.tasks.goals.lifting import Lift, PickTracker
 from robospa.tasks.objects import model_of
 from robospa.tasks.plan import Pick, Skill
-from robospa.tasks.scene import Scene
+from robospa.tasks.sampling.turns import Turnable
+from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.task import SceneFacts, Tracker
 
 
@@ -48,6 +49,19 @@ def lifted(lift: Lift) -> Callable[[Scene], Tracker]:
 def pick_target(scene: Scene) -> tuple[Skill, ...]:
     """The plan: pick the target."""
     return (Pick(PickFacts.of(scene).target),)
+
+
+def put_down(items: Sequence[Turnable], yaws: Sequence[float]) -> tuple[SceneObject, ...]:
+    """`items` on the table, turned by `yaws` [rad], as "object_0", "object_1", ..."""
+    return tuple(
+        SceneObject(
+            f"object_{k}",
+            item.asset,
+            standing(item.place, yaw, item.params["half"][2] if "half" in item.params else 0.0),
+            item.params,
+        )
+        for k, (item, yaw) in enumerate(zip(items, yaws, strict=True))
+    )
 
 
 BLOCK_HALF = 0.015

@@ -17,14 +17,11 @@ import numpy as np
 
 from robospa.geometry import Array
 from robospa.tasks.families import picking
-from robospa.tasks.families.table import standing
 from robospa.tasks.goals.lifting import Lift
 from robospa.tasks.instructions import Slots, TaskText
 from robospa.tasks.sampling.grid import StraightLines
-from robospa.tasks.sampling.places import LayoutError
-from robospa.tasks.sampling.turns import Turnable, free_turns
-from robospa.tasks.scene import Scene, SceneObject
-from robospa.tasks.shapes import Params
+from robospa.tasks.sampling.turns import Turnable, turned
+from robospa.tasks.scene import Scene
 from robospa.tasks.task import Draw, Level, SceneSample, Task
 from robospa.workcell import Workcell
 
@@ -155,29 +152,6 @@ def _places(
     return lines.places(rng, used, least, lambda points: _seen(workcell, points))
 
 
-def _lying(
-    workcell: Workcell,
-    crowd: Crowd,
-    shape: SlotGrid,
-    families: Sequence[SpacedKind],
-    params: Sequence[Params],
-    used: list[tuple[int, int]],
-    rng: np.random.Generator,
-) -> tuple[list[tuple[float, float]], list[float]]:
-    """Where the objects lie [m], and their turns [rad]; LayoutError if nothing fits."""
-    for _ in range(LAYOUTS):
-        points = [(x, y) for x, y in _places(workcell, crowd, shape, families, used, rng).tolist()]
-        items = [
-            Turnable(family.asset, own, point, family.half_range)
-            for family, own, point in zip(families, params, points, strict=True)
-        ]
-        try:
-            return points, free_turns(rng, workcell, items, EDGE)
-        except LayoutError:
-            continue
-    raise LayoutError(f"no free layout of {len(used)} objects in {LAYOUTS} draws; skip this seed")
-
-
 def _seen(workcell: Workcell, points: Array) -> bool:
     return bool(workcell.in_view(points[:, 0], points[:, 1], 0.0, 0.0, MARGIN).all())
 
@@ -235,19 +209,22 @@ def drawer(crowd: Crowd) -> Draw:
         families = families[: len(used)]
         params = [picking.draw_params(rng, f.asset) for f in families[: 1 if crowd.alike else None]]
         params = params * (len(families) if crowd.alike else 1)
-        points, yaws = _lying(workcell, crowd, shape, families, params, used, rng)
-        objects = []
-        for i, (x, y) in enumerate(points):
-            asset = families[i].asset
-            pose = standing((x, y), yaws[i], picking.BLOCK_HALF if asset == "block" else 0.0)
-            objects.append(SceneObject(f"object_{i}", asset, pose, params[i]))
+
+        def lying() -> tuple[None, list[Turnable]]:
+            points = _places(workcell, crowd, shape, families, used, rng).tolist()
+            return None, [
+                Turnable(family.asset, own, (x, y), family.half_range)
+                for family, own, (x, y) in zip(families, params, points, strict=True)
+            ]
+
+        _, items, yaws = turned(rng, workcell, lying, EDGE, LAYOUTS)
         facts = Facts(
             target=f"object_{used.index(target)}",
             reference=f"object_{used.index(reference)}",
             relation=direction,
             reference_label=_label(shape, reference, used),
         )
-        return SceneSample(tuple(objects), facts)
+        return SceneSample(picking.put_down(items, yaws), facts)
 
     return draw
 

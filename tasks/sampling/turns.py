@@ -7,7 +7,7 @@ distances, as long as they do not point at them.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -16,7 +16,7 @@ import numpy as np
 from robospa.geometry import Array
 from robospa.tasks.objects import object_model
 from robospa.tasks.objects.build import points_of
-from robospa.tasks.sampling.places import LayoutError, Mask
+from robospa.tasks.sampling.places import LAYOUTS, Drawn, LayoutError, Mask
 from robospa.tasks.shapes import Params
 from robospa.workcell import Workcell
 
@@ -105,6 +105,26 @@ def free_turns(
         if found is not None:
             return found
     raise LayoutError(f"{len(items)} objects find no turns side by side; skip this seed")
+
+
+def turned(
+    rng: np.random.Generator,
+    workcell: Workcell,
+    draw: Callable[[], tuple[Drawn, Sequence[Turnable]]],
+    margin: tuple[float, float] = (0.0, 0.0),
+    tries: int = LAYOUTS,
+) -> tuple[Drawn, Sequence[Turnable], list[float]]:
+    """What `draw` gives, its things, and their `free_turns`, in the first of `tries` draws.
+
+    LayoutError if there are turns for none.
+    """
+    for _ in range(tries):
+        found, items = draw()
+        try:
+            return found, items, free_turns(rng, workcell, items, margin)
+        except LayoutError:
+            continue
+    raise LayoutError(f"no free layout of {len(items)} objects in {tries} draws; skip this seed")
 
 
 def _round(
