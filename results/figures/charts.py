@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
@@ -14,7 +13,6 @@ from robospa.results.figures.series import (
     Series,
     label_of,
     legend_below,
-    look,
     new_figure,
     percent_of,
     plain,
@@ -22,13 +20,12 @@ from robospa.results.figures.series import (
     whiskers,
 )
 from robospa.results.scoring.scores import Scores
-from robospa.trial import CATEGORIES, CATEGORY_NAMES, PROCEDURAL, SPATIAL
+from robospa.trial import CATEGORY_NAMES, PROCEDURAL, SPATIAL
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.collections import PathCollection
     from matplotlib.figure import Figure
-    from matplotlib.projections.polar import PolarAxes
 
 
 def chance_levels(scores: Scores) -> dict[tuple[str, int], float]:
@@ -43,6 +40,10 @@ def chance_levels(scores: Scores) -> dict[tuple[str, int], float]:
             chance = (sr.value - onta.value) / (1 - onta.value)
             found.setdefault((cell.category, cell.level), []).append(100 * chance)
     return {place: sum(v) / len(v) for place, v in found.items()}
+
+
+FIRST = (0, (4, 2))
+"""The dashes of the first choice; its line is thin and has no marks."""
 
 
 def draw_levels(all_series: Sequence[Series]) -> Figure:
@@ -69,9 +70,12 @@ def draw_levels(all_series: Sequence[Series]) -> Figure:
             if column == 0:
                 axis.set_ylabel("SR [%]")
     handles = series_handles(all_series)
-    if guessed:
-        from matplotlib.lines import Line2D
+    from matplotlib.lines import Line2D
 
+    averages = [a for s in all_series for a in s.scores.categories.values()]
+    if any(percent_of(average, "sr1") is not None for average in averages):
+        handles.append(Line2D([], [], color=INK, lw=0.7, ls=FIRST, label="SR@1"))
+    if guessed:
         handles.append(Line2D([], [], color=INK, lw=0.8, ls=(0, (1, 2)), label="chance"))
     legend_below(figure, handles)
     return figure
@@ -88,15 +92,15 @@ def _level_panel(
     if chance:
         axis.plot(*zip(*chance, strict=True), ls=(0, (1, 2)), color=INK, lw=0.8)
     for index, series in enumerate(all_series):
-        points = [
-            (n, e)
-            for n in levels
-            if (a := series.scores.categories.get((category, n))) and (e := a.values.get("sr"))
-        ]
+        parts = [(n, a) for n in levels if (a := series.scores.categories.get((category, n)))]
+        points = [(n, e) for n, a in parts if (e := a.values.get("sr"))]
         if not points:
             continue
         aside = (index - (len(all_series) - 1) / 2) * min(0.09, 0.4 / len(all_series))
         whiskers(axis, [(n + aside, e) for n, e in points], index)
+        first = [(n + aside, y) for n, a in parts if (y := percent_of(a, "sr1")) is not None]
+        colour = COLOURS[index % len(COLOURS)]
+        axis.plot([x for x, _ in first], [y for _, y in first], color=colour, lw=0.7, ls=FIRST)
     axis.set_title(CATEGORY_NAMES[category], fontsize=6.2, pad=3)
     axis.text(0.99, 0.98, category, transform=axis.transAxes, ha="right", va="top", weight="bold")
     axis.set_ylim(-6, 132)  # room for the code
@@ -104,119 +108,6 @@ def _level_panel(
     axis.set_xlim(min(levels) - 0.4, max(levels) + 0.4)
     axis.set_xticks(list(levels), [f"L{n}" for n in levels])
     plain(axis)
-
-
-MOST_OUTLINES = 3
-FEWEST_SPOKES = 3
-
-
-def draw_radar(all_series: Sequence[Series]) -> Figure:
-    """The figure; a category without a result leaves a gap in its series' outline."""
-    present = {place for series in all_series for place in series.scores.categories}
-    there = sorted({level for _, level in present if level})  # 0 is all of them together
-    levels = sorted({there[0], there[-1]}) if there else [1]
-    if len(all_series) > MOST_OUTLINES or len({c for c, _ in present}) < FEWEST_SPOKES:
-        return draw_dots(all_series, levels)
-    figure = new_figure(2.2)
-    kind = {"projection": "polar"}
-    axes = figure.subplots(1, len(levels), subplot_kw=kind, squeeze=False)[0]
-    top = _top(all_series, levels)
-    for axis, level in zip(axes, levels, strict=True):
-        _radar(axis, all_series, level, top)
-    legend_below(figure, series_handles(all_series))
-    return figure
-
-
-def _top(all_series: Sequence[Series], levels: Sequence[int]) -> float:
-    """The outer ring [%]: the next 20 above the largest value, the same for all radars."""
-    values = [
-        percent_of(s.scores.categories.get((c, n)), "sr")
-        for s in all_series
-        for c in CATEGORIES
-        for n in levels
-    ]
-    largest = max((v for v in values if v is not None), default=100.0)
-    return float(min(100, max(20, 20 * math.ceil(largest / 20))))
-
-
-def _radar(axis: PolarAxes, all_series: Sequence[Series], level: int, top: float) -> None:
-    angles = [2 * math.pi * i / len(CATEGORIES) for i in range(len(CATEGORIES))]
-    for index, series in enumerate(all_series):
-        values = [percent_of(series.scores.categories.get((c, level)), "sr") for c in CATEGORIES]
-        known = [math.nan if v is None else v for v in values]
-        colour = COLOURS[index % len(COLOURS)]
-        axis.plot(
-            [*angles, 0.0],
-            [*known, known[0]],
-            **look(index),
-            ms=2.4,
-            lw=1.0,
-            clip_on=False,
-        )
-        if None not in values:
-            axis.fill(angles, known, color=colour, alpha=0.07, lw=0)
-    axis.set_theta_zero_location("N")
-    axis.set_theta_direction(-1)
-    axis.set_xticks(angles, CATEGORIES)
-    axis.tick_params(axis="x", pad=-2)
-    axis.set_ylim(0, top)
-    rings = [top * k / 4 for k in (1, 2, 3, 4)] if top > 20 else [10.0, 20.0]
-    axis.set_yticks(rings, [*(f"{r:g}" for r in rings[:-1]), ""], fontsize=5)
-    axis.set_rlabel_position(18)
-    axis.spines["polar"].set_color(GRID)
-    axis.set_title(f"L{level}", loc="left", x=-0.12, y=1.06, weight="bold")
-    axis.set_xlabel(f"SR, outer ring {top:g} %", fontsize=6)
-
-
-LINE = 0.05
-"""Height that a series takes of a category's line [inch]."""
-LEAST = 1.1
-"""Height of a figure whose few lines leave no room for its axes and legend [inch]."""
-
-
-def draw_dots(all_series: Sequence[Series], levels: Sequence[int]) -> Figure:
-    """The figure, with a panel for each of `levels`; categories that no series has get no line."""
-    present = {c for s in all_series for (c, level) in s.scores.categories if level in levels}
-    shown = [c for c in CATEGORIES if c in present] or list(CATEGORIES)
-    figure = new_figure(max(LEAST, len(shown) * (LINE * len(all_series) + 0.04) + 0.6))
-    axes = figure.subplots(1, len(levels), sharey=True, squeeze=False)[0]
-    for axis, level in zip(axes, levels, strict=True):
-        for index, series in enumerate(all_series):
-            _dots(axis, series, index, len(all_series), shown, level)
-        axis.set_title(f"L{level}", loc="left", weight="bold")
-        axis.set_xlim(-3, 103)
-        axis.set_xlabel("SR [%]")
-        plain(axis, "x")
-        axis.tick_params(axis="y", length=0)
-        for line in range(1, len(shown)):
-            axis.axhline(line - 0.5, color="#8888884d", lw=0.4)
-    axes[0].set_ylim(len(shown) - 0.5, -0.5)
-    axes[0].set_yticks(range(len(shown)), shown)
-    legend_below(figure, series_handles(all_series))
-    return figure
-
-
-def _dots(
-    axis: Axes, series: Series, index: int, count: int, shown: Sequence[str], level: int
-) -> None:
-    """The values of one series, which has its own height within every line."""
-    height = (index + 0.5) / count * 0.8 - 0.4
-    for line, category in enumerate(shown):
-        average = series.scores.categories.get((category, level))
-        estimate = None if average is None else average.values.get("sr")
-        if estimate is None:
-            continue
-        value, low, high = (100 * x for x in (estimate.value, estimate.low, estimate.high))
-        axis.errorbar(
-            [value],
-            [line + height],
-            xerr=[[max(0.0, value - low)], [max(0.0, high - value)]],
-            color=COLOURS[index % len(COLOURS)],
-            marker=MARKERS[index % len(MARKERS)],
-            ms=2.4,
-            elinewidth=0.6,
-            capsize=0,
-        )
 
 
 def draw_progress(all_series: Sequence[Series]) -> Figure:

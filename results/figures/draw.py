@@ -12,7 +12,6 @@ from robospa.results.figures.charts import (
     draw_latency,
     draw_levels,
     draw_progress,
-    draw_radar,
     has_latency,
 )
 from robospa.results.figures.series import (
@@ -26,8 +25,7 @@ from robospa.results.figures.series import (
 
 CAPTIONS = {
     "success": "Success rate by level for every category, with 95 % intervals; "
-    "the dotted line is guessing among the candidates.",
-    "radar": "Success rate of every category at the first and the last level; a gap has no result.",
+    "thin dashes are SR@1, what the first choices alone reach, dots guessing among the candidates.",
     "progress": "Progress score against success rate, a point a procedural variant: the higher "
     "above the line, the further failed trials came.",
     "latency": "Share of trials whose median, 95th and 99th percentile latency lies below a value.",
@@ -56,8 +54,6 @@ def draw(
         if any(s.scores.categories for s in together):
             save(draw_levels(together), folder, "success", formats)
             made.append(DrawnFigure("success", "Success against level", CAPTIONS["success"] + over))
-            save(draw_radar(together), folder, "radar", formats)
-            made.append(DrawnFigure("radar", "Categories", CAPTIONS["radar"] + over))
         if any(percent_of(c, "ps") is not None for s in together for c in s.scores.cells.values()):
             save(draw_progress(together), folder, "progress", formats)
             made.append(

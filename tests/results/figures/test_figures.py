@@ -18,11 +18,10 @@ from robospa.results.figures.charts import (
     draw_latency,
     draw_levels,
     draw_progress,
-    draw_radar,
 )
 from robospa.results.figures.curves import CurvePoint, draw_learning_curve, value_at
 from robospa.results.figures.draw import draw
-from robospa.results.figures.series import FORMATS, GRID, INK, Series, label_of, save, styled
+from robospa.results.figures.series import FORMATS, GRID, INK, Series, label_of, styled
 from robospa.results.paper.columns import published_column
 from robospa.results.records.runs import Run
 from robospa.results.records.trial_record import TrialRecord
@@ -76,13 +75,13 @@ def drawn(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_run_gets_all_figures_in_all_formats(drawn: Path) -> None:
-    made = ["success", "radar", "progress", "latency", "failures", "heat"]
+    made = ["success", "progress", "latency", "failures", "heat"]
     assert {p.name for p in drawn.iterdir()} == {f"{n}.{f}" for n in made for f in FORMATS}
 
 
 def test_published_models_have_no_latency_and_no_failures(tmp_path: Path) -> None:
     made = [d.name for d in draw([published("RDT")], tmp_path, SVG)]
-    assert made == ["success", "radar", "progress", "heat"]
+    assert made == ["success", "progress", "heat"]
 
 
 def test_beside_a_run_published_models_get_no_heat_map(tmp_path: Path) -> None:
@@ -92,7 +91,7 @@ def test_beside_a_run_published_models_get_no_heat_map(tmp_path: Path) -> None:
 
 def test_the_same_data_make_the_same_bytes(drawn: Path, tmp_path: Path) -> None:
     made = [drawing.name for drawing in draw([small_run()], tmp_path)]
-    assert made == ["success", "radar", "progress", "latency", "failures", "heat"]
+    assert made == ["success", "progress", "latency", "failures", "heat"]
     for path in drawn.iterdir():
         assert path.read_bytes() == (tmp_path / path.name).read_bytes(), path.name
 
@@ -100,7 +99,7 @@ def test_the_same_data_make_the_same_bytes(drawn: Path, tmp_path: Path) -> None:
 def test_a_series_without_any_result_draws_what_it_can(tmp_path: Path) -> None:
     keys = [TrialKey("Pick_Blocks_Size", 2, 7)]
     empty = Series("empty", score(keys, {}, {"Pick_Blocks_Size": "GAC"}))
-    assert [d.name for d in draw([empty], tmp_path, SVG)] == ["success", "radar", "heat"]
+    assert [d.name for d in draw([empty], tmp_path, SVG)] == ["success", "heat"]
 
 
 def test_names_of_policies_are_no_mathematics(tmp_path: Path) -> None:
@@ -135,29 +134,7 @@ def test_a_series_keeps_its_trials_order_free(drawn: Path, tmp_path: Path) -> No
         assert (drawn / name).read_bytes() == (tmp_path / name).read_bytes()
 
 
-def test_few_categories_are_dots_at_the_first_and_last_level_that_were_run() -> None:
-    figure = draw_radar([small_run()])
-    assert [axis.name for axis in figure.axes] == ["rectilinear", "rectilinear"]
-    assert [axis.get_title(loc="left") for axis in figure.axes] == ["L1", "L5"]
-
-
-def test_a_run_of_one_level_has_one_panel() -> None:
-    records = [trial("Pick_Blocks_Size", "GAC", 3, seed, True) for seed in range(2)]
-    by_key = {r.key: r for r in records}
-    (axis,) = draw_radar([Series("one", score(by_key, by_key), tuple(records))]).axes
-    assert axis.get_title(loc="left") == "L3"
-
-
-def test_many_models_are_dots_with_intervals_not_outlines(tmp_path: Path) -> None:
-    models = [published(name) for name in ("RDT", "GO-1", "pi0.5", "X-VLA")]
-    assert [axis.name for axis in draw_radar(models[:3]).axes] == ["polar", "polar"]
-    assert [axis.name for axis in draw_radar(models).axes] == ["rectilinear", "rectilinear"]
-    with styled():
-        save(draw_radar(models), tmp_path, "radar", SVG)
-    assert (tmp_path / "radar.svg").stat().st_size > 10_000
-
-
-@pytest.mark.parametrize("make", [draw_radar, draw_latency, draw_levels, draw_progress])
+@pytest.mark.parametrize("make", [draw_latency, draw_levels, draw_progress])
 def test_nothing_of_a_figure_is_cut_off(make: Callable[[Sequence[Series]], Figure]) -> None:
     runs = [small_run(f"{n} mistakes:neighbour (privileged, 3 of 60 missing)") for n in range(3)]
     with styled():
