@@ -12,8 +12,9 @@ from robospa.results.failures.labels import NAMES, failures_of
 from robospa.results.paper.rounding import rounded, text
 from robospa.results.records.action_problems import grouped, problem_lines
 from robospa.results.records.manifest import departures
-from robospa.results.records.runs import Run, by_setting, setting_name
+from robospa.results.records.runs import Run, by_setting, finished, setting_name
 from robospa.results.report.run_card import ends
+from robospa.results.scoring.first_choice import after_others
 from robospa.results.scoring.repeats import policy_error_lines, repeat_lines
 from robospa.results.scoring.scores import (
     IDLE,
@@ -165,7 +166,13 @@ def print_scores(run: Run, scores: Scores) -> None:
     console = plain_console(wide=130)
     console.print(_ends_line(run), style="dim", soft_wrap=True)
     lines = [*missing_lines(scores), *loss_lines(run), *policy_error_lines(run)]
-    for line in [*lines, *repeat_lines(run), *problem_lines(run.records.values())]:
+    odd = after_others([r for r in run.records.values() if finished(r)])
+    for line in [
+        *lines,
+        *[odd] * bool(odd),
+        *repeat_lines(run),
+        *problem_lines(run.records.values()),
+    ]:
         console.print(line, style="yellow", soft_wrap=True)
 
 

@@ -13,12 +13,16 @@ from robospa.results.records.action_problems import described, trial_problems
 from robospa.results.records.runs import VIDEOS, Run, film_name
 from robospa.results.records.trial_record import EventRow, TrialRecord
 from robospa.results.report.run_card import END_NAMES, NOT_RUN
+from robospa.results.scoring.first_choice import first_choice
 from robospa.trial import TrialKey
 
 SHOWN_TRIALS = 60_000
 """Two whole benchmark runs. Beyond that browsers choke: successes are left out first."""
 Failures = Mapping[TrialKey, Failure]
 """The type of every failed trial of a run."""
+
+
+LATER = "success, not by the first choice"
 
 
 def trial_rows(
@@ -58,7 +62,7 @@ def _row(
     place = folder / VIDEOS / str(number + 1) if several else folder / VIDEOS
     video = film(run, record, place)
     row |= {
-        "end": END_NAMES[record.end],
+        "end": LATER if record.success and not first_choice(record) else END_NAMES[record.end],
         "good": int(record.success),
         "done": record.done,
         "total": record.total,

@@ -111,9 +111,9 @@ def after_others(results: Sequence[TrialRecord]) -> str:
         return ""
     text = (
         f"{len(later)} of {len(won)} successes came after something else was taken, pressed, done "
-        f"too early or once more (significantly more than {SHARE:.0%}"
-        + (f" in {some(sorted(odd))}" if odd else "")
-        + "): SR@1 says what the first choices were worth"
+        f"too early or once more, which is more than {100 * SHARE:g} % by more than chance"
+        + (f" (in {some(sorted(odd))} alone too)" if odd else "")
+        + ": SR@1 says what the first choices were worth"
     )
     spatial = [r for r in results if r.category in SPATIAL and r.candidates > 1]
     right, by_chance = sum(map(first_choice, spatial)), Counter(1 / r.candidates for r in spatial)
