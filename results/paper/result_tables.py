@@ -37,9 +37,9 @@ _MARK_NOTES = {
     "none": "",
 }
 FIRST = (
-    "The official rule (SR, ONTA) lets a policy try one thing after the other, so that one which "
-    "never reads the instruction can reach 100 % of the spatial tasks; SR@1 and ONTA@1 count only "
-    "successes before which nothing else was taken, pressed, done too early or done once more."
+    "The official rule (SR, ONTA) lets a policy try one thing after the other: one that reads "
+    "nothing can reach 100 % of the spatial tasks. SR@1 and ONTA@1 count successes with nothing "
+    "else taken, pressed, done early or once more."
 )
 DASH = TableCell("–")
 Marked = Mapping[tuple[str, int], set[str]]
@@ -249,7 +249,7 @@ def _value(column: Column, metric: str, row: str, level: int, best: bool) -> Tab
     value = column.value(metric, row, level)
     if value is None:
         return DASH
-    whole = metric == "sr" and row in load().tasks and value == round(value)
+    whole = metric in ("sr", "sr1") and row in load().tasks and value == round(value)
     found = column.estimate(metric, row, level)
     low, high = (100 * found.low, 100 * found.high) if found else (None, None)
     entry = TableCell(rounding.text(value, 0 if whole else 1), value, low, high, best)
