@@ -60,20 +60,6 @@ class LoadedRun(Run):
         kinds |= dict.fromkeys(NUMBERS, "float64")
         return frame.astype(kinds)
 
-    def to_parquet(self, path: str | Path) -> None:
-        """Write the rows of `to_pandas` as a Parquet file.
-
-        Raises MissingPackage without pyarrow, which the extra `notebook` brings.
-        """
-        arrow, parquet = need("pyarrow"), need("pyarrow.parquet")
-        texts = dict.fromkeys((*KEY_COLUMNS, "end", *TEXTS), arrow.string())
-        numbers = dict.fromkeys(NUMBERS, arrow.float64())
-        counts = dict.fromkeys(("level", "seed", *COUNTS, *PROBLEMS), arrow.int64())
-        kinds = {**texts, **numbers, **counts, **dict.fromkeys(FLAGS, arrow.bool_())}
-        columns = trial_columns(self)
-        schema = arrow.schema([(name, kinds[name]) for name in columns])
-        parquet.write_table(arrow.table(columns, schema=schema), Path(path))
-
     def _repr_html_(self) -> str:
         """What a notebook shows."""
         return run_html(self)

@@ -13,7 +13,6 @@ from robospa.harness.cli.options import SHARE, AsJson, print_json
 
 if TYPE_CHECKING:
     from robospa.results.comparison.compare import Difference, RunComparison
-    from robospa.results.scoring.models import ModelResults
 
 GAPS = (0.02, 0.05, 0.1, 0.2)
 """Differences of rates in the table of sample sizes."""
@@ -38,7 +37,6 @@ class Method(StrEnum):
 
     wilson = "wilson"
     exact = "exact"
-    jeffreys = "jeffreys"
     bootstrap = "bootstrap"
 
 
@@ -51,7 +49,6 @@ def compare(
     metric: Annotated[Metric, typer.Option(help="what is compared")] = Metric.sr,
     ci: Annotated[Method, typer.Option(help="intervals of single rates")] = Method.wilson,
     variants: Annotated[bool, typer.Option(help="list all variants, not only those apart")] = False,
-    drops: Annotated[bool, typer.Option(help="what each side loses from level to level")] = False,
     power: Annotated[
         bool, typer.Option(help="compare nothing: say how many trials tell rates apart")
     ] = False,
@@ -77,8 +74,6 @@ def compare(
         print_json(found)
         return
     _print(found, variants)
-    if drops:
-        _print_drops(one, two, metric.value)
 
 
 def _print(found: RunComparison, variants: bool) -> None:
@@ -112,20 +107,6 @@ def _table(title: str, rows: Sequence[Difference], found: RunComparison) -> None
 
     if rows:
         show(difference_table(found, rows, title))
-
-
-def _print_drops(one: ModelResults, two: ModelResults, metric: str) -> None:
-    from robospa.results.comparison.compare import chance, drops
-
-    for model in (one, two):
-        print(f"{model.name} loses from level to level, percentage points")
-        for row in drops(model, metric):
-            e = row.estimate
-            partly = f" ({row.variants} of {row.listed} tasks)" if row.variants < row.listed else ""
-            print(
-                f"  {row.label}{partly}: {100 * e.value:+z.1f} "
-                f"[{100 * e.low:+z.1f}, {100 * e.high:+z.1f}], p {chance(row.p)}"
-            )
 
 
 def _power(tasks: str, levels: str, base: float, as_json: bool) -> None:

@@ -42,9 +42,7 @@ def report(
     with_published: Annotated[
         bool, typer.Option("--with-published", help="put the four published models beside them")
     ] = False,
-    ci: Annotated[
-        str, typer.Option(help="95 % intervals: wilson, exact, jeffreys or bootstrap")
-    ] = "wilson",
+    ci: Annotated[str, typer.Option(help="95 % intervals: wilson, exact or bootstrap")] = "wilson",
     out: Annotated[
         Path | None,
         typer.Option(

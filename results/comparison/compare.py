@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from html import escape
-from itertools import pairwise
 from pathlib import Path
 
 from robospa.results.comparison.pairs import (
@@ -326,35 +325,6 @@ def chance(p: float) -> str:
     return f"{p:.3f}" if p >= 0.0005 else "<.001"
 
 
-def drops(results: ModelResults, metric: str = "sr") -> list[Difference]:
-    """The loss of each category, dimension and the whole between levels, and from first to last.
-
-    Only tasks that both levels have count. Scenes of different levels are unrelated.
-    """
-    samples, category = results.samples(metric), results.categories
-    levels = sorted({level for _, level in samples})
-    steps = [*pairwise(levels)]
-    if len(levels) > 2:
-        steps.append((levels[0], levels[-1]))
-    found = []
-    for low, high in steps:
-        both = [t for t, n in samples if n == low and (t, high) in samples]
-        all_tasks = {t for t, n in results.listed if n in (low, high)}
-        for label, kind, chosen in collections(category):
-            tasks = [t for t in both if category.get(t) in chosen]
-            if not tasks:
-                continue
-            shares = weights_of([(t, low) for t in tasks], category)
-            easy, hard = (interval_of([samples[t, n] for t in tasks], shares) for n in (low, high))
-            gap = difference(easy, hard)
-            count = sum(category.get(t) in chosen for t in all_tasks)
-            trials = sum(samples[t, n].trials for t in tasks for n in (low, high))
-            name = f"{label} L{low}-L{high}"
-            row = (len(tasks), count, trials, easy.value, hard.value, gap, p_of_interval(gap))
-            found.append(Difference(name, kind, high, *row))
-    return found
-
-
 AXES = {
     "embodiment": "robots",
     "mode": "scene modes",
@@ -430,7 +400,7 @@ def compare(first: Side, second: Side, metric: str = "sr", ci: str = "wilson") -
         first: A run, its folder, `FOLDER@ROBOT` for one robot of it, or a published model's name.
         second: What it is compared with.
         metric: "sr", "sr1", "onta", "onta1" or "ps".
-        ci: How intervals of single rates are made: "wilson", "exact", "jeffreys" or "bootstrap".
+        ci: How intervals of single rates are made: "wilson", "exact" or "bootstrap".
 
     Raises:
         RunError: A folder holds no run, or one of several robots.

@@ -35,8 +35,10 @@ def missing_lines(scores: Scores) -> list[str]:
     return [
         f"{cell.task} L{cell.level}: {cell.missing} of {cell.listed} trials are missing; if all "
         f"had failed SR would be {100 * cell.worst:.1f}, if all had succeeded {100 * cell.best:.1f}"
+        + (f", SR@1 {100 * ends[0]:.1f} or {100 * ends[1]:.1f}" if ends else "")
         for cell in scores.cells.values()
         if cell.missing
+        for ends in [cell.bounds("sr1")]
     ]
 
 

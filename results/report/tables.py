@@ -143,7 +143,7 @@ AVERAGES = (
     "Values in percent. A category is the mean of its tasks; dimensions and the overall value are "
     "means of categories. ONTA is 0 for guessing among the candidates."
 )
-SINGLE = {"wilson": "Wilson's", "exact": "Clopper and Pearson's exact", "jeffreys": "Jeffreys'"}
+SINGLE = {"wilson": "Wilson's", "exact": "Clopper and Pearson's exact"}
 """Methods for the success rate of one variant, by the name of `intervals.METHODS`."""
 BOOTSTRAP = "95 % intervals are the paper's: a bootstrap over the trials within each variant."
 PROGRESS = "Intervals of progress are a bootstrap over trials."

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from robospa.results.records.action_problems import grouped
 from robospa.results.records.runs import Run, finished
 from robospa.results.records.trial_record import RetryRow, TrialRecord
+from robospa.results.scoring.first_choice import first_choice
 from robospa.results.scoring.scores import Scores, score
 from robospa.results.statistics.intervals import METHODS
 from robospa.trial import TrialKey
@@ -138,12 +139,12 @@ def repeat_lines(run: Run) -> list[str]:
     if not text:
         return []
     cells = worst_case(run).cells.values()
-    failed = sum(cell.successes for cell in cells)
-    results = sum(cell.trials for cell in cells)
-    now = sum(r.success for r in run.records.values())
+    left, first = (sum(cell.count(m) or 0 for cell in cells) for m in ("sr", "sr1"))
+    results, records = sum(cell.trials for cell in cells), run.records.values()
     return [
-        f"repeated after a fault {text}; if all of them had failed, {failed} of {results} trials "
-        f"would be successes instead of {now}"
+        f"repeated after a fault {text}; if all of them had failed, {left} of {results} trials "
+        f"would be successes instead of {sum(r.success for r in records)}, {first} by the first "
+        f"choice instead of {sum(map(first_choice, records))}"
     ]
 
 

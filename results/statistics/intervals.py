@@ -4,7 +4,7 @@ Wilson for one rate, MOVER (Zou and Donner 2008) for a weighted sum of independe
 their own limits: both are closed formulas, need no seed and stay honest at 0 and at all of n, where
 the bootstrap collapses to a point. Progress is no 0/1 outcome: its mean takes a seeded bootstrap,
 with the limit of a rate where no episode differs from another.
-Every `Estimate` names the method that made it. Exact and Jeffreys intervals need SciPy.
+Every `Estimate` names the method that made it. Exact intervals need SciPy.
 
 Except for `over_tasks`, all of them answer: the same tasks with other seeds.
 """
@@ -24,7 +24,7 @@ from robospa.results.statistics.samples import Sample, draw, draw_over_tasks, sc
 Z95 = 1.959963984540054
 """Two-sided 95 % quantile of the normal distribution."""
 LEVEL = 0.95
-METHODS = ("wilson", "exact", "jeffreys", "bootstrap")
+METHODS = ("wilson", "exact", "bootstrap")
 """Methods for the interval of a rate (`--ci`); the first is the default."""
 
 
@@ -58,17 +58,6 @@ def exact(successes: int, trials: int) -> Estimate:
     low = 0.0 if k == 0 else float(betaincinv(k, n - k + 1, tail))
     high = 1.0 if k == n else float(betaincinv(k + 1, n - k, 1 - tail))
     return Estimate(k / n, low, high, "exact")
-
-
-def jeffreys(successes: int, trials: int) -> Estimate:
-    """Rate with the central interval of Beta(k + 1/2, n - k + 1/2), closed at 0 and at n."""
-    from scipy.special import betaincinv
-
-    _check(successes, trials)
-    k, n, tail = successes, trials, (1 - LEVEL) / 2
-    low = 0.0 if k == 0 else float(betaincinv(k + 0.5, n - k + 0.5, tail))
-    high = 1.0 if k == n else float(betaincinv(k + 0.5, n - k + 0.5, 1 - tail))
-    return Estimate(k / n, low, high, "Jeffreys")
 
 
 def below(trials: int) -> float:
@@ -225,7 +214,6 @@ def over_tasks(
 _RATES: dict[str, Callable[[int, int], Estimate]] = {
     "wilson": wilson,
     "exact": exact,
-    "jeffreys": jeffreys,
 }
 
 

@@ -65,12 +65,6 @@ def test_a_data_frame_averages_over_what_has_a_result(run: Run) -> None:
     assert pandas.api.types.is_integer_dtype(frame.steps.dtype)
 
 
-def test_parquet_holds_the_same_rows(run: Run, tmp_path: Path) -> None:
-    parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow comes with extra notebook")
-    run.to_parquet(tmp_path / "trials.parquet")
-    assert parquet.read_table(tmp_path / "trials.parquet").to_pydict() == trial_columns(run)
-
-
 def test_without_pandas_a_sentence_says_what_brings_it(
     run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:

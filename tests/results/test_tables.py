@@ -275,7 +275,7 @@ def test_every_command_prints_names_as_they_are(
     named(run, name)
     named(other, "plain")
     assert name in output(capsys, "report", run)
-    assert run.name in output(capsys, "compare", run, other, "--variants", "--drops")
+    assert run.name in output(capsys, "compare", run, other, "--variants")
     output(capsys, "report", run, other, "--lint")
     output(capsys, "report", run, "--failures")
     assert _unescaped(name) in _unescaped(output(capsys, "report", run, "--failures", "--trials"))

@@ -13,7 +13,6 @@ from robospa.results.comparison.compare import (
     RunComparison,
     by_axis,
     compare_results,
-    drops,
 )
 from robospa.results.paper.columns import published_results
 from robospa.results.records.runs import by_setting
@@ -159,16 +158,6 @@ def test_notes_tell_of_versions_and_of_policies_that_ignore_their_seed(tmp_path:
     notes = " ".join(compare_results(one, two).notes)
     assert "different versions of robospa" in notes
     assert "a ignores the policy seed" in notes
-
-
-def test_drops_between_levels(tmp_path: Path) -> None:
-    records = [r for n, k in ((1, 3), (2, 2), (3, 0)) for r in outcomes(SIZE, n, [1] * k + [0])]
-    found = {row.label: row for row in drops(side(tmp_path / "a", records))}
-    assert {"GAC L1-L2", "GAC L2-L3", "GAC L1-L3", "overall L1-L3"} <= set(found)
-    assert found["GAC L1-L2"].estimate.value == pytest.approx(3 / 4 - 2 / 3)
-    assert found["overall L1-L3"].estimate == replace(
-        difference(wilson(3, 4), wilson(0, 1)), method=found["overall L1-L3"].estimate.method
-    )
 
 
 @pytest.mark.parametrize(

@@ -65,7 +65,8 @@ def test_in_the_worst_case_every_repeated_trial_had_failed() -> None:
         trial_record(key(3), True, retries=(AWAY,), attempts=2),
         trial_record(key(4), False, retries=(LOST,), attempts=2),
     )
-    assert worst_case(run).cells["Pick_Fake", 1].successes == 2
+    cell = worst_case(run).cells["Pick_Fake", 1]
+    assert (cell.successes, cell.firsts) == (2, 2)
 
 
 def test_rates_are_given_over_all_levels_and_for_each() -> None:
@@ -82,51 +83,42 @@ def test_rates_are_given_over_all_levels_and_for_each() -> None:
     ]
 
 
-def run_of(*records: TrialRecord) -> Run:
-    return Run(
-        Path("run"), RunManifest(), tuple(r.key for r in records), {r.key: r for r in records}
-    )
-
-
-def fault_key(seed: int, level: int = 1) -> TrialKey:
-    return TrialKey("Pick_Fake", level, seed)
-
-
 def test_policy_errors_are_grouped_without_their_numbers() -> None:
     errors = [
-        trial_record(fault_key(n), end="policy_error", message=f"nan in action {n}")
-        for n in range(3)
+        trial_record(key(n), end="policy_error", message=f"nan in action {n}") for n in range(3)
     ]
-    other = trial_record(fault_key(9), end="policy_error", message="no camera")
-    found = policy_error_lines(run_of(other, *errors))
+    other = trial_record(key(9), end="policy_error", message="no camera")
+    found = policy_error_lines(made(other, *errors))
     assert found == [
         "policy errors 4 of 4 (100.0 %; L1 100.0 %)",
         "policy error 3: nan in action 0",
         "policy error 1: no camera",
     ]
-    card = dict(facts(run_of(other, *errors)))
+    card = dict(facts(made(other, *errors)))
     assert card["policy errors"].endswith("L1 100.0 %); 3 nan in action 0; 1 no camera")
-    assert policy_error_lines(run_of(trial_record())) == []
+    assert policy_error_lines(made(trial_record())) == []
 
 
 def test_half_of_all_trials_in_policy_errors_is_a_failed_run() -> None:
-    error, sound = trial_record(fault_key(1), end="policy_error"), trial_record(fault_key(2))
-    assert "1 of 2 trials ended in a policy error" in many_policy_errors(run_of(error, sound))
-    assert many_policy_errors(run_of(error, sound, trial_record(fault_key(3)))) == ""
-    assert many_policy_errors(run_of()) == ""
+    error, sound = trial_record(key(1), end="policy_error"), trial_record(key(2))
+    assert "1 of 2 trials ended in a policy error" in many_policy_errors(made(error, sound))
+    assert many_policy_errors(made(error, sound, trial_record(key(3)))) == ""
+    assert many_policy_errors(made()) == ""
 
 
 def test_repeated_trials_are_told_with_level_cause_and_worst_case() -> None:
-    run = run_of(
-        trial_record(fault_key(1), True, retries=(LOST, LOST), attempts=3),
-        trial_record(fault_key(2), True),
-        trial_record(fault_key(3, 3)),
+    run = made(
+        trial_record(key(1), True, retries=(LOST, LOST), attempts=3),
+        trial_record(key(2), True),
+        trial_record(key(3, 3)),
     )
     assert repeats_text(run) == "1 of 3 (33.3 %; L1 50.0 %): 2 connection lost"
     (line,) = repeat_lines(run)
-    assert line.endswith("if all of them had failed, 1 of 3 trials would be successes instead of 2")
-    assert repeat_lines(run_of(trial_record())) == []
+    assert (
+        "1 of 3 trials would be successes instead of 2, 1 by the first choice instead of 2" in line
+    )
+    assert repeat_lines(made(trial_record())) == []
 
 
 def test_attempts_of_an_older_version_have_no_cause() -> None:
-    assert repeats_text(run_of(trial_record(attempts=2))).endswith(": 1 unknown (an older version)")
+    assert repeats_text(made(trial_record(attempts=2))).endswith(": 1 unknown (an older version)")

@@ -130,7 +130,6 @@ def test_intervals_by_the_chosen_method_leave_all_values_as_they_are() -> None:
     assert {ci: e.method for ci, e in values.items() if e} == {
         "wilson": "MOVER on Wilson",
         "exact": "MOVER on exact",
-        "jeffreys": "MOVER on Jeffreys",
         "bootstrap": "stratified bootstrap",
     }
     point = values["bootstrap"]
