@@ -1,6 +1,7 @@
 """Every task's SR, SR@1 and PS of several runs, beside the PS of doing nothing, as Markdown.
 
     python tools/task_rates.py expert=runs/oracle tries-all=runs/tries_all ... > table.md
+    python tools/task_rates.py --csv expert=runs/oracle ... > benchmarks/results/floors.csv
 
 Means over the levels that a run has of a task. Of a run in parts name it once a part.
 """
@@ -14,7 +15,7 @@ from robospa.results.paper.rounding import text
 from robospa.results.records.runs import read_run
 from robospa.results.scoring.scores import IDLE, Scores, combine, score_run
 from robospa.results.statistics.intervals import Estimate
-from robospa.results.tables import Table, TableCell, TableRow, to_markdown
+from robospa.results.tables import Table, TableCell, TableRow, to_csv, to_markdown
 from robospa.trial import BASIC, CATEGORIES, CATEGORY_NAMES, METRIC_NAMES
 
 SHOWN = ("sr", "sr1", "ps")
@@ -31,16 +32,20 @@ def task_rates(named: Mapping[str, Scores]) -> Table:
         if tasks:
             rows.append(TableRow(f"{one} {CATEGORY_NAMES[one]}", kind="section"))
         rows += [_row(task, named) for task in tasks]
-    groups = (*((name, len(SHOWN)) for name in named), (NOTHING, 1))
-    heads = (*[METRIC_NAMES[metric] for metric in SHOWN] * len(named), METRIC_NAMES["ps"])
+    groups = (*((name, 1 + len(SHOWN)) for name in named), (NOTHING, 1))
+    shown = (*[METRIC_NAMES[metric] for metric in SHOWN], "trials")
+    heads = (*shown * len(named), METRIC_NAMES["ps"])
     notes = tuple(f"{name}: {_extent(scores)}." for name, scores in named.items())
     return Table("task-rates", "Cell by cell", "task", heads, tuple(rows), groups, notes)
 
 
 def _row(task: str, named: Mapping[str, Scores]) -> TableRow:
-    found = [scores.tasks[task].values if task in scores.tasks else {} for scores in named.values()]
-    idle = next((values[IDLE] for values in found if values.get(IDLE)), None)
-    cells = [_cell(values.get(metric)) for values in found for metric in SHOWN]
+    found = [scores.tasks.get(task) for scores in named.values()]
+    idle = next((one.values[IDLE] for one in found if one and one.values.get(IDLE)), None)
+    cells: list[TableCell] = []
+    for one in found:
+        cells += [_cell(one.values.get(metric) if one else None) for metric in SHOWN]
+        cells.append(TableCell(str(one.trials) if one else ""))
     return TableRow(task, (*cells, _cell(idle)))
 
 
@@ -63,12 +68,14 @@ def _extent(scores: Scores) -> str:
 def main(words: Sequence[str]) -> None:
     """Print the table of the runs `NAME=FOLDER`."""
     named: dict[str, Scores] = {}
-    for word in words:
+    as_csv = "--csv" in words
+    for word in words[as_csv:]:
         name, _, folder = word.rpartition("=")
         scores = score_run(read_run(folder))
         known = named.get(name)
         named[name] = combine({**known.cells, **scores.cells}) if known else scores
-    print(to_markdown(task_rates(named)))
+    table = task_rates(named)
+    print(to_csv([table]) if as_csv else to_markdown(table), end="" if as_csv else "\n")
 
 
 if __name__ == "__main__":

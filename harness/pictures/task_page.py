@@ -7,8 +7,10 @@ repository's root after a task has come or changed; a test compares the page wit
 
 from __future__ import annotations
 
+import csv
 import sys
-from collections.abc import Iterable, Sequence
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import groupby, pairwise
 from pathlib import Path
 
@@ -26,50 +28,96 @@ SIZE = (192, 144)
 """Size of each of them [px]; rendered at twice that and averaged."""
 QUALITY = 78
 
+FLOORS = Path("benchmarks/results/floors.csv")
+"""What `tools/task_rates.py --csv` wrote of the expert and of policies that read no sentence."""
+EXPERT = "expert"
+COUNT = "trials"
+
 HEAD = """# Tasks
 
-Written by `python -m robospa.harness.pictures.task_page` from the catalog: do not edit. {bases}
-base tasks and {basics} basic ones for reference, each with five levels; the pictures show levels
-{first} and {last}. *n* is the number of objects that a guesser could pick or of the kinds of things
-to handle, *T* the number of subtasks, *limit* the policy actions that a trial may take: one value
-where all levels agree, else one a level or a range. What is on the table and what the seed decides:
-`robospa tasks NAME --level 3 --seed 100007` shows a scene in words and as a picture.
-Departures from the official tasks are in [fidelity.md](fidelity.md).
+Written by `python -m robospa.harness.pictures.task_page`: do not edit. {bases} base tasks and
+{basics} basic ones for reference, with five levels; pictures show levels {first} and {last}. *n* is
+the number of objects that a guesser could pick or of kinds of things to handle, *T* of subtasks
+(spatial and basic tasks: 1), *limit* of actions (there: 150): one value, each level's, or a range
+in equal steps. `robospa tasks NAME --level 3 --seed 100007` shows a scene.
+[Departures](fidelity.md) from the official tasks.
+
+Percentages are SR/SR@1, of procedures SR/SR@1/PS, of [policies that read no
+sentence](policies.md#floors) at levels 1, 3 and 5, and of [a learned one](learned.md), heat-maps
+({extents}); *doing nothing* is its PS. The expert has 100 everywhere{but}.
 """
 
+Rates = Mapping[str, Mapping[str, str]]
+"""By task and policy "SR/SR@1" or "SR/SR@1/PS" in percent."""
 
-def page() -> str:
-    """The page's text."""
+
+def page(root: Path = Path()) -> str:
+    """The page's text, with the figures that lie below `root`."""
     found = list(tasks().values())
     basics = sum(task.dimension == "basic" for task in found)
-    head = HEAD.format(bases=len(found) - basics, basics=basics, first=SHOWN[0], last=SHOWN[-1])
+    rates, trials = floors(root / FLOORS)
+    extents = ", ".join(f"{name} {count} trials a task" for name, count in trials.items())
+    poor = [name for name, by in rates.items() if set(by.get(EXPERT, "100").split("/")) != {"100"}]
+    head = HEAD.format(
+        bases=len(found) - basics, basics=basics, first=SHOWN[0], last=SHOWN[-1],
+        extents=extents, but=f" but in {', '.join(poor)}" if poor else "",
+    )  # fmt: skip
     parts = [head]
     by_category = sorted(found, key=lambda task: list(CATEGORY_NAMES).index(task.category))
     for category, grouped in groupby(by_category, key=lambda task: task.category):
-        members = list(grouped)
         parts.append(f"## {CATEGORY_NAMES[category]} ({category})\n")
-        alike = len({task.success for task in members}) == 1
-        if alike:
-            parts.append(f"Success: {members[0].success.rstrip('.')}.\n")
-        parts.append("| | task | levels 1 to 5 |" + ("" if alike else " success |"))
-        parts.append("|---|---|---|" + ("" if alike else "---|"))
-        parts += [row(task, success=not alike) for task in members]
-        parts.append("")
+        parts += [*table(list(grouped), rates), ""]
     return "\n".join(parts)
 
 
-def row(task: Task, success: bool) -> str:
-    """The line of one task, with or without what `success` is."""
+def floors(path: Path) -> tuple[Rates, Mapping[str, str]]:
+    """Rates by task and policy, and how many trials of a task every policy has."""
+    rates: dict[str, dict[str, str]] = {}
+    counts: dict[str, set[int]] = {}
+    with path.open(encoding="utf-8", newline="") as file:
+        for row in csv.DictReader(file):
+            task, policy, text = row["row"], row["group"], row["text"]
+            if not text:
+                continue
+            if row["column"] == COUNT:
+                counts.setdefault(policy, set()).add(int(text))
+                continue
+            before = rates.setdefault(task, {}).get(policy)
+            rates[task][policy] = text if before is None else f"{before}/{text}"
+    spans = {name: sorted({min(n), max(n)}) for name, n in counts.items() if name != EXPERT}
+    return rates, {name: " to ".join(map(str, span)) for name, span in spans.items()}
+
+
+def table(members: Sequence[Task], rates: Rates) -> list[str]:
+    """The lines of a category: a row a task, what success is, and the rates of policies."""
+    (most, count), *_ = Counter(task.success for task in members).most_common(1)
+    shared = count >= len(members) - 1
+    lines = []
+    if shared:
+        others = [f"{task.name}: {task.success}" for task in members if task.success != most]
+        sentences = [text.rstrip(".") + "." for text in (f"Success: {most}", *others)]
+        lines.append(" ".join(sentences) + "\n")
+    named = dict.fromkeys(policy for by in rates.values() for policy in by if policy != EXPERT)
+    columns = [p for p in named if any(p in rates.get(task.name, {}) for task in members)]
+    heads = ["task", "levels 1 to 5", *([] if shared else ["success"]), *columns]
+    lines += [f"| | {' | '.join(heads)} |", "|---" * (1 + len(heads)) + "|"]
+    return lines + [row(task, not shared, rates.get(task.name, {}), columns) for task in members]
+
+
+def row(task: Task, success: bool, rates: Mapping[str, str], policies: Sequence[str]) -> str:
+    """The line of one task, with or without what `success` is, and its rates."""
     levels = [task.levels[k] for k in sorted(task.levels)]
     n, total, limit = (
         per_level([getattr(level, name) for level in levels])
         for name in ("candidates", "subtasks", "steps")
     )
+    things = f"n, T {n}" if n == total else f"n {n}; T {total}"
     cells = (
         f"![{task.name}]({PICTURES.relative_to(PAGE.parent).as_posix()}/{picture_name(task)})",
         f"**{task.name}**<br>{task.summary}",
-        f"n {n}; T {total}<br>limit {limit}",
+        f"{things}<br>limit {limit}" if task.dimension == "procedural" else f"n {n}",
         *([task.success[:1].upper() + task.success[1:].rstrip(".")] if success else []),
+        *(rates.get(policy, "-") for policy in policies),
     )
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
@@ -80,11 +128,11 @@ def picture_name(task: Task) -> str:
 
 
 def per_level(values: Sequence[int]) -> str:
-    """The values of all levels: "150" if they agree, "1 to 5" if they count up, else each."""
+    """The values of all levels: "150" if they agree, "1 to 5" in equal steps, else each."""
     if len(set(values)) == 1:
         return str(values[0])
-    steps = {b - a for a, b in pairwise(values)}
-    return f"{values[0]} to {values[-1]}" if steps == {1} else ", ".join(map(str, values))
+    even = len({b - a for a, b in pairwise(values)}) == 1
+    return f"{values[0]} to {values[-1]}" if even else ", ".join(map(str, values))
 
 
 def draw(chosen: Iterable[Task], folder: Path) -> int:

@@ -24,6 +24,6 @@ def test_a_row_a_task() -> None:
     table = task_rates({"a": first, "b": scores(pick)})
     rows = {row.label: [cell.text for cell in row.cells] for row in table.rows if row.cells}
     assert rows == {
-        "Pick_Blocks_Size": ["100", "100", "", "100", "100", "", ""],
-        "Put_Bottles_Dustbin": ["0", "0", "50", "", "", "", "25"],
+        "Pick_Blocks_Size": ["100", "100", "", "1", "100", "100", "", "1", ""],
+        "Put_Bottles_Dustbin": ["0", "0", "50", "1", "", "", "", "", "25"],
     }

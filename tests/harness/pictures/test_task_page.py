@@ -14,7 +14,7 @@ ROOT = Path(__file__).resolve().parents[3]
 
 def test_the_page_is_what_the_catalog_says() -> None:
     again = "run `python -m robospa.harness.pictures.task_page --text`"
-    assert (ROOT / task_page.PAGE).read_text() == task_page.page(), again
+    assert (ROOT / task_page.PAGE).read_text() == task_page.page(ROOT), again
 
 
 def test_every_task_has_its_picture_and_they_are_small() -> None:
@@ -27,12 +27,17 @@ def test_every_task_has_its_picture_and_they_are_small() -> None:
 
 @pytest.mark.parametrize(
     ("values", "text"),
-    [([150] * 5, "150"), ([2, 3, 4, 5, 6], "2 to 6"), ([1, 2, 2, 3, 3], "1, 2, 2, 3, 3")],
+    [
+        ([150] * 5, "150"),
+        ([200, 400, 600, 800, 1000], "200 to 1000"),
+        ([1, 2, 2, 3, 3], "1, 2, 2, 3, 3"),
+    ],
 )
 def test_values_of_five_levels_in_words(values: list[int], text: str) -> None:
     assert task_page.per_level(values) == text
 
 
 def test_a_row_says_the_limits_of_all_levels() -> None:
-    line = task_page.row(tasks()["Click_Can_Place_Items"], success=True)
-    assert "T 1 to 5<br>limit 200, 400, 600, 800, 1000" in line and line.count("|") == 5
+    rates = {"hold": "0/0/20"}
+    line = task_page.row(tasks()["Click_Can_Place_Items"], True, rates, ["hold", "other"])
+    assert "T 1 to 5<br>limit 200 to 1000" in line and line.endswith("| 0/0/20 | - |")
