@@ -2,7 +2,7 @@
 
 An entry's values come from the outcomes of its trials; all averages are computed here, and a
 submission whose own scores differ from them is refused. Two entries are ranked against each
-other only if both are `rankable` and share a `Group`. What an entry does not state equals nothing.
+other only in a cell of the `ranks` of both, and if they share a `Group`. What an entry does not state equals nothing.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import astuple, dataclass, replace
 
-from robospa.leaderboard.agreement import LEAST_POWER, LIE
+from robospa.leaderboard.agreement import CELL_LIE, LEAST_POWER, LIE
 from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.card import Card, recipe_of
 from robospa.leaderboard.evidence import BadgeEvidence, what_it_catches
@@ -68,13 +68,13 @@ def group(entry: Entry) -> Group | None:
     return found if all(astuple(found)) else None
 
 
-def rankable(entry: Entry) -> bool:
-    """Whether `entry` gets a rank in its group: it has trials, of a frozen suite of this benchmark,
-    that were reproduced on hidden scenes. Anything else is a claim."""
+def ranks(entry: Entry) -> tuple[str, ...]:
+    """The cells in which `entry` gets a rank in its group: of trials of a frozen suite of this
+    benchmark, reproduced on hidden scenes that would have shown a lie there. All else is a claim."""
     found = group(entry)
     if found is None or found.of_draft or entry.column.published:
-        return False
-    return "reproduced" in entry.badges
+        return ()
+    return entry.cells
 
 
 def groups_of(entries: Iterable[Entry]) -> list[Group]:
@@ -109,10 +109,12 @@ MEANINGS = {
     ),
     "reproduced": (
         "The server acted on hidden scenes, which nobody could know or train on, and agrees with "
-        f"the claim; rates {100 * LIE:g} points lower would have shown with at least "
+        "the claim as a whole and in every cell; rates "
+        f"{100 * LIE:g} points lower everywhere would have shown with at least "
         f"{100 * LEAST_POWER:g} %. Smaller gains, such as the best of many runs on the public "
         "seeds, may hide below that, and nothing shows what runs behind the server. Only models "
-        "with this badge are ranked."
+        "with this badge are ranked, and only in cells where a lie of "
+        f"{100 * CELL_LIE:g} points in that cell alone would have shown with as much."
     ),
 }
 """What a badge proves, and what it does not."""
@@ -141,6 +143,8 @@ class Entry:
     evidence: tuple[tuple[str, str], ...]
     failures: Mapping[str, Mapping[str, int]]
     submission: Submission | None = None
+    cells: tuple[str, ...] = ()
+    """"ROW/LEVEL" where hidden scenes would have shown a lie."""
 
     @property
     def badge(self) -> str:
@@ -224,6 +228,7 @@ def entry_of(submission: Submission) -> Entry:
         evidence=tuple(evidence_lines(evidence)),
         failures=submission.failures,
         submission=submission,
+        cells=tuple(evidence.reproduced.ranks) if evidence.reproduced else (),
     )
 
 
@@ -274,11 +279,14 @@ def evidence_lines(evidence: BadgeEvidence) -> list[tuple[str, str]]:
         lines += [(BADGES[evidence.badges[1]], text), ("challenge", again.challenge)]
     if fresh:
         text = (
-            f"{fresh.overall.fresh} of {fresh.trials} trials on hidden scenes succeeded, where "
-            f"the claim leads one to expect {fresh.overall.expected:.1f}: p = "
-            f"{fresh.overall.p:.2g}, tested at {fresh.alpha:g}. Had every rate been "
+            f"{fresh.overall.fresh} of {fresh.trials} trials on hidden scenes succeeded at the "
+            "first choice, where the claim leads one to expect "
+            f"{fresh.overall.expected:.1f}: p = {fresh.overall.p:.2g}, tested at {fresh.alpha:g}, "
+            "as is every cell, corrected after Holm. Had every rate been "
             f"{100 * LIE:g} points lower than claimed, this would have shown with "
-            f"{100 * fresh.notices:.0f} %. {fresh.repeated} of the trials had to be repeated and "
+            f"{100 * fresh.notices:.0f} %. Ranked in {len(fresh.ranks)} of {len(fresh.cells)} "
+            f"cells, where {100 * CELL_LIE:g} points less would have shown with "
+            f"{100 * LEAST_POWER:g} %. {fresh.repeated} of the trials had to be repeated and "
             "count as failures."
         )
         lines += [("reproduced", text), ("commitment", fresh.commitment)]

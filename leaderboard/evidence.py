@@ -12,16 +12,28 @@ import hashlib
 import math
 import re
 from collections.abc import Iterable, Sequence
+from functools import cached_property
 from typing import Annotated
 
-from msgspec import Struct
+from msgspec import Meta, Struct
 
-from robospa.leaderboard.agreement import LEAST_POWER, LIE
+from robospa.leaderboard.agreement import (
+    CELL_LIE,
+    LEAST_POWER,
+    LIE,
+    Agreement,
+    Counts,
+    agreement,
+    contradictions,
+)
 from robospa.leaderboard.bundle import IN_REPOSITORY, BundleError
 from robospa.leaderboard.card import LINK
-from robospa.schema import Count, Number, pattern, read
+from robospa.schema import Count, Number, one_of, pattern, read
+from robospa.text import some
 from robospa.trial import TrialKey
 
+MOST_ALPHA = 0.1
+"""A test at a higher level is none."""
 CHALLENGE = 8
 """A challenge has at least this many characters: fewer can be guessed."""
 FORGED = 0.05
@@ -166,37 +178,28 @@ class ReplayEvidence(Struct, frozen=True, kw_only=True):
         return self.identical == self.sampled
 
 
-class OverallTest(Struct, frozen=True):
-    """The test over all hidden trials: `fresh` successes where `expected` agree with the claim."""
-
-    fresh: Count
-    expected: Number
-    p: Number
-
-
-class CategoryTest(Struct, frozen=True, kw_only=True):
-    """The test of a category; `p_holm` is corrected after Holm."""
-
-    fresh: Count = 0
-    expected: Number = 0.0
-    p: Number = 1.0
-    p_holm: Number
+Four = tuple[Count, Count, Count, Count]
+"""Claimed successes and trials of a variant, and fresh ones."""
+RANKED = "sr1"
+"""The metric whose power is stated: models are ranked by it, and by what follows from it."""
+TESTED = ("sr", RANKED)
 
 
-class Reproduction(Struct, frozen=True, kw_only=True):
+class Reproduction(Struct, frozen=True, kw_only=True, dict=True):
     """Level 3: how `trials` on hidden scenes agree with the claims of the bundle with this hash,
-    tested at the level `alpha`. `repeated` ones count as failures. `variants` are claimed and fresh
-    counts; `power` is the chance to notice rates that are lower everywhere, by how much."""
+    tested at the level `alpha`. `repeated` ones count as failures. `counts` are by metric and
+    variant; `power` is the chance to notice rates that are lower everywhere, by how much, and
+    `cells` that of CELL_LIE in a cell alone."""
 
     bundle: str
     commitment: str = ""
     trials: Count
     repeated: Count = 0
-    alpha: Number
-    overall: OverallTest
-    categories: dict[str, CategoryTest]
-    variants: dict[str, tuple[Count, Count, Count, Count]] = {}
+    alpha: Annotated[Number, Meta(gt=0, le=MOST_ALPHA)]
+    categories: dict[str, str]
+    counts: dict[Annotated[str, one_of(TESTED)], dict[str, Four]]
     power: dict[str, Number]
+    cells: dict[str, Number]
 
     @property
     def notices(self) -> float:
@@ -209,26 +212,46 @@ class Reproduction(Struct, frozen=True, kw_only=True):
         return self.trials > 0 and self.notices >= LEAST_POWER
 
     @property
+    def ranks(self) -> list[str]:
+        """The cells in which a lie of CELL_LIE would have been noticed."""
+        return [name for name, chance in self.cells.items() if chance >= LEAST_POWER]
+
+    @property
     def holds(self) -> bool:
-        """Whether neither the whole nor a category contradicts the claim at level `alpha`."""
-        least = min([self.overall.p, *(test.p_holm for test in self.categories.values())])
-        return least >= self.alpha
+        """Whether nothing contradicts the claim."""
+        return not self.contradictions
+
+    @cached_property
+    def contradictions(self) -> dict[str, float]:
+        """What contradicts the claim, with its p."""
+        metrics = {m: {v: Counts(*four) for v, four in c.items()} for m, c in self.counts.items()}
+        return contradictions(metrics, self.categories, self.alpha)
+
+    @cached_property
+    def overall(self) -> Agreement:
+        """The test of everything, in the metric that ranks."""
+        return agreement(Counts(*four) for four in self.counts[RANKED].values())
 
     def sentences(self) -> list[str]:
         """What this shows and what it does not, for people."""
-        counts = self.variants.values()
+        counts = self.counts[RANKED].values()
         claimed = sum(good / trials * fresh for good, trials, _, fresh in counts)
         said = [
-            f"{self.overall.fresh} of {self.trials} fresh trials succeeded where the claim leads "
-            f"one to expect {claimed:.1f} (exact test over {len(self.variants)} variants, "
-            f"two-sided p = {self.overall.p:.3g})."
+            f"{self.overall.fresh} of {self.trials} fresh trials succeeded at the first choice "
+            f"where the claim leads one to expect {claimed:.1f} (exact test over {len(counts)} "
+            f"variants, two-sided p = {self.overall.p:.3g})."
         ]
-        for category, test in self.categories.items():
-            if test.p_holm < self.alpha:
-                said.append(f"{category} contradicts the claim (p = {test.p_holm:.3g} after Holm).")
+        if found := self.contradictions:
+            named = [f"{name} (p = {p:.3g})" for name, p in found.items()]
+            said.append(f"The claim is contradicted by {some(named)}.")
         power = {float(drop): 100 * chance for drop, chance in self.power.items()}
         chances = ", ".join(f"{100 * drop:g} points {p:.0f} %" for drop, p in power.items())
         said.append(f"Chance to notice rates that are lower everywhere by: {chances}.")
+        said.append(
+            f"In {len(self.ranks)} of {len(self.cells)} cells, {some(self.ranks)}, a lie of "
+            f"{100 * CELL_LIE:g} points in that cell alone would show with "
+            f"{100 * LEAST_POWER:g} %: these are ranked."
+        )
         if self.repeated:
             said.append(f"{self.repeated} trials were repeated and count as failures.")
         if not self.enough:
@@ -283,7 +306,9 @@ def read_evidence(data: object, bundle: str, where: str) -> BadgeEvidence:
             f"with {100 * fresh.notices:.0f} %; a badge needs {100 * LEAST_POWER:g} %"
         )
     if fresh and not fresh.holds:
-        raise BundleError(f"{where}: hidden seeds contradict what the bundle claims")
+        raise BundleError(
+            f"{where}: hidden seeds contradict what the bundle claims: {some(fresh.contradictions)}"
+        )
     return evidence
 
 

@@ -1,10 +1,11 @@
 """Level 3, *reproduced*: hidden scenes run against the submitter's server, held against the bundle.
 
-The server has to be what the bundle says: same spec, same settings. All outcomes together and those
-of every category are tested exactly (`robospa.leaderboard.agreement`); categories are corrected for
-being several. A fresh trial that was repeated counts as a failure: the policy may have broken off
-the attempts that went badly. Passing means that the claim was not contradicted, which is worth a
-badge only if a lie of five points would have been noticed.
+The server has to be what the bundle says: same spec, same settings. Successes, and those at the
+first choice, are tested exactly over everything and in every cell that can be sorted
+(`robospa.leaderboard.agreement`). A fresh trial that was repeated counts as a failure: the policy
+may have broken off the attempts that went badly. Passing means that the claim was not contradicted,
+which is worth a badge only if a lie of five points everywhere would have been noticed, and a rank
+in a cell only if one of twenty there alone would.
 
 A block of hidden scenes is fixed before a submitter can see them, and provably not chosen
 afterwards: a JSON file of a random salt and fresh seeds. The salt enters every random draw of
@@ -21,6 +22,7 @@ import re
 import secrets
 from collections.abc import Callable, Sequence
 from dataclasses import astuple, dataclass, replace
+from operator import attrgetter
 from pathlib import Path
 
 from robospa.harness.running.atomic_file import replace_file
@@ -30,24 +32,26 @@ from robospa.harness.running.policy_probe import probe_policies
 from robospa.harness.seeds.attempt import expert_pool
 from robospa.harness.trial import salt_hash
 from robospa.leaderboard.agreement import (
+    CELL_LIE,
     LEAST_POWER,
     LIE,
     Counts,
-    agreement,
-    holm,
+    cells,
     power,
     trials_needed,
 )
 from robospa.leaderboard.bundle import MEGA, BundleError, canonical, sha256
-from robospa.leaderboard.evidence import CategoryTest, OverallTest, Reproduction
+from robospa.leaderboard.evidence import MOST_ALPHA, RANKED, TESTED, Reproduction
 from robospa.leaderboard.rules import Reference
 from robospa.leaderboard.untrusted import parse_map
 from robospa.leaderboard.verify import Valid
 from robospa.results.records.runs import Run
+from robospa.results.records.trial_record import TrialRecord
+from robospa.results.scoring.first_choice import first_choice
 from robospa.results.scoring.repeats import was_repeated, with_repeated_failed
 from robospa.tasks.scene import SUITE
 from robospa.tasks.seeds import ListKey
-from robospa.trial import REFERENCE, TrialKey
+from robospa.trial import CATEGORIES, DIMENSIONS, REFERENCE, TrialKey
 
 FORMAT = 2
 """In format 1 the salt did not enter the scenes."""
@@ -168,40 +172,59 @@ def _seeds(lists: object, what: str) -> dict[tuple[str, int], tuple[int, ...]]:
     return seeds
 
 
-MOST_ALPHA = 0.1
 DROPS = (0.02, LIE, 0.1)
 """Losses of success for which the power is stated."""
 
 
-def claims_of(valid: Valid) -> dict[tuple[str, int], Counts]:
+COUNTED: dict[str, Callable[[TrialRecord], bool]] = dict(
+    zip(TESTED, (attrgetter("success"), first_choice), strict=True)
+)
+"""What counts as a success in the metrics that are tested."""
+
+
+def claims_of(valid: Valid, metric: str = RANKED) -> dict[str, Counts]:
     """What the bundle claims of each of its variants, without fresh trials."""
-    found: dict[tuple[str, int], list[bool]] = {}
+    found: dict[str, list[bool]] = {}
     for key, record in valid.run.records.items():
-        found.setdefault(key.variant, []).append(record.success)
+        found.setdefault(f"{key.task}/{key.level}", []).append(COUNTED[metric](record))
     return {variant: Counts(sum(made), len(made), 0, 0) for variant, made in found.items()}
 
 
 def plan(valid: Valid, trials: int | None, alpha: float = 0.01) -> int:
     """How many hidden trials of every variant a block for the bundle has: `trials`, or as few as a
-    badge needs. BundleError for fewer than that, unless the bundle is for practice.
+    badge and ranks in all categories need. BundleError for fewer than a badge needs, unless the
+    bundle is for practice.
     """
-    claims = list(claims_of(valid).values())
+    claims = claims_of(valid)
     if not 0 < alpha <= MOST_ALPHA:
         raise BundleError(f"a test at the level {alpha:g} is none; choose at most {MOST_ALPHA:g}")
     if valid.manifest.practice and trials is not None and trials > 0:
         return trials
-    needed = trials_needed(claims, alpha)
+    needed = trials_needed(list(claims.values()), alpha)
     if needed is None:
         raise BundleError(
-            f"no block earns this bundle a badge: with {sum(c.claimed_trials for c in claims)} "
-            f"trials its own rates are too uncertain to notice a lie of {100 * LIE:g} points"
+            f"no block earns this bundle a badge: with {len(valid.keys)} trials its own rates are "
+            f"too uncertain to notice a lie of {100 * LIE:g} points"
         )
     if trials is not None and trials < needed:
         raise BundleError(
             f"{trials} hidden trials a variant are too few: {needed} notice a lie of "
             f"{100 * LIE:g} points with {100 * LEAST_POWER:g} %"
         )
-    return trials or needed
+    found, level = _cells(valid, alpha)
+    categories = [[claims[v] for v in own] for place, own in found.items() if place in RANKED_ROWS]
+    more = [trials_needed(own, level, CELL_LIE) or 0 for own in categories]
+    return trials or max(needed, *more, 0)
+
+
+def _cells(valid: Valid, alpha: float) -> tuple[dict[str, tuple[str, ...]], float]:
+    """The cells of the bundle, and the level that is left for each when all are tested."""
+    found = cells(claims_of(valid), valid.run.manifest.categories)
+    return found, alpha / (len(COUNTED) * len(set(found.values())))
+
+
+RANKED_ROWS = frozenset(f"{row}/0" for row in (*DIMENSIONS, *CATEGORIES))
+"""The cells in which a block of the usual size earns a rank."""
 
 
 def hidden_keys(valid: Valid, block: Block, reference: Reference) -> list[TrialKey]:
@@ -249,30 +272,29 @@ def compare(
             f"the run on the hidden seeds is not complete: {len(fresh.without_result)} of "
             f"{len(keys)} trials are missing; go on with --resume"
         )
-    records, claims = with_repeated_failed(fresh.records), claims_of(valid)
-    category_of = valid.run.manifest.categories
-    variants: dict[tuple[str, int], Counts] = {}
-    categories: dict[str, list[Counts]] = {}
-    for variant in block.seeds:
-        made = [records[k].success for k in keys if k.variant == variant]
-        counts = replace(claims[variant], fresh=sum(made), fresh_trials=len(made))
-        variants[variant] = counts
-        categories.setdefault(category_of[variant[0]], []).append(counts)
-    tests = {name: agreement(found) for name, found in categories.items()}
-    corrected = holm([found.p for found in tests.values()])
-    everything = list(variants.values())
-    overall = agreement(everything)
+    records = with_repeated_failed(fresh.records)
+    made: dict[str, dict[str, Counts]] = {}
+    for metric, good in COUNTED.items():
+        claims = claims_of(valid, metric)
+        found: dict[str, list[bool]] = {variant: [] for variant in claims}
+        for key in keys:
+            found[f"{key.task}/{key.level}"].append(good(records[key]))
+        made[metric] = {
+            v: replace(claims[v], fresh=sum(won), fresh_trials=len(won)) for v, won in found.items()
+        }
+    ranked = made[RANKED]
+    places, level = _cells(valid, alpha)
+    chances = {
+        own: power([ranked[v] for v in own], CELL_LIE, level) for own in set(places.values())
+    }
     return Reproduction(
         bundle=valid.manifest.bundle,
         commitment=block.commitment,
         trials=len(keys),
         repeated=sum(was_repeated(records[key]) for key in keys),
         alpha=alpha,
-        overall=OverallTest(overall.fresh, overall.expected, overall.p),
-        categories={
-            name: CategoryTest(fresh=found.fresh, expected=found.expected, p=found.p, p_holm=p)
-            for (name, found), p in zip(tests.items(), corrected, strict=True)
-        },
-        variants={f"{task}/{level}": astuple(c) for (task, level), c in variants.items()},
-        power={f"{drop:g}": power(everything, drop, alpha) for drop in DROPS},
+        categories=valid.run.manifest.categories,
+        counts={m: {v: astuple(c) for v, c in counts.items()} for m, counts in made.items()},
+        power={f"{drop:g}": power(list(ranked.values()), drop, alpha) for drop in DROPS},
+        cells={place: chances[own] for place, own in places.items()},
     )

@@ -29,7 +29,7 @@ from robospa.leaderboard.entries import (
     group,
     groups_of,
     page_values,
-    rankable,
+    ranks,
 )
 from robospa.leaderboard.submission import left_out, read_submissions
 from robospa.leaderboard.verify import paired, results_of
@@ -123,7 +123,7 @@ def row_data() -> dict[str, dict[str, str]]:
 
 
 def model_data(entry: Entry) -> dict[str, object]:
-    """An entry for the table's script; see `rankable`."""
+    """An entry for the table's script; see `ranks`."""
     return {
         "id": entry.slug,
         "name": entry.name,
@@ -131,7 +131,7 @@ def model_data(entry: Entry) -> dict[str, object]:
         "badge": entry.badge,
         "badges": list(entry.badges),
         "group": str(group(entry) or ""),
-        "rankable": rankable(entry),
+        "ranks": ranks(entry),
         "embodiment": entry.embodiment,
         "mode": entry.mode,
         "split": entry.split,
