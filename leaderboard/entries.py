@@ -1,8 +1,9 @@
 """Who stands on the leaderboard: submissions with their badges, and the four published models.
 
 An entry's values come from the outcomes of its trials; all averages are computed here, and a
-submission whose own scores differ from them is refused. Two entries are ranked against each
-other only in a cell of the `ranks` of both, and if they share a `Group`. What an entry does not state equals nothing.
+submission whose own scores differ from them is refused. Two entries of one `Group` are ranked
+against each other in the cells that are in the `ranks` of both. What an entry does not state equals
+nothing.
 """
 
 from __future__ import annotations
@@ -69,8 +70,8 @@ def group(entry: Entry) -> Group | None:
 
 
 def ranks(entry: Entry) -> tuple[str, ...]:
-    """The cells in which `entry` gets a rank in its group: of trials of a frozen suite of this
-    benchmark, reproduced on hidden scenes that would have shown a lie there. All else is a claim."""
+    """The cells in which `entry` gets a rank in its group: it has trials of a frozen suite of this
+    benchmark, and hidden scenes would have shown a lie there. All else is a claim."""
     found = group(entry)
     if found is None or found.of_draft or entry.column.published:
         return ()

@@ -15,7 +15,7 @@ from collections.abc import Iterable, Sequence
 from functools import cached_property
 from typing import Annotated
 
-from msgspec import Meta, Struct
+from msgspec import Struct
 
 from robospa.leaderboard.agreement import (
     CELL_LIE,
@@ -32,8 +32,6 @@ from robospa.schema import Count, Number, one_of, pattern, read
 from robospa.text import some
 from robospa.trial import TrialKey
 
-MOST_ALPHA = 0.1
-"""A test at a higher level is none."""
 CHALLENGE = 8
 """A challenge has at least this many characters: fewer can be guessed."""
 FORGED = 0.05
@@ -195,7 +193,7 @@ class Reproduction(Struct, frozen=True, kw_only=True, dict=True):
     commitment: str = ""
     trials: Count
     repeated: Count = 0
-    alpha: Annotated[Number, Meta(gt=0, le=MOST_ALPHA)]
+    alpha: Number
     categories: dict[str, str]
     counts: dict[Annotated[str, one_of(TESTED)], dict[str, Four]]
     power: dict[str, Number]
@@ -307,7 +305,8 @@ def read_evidence(data: object, bundle: str, where: str) -> BadgeEvidence:
         )
     if fresh and not fresh.holds:
         raise BundleError(
-            f"{where}: hidden seeds contradict what the bundle claims: {some(fresh.contradictions)}"
+            f"{where}: hidden seeds contradict what the bundle claims: "
+            f"{some([*fresh.contradictions])}"
         )
     return evidence
 

@@ -41,7 +41,7 @@ from robospa.leaderboard.agreement import (
     trials_needed,
 )
 from robospa.leaderboard.bundle import MEGA, BundleError, canonical, sha256
-from robospa.leaderboard.evidence import MOST_ALPHA, RANKED, TESTED, Reproduction
+from robospa.leaderboard.evidence import RANKED, TESTED, Reproduction
 from robospa.leaderboard.rules import Reference
 from robospa.leaderboard.untrusted import parse_map
 from robospa.leaderboard.verify import Valid
@@ -172,6 +172,8 @@ def _seeds(lists: object, what: str) -> dict[tuple[str, int], tuple[int, ...]]:
     return seeds
 
 
+MOST_ALPHA = 0.1
+"""A test at a higher level is none."""
 DROPS = (0.02, LIE, 0.1)
 """Losses of success for which the power is stated."""
 

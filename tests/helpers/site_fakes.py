@@ -13,7 +13,8 @@ from run_fakes import FakePolicy
 
 from robospa.leaderboard.bundle import canonical
 from robospa.leaderboard.card import to_card
-from robospa.leaderboard.entries import Entry, published_entries
+from robospa.leaderboard.entries import Entry, page_values, published_entries
+from robospa.leaderboard.evidence import TESTED
 from robospa.leaderboard.packing import pack
 from robospa.leaderboard.submission import add
 from robospa.leaderboard.verify import Valid
@@ -37,8 +38,9 @@ REPRODUCED: dict[str, Any] = {
     "alpha": 0.01,
     "trials": 2000,
     "power": {"0.02": 0.4, "0.05": 0.97, "0.1": 1.0},
-    "overall": {"p": 0.4, "fresh": 1210, "expected": 1222.5},
-    "categories": {"GAC": {"p": 0.4, "p_holm": 0.4}},
+    "categories": {"Pick_Blocks_Size": "GAC"},
+    "counts": {m: {f"Pick_Blocks_Size/{n}": [60, 100, 242, 400] for n in LEVELS} for m in TESTED},
+    "cells": {"GAC/0": 0.97, "Pick_Blocks_Size/0": 0.97, "Pick_Blocks_Size/1": 0.3},
 }
 
 
@@ -99,6 +101,7 @@ def _random_entry(model: Entry, number: int) -> Entry:
         split="heldout",
         suite="robospa-1",
         column=column,
+        cells=tuple(f"{row}/{n}" for row in page_values(model)["sr"] for n in (0, *LEVELS)),
     )
 
 

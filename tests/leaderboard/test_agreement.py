@@ -13,6 +13,8 @@ from robospa.leaderboard.agreement import (
     LIE,
     Counts,
     agreement,
+    cells,
+    contradictions,
     holm,
     power,
     trials_needed,
@@ -56,17 +58,30 @@ def test_variants_without_any_success_count_for_nothing() -> None:
     assert agreement([*some, Counts(0, 100, 0, 10)]).p == pytest.approx(agreement(some).p)
 
 
-def test_honest_claims_are_rarely_contradicted() -> None:
+CATEGORY = {f"Task_{n}": "GAC" if n < 28 else "MIP" for n in range(56)}
+
+
+def test_honest_claims_are_rarely_contradicted_and_a_lie_about_one_variant_always() -> None:
     random = np.random.default_rng(5)
-    wrong = 0
-    for _ in range(400):
-        rates = random.uniform(0, 0.6, 12)
-        counts = [
-            Counts(int(random.binomial(100, r)), 100, int(random.binomial(10, r)), 10)
-            for r in rates
+    refused = noticed = 0
+    for _ in range(60):
+        rates = random.uniform(0, 0.9, 280).tolist()
+        drawn = [
+            Counts(int(random.binomial(100, r)), 100, int(random.binomial(7, r)), 7) for r in rates
         ]
-        wrong += agreement(counts).p < 0.05
-    assert wrong <= 30  # 5 % of 400 is 20, and an exact test errs on the other side
+        claim = {f"Task_{n // 5}/{n % 5 + 1}": c for n, c in enumerate(drawn)}
+        refused += bool(contradictions({"sr": claim}, CATEGORY, 0.01))
+        lie = {**claim, "Task_7/3": Counts(100, 100, 0, 7)}
+        noticed += "sr of Task_7/3" in contradictions({"sr": lie, "sr1": claim}, CATEGORY, 0.01)
+    assert refused <= 3 and noticed == 60
+
+
+def test_cells_are_the_values_of_a_table() -> None:
+    found = cells(["Task_1/2", "Task_1/3", "Task_40/2"], CATEGORY)
+    assert found["overall/2"] == ("Task_1/2", "Task_40/2")
+    assert found["spatial/0"] == found["GAC/0"] == found["Task_1/0"] == ("Task_1/2", "Task_1/3")
+    assert found["procedural/2"] == ("Task_40/2",) and "MIP/3" not in found
+    assert "overall/0" not in cells(["Task/1"], {"Task": "CBG"})
 
 
 def test_power_grows_with_the_drop() -> None:

@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 from site_fakes import many_entries
 
-from robospa.leaderboard.entries import Entry, Group, group, published_entries, rankable
+from robospa.leaderboard.entries import Entry, Group, group, published_entries, ranks
 from robospa.leaderboard.site import index_page, model_data
 from robospa.results.paper.origin import ORIGIN
 
@@ -34,19 +34,18 @@ def test_the_published_models_share_a_group_with_each_other_alone(entries: list[
 
 
 def test_published_models_have_no_rank(entries: list[Entry]) -> None:
-    assert [rankable(entry) for entry in entries] == [False] * 4 + [True] * 30
+    assert [bool(ranks(entry)) for entry in entries] == [False] * 4 + [True] * 30
 
 
 def test_who_was_not_reproduced_on_hidden_scenes_is_a_claim(entries: list[Entry]) -> None:
-    entry = replace(entries[5], badges=("valid", "replayed"))
-    assert group(entry) and not rankable(entry)
-    assert not model_data(entry)["rankable"]
+    entry = replace(entries[5], cells=())
+    assert group(entry) and not model_data(entry)["ranks"]
 
 
 def test_the_page_is_given_groups_and_who_is_ranked(entries: list[Entry]) -> None:
     """The page's script ranks by these two fields and by nothing else."""
     made = [model_data(entry) for entry in (*entries[:5], replace(entries[5], split=""))]
-    assert [(one["group"], one["rankable"]) for one in made] == [
+    assert [(one["group"], bool(one["ranks"])) for one in made] == [
         *[(PAPER, False)] * 4,
         ("robospa-1, aloha-agilex, clean, heldout", True),
         ("", False),
@@ -72,7 +71,7 @@ def test_the_page_shows_one_part_for_each_group_the_papers_last(entries: list[En
 def test_what_is_not_stated_equals_nothing(part: str) -> None:
     entry = replace(published_entries()[0], **{part: ""})
     assert group(entry) is None
-    assert not rankable(entry)
+    assert not ranks(entry)
 
 
 @pytest.mark.parametrize("part", ["suite", "embodiment", "mode", "split"])
@@ -84,5 +83,5 @@ def test_one_other_part_is_another_group(part: str) -> None:
 def test_nobody_is_ranked_in_a_suite_that_still_changes(entries: list[Entry]) -> None:
     draft = replace(entries[-1], suite="robospa-3-draft")
     found = group(draft)
-    assert not rankable(draft)
+    assert not ranks(draft)
     assert found is not None and "draft" in found.note

@@ -27,7 +27,7 @@ from robospa.leaderboard.verify import Valid
 from robospa.results.records.manifest import RunManifest, RunSettings
 from robospa.results.records.runs import Run
 from robospa.results.records.trial_record import RetryRow
-from robospa.trial import TrialKey
+from robospa.trial import CATEGORIES, TrialKey
 
 SALT = "ab" * 32
 LEVELS = (1, 2, 3, 4, 5)
@@ -113,12 +113,17 @@ def test_a_block_has_every_variant_of_the_bundle(valid: Valid) -> None:
 
 
 def test_a_block_has_as_many_trials_as_a_badge_needs(large: Valid) -> None:
-    needed = plan(large, None)
-    assert 5 <= needed <= 10
-    assert plan(large, needed + 3) == needed + 3
-    for few in (0, 1, needed - 1):
+    assert plan(large, None) == 7 == plan(large, 7)
+    for few in (0, 1, 6):
         with pytest.raises(BundleError, match=f"{few} hidden trials a variant are too few: "):
             plan(large, few)
+
+
+def test_a_block_has_as_many_as_ranks_in_all_categories_need(large: Valid) -> None:
+    tasks = enumerate(large.run.manifest.categories)
+    info = RunManifest(categories={task: CATEGORIES[n % 10] for n, task in tasks})
+    tenths = replace(large, run=replace(large.run, manifest=info))
+    assert plan(tenths, None) > 7 == plan(tenths, 7)
 
 
 @pytest.mark.parametrize("alpha", [0.0, 1.0])

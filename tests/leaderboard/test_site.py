@@ -23,6 +23,7 @@ from robospa.trial import TrialKey
 
 pytestmark = pytest.mark.usefixtures("same_figures_once")
 
+LIED = [100, 100, 340, 400]
 EVIL = '</script><script>alert(1)</script><img src=x onerror="alert(2)">'
 
 
@@ -153,7 +154,11 @@ def test_every_file_of_the_bundle_is_held_against_its_hash(folder: Path) -> None
         ("evidence.json", lambda d: d["replayed"].update(trials=21), "not those of the bundle"),
         ("evidence.json", lambda d: d["replayed"].update(identical=19), "not those of the bundle"),
         ("evidence.json", lambda d: d["replayed"].update(challenge="1"), "fewer than 8"),
-        ("evidence.json", lambda d: d["reproduced"]["overall"].update(p=1e-9), "contradict"),
+        (
+            "evidence.json",
+            lambda d: d["reproduced"]["counts"]["sr"].update({"Pick_Blocks_Size/1": LIED}),
+            "contradict what the bundle claims: sr of Pick_Blocks_Size/1",
+        ),
         (
             "evidence.json",
             lambda d: d["reproduced"].update(trials=1, power={"0.05": 0.0}),

@@ -119,7 +119,7 @@ def test_hidden_seeds_run_against_a_server(packed: Path) -> None:
     assert "agrees, but earns no badge: 8 of 10 fresh trials succeeded" in done.out
     assert "A badge needs 95 % for 5 points." in done.out
     evidence = json.loads((packed / "hidden.json").read_text())["reproduced"]
-    assert evidence["variants"] == {f"{PICK}/{level}": [3, 4, 4, 5] for level in (1, 2)}
+    assert evidence["counts"]["sr"] == {f"{PICK}/{level}": [3, 4, 4, 5] for level in (1, 2)}
     assert evidence["commitment"] == block.commitment and evidence["trials"] == 10
     assert evidence["bundle"] == verify(bundle, FAKE, practice=True).manifest.bundle
     manifest = (packed / "fresh" / "run.json").read_text()
@@ -179,8 +179,7 @@ def test_inflated_numbers_are_not_reproduced(packed: Path, tmp_path: Path) -> No
         done = submit("reproduce", *words, "--evidence", tmp_path / "hidden.json")
     assert done.code == 1
     assert "NOT REPRODUCED: 0 of 16 fresh trials succeeded" in done.out
-    evidence = json.loads((tmp_path / "hidden.json").read_text())["reproduced"]
-    assert evidence["overall"]["p"] == pytest.approx(2 * (4 / 220) ** 2)
+    assert f"two-sided p = {2 * (4 / 220) ** 2:.3g})" in done.out
 
 
 def test_another_server_than_the_bundles_is_refused(packed: Path, tmp_path: Path) -> None:
