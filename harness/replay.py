@@ -13,17 +13,22 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from robospa.harness.running.manifest import this_processor
 from robospa.harness.running.record_store import ActionRecorder, read_actions, read_joints
 from robospa.harness.trial import Recorder, TrialSetup, policy_seed, run_trial, task_parts, trial_id
 from robospa.harness.world import JOINTS_FROM_EE, ActionError, Poll, StepResult, World
 from robospa.observation import Observation
 from robospa.protocol.errors import PolicyAnswerError
 from robospa.protocol.policy import Policy, PolicySpec, TrialInfo
-from robospa.results.records.runs import action_path
+from robospa.results.records.manifest import read_manifest
+from robospa.results.records.runs import action_path, differences
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
 CHUNK = 1000
+OUTCOME = frozenset(("success", "done", "best"))
+STATE = frozenset(("digest", "physics_steps"))
+"""What differs between kinds of processors while the outcome stays."""
 ENDED = "the recorded actions end here"
 """What a record says whose goal was not met by then."""
 
@@ -116,7 +121,8 @@ def replay_record(
 ) -> None:
     """Replay the trial of `record`, whose actions are in the run in `folder`, for `recorder`.
 
-    Raises ReplayError if it ends in another state, RunError if its actions cannot be read, and what
+    Raises ReplayError if it ends otherwise, or in another state on a processor of the run's kind,
+    RunError if its actions cannot be read, and what
     `world` raises.
     """
     key = record.key
@@ -140,10 +146,13 @@ def replay_record(
         parts=parts,
         step_scale=max(step_scale, len(actions) / limit),
     )
-    if again.digest != record.digest:
+    if again.digest == record.digest:
+        return
+    differs = OUTCOME & set(differences(record, again))
+    if differs or this_processor().kind in {p.kind for p in read_manifest(folder).about.processors}:
         raise ReplayError(
-            f"{key.slug} played again ends in another state: the run is not repeatable on this "
-            "machine"
+            f"{key.slug} played again ends in another {min(differs, default='state')}: the run is "
+            "not repeatable on this machine"
         )
 
 

@@ -44,6 +44,9 @@ from robospa.tasks.snapshot import Snapshot
 from robospa.tasks.task import Task, Tracker
 from robospa.trial import TrialKey
 
+FINAL = "final"
+"""The diagnostic that says where objects lie in the end [m], to the hundredth of a millimetre."""
+
 
 class Recorder(Protocol):
     """Called while a trial runs, to record it."""
@@ -290,6 +293,8 @@ def _play(
 def _diagnostics(run: TrialState) -> dict[str, object]:
     """The goal's diagnostics, what the objects are, and actions executed otherwise than sent."""
     found = dict(run.parts.tracker.diagnostics())
+    poses = run.world.snapshot().poses
+    found[FINAL] = {name: [round(x, 5) for x in pose.position] for name, pose in poses.items()}
     if run.events:
         found["objects"] = describe_objects(run.parts.scene)
     if run.grasps is not None:

@@ -7,9 +7,8 @@
     records.jsonl            one hash-chained row a trial, by task, level and seed
     actions/TASK-L1.bin      the actions of a variant's trials
     videos/TRIAL.mp4         the announced sample, one trial a base task
-    report/scores.json       scores, and the tables as our reporter makes them
+    report/scores.json       all scores, as `robospa report` has them
     report/outcomes.json     success and progress of every trial, a character each
-    report/tables.csv, .md
 
 Names are matched against this list, sizes are bounded before a byte is read, and nothing in a
 bundle is ever extracted, imported or run.
@@ -32,7 +31,7 @@ from robospa.trial import TrialKey
 
 IN_REPOSITORY = "bundle.zip"
 """Name of a bundle in its submission's folder, and its address in `bundle.txt`."""
-FORMAT = 1
+FORMAT = 2
 """Version of this layout. A newer one is refused, an older one is read as long as it is known."""
 MANIFEST = "manifest.json"
 CARD = "model.json"
@@ -41,7 +40,6 @@ SEEDS = "seeds.json"
 RECORDS = "records.jsonl"
 SCORES = "report/scores.json"
 OUTCOMES = "report/outcomes.json"
-TABLES = {"csv": "report/tables.csv", "md": "report/tables.md"}
 
 MEGA = 1024 * 1024
 _TASK = r"[A-Za-z0-9_]{1,64}"
@@ -49,7 +47,7 @@ _SETTING = r"[A-Za-z0-9_.-]{1,250}"
 KINDS: tuple[tuple[re.Pattern[str], int], ...] = (
     (re.compile(r"manifest\.json|model\.json"), MEGA),
     (re.compile(r"run\.json|seeds\.json"), 2 * MEGA),
-    (re.compile(r"report/(scores\.json|outcomes\.json|tables\.csv|tables\.md)"), 2 * MEGA),
+    (re.compile(r"report/(scores|outcomes)\.json"), 2 * MEGA),
     (re.compile(r"records\.jsonl"), 192 * MEGA),
     (re.compile(rf"actions/{_TASK}-L[1-5]\.bin"), 32 * MEGA),
     (

@@ -296,8 +296,8 @@ def add(
 def _lines(found: evidence.Validity, seconds: float) -> list[str]:
     """What of a bundle was found valid, in sentences."""
     counts = f"valid: {found.trials} trials of {found.variants} variants"
-    what = "structure, hashes, chain, seeds, records, actions, scores, tables and scenes hold"
-    return [f"{counts}; {what} ({seconds:.1f} s)", *found.warnings]
+    what = "structure, hashes, chain, seeds, records, actions, scores and scenes hold"
+    return [f"{counts}; {what} ({seconds:.1f} s)", found.attempts, *found.warnings]
 
 
 def scene_progress() -> Callable[[int, int], None]:

@@ -23,7 +23,7 @@ from robospa.results.paper.origin import DIFFERENCES
 from robospa.results.paper.published import LEVELS, load
 from robospa.results.scoring.scores import to_json
 from robospa.results.statistics.intervals import Estimate
-from robospa.trial import CATEGORIES, DIMENSIONS
+from robospa.trial import CATEGORIES, DIMENSIONS, METRICS
 
 
 @dataclass(frozen=True, order=True)
@@ -266,17 +266,12 @@ def evidence_lines(evidence: BadgeEvidence) -> list[tuple[str, str]]:
         (
             "valid",
             f"{valid.trials} trials of {valid.variants} variants: structure, hashes, chain, "
-            "seeds, records, actions, scores and scenes hold.",
+            f"seeds, records, actions, scores and scenes hold. {valid.attempts}",
         )
     ]
     lines += [("lint", text) for text in valid.warnings]
     if again:
-        text = (
-            f"{again.sampled} of {again.trials} trials were played again: "
-            f"{again.identical} identical to the bit, {again.agrees} with the same outcome "
-            "and another final state, none with another outcome."
-        )
-        text += f" {what_it_catches(again.trials, again.sampled)}"
+        text = f"{again.sentence} {what_it_catches(again.trials, again.sampled)}"
         lines += [(BADGES[evidence.badges[1]], text), ("challenge", again.challenge)]
     if fresh:
         text = (
@@ -298,7 +293,7 @@ def page_values(entry: Entry) -> dict[str, dict[str, list[list[float] | int]]]:
     """Percent by metric, row and level (0: all levels) as [value, low, high]; 0 is no value."""
     made: dict[str, dict[str, list[list[float] | int]]] = {}
     rows = [*load().tasks, *CATEGORIES, *DIMENSIONS, rounding.OVERALL]
-    for metric in ("sr", "onta", "ps"):
+    for metric in METRICS:
         made[metric] = {}
         for row in rows:
             found = [_shown(entry.column, metric, row, level) for level in (0, *LEVELS)]

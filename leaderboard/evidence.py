@@ -28,6 +28,7 @@ from robospa.leaderboard.agreement import (
 )
 from robospa.leaderboard.bundle import IN_REPOSITORY, BundleError
 from robospa.leaderboard.card import LINK
+from robospa.results.records.manifest import Processor
 from robospa.schema import Count, Number, one_of, pattern, read
 from robospa.text import some
 from robospa.trial import TrialKey
@@ -39,6 +40,9 @@ FORGED = 0.05
 MISSED = 0.001
 INVENTED = (0.05, 0.02, 0.01)
 """The shares of invented outcomes for which the chance is stated."""
+APART = 20.0
+"""The most that half of the replayed trials may lie apart [mm]. A start moved by 1e-7 m moves the
+end of half the trials by 0.001 mm, but that of a bottle that is dropped by 320 mm."""
 CATCHES = ("catches_5_percent", "catches_2_percent", "catches_1_percent")
 
 
@@ -136,20 +140,31 @@ BADGES = ("valid", "replayed", "reproduced")
 
 
 class Validity(Struct, frozen=True):
-    """Level 1: the bundle's hash, how much it holds, and the warnings of our lint."""
+    """Level 1: the bundle's hash, how much it holds, how often the run was started or gone on with
+    and how many of its trials were started more than once, and the warnings of our lint."""
 
     bundle: str
     trials: Count
     variants: Count
     practice: bool = False
-    made_with: str = ""
-    tables_compared: bool = True
+    drivers: Count = 1
+    repeated: Count = 0
     warnings: tuple[str, ...] = ()
+
+    @property
+    def attempts(self) -> str:
+        """How often trials were tried, as a sentence: what may hide the best of several."""
+        return (
+            f"The run had {self.drivers} driver{'s' * (self.drivers > 1)}, and {self.repeated} of "
+            "its trials were started more than once."
+        )
 
 
 class ReplayEvidence(Struct, frozen=True, kw_only=True):
     """Level 2: how many of the sampled trials came again identically, alike, or differently, what
-    such a sample catches, and versions that are others than the run's."""
+    such a sample catches, and versions that are others than the run's. Of the `placed` trials,
+    whose records say where objects came to lie, the `median` and the `most` of how far one lay
+    apart [mm]."""
 
     bundle: str
     challenge: str
@@ -164,16 +179,44 @@ class ReplayEvidence(Struct, frozen=True, kw_only=True):
     catches_1_percent: Number = 0.0
     changed_versions: tuple[str, ...] = ()
     different_trials: tuple[str, ...] = ()
+    ran_on: tuple[Processor, ...] = ()
+    played_on: Processor = Processor()
+    placed: Count = 0
+    median: Number = 0.0
+    most: Number = 0.0
 
     @property
     def holds(self) -> bool:
-        """Whether every outcome came again."""
-        return self.different == 0
+        """Whether every outcome came again, and most objects where they lay."""
+        return self.different == 0 and self.median <= APART
 
     @property
     def exact(self) -> bool:
         """Whether every final state came again to the bit."""
         return self.identical == self.sampled
+
+    @property
+    def same_kind(self) -> bool:
+        """Whether run and replay say that they were on one kind of processor."""
+        return {one.kind for one in self.ran_on} == {self.played_on.kind}
+
+    @property
+    def sentence(self) -> str:
+        """What came again, and how exactly, for people."""
+        ran = ", ".join(map(str, dict.fromkeys(self.ran_on))) or "not stated"
+        played = str(self.played_on) if self.played_on.vendor else "not stated"
+        said = (
+            f"{self.sampled} of {self.trials} trials were played again: "
+            f"{self.sampled - self.different} with the same outcome, {self.identical} of them with "
+            "the same final state to the bit, as one kind of processor gives (the run's: "
+            f"{ran}; the replay's: {played})."
+        )
+        if not self.placed:
+            return f"{said} The records do not say where objects came to lie."
+        return (
+            f"{said} Objects of {self.placed} trials lay at most {self.most:.2f} mm apart, half of "
+            f"the trials within {self.median:.2f} mm."
+        )
 
 
 Four = tuple[Count, Count, Count, Count]
@@ -314,7 +357,9 @@ def read_evidence(data: object, bundle: str, where: str) -> BadgeEvidence:
 def _check_replay(again: ReplayEvidence, trials: int, where: str) -> None:
     """BundleError unless a large enough sample of the bundle's `trials` came again."""
     if not again.holds:
-        raise BundleError(f"{where}: the replay found other outcomes than the bundle has")
+        raise BundleError(
+            f"{where}: the replay found other outcomes, or objects elsewhere, than the bundle has"
+        )
     if again.trials != trials or again.identical + again.agrees != again.sampled:
         raise BundleError(f"{where}: the replay's counts are not those of the bundle")
     if again.sampled < (least := least_sample(trials)):

@@ -37,7 +37,6 @@ from robospa.leaderboard.verify import (
     outcomes_of,
     scores_of,
     seed_lists,
-    tables_of,
     verify,
 )
 from robospa.results.records.manifest import PolicySettings, RunAbout, make_manifest
@@ -167,7 +166,11 @@ def merged(runs: Sequence[Run]) -> Run:
     manifest = make_manifest(
         structs.replace(settings, policies=policies if differ else {}),
         keys,
-        RunAbout(**{name: getattr(about, name) for name in ABOUT}),
+        structs.replace(
+            RunAbout(**{name: getattr(about, name) for name in ABOUT}),
+            processors=tuple(dict.fromkeys(p for r in runs for p in r.manifest.about.processors)),
+            drivers=sum(run.manifest.about.drivers for run in runs),
+        ),
         categories,
         first.manifest.suite,
     )
@@ -238,8 +241,6 @@ def write_bundle(
             (layout.OUTCOMES, outcomes_of(run)),
         ):
             writer.add(name, layout.canonical(content))
-        for ending, table in tables_of(run).items():
-            writer.add(layout.TABLES[ending], table)
         manifest = BundleManifest(
             format=layout.FORMAT,
             suite=suite,

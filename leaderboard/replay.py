@@ -1,13 +1,15 @@
 """Level 2, *replayed*: recorded actions fed to the simulator, ends compared with the records.
 
 A trial is *identical* if everything that a repeatable world decides is equal, the final state to
-the last bit; it *agrees* if scene, instruction, end, success and progress are equal but the final
-state is not, as on another processor or with another build of the simulator; otherwise it is
-*different*. Neither a GPU nor rendering is needed. Refuses nothing: the caller judges the counts.
+the last bit, as on one kind of processor; it *agrees* if scene, instruction, end, success and
+progress are equal but the final state is not, as on another kind or with another build of the
+simulator; otherwise it is *different*. How far objects lie from where the records say is measured.
+Neither a GPU nor rendering is needed. Refuses nothing: the caller judges counts and distances.
 """
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Callable
 from concurrent.futures import as_completed
@@ -15,12 +17,17 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from robospa.harness.factory import load_function
 from robospa.harness.pool import JobProcess, Pool, WorkerDied
-from robospa.harness.running.manifest import about_machine, changed_settings
+from robospa.harness.replay import STATE
+from robospa.harness.running.manifest import about_machine, changed_settings, this_processor
+from robospa.harness.trial import FINAL
 from robospa.harness.worlds import open_world
 from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.evidence import (
+    APART,
     CATCHES,
     ReplayEvidence,
     catches,
@@ -41,19 +48,21 @@ if TYPE_CHECKING:
     from robospa.harness.world import World
 
 IDENTICAL, AGREES, DIFFERENT = "identical", "agrees", "different"
-STATE = ("digest", "physics_steps")
-"""What may differ where a simulator rounds differently while the outcome stays."""
+LOST = 1e6
+"""How far apart things lie [mm] of which a record says nonsense."""
 
 
 @dataclass(frozen=True)
 class Replayed:
-    """What became of one trial: `kind`, the fields in which it `differs`, and the new record."""
+    """What became of one trial: `kind`, the fields in which it `differs`, the new record, and how
+    far `apart` [mm] an object lies; None where the record does not say."""
 
     key: TrialKey
     kind: str
     differs: tuple[str, ...]
     record: TrialRecord | None
     trouble: str = ""
+    apart: float | None = None
 
 
 @dataclass(frozen=True)
@@ -66,24 +75,19 @@ class SampleReplay:
     def sentences(self) -> list[str]:
         """What this shows and what it does not, for people."""
         found = self.evidence
-        said = [
-            f"{found.sampled} of {found.trials} trials were played again: {found.identical} "
-            f"identical to the bit, {found.agrees} with the same outcome and another final state, "
-            f"{found.different} with another outcome.",
-            what_it_catches(found.trials, found.sampled),
-        ]
+        said = [found.sentence, what_it_catches(found.trials, found.sampled)]
         why = "versions are those of the run, so processor or library build differ, or the run"
+        if found.same_kind:
+            why = "versions and kind of processor are those of the run"
         if found.changed_versions:
             why = "other versions: " + "; ".join(found.changed_versions)
-        if not found.holds:
-            first = next(trial for trial in self.trials if trial.kind == DIFFERENT)
+        if found.median > APART:
+            said.append(f"Half of the trials may lie no more than {APART:g} mm apart ({why}).")
+        if first := next((trial for trial in self.trials if trial.kind == DIFFERENT), None):
             what = first.trouble or "other " + ", ".join(first.differs)
             said.append(f"First difference: {first.key.slug}: {what} ({why}).")
         elif not found.exact:
-            said.append(
-                "Outcomes agree but final states do not: the simulator rounds differently here "
-                f"({why})."
-            )
+            said.append(f"Outcomes agree but not all final states do, to the bit ({why}).")
         return said
 
 
@@ -119,6 +123,7 @@ def replay(
             ) from None
     trials = tuple(found[key] for key in keys)
     kinds = Counter(trial.kind for trial in trials)
+    apart = [trial.apart for trial in trials if trial.apart is not None]
     listed, five_two_one = len(valid.keys), catches(len(valid.keys), len(trials)).values()
     evidence = ReplayEvidence(
         bundle=valid.manifest.bundle,
@@ -132,6 +137,11 @@ def replay(
         **dict(zip(CATCHES, five_two_one, strict=True)),
         changed_versions=_changed(valid.run.manifest.about),
         different_trials=tuple(trial.key.slug for trial in trials if trial.kind == DIFFERENT),
+        ran_on=valid.run.manifest.about.processors,
+        played_on=this_processor(),
+        placed=len(apart),
+        median=float(np.median(apart)) if apart else 0.0,
+        most=max(apart, default=0.0),
     )
     return SampleReplay(trials, evidence)
 
@@ -145,10 +155,23 @@ def judge(claimed: TrialRecord, again: TrialRecord) -> Replayed:
         differs = [name for name in differs if name not in ("steps", "actions_digest")]
     elif claimed.end != again.end:
         differs.append("end")
-    if not differs:
-        return Replayed(claimed.key, IDENTICAL, (), again)
-    kind = AGREES if set(differs) <= set(STATE) else DIFFERENT
-    return Replayed(claimed.key, kind, tuple(differs), again)
+    far = _apart(claimed, again)
+    kind = AGREES if set(differs) <= STATE else DIFFERENT
+    return Replayed(claimed.key, kind if differs else IDENTICAL, tuple(differs), again, apart=far)
+
+
+def _apart(claimed: TrialRecord, again: TrialRecord) -> float | None:
+    """How far an object lies from where `claimed` says [mm], at most; None if it does not say."""
+    if FINAL not in claimed.diagnostics:
+        return None
+    said, found = claimed.diagnostics[FINAL], again.diagnostics[FINAL]
+    try:
+        assert said.keys() == found.keys()
+        apart = np.array([np.subtract(said[name], place) for name, place in found.items()])
+    except (AttributeError, AssertionError, TypeError, ValueError):
+        return LOST
+    far = float(np.linalg.norm(apart.reshape(-1, 3), axis=1).max(initial=0))
+    return min(LOST, 1000 * far) if math.isfinite(far) else LOST
 
 
 Job = tuple[TrialRecord, Trace, str]

@@ -7,6 +7,7 @@ its own.
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -15,6 +16,7 @@ from itertools import groupby
 from typing import Any
 
 import numpy as np
+from msgspec import to_builtins
 from numpy.typing import NDArray
 
 from robospa.action_space import KINDS
@@ -126,7 +128,15 @@ CONTROLS = ("rest_to_rest",)
 ONE = ("embodiment", "mode", "split")
 
 
-VERSIONS = frozenset(("robospa", "python", "numpy", "sapien"))
+VERSIONS = {
+    "robospa": r"[0-9]+\.[0-9][^ ]{0,40}",
+    "python": r"3\.[1-9][0-9]\.[^ ]{1,20}",
+    "numpy": r"[12]\.[0-9][^ ]{0,20}",
+    "sapien": r"3\.0\.[^ ]{1,20}",
+}
+"""What a run has to say of its software, as far as ours runs with it."""
+LONGEST, MOST_WARNINGS = 1000, 20
+"""Characters of a text in what a run says of itself, and warnings, at most."""
 
 
 def manifest_of(data: object, what: str = "the run") -> RunManifest:
@@ -148,8 +158,7 @@ def check_settings(run: RunManifest, reference: Reference) -> RunSettings:
     for name in ONE:
         if len(getattr(settings, name)) != 1:
             raise BundleError(f"the run mixes {name}s or names none; a bundle has one")
-    if lacking := sorted(VERSIONS - run.about.versions.keys()):
-        raise BundleError(f"the run does not say its version of {lacking[0]}")
+    _check_about(run)
     if settings.world.arguments.get("control", CONTROLS[0]) not in CONTROLS:
         raise BundleError(
             "the run executes actions at a fixed rate; the benchmark moves from rest to rest"
@@ -187,6 +196,33 @@ def check_settings(run: RunManifest, reference: Reference) -> RunSettings:
     if settings.world.name != reference.world:
         raise BundleError("the run was made in another world than the benchmark's simulator")
     return settings
+
+
+def _check_about(run: RunManifest) -> None:
+    """BundleError for software, machine or warnings that no run of ours has."""
+    about = run.about
+    for name, known in VERSIONS.items():
+        if not re.fullmatch(known, about.versions.get(name, "")):
+            said = ascii(about.versions.get(name, "nothing"))[:40]
+            raise BundleError(f"the run says {said} of its version of {name}, which cannot be")
+    cores = about.machine.get("cores", 1)
+    if not re.fullmatch("[0-9a-f]{16}", about.code) or type(cores) is not int or cores < 1:
+        raise BundleError("the run has a hash of its code, or cores of its machine, that cannot be")
+    stack: list[object] = [to_builtins(about)]
+    longest = 0
+    while stack:
+        value = stack.pop()
+        if isinstance(value, dict):
+            stack += [*value, *value.values()]
+        elif isinstance(value, (list, tuple)):
+            stack += value
+        elif isinstance(value, str):
+            longest = max(longest, len(value))
+    if longest > LONGEST or len(about.warnings) > MOST_WARNINGS:
+        raise BundleError(
+            f"the run has {len(about.warnings)} warnings, and a text of {longest} characters; "
+            f"{MOST_WARNINGS} and {LONGEST} are the most"
+        )
 
 
 def check_card_fits(card: Card, settings: RunSettings, task: str) -> None:

@@ -20,6 +20,7 @@ from statistics import NormalDist
 
 from robospa.harness.running.atomic_file import replace_file
 from robospa.leaderboard import bundle as layout
+from robospa.leaderboard.agreement import CELL_LIE
 from robospa.leaderboard.bundle import IN_REPOSITORY, BundleError
 from robospa.leaderboard.entries import (
     BADGES,
@@ -42,7 +43,7 @@ from robospa.results.paper.published import load
 from robospa.results.report.page import FIGURES, card, figure, own_version, render
 from robospa.results.report.tables import ReportTable, for_page, method_notes, report_tables
 from robospa.results.scoring.models import ModelResults
-from robospa.trial import CATEGORIES, CATEGORY_NAMES, DIMENSIONS
+from robospa.trial import CATEGORIES, CATEGORY_NAMES, DIMENSIONS, METRIC_NAMES
 
 MARK = ".robospa-site"
 """A file that says a folder is ours to write over."""
@@ -91,6 +92,7 @@ def index_page(entries: Sequence[Entry]) -> str:
         origin=ORIGIN,
         badge_meanings=[(badge, name, MEANINGS[badge]) for badge, name in BADGES.items()],
         suites=suites(entries),
+        cell_lie=f"{100 * CELL_LIE:g}",
         data={
             "models": [model_data(entry) for entry in entries],
             "groups": [
@@ -101,6 +103,7 @@ def index_page(entries: Sequence[Entry]) -> str:
             "rows": row_data(),
             "badges": BADGES,
             "training": TRAINING,
+            "metrics": METRIC_NAMES,
             "pairs": [f"{one.slug}/{two.slug}" for one, two in pairs_of(entries)],
             "critical": critical_values(min(COMPARISONS, max(100, len(entries)))),
         },
@@ -131,7 +134,7 @@ def model_data(entry: Entry) -> dict[str, object]:
         "badge": entry.badge,
         "badges": list(entry.badges),
         "group": str(group(entry) or ""),
-        "ranks": ranks(entry),
+        "ranks": _by_row(ranks(entry)),
         "embodiment": entry.embodiment,
         "mode": entry.mode,
         "split": entry.split,
@@ -142,6 +145,14 @@ def model_data(entry: Entry) -> dict[str, object]:
         "count": count_of(entry.parameters),
         "values": page_values(entry),
     }
+
+
+def _by_row(cells: Sequence[str]) -> dict[str, str]:
+    """`cells` ("ROW/LEVEL") as the digits of their levels by row."""
+    rows: dict[str, str] = {}
+    for row, _, level in (cell.rpartition("/") for cell in cells):
+        rows[row] = rows.get(row, "") + level
+    return rows
 
 
 def count_of(text: str) -> float:

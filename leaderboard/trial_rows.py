@@ -42,7 +42,7 @@ SERVER_LATENCY = {"queue", "infer", "batch"}
 """Entries of the latency that are only there if the policy's server sent them."""
 
 
-MOST_TIMES, MOST_DIAGNOSTICS = 32, 400
+MOST_TIMES, MOST_DIAGNOSTICS = 32, 600
 """More entries of `timing`, and values in `diagnostics` with all that they hold, than any trial
 has: what is read stays in memory, where an empty list takes 30 times the place of its text."""
 

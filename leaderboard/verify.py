@@ -11,7 +11,6 @@ from __future__ import annotations
 import gc
 import hashlib
 import math
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -46,17 +45,15 @@ from robospa.leaderboard.rules import (
 )
 from robospa.leaderboard.traces import Trace, decode, most_bytes
 from robospa.leaderboard.trial_rows import check_record, check_trace, read_rows, trace_hash
-from robospa.leaderboard.untrusted import BundleArchive, check_text, parse
+from robospa.leaderboard.untrusted import BundleArchive, parse
 from robospa.results.comparison.compare import Difference, compare_results, over_levels
 from robospa.results.lint import lint_run
-from robospa.results.paper.columns import run_column
-from robospa.results.paper.tables import FORMATS
 from robospa.results.records.manifest import RunManifest, RunSettings, seed_hash
 from robospa.results.records.runs import Run
-from robospa.results.records.trial_record import TrialRecord
-from robospa.results.report.page import own_version
-from robospa.results.report.tables import report_tables
+from robospa.results.records.trial_record import EventRow, TrialRecord
+from robospa.results.scoring.first_choice import first_choice, held_at_start
 from robospa.results.scoring.models import IncomparableError, ModelResults, results_of_records
+from robospa.results.scoring.repeats import was_repeated
 from robospa.results.scoring.scores import ScoresData, Variant, score_run, to_json
 from robospa.schema import pattern, read
 from robospa.trial import METRICS, TrialKey
@@ -64,8 +61,6 @@ from robospa.trial import METRICS, TrialKey
 LISTING = ("unequal-trials", "missing")
 """Lint rules about how many trials there are, which `check_seeds` decides."""
 MOVIE = b"ftyp"
-TABLES = tuple(layout.TABLES.items())
-NUMBER = re.compile(r"-?[0-9]+(?:[.][0-9]+)?")
 THREADS = 4
 """Action files that are looked at together; decoding takes seven times the bytes of each."""
 
@@ -109,7 +104,9 @@ def verify(
     with BundleArchive(path, limits) as archive:
         manifest = _manifest(archive, reference, practice)
         archive.listed = manifest.files
-        claimed = manifest_of(archive.read_map(layout.RUN))
+        claimed = manifest_of(said := archive.read_map(layout.RUN))
+        if where := compare_scores(claimed.to_json(), said):
+            raise BundleError(f"{layout.RUN} says what no run says: {where}")
         keys = _keys(claimed, archive.limits)
         _check_lists(archive.read_map(layout.SEEDS), manifest, keys, claimed)
         card = to_card(archive.read_map(layout.CARD))
@@ -119,7 +116,7 @@ def verify(
         run = Run(path, claimed, keys, records)
         warnings = check_records(run, reference)
         _check_actions(archive, run, traces, reference)
-        compared = _check_derived(archive, run, manifest)
+        _check_derived(archive, run)
         _check_videos(archive, manifest, records)
         archive.all_used()
     check_scenes(records, reference.parts, workers or cores(), done)
@@ -128,8 +125,8 @@ def verify(
         trials=len(keys),
         variants=len({key.variant for key in keys}),
         practice=manifest.practice,
-        made_with=manifest.robospa,
-        tables_compared=compared,
+        drivers=claimed.about.drivers,
+        repeated=sum(map(was_repeated, records.values())),
         warnings=tuple(warnings),
     )
     return Valid(path, manifest, card, run, traces, evidence)
@@ -197,10 +194,8 @@ def _manifest(archive: BundleArchive, reference: Reference, practice: bool) -> B
     version = data.get("format")
     if type(version) is not int or version < 1:
         raise BundleError("the manifest does not say which format the bundle has")
-    if version > layout.FORMAT:
-        raise BundleError(
-            f"the bundle has format {version}, this robospa reads up to {layout.FORMAT}: update it"
-        )
+    if version != layout.FORMAT:
+        raise BundleError(f"the bundle has format {version}; this robospa reads {layout.FORMAT}")
     manifest = read(BundleManifest, data, "the manifest", BundleError)
     if manifest.suite != reference.suite:
         raise BundleError(
@@ -228,7 +223,7 @@ def _check_files(archive: BundleArchive, listed: Mapping[str, FileEntry]) -> Non
         if entry.size != archive.sizes[name]:
             raise BundleError(f"{name} was changed: its size is not the manifest's")
     needed = (layout.CARD, layout.RUN, layout.SEEDS, layout.RECORDS, layout.SCORES, layout.OUTCOMES)
-    for name in (*needed, *layout.TABLES.values()):
+    for name in needed:
         if name not in listed:
             raise BundleError(f"the bundle has no {name}")
 
@@ -359,31 +354,13 @@ def read_traces(valid: Valid, wanted: Sequence[TrialKey]) -> dict[TrialKey, Trac
     return found
 
 
-def _check_derived(archive: BundleArchive, run: Run, manifest: BundleManifest) -> bool:
-    """Whether the tables were compared, too; BundleError if a number is not what follows.
-
-    Words of tables may be others, and another version may have other tables.
-    """
+def _check_derived(archive: BundleArchive, run: Run) -> None:
+    """BundleError if a number is not what follows from the records."""
     given = parse(archive.read(layout.SCORES), layout.SCORES)
     if where := compare_scores(scores_of(run), given):
         raise BundleError(f"{layout.SCORES} is not what the records give: {where}")
     if archive.read_map(layout.OUTCOMES) != to_builtins(outcomes_of(run)):
         raise BundleError(f"{layout.OUTCOMES} is not what the records give")
-    texts = {ending: archive.read(name).decode("utf-8", "replace") for ending, name in TABLES}
-    for ending, name in TABLES:
-        check_text(texts[ending], name)
-    if manifest.robospa != own_version():
-        return False
-    for ending, table in tables_of(run).items():
-        if compare_scores(_cells(ending, table.decode()), _cells(ending, texts[ending])):
-            raise BundleError(f"{layout.TABLES[ending]} is not what the records give")
-    return True
-
-
-def _cells(ending: str, text: str) -> list[list[float]]:
-    """The numbers in every row of the tables in a file, without its titles and notes."""
-    rows = [row for row in text.splitlines() if ending == "csv" or row.startswith("|")]
-    return [[float(number) for number in NUMBER.findall(row)] for row in rows]
 
 
 def _check_videos(
@@ -414,21 +391,13 @@ def scores_of(run: Run) -> ScoresData:
     return to_json(score_run(run))
 
 
-def tables_of(run: Run) -> dict[str, bytes]:
-    """The report's tables of `run` as files, by ending."""
-    try:
-        tables = [shown.table for shown in report_tables([run_column(run, "model")])]
-    except IncomparableError:
-        tables = []  # of variants that no table has
-    return {ending: FORMATS[ending](tables).encode() for ending in ("csv", "md")}
-
-
 def compare_scores(right: object, given: object, where: str = "") -> str:
-    """Where `given` first differs from `right`, in words; "" if nowhere."""
+    """Where `given` first differs from `right`, in words; "" if nowhere. A version that has fewer
+    scores leaves them out, which is no difference."""
     if isinstance(right, Mapping):
-        if not isinstance(given, Mapping) or set(given) != set(right):
-            return f"{where or 'the scores'} have other entries"
-        pairs = [(name, right[name], given[name]) for name in right]
+        if not isinstance(given, Mapping) or bool(given) < bool(right) or set(given) - set(right):
+            return f"{where or 'it'} has other entries"
+        pairs = [(name, right[name], given[name]) for name in given]
     elif isinstance(right, (list, tuple)):
         if not isinstance(given, list) or len(given) != len(right):
             return f"{where} has another length"
@@ -456,12 +425,14 @@ Rows = dict[str, dict[str, list[float | None]]]
 
 
 class Outcomes(Struct, forbid_unknown_fields=True):
-    """The outcomes of a variant."""
+    """The outcomes of a variant: of every trial whether it failed (0), succeeded by its first
+    choice (1) or later (2), how many subtasks are done, and how many held at the start."""
 
     candidates: int
     total: Annotated[int, Meta(gt=0, lt=len(DIGITS))]
-    success: Annotated[str, pattern("[01]*", "text of 0 and 1")] = ""
+    success: Annotated[str, pattern("[012]*", "text of 0, 1 and 2")] = ""
     done: Annotated[str, pattern("[0-9a-z]*", "text of digits and small letters")] = ""
+    held: Annotated[str, pattern("[0-9a-z]*", "text of digits and small letters")] = ""
 
 
 def outcomes_of(run: Run) -> dict[str, Outcomes]:
@@ -470,8 +441,9 @@ def outcomes_of(run: Run) -> dict[str, Outcomes]:
     for key in sorted(run.keys):
         record = run.records[key]
         own = found.setdefault(f"{key.task}/{key.level}", Outcomes(record.candidates, record.total))
-        own.success += "1" if record.success else "0"
+        own.success += str(2 * record.success - first_choice(record))
         own.done += DIGITS[record.done]
+        own.held += DIGITS[held_at_start(record)]
     return found
 
 
@@ -496,19 +468,23 @@ def results_of(name: str, outcomes: Mapping[str, object], run: RunManifest) -> M
 def _checked(data: object, count: int, where: str) -> Outcomes:
     """The outcomes of a variant, if they are of `count` trials."""
     part = read(Outcomes, data, f"{where}: the outcomes", BundleError)
-    if not len(part.success) == len(part.done) == count:
+    if not len(part.success) == len(part.done) == len(part.held) == count:
         raise BundleError(f"{where}: the outcomes are not of {count} trials")
-    if set(part.done) - set(DIGITS[: part.total + 1]):
+    if set(part.done + part.held) - set(DIGITS[: part.total + 1]):
         raise BundleError(f"{where}: the outcomes say that more is done than a trial can have")
     return part
 
 
 def _record(key: TrialKey, category: str, part: Outcomes, place: int) -> TrialRecord:
-    """As much of a trial's record as a comparison looks at. One suite, one seed: one scene."""
-    done, good = DIGITS.index(part.done[place]), part.success[place] == "1"
+    """As much of a trial's record as scores and comparisons look at. One suite, one seed: one
+    scene."""
+    done, held = (DIGITS.index(text[place]) for text in (part.done, part.held))
+    good, later = part.success[place] != "0", part.success[place] == "2"
     counts = (done, done, part.total, part.candidates, 0, 0, 0)
     end = "success" if good else "step_limit"
-    return TrialRecord(key, category, "", "", end, good, *counts, "", "", 0.0)
+    kinds = [*(("subtask_done", index) for index in range(held)), *[("wrong_object", -1)] * later]
+    events = tuple(EventRow(time=0, kind=k, object="", index=i, note="", step=0) for k, i in kinds)
+    return TrialRecord(*(key, category, "", "", end, good, *counts, "", "", 0.0), events=events)
 
 
 def paired(first: ModelResults, second: ModelResults) -> dict[str, Rows]:

@@ -185,6 +185,11 @@ class Processor(Struct, frozen=True):
     model: Count = 0
     name: Annotated[str, Meta(max_length=100)] = ""
 
+    @property
+    def kind(self) -> tuple[str, int, int]:
+        """What two have in common that make the same bits."""
+        return self.vendor, self.family, self.model
+
     def __str__(self) -> str:
         return f"{self.vendor} family {self.family} model {self.model}"
 

@@ -157,8 +157,8 @@ FORGERIES: list[tuple[Forgery, str]] = [
     # sizes
     (put(ACTIONS, bytes(65 * layout.MEGA)), "unpacks to 68157440 bytes"),
     (record(message="x" * 300_000), "longer than"),
-    (record(diagnostics={"x": [[]] * 500}), "more times or diagnostics"),
-    (record(diagnostics={str(n): 0 for n in range(500)}), "more times or diagnostics"),
+    (record(diagnostics={"x": [[]] * 700}), "more times or diagnostics"),
+    (record(diagnostics={str(n): 0 for n in range(700)}), "more times or diagnostics"),
     (record(diagnostics={"x": [[[]] * 30] * 30}), "more times or diagnostics"),
     (record(timing={str(n): 0.0 for n in range(50)}), "more times or diagnostics"),
     (rows(lambda made: [*made, made[-1]]), "is there twice"),
@@ -206,8 +206,7 @@ FORGERIES: list[tuple[Forgery, str]] = [
     (first_failure(lambda row: row["record"].update(success=True, end="success")), "say False"),
     (first_failure(claim_success), "is not what the records give"),
     (field(layout.OUTCOMES, f"{PICK}/1", success="1111"), "outcomes.json is not what"),
-    (replaced(layout.TABLES["csv"], b"75", b"99"), "tables.csv is not what the records give"),
-    (replaced(layout.TABLES["md"], b"75", b"99"), "tables.md is not what the records give"),
+    (replaced(layout.SCORES, b"0.75", b"0.99"), "scores.json is not what the records give"),
     (other_film, "video"),
     (lambda files: files.update({film(files): b"<html>" * 9}), "is not an MP4 video"),
     # text
@@ -229,13 +228,19 @@ FORGERIES: list[tuple[Forgery, str]] = [
     ),
     (replaced(layout.RECORDS, b'"message":""', b'"message":"\\u003cscript>"'), "follow|markup"),
     (field(*SPEC, name="<script>"), "markup"),
-    (lambda files: files.update({layout.TABLES["md"]: b"<script>"}), "markup"),
     # other versions, and settings that do not count
     (field(layout.CARD, onload="x"), "unknown field 'onload'"),
     (record(reward=1.0), "newer version"),
     (field(*SPEC, privileged=True), "privileged"),
     (field(*SPEC, environment_state=True), "privileged"),
     (field(layout.RUN, "settings", "world", name="os:getcwd"), "another world"),
+    (field(layout.RUN, "settings", "world", gravity=0), "says what no run says: settings, world"),
+    (field(layout.RUN, "about", "versions", python="2.7.1"), "of python, which cannot be"),
+    (field(layout.RUN, "about", "versions", sapien="1.0"), "of sapien, which cannot be"),
+    (field(layout.RUN, "about", code="x"), "cannot be"),
+    (field(layout.RUN, "about", "machine", cores=0), "cannot be"),
+    (field(layout.RUN, "about", warnings=["x" * 1001]), "a text of 1001 characters"),
+    (field(layout.RUN, "about", warnings=["x"] * 21), "has 21 warnings"),
 ]
 
 
@@ -254,7 +259,7 @@ def assert_refused(path: Path, words: str, limits: BundleLimits | None = None) -
     ("changes", "words"),
     [
         ({"chain": {"rows": 40, "last": "0" * 64}}, "does not end as the manifest says"),
-        ({"format": 2}, "format 2, this robospa reads up to 1"),
+        ({"format": 1}, "format 1; this robospa reads 2"),
         ({"suite": "robospa-99"}, "robospa-99"),
     ],
 )

@@ -52,7 +52,7 @@ def test_the_numbers_are_those_of_comparing_the_runs(runs: tuple[Run, Run]) -> N
     ("field", "value", "words"),
     [
         ("success", "01", "not of 4 trials"),
-        ("success", "01x1", "must be text of 0 and 1"),
+        ("success", "01x1", "must be text of 0, 1 and 2"),
         ("done", "9999", "more is done than"),
         ("total", 99, "must be a whole number <= 35, not 99"),
         ("more", 1, "unknown field 'more'"),

@@ -9,13 +9,14 @@ from typing import Any
 
 import pytest
 from bundle_fakes import PRESS, REFERENCE, Files, put_rows, rows_of, seal, success_event, zip_up
+from msgspec import structs
 
 from robospa.leaderboard import bundle as layout
 from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.evidence import sample_size
-from robospa.leaderboard.replay import SampleReplay, replay
+from robospa.leaderboard.replay import SampleReplay, judge, replay
 from robospa.leaderboard.rules import Reference, manifest_of
-from robospa.leaderboard.verify import outcomes_of, scores_of, tables_of, verify
+from robospa.leaderboard.verify import outcomes_of, scores_of, verify
 from robospa.results.records.runs import Run, from_data
 
 CHALLENGE = "a value nobody knew"
@@ -33,8 +34,8 @@ def test_an_honest_bundle_replays_to_the_bit(honest: Path) -> None:
         "step_limit",
         "policy_error",
     }
-    assert "40 of 40 trials were played again: 40 identical" in made.sentences()[0]
-    assert made.evidence.identical == 40
+    assert made.evidence.identical == made.evidence.placed == 40 and made.evidence.most == 0
+    assert made.evidence.same_kind
 
 
 def test_another_build_with_the_same_outcomes_is_said_to_be_that(honest: Path) -> None:
@@ -42,7 +43,20 @@ def test_another_build_with_the_same_outcomes_is_said_to_be_that(honest: Path) -
     made = replayed(honest, 5, other)
     assert made.evidence.holds and not made.evidence.exact
     assert made.evidence.agrees == 5
-    assert "Outcomes agree but final states do not" in made.sentences()[2]
+
+
+def test_objects_that_lie_elsewhere_are_refused(honest: Path) -> None:
+    """By the median: one bottle that rolls away is no contradiction."""
+    (trial, *_) = replayed(honest, 5).trials
+    assert trial.record
+    moved = {n: [x + 0.03, *rest] for n, (x, *rest) in trial.record.diagnostics["final"].items()}
+    for final, apart in ((moved, 30.0), ({}, 1e6), ("nowhere", 1e6)):
+        diagnostics = {**trial.record.diagnostics, "final": final}
+        found = judge(replace(trial.record, diagnostics=diagnostics), trial.record)
+        assert found.apart == pytest.approx(apart) and found.kind == "identical"
+    evidence = replayed(honest, 5).evidence
+    assert structs.replace(evidence, most=300.0, median=19.0).holds
+    assert not structs.replace(evidence, median=21.0).holds
 
 
 def test_another_physics_does_not_hold(honest: Path) -> None:
@@ -73,8 +87,6 @@ def forge(files: Files, change: Any) -> Files:
     run = Run(Path("forged"), manifest, manifest.keys, records)
     files[layout.SCORES] = layout.canonical(scores_of(run))
     files[layout.OUTCOMES] = layout.canonical(outcomes_of(run))
-    for ending, table in tables_of(run).items():
-        files[layout.TABLES[ending]] = table
     return seal(files)
 
 

@@ -59,7 +59,9 @@ def test_from_run_to_badge(packed: Path) -> None:
     done = submit("verify", bundle, *more, "--evidence", found, *FAKES)
     assert done.code == 0, done.err
     assert "valid: 8 trials of 2 variants" in done.out
-    assert "replayed: 8 of 8 trials were played again: 8 identical" in done.out
+    assert (
+        "replayed: 8 of 8 trials were played again: 8 with the same outcome, 8 of them" in done.out
+    )
     assert "8/8 trials" in done.err
     evidence = json.loads(found.read_text())
     assert evidence["replayed"]["identical"] == 8

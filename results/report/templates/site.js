@@ -8,6 +8,10 @@ const tasksOf = (category) => ROWS.filter((r) => data.rows[r].category === categ
 const categories = ROWS.filter((r) => data.rows[r].kind === "category");
 const rowName = (row) => words(data.rows[row].name);
 const value = (model, column) => model.values[column.metric]?.[column.row]?.[column.level] || null;
+// The official metric that stands beside one by the first choice; models are ranked by the latter.
+const BESIDE = { sr1: "sr", onta1: "onta" };
+const official = (model, column) => BESIDE[column.metric] ? value(model, { ...column, metric: BESIDE[column.metric] }) : null;
+const shownValue = (model, column) => value(model, column) || official(model, column);
 const percent = (x) => x.toFixed(1).replace(/^-(0\.0)$/, "$1");
 const interval = (v) => `[${percent(v[1])}, ${percent(v[2])}]`;
 
@@ -24,7 +28,7 @@ const alike = (a, b) => a.group !== "" && a.group === b.group; // "": not known,
 // A rank among the models of one group; best: nobody there is better, and somebody is worse.
 function ranks(models, column) {
   const found = new Map();
-  const known = models.filter((m) => m.rankable && value(m, column));
+  const known = models.filter((m) => BESIDE[column.metric] && m.ranks[column.row]?.includes(column.level) && value(m, column));
   for (const model of known) {
     const others = known.filter((o) => o !== model && alike(o, model));
     const ahead = others.filter((o) => isBetter(value(o, column), value(model, column), others.length));
@@ -39,10 +43,10 @@ function fill(select, pairs, kept = select.value) {
   select.replaceChildren(...pairs.map(([v, text]) => make("option", { value: v }, text)));
   if (pairs.some(([v]) => v === kept)) select.value = kept;
 }
-const hasRow = (metric, row) => data.models.some((m) => m.values[metric]?.[row]);
+const hasRow = (metric, row) => data.models.some((m) => m.values[metric]?.[row] || m.values[BESIDE[metric]]?.[row]);
 function columnsOf() {
   const show = view.elements.show.value;
-  const metric = show === "overview" ? "sr" : view.elements.metric.value;
+  const metric = show === "overview" ? "sr1" : view.elements.metric.value;
   const level = Number(view.elements.level.value);
   const of = view.elements.of;
   const rows = ROWS.filter((r) => hasRow(metric, r));
@@ -56,10 +60,9 @@ function columnsOf() {
   if (show === "categories") return categories.filter((c) => rows.includes(c)).map((c) => at(c, metric, c, level, rowName(c)));
   if (show === "tasks") return [at(of.value, metric, of.value, level, rowName(of.value)),
     ...tasksOf(of.value).map((t) => at(rowName(t), metric, t, level))];
-  return [at("overall", "sr", "overall", 0, "success rate"), at("spatial", "sr", "spatial", 0, "success rate"),
-    at("procedural", "sr", "procedural", 0, "success rate"),
-    at("ONTA", "onta", "spatial", 0, "success beyond guessing, spatial"), at("PS", "ps", "procedural", 0, "progress, procedural"),
-    ...LEVELS.map((n) => at("L" + n, "sr", "overall", n, "success rate, overall"))];
+  return [...["overall", "spatial", "procedural"].map((r) => at(r, "sr1", r, 0, "SR@1")),
+    at("ONTA@1", "onta1", "spatial", 0, "beyond guessing, spatial"), at("PS", "ps", "procedural", 0, "progress, procedural"),
+    ...LEVELS.map((n) => at("L" + n, "sr1", "overall", n, "SR@1, overall"))];
 }
 const ABOUT = [["badge", (m) => data.badges[m.badge], (m) => -Object.keys(data.badges).indexOf(m.badge)], ["embodiment", (m) => m.embodiment],
   ["scenes", (m) => m.mode], ["training", (m) => data.training[m.training]], ["size", (m) => m.parameters, (m) => m.count]]
@@ -81,7 +84,7 @@ function chosen() {
 }
 function sorted(models, column) {
   const extra = ABOUT.find((a) => a[0] === order.name);
-  const key = order.name === "model" ? (m) => m.name : extra ? extra[2] || extra[1] : (m) => value(m, column)?.[0] ?? null;
+  const key = order.name === "model" ? (m) => m.name : extra ? extra[2] || extra[1] : (m) => shownValue(m, column)?.[0] ?? null;
   const sign = order.down ? -1 : 1;
   return models.map((m) => [key(m), m]).sort(([a], [b]) =>
     (a === null) - (b === null) || sign * (typeof a === "number" ? a - b : String(a).localeCompare(String(b)))).map((p) => p[1]);
@@ -112,14 +115,16 @@ function draw(focus) {
     if (focus && cell.dataset.name === focus) cell.querySelector("button").focus({ preventScroll: true });
   }
   const line = (m) => {
-    const row = make("tr", {}, make("td", { className: "num rank" }, String(main.get(m)?.rank ?? (m.rankable || ["published", "run"].includes(m.badge) ? "–" : "claim"))));
+    const row = make("tr", {}, make("td", { className: "num rank" }, String(main.get(m)?.rank ?? (["published", "run", "reproduced"].includes(m.badge) ? "–" : "claim"))));
     const link = make("a", { href: `models/${m.id}/index.html` }, m.name);
     row.append(make("th", { className: "name", scope: "row" }, link, make("small", {}, m.team), ...categoriesRun(m)));
     columns.forEach((c, n) => {
-      const v = value(m, c);
+      const v = shownValue(m, c);
+      const other = official(m, c);
       const place = places[n].get(m);
       const cell = make("td", { className: "num" + (place?.best ? " best" : "") }, v ? percent(v[0]) : "–");
       if (v && intervals) cell.append(make("small", {}, interval(v)));
+      if (other) cell.append(make("small", { title: "by the official rule" }, data.metrics[BESIDE[c.metric]] + (other === v ? "" : " " + percent(other[0]))));
       row.append(cell);
     });
     for (const [name, text] of ABOUT) {
@@ -141,9 +146,9 @@ function draw(focus) {
 }
 // Success in the categories of a model that did not run all of them, and so has no average.
 function categoriesRun(m) {
-  const at = (row) => value(m, { metric: "sr", row, level: 0 });
-  const run = at("overall") ? [] : categories.filter(at);
-  return run.length ? [make("small", {}, run.map((c) => `${c} ${percent(at(c)[0])} %`).join(", "))] : [];
+  const at = (row) => ["sr1", "sr"].map((metric) => value(m, { metric, row, level: 0 })).map((v) => v ? percent(v[0]) : "–");
+  const run = at("overall")[1] === "–" ? categories.filter((c) => at(c)[1] !== "–") : [];
+  return run.length ? [make("small", {}, run.map((c) => `${c} SR@1 ${at(c)[0]} %, SR ${at(c)[1]} %`).join("; "))] : [];
 }
 function change() {
   columns = columnsOf();
@@ -191,7 +196,7 @@ function radar(sides, metric, level) {
   return chart("Categories, " + (level ? "L" + level : "all levels"), 340, 280, parts);
 }
 function curve(sides, metric) {
-  const rows = [metric === "sr" ? "overall" : metric === "onta" ? "spatial" : "procedural", ...categories];
+  const rows = [metric.startsWith("sr") ? "overall" : metric.startsWith("onta") ? "spatial" : "procedural", ...categories];
   const row = rows.find((r) => sides.every((m) => value(m, { metric, row: r, level: 0 }))) || rows[0];
   const found = sides.map((m) => LEVELS.map((level) => value(m, { metric, row, level })));
   const top = topOf(found.flat().map((v) => (v ? v[2] : 0)));
@@ -246,7 +251,9 @@ function differing(a, b) {
 }
 function compare() {
   const sides = [pair.elements.one.value, pair.elements.two.value].map((id) => data.models.find((m) => m.id === id));
-  const metric = pair.elements.metric.value;
+  const asked = pair.elements.metric.value;
+  const unknown = asked in BESIDE && sides.some((m) => !Object.keys(m.values[asked] ?? {}).length);
+  const metric = unknown ? BESIDE[asked] : asked;
   const level = Number(pair.elements.level.value);
   const like = alike(...sides);
   const unlike = document.getElementById("unlike");
@@ -255,7 +262,7 @@ function compare() {
   document.querySelector(".charts").replaceChildren(radar(sides, metric, level), curve(sides, metric));
   const rows = ROWS.filter((r) => hasRow(metric, r) && (data.rows[r].kind !== "task" || pair.elements.tasks.checked));
   const pairing = pairOf(...sides);
-  document.getElementById("how").textContent = HOW[like ? pairing.how : "unlike"];
+  document.getElementById("how").textContent = (unknown ? "By the official rule: first choices are not known of both. " : "") + HOW[like ? pairing.how : "unlike"];
   const names = sides.map((m, n) => make("span", {}, make("span", { className: "key" + (n ? " two" : "") }), m.name));
   const title = (content) => make("th", { scope: "col", className: "num" }, content);
   document.querySelector("#sides thead tr").replaceChildren(make("th", { scope: "col", className: "name" }, ""), ...names.map(title), title("differ\u00adence"),
@@ -287,7 +294,7 @@ choices("training", data.training);
 const carried = Object.keys(data.badges).filter((b) => data.models.some((m) => m.badges.includes(b)));
 fill(filters.elements.badge, [["", "all"], ...carried.map((b) => [b, data.badges[b]])]);
 filters.elements.badge.parentElement.hidden = carried.length < 2;
-const first = (m) => value(m, { metric: "sr", row: "overall", level: 0 })?.[0] ?? -1;
+const first = (m) => shownValue(m, { metric: "sr1", row: "overall", level: 0 })?.[0] ?? -1;
 const place = (m) => GROUPS.findIndex((g) => g.key === m.group);
 const by = [...data.models].sort((a, b) => place(a) - place(b) || first(b) - first(a));
 const named = by.map((m) => [m.id, m.name]);

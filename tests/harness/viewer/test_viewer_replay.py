@@ -11,7 +11,9 @@ from run_fakes import FakeWorld, parts
 
 from robospa.geometry import Pose
 from robospa.harness.replay import ReplayError
+from robospa.harness.running.manifest import this_processor, write_manifest
 from robospa.harness.viewer.show import PoseRecorder, recorded_playback
+from robospa.results.records.manifest import RunAbout, RunSettings, make_manifest
 
 
 class Posed(FakeWorld):
@@ -40,9 +42,16 @@ def test_ten_frames_a_second_are_kept() -> None:
 
 
 def test_a_trial_that_does_not_come_again_is_refused(tmp_path: Path) -> None:
+    """In another outcome nowhere, in another state not on the kind of processor that ran it."""
     record = replace(recorded(tmp_path / "run", KEYS[0]), digest="another")
-    with pytest.raises(ReplayError, match="another state"):
-        recorded_playback(Posed(), record, tmp_path / "run", parts=parts)
+    for processors in ((), (this_processor(),)):
+        about = RunAbout(processors=processors)
+        write_manifest(tmp_path / "run", make_manifest(RunSettings(), KEYS, about))
+        if not processors:
+            recorded_playback(Posed(), record, tmp_path / "run", parts=parts)
+    for claim, words in ((record, "state"), (replace(record, success=False), "success")):
+        with pytest.raises(ReplayError, match=f"another {words}"):
+            recorded_playback(Posed(), claim, tmp_path / "run", parts=parts)
 
 
 def test_a_world_that_does_not_tell_where_its_bodies_are_is_refused(tmp_path: Path) -> None:
