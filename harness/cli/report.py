@@ -136,11 +136,10 @@ def _failures(folder: Path, by: str, trials: bool, film: bool, as_json: bool) ->
 
     found = _make_films(folder) if film else read_run(folder)
     records = list(found.records.values())
-    layout = "json" if as_json else "markdown"
     if trials:
-        print(trials_table(records, layout))
+        print(trials_table(records, as_json))
         return
-    print(counts_table(records, by, layout))
+    print(counts_table(records, by, as_json))
     if as_json:
         return
     types = [failure for record in records if (failure := label(record)) is not None]

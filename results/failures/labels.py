@@ -9,8 +9,6 @@ A trial lost to infrastructure is no failure of the policy and gets no type.
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, fields, replace
@@ -168,15 +166,14 @@ def _spatial(record: TrialRecord) -> Cause | None:
     return Cause("target_grounding", reached, f"reached {name}, which was not asked for")
 
 
-FORMATS = ("markdown", "csv", "json")
 SHOWN = 100
 """Failures that are printed before the others are only counted."""
 
 
-def counts_table(records: Iterable[TrialRecord], by: str, layout: str) -> str:
-    """Occurrences of each type, as "markdown", "csv" or "json"; ValueError for another layout."""
+def counts_table(records: Iterable[TrialRecord], by: str, as_json: bool) -> str:
+    """Occurrences of each type, as JSON or a table in Markdown."""
     rows = distribution(records, by)
-    if layout == "json":
+    if as_json:
         return json.dumps(rows, indent=1)
     kinds = [k for k in KINDS if any(k in row for row in rows.values())]
     head = [by, "failed", *(NAMES[k] + " *" * (k in OURS) for k in kinds)]
@@ -184,7 +181,7 @@ def counts_table(records: Iterable[TrialRecord], by: str, layout: str) -> str:
         [name, str(sum(row.values())), *(str(row.get(k, 0)) for k in kinds)]
         for name, row in rows.items()
     ]
-    return _laid_out(head, body, layout)
+    return _laid_out(head, body)
 
 
 @dataclass(frozen=True)
@@ -278,22 +275,16 @@ UNLISTED = ("embodiment", "mode", "split")
 """Fields that the listing has no column for."""
 
 
-def trials_table(records: Iterable[TrialRecord], layout: str) -> str:
-    """Every failed trial: type, evidence, when; as "markdown", "csv" or "json"."""
+def trials_table(records: Iterable[TrialRecord], as_json: bool) -> str:
+    """Every failed trial: type, evidence, when; as JSON or a table in Markdown."""
     rows = [asdict(trial) for trial in failed_trials(records)]
     head = [field.name for field in fields(FailedTrial) if field.name not in UNLISTED]
-    if layout == "json":
+    if as_json:
         return json.dumps([{name: row[name] for name in head} for row in rows], indent=1)
     body = [["" if row[name] is None else str(row[name]) for name in head] for row in rows]
-    return _laid_out(head, body, layout)
+    return _laid_out(head, body)
 
 
-def _laid_out(head: list[str], body: list[list[str]], layout: str) -> str:
-    if layout == "csv":
-        text = io.StringIO()
-        csv.writer(text, lineterminator="\n").writerows([head, *body])
-        return text.getvalue().rstrip("\n")
-    if layout != "markdown":
-        raise ValueError(f"no layout {layout!r}; there are {', '.join(FORMATS)}")
+def _laid_out(head: list[str], body: list[list[str]]) -> str:
     rows = ([cell.replace("|", "\\|") for cell in line] for line in body)
     return markdown_table(head, rows, [" --- "] * len(head))

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from xml.etree import ElementTree
 
 import pytest
@@ -43,9 +43,6 @@ from robospa.results.tables import (
     to_markdown,
 )
 from robospa.text import plain_console
-
-if TYPE_CHECKING:
-    pass
 
 EVIL = "=a|b_c & 100% <script>alert(1)</script> \\input{x} $#~^{} “é” 模型"
 SMALL = Table(
