@@ -1,8 +1,8 @@
 """Attempts at trials that did not count: how many a trial has had, over all drivers of its run.
 
 A fault that the harness sees itself repeats the trial. A policy can bring such faults about, so
-every attempt that it may have had is on disk before the next one begins, as the record of a loss,
-and a trial has a fixed number of them however often the run is resumed.
+every attempt is on disk before it gets the trial, as the record of a loss that the end of the
+driver would be, and a trial has a fixed number of them however often the run is resumed.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from robospa.harness.running.record_store import RecordWriter
 from robospa.harness.running.scheduler import TrialQueue
 from robospa.results.records.action_problems import error_kind, problem_counts
 from robospa.results.records.runs import finished
-from robospa.results.records.trial_record import RetryRow, TrialRecord
+from robospa.results.records.trial_record import INTERRUPTED, RetryRow, TrialRecord
 from robospa.results.scoring.repeats import reached_policy
 from robospa.trial import TrialKey
 
@@ -39,6 +39,10 @@ def spent_trials(
     """Those of `keys` that have had all their `attempts` and stay without a result."""
     retries = earlier_retries(known)
     return [key for key in keys if attempts_spent(retries.get(key, ())) >= attempts]
+
+
+CUT_OFF = RetryRow(INTERRUPTED, "the run ended before the trial did")
+"""An attempt that has begun and, as far as is known, not ended."""
 
 
 class LossWriter:

@@ -103,11 +103,16 @@ class RunTrial:
 
 
 @dataclass(frozen=True)
+class Proceed:
+    """To a worker: the attempt that it announced is on disk, and its policy may have the trial."""
+
+
+@dataclass(frozen=True)
 class Stop:
     """To a worker: close the connection to the policy and end."""
 
 
-Command = RunTrial | Stop
+Command = RunTrial | Proceed | Stop
 
 
 @dataclass(frozen=True)
@@ -128,6 +133,12 @@ class Heartbeat:
     activity: Activity
     answers: int = 0
     answer_ms: float = 0.0
+
+
+@dataclass(frozen=True)
+class TrialBegins:
+    """The policy is about to be sent the trial: an attempt, whatever ends it. The worker waits for
+    Proceed."""
 
 
 @dataclass(frozen=True)
@@ -157,5 +168,5 @@ class Fatal:
     message: str
 
 
-Message = WorkerReady | Heartbeat | TrialDone | TrialLost | Fatal
+Message = WorkerReady | Heartbeat | TrialBegins | TrialDone | TrialLost | Fatal
 """From a worker."""

@@ -117,11 +117,18 @@ class MonitoredPolicy:
 
     An exception of a policy in this process becomes a PolicyError. `in_trial`: it was sent a trial
     since it was connected to, or since `begin`. `failed`: it reported an error of its own since
-    then, after which its connection may be of no more use.
+    then, after which its connection may be of no more use. `announce` is called before it is sent
+    a trial.
     """
 
-    def __init__(self, policy: Policy, target: str, heartbeat: HeartbeatSender) -> None:
-        self._policy = policy
+    def __init__(
+        self,
+        policy: Policy,
+        target: str,
+        heartbeat: HeartbeatSender,
+        announce: Callable[[], None] = lambda: None,
+    ) -> None:
+        self._policy, self._announce = policy, announce
         self.target = target
         self._heartbeat = heartbeat
         self.in_trial = self.failed = False
@@ -147,9 +154,11 @@ class MonitoredPolicy:
 
     def reset(self, trial: TrialInfo) -> None:
         """Begin a trial."""
-        self.in_trial = True
-        with self._heartbeat.policy(self.target), self._own_errors():
-            self._policy.reset(trial)
+        with self._heartbeat.policy(self.target):
+            self._announce()
+            self.in_trial = True
+            with self._own_errors():
+                self._policy.reset(trial)
 
     def infer(self, observation: Observation) -> NDArray[np.float32]:
         """The policy's answer, not yet checked."""

@@ -18,6 +18,7 @@ from dataclasses import dataclass, field, replace
 from robospa.harness.factory import is_url
 from robospa.harness.running.atomic_file import LOGS, StorageError, storage_errors
 from robospa.harness.running.attempts import (
+    CUT_OFF,
     ErrorWatch,
     LossWriter,
     ProblemWatch,
@@ -29,8 +30,10 @@ from robospa.harness.running.executor import (
     Fatal,
     Heartbeat,
     Message,
+    Proceed,
     RunAborted,
     Stop,
+    TrialBegins,
     TrialDone,
     TrialLost,
     WorkerReady,
@@ -223,6 +226,8 @@ class Runner:
                 if new := message.answers - slot.answers:
                     slot.answers = message.answers
                     self._scheduler.servers[slot.target].add_answers(new, message.answer_ms)
+            case TrialBegins():
+                self._begin(slot)
             case TrialDone():
                 self._complete(slot, message.record)
             case Fatal():
@@ -279,6 +284,14 @@ class Runner:
             self.on_note(f"workers wait while cores idle: {more} more, {total} now")
 
     # --- trials -----------------------------------------------------------------------------------
+
+    def _begin(self, slot: Slot) -> None:
+        """Put the attempt of `slot` on disk, as one that the end of this driver cuts off, and let
+        the policy have the trial."""
+        assert slot.job is not None
+        work = slot.job.work
+        self._losses.write(work.key, CUT_OFF.message, (*work.retries, CUT_OFF))
+        slot.worker.send(Proceed())
 
     def _complete(self, slot: Slot, record: TrialRecord) -> None:
         """The trial of `slot` has its record."""

@@ -2,10 +2,10 @@
 
 Every trial that it may hold at once has a pipe to the driver, a world and a policy connection of
 its own; one computes while the others wait for their servers (`ComputeLock`). Commands are answered
-with the messages of `harness.running.executor`: WorkerReady, then for each trial TrialDone once its
-record is on disk or TrialLost if it could not be run, or Fatal if no trial could ever be run. After
-a loss the world is rebuilt and the policy reconnected before the next trial, never within one.
-Threads send heartbeats.
+with the messages of `harness.running.executor`: WorkerReady, then for each trial TrialBegins before
+the policy has it, and TrialDone once its record is on disk or TrialLost if it could not be run, or
+Fatal if no trial could ever be run. After a loss the world is rebuilt and the policy reconnected
+before the next trial, never within one. Threads send heartbeats.
 """
 
 from __future__ import annotations
@@ -33,6 +33,7 @@ from robospa.harness.running.executor import (
     Message,
     RunTrial,
     Stop,
+    TrialBegins,
     TrialDone,
     TrialLost,
     WorkerHandle,
@@ -144,9 +145,10 @@ class Worker:
         config: WorkerConfig,
         writer: RecordWriter,
         heartbeat: HeartbeatSender | None = None,
+        announce: Callable[[], None] = lambda: None,
     ) -> None:
         self.config = config
-        self.writer = writer
+        self.writer, self.announce = writer, announce
         self.heartbeat = heartbeat or HeartbeatSender()
         self.parts = load_parts(config)
         self._world: World | None = None
@@ -225,7 +227,7 @@ class Worker:
                 options["timeouts"] = replace(options["timeouts"], wait=0.0)
             with self.heartbeat.policy(target):
                 opened = open_policy(target, options)
-            self._policy = MonitoredPolicy(opened, target, self.heartbeat)
+            self._policy = MonitoredPolicy(opened, target, self.heartbeat, self.announce)
         elif self._stale:
             self._policy.reconnect()
         self._stale = False
@@ -313,7 +315,11 @@ def _hold(
         with sending:
             pipe.send(message)
 
-    worker = Worker(config, writer, HeartbeatSender(send, turn))
+    def announce() -> None:
+        send(TrialBegins())
+        pipe.recv()  # Proceed; EOFError if the driver is gone
+
+    worker = Worker(config, writer, HeartbeatSender(send, turn), announce)
     worker.heartbeat.start()
     try:
         send(WorkerReady(writer.path))

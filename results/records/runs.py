@@ -26,7 +26,7 @@ from robospa.results.records.manifest import (
     read_bytes,
     read_manifest,
 )
-from robospa.results.records.trial_record import TrialRecord
+from robospa.results.records.trial_record import INTERRUPTED, TrialRecord
 from robospa.schema import parse_json, read
 from robospa.text import some
 from robospa.trial import TrialKey
@@ -112,6 +112,11 @@ class Run:
 def finished(record: TrialRecord | None) -> bool:
     """Whether `record` is a result (a trial lost to infrastructure is none)."""
     return record is not None and record.end != "infrastructure"
+
+
+def under_way(record: TrialRecord) -> bool:
+    """Whether `record` says that an attempt has begun, and none how it ended."""
+    return not finished(record) and [r.cause for r in record.retries[-1:]] == [INTERRUPTED]
 
 
 def to_line(record: TrialRecord) -> str:
@@ -222,6 +227,8 @@ def read_run(folder: str | Path) -> Run:
         torn += [path.name] * was_torn
     counts = Counter(r.key for r in results if not withdraws(records[r.key], r))
     repeated = tuple(key for key, count in counts.items() if count > 1)
+    if going_on:
+        records = {key: r for key, r in records.items() if not under_way(r)}
     records = _with_films(records, films_in(folder))
     return Run(folder, manifest, manifest.keys, records, tuple(torn), repeated, going_on)
 

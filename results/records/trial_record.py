@@ -20,6 +20,7 @@ END_REASONS = (
     "goal_lost",  # the goal can no longer be met (memory tasks)
     "infrastructure",  # the trial could not be run: missing, never scored as a failure
 )
+INTERRUPTED = "interrupted"
 RETRY_CAUSES = (
     "unreachable",  # no connection could be made, so the policy never got the trial
     "connection_lost",  # the connection ended within the trial
@@ -29,6 +30,7 @@ RETRY_CAUSES = (
     "worker_stuck",  # the worker did not advance and was killed
     "harness_error",  # the simulator, or other code of ours, raised an error
     "policy_error",  # withdrawn, because the first trials of the task all ended so
+    INTERRUPTED,  # the driver was killed or stopped before the trial ended
 )
 """Why an attempt at a trial did not count. All but the first may be the policy's doing."""
 
@@ -54,7 +56,7 @@ class RetryRow:
 
     cause: Annotated[str, one_of(RETRY_CAUSES)]
     """`unreachable`, `connection_lost`, `deadline`, `unreadable_answer`, `worker_ended`,
-    `worker_stuck`, `harness_error` or `policy_error`."""
+    `worker_stuck`, `harness_error`, `policy_error` or `interrupted`."""
     message: str = ""
     """What happened, in a sentence."""
     steps: Count | None = None

@@ -181,12 +181,6 @@ class FakePolicy:
         return np.ones((self.length, 14), np.float32)
 
 
-class SlowPolicy(FakePolicy):
-    def infer(self, observation: Mapping[str, Any]) -> NDArray[np.float32]:
-        time.sleep(0.03)
-        return super().infer(observation)
-
-
 class NanPolicy(FakePolicy):
     def infer(self, observation: Mapping[str, Any]) -> NDArray[np.float32]:
         answer = super().infer(observation)
@@ -199,6 +193,19 @@ class KeyedPolicy(FakePolicy):
 
     def __init__(self) -> None:
         super().__init__(KEYED)
+
+
+class CountedPolicy(KeyedPolicy):
+    """Slow; leaves a byte for each attempt that it is sent."""
+
+    def reset(self, trial: TrialInfo) -> None:
+        super().reset(trial)
+        with (Path(os.environ["FAKE_MARKS"]) / str(self.seed)).open("ab", 0) as marks:
+            marks.write(b"x")
+
+    def infer(self, observation: Mapping[str, Any]) -> NDArray[np.float32]:
+        time.sleep(0.03)
+        return super().infer(observation)
 
 
 class FlakyPolicy(KeyedPolicy):
@@ -240,10 +247,6 @@ class LastWordsPolicy(KeyedPolicy):
     def end(self, outcome: Mapping[str, Any]) -> None:
         if self.seed == 100003:
             os.kill(os.getpid(), signal.SIGKILL)
-
-
-def slow() -> FakePolicy:
-    return SlowPolicy()
 
 
 def other() -> FakePolicy:

@@ -144,7 +144,7 @@ def test_a_loss_is_on_disk_before_the_next_attempt(tmp_path: Path) -> None:
 
     with Looking("first", fault_server.cut) as url:
         evaluate(request(url, tmp_path))
-    assert seen == [0, 1, 2]
+    assert seen == [1, 3, 5]  # of every attempt that it began, and of its loss
 
 
 def test_a_server_that_is_away_costs_no_attempt_for_ever(tmp_path: Path) -> None:

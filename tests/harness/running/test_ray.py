@@ -118,7 +118,7 @@ def test_the_command_gives_the_same_records_as_local_workers_and_no_noise(
     assert "ray" not in done.stderr.lower(), done.stderr
     keys = [TrialKey("Pick_Blocks_Size", n, 100000 + s) for n in (1, 2, 3) for s in range(10)]
     Runner(config(tmp_path / "local"), keys, RunOptions(workers=1)).run()
-    assert sorted(r.key for r in lines(tmp_path / "ray")) == keys
+    assert sorted(r.key for r in lines(tmp_path / "ray") if finished(r)) == keys
     assert digests(tmp_path / "ray") == digests(tmp_path / "local")
     assert traces(tmp_path / "ray") == traces(tmp_path / "local")
 

@@ -12,8 +12,10 @@ from robospa.harness.running import ray_executor as ray_node
 from robospa.harness.running.executor import (
     Heartbeat,
     Message,
+    Proceed,
     RunTrial,
     Stop,
+    TrialBegins,
     TrialDone,
     WorkerReady,
 )
@@ -51,6 +53,8 @@ def test_a_worker_hands_over_its_record_and_trace_and_leaves_nothing(
     actor: WorkerActor, tmp_path: Path
 ) -> None:
     actor.send(RunTrial(KEY, "run_fakes:FakePolicy", (RetryRow("deadline"),)))
+    assert received(actor) == ([TrialBegins()], set())
+    actor.send(Proceed())
     (message,), files = received(actor)
     assert isinstance(message, TrialDone)
     assert (message.record.key, message.record.attempts) == (KEY, 2)

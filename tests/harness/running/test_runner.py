@@ -19,6 +19,7 @@ from robospa.results.records.runs import finished, read_file, read_records
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
 
+KILLS = int(os.environ.get("ROBOSPA_KILLS", "2"))
 QUICK = RunOptions(workers=2, backoff=0.01)
 
 
@@ -38,8 +39,9 @@ def go(
     return records, notes
 
 
-def lines(folder: Path) -> list[TrialRecord]:
-    return [r for path in sorted((folder / "trials").glob("*.jsonl")) for r in read_file(path)]
+def results(folder: Path) -> list[TrialRecord]:
+    files = sorted((folder / "trials").glob("*.jsonl"))
+    return [r for path in files for r in read_file(path) if finished(r)]
 
 
 def digests(folder: Path) -> dict[TrialKey, tuple[str, str]]:
@@ -50,7 +52,7 @@ def test_every_trial_is_run_once_and_alike_with_one_worker_or_two(tmp_path: Path
     go(tmp_path / "one", "FakePolicy", keys(), RunOptions(workers=1))
     go(tmp_path / "two", "FakePolicy", keys(), RunOptions(workers=2))
     assert digests(tmp_path / "one") == digests(tmp_path / "two")
-    assert sorted(r.key for r in lines(tmp_path / "two")) == keys()
+    assert sorted(r.key for r in results(tmp_path / "two")) == keys()
 
 
 def test_action_traces_lie_beside_the_records(tmp_path: Path) -> None:
@@ -120,7 +122,7 @@ def test_a_record_on_disk_counts_although_its_worker_died_before_saying_so(
     tmp_path: Path,
 ) -> None:
     records, _ = go(tmp_path, "LastWordsPolicy", keys())
-    assert sorted(r.key for r in records) == sorted(r.key for r in lines(tmp_path)) == keys()
+    assert sorted(r.key for r in records) == sorted(r.key for r in results(tmp_path)) == keys()
 
 
 def test_a_policy_that_does_not_exist_stops_the_run(tmp_path: Path) -> None:
@@ -139,40 +141,49 @@ from robospa.results.records.trial_record import TrialKey
 
 if __name__ == "__main__":
     folder = Path(sys.argv[1])
-    config = WorkerConfig(folder, "run_fakes:slow", world="run_fakes:FakeWorld",
+    config = WorkerConfig(folder, "run_fakes:CountedPolicy", world="run_fakes:FakeWorld",
                           parts="run_fakes:parts")
     keys = [TrialKey("Pick_Fake", 1, 100000 + n) for n in range(30)]
     with run_lock(folder):
         known = read_records(folder)
         owed = [k for k in keys if not finished(known.get(k))]
         print("owed", len(owed), flush=True)
-        Runner(config, owed, RunOptions(workers=2)).run()
+        Runner(config, owed, RunOptions(workers=2, attempts=10), known=known).run()
 """
 
 
-def test_killing_the_driver_loses_and_doubles_nothing(tmp_path: Path) -> None:
-    script = tmp_path / "driver.py"
+def test_killing_the_driver_loses_and_doubles_nothing_and_counts_as_an_attempt(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    script, folder, begun = tmp_path / "driver.py", tmp_path / "run", tmp_path / "begun"
     script.write_text(DRIVER)
-    folder = tmp_path / "run"
+    begun.mkdir()
+    monkeypatch.setenv("FAKE_MARKS", str(begun))
     command = [sys.executable, str(script), str(folder)]
-    victim = subprocess.Popen(command, stdout=subprocess.DEVNULL)
-    while not _count(folder):
-        assert victim.poll() is None
-        time.sleep(0.01)
-    victim.send_signal(signal.SIGKILL)
-    victim.wait()
-    done = subprocess.run(
-        command, env=dict(os.environ), capture_output=True, text=True, timeout=120
-    )
+    for kill in range(1, KILLS + 1):
+        victim = subprocess.Popen(command, stdout=subprocess.DEVNULL)
+        while _count(folder) < 30 * kill // (KILLS + 1):
+            assert victim.poll() is None
+            time.sleep(0.01)
+        victim.send_signal((signal.SIGKILL, signal.SIGINT)[kill % 2])
+        victim.wait()
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stderr
     assert 0 < int(done.stdout.split()[1]) < 30
-    records = lines(folder)
-    assert len(read_records(folder)) == 30
-    assert len(records) <= 32  # at most the two in flight were run twice
+    records = read_records(folder)
+    assert len(records) == len(results(folder)) == 30
+    true = {int(mark.name): mark.stat().st_size for mark in begun.iterdir()}
+    counted = {key.seed: r.attempts for key, r in records.items()}
+    print(f"{KILLS} kills, {sum(true.values())} attempts, {sum(counted.values())} counted")
+    # A kill between the line on disk and the policy costs an attempt that the policy never had.
+    assert all(true[seed] <= counted[seed] <= true[seed] + 1 for seed in true)
+    assert sum(true.values()) > 30
+    causes = {row.cause for r in records.values() for row in r.retries}
+    assert causes == {"interrupted"}
 
 
 def _count(folder: Path) -> int:
     try:
-        return len(lines(folder))
+        return len(results(folder))
     except RunError:
         return 0
