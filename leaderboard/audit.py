@@ -207,9 +207,10 @@ def sentence_reaction(
 
 def faults(run: Run) -> list[AuditFinding]:
     """Repeated trials and policy errors, over all levels and at each."""
-    made = []
+    made, drivers = [], run.manifest.about.drivers
     for rate in fault_rates(run.records.values()):
-        where = f"level {rate.level}" if rate.level else "all levels"
+        whole = "all levels" if drivers == 1 else f"all levels, by {drivers} drivers in turn"
+        where = f"level {rate.level}" if rate.level else whole
         text = (
             f"{where}: {rate.repeated} of {rate.results} trials were repeated "
             f"({rate.attempts} attempts that did not count), {rate.policy_errors} ended in a "

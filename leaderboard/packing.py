@@ -45,7 +45,7 @@ from robospa.results.records.trial_record import TrialRecord
 from robospa.results.report.page import own_version
 from robospa.trial import TrialKey, path_part
 
-ABOUT = ("versions", "git", "code", "machine", "world", "warnings")
+ABOUT = ("versions", "git", "code", "machine", "world", "warnings", "drivers", "processors")
 """What of the machine and its software goes into the bundle."""
 SAME = ("versions", "code")
 DATE = (1980, 1, 1, 0, 0, 0)

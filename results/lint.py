@@ -24,7 +24,7 @@ from robospa.results.records.action_problems import (
 )
 from robospa.results.records.manifest import LIMITS, REAL_TIME, departures
 from robospa.results.records.runs import Run, finished, lost_actions
-from robospa.results.records.trial_record import TrialRecord
+from robospa.results.records.trial_record import INTERRUPTED, TrialRecord
 from robospa.results.scoring.first_choice import after_others
 from robospa.results.scoring.repeats import (
     FEW,
@@ -261,6 +261,10 @@ def _lint_limits(run: Run, name: str) -> Iterator[Finding]:
     if unknown := [server for server, named in run.manifest.servers.items() if not named]:
         text = f"nothing says which checkpoint was served at {some(unknown)}"
         yield Finding("unknown-checkpoint", "note", name, text)
+    if (drivers := run.manifest.about.drivers) > 1:
+        cut = sum(x.cause == INTERRUPTED for r in run.records.values() for x in r.retries)
+        text = f"{drivers} drivers ran it one after the other, whose ends cut off {cut} attempts"
+        yield Finding("drivers", "note", name, text)
 
 
 def _lint_actions(run: Run, name: str) -> Iterator[Finding]:

@@ -11,17 +11,22 @@ from typing import Any
 import fault_server
 import pytest
 from fault_server import ALWAYS, ONCE, FaultyServer
+from msgspec import structs
 from numpy.typing import NDArray
-from run_fakes import FakePolicy
+from run_fakes import FakePolicy, fake_task_of
 
 from robospa.harness.running import manifest
-from robospa.harness.running.attempts import FIRST
+from robospa.harness.running.atomic_file import run_lock
+from robospa.harness.running.attempts import CUT_OFF, FIRST, loss_record
 from robospa.harness.running.evaluate import Request, RunAborted, evaluate
+from robospa.harness.running.record_store import RecordWriter
 from robospa.harness.running.runner import Runner, RunOptions
+from robospa.harness.running.scheduler import TrialQueue
 from robospa.harness.running.worker import WorkerConfig
 from robospa.protocol.server import ServerThread
 from robospa.protocol.transport import Timeouts
-from robospa.results.records.manifest import RunError
+from robospa.results.lint import lint_run
+from robospa.results.records.manifest import RunAbout, RunError, RunSettings, make_manifest
 from robospa.results.records.runs import Run, read_file, read_run
 from robospa.results.scoring.repeats import fault_rates, was_repeated, worst_case
 from robospa.results.scoring.scores import score_run
@@ -145,6 +150,20 @@ def test_a_loss_is_on_disk_before_the_next_attempt(tmp_path: Path) -> None:
     with Looking("first", fault_server.cut) as url:
         evaluate(request(url, tmp_path))
     assert seen == [1, 3, 5]  # of every attempt that it began, and of its loss
+
+
+def test_an_attempt_under_way_is_waited_for_until_its_driver_is_gone(tmp_path: Path) -> None:
+    manifest.write_manifest(tmp_path, make_manifest(RunSettings(), keys(1)))
+    writer = RecordWriter(tmp_path)
+    queue = TrialQueue(keys(1), fake_task_of)
+    writer.write(loss_record(keys(1)[0], "", (CUT_OFF,), queue))
+    with run_lock(tmp_path):
+        assert not read_run(tmp_path).missing and read_run(tmp_path).waiting
+    found = read_run(tmp_path)
+    assert found.missing and [f.rule for f in lint_run(found)] == ["missing"]
+    more = structs.replace(found.manifest, about=RunAbout(drivers=2))
+    (drivers,) = [f for f in lint_run(replace(found, manifest=more)) if f.rule == "drivers"]
+    assert "2 drivers" in drivers.text and "cut off 1 attempts" in drivers.text
 
 
 def test_a_server_that_is_away_costs_no_attempt_for_ever(tmp_path: Path) -> None:

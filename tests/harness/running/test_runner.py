@@ -169,7 +169,7 @@ def test_killing_the_driver_loses_and_doubles_nothing_and_counts_as_an_attempt(
         victim.wait()
     done = subprocess.run(command, capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stderr
-    assert 0 < int(done.stdout.split()[1]) < 30
+    assert int(done.stdout.split()[1]) < 30
     records = read_records(folder)
     assert len(records) == len(results(folder)) == 30
     true = {int(mark.name): mark.stat().st_size for mark in begun.iterdir()}
