@@ -294,7 +294,7 @@ def _attempt(worker: Worker, command: RunTrial) -> Message:
 
 
 def _serve(
-    commands: Connection[Any, Command], send: Callable[[Message], None], worker: Worker
+    commands: Connection[Any, RunTrial | Stop], send: Callable[[Message], None], worker: Worker
 ) -> None:
     while True:
         command = commands.recv()
