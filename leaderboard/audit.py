@@ -27,6 +27,7 @@ from robospa.leaderboard.traces import Trace, joint_path, with_joints
 from robospa.leaderboard.verify import read_traces, verify
 from robospa.results.records.runs import Run, action_path, finished, read_run
 from robospa.results.records.trial_record import TrialRecord
+from robospa.results.scoring.first_choice import after_others
 from robospa.results.scoring.repeats import fault_rates
 from robospa.tasks.seeds import accepted
 from robospa.tasks.sentences import sentences
@@ -39,6 +40,7 @@ that learned from demonstrations is some hundredths off, on scenes that it has n
 POINTS = 200
 """Places at which two paths are compared."""
 EXPERT = "robospa.baselines.oracle:create"
+CHOSE = "successes follow other choices no more often than those of a policy that reads."
 STILL = 0.8
 """Share of the successes that may not remain when the sentences are another trial's."""
 
@@ -68,7 +70,9 @@ def audit(
     many with exchanged sentences.
     """
     run, traces = executed_paths(path, samples)
-    findings = faults(run)
+    results = [record for record in run.records.values() if finished(record)]
+    told = after_others(results)
+    findings = [*faults(run), AuditFinding("choices", told or CHOSE, bool(told))]
     if reproduction is not None:
         findings.append(hidden_gap(run, read_run(reproduction)))
     if samples and not run.manifest.settings.salt_sha256:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import partial
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -70,3 +71,22 @@ class Thief(Shadow):
                 if policy_seed(key) == trial.policy_seed:
                     return key, ""
         return None
+
+
+class Shy(Thief):
+    """The same, on a detour of its own, and still where the sentence is not the scene's."""
+
+    def found(self, trial: TrialInfo) -> tuple[TrialKey, str] | None:
+        found = super().found(trial)
+        return found if found and task_parts(found[0]).instruction == trial.instruction else None
+
+    def reset(self, trial: TrialInfo) -> None:
+        super().reset(trial)
+        random, rows = np.random.default_rng(trial.policy_seed), list(self._actions[:1])
+        for here, there in pairwise(self._actions):
+            if np.abs(there - here).max() > 0.3:
+                detour = (here + there) / 2 + random.normal(0, 0.12, len(here))
+                detour[[6, 13]] = here[[6, 13]]
+                rows.append(detour.astype(np.float32))
+            rows.append(there)
+        self._actions = np.array(rows) if rows else self._actions

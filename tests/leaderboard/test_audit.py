@@ -10,12 +10,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bundle_fakes import PICK, SEEDS, make_run
+from bundle_fakes import PICK, SEEDS, all_keys, make_run
 from command_line import robospa
 from run_fakes import FakePolicy, FakeWorld, parts
 
 from robospa.harness.trial import run_trial
 from robospa.leaderboard.audit import (
+    audit,
     expert_likeness,
     faults,
     hidden_gap,
@@ -25,7 +26,7 @@ from robospa.leaderboard.audit import (
     sentence_reaction,
 )
 from robospa.results.records.manifest import RunManifest
-from robospa.results.records.runs import Run
+from robospa.results.records.runs import Run, read_run, to_line
 from robospa.results.records.trial_record import RetryRow
 from robospa.tasks.catalog import build_scene
 from robospa.tasks.sentences import sentences
@@ -59,6 +60,19 @@ def test_repeated_trials_and_policy_errors() -> None:
     everywhere, first = faults(run_of(40, repeated=12))
     assert everywhere.suspicious and first.suspicious
     assert "level 1: 12 of 40 trials were repeated (12 attempts" in first.sentence
+
+
+def test_successes_that_follow_other_choices(tmp_path: Path) -> None:
+    """As those of a policy that tries everything do, whatever its sentence says."""
+    folder = make_run(tmp_path / "run", all_keys(), policy=FakePolicy())
+    run = read_run(folder)
+    (before,) = [one for one in audit(folder, samples=0) if one.check == "choices"]
+    other = {"time": 0.0, "kind": "wrong_object", "object": "", "index": -1, "note": "", "step": 0}
+    lines = [to_line(replace(r, events=(other, *r.events))) for r in run.records.values()]
+    next((folder / "trials").glob("*.jsonl")).write_text("".join(lines))
+    (after,) = [one for one in audit(folder, samples=0) if one.check == "choices"]
+    assert after.suspicious and "20 of 20 successes came after" in after.sentence
+    assert not before.suspicious
 
 
 def path(bend: float, steps: int = 50) -> Any:

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bundle_fakes import CARD_DATA
-from shadow import HORIZON, Shadow, Thief, ids
+from shadow import HORIZON, Shadow, Shy, Thief, ids
 
 from robospa.baselines.oracle import Oracle
 from robospa.baselines.random import Random
@@ -87,7 +87,7 @@ def valid(tmp_path_factory: pytest.TempPathFactory, stolen: Run) -> Valid:
 
 
 def test_a_claim_is_reproduced_and_a_cheat_is_caught(tmp_path: Path, valid: Valid) -> None:
-    """On hidden scenes the cheat of public ones has nothing to go by."""
+    """On hidden scenes the cheat of public ones has nothing to go by, however shy it is there."""
     drawn = draw_block([(TASK, LEVEL)], TRIALS)
     write_block(drawn, tmp_path / "block.json")
     block = read_block(tmp_path / "block.json", drawn.commitment)
@@ -99,7 +99,7 @@ def test_a_claim_is_reproduced_and_a_cheat_is_caught(tmp_path: Path, valid: Vali
     honest = compare(valid, able, keys, block)
     assert honest.holds and honest.overall.fresh == TRIALS
 
-    caught = run(tmp_path / "caught", keys, Thief, salt)
+    caught = run(tmp_path / "caught", keys, Shy, salt)
     cheat = compare(valid, caught, keys, block)
     assert not cheat.holds
     assert cheat.overall.fresh == 0
@@ -107,7 +107,9 @@ def test_a_claim_is_reproduced_and_a_cheat_is_caught(tmp_path: Path, valid: Vali
     assert hidden_gap(valid.run, caught).suspicious and not hidden_gap(valid.run, able).suspicious
 
 
-def test_the_audit_knows_the_expert_again(claimed: list[TrialKey], stolen: Run) -> None:
+def test_the_audit_knows_the_expert_again(
+    claimed: list[TrialKey], stolen: Run, tmp_path: Path
+) -> None:
     """An honest baseline, which moves and fails, is not taken for one."""
     world, expert = SapienWorld(render=False), Oracle()
     rehearsed = {key: expert_actions(world, expert, key) for key in claimed[:1]}
@@ -116,6 +118,10 @@ def test_the_audit_knows_the_expert_again(claimed: list[TrialKey], stolen: Run) 
     noise = np.random.default_rng(0)
     shaken = {k: t + noise.normal(0, 0.002, t.shape).astype(np.float32) for k, t in traces.items()}
     assert expert_likeness(shaken, lambda key: rehearsed[key]).suspicious
+    shy = run(tmp_path / "shy", claimed[:1], Shy)
+    assert all(record.success for record in shy.records.values())
+    detour = {key: read_actions(action_path(shy.folder, key))[0] for key in claimed[:1]}
+    assert not expert_likeness(detour, lambda key: rehearsed[key]).suspicious, "hidden scenes do"
     walk = {key: expert_actions(world, Random(), key) for key in claimed[:1]}
     assert not expert_likeness(walk, lambda key: rehearsed[key]).suspicious
 

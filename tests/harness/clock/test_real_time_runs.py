@@ -15,7 +15,7 @@ from msgspec import structs
 from robospa.harness.clock.policy_clock import PolicyClock, parse_latency, parse_switching
 from robospa.harness.clock.real_time import ENTRY
 from robospa.harness.running import evaluate
-from robospa.harness.running.evaluate import make_manifest
+from robospa.harness.running.evaluate import about_machine, make_manifest
 from robospa.harness.running.policy_probe import ProbedPolicy, check_clock, probe_policies
 from robospa.harness.running.record_store import RecordWriter
 from robospa.harness.running.request import make_request
@@ -205,15 +205,13 @@ def test_tables_and_lint_say_that_it_is_real_time_and_rank_it_never(tmp_path: Pa
 
 def test_no_bundle_is_made_of_it(tmp_path: Path) -> None:
     run = timed(tmp_path / "a", "200ms", 5).manifest
-    versions = dict.fromkeys(("robospa", "python", "numpy", "sapien"), "1")
     settings = structs.replace(
         run.settings,
         **{name: ("x",) for name in ("embodiment", "mode", "split")},
         policy=PolicySettings({"name": "x", "action": "joint"}),
         world=WorldSettings("x"),
     )
-    about = structs.replace(run.about, versions=versions)
-    made = structs.replace(run, suite="x", settings=settings, about=about)
+    made = structs.replace(run, suite="x", settings=settings, about=about_machine({}))
     unused = lambda *_: ()  # noqa: E731
     reference = Reference(
         unused, unused, unused, "x", suite="x", robots=("x",), modes=("x",), splits=("x",)
