@@ -144,7 +144,6 @@ def _at(values: Sequence[T], place: int) -> T | None:
 
 
 def _possible(percent: float, parts: int, printed: bool) -> bool:
-    """Whether some whole number out of `parts` gives `percent`."""
     near = round(percent * parts / 100)
     values = (100 * n / parts for n in (near - 1, near, near + 1))
     if not printed:
@@ -222,7 +221,6 @@ def run_rows(
 def _lint_listing(
     run: Run, name: str, variants: Collection[tuple[str, int]] | None
 ) -> Iterator[Finding]:
-    """The trials that are present against those that are listed."""
     listed = Counter(run.keys)
     twice = [key.slug for key, count in listed.items() if count > 1]
     if twice:
@@ -253,7 +251,6 @@ def _lint_listing(
 
 
 def _lint_limits(run: Run, name: str) -> Iterator[Finding]:
-    """Departures of a run from the benchmark's rules."""
     for one in departures(run.manifest):
         if one.name in LINTED:
             text = f"{one}: not the benchmark's numbers"
@@ -268,7 +265,6 @@ def _lint_limits(run: Run, name: str) -> Iterator[Finding]:
 
 
 def _lint_actions(run: Run, name: str) -> Iterator[Finding]:
-    """Actions and instructions that did not arrive as they were sent, if that is no exception."""
     results = [record for record in run.records.values() if finished(record)]
     for one in problem_counts(results):
         if one.often:
@@ -280,7 +276,6 @@ def _lint_actions(run: Run, name: str) -> Iterator[Finding]:
 
 
 def _lint_files(run: Run, name: str) -> Iterator[Finding]:
-    """Torn and repeated records."""
     for file in run.torn:
         text = f"the last line of {file} was torn off: its trial has to be run again"
         yield Finding("torn-line", "warning", name, text)
@@ -290,7 +285,6 @@ def _lint_files(run: Run, name: str) -> Iterator[Finding]:
 
 
 def _lint_variant(where: str, records: Sequence[TrialRecord]) -> Iterator[Finding]:
-    """The trials of one variant."""
     for rule, what, names in (
         ("mixed-totals", "number of subtasks", {str(r.total) for r in records}),
         ("mixed-categories", "category", {r.category for r in records}),

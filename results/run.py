@@ -61,7 +61,6 @@ class LoadedRun(Run):
         return frame.astype(kinds)
 
     def _repr_html_(self) -> str:
-        """What a notebook shows."""
         return run_html(self)
 
 

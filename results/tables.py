@@ -77,7 +77,6 @@ class Table:
         return to_text(self)
 
     def _repr_html_(self) -> str:
-        """What a notebook shows."""
         return html_fragment(self)
 
     @property

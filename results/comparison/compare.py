@@ -106,7 +106,6 @@ class RunComparison:
         return difference_table(self, self.cells if variants else self.groups, title)
 
     def _repr_html_(self) -> str:
-        """What a notebook shows."""
         said = "<br>".join(escape(text) for text in (self.banner, *self.notes) if text)
         return f"<p>{said}</p>\n{self.table()._repr_html_()}"
 
@@ -178,7 +177,6 @@ def over_levels(
 
 
 def _estimate(pairs: Sequence[VariantPair], weights: Sequence[float], method: str) -> Estimate:
-    """Interval of the weighted difference: of the pairs, or of two unrelated sums."""
     gaps = [c.gap for c in pairs if c.gap is not None]
     if len(gaps) < len(pairs):
         a = interval_of([c.first for c in pairs], weights, method)

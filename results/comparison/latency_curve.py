@@ -138,7 +138,6 @@ def _shared_seeds(models: Sequence[ModelResults], variant: Variant) -> list[int]
 def _outcomes(
     models: Sequence[ModelResults], variant: Variant, seeds: Sequence[int]
 ) -> NDArray[np.bool_]:
-    """Success (latencies, seeds)."""
     return np.array([[m.trials[variant][seed].success for seed in seeds] for m in models])
 
 
@@ -183,7 +182,6 @@ def _numbers(records: Sequence[TrialRecord], name: str) -> list[float]:
 
 
 def _share(records: Sequence[TrialRecord], name: str) -> float:
-    """Share of all periods."""
     total = sum(_numbers(records, "periods"))
     return sum(_numbers(records, name)) / total if total else 0.0
 

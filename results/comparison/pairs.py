@@ -71,7 +71,6 @@ def _paired(
 
 
 def _gap(pairs: Sequence[tuple[TrialRecord, TrialRecord]], metric: str, one: Sample) -> Sample:
-    """Sample of the pairs' differences, on the scale of the metric."""
     if metric == "ps":
         top = max(len(one.counts) - 1, 1)
         gaps = [a.done * top // a.total - b.done * top // b.total for a, b in pairs]
@@ -191,7 +190,6 @@ def worst_and_best(first: ModelResults, second: ModelResults, metric: str) -> li
 def _bounds(
     model: ModelResults, variants: Sequence[Variant], weights: Sequence[float], metric: str
 ) -> tuple[float, float]:
-    """The mean if every missing trial had achieved nothing, and if every one everything."""
     spans = [model.scores.cells[v].bounds(metric) or (0.0, 1.0) for v in variants]
     low = sum(w * low for w, (low, _) in zip(weights, spans, strict=True))
     return low, sum(w * high for w, (_, high) in zip(weights, spans, strict=True))

@@ -240,7 +240,6 @@ class FailedTrials(list[FailedTrial]):
     __repr__ = __str__
 
     def _repr_html_(self) -> str:
-        """What a notebook shows."""
         rows = tuple(
             TableRow(f.trial, (TableCell(f.type), TableCell(f.evidence))) for f in self[:SHOWN]
         )

@@ -29,16 +29,11 @@ if TYPE_CHECKING:
 
 
 def chance_levels(scores: Scores) -> dict[tuple[str, int], float]:
-    """Success rate of guessing among the candidates, per spatial category and level [%].
-
-    A cell's ONTA is its success rate rescaled so that chance is 0, which gives chance back.
-    """
+    """Success rate of guessing among the candidates, per spatial category and level [%]."""
     found: dict[tuple[str, int], list[float]] = {}
     for cell in scores.cells.values():
-        sr, onta = cell.values.get("sr"), cell.values.get("onta")
-        if sr is not None and onta is not None and onta.value < 1:
-            chance = (sr.value - onta.value) / (1 - onta.value)
-            found.setdefault((cell.category, cell.level), []).append(100 * chance)
+        if cell.candidates > 1:
+            found.setdefault((cell.category, cell.level), []).append(100 / cell.candidates)
     return {place: sum(v) / len(v) for place, v in found.items()}
 
 
@@ -222,7 +217,6 @@ def _heat_number(axis: Axes, line: int, column: int, value: float) -> None:
 
 
 def _categories(axis: Axes, of_line: list[str]) -> None:
-    """A line between categories and their codes at the right."""
     start = 0
     for line in range(1, len(of_line) + 1):
         if line == len(of_line) or of_line[line] != of_line[start]:

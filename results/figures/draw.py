@@ -72,7 +72,6 @@ def draw(
 def _own_figures(
     series: Series, number: int, mapped: bool, folder: Path, formats: Sequence[str]
 ) -> list[DrawnFigure]:
-    """The figures that show one series only."""
     made = []
     ending = f"-{number}" if number else ""
     of = f": {series.name}" if number else ""

@@ -250,7 +250,6 @@ def _basic(data: Published) -> Iterator[Check]:
 
 
 def _counts(data: Published) -> Iterator[Check]:
-    """Numbers of the descriptive tables that follow from others."""
     for model, row in data.models.items():
         hours = rounded(row.gpus * row.hours)
         yield Check(

@@ -204,7 +204,6 @@ def _summary_rows(metric: str) -> list[tuple[str, str]]:
 def _best(
     columns: Sequence[Column], metric: str, rows: Sequence[str], levels: Sequence[int], mark: str
 ) -> dict[tuple[str, int], set[str]]:
-    """Titles of the columns to mark, by row and level."""
     if mark not in MARKS:
         raise ValueError(f"no mark is called {mark!r}; there are {', '.join(MARKS)}")
     places = [(row, level) for row in rows for level in levels]

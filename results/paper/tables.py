@@ -69,7 +69,6 @@ def interval_table(columns: Sequence[Column]) -> Table:
 
 
 def _open_notes(columns: Sequence[Column], level: int) -> list[str]:
-    """Notes on missing tasks and trials of `columns` at `level`."""
     notes: list[str] = []
     for column in columns:
         notes += not_run_note(column, [level])
@@ -183,7 +182,6 @@ def basic_table(columns: Sequence[Column] = (), metrics: Sequence[str] = ("sr",)
 
 
 def _grounding(run: Column, metric: str, category: str, level: int, sets: int) -> TableCell:
-    """A run's mean over the `sets` of a basic category at `level`."""
     part = run.scores.categories.get((category, level))
     found = None if part is None else part.values.get(metric)
     if part is None or found is None:

@@ -19,6 +19,7 @@ from robospa.results.scoring.repeats import policy_error_lines, repeat_lines
 from robospa.results.scoring.scores import (
     IDLE,
     AverageScore,
+    Range,
     Scores,
     VariantScore,
     level_name,
@@ -34,12 +35,17 @@ def missing_lines(scores: Scores) -> list[str]:
     """One sentence for every variant that lacks trials."""
     return [
         f"{cell.task} L{cell.level}: {cell.missing} of {cell.listed} trials are missing; if all "
-        f"had failed SR would be {100 * cell.worst:.1f}, if all had succeeded {100 * cell.best:.1f}"
-        + (f", SR@1 {100 * ends[0]:.1f} or {100 * ends[1]:.1f}" if ends else "")
+        f"had failed SR would be {sr[0]:.1f} and SR@1 {first[0]:.1f}, if all had succeeded "
+        f"{sr[1]:.1f} and {first[1]:.1f}"
         for cell in scores.cells.values()
         if cell.missing
-        for ends in [cell.bounds("sr1")]
+        for sr, first in [[_percents(cell.bounds(metric)) for metric in ("sr", "sr1")]]
     ]
+
+
+def _percents(ends: Range | None) -> Range:
+    low, high = ends or (0.0, 1.0)
+    return 100 * low, 100 * high
 
 
 def loss_lines(run: Run, most: int = 5) -> list[str]:
@@ -155,7 +161,6 @@ def _table_row(row: ScoreRow) -> TableRow:
 
 
 def _level_cell(part: VariantScore | AverageScore | None) -> TableCell:
-    """A success rate, marked if trials are missing below it."""
     if part is None:
         return TableCell()
     return TableCell(short(part.values.get("sr")), sign=MISSING * bool(part.missing))
@@ -179,7 +184,6 @@ def print_scores(run: Run, scores: Scores) -> None:
 
 
 def _ends_line(run: Run) -> str:
-    """Number of trials by end, those without a result included."""
     counts = ", ".join(f"{count} {name}" for name, count in ends(run).items())
     note = f" ({MISSING} lacks trials)" if run.missing else ""
     return f"{len(run.keys)} trials: {counts}{note}"

@@ -51,7 +51,7 @@ def with_repeated_failed(
 
 def worst_case(run: Run, ci: str = METHODS[0]) -> Scores:
     """The scores of `run` if every repeated trial had failed. What missing trials leave open is in
-    `VariantScore.worst` and `AverageScore.worst`, as always."""
+    their `bounds`, as always."""
     return score(run.keys, with_repeated_failed(run.records), run.manifest.categories, ci)
 
 

@@ -91,16 +91,6 @@ class VariantScore:
         """Listed trials without a result."""
         return self.listed - self.trials
 
-    @property
-    def worst(self) -> float:
-        """Success rate if every missing trial were a failure."""
-        return self.successes / self.listed if self.listed else 0.0
-
-    @property
-    def best(self) -> float:
-        """Success rate if every missing trial were a success."""
-        return (self.successes + self.missing) / self.listed if self.listed else 1.0
-
     def bounds(self, metric: str) -> Range | None:
         """`metric` if every missing trial had achieved nothing, and if every one all; None where
         it does not apply or cannot be known."""
@@ -121,16 +111,11 @@ class VariantScore:
 
 @dataclass(frozen=True)
 class AverageScore:
-    """A mean over tasks or categories, by metric; None where something below has no value.
-
-    `worst` and `best` bound the mean success rate over all that the missing trials could be.
-    """
+    """A mean over tasks or categories, by metric; None where something below has no value."""
 
     trials: int
     missing: int
     values: Mapping[str, Estimate | None]
-    worst: float
-    best: float
     samples: Mapping[str, Weighted] = field(default_factory=dict)
     """By metric the samples of all variants below with their weights, where all are known."""
     ranges: Mapping[str, Range] = field(default_factory=dict)
@@ -314,8 +299,6 @@ def _join(parts: Sequence[VariantScore | AverageScore], ci: str = METHODS[0]) ->
         trials=sum(p.trials for p in parts),
         missing=sum(p.missing for p in parts),
         values=values,
-        worst=float(np.mean([p.worst for p in parts])),
-        best=float(np.mean([p.best for p in parts])),
         samples=samples,
         ranges=ranges,
     )

@@ -242,7 +242,6 @@ def _percentile(value: float, draws: NDArray[np.float64], method: str) -> Estima
 
 
 def _root(function: Callable[[float], float], low: float, high: float) -> float:
-    """The root of a falling `function` between `low` and `high`."""
     for _ in range(60):
         middle = (low + high) / 2
         low, high = (middle, high) if function(middle) > 0 else (low, middle)

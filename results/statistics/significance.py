@@ -118,7 +118,6 @@ def p_of_difference(first: Sample | Estimate, second: Sample | Estimate) -> floa
 
 
 def _both_rates(first: Sample, second: Sample) -> bool:
-    """Whether the two are success rates on the same scale and few enough for an exact test."""
     same = (first.scale, first.shift) == (second.scale, second.shift)
     small = max(first.trials, second.trials) <= LARGEST
     return first.binary and second.binary and same and small

@@ -240,7 +240,6 @@ def _content(name: str) -> object:
 
 
 def _read(schema: type[T], name: str) -> T:
-    """The file `name` as a `schema`."""
     return read(schema, _content(name), name)
 
 

@@ -179,8 +179,8 @@ def test_missing_trials_are_shown_with_the_worst_and_the_best_case(tmp_path: Pat
     run = make_run(tmp_path / "run", RECORDS, lost=4)
     folder = write_report(make_report(run), tmp_path / "report")
     sentence = (
-        "Pick_It L1: 4 of 8 trials are missing; if all had failed SR would be 37.5, "
-        "if all had succeeded 87.5"
+        "Pick_It L1: 4 of 8 trials are missing; if all had failed SR would be 37.5 and SR@1 37.5, "
+        "if all had succeeded 87.5 and 87.5"
     )
     assert sentence in (folder / "report.html").read_text()
     data = json.loads((folder / "report.json").read_text())["runs"][0]

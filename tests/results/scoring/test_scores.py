@@ -104,7 +104,7 @@ def test_a_lost_trial_is_missing_and_bounds_the_rate() -> None:
     cell = scores([trial("A", "GAC", 0, 1), lost]).cells["A", 1]
     assert (cell.listed, cell.trials, cell.missing) == (2, 1, 1)
     assert values(cell, "sr") == 1.0
-    assert (cell.worst, cell.best) == (0.5, 1.0)
+    assert cell.bounds("sr") == (0.5, 1.0)
 
 
 def test_a_variant_without_a_result_leaves_the_averages_open() -> None:
@@ -112,7 +112,7 @@ def test_a_variant_without_a_result_leaves_the_averages_open() -> None:
     assert found.cells["Z", 1].values == dict.fromkeys(("sr", "sr1", "onta", "onta1"))
     assert values(found.categories["GAC", 1], "sr") is None
     assert values(found.overall[1], "onta") is None
-    assert (found.overall[1].worst, found.overall[1].best) == (0.5, 1.0)
+    assert found.overall[1].bounds("sr") == (0.5, 1.0)
     assert found.overall[1].missing == 1
 
 
@@ -201,7 +201,7 @@ def test_the_terminal_marks_incomplete_variants_and_says_why(
     text = capsys.readouterr().out
     assert "83.3†" in text and "50.0†" in text
     assert "16 trials: 8 success, 4 step limit, 2 missing, 2 not run († lacks trials)" in text
-    assert "if all had failed SR would be 62.5, if all had succeeded 87.5" in text
+    assert "SR would be 62.5 and SR@1 62.5, if all had succeeded 87.5 and 87.5" in text
     assert f"missing 2: {WHY}" in text
     assert "missing 2: not run yet" in text
 
