@@ -16,7 +16,7 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 from robospa.baselines.oracle import Oracle
@@ -25,7 +25,7 @@ from robospa.harness.skills.pick import pick
 from robospa.harness.skills.workspace import Steps, Workspace, is_wall, moved_back, wall_front
 from robospa.tasks.catalog import LEVELS, build_scene, task
 from robospa.tasks.objects import object_model
-from robospa.tasks.plan import Home, Pick, Place, Press, Wait
+from robospa.tasks.plan import Hit, Home, Pick, Place, Press, Skill, Wait
 from robospa.tasks.scene import Scene, SceneObject
 from robospa.tasks.snapshot import Snapshot
 
@@ -39,11 +39,6 @@ TRAINING_SEEDS = range(1_000_000, 1_000_030)
 """Of each level: what `commonest` has seen."""
 CELL = 0.05
 """Places [m] that round to the same multiple of this are one place; nearer ones are taken."""
-
-Calls = tuple[Any, ...]
-"""Calls of `robospa.tasks.plan`, or a `TryOut`."""
-Planner = Callable[[Scene, Workspace], Sequence[Any]]
-"""Calls from a scene without facts, once all of it has appeared."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +57,10 @@ class TryOut:
             ws.add(grasp.arm, out)
         ws.held[grasp.arm] = None
         yield from ws.flush()
+
+
+Planner = Callable[[Scene, Workspace], Sequence[object]]
+"""tuple[Skill, ...] from a scene without facts, once all of it has appeared."""
 
 
 class BlindExpert(Expert):
@@ -92,12 +91,12 @@ class BlindExpert(Expert):
             raise
 
 
-def tries_all(scene: Scene, ws: Workspace) -> Sequence[Any]:
+def tries_all(scene: Scene, ws: Workspace) -> list[TryOut]:
     """Everything loose that a gripper can close around, one after the other."""
     return [TryOut(item.name) for item in _nearest_first(scene, ws) if not item.fixed] * ROUNDS
 
 
-def presses_all(scene: Scene, ws: Workspace) -> Sequence[Any]:
+def presses_all(scene: Scene, ws: Workspace) -> list[Press]:
     """Everything fixed that a gripper could close around, twice each."""
     return [Press(o.name) for o in _nearest_first(scene, ws) if o.fixed for _ in "12"] * ROUNDS
 
@@ -126,16 +125,16 @@ class Habit:
 
     kind: tuple[str, bool]
     rank: int
-    calls: Calls
-    sort: Calls
+    calls: tuple[Skill, ...]
+    sort: tuple[Skill, ...]
 
 
-def commonest(scene: Scene, ws: Workspace) -> Sequence[Any]:
+def commonest(scene: Scene, ws: Workspace) -> list[Skill]:
     """With as many things of each asset as usual what is commonest for their kind, and possible."""
     seen = sorted(o.asset for o in scene.objects)
     known = _training(scene.task)
     alike = [habits for assets, habits in known if assets == seen] or [h for _, h in known]
-    sorts: dict[tuple[str, bool], Counter[Calls]] = defaultdict(Counter)
+    sorts: dict[tuple[str, bool], Counter[tuple[Skill, ...]]] = defaultdict(Counter)
     numbers: dict[str, Counter[int]] = defaultdict(Counter)
     example = {habit.sort: habit.calls for habits in alike for habit in habits}
     ranks: dict[str, list[int]] = defaultdict(list)
@@ -149,7 +148,7 @@ def commonest(scene: Scene, ws: Workspace) -> Sequence[Any]:
     things.sort(key=lambda o: sum(ranks[o.asset]) / len(ranks[o.asset]))
     left = {asset: count.most_common(1)[0][0] for asset, count in numbers.items()}
     done: list[SceneObject] = []
-    plan: list[Any] = []
+    plan: list[Skill] = []
     taken: list[tuple[float, float]] = []
     for item in things:
         kind = (item.asset, ws.pose(item.name).position[0] > 0)
@@ -179,14 +178,15 @@ def _training(name: str) -> list[tuple[list[str], list[Habit]]]:
 
 def _habits(scene: Scene) -> list[Habit]:
     """The plan of a training scene, thing by thing."""
-    by_thing: dict[str, list[Any]] = {}
+    by_thing: dict[str, list[Skill]] = {}
     for call in task(scene.task).plan(scene):
         if not isinstance(call, Wait | Home):
-            by_thing.setdefault(_actor(call), []).append(call)
+            actor = call.tool if isinstance(call, Hit) else call.object
+            by_thing.setdefault(actor, []).append(call)
     return [_habit(scene, rank, *entry) for rank, entry in enumerate(by_thing.items())]
 
 
-def _habit(scene: Scene, rank: int, name: str, calls: Sequence[Any]) -> Habit:
+def _habit(scene: Scene, rank: int, name: str, calls: Sequence[Skill]) -> Habit:
     item = scene.object(name)
     base = scene.table_top - object_model(item.asset, item.params).bottom
     names = {o.name: o.asset for o in scene.objects} | {name: ""}
@@ -195,18 +195,14 @@ def _habit(scene: Scene, rank: int, name: str, calls: Sequence[Any]) -> Habit:
     return Habit(kind, rank, plain, tuple(_rounded(call) for call in plain))
 
 
-def _actor(call: Any) -> str:
-    return str(call.tool if hasattr(call, "tool") else call.object)
-
-
-def _named(call: Any, name: Callable[[str], str], rise: float) -> Any:
+def _named(call: Skill, name: Callable[[str], str], rise: float) -> Skill:
     """`call` with other names of objects, and places on the table `rise` [m] higher."""
     changes: dict[str, Any] = {
         key: name(value)
         for key in ("object", "tool", "on", "into")
         if isinstance(value := getattr(call, key, None), str)
     }
-    if hasattr(call, "targets"):
+    if isinstance(call, Hit):
         changes["targets"] = tuple(name(target) for target in call.targets)
     if isinstance(call, Place) and call.on is None:
         x, y, z = call.position
@@ -214,7 +210,7 @@ def _named(call: Any, name: Callable[[str], str], rise: float) -> Any:
     return replace(call, **changes)
 
 
-def _rounded(call: Any) -> Any:
+def _rounded(call: Skill) -> Skill:
     """What is the same place: equal to `CELL` in the plane, and to 1 cm above the table."""
     if not isinstance(call, Place):
         return call
@@ -223,8 +219,12 @@ def _rounded(call: Any) -> Any:
 
 
 def _bound(
-    calls: Calls, item: SceneObject, scene: Scene, ws: Workspace, done: Sequence[SceneObject]
-) -> Calls:
+    calls: tuple[Skill, ...],
+    item: SceneObject,
+    scene: Scene,
+    ws: Workspace,
+    done: Sequence[SceneObject],
+) -> tuple[Skill, ...]:
     """`calls` about `item`: on or into the last thing handled if it is alike, else the nearest of
     that asset that these calls do not have yet; () where there is none."""
     here, used = ws.pose(item.name).position, {item.name}
@@ -248,9 +248,9 @@ def _bound(
 
 
 class Blind(Oracle):
-    """One of the blind policies."""
+    """The blind policy `name`; `salt` is the secret of hidden scenes."""
 
-    def __init__(self, name: str, planner: Planner, salt: str) -> None:
+    def __init__(self, name: str, planner: Planner, salt: str = "") -> None:
         super().__init__(salt)
         self.spec = replace(Oracle.spec, name=name)
         self._planner = planner
@@ -259,16 +259,6 @@ class Blind(Oracle):
         return BlindExpert(scene, snapshot, self._planner)
 
 
-def create_tries_all(salt: str = "") -> Blind:
-    """A new policy, one per connection; `salt` is the secret of hidden scenes."""
-    return Blind("tries-all", tries_all, salt)
-
-
-def create_presses_all(salt: str = "") -> Blind:
-    """A new policy, one per connection; `salt` is the secret of hidden scenes."""
-    return Blind("presses-all", presses_all, salt)
-
-
-def create_commonest(salt: str = "") -> Blind:
-    """A new policy, one per connection; `salt` is the secret of hidden scenes."""
-    return Blind("commonest", commonest, salt)
+create_tries_all = partial(Blind, "tries-all", tries_all)
+create_presses_all = partial(Blind, "presses-all", presses_all)
+create_commonest = partial(Blind, "commonest", commonest)

@@ -12,6 +12,7 @@ Like the oracle it knows the scene and says so in its spec.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,9 +21,8 @@ from robospa.action_space import quantize
 from robospa.baselines.oracle import Oracle
 from robospa.harness.clock.policy_clock import action_steps, rate_of
 from robospa.harness.robots import embodiment
-from robospa.harness.skills import Expert
 from robospa.observation import Observation
-from robospa.protocol.policy import PolicySpec, TrialInfo
+from robospa.protocol.policy import TrialInfo
 from robospa.tasks.snapshot import Snapshot, snapshot_from_json
 
 Actions = NDArray[np.float32]
@@ -51,17 +51,8 @@ class Reactive(Oracle):
         super().__init__(salt)
         self.chunk, self.feedback = chunk, feedback
         self.period = 1.0 / rate_of(action_steps(rate))
-        self.spec = PolicySpec(
-            name="reactive" if feedback else "reactive:open-loop",
-            cameras=(),
-            state="commanded",
-            action="joint",
-            horizon=chunk,
-            seeded=True,
-            privileged=True,
-            needs_trial_key=True,
-            checkpoint="no weights",
-        )
+        name = "reactive" if feedback else "reactive:open-loop"
+        self.spec = replace(Oracle.spec, name=name, horizon=chunk)
         self._stops: list[Actions] = []
         self._last: Actions | None = None
         self._arrived: float | None = None
@@ -78,7 +69,7 @@ class Reactive(Oracle):
         robot = embodiment(self._scene.embodiment)
         snapshot = snapshot_from_json(observation["privileged"], robot.grippers)
         if self._expert is None:
-            self._expert = Expert(self._scene, snapshot)
+            self._expert = self._planned(self._scene, snapshot)
         commanded = np.asarray(observation["state"], np.float32)
         if self._last is None:
             self._last = commanded
