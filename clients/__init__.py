@@ -15,10 +15,15 @@ from collections.abc import Mapping
 from typing import Any
 from urllib.parse import urlsplit
 
-from robospa.clients.detect import explain_error
-from robospa.clients.dialect import TLS_PORT, ConnectionParams, Dialect, Endpoint, dialects
-from robospa.protocol.client import Identity, RemotePolicy, WireClient, expecting
-from robospa.protocol.codec import DEFAULT_LIMITS, Limits
+from robospa.clients.dialect import (
+    TLS_PORT,
+    ConnectionParams,
+    Dialect,
+    Endpoint,
+    dialects,
+    explain_error,
+)
+from robospa.protocol.client import Identity, RemotePolicy, WireClient
 from robospa.protocol.errors import (
     HandshakeError,
     ServerError,
@@ -27,7 +32,6 @@ from robospa.protocol.errors import (
     without_secrets,
 )
 from robospa.protocol.options import read_options, url_options
-from robospa.protocol.policy import PolicySpec
 from robospa.protocol.transport import Timeouts
 
 __all__ = ["check_options", "connect", "find_endpoint"]
@@ -90,9 +94,7 @@ def connect(
     timeouts: Timeouts | None = None,
     *,
     options: Mapping[str, object] | None = None,
-    limits: Limits = DEFAULT_LIMITS,
     ssl: ssl_module.SSLContext | None = None,
-    expect: PolicySpec | None = None,
     identity: Identity | None = None,
 ) -> RemotePolicy:
     """A `Policy` behind a server: `spec`, `reset`, `infer` and `close`.
@@ -106,20 +108,18 @@ def connect(
         token: Sent to the server if it asks for one.
         timeouts: Limits of each kind of answer [s].
         options: Options of the dialect; those in the URL win.
-        limits: Sizes that a message may have.
         ssl: Context for `wss://` and `https://`.
-        expect: The spec that the server must have.
         identity: Who the server must be; by default it must stay who it is at the first connection.
 
     Raises:
         ValueError: The URL or an option is impossible.
-        SpecMismatch: The server has another spec than `expect`, or is another one.
+        SpecMismatch: The server is another one than `identity`.
         WireError: No server answers there, or not as its dialect requires; all such errors are in
             `robospa.protocol.errors`.
     """
     endpoint, chosen = _prepare(url, options)
-    params = ConnectionParams(endpoint, timeouts or Timeouts(), limits, token, ssl)
-    known = expect is not None or identity is not None
+    params = ConnectionParams(endpoint, timeouts or Timeouts(), token=token, ssl=ssl)
+    known = identity is not None
 
     def opened() -> WireClient:
         nonlocal known
@@ -137,4 +137,4 @@ def connect(
                 raise
             raise explain_error(error, params) from error.__cause__
 
-    return expecting(RemotePolicy(url, opened, params.timeouts, identity), expect)
+    return RemotePolicy(url, opened, params.timeouts, identity)

@@ -8,15 +8,16 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import NDArray
 
 from robospa.action_space import ActionSpace
 from robospa.protocol.errors import PolicyAnswerError, printable
-from robospa.protocol.options import option
-from robospa.protocol.policy import MAX_HORIZON
+from robospa.protocol.options import check_ranges, option
+from robospa.protocol.policy import MAX_HORIZON, PolicySpec
 from robospa.trial import REFERENCE
 
 NAMED = 160
@@ -89,24 +90,9 @@ def invert_grippers(chunk: object, space: ActionSpace) -> Any:
     return actions
 
 
-HORIZON = "actions in a chunk, at most; none for as many as come"
-"""Help of the option `horizon`, which every dialect has."""
-
-
-def check_horizon(horizon: int | None, execute: int | None) -> None:
-    """ValueError unless 1 <= execute <= horizon <= MAX_HORIZON; None for no limit."""
-    most = MAX_HORIZON if horizon is None else horizon
-    if not 1 <= (most if execute is None else execute) <= most <= MAX_HORIZON:
-        raise ValueError(
-            f"options horizon and execute: 1 <= execute <= horizon <= {MAX_HORIZON} is needed"
-        )
-
-
 PIECES = re.compile(r"[^\W\d_]+|\d+|(?:[^\w\s]|_)+")
 END_TOKENS = 2
 """Those that mark the beginning and the end of a text."""
-BUDGET = "tokens of an instruction that the model reads, as X-VLA's 50 or pi0's 48; none for all"
-"""Help of the option `text_budget` where the server may run any model."""
 STATE_TOKENS = 50
 """What pi0.5's prompt has beside the instruction: fourteen numbers and the words around them."""
 
@@ -118,12 +104,6 @@ def least_tokens(text: str) -> int:
     into one token. What is over a budget by this count is cut off for certain.
     """
     return len(PIECES.findall(text)) + END_TOKENS
-
-
-def check_budget(budget: int | None) -> None:
-    """ValueError if `budget` cannot be one."""
-    if budget is not None and budget < 1:
-        raise ValueError(f"option text_budget={budget}: at least 1, or none for no limit")
 
 
 def budget_warning(budget: int | None, instructions: dict[str, str]) -> str | None:
@@ -140,16 +120,67 @@ def budget_warning(budget: int | None, instructions: dict[str, str]) -> str | No
     )
 
 
+Count = Annotated[int, Meta(ge=1)]
+Frequency = Annotated[float, Meta(gt=0, le=10_000)]
+"""[Hz]"""
+
+
 @dataclass(frozen=True)
 class RobotOption:
-    """The option that every dialect and every server of a learned model has."""
+    """The option that every dialect and every server of a learned model has. Numbers are within the
+    bounds of their annotations, or a ValueError says what is allowed."""
 
     embodiment: str = option(
         REFERENCE, "robot that the model was trained with: evaluations of another are refused"
     )
+
+    def __post_init__(self) -> None:
+        check_ranges(self)
 
     def columns(self, kind: str) -> int | None:
         """Columns of an action of this `kind`; None if only the trial says it, whose robot may have
         other joints."""
         known = kind != "joint" or self.embodiment == REFERENCE
         return ActionSpace(kind).width if known else None
+
+
+@dataclass(frozen=True)
+class ChunkOptions(RobotOption):
+    """How many actions a chunk has, and how many of them are executed."""
+
+    horizon: Annotated[int, Meta(ge=1, le=MAX_HORIZON)] | None = option(
+        None, "actions in a chunk, at most; none for as many as come"
+    )
+    execute: Count | None = option(None, "actions executed before the next query; none for all")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.horizon and self.execute and self.execute > self.horizon:
+            raise ValueError(f"option execute={self.execute}: at most the horizon {self.horizon}")
+
+    def spec_of(self, name: str, **more: Any) -> PolicySpec:
+        """The spec of a server that says nothing of itself; `more` are other fields of it."""
+        return PolicySpec(
+            name,
+            horizon=self.horizon,
+            execute=self.execute,
+            embodiments=(self.embodiment,),
+            **{"action_dim": ActionSpace().width, **more},
+        )
+
+
+@dataclass(frozen=True)
+class AnyModelOptions(ChunkOptions):
+    """Those of a server that may run any model, and does not say what that answers and reads."""
+
+    space: str = option("joint", "what the model answers", ("joint", "ee"))
+    state: str = option("commanded", "which joints to send", ("commanded", "measured"))
+    text_budget: Count | None = option(
+        None,
+        "tokens of an instruction that the model reads, as X-VLA's 50 or pi0's 48; none for all",
+    )
+
+    def spec_of(self, name: str, **more: Any) -> PolicySpec:
+        """The same, with the space, state and text of these options."""
+        known = {"action": self.space, "state": self.state, "text_budget": self.text_budget}
+        return super().spec_of(name, action_dim=self.columns(self.space), **known, **more)

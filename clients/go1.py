@@ -25,10 +25,8 @@ from typing import Any
 
 import numpy as np
 
-from robospa.action_space import ActionSpace
-from robospa.clients.chunks import HORIZON, RobotOption, check_horizon
-from robospa.clients.detect import Probe
-from robospa.clients.dialect import ConnectionParams, Dialect
+from robospa.clients.chunks import ChunkOptions, Frequency
+from robospa.clients.dialect import ConnectionParams, Dialect, Probe
 from robospa.clients.http import HttpSession, chunk_of, dumps
 from robospa.clients.model_policy import (
     Chunk,
@@ -42,11 +40,10 @@ from robospa.clients.model_policy import (
 )
 from robospa.observation import Observation
 from robospa.protocol.options import option
-from robospa.protocol.policy import PolicySpec
 
 
 @dataclass(frozen=True)
-class Go1Conventions(RobotOption):
+class Go1Conventions(ChunkOptions):
     """What neither the checkpoint nor GO-1's server says."""
 
     wrists: str = option(
@@ -54,15 +51,7 @@ class Go1Conventions(RobotOption):
         "`swapped` sends each wrist image under the other's name, as RoboTwin's client does",
         ("correct", "swapped"),
     )
-    ctrl_freq: float = option(30.0, "control frequency [Hz] given to the network")
-    horizon: int | None = option(None, HORIZON)
-    execute: int | None = option(None, "actions executed before the next query; none for all")
-
-    def __post_init__(self) -> None:
-        """ValueError for options that cannot be."""
-        if not 0 < self.ctrl_freq < 10_000:
-            raise ValueError(f"option ctrl_freq={self.ctrl_freq:g} is no frequency in Hz")
-        check_horizon(self.horizon, self.execute)
+    ctrl_freq: Frequency = option(30.0, "control frequency [Hz] given to the network")
 
     @property
     def cameras(self) -> dict[str, str]:
@@ -110,14 +99,7 @@ class Go1Session(HttpSession):
 
     def __init__(self, params: ConnectionParams, options: Go1ClientOptions) -> None:
         self._options = options
-        spec = PolicySpec(
-            name="go1",
-            state=options.state,
-            horizon=options.horizon,
-            execute=options.execute,
-            embodiments=(options.embodiment,),
-            action_dim=ActionSpace().width,
-        )
+        spec = options.spec_of("go1", state=options.state)
         warnings = (*WARNINGS, SWAPPED) if options.wrists == "swapped" else WARNINGS
         super().__init__(params, "go1", spec, options, warnings, ("HTTP 500", SILENT))
 
@@ -171,15 +153,8 @@ class Go1(ModelPolicy):
     def __init__(self, model: Any, options: Go1ServerOptions) -> None:
         super().__init__()
         self.model, self.options = model, options
-        self.spec = PolicySpec(
-            name="go1",
-            horizon=options.horizon,
-            execute=options.execute,
-            seeded=True,
-            embodiments=(options.embodiment,),
-            action_dim=ActionSpace().width,
-            checkpoint=describe_checkpoint(options.checkpoint),
-        )
+        checkpoint = describe_checkpoint(options.checkpoint)
+        self.spec = options.spec_of("go1", seeded=True, checkpoint=checkpoint)
 
     def predict(self, queries: Sequence[Query]) -> list[Chunk]:
         """One chunk (T, 14) of absolute joint targets per query."""

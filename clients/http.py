@@ -23,8 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.clients.chunks import as_chunk, plain_dtype
-from robospa.clients.detect import explain_error
-from robospa.clients.dialect import ConnectionParams, StatelessSession
+from robospa.clients.dialect import ConnectionParams, StatelessSession, explain_error
 from robospa.protocol.errors import (
     CallTimeout,
     ConnectFailed,

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from robospa.action_space import ActionSpace
-from robospa.clients.chunks import STATE_TOKENS, RobotOption, check_horizon
+from robospa.clients.chunks import STATE_TOKENS, Count, RobotOption
 from robospa.clients.model_policy import (
     Chunk,
     ModelMissing,
@@ -148,7 +148,7 @@ class LeRobotServerOptions(RobotOption):
 
     path: str = option("", "folder of the checkpoint (`pretrained_model`), or a hub name")
     device: str = option("cuda", "device of the model")
-    batch: int = option(8, "observations in one call of the model, at most")
+    batch: Count = option(8, "observations in one call of the model, at most")
     images: str | None = option(
         None, "camera:key pairs, as head:observation.images.image; none to go by the keys' names"
     )
@@ -185,16 +185,14 @@ class LeRobotServerOptions(RobotOption):
         "open", "joint: whether a gripper number says open or closed", ("open", "closed")
     )
     closed_above: float = option(0.7, "ee6d, closed: a number above this closes the gripper")
-    execute: int | None = option(
+    execute: Count | None = option(
         None, "actions executed before the next query; none: n_action_steps of the configuration"
     )
 
     def __post_init__(self) -> None:
-        """ValueError for options that cannot be."""
+        super().__post_init__()
         if not self.path:
             raise ValueError("option path is needed: the checkpoint's folder or hub name")
-        if self.batch < 1:
-            raise ValueError(f"option batch={self.batch}: at least 1")
         if self.state_prompt not in (None, 14, 32):
             raise ValueError(f"option state_prompt={self.state_prompt} is none of 14, 32")
         if self.space is not None and self.space not in SPACES:
@@ -234,7 +232,8 @@ class LeRobot(ModelPolicy):
             raise ValueError("a policy that wants earlier poses is not supported, only joints")
         horizon = getattr(config, "chunk_size", None) or config.n_action_steps
         execute = options.execute or min(int(config.n_action_steps), int(horizon))
-        check_horizon(int(horizon), execute)
+        if execute > horizon:
+            raise ValueError(f"option execute={execute}: at most the policy's horizon {horizon}")
         joint = self.encoding.space == "joint"
         self.spec = PolicySpec(
             name=f"lerobot:{config.type}",

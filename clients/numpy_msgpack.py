@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from robospa.clients.chunks import plain_dtype
 from robospa.clients.dialect import ConnectionParams
 from robospa.protocol.client import violation
-from robospa.protocol.codec import Limits
+from robospa.protocol.codec import Limits, Reader, decode
 from robospa.protocol.errors import DecodeError, EncodeError, TransportError, printable
 from robospa.protocol.transport import Transport
 
@@ -70,113 +70,52 @@ def pack(value: object, form: Form, limits: Limits) -> bytes:
     return data
 
 
-def check_structure(data: bytes, limits: Limits) -> None:
-    """Raises DecodeError unless everything that `data` announces is there and within `limits`.
+class _AnyForm(Reader):
+    """Reads arrays in all forms."""
 
-    msgpack itself allocates by announced counts: a few kilobytes of lists in lists would cost it
-    gigabytes.
-    """
-    position, announced, left = 0, 0, [1]
-    while left:
-        if left[-1] == 0:
-            left.pop()
-            continue
-        left[-1] -= 1
-        if position >= len(data):
-            raise DecodeError("the message ends in the middle of a value")
-        tag = data[position]
-        position += 1
-        if tag in _COUNTED or 0x80 <= tag < 0xA0:
-            width, each = _COUNTED.get(tag, (0, 1 if tag >= 0x90 else 2))
-            count = (
-                int.from_bytes(data[position : position + width], "big") if width else tag & 0x0F
-            )
-            position += width
-            count *= each
-            if count > len(data) - position:
-                raise DecodeError(f"{count} members announced, {len(data) - position} bytes left")
-            left.append(count)
-            announced += count
-            if announced > limits.items or len(left) > limits.depth + 1:
-                raise DecodeError(
-                    f"more than {limits.items} items, or nested deeper than {limits.depth} levels"
-                )
-        elif tag in _SIZED:
-            width = _SIZED[tag]
-            position += width + int.from_bytes(data[position : position + width], "big")
-        elif 0xA0 <= tag < 0xC0:
-            position += tag & 0x1F
-        else:
-            position += _FIXED.get(tag, 0)
-    if position > len(data):
-        raise DecodeError("the message ends in the middle of a value")
+    __slots__ = ()
+
+    def map(self, count: int, depth: int) -> object:
+        self.count(count, 2)
+        found: dict[object, object] = {}
+        for _ in range(count):
+            key = self.value(depth + 1)
+            if isinstance(key, list | dict | np.ndarray):
+                raise self.fail("a map key is no plain value")
+            found[key] = self.value(depth + 1)
+        return self.meant(found)
+
+    def meant(self, value: dict[object, object]) -> object:
+        """The array that a map stands for, or the map."""
+        if value.get(b"nd") is True:
+            if value.get(b"kind") not in (b"", None, ""):
+                raise DecodeError("an array of objects or structures is refused")
+            return _build(value.get(b"type"), value.get(b"shape"), value.get(b"data"))
+        if value.get(b"nd") is False:
+            return _build(value.get(b"type"), [], value.get(b"data")).item()
+        if value.get("__ndarray__") is True:
+            return _build(value.get("dtype"), value.get("shape"), value.get("data"))
+        if b"__ndarray__" in value:
+            return _build(value.get(b"dtype"), value.get(b"shape"), value.get(b"data"))
+        return value.get(b"data") if b"__npgeneric__" in value else value
 
 
-_COUNTED = {0xDC: (2, 1), 0xDD: (4, 1), 0xDE: (2, 2), 0xDF: (4, 2)}
-"""Tag of a list or map -> bytes of its count, values of each member."""
-_SIZED = {0xC4: 1, 0xC5: 2, 0xC6: 4, 0xD9: 1, 0xDA: 2, 0xDB: 4}
-_FIXED = {
-    **dict.fromkeys((0xCC, 0xD0), 1),
-    **dict.fromkeys((0xCD, 0xD1), 2),
-    **dict.fromkeys((0xCA, 0xCE, 0xD2), 4),
-    **dict.fromkeys((0xCB, 0xCF, 0xD3), 8),
-    **{0xD4 + power: 1 + 2**power for power in range(5)},
-}
-"""Tag -> bytes that follow."""
+class _Lenient(_AnyForm):
+    """An array of something else than plain numbers becomes a text that says so."""
+
+    __slots__ = ()
+
+    def meant(self, value: dict[object, object]) -> object:
+        dtype = value.get(b"dtype")
+        if b"__ndarray__" in value and plain_dtype(dtype) is None:
+            return f"array of {str(dtype)[:40]} {str(value.get(b'shape'))[:80]}"
+        return super().meant(value)
 
 
 def unpack(data: bytes, limits: Limits, *, lenient: bool = False) -> object:
-    """The value of one message; raises DecodeError.
-
-    `lenient`: an array of something else than plain numbers becomes a text that says so, for wires
-    whose own client reads it.
-    """
-    if len(data) > limits.message:
-        raise DecodeError(f"message of {len(data)} bytes is over the limit of {limits.message}")
-    check_structure(data, limits)
-    try:
-        return msgpack.unpackb(
-            data,
-            raw=False,
-            strict_map_key=False,
-            object_hook=_array_or_note if lenient else _array,
-            ext_hook=_refuse,
-            max_array_len=limits.items,
-            max_map_len=limits.items,
-            max_str_len=limits.text,
-            max_bin_len=limits.array,
-        )
-    except DecodeError:
-        raise
-    except Exception as error:  # msgpack's errors have no common base but this one
-        raise DecodeError(f"no readable msgpack: {error}") from error
-
-
-def _refuse(code: int, data: bytes) -> object:
-    raise DecodeError(f"extension type {code} is refused")
-
-
-def _array(value: dict[object, object]) -> object:
-    if value.get(b"nd") is True:
-        if value.get(b"kind") not in (b"", None, ""):
-            raise DecodeError("an array of objects or structures is refused")
-        return _build(value.get(b"type"), value.get(b"shape"), value.get(b"data"))
-    if value.get(b"nd") is False:
-        return _build(value.get(b"type"), [], value.get(b"data")).item()
-    if value.get("__ndarray__") is True:
-        return _build(value.get("dtype"), value.get("shape"), value.get("data"))
-    if b"__ndarray__" in value:
-        return _build(value.get(b"dtype"), value.get(b"shape"), value.get(b"data"))
-    if b"__npgeneric__" in value:
-        return value.get(b"data")
-    return value
-
-
-def _array_or_note(value: dict[object, object]) -> object:
-    dtype = value.get(b"dtype")
-    if b"__ndarray__" in value and plain_dtype(dtype) is None:
-        return f"array of {str(dtype)[:40]} {str(value.get(b'shape'))[:80]}"
-    return _array(value)
+    """The value of one message; raises DecodeError. `lenient`: for wires whose own client reads
+    arrays of anything, see `_Lenient`."""
+    return decode(data, limits, _Lenient if lenient else _AnyForm)
 
 
 def _build(dtype: object, shape: Any, data: object) -> NDArray[Any]:

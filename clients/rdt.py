@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from robospa.action_space import ActionSpace
-from robospa.clients.chunks import HORIZON, RobotOption, check_horizon
+from robospa.clients.chunks import ChunkOptions
 from robospa.clients.model_policy import (
     Chunk,
     ModelMissing,
@@ -39,7 +39,7 @@ from robospa.clients.model_policy import (
 )
 from robospa.observation import Observation
 from robospa.protocol.options import option
-from robospa.protocol.policy import PolicySpec, TrialInfo
+from robospa.protocol.policy import TrialInfo
 
 CACHED = 512
 """Embeddings kept in memory; about 0.3 MB each."""
@@ -139,7 +139,7 @@ ACTION_FACTORS = (11.8997, 13.9231)
 
 
 @dataclass(frozen=True)
-class RdtServerOptions(RobotOption):
+class RdtServerOptions(ChunkOptions):
     """How RDT is loaded and fed."""
 
     checkpoint: str = option("", "folder or file (.pt, .safetensors) with the fine-tuned weights")
@@ -162,12 +162,9 @@ class RdtServerOptions(RobotOption):
         ("cancelled", "none"),
     )
     jpeg: bool = option(True, "put images through JPEG, as in training")
-    horizon: int | None = option(None, HORIZON)
-    execute: int | None = option(None, "actions executed before the next query; none for all")
 
     def __post_init__(self) -> None:
-        """ValueError for options that cannot be."""
-        check_horizon(self.horizon, self.execute)
+        super().__post_init__()
         if not self.checkpoint:
             raise ValueError("option checkpoint is needed: the fine-tuned weights")
         if self.embeddings is None and self.t5 is None:
@@ -180,16 +177,8 @@ class Rdt(ModelPolicy):
     def __init__(self, model: Any, embeddings: Embeddings, options: RdtServerOptions) -> None:
         super().__init__()
         self.model, self.embeddings, self.options = model, embeddings, options
-        self.spec = PolicySpec(
-            name="rdt",
-            horizon=options.horizon,
-            execute=options.execute,
-            history=(-1,),
-            seeded=True,
-            embodiments=(options.embodiment,),
-            action_dim=ActionSpace().width,
-            checkpoint=describe_checkpoint(options.checkpoint),
-        )
+        checkpoint = describe_checkpoint(options.checkpoint)
+        self.spec = options.spec_of("rdt", history=(-1,), seeded=True, checkpoint=checkpoint)
 
     def begin(self, trial: TrialInfo) -> None:
         """Encode the trial's instruction now, so that no step waits for it."""

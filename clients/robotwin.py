@@ -16,21 +16,20 @@ import socket
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
+from msgspec import Meta
 
 from robospa.action_space import SIX_JOINT_ARMS, ActionSpace
-from robospa.clients.chunks import (
-    BUDGET,
-    HORIZON,
-    RobotOption,
-    as_chunk,
-    check_budget,
-    check_horizon,
-    refuse_unread,
+from robospa.clients.chunks import AnyModelOptions, as_chunk, refuse_unread
+from robospa.clients.dialect import (
+    ConnectionParams,
+    Dialect,
+    Probe,
+    StatelessSession,
+    explain_error,
 )
-from robospa.clients.detect import Probe, explain_error
-from robospa.clients.dialect import ConnectionParams, Dialect, StatelessSession
 from robospa.clients.http import array_of, has_unread_bytes
 from robospa.observation import Observation
 from robospa.protocol.errors import (
@@ -42,7 +41,7 @@ from robospa.protocol.errors import (
     printable,
 )
 from robospa.protocol.options import option
-from robospa.protocol.policy import PolicySpec, TrialInfo
+from robospa.protocol.policy import TrialInfo
 from robospa.protocol.transport import connect_until
 
 MAX_REASON = 240
@@ -178,7 +177,7 @@ WARNINGS = (
 
 
 @dataclass(frozen=True)
-class RoboTwinClientOptions(RobotOption):
+class RoboTwinClientOptions(AnyModelOptions):
     """What RoboTwin's TCP server does not say."""
 
     layout: str = option(
@@ -194,19 +193,12 @@ class RoboTwinClientOptions(RobotOption):
         ("ask", "update", "both"),
     )
     reset: str = option("reset_model", "method called at the start of a trial; none for no call")
-    space: str = option("joint", "what the model answers", ("joint", "ee"))
-    history: int = option(0, "earlier steps, one action apart, given to update_obs before asking")
-    state: str = option("commanded", "which joints to send", ("commanded", "measured"))
-    horizon: int | None = option(None, HORIZON)
-    execute: int | None = option(None, "actions executed before the next query; none for all")
-    text_budget: int | None = option(None, BUDGET)
+    history: Annotated[int, Meta(ge=0, le=64)] = option(
+        0, "earlier steps, one action apart, given to update_obs before asking"
+    )
 
     def __post_init__(self) -> None:
-        """ValueError for options that cannot be."""
-        check_horizon(self.horizon, self.execute)
-        check_budget(self.text_budget)
-        if not 0 <= self.history <= 64:
-            raise ValueError(f"option history={self.history} is not one of 0 to 64")
+        super().__post_init__()
         if not self.reset.isidentifier() or self.reset.startswith("_"):
             raise ValueError(f"option reset={self.reset!r} is no name of a model's method")
 
@@ -263,17 +255,7 @@ class RoboTwinSession(StatelessSession):
     def __init__(self, params: ConnectionParams, options: RoboTwinClientOptions) -> None:
         self._params, self._options, self._answered = params, options, False
         self._last_step, self._joints = -1, SIX_JOINT_ARMS
-        spec = PolicySpec(
-            name="robotwin",
-            state=options.state,
-            action=options.space,
-            horizon=options.horizon,
-            execute=options.execute,
-            history=tuple(range(-options.history, 0)),
-            embodiments=(options.embodiment,),
-            action_dim=options.columns(options.space),
-            text_budget=options.text_budget,
-        )
+        spec = options.spec_of("robotwin", history=tuple(range(-options.history, 0)))
         super().__init__("robotwin", spec, options, WARNINGS)
         self._connection = FramedJson(params)
 

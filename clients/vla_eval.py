@@ -23,22 +23,18 @@ import numpy as np
 
 from robospa.action_space import SIX_JOINT_ARMS, ActionSpace
 from robospa.clients.chunks import (
-    BUDGET,
-    HORIZON,
-    RobotOption,
+    AnyModelOptions,
+    Count,
     as_chunk,
-    check_budget,
-    check_horizon,
     invert_grippers,
     refuse_unread,
 )
-from robospa.clients.detect import Probe
-from robospa.clients.dialect import ConnectionParams, Dialect, StatelessSession
+from robospa.clients.dialect import ConnectionParams, Dialect, Probe, StatelessSession
 from robospa.clients.numpy_msgpack import MsgpackSocket, text_form
 from robospa.observation import CameraSpec, Observation
 from robospa.protocol.errors import HandshakeError, ServerError, json_values, printable
 from robospa.protocol.options import option
-from robospa.protocol.policy import PolicySpec, TrialInfo
+from robospa.protocol.policy import TrialInfo
 
 CAMERAS = {"head": "head_camera", "left_wrist": "left_camera", "right_wrist": "right_camera"}
 PROTOCOL = 1
@@ -57,26 +53,20 @@ WARNINGS = (
 
 
 @dataclass(frozen=True)
-class VlaEvalClientOptions(RobotOption):
+class VlaEvalClientOptions(AnyModelOptions):
     """What a vla-eval server does not say."""
 
-    space: str = option("joint", "what the model answers", ("joint", "ee"))
     grippers: str = option("open", "what 1 means in an answered gripper", ("open", "closed"))
     cameras: str = option("head,left_wrist,right_wrist", "our cameras to send, in this order")
     state_keys: str = option("joint_state", "names under which the joints are sent")
-    state: str = option("commanded", "which joints to send", ("commanded", "measured"))
-    horizon: int | None = option(None, HORIZON)
-    execute: int | None = option(
+    execute: Count | None = option(
         1,
         "actions executed before the next query; none for all, where vla-eval's own runner "
         "executes the first alone",
     )
-    text_budget: int | None = option(None, BUDGET)
 
     def __post_init__(self) -> None:
-        """ValueError for options that cannot be."""
-        check_horizon(self.horizon, self.execute)
-        check_budget(self.text_budget)
+        super().__post_init__()
         wrong = [name for name in self.views if name not in CAMERAS]
         if wrong or len(set(self.views)) != len(self.views):
             raise ValueError(f"option cameras={self.cameras!r}: some of {', '.join(CAMERAS)}")
@@ -105,17 +95,8 @@ class VlaEvalSession(StatelessSession):
         self._options, self._joints = options, SIX_JOINT_ARMS
         self._number = 0
         self._socket = MsgpackSocket(params, text_form)
-        spec = PolicySpec(
-            name="vla-eval",
-            cameras=tuple(CameraSpec(name) for name in options.views),
-            state=options.state,
-            action=options.space,
-            horizon=options.horizon,
-            execute=options.execute,
-            embodiments=(options.embodiment,),
-            action_dim=options.columns(options.space),
-            text_budget=options.text_budget,
-        )
+        cameras = tuple(CameraSpec(name) for name in options.views)
+        spec = options.spec_of("vla-eval", cameras=cameras)
         number = self._send("hello", {"harness_version": "robospa", "protocol_version": PROTOCOL})
         greeting = self._answer("hello", number, params.timeouts.hello)
         theirs = greeting.get("protocol_version")

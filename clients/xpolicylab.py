@@ -27,30 +27,27 @@ import contextlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime, timezone
+from typing import Annotated
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import NDArray
 
 from robospa.action_space import ARMS, POSE, SIX_JOINT_ARMS, ActionSpace
 from robospa.clients.chunks import (
-    BUDGET,
-    HORIZON,
     NAMED,
-    RobotOption,
+    AnyModelOptions,
     as_chunk,
-    check_budget,
-    check_horizon,
     invert_grippers,
     refuse_unread,
 )
-from robospa.clients.detect import Probe
-from robospa.clients.dialect import ConnectionParams, Dialect, StatelessSession
+from robospa.clients.dialect import ConnectionParams, Dialect, Probe, StatelessSession
 from robospa.clients.numpy_msgpack import MsgpackSocket, binary_form
 from robospa.geometry import quaternion_to_matrix
 from robospa.observation import Observation
 from robospa.protocol.errors import PolicyAnswerError, ServerError, printable
 from robospa.protocol.options import option
-from robospa.protocol.policy import PolicySpec, TrialInfo
+from robospa.protocol.policy import TrialInfo
 from robospa.registry import did_you_mean
 
 BODIES = {"joint": "arm_joint_state", "ee": "ee_pose"}
@@ -175,26 +172,17 @@ WARNINGS = (
 
 
 @dataclass(frozen=True)
-class XPolicyLabClientOptions(RobotOption):
+class XPolicyLabClientOptions(AnyModelOptions):
     """What XPolicyLab's server does not say."""
 
     space: str = option(
         "joint", "the action_type that the policy is configured with", ("joint", "ee")
     )
     grippers: str = option("open", "what 1 means in an answered gripper", ("open", "closed"))
-    frequency: int = option(30, "control frequency [Hz] sent in additional_info")
-    state: str = option("commanded", "which joints to send", ("commanded", "measured"))
-    horizon: int | None = option(None, HORIZON)
-    execute: int | None = option(None, "actions executed before the next query; none for all")
+    frequency: Annotated[int, Meta(ge=1, le=10_000)] = option(
+        30, "control frequency [Hz] sent in additional_info"
+    )
     evaluation_id: str = option("robospa", "name of the evaluation in every message")
-    text_budget: int | None = option(None, BUDGET)
-
-    def __post_init__(self) -> None:
-        """ValueError for options that cannot be."""
-        check_horizon(self.horizon, self.execute)
-        check_budget(self.text_budget)
-        if not 0 < self.frequency < 10_000:
-            raise ValueError(f"option frequency={self.frequency} is no frequency in Hz")
 
 
 def encode(
@@ -261,16 +249,7 @@ class XPolicyLabSession(StatelessSession):
         self._trial: dict[str, object] = {}
         self._joints = SIX_JOINT_ARMS
         self._ids: dict[str, object] = {}
-        spec = PolicySpec(
-            name="xpolicylab",
-            state=options.state,
-            action=options.space,
-            horizon=options.horizon,
-            execute=options.execute,
-            embodiments=(options.embodiment,),
-            action_dim=options.columns(options.space),
-            text_budget=options.text_budget,
-        )
+        spec = options.spec_of("xpolicylab")
         self._socket = MsgpackSocket(params, binary_form)
         greeting = self._call(0, "hello", "hello_ack", {}, params.timeouts.hello)
         server = printable(str(greeting.get("server", "")), 200)

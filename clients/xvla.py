@@ -23,22 +23,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import NDArray
 
 from robospa.action_space import ActionSpace
-from robospa.clients.chunks import (
-    HORIZON,
-    RobotOption,
-    check_budget,
-    check_horizon,
-    invert_grippers,
-    refuse_unread,
-)
-from robospa.clients.detect import Probe
-from robospa.clients.dialect import ConnectionParams, Dialect
+from robospa.clients.chunks import ChunkOptions, Count, invert_grippers, refuse_unread
+from robospa.clients.dialect import ConnectionParams, Dialect, Probe
 from robospa.clients.http import HttpSession, chunk_of, dumps
 from robospa.clients.model_policy import (
     Chunk,
@@ -69,12 +62,14 @@ VIEWS = ("head", "left_wrist", "right_wrist")
 
 
 @dataclass(frozen=True)
-class XvlaConventions(RobotOption):
+class XvlaConventions(ChunkOptions):
     """What neither the checkpoint nor X-VLA's server says: the same whoever loads the model."""
 
     space: str = option("ee6d", "what the model answers", ("ee6d", "joint"))
-    domain_id: int = option(6, "the soft prompt, 0 to 29; 6 is the released RoboTwin checkpoint's")
-    steps: int = option(10, "denoising steps")
+    domain_id: Annotated[int, Meta(ge=0, le=29)] = option(
+        6, "the soft prompt, 0 to 29; 6 is the released RoboTwin checkpoint's"
+    )
+    steps: Count = option(10, "denoising steps")
     quaternions: str = option(
         "xyzw", "how RoboTwin's w x y z are read: `xyzw` repeats the official slip", ORDERS
     )
@@ -89,20 +84,12 @@ class XvlaConventions(RobotOption):
     closed_above: float = option(
         0.7, "a gripper number of the 20 above this closes the gripper, any other opens it"
     )
-    horizon: int | None = option(None, HORIZON)
-    execute: int | None = option(None, "actions executed before the next query; none for all")
-    text_budget: int | None = option(
+    text_budget: Count | None = option(
         50, "tokens of text that the model's processor keeps; the rest is cut off in silence"
     )
 
     def __post_init__(self) -> None:
-        """ValueError for options that cannot be."""
-        if not 0 <= self.domain_id < 30:
-            raise ValueError(f"option domain_id={self.domain_id} is not one of 0 to 29")
-        if self.steps < 1:
-            raise ValueError(f"option steps={self.steps}: at least one is needed")
-        check_horizon(self.horizon, self.execute)
-        check_budget(self.text_budget)
+        super().__post_init__()
         wrong = [name for name in self.views if name not in VIEWS]
         if wrong or len(set(self.views)) != len(self.views) or not self.views:
             raise ValueError(f"option cameras={self.cameras!r}: one to three of {', '.join(VIEWS)}")
@@ -115,15 +102,10 @@ class XvlaConventions(RobotOption):
     def spec_of_model(self, text_budget: int | None) -> PolicySpec:
         """The spec that these options make of a server or a model."""
         action = "joint" if self.space == "joint" else "ee"
-        return PolicySpec(
-            name="xvla",
-            cameras=tuple(CameraSpec(name) for name in self.views),
-            action=action,
-            horizon=self.horizon,
-            execute=self.execute,
-            embodiments=(self.embodiment,),
-            action_dim=ActionSpace(action).width,
-            text_budget=text_budget,
+        cameras = tuple(CameraSpec(name) for name in self.views)
+        width = ActionSpace(action).width
+        return self.spec_of(
+            "xvla", cameras=cameras, action=action, action_dim=width, text_budget=text_budget
         )
 
 
@@ -279,15 +261,13 @@ class XvlaServerOptions(XvlaConventions):
     checkpoint: str = option("", "folder or hub name of the model and its processor")
     code: str | None = option(None, "checkout of X-VLA, or set PYTHONPATH")
     device: str = option("cuda", "device of the model")
-    batch: int = option(8, "observations in one call of the model, at most")
+    batch: Count = option(8, "observations in one call of the model, at most")
 
     def __post_init__(self) -> None:
         """ValueError for options that cannot be."""
         super().__post_init__()
         if not self.checkpoint:
             raise ValueError("option checkpoint is needed: a folder or a hub name")
-        if self.batch < 1:
-            raise ValueError("option batch: at least 1 is needed")
 
 
 class Xvla(ModelPolicy):

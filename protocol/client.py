@@ -54,7 +54,7 @@ from robospa.protocol.messages import (
     pack,
     unpack,
 )
-from robospa.protocol.policy import PolicySpec, TrialInfo, check_chunk, check_size, compare_specs
+from robospa.protocol.policy import PolicySpec, TrialInfo, check_chunk, check_size
 from robospa.protocol.transport import Address, Timeouts, Transport
 
 if TYPE_CHECKING:
@@ -397,27 +397,15 @@ def connect(
     *,
     limits: Limits = DEFAULT_LIMITS,
     ssl: ssl_module.SSLContext | None = None,
-    expect: PolicySpec | None = None,
 ) -> RemotePolicy:
     """Connect to a `robospa.v1` server at a ws:// or wss:// URL and check that both ends fit.
 
-    `expect`: refuse (SpecMismatch) a server with another spec. Raises ConnectFailed, HandshakeError
-    and its children, ProtocolViolation; ValueError for a wrong URL.
+    Raises ConnectFailed, HandshakeError and its children, ProtocolViolation; ValueError for a wrong
+    URL.
     """
     allowed = timeouts or Timeouts()
     address = Address(url, token, ssl)
-    return expecting(
-        RemotePolicy(url, lambda: open_wire(address, allowed, limits), allowed), expect
-    )
-
-
-def expecting(policy: RemotePolicy, expect: PolicySpec | None) -> RemotePolicy:
-    """`policy` itself, or SpecMismatch (and a closed connection) if its spec is another one."""
-    changes = compare_specs(expect, policy.spec) if expect is not None else []
-    if changes:
-        policy.close()
-        raise SpecMismatch(f"the server at {policy.url} has another spec: {'; '.join(changes)}")
-    return policy
+    return RemotePolicy(url, lambda: open_wire(address, allowed, limits), allowed)
 
 
 def open_wire(

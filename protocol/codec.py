@@ -176,11 +176,13 @@ _SHAPE_KEY, _DATA_KEY = _binary(_SHAPE), _binary(_DATA)
 # ---------------------------------------------------------------- decoding
 
 
-def decode(buffer: Buffer, limits: Limits = DEFAULT_LIMITS) -> object:
+def decode(
+    buffer: Buffer, limits: Limits = DEFAULT_LIMITS, kind: type[Reader] | None = None
+) -> object:
     """The value in `buffer`, which must hold exactly one. Raises DecodeError and nothing else."""
     if len(buffer) > limits.message:
         raise DecodeError(f"message of {len(buffer)} bytes is over the limit of {limits.message}")
-    reader = _Reader(buffer, limits)
+    reader = (kind or Reader)(buffer, limits)
     value = reader.value(0)
     if reader.pos != reader.end:
         raise DecodeError(f"{reader.end - reader.pos} bytes follow the message's end")
@@ -207,7 +209,7 @@ _LIST = {0xDC: 2, 0xDD: 4}
 _MAP = {0xDE: 2, 0xDF: 4}
 
 
-class _Reader:
+class Reader:
     """A cursor over one message. Every length is checked against what is left before use."""
 
     __slots__ = ("bytes", "end", "items", "limits", "pos", "view")

@@ -32,8 +32,6 @@ from robospa.protocol.policy import (
 from robospa.schema import describe, read
 
 VERSION = "1.1"
-OLDEST = 1
-"""Least minor version that both ends need: the `reset` of 1.0 carried the trial's seed."""
 SUBPROTOCOL = "robospa.v1"
 MAX_ID = 2**53
 """Request ids stay exact in languages whose only number is a double."""
@@ -180,19 +178,8 @@ def _check_version(hello: Mapping[str, object]) -> None:
     version = hello.get("version")
     if not isinstance(version, str):
         raise DecodeError(f"hello message: 'version' must be text, not {describe(version)}")
-    if major(version) != major(VERSION):
+    if version.partition(".")[0] != VERSION.partition(".")[0]:
         raise VersionMismatch(
             f"the server speaks robospa protocol {version} and this is {VERSION}: "
             "install the same major version at both ends"
         )
-    minor = version.partition(".")[2].partition(".")[0]
-    if not minor.isdecimal() or int(minor) < OLDEST:
-        raise VersionMismatch(
-            f"the server speaks robospa protocol {version}, whose reset names the trial's scene, "
-            f"and this is {VERSION}: install the same version at both ends"
-        )
-
-
-def major(version: str) -> str:
-    """The part of a version that must agree."""
-    return version.split(".", 1)[0]

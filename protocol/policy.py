@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field, fields
-from typing import TYPE_CHECKING, Annotated, Any, Protocol, TypeGuard, cast
+from typing import Annotated, Protocol, TypeGuard, cast
 
 import numpy as np
 from msgspec import Meta
@@ -190,18 +190,6 @@ class TrialInfo:
         """The trial in a decoded map; unknown fields are ignored. Raises DecodeError."""
         return read(cls, value, "trial", DecodeError)
 
-    if not TYPE_CHECKING:
-
-        def __getattr__(self, name: str) -> Any:
-            """Only asked for what is not there; says where the fields of protocol 1.0 are now."""
-            if name in ("level", "seed", "mode", "split"):
-                raise AttributeError(
-                    f"a policy is not sent the trial's {name}: seed randomness by policy_seed and "
-                    "name files by id, or set needs_trial_key in the spec and read key (results "
-                    "are then marked and never ranked)"
-                )
-            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
-
 
 class Policy(Protocol):
     """A robot policy, in process or behind a server."""
@@ -376,9 +364,3 @@ def check_size(spec: PolicySpec, limits: Limits, url: str) -> None:
             f"observation, and a message may have {limits.message / 1e6:.0f} MB: ask for smaller "
             "images"
         )
-
-
-def compare_specs(expected: PolicySpec, found: PolicySpec) -> list[str]:
-    """One phrase per field that differs; empty if the specs are the same."""
-    old, new = expected.to_json(), found.to_json()
-    return [f"{name} was {old[name]} and is {new[name]}" for name in old if old[name] != new[name]]

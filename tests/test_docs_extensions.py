@@ -299,7 +299,7 @@ def test_a_policy_behind_the_dialect_answers_in_our_units(acme: str) -> None:
 
 
 def test_its_options_are_checked_and_other_dialects_name_it(acme: str) -> None:
-    with pytest.raises(ValueError, match="execute <= horizon"):
+    with pytest.raises(ValueError, match="at most the horizon"):
         check_options("acme+http://gpu?horizon=20&execute=21")
     with pytest.raises(ValueError, match=r"acme\+http://"):
         check_options("nothing://gpu")

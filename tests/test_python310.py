@@ -65,7 +65,7 @@ def test_it_imports_on_python_310_where_there_is_one() -> None:
         )
     code = (
         "from robospa.clients import go1, lerobot, rdt, xvla\n"
-        "from robospa.clients.openpi import serve as openpi\n"
+        "from robospa.clients import openpi\n"
         "from robospa.baselines import random, hold\n"
         "from robospa.harness.cli import main, serve\n"
         "from robospa.protocol.server import ServerThread\n"

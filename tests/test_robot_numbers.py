@@ -20,7 +20,7 @@ NAMED = (
     "robospa/trial.py",
     "harness/robots/",
     "protocol/openpi.py",
-    "clients/openpi/",
+    "clients/openpi.py",
 )
 """Where else the name stands: the default, robots with the same arm, openpi's configurations."""
 

@@ -23,7 +23,7 @@ from standins import (
     observation,
 )
 
-from robospa.clients import connect, detect
+from robospa.clients import connect, dialect
 from robospa.protocol.client import RemotePolicy
 from robospa.protocol.errors import (
     PolicyError,
@@ -201,7 +201,7 @@ def test_a_door_that_closes_later_is_not_taken_for_another_dialect(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """What is there after a first success is in trouble; that is no reason to stop the run."""
-    monkeypatch.setattr(detect, "SECONDS", 0.5)
+    monkeypatch.setattr(dialect, "SECONDS", 0.5)
     with talking(name, lambda seen: joint_chunk(), replace(LIMIT, wait=0.5)) as (policy, line):
         line.mode = "cut"
         line.cut()

@@ -26,10 +26,8 @@ from standins import (
 )
 
 from robospa.action_space import ActionSpace
-from robospa.clients import connect
-from robospa.clients.openpi import finetune, serve
-from robospa.clients.openpi import serve as openpi
-from robospa.clients.openpi.client import OpenPiClientOptions
+from robospa.clients import connect, openpi
+from robospa.clients.openpi import OpenPiClientOptions
 from robospa.protocol.errors import (
     ConnectionLost,
     EncodeError,
@@ -338,7 +336,7 @@ def configs(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
 
 
 def test_the_configuration_is_the_papers(configs: dict[str, Any]) -> None:
-    made = finetune.train_config("pi05_robospa_Pick_Blocks_Size")
+    made = openpi.train_config("pi05_robospa_Pick_Blocks_Size")
     assert made.name == "pi05_robospa_Pick_Blocks_Size"
     assert (made.num_train_steps, made.batch_size) == (20_000, 16)
     assert made.model.fields == {"pi05": True}
@@ -351,11 +349,11 @@ def test_the_configuration_is_the_papers(configs: dict[str, Any]) -> None:
 
 
 def test_the_names_read_at_training_are_those_sent_at_evaluation(configs: dict[str, Any]) -> None:
-    made = finetune.train_config("pi05_robospa_x")
+    made = openpi.train_config("pi05_robospa_x")
     (repacked,) = made.data.repack_transforms.inputs
     (structure,) = repacked.args
     observation: Any = {
-        "images": {name: np.zeros((2, 2, 3), np.uint8) for name in finetune.CAMERAS.values()},
+        "images": {name: np.zeros((2, 2, 3), np.uint8) for name in openpi.CAMERAS.values()},
         "state": np.zeros(ActionSpace("joint").width),
         "instruction": "Go.",
     }
@@ -363,11 +361,11 @@ def test_the_names_read_at_training_are_those_sent_at_evaluation(configs: dict[s
     assert set(structure) == {*sent, "actions"}
     assert set(structure["images"]) == set(sent["images"])  # type: ignore[call-overload]
     assert structure["images"]["cam_left_wrist"] == "observation.images.left_wrist"
-    assert {CAMERA_NAMES[ours]: ours for ours in finetune.CAMERAS.values()} == finetune.CAMERAS
+    assert {CAMERA_NAMES[ours]: ours for ours in openpi.CAMERAS.values()} == openpi.CAMERAS
 
 
 def test_low_memory_freezes_what_openpi_freezes(configs: dict[str, Any]) -> None:
-    made = finetune.train_config("pi05_lora_robospa_x")
+    made = openpi.train_config("pi05_lora_robospa_x")
     variants = ["action_expert_variant", "paligemma_variant", "pi05"]
     assert sorted(made.model.fields) == variants == made.freeze_filter
     assert made.ema_decay is None and made.data.repo_id == "robospa/x"
@@ -376,7 +374,7 @@ def test_low_memory_freezes_what_openpi_freezes(configs: dict[str, Any]) -> None
 @pytest.mark.parametrize("name", ["pi05_robospa_", "pi05_aloha", "pi05_robospa_a/b", "x"])
 def test_another_name_is_refused(name: str, configs: dict[str, Any]) -> None:
     with pytest.raises(ValueError, match="no configuration of ours"):
-        finetune.train_config(name)
+        openpi.train_config(name)
 
 
 def test_a_script_of_openpi_finds_the_configurations_that_it_is_given(
@@ -391,7 +389,7 @@ def test_a_script_of_openpi_finds_the_configurations_that_it_is_given(
     monkeypatch.setattr(sys, "argv", ["before"])
     monkeypatch.setattr(sys, "path", list(sys.path))
     out = tmp_path / "out"
-    finetune.main([str(script), "pi05_robospa_a", "--policy.config=pi05_lora_robospa_b", str(out)])
+    openpi.main([str(script), "pi05_robospa_a", "--policy.config=pi05_lora_robospa_b", str(out)])
     assert out.read_text() == "__main__ pi05_lora_robospa_b pi05_robospa_a"
 
 
@@ -404,7 +402,7 @@ def test_our_server_finds_the_configuration_of_a_dataset(
         "openpi.policies.policy_config",
         create_trained_policy=lambda config, folder: given.append(config) or SimpleNamespace(),
     )
-    options = serve.OpenPiServerOptions(config="pi05_robospa_x", checkpoint="19999")
-    policy = serve.create(options)
+    options = openpi.OpenPiServerOptions(config="pi05_robospa_x", checkpoint="19999")
+    policy = openpi.create(options)
     assert given == [configs["pi05_robospa_x"]]
     assert (policy.spec.name, policy.spec.horizon) == ("openpi:pi05_robospa_x", 50)

@@ -183,7 +183,7 @@ def test_the_model_is_made_as_its_own_script_does(
     [
         ({}, "checkpoint is needed"),
         ({"checkpoint": "x", "t5": None}, "embeddings and t5 are both none"),
-        ({"checkpoint": "x", "execute": 0}, "1 <= execute <= horizon"),
+        ({"checkpoint": "x", "execute": 0}, "execute is 0"),
     ],
 )
 def test_options_that_cannot_be(given: dict[str, Any], words: str) -> None:

@@ -191,6 +191,7 @@ class Fast(StandIn):
 
         class Handler(BaseHTTPRequestHandler):
             protocol_version = "HTTP/1.1"
+            disable_nagle_algorithm = True  # else each answer waits 40 ms for the client's ACK
 
             def do_GET(self) -> None:
                 if self.path == "/act":

@@ -115,6 +115,7 @@ class Scripted:
             compression=None,
             max_size=None,
             max_queue=1,
+            close_timeout=0.2,
         )
         self._thread = threading.Thread(target=self._server.serve_forever, daemon=True)
 

@@ -25,7 +25,6 @@ from robospa.protocol.errors import (
     PolicyAnswerError,
     ProtocolViolation,
     ServerError,
-    SpecMismatch,
     TransportError,
     VersionMismatch,
 )
@@ -125,11 +124,6 @@ def test_waits_for_a_server_that_starts_or_restarts(start: Any, serve: Any) -> N
 def test_what_is_no_websocket_url(url: str) -> None:
     with pytest.raises(ValueError, match="not of the form ws://host:port"):
         connect(url, timeouts=QUICK)
-
-
-def test_another_spec_than_expected_refuses_to_start() -> None:
-    with Scripted(HELLO) as url, pytest.raises(SpecMismatch, match="horizon was 9 and is 4"):
-        connect(url, timeouts=QUICK, expect=replace(SPEC, horizon=9))
 
 
 @pytest.mark.parametrize(

@@ -35,7 +35,6 @@ from robospa.protocol.policy import (
     TrialInfo,
     check_chunk,
     check_observation,
-    compare_specs,
 )
 from robospa.trial import TrialKey
 
@@ -194,11 +193,6 @@ def test_actions_must_be_an_array(chunk: Any) -> None:
         unpack(encode({"type": "actions", "id": 1, "chunk": chunk}))
 
 
-def test_specs_are_compared_by_field() -> None:
-    assert compare_specs(SPEC, SPEC) == []
-    assert compare_specs(SPEC, replace(SPEC, horizon=9)) == ["horizon was 4 and is 9"]
-
-
 @pytest.mark.parametrize(
     ("answer", "reason"),
     [
@@ -267,18 +261,6 @@ def test_committed_actions_are_checked_for_a_policy_that_reads_them(
         check_observation(observation(**sent), reads)
     check_observation(observation(**sent), SPEC)
     check_observation(observation(), reads)
-
-
-def test_a_server_whose_reset_names_the_scene_is_refused() -> None:
-    hello = {"type": "hello", "id": 0, "version": "1.0", "server": "s", "spec": SPEC.to_json()}
-    with pytest.raises(VersionMismatch, match=r"1\.0, whose reset names the trial's scene"):
-        unpack(encode(hello))
-
-
-@pytest.mark.parametrize("name", ["level", "seed", "mode", "split"])
-def test_a_policy_that_reads_the_seed_is_told_where_it_went(name: str) -> None:
-    with pytest.raises(AttributeError, match=f"not sent the trial's {name}: .*needs_trial_key"):
-        getattr(TRIAL, name)
 
 
 @pytest.mark.parametrize("row", [None, [0.0], np.zeros(4), np.zeros((2, 2), np.float32)])

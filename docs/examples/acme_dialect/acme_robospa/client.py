@@ -15,28 +15,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robospa.clients.chunks import HORIZON, as_chunk, check_horizon
-from robospa.clients.detect import Probe
-from robospa.clients.dialect import ConnectionParams, Dialect
+from robospa.clients.chunks import ChunkOptions, as_chunk
+from robospa.clients.dialect import ConnectionParams, Dialect, Probe
 from robospa.clients.http import HttpSession, dumps
 from robospa.observation import CameraSpec, Observation
 from robospa.protocol.errors import ProtocolViolation
 from robospa.protocol.options import option
-from robospa.protocol.policy import PolicySpec
 
 SCALE = np.where(np.isin(np.arange(14), [6, 13]), 100, 1).astype(np.float32)
 """Their numbers are ours times this."""
 
 
 @dataclass(frozen=True)
-class AcmeOptions:
+class AcmeOptions(ChunkOptions):
     """What Acme's server does not say."""
 
-    horizon: int | None = option(None, HORIZON)
-    execute: int | None = option(None, "actions executed before the next query; none for all")
-
-    def __post_init__(self) -> None:
-        check_horizon(self.horizon, self.execute)
+    camera: str = option("head", "our camera to send", ("head", "front"))
 
 
 class AcmeSession(HttpSession):
@@ -45,13 +39,8 @@ class AcmeSession(HttpSession):
     path = "/predict"
 
     def __init__(self, params: ConnectionParams, options: AcmeOptions) -> None:
-        spec = PolicySpec(
-            "acme",
-            cameras=(CameraSpec("head"),),
-            horizon=options.horizon,
-            execute=options.execute,
-            action_dim=14,
-        )
+        self._camera = options.camera
+        spec = options.spec_of("acme", cameras=(CameraSpec(options.camera),))
         warning = "Acme's server does not say which tasks its model was trained on"
         super().__init__(params, "acme", spec, options, [warning])
 
@@ -59,7 +48,7 @@ class AcmeSession(HttpSession):
         self, id: int, observation: Observation, timeout: float
     ) -> tuple[object, Mapping[str, float]]:
         sent = {
-            "camera": observation["images"]["head"],
+            "camera": observation["images"][self._camera],
             "joints": (observation["state"] * SCALE).tolist(),
             "text": observation["instruction"],
         }
