@@ -10,7 +10,7 @@ from __future__ import annotations
 import io
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,28 +62,15 @@ class VideoBuffer:
         return self._bytes.getvalue()
 
 
-class Frames(Protocol):
-    """What takes the frames of a film."""
-
-    def add(self, image: NDArray[np.uint8]) -> None:
-        """Append one RGB frame, uint8 (height, width, 3)."""
-
-    def finish(self) -> bytes:
-        """The whole file; nothing can be added any more."""
-        ...
-
-
 class FilmRecorder:
-    """A `Recorder` that draws a trial while it is played: all `cameras` side by side.
+    """A `Recorder` that draws a trial while it is played, all `cameras` side by side, as an MP4.
 
-    `video` takes the frames, by default an MP4. While nothing moves, one picture serves for all.
+    While nothing moves, one picture serves for all.
     """
 
-    def __init__(
-        self, cameras: Sequence[CameraSpec] = (CameraSpec(CAMERA),), video: Frames | None = None
-    ) -> None:
+    def __init__(self, cameras: Sequence[CameraSpec] = (CameraSpec(CAMERA),)) -> None:
         self._cameras = tuple(cameras)
-        self._video = video if video is not None else VideoBuffer()
+        self._video = VideoBuffer()
         self._drawn: RenderableState | None = None
         self._image = np.zeros((0, 0, 3), np.uint8)
         self._due = EVERY
@@ -105,6 +92,10 @@ class FilmRecorder:
         """Show the last view for half a second."""
         self._show(world, FPS // 2)
 
+    def add(self, image: NDArray[np.uint8]) -> None:
+        """Take one RGB frame, uint8 (height, width, 3)."""
+        self._video.add(image)
+
     def finish(self) -> bytes:
         """The film; nothing can be added any more."""
         return self._video.finish()
@@ -115,7 +106,7 @@ class FilmRecorder:
             self._drawn = still
             self._image = np.hstack(still.draw(self._cameras))
         for _ in range(frames):
-            self._video.add(self._image)
+            self.add(self._image)
 
 
 def film(

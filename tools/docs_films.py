@@ -1,8 +1,8 @@
 """The animated pictures of the documentation: the expert at three tasks, and with each robot.
 
-`python -m robospa.harness.pictures.films FOLDER` writes FOLDER/trials.webp, each task with its
-sentence below, and FOLDER/ROBOT.webp for the robots of the paper. Pages show WebP without a player.
-Needs a device that draws.
+`python tools/docs_films.py FOLDER` writes FOLDER/trials.webp, each task with its sentence below,
+and FOLDER/ROBOT.webp for the robots of the paper. Pages show WebP without a player. Needs a device
+that draws.
 """
 
 from __future__ import annotations
@@ -29,14 +29,15 @@ from robospa.trial import REFERENCE, TrialKey
 if TYPE_CHECKING:
     from PIL import Image
 
+SEED = 100_000
 SHOWN = (
-    ("Pick_Mixed_Objects_Distance_B", 5, 100_000),
-    ("Stack_Blocks_Color_Order", 3, 100_000),
-    ("Click_Can_Place_Items", 3, 100_000),
+    ("Pick_Mixed_Objects_Distance_B", 5),
+    ("Stack_Blocks_Color_Order", 3),
+    ("Click_Can_Place_Items", 3),
 )
-"""Task, level and seed: one of spatial understanding, and two of several steps."""
+"""Task and level: one of spatial understanding, and two of several steps."""
 ROBOTS = (REFERENCE, "franka-panda", "ur5-wsg", "piper", "ARX-X5")
-ROBOTS_TASK, FIRST_SEED, TRIES = ("Stack_Blocks_Color_Order", 3), 100_000, 10
+ROBOTS_TASK, TRIES = ("Stack_Blocks_Color_Order", 3), 10
 """What every robot does: three blocks, both arms; the first of so many scenes that it solves."""
 CAMERA = CameraSpec("third", 960, 720)
 CUT, SIZE = (48, 90, 912, 606), (576, 344)
@@ -53,10 +54,11 @@ MOST_BYTES, ROBOT_BYTES = 1_500_000, 900_000
 DARK, LIGHT = (24, 28, 34), (236, 239, 243)
 
 
-class Animation:
-    """Keeps one of `every` frames of a film as `drawn` makes a page of it."""
+class Animation(FilmRecorder):
+    """Keeps one of `every` frames of a trial as `drawn` makes a page of it."""
 
     def __init__(self, drawn: Callable[[Image.Image], Image.Image], every: int = 1) -> None:
+        super().__init__([CAMERA])
         self._drawn, self._every, self._count = drawn, every, 0
         self.frames: list[Image.Image] = []
 
@@ -67,10 +69,6 @@ class Animation:
         if self._count % self._every == 0:
             self.frames.append(self._drawn(Image.fromarray(image)))
         self._count += 1
-
-    def finish(self) -> bytes:
-        """Nothing: who made it has the frames."""
-        return b""
 
 
 def encode(frames: list[Image.Image], most_bytes: int) -> bytes:
@@ -90,35 +88,33 @@ def captioned(image: Image.Image, sentence: str) -> Image.Image:
     """The part of `image` that is shown, and `sentence` below it."""
     from PIL import Image, ImageDraw, ImageFont
 
-    page = Image.new("RGB", (SIZE[0], SIZE[1] + STRIP), DARK)
-    page.paste(image.crop(CUT).resize(SIZE, Image.Resampling.LANCZOS), (0, 0))
-    draw, font = ImageDraw.Draw(page), ImageFont.load_default(TEXT)
+    made = Image.new("RGB", (SIZE[0], SIZE[1] + STRIP), DARK)
+    made.paste(image.crop(CUT).resize(SIZE, Image.Resampling.LANCZOS), (0, 0))
+    draw, font = ImageDraw.Draw(made), ImageFont.load_default(TEXT)
     middle = (SIZE[0] / 2, SIZE[1] + STRIP / 2)
     text = "\n".join(textwrap.wrap(sentence, MOST_LETTERS))
     draw.multiline_text(middle, text, font=font, fill=LIGHT, anchor="mm", align="center")
-    return page
+    return made
 
 
 def tasks_film(world: World) -> bytes:
     """The expert at all tasks of SHOWN, one after the other; RuntimeError if it fails at one."""
     frames: list[Image.Image] = []
-    for task, level, seed in SHOWN:
-        sentence = instruction(build_scene(task, level, seed), "heldout")
-        video = Animation(partial(captioned, sentence=sentence), EVERY)
-        recorder = FilmRecorder([CAMERA], video)
-        if not demonstrate(world, TrialKey(task, level, seed), recorder).success:
-            raise RuntimeError(f"the expert does not solve {task} level {level} seed {seed}")
-        frames += video.frames
+    for task, level in SHOWN:
+        sentence = instruction(build_scene(task, level, SEED), "heldout")
+        recorder = Animation(partial(captioned, sentence=sentence), EVERY)
+        if not demonstrate(world, TrialKey(task, level, SEED), recorder).success:
+            raise RuntimeError(f"the expert does not solve {task} level {level} seed {SEED}")
+        frames += recorder.frames
     return encode(frames, MOST_BYTES)
 
 
 def robot_film(world: World, robot: str) -> bytes:
     """The expert with `robot` in the first scene that it solves; RuntimeError for none."""
-    for seed in range(FIRST_SEED, FIRST_SEED + TRIES):
-        video = Animation(lambda image: image.crop(ROBOT_CUT).resize(ROBOT_SIZE))
-        key = TrialKey(*ROBOTS_TASK, seed, robot)
-        if demonstrate(world, key, FilmRecorder([CAMERA], video)).success:
-            return encode(video.frames, ROBOT_BYTES)
+    for seed in range(SEED, SEED + TRIES):
+        recorder = Animation(lambda image: image.crop(ROBOT_CUT).resize(ROBOT_SIZE))
+        if demonstrate(world, TrialKey(*ROBOTS_TASK, seed, robot), recorder).success:
+            return encode(recorder.frames, ROBOT_BYTES)
     raise RuntimeError(f"{robot} solves none of {TRIES} scenes")
 
 
@@ -131,10 +127,9 @@ def main(folder: Path) -> None:
     (folder / "trials.webp").write_bytes(tasks_film(world))
     for robot in ROBOTS:
         (folder / f"{robot}.webp").write_bytes(robot_film(world, robot))
-    world.close()
 
 
 if __name__ == "__main__":
     if len(sys.argv) != 2:
-        sys.exit("usage: python -m robospa.harness.pictures.films FOLDER")
+        sys.exit("usage: python tools/docs_films.py FOLDER")
     main(Path(sys.argv[1]))

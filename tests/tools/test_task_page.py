@@ -5,15 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+import task_page
 
-from robospa.harness.pictures import task_page
 from robospa.tasks.catalog import tasks
 
-ROOT = Path(__file__).resolve().parents[3]
+ROOT = Path(__file__).resolve().parents[2]
 
 
 def test_the_page_is_what_the_catalog_says() -> None:
-    again = "run `python -m robospa.harness.pictures.task_page --text`"
+    again = "run `python tools/task_page.py --text`"
     assert (ROOT / task_page.PAGE).read_text() == task_page.page(ROOT), again
 
 

@@ -1,6 +1,6 @@
 """The page of all tasks, `docs/tasks.md`, written from the catalog and from scenes it draws.
 
-`python -m robospa.harness.pictures.task_page` writes the page and, where this machine draws, the
+`python tools/task_page.py` writes the page and, where this machine draws, the
 pictures that are missing; `--all` draws every picture again, `--text` none. Run it from the
 repository's root after a task has come or changed; a test compares the page with the catalog.
 """
@@ -35,7 +35,7 @@ COUNT = "trials"
 
 HEAD = """# Tasks
 
-Written by `python -m robospa.harness.pictures.task_page`: do not edit. {bases} base tasks and
+Written by `python tools/task_page.py`: do not edit. {bases} base tasks and
 {basics} basic ones for reference, with five levels; pictures show levels {first} and {last}. *n* is
 the number of objects that a guesser could pick or of kinds of things to handle, *T* of subtasks
 (spatial and basic tasks: 1), *limit* of actions (there: 150): one value, each level's, or a range
@@ -165,10 +165,7 @@ def main(arguments: Sequence[str]) -> None:
     """Write the page, then the pictures that were asked for."""
     unknown = set(arguments) - {"--text", "--all"}
     if unknown or not PAGE.parent.is_dir():
-        sys.exit(
-            "usage, in the repository's root: "
-            "python -m robospa.harness.pictures.task_page [--text|--all]"
-        )
+        sys.exit("usage, in the repository's root: python tools/task_page.py [--text|--all]")
     PAGE.write_text(page())
     print(f"{PAGE}: {len(tasks())} tasks")
     if "--text" in arguments:
