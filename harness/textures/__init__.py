@@ -1,25 +1,26 @@
 """Textures of randomised scenes: images as pure functions of a split and a number.
 
 10,000 seen and 1,000 unseen ones, made when they are asked for: nothing is downloaded or stored.
-With $ROBOSPA_TEXTURES they are the files of a folder (`robospa.harness.textures.folder`).
+With $ROBOSPA_TEXTURES they are the files of a folder.
 """
 
 from __future__ import annotations
 
+import hashlib
 import os
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.harness.textures import plain_prints, stone_tiles, wood_cloth
+from robospa.harness.textures import materials, prints
 from robospa.harness.textures.field import SIZE, Draw, Picture
-from robospa.harness.textures.folder import TextureFolder
-from robospa.tasks.scene import SEEN, UNSEEN, Texture
+from robospa.tasks.packs import PackError
+from robospa.tasks.scene import SEEN, TEXTURES, UNSEEN, Texture
 
 VARIABLE = "ROBOSPA_TEXTURES"
 """Environment variable that names a folder of the user's own textures."""
@@ -42,42 +43,42 @@ class Material:
 
 
 KINDS = (
-    Material(wood_cloth.veneer, wood_cloth.WOODS, 4, 4),
-    Material(wood_cloth.boards, wood_cloth.WOODS, 4, 4),
-    Material(wood_cloth.parquet, wood_cloth.WOODS, 2),
-    Material(wood_cloth.slats, wood_cloth.WOODS, 2, 1),
-    Material(stone_tiles.marble, stone_tiles.MARBLES, 2, 3),
-    Material(stone_tiles.granite, stone_tiles.GRANITES, 2),
-    Material(stone_tiles.terrazzo, stone_tiles.CHIPS, 2, 3),
-    Material(stone_tiles.concrete, stone_tiles.EARTHS, 2),
-    Material(stone_tiles.layered, stone_tiles.EARTHS, 2),
-    Material(stone_tiles.gravel, stone_tiles.EARTHS, 2),
-    Material(wood_cloth.weave, wood_cloth.CLOTHS, 2, 3),
-    Material(wood_cloth.twill, wood_cloth.CLOTHS, 2),
-    Material(wood_cloth.tartan, wood_cloth.TARTANS, 2),
-    Material(wood_cloth.gingham, wood_cloth.CLOTHS, 2),
-    Material(wood_cloth.knit, wood_cloth.CLOTHS, 2, 1),
-    Material(wood_cloth.felt, wood_cloth.CLOTHS, 2, 1),
-    Material(stone_tiles.square, stone_tiles.GLAZES, 4),
-    Material(stone_tiles.chequer, stone_tiles.GLAZES, 2),
-    Material(stone_tiles.brick, stone_tiles.BRICKS, 2, 3),
-    Material(stone_tiles.hexagons, stone_tiles.GLAZES, 2),
-    Material(stone_tiles.mosaic, stone_tiles.GLAZES, 2),
-    Material(plain_prints.stripes, plain_prints.INKS, 3),
-    Material(plain_prints.dots, plain_prints.INKS, 4),
-    Material(plain_prints.zigzag, plain_prints.INKS, 4),
-    Material(plain_prints.lozenges, plain_prints.INKS, 2, 1),
-    Material(plain_prints.flowers, plain_prints.INKS, 2),
-    Material(plain_prints.leaves, plain_prints.INKS, 2),
-    Material(plain_prints.shapes, plain_prints.INKS, 3),
-    Material(plain_prints.scales, plain_prints.INKS, 2, 1),
-    Material(plain_prints.paper, plain_prints.PAPERS, 3),
-    Material(plain_prints.plaster, plain_prints.PAINTS, 2, 3),
-    Material(plain_prints.worn, plain_prints.PAINTS, 2),
-    Material(plain_prints.leather, plain_prints.HIDES, 2),
-    Material(plain_prints.cork, plain_prints.HIDES, 2, 1),
-    Material(plain_prints.brushed, plain_prints.METALS, 2, 1),
-    Material(plain_prints.ground, plain_prints.GREENS, 2, 1),
+    Material(materials.veneer, materials.WOODS, 4, 4),
+    Material(materials.boards, materials.WOODS, 4, 4),
+    Material(materials.parquet, materials.WOODS, 2),
+    Material(materials.slats, materials.WOODS, 2, 1),
+    Material(materials.marble, materials.MARBLES, 2, 3),
+    Material(materials.granite, materials.GRANITES, 2),
+    Material(materials.terrazzo, materials.CHIPS, 2, 3),
+    Material(materials.concrete, materials.EARTHS, 2),
+    Material(materials.layered, materials.EARTHS, 2),
+    Material(materials.gravel, materials.EARTHS, 2),
+    Material(materials.weave, materials.CLOTHS, 2, 3),
+    Material(materials.twill, materials.CLOTHS, 2),
+    Material(materials.tartan, materials.TARTANS, 2),
+    Material(materials.gingham, materials.CLOTHS, 2),
+    Material(materials.knit, materials.CLOTHS, 2, 1),
+    Material(materials.felt, materials.CLOTHS, 2, 1),
+    Material(materials.square, materials.GLAZES, 4),
+    Material(materials.chequer, materials.GLAZES, 2),
+    Material(materials.brick, materials.BRICKS, 2, 3),
+    Material(materials.hexagons, materials.GLAZES, 2),
+    Material(materials.mosaic, materials.GLAZES, 2),
+    Material(prints.stripes, prints.INKS, 3),
+    Material(prints.dots, prints.INKS, 4),
+    Material(prints.zigzag, prints.INKS, 4),
+    Material(prints.lozenges, prints.INKS, 2, 1),
+    Material(prints.flowers, prints.INKS, 2),
+    Material(prints.leaves, prints.INKS, 2),
+    Material(prints.shapes, prints.INKS, 3),
+    Material(prints.scales, prints.INKS, 2, 1),
+    Material(prints.paper, prints.PAPERS, 3),
+    Material(prints.plaster, prints.PAINTS, 2, 3),
+    Material(prints.worn, prints.PAINTS, 2),
+    Material(prints.leather, prints.HIDES, 2),
+    Material(prints.cork, prints.HIDES, 2, 1),
+    Material(prints.brushed, prints.METALS, 2, 1),
+    Material(prints.ground, prints.GREENS, 2, 1),
 )
 
 _LOTS = tuple(kind for kind in KINDS for _ in range(kind.share))
@@ -101,18 +102,6 @@ def chosen(draw: Draw, split: str) -> tuple[Material, Colors, int]:
     """A kind, its colours and its style."""
     kind = draw.pick(_LOTS)
     return (kind, *draw.pick(combinations(kind, split)))
-
-
-class Source(Protocol):
-    """Where images of textures come from."""
-
-    def image(self, texture: Texture, /) -> NDArray[np.uint8]:
-        """SRGB, uint8 (SIZE, SIZE, 3), not to be written to; ValueError if it cannot be had."""
-        ...
-
-    def about(self) -> dict[str, object]:
-        """What a manifest says of it."""
-        ...
 
 
 class MadeTextures:
@@ -141,6 +130,88 @@ def _tinged(draw: Draw, picture: Picture) -> Picture:
     tinge = np.array([tone * draw.number(0.93, 1.07) for _ in range(3)], np.float32)
     result: Picture = picture * tinge
     return result
+
+
+ENDINGS = (".png", ".jpg", ".jpeg", ".webp")
+LARGEST = 8192
+"""Pixels along a side of a file."""
+
+
+class TextureFolder:
+    """A user's own textures: folders `seen` and `unseen` of images that are called by their
+    numbers, as the official ones are: `unseen/0.png`, `unseen/1.png`, ... Texture k of a split is
+    the k-th in the order of numbers; where there are fewer files than textures, they come round
+    again. PackError, in one sentence, if `path` is no such folder."""
+
+    def __init__(self, path: Path) -> None:
+        if not path.is_dir():
+            raise PackError(
+                f"there is no folder of textures {str(path)!r}; make it or unset ROBOSPA_TEXTURES"
+            )
+        self._path = path
+        self._files = {split: _numbered(path / split) for split in TEXTURES}
+        if not any(self._files.values()):
+            raise PackError(
+                f"the folder of textures {str(path)!r} has no image such as seen/0.png or "
+                "unseen/0.png"
+            )
+        self.image = lru_cache(maxsize=64)(self._read)
+
+    def _read(self, texture: Texture) -> NDArray[np.uint8]:
+        from PIL import Image, UnidentifiedImageError
+
+        files = self._files[texture.split]
+        if not files:
+            raise PackError(
+                f"the folder of textures {str(self._path)!r} has no {texture.split} images, which "
+                f"this scene mode needs; add {texture.split}/0.png, 1.png, ..."
+            )
+        file = files[texture.index % len(files)]
+        if not file.is_file():  # such as a pipe, which nobody may ever write to
+            raise PackError(f"the texture {str(file)!r} cannot be read: it is no file")
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+                with Image.open(file) as opened:
+                    if max(opened.size) > LARGEST:
+                        raise PackError(
+                            f"the texture {str(file)!r} has {opened.width}x{opened.height} pixels, "
+                            f"more than {LARGEST} along a side"
+                        )
+                    picture = opened.convert("RGB").resize((SIZE, SIZE), Image.Resampling.BOX)
+        except (OSError, UnidentifiedImageError, Image.DecompressionBombError) as error:
+            raise PackError(f"the texture {str(file)!r} cannot be read: {error}") from error
+        return np.asarray(picture, dtype=np.uint8)
+
+    def about(self) -> dict[str, object]:
+        """How many images there are, and a hash of their names and sizes."""
+        listed = hashlib.sha256()
+        for split, files in self._files.items():
+            for file in files:
+                try:
+                    size = file.stat().st_size
+                except OSError as error:
+                    raise PackError(f"the texture {str(file)!r} cannot be read: {error}") from error
+                listed.update(f"{split}/{file.name} {size}\n".encode())
+        counts = {split: len(files) for split, files in self._files.items()}
+        return {"folder": self._path.name, **counts, "hash": listed.hexdigest()[:16]}
+
+
+def _numbered(folder: Path) -> list[Path]:
+    """The images of a split in the order of their numbers."""
+    if not folder.is_dir():
+        return []
+    files = [file for file in folder.iterdir() if file.suffix.lower() in ENDINGS]
+    for file in files:
+        if not (file.stem.isascii() and file.stem.isdigit()):
+            raise PackError(
+                f"the texture {str(file)!r} must be called by a number, such as 0{file.suffix}"
+            )
+    return sorted(files, key=lambda file: (int(file.stem), file.name))
+
+
+Source = MadeTextures | TextureFolder
+"""Where images of textures come from."""
 
 
 def source() -> Source:

@@ -20,7 +20,7 @@ from robospa.harness.packs.archive import ArchiveError, open_archive
 from robospa.harness.packs.index import fault
 from robospa.harness.packs.official import OfficialPack
 from robospa.harness.packs.placing import read_model_data
-from robospa.harness.textures.folder import TextureFolder
+from robospa.harness.textures import TextureFolder
 from robospa.tasks.official import official_models
 from robospa.tasks.packs import PackError
 from robospa.tasks.scene import Texture

@@ -10,9 +10,8 @@ import pytest
 from PIL import Image
 
 from robospa.harness import textures
-from robospa.harness.textures import KINDS, MadeTextures, combinations, source
+from robospa.harness.textures import KINDS, MadeTextures, TextureFolder, combinations, source
 from robospa.harness.textures.field import SIZE, Draw, Field, cell, noise, wave
-from robospa.harness.textures.folder import TextureFolder
 from robospa.tasks.scene import SEEN, UNSEEN, Texture
 
 DIGESTS = {

@@ -5,25 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.harness.textures.field import (
-    Cells,
-    Draw,
-    Field,
-    Picture,
-    X,
-    Y,
-    cell,
-    each,
-    filled,
-    mix,
-    noise,
-    ramp,
-    rgb,
-    shaded,
-    smooth,
-    turned,
-    wave,
-)
+from robospa.harness.textures import field as f
 
 PAPERS = (
     ("e9e2d0", "f5f0e4"), ("c8a97e", "d6bb94"), ("f2f2ef", "fbfbf9"), ("d9cfc0", "e6dece"),
@@ -49,87 +31,97 @@ GREENS = (
 )  # fmt: skip
 
 
-def paper(draw: Draw, colors: tuple[str, ...], style: int) -> Picture:
+def paper(draw: f.Draw, colors: tuple[str, ...], style: int) -> f.Picture:
     """Fibres; corrugated card in style 1, crumpled in style 2."""
-    t = 0.5 * noise(draw, 90, 90, 2) + 0.3 * noise(draw, 4, 4, 3) + 0.2 * noise(draw, 10, 120, 1)
-    picture = ramp(t, colors)
+    t = (
+        0.5 * f.noise(draw, 90, 90, 2)
+        + 0.3 * f.noise(draw, 4, 4, 3)
+        + 0.2 * f.noise(draw, 10, 120, 1)
+    )
+    picture = f.ramp(t, colors)
     if style % 3 == 1:
-        return shaded(picture, 0.95 + 0.05 * wave(Y * draw.whole(24, 40)))
+        return f.shaded(picture, 0.95 + 0.05 * f.wave(f.Y * draw.whole(24, 40)))
     if style % 3 == 2:
-        folds = Cells(draw, *(draw.whole(6, 10),) * 2, 1.0)
-        facet = each(draw, folds.number)
-        slope = facet * 0.16 + folds.near * (each(draw, folds.number) - 0.5) * 0.2
-        crease = smooth(folds.seam * 12)
-        return shaded(picture, (0.86 + slope) * (0.93 + 0.07 * crease))
+        folds = f.Cells(draw, *(draw.whole(6, 10),) * 2, 1.0)
+        facet = f.each(draw, folds.number)
+        slope = facet * 0.16 + folds.near * (f.each(draw, folds.number) - 0.5) * 0.2
+        crease = f.smooth(folds.seam * 12)
+        return f.shaded(picture, (0.86 + slope) * (0.93 + 0.07 * crease))
     return picture
 
 
-def plaster(draw: Draw, colors: tuple[str, ...], style: int) -> Picture:
+def plaster(draw: f.Draw, colors: tuple[str, ...], style: int) -> f.Picture:
     """Trowelled, or rough stucco in odd styles, lit from one side."""
-    relief = noise(draw, 13, 19, 5) if style % 2 == 0 else noise(draw, 42, 42, 3)
+    relief = f.noise(draw, 13, 19, 5) if style % 2 == 0 else f.noise(draw, 42, 42, 3)
     lit = relief[1:, 1:] - relief[:-1, :-1]
     light = np.ones(relief.shape, np.float32)
     light[1:, 1:] += lit * (2.2 if style % 2 == 0 else 0.9)
-    return shaded(ramp(0.5 * noise(draw, 3, 3, 4) + 0.5 * relief, colors), np.clip(light, 0.6, 1.3))
+    return f.shaded(
+        f.ramp(0.5 * f.noise(draw, 3, 3, 4) + 0.5 * relief, colors), np.clip(light, 0.6, 1.3)
+    )
 
 
-def worn(draw: Draw, colors: tuple[str, ...], style: int) -> Picture:
+def worn(draw: f.Draw, colors: tuple[str, ...], style: int) -> f.Picture:
     """Paint that has come off in places, over another paint or bare plaster."""
     other = draw.pick(BARE)
-    top, under = ramp(noise(draw, 4, 4, 4), colors), ramp(noise(draw, 20, 20, 3), other)
-    lumps = noise(draw, 7, 7, 5) if style % 2 == 0 else noise(draw, 3, 10, 5)
-    gone = smooth((lumps - draw.number(0.66, 0.82)) * 14)
-    edge = smooth((lumps - 0.55) * 5) * (1 - gone)
-    return mix(shaded(top, 1 - 0.12 * edge), under, gone)
+    top, under = f.ramp(f.noise(draw, 4, 4, 4), colors), f.ramp(f.noise(draw, 20, 20, 3), other)
+    lumps = f.noise(draw, 7, 7, 5) if style % 2 == 0 else f.noise(draw, 3, 10, 5)
+    gone = f.smooth((lumps - draw.number(0.66, 0.82)) * 14)
+    edge = f.smooth((lumps - 0.55) * 5) * (1 - gone)
+    return f.mix(f.shaded(top, 1 - 0.12 * edge), under, gone)
 
 
-def leather(draw: Draw, colors: tuple[str, ...], style: int) -> Picture:
+def leather(draw: f.Draw, colors: tuple[str, ...], style: int) -> f.Picture:
     """Grained hide; quilted in odd styles."""
-    grains = Cells(draw, *(draw.whole(34, 50),) * 2)
-    bump = smooth(grains.seam * 3)
-    picture = shaded(ramp(noise(draw, 5, 5, 4), colors), 0.72 + 0.3 * bump)
+    grains = f.Cells(draw, *(draw.whole(34, 50),) * 2)
+    bump = f.smooth(grains.seam * 3)
+    picture = f.shaded(f.ramp(f.noise(draw, 5, 5, 4), colors), 0.72 + 0.3 * bump)
     if style % 2:
         count = draw.whole(4, 8)
-        a, b = (X + Y) * count, (X - Y) * count
+        a, b = (f.X + f.Y) * count, (f.X - f.Y) * count
         near = np.minimum(np.abs(a - np.floor(a + 0.5)), np.abs(b - np.floor(b + 0.5)))
-        picture = shaded(picture, 0.6 + 0.42 * smooth(near * 4))
+        picture = f.shaded(picture, 0.6 + 0.42 * f.smooth(near * 4))
     return picture
 
 
-def cork(draw: Draw, colors: tuple[str, ...], style: int) -> Picture:
+def cork(draw: f.Draw, colors: tuple[str, ...], style: int) -> f.Picture:
     """Pressed crumbs of two sizes."""
-    coarse = Cells(draw, *(draw.whole(26, 46),) * 2, 1.0)
-    t = 0.6 * each(draw, coarse.number) + 0.4 * noise(draw, 80, 80, 2)
-    picture = ramp(
+    coarse = f.Cells(draw, *(draw.whole(26, 46),) * 2, 1.0)
+    t = 0.6 * f.each(draw, coarse.number) + 0.4 * f.noise(draw, 80, 80, 2)
+    picture = f.ramp(
         t, ("a8794a", "c69a66", "dcb887") if style % 2 == 0 else ("8a623c", "b0855a", colors[1])
     )
-    crumbs = (each(draw, coarse.number) < 0.08).astype(np.float32) * smooth(coarse.seam * 5)
-    return mix(picture, rgb("5e4128"), crumbs * 0.8)
+    crumbs = (f.each(draw, coarse.number) < 0.08).astype(np.float32) * f.smooth(coarse.seam * 5)
+    return f.mix(picture, f.rgb("5e4128"), crumbs * 0.8)
 
 
-def brushed(draw: Draw, colors: tuple[str, ...], style: int) -> Picture:
+def brushed(draw: f.Draw, colors: tuple[str, ...], style: int) -> f.Picture:
     """Brushed metal; riveted or ribbed plates in odd styles."""
-    t = 0.7 * noise(draw, 3, 120, 2) + 0.3 * noise(draw, 2, 2, 2)
-    picture = ramp(t, colors)
+    t = 0.7 * f.noise(draw, 3, 120, 2) + 0.3 * f.noise(draw, 2, 2, 2)
+    picture = f.ramp(t, colors)
     if style % 2:
         count = draw.whole(2, 4)
-        x, y = X * count, Y * count
+        x, y = f.X * count, f.Y * count
         u, v = np.abs(x - np.floor(x) - 0.5), np.abs(y - np.floor(y) - 0.5)
-        seam = smooth((0.5 - np.maximum(u, v)) * 40)
+        seam = f.smooth((0.5 - np.maximum(u, v)) * 40)
         p, q = u - 0.42, v - 0.42
         rivet = np.sqrt(p * p + q * q)
-        bump = 1 + 0.22 * smooth((0.022 - rivet) * 90)
-        picture = shaded(picture, (0.6 + 0.4 * seam) * bump)
+        bump = 1 + 0.22 * f.smooth((0.022 - rivet) * 90)
+        picture = f.shaded(picture, (0.6 + 0.4 * seam) * bump)
     return picture
 
 
-def ground(draw: Draw, colors: tuple[str, ...], style: int) -> Picture:
+def ground(draw: f.Draw, colors: tuple[str, ...], style: int) -> f.Picture:
     """Grass, moss, sand and soil seen from above; in odd styles with ripples or tufts."""
-    t = 0.45 * noise(draw, 110, 110, 1) + 0.35 * noise(draw, 30, 30, 3) + 0.2 * noise(draw, 4, 4, 3)
+    t = (
+        0.45 * f.noise(draw, 110, 110, 1)
+        + 0.35 * f.noise(draw, 30, 30, 3)
+        + 0.2 * f.noise(draw, 4, 4, 3)
+    )
     if style % 2:
-        ripple = wave(Y * draw.whole(7, 13) + noise(draw, 3, 3, 4) * 2.2)
+        ripple = f.wave(f.Y * draw.whole(7, 13) + f.noise(draw, 3, 3, 4) * 2.2)
         t = t + 0.16 * ripple
-    return ramp(t, colors)
+    return f.ramp(t, colors)
 
 
 INKS = (
@@ -144,79 +136,79 @@ SHARP = 40.0
 """How steep an edge of ink is, in units of a motif."""
 
 
-def _paper(draw: Draw, picture: Picture) -> Picture:
+def _paper(draw: f.Draw, picture: f.Picture) -> f.Picture:
     """The print on slightly uneven paper."""
-    return shaded(picture, 0.95 + 0.07 * noise(draw, 60, 60, 3))
+    return f.shaded(picture, 0.95 + 0.07 * f.noise(draw, 60, 60, 3))
 
 
-def _ink(distance: Field, scale: float = SHARP) -> Field:
+def _ink(distance: f.Field, scale: float = SHARP) -> f.Field:
     """1 where the signed distance is negative, with a soft edge."""
-    return smooth(0.5 - distance * scale)
+    return f.smooth(0.5 - distance * scale)
 
 
-def stripes(draw: Draw, colors: tuple[str, ...], style: int) -> Picture:
+def stripes(draw: f.Draw, colors: tuple[str, ...], style: int) -> f.Picture:
     """Bands of two to four colours: upright, lying, or slanting."""
-    x, _ = ((X, Y), (Y, X), turned(0.4142))[style % 3]
+    x, _ = ((f.X, f.Y), (f.Y, f.X), f.turned(0.4142))[style % 3]
     place = x * draw.whole(4, 12)
-    _, part = cell(place)
-    picture = filled(colors[0])
+    _, part = f.cell(place)
+    picture = f.filled(colors[0])
     for color in colors[1 : draw.whole(2, 4)]:
         start, wide = draw.number(0.0, 0.7), draw.number(0.06, 0.3)
         inside = np.abs(part - (start + wide / 2)) - wide / 2
-        picture = mix(picture, rgb(color), _ink(inside, 30))
+        picture = f.mix(picture, f.rgb(color), _ink(inside, 30))
     return _paper(draw, picture)
 
 
-def dots(draw: Draw, colors: tuple[str, ...], style: int) -> Picture:
+def dots(draw: f.Draw, colors: tuple[str, ...], style: int) -> f.Picture:
     """Spots in rows or staggered, of one or several colours; rings in style 2."""
     count = draw.whole(7, 16)
-    y = Y * count
-    row, v = cell(y)
-    column, u = cell(X * count + _every_other(row) * (style % 2))
+    y = f.Y * count
+    row, v = f.cell(y)
+    column, u = f.cell(f.X * count + _every_other(row) * (style % 2))
     u, v = u - 0.5, v - 0.5
     radius = draw.number(0.17, 0.36)
     away = np.sqrt(u * u + v * v) - radius
     if style >= 2:
         away = np.abs(away) - draw.number(0.04, 0.08)
-    which = np.floor(each(draw, row * 64 + column) * draw.whole(1, 3)).astype(np.int32)
-    inks = np.stack([rgb(code) for code in colors[1:]])
-    return _paper(draw, mix(filled(colors[0]), inks[which], _ink(away, 12)))
+    which = np.floor(f.each(draw, row * 64 + column) * draw.whole(1, 3)).astype(np.int32)
+    inks = np.stack([f.rgb(code) for code in colors[1:]])
+    return _paper(draw, f.mix(f.filled(colors[0]), inks[which], _ink(away, 12)))
 
 
-def zigzag(draw: Draw, colors: tuple[str, ...], style: int) -> Picture:
+def zigzag(draw: f.Draw, colors: tuple[str, ...], style: int) -> f.Picture:
     """Chevrons, or waves in odd styles, in two or three colours."""
-    x, y = (X, Y) if style < 2 else (Y, X)
+    x, y = (f.X, f.Y) if style < 2 else (f.Y, f.X)
     swing = x * draw.whole(5, 11)
-    tooth = np.abs(cell(swing)[1] - 0.5) * 2 if style % 2 == 0 else wave(swing) * 0.5
+    tooth = np.abs(f.cell(swing)[1] - 0.5) * 2 if style % 2 == 0 else f.wave(swing) * 0.5
     place = y * draw.whole(7, 14) + tooth * draw.number(0.5, 1.1)
-    _, part = cell(place)
-    picture = mix(filled(colors[0]), rgb(colors[1]), _ink(np.abs(part - 0.25) - 0.2, 25))
+    _, part = f.cell(place)
+    picture = f.mix(f.filled(colors[0]), f.rgb(colors[1]), _ink(np.abs(part - 0.25) - 0.2, 25))
     if draw.chance(0.5):
-        picture = mix(picture, rgb(colors[2]), _ink(np.abs(part - 0.72) - 0.07, 25))
+        picture = f.mix(picture, f.rgb(colors[2]), _ink(np.abs(part - 0.72) - 0.07, 25))
     return _paper(draw, picture)
 
 
-def lozenges(draw: Draw, colors: tuple[str, ...], style: int) -> Picture:
+def lozenges(draw: f.Draw, colors: tuple[str, ...], style: int) -> f.Picture:
     """Argyle: diamonds of two colours, with thin lines across in odd styles."""
-    a, b = (X * draw.number(0.9, 1.4) + Y), (X * 1.15 - Y)
+    a, b = (f.X * draw.number(0.9, 1.4) + f.Y), (f.X * 1.15 - f.Y)
     count = draw.whole(4, 9)
     a, b = a * count, b * count
-    (i, u), (j, v) = cell(a), cell(b)
-    inks = np.stack([rgb(code) for code in colors])
+    (i, u), (j, v) = f.cell(a), f.cell(b)
+    inks = np.stack([f.rgb(code) for code in colors])
     which = np.where((i + j) % 2 == 0, 0, 1 + (i % 2))
     picture = inks[which]
     if style % 2:
         line = np.minimum(np.abs(u - 0.5), np.abs(v - 0.5)) - 0.02
-        picture = mix(picture, rgb(colors[3]), _ink(line, 25))
+        picture = f.mix(picture, f.rgb(colors[3]), _ink(line, 25))
     return _paper(draw, picture)
 
 
-def _every_other(row: NDArray[np.int32]) -> Field:
+def _every_other(row: NDArray[np.int32]) -> f.Field:
     """Half a motif to the side in odd rows."""
     return (row % 2).astype(np.float32) * 0.5
 
 
-def _petals(u: Field, v: Field, count: int, radius: float) -> Field:
+def _petals(u: f.Field, v: f.Field, count: int, radius: float) -> f.Field:
     """Signed distance, roughly, from a flower of `count` (4, 6 or 8) petals."""
     best = np.full(u.shape, 9, np.float32)
     turns = {4: ((1, 0), (0, 1)), 6: ((1, 0), (0.5, 0.866), (-0.5, 0.866))}
@@ -228,91 +220,93 @@ def _petals(u: Field, v: Field, count: int, radius: float) -> Field:
     return best
 
 
-def flowers(draw: Draw, colors: tuple[str, ...], style: int) -> Picture:
+def flowers(draw: f.Draw, colors: tuple[str, ...], style: int) -> f.Picture:
     """Blossoms strewn evenly over a ground, large ones and, in odd styles, small ones between."""
-    picture = filled(colors[0])
+    picture = f.filled(colors[0])
     layers = (
         ((draw.whole(4, 6), 0.40), (draw.whole(9, 13), 0.30))
         if style % 2
         else ((draw.whole(5, 9), 0.42),)
     )
     for k, (count, radius) in enumerate(layers):
-        y = Y * count
-        row, v = cell(y)
-        column, u = cell(X * count + _every_other(row))
+        y = f.Y * count
+        row, v = f.cell(y)
+        column, u = f.cell(f.X * count + _every_other(row))
         key = row * 64 + column
-        u = u - 0.5 + (each(draw, key) - 0.5) * 0.25
-        v = v - 0.5 + (each(draw, key) - 0.5) * 0.25
-        size = 0.75 + 0.25 * each(draw, key)
+        u = u - 0.5 + (f.each(draw, key) - 0.5) * 0.25
+        v = v - 0.5 + (f.each(draw, key) - 0.5) * 0.25
+        size = 0.75 + 0.25 * f.each(draw, key)
         blossom = _petals(u / size, v / size, draw.pick((4, 6, 8)), radius)
-        there = (each(draw, key) < (1.0 if k == 0 else 0.6)).astype(np.float32)
-        picture = mix(picture, rgb(colors[1 + k]), _ink(blossom, 14) * there)
+        there = (f.each(draw, key) < (1.0 if k == 0 else 0.6)).astype(np.float32)
+        picture = f.mix(picture, f.rgb(colors[1 + k]), _ink(blossom, 14) * there)
         heart = np.sqrt(u * u + v * v) - radius * 0.24
-        picture = mix(picture, rgb(colors[3]), _ink(heart, 14) * there)
+        picture = f.mix(picture, f.rgb(colors[3]), _ink(heart, 14) * there)
     return _paper(draw, picture)
 
 
-def leaves(draw: Draw, colors: tuple[str, ...], style: int) -> Picture:
+def leaves(draw: f.Draw, colors: tuple[str, ...], style: int) -> f.Picture:
     """Leaves along stems that run up the wall, or strewn in odd styles."""
     count = draw.whole(6, 11)
-    picture = filled(colors[0])
-    x, y = X * count, Y * count * 1.4
-    column, u = cell(x)
-    u = u - 0.5 + wave(Y * 3 + each(draw, column)) * 0.08
-    row, v = cell(y + each(draw, column))
+    picture = f.filled(colors[0])
+    x, y = f.X * count, f.Y * count * 1.4
+    column, u = f.cell(x)
+    u = u - 0.5 + f.wave(f.Y * 3 + f.each(draw, column)) * 0.08
+    row, v = f.cell(y + f.each(draw, column))
     v = v - 0.5
     if style % 2:
         key = row * 64 + column
-        slope = each(draw, key) * 2 - 1
+        slope = f.each(draw, key) * 2 - 1
         p, q = u + v * slope, v - u * slope
         leaf = np.sqrt(p * p * 5 + q * q) - 0.36
         rib = np.maximum(np.abs(p) - 0.02, np.abs(q) - 0.3)
     else:
-        picture = mix(picture, rgb(colors[2]), _ink(np.abs(u) - 0.025, 14))
+        picture = f.mix(picture, f.rgb(colors[2]), _ink(np.abs(u) - 0.025, 14))
         p, q = np.abs(u) - 0.22, v + np.abs(u) * 0.9
         leaf = np.sqrt(p * p * 1.6 + q * q * 6) - 0.24
         rib = np.maximum(np.abs(q) - 0.015, np.abs(p) - 0.2)
-    picture = mix(picture, rgb(colors[1]), _ink(leaf, 14))
-    return _paper(draw, mix(picture, rgb(colors[2]), _ink(rib, 20)))
+    picture = f.mix(picture, f.rgb(colors[1]), _ink(leaf, 14))
+    return _paper(draw, f.mix(picture, f.rgb(colors[2]), _ink(rib, 20)))
 
 
-def shapes(draw: Draw, colors: tuple[str, ...], style: int) -> Picture:
+def shapes(draw: f.Draw, colors: tuple[str, ...], style: int) -> f.Picture:
     """Triangles, quarter circles or half circles in a grid, each in a colour of its own."""
     count = draw.whole(5, 10)
-    x, y = X * count, Y * count
-    (i, v), (j, u) = cell(y), cell(x)
+    x, y = f.X * count, f.Y * count
+    (i, v), (j, u) = f.cell(y), f.cell(x)
     key = i * 64 + j
-    u = np.where(each(draw, key) < 0.5, u, 1 - u)
-    v = np.where(each(draw, key) < 0.5, v, 1 - v)
+    u = np.where(f.each(draw, key) < 0.5, u, 1 - u)
+    v = np.where(f.each(draw, key) < 0.5, v, 1 - v)
     if style % 3 == 0:
         away = u - v
     elif style % 3 == 1:
         away = np.sqrt(u * u + v * v) - draw.number(0.75, 0.98)
     else:
         away = np.maximum(np.sqrt((u - 0.5) * (u - 0.5) + v * v) - 0.48, -v)
-    inks = np.stack([rgb(code) for code in colors])
-    first = np.floor(each(draw, key) * 4).astype(np.int32)
-    second = (first + 1 + np.floor(each(draw, key) * 3).astype(np.int32)) % 4
-    return _paper(draw, mix(inks[first], inks[second], _ink(away, 16)))
+    inks = np.stack([f.rgb(code) for code in colors])
+    first = np.floor(f.each(draw, key) * 4).astype(np.int32)
+    second = (first + 1 + np.floor(f.each(draw, key) * 3).astype(np.int32)) % 4
+    return _paper(draw, f.mix(inks[first], inks[second], _ink(away, 16)))
 
 
-def scales(draw: Draw, colors: tuple[str, ...], style: int) -> Picture:
+def scales(draw: f.Draw, colors: tuple[str, ...], style: int) -> f.Picture:
     """Overlapping fans of rings, as on Japanese cloth; filled fans in odd styles."""
     count = draw.whole(6, 11)
-    picture = filled(colors[0])
-    y = Y * count * 2
-    top, down = cell(y)
+    picture = f.filled(colors[0])
+    y = f.Y * count * 2
+    top, down = f.cell(y)
     rings = 0 if style % 2 else draw.whole(2, 3)
     for back in (2, 1, 0):  # nearer rows are drawn over farther ones
         row = top - back + 1
-        column, u = cell(X * count + _every_other(row))
+        column, u = f.cell(f.X * count + _every_other(row))
         u, v = u - 0.5, (down + (back - 1)) * 0.5
         away = np.sqrt(u * u + v * v) * 2
         inside = _ink(away - 1, 12)
-        tone = each(draw, row * 64 + column)
-        body = mix(filled(colors[1]), rgb(colors[2]), (tone < 0.4).astype(np.float32))
+        tone = f.each(draw, row * 64 + column)
+        body = f.mix(f.filled(colors[1]), f.rgb(colors[2]), (tone < 0.4).astype(np.float32))
         line = _ink(np.abs(away - 0.93) - 0.05, 10)
         for k in range(rings):
             line = np.maximum(line, _ink(np.abs(away - 0.93 + 0.25 * (k + 1)) - 0.05, 10))
-        picture = mix(picture, mix(body, rgb(colors[3] if style % 2 else colors[0]), line), inside)
+        picture = f.mix(
+            picture, f.mix(body, f.rgb(colors[3] if style % 2 else colors[0]), line), inside
+        )
     return _paper(draw, picture)
