@@ -13,7 +13,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from robospa.geometry import Pose, Vec3, from_matrix
+from robospa.geometry import Pose, from_matrix, vec3
 from robospa.harness.packs.archive import Archive, ArchiveError, Arrays, cached, load_arrays
 from robospa.harness.packs.mesh_files import (
     Floats,
@@ -169,12 +169,6 @@ def convex_shapes(pieces: Sequence[Piece]) -> tuple[Shape, ...]:
     return tuple(_shape(*piece) for piece in pieces)
 
 
-def vector(values: Floats) -> Vec3:
-    """(3,) as a tuple."""
-    x, y, z = values.tolist()
-    return (x, y, z)
-
-
 def _shape(corners: Floats, triangles: Ints) -> Shape:
     normals, _ = planes(corners, triangles)
     axes = [normals[0]]
@@ -189,8 +183,8 @@ def _shape(corners: Floats, triangles: Ints) -> Shape:
     turn = np.array([axes[0], axes[1], np.cross(axes[0], axes[1])]).T
     along = corners @ turn
     middle, half = (along.max(axis=0) + along.min(axis=0)) / 2, np.ptp(along, axis=0) / 2
-    pose = Pose(vector(turn @ middle), from_matrix(turn))
-    return Shape(Box(vector(half)), pose, visual=False)
+    pose = Pose(vec3(turn @ middle), from_matrix(turn))
+    return Shape(Box(vec3(half)), pose, visual=False)
 
 
 # -- hollows -----------------------------------------------------------------------------------

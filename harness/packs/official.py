@@ -11,13 +11,14 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 
+from robospa.geometry import vec3
 from robospa.harness.packs.archive import (
     Archive,
     ArchiveError,
@@ -25,7 +26,7 @@ from robospa.harness.packs.archive import (
     load_arrays,
     open_archive,
 )
-from robospa.harness.packs.convex import colliding_pieces, convex_shapes, vector
+from robospa.harness.packs.convex import colliding_pieces, convex_shapes
 from robospa.harness.packs.index import THING, clutter_things, digest_of, task_faults
 from robospa.harness.packs.mesh_files import Floats, Piece
 from robospa.harness.packs.placing import (
@@ -114,51 +115,42 @@ def make_model(
     archive: Archive, chosen: OfficialModel, builtin: ObjectModel, tint: Color | None = None
 ) -> ObjectModel:
     """The archive's `chosen` model with all that its `builtin` likeness has."""
-    what = f"the official model {chosen.name}"
     files = archive.files(chosen)
     data = read_model_data(files.data)
-    parts = bodies_of(archive, files, chosen.hinge, what)
+    parts = bodies_of(archive, files, chosen)
     data = data.in_root(parts.links)
-    pieces = [*parts.body.pieces, *(parts.door.pieces if parts.door else ())]
-    points = np.concatenate([corners for corners, _ in pieces])
-    placing = place(points, _box(parts), data, chosen, builtin, what)
+    bodies = [parts.body, *([parts.door] if parts.door else [])]
+    points = np.concatenate([corners for body in bodies for corners, _ in body.pieces])
+    drawn = np.concatenate([body.box for body in bodies])
+    box = np.stack([drawn.min(axis=0), drawn.max(axis=0)])
+    placing = place(points, box, data, chosen, builtin)
     likeness = Likeness.of(builtin, placing)
-    placed = _placed(parts.body.pieces, placing)
-    low, high = placing.low, placing.high
-    size = (high - low).tolist()
+    placed = _placed(parts.body, placing)
     placed_points = placing.points(points)
-    held = grasp_points(placed, builtin, likeness, placing, data, chosen)
     return ObjectModel(
         asset=builtin.asset,
         shapes=convex_shapes(placed),
-        size=(size[0], size[1], size[2]),
+        size=vec3(placing.high - placing.low),
         radius=float(np.hypot(placed_points[:, 0], placed_points[:, 1]).max()),
         noun=builtin.noun,
         phrases=builtin.phrases,
         bottom=0.0,
         mass=data.mass or builtin.mass,
         friction=builtin.friction,
-        grasps=held,
-        frames=frames(builtin, likeness, placing, data, chosen, what),
-        hinge=_hinge(parts, placing, builtin, what, tint),
+        grasps=grasp_points(placed, builtin, likeness, placing, data, chosen),
+        frames=frames(builtin, likeness, placing, data, chosen),
+        hinge=_hinge(parts, placing, builtin, chosen, tint),
         skin=Skin(str(parts.body.skin), placing.scale, placing.pose, tint),
     )
 
 
-def _box(parts: Bodies) -> Floats:
-    """Corners (2, 3) of the box around all that is drawn."""
-    boxes = [parts.body.box, *([parts.door.box] if parts.door else [])]
-    corners = np.concatenate(boxes)
-    return np.stack([corners.min(axis=0), corners.max(axis=0)])
-
-
-def _placed(pieces: Sequence[Piece], placing: Placing) -> list[Piece]:
-    """The pieces in the body frame [m]."""
-    return [(placing.points(corners), triangles) for corners, triangles in pieces]
+def _placed(body: Body, placing: Placing) -> list[Piece]:
+    """The body's pieces in our body frame [m]."""
+    return [(placing.points(corners), triangles) for corners, triangles in body.pieces]
 
 
 def _hinge(
-    parts: Bodies, placing: Placing, builtin: ObjectModel, what: str, tint: Color | None
+    parts: Bodies, placing: Placing, builtin: ObjectModel, model: OfficialModel, tint: Color | None
 ) -> Hinge | None:
     """The door: it turns from 0 as drawn to its joint's limit, whichever way that is."""
     if parts.door is None or parts.joint is None:
@@ -170,13 +162,11 @@ def _hinge(
     axis = placing.turn @ frame[:3, :3] @ np.asarray(parts.joint.axis) * way
     length = float(np.linalg.norm(axis))
     if length < 1e-6:
-        raise ArchiveError(f"{what} has a door that turns about no axis")
-    axis = axis / length
-    at = placing.points(frame[None, :3, 3])[0]
+        raise ArchiveError(f"{model} has a door that turns about no axis")
     return Hinge(
-        shapes=convex_shapes(_placed(parts.door.pieces, placing)),
-        point=vector(at),
-        axis=vector(axis),
+        shapes=convex_shapes(_placed(parts.door, placing)),
+        point=vec3(placing.points(frame[None, :3, 3])[0]),
+        axis=vec3(axis / length),
         upper=max(upper, -lower),
         friction=builtin.hinge.friction,
         damping=builtin.hinge.damping,
@@ -209,56 +199,54 @@ class Bodies:
     links: Mapping[str, Floats] = field(default_factory=dict)
 
 
-def bodies_of(archive: Archive, files: ModelFiles, hinge: bool, what: str) -> Bodies:
-    """Read the model's files, or what was made of them before. ArchiveError, naming `what`."""
+def bodies_of(archive: Archive, files: ModelFiles, model: OfficialModel) -> Bodies:
+    """Read the model's files, or what was made of them before. ArchiveError."""
     if files.urdf is None:
         assert files.visual is not None and files.collision is not None
         drawn, solid = (MeshUse(file, np.eye(4)) for file in (files.visual, files.collision))
         return Bodies(_body(archive, [drawn], [solid]))
     robot = read_urdf(files.urdf, archive.inside)
-    joint = door_joint(robot, what) if hinge else None
+    joint = _door_joint(robot, model) if model.hinge else None
     moved = robot.moved_by(joint.child) if joint is not None else frozenset()
-    body = _of_links(archive, robot, [link for link in robot.visuals if link not in moved], what)
-    links = {link: robot.in_root(link) for link in robot.visuals}
-    door = None if joint is None else _of_links(archive, robot, sorted(moved), what)
-    return Bodies(body, door, joint, links)
+    rest = [link for link in robot.visuals if link not in moved]
+    return Bodies(
+        _of_links(archive, robot, rest, model),
+        None if joint is None else _of_links(archive, robot, sorted(moved), model),
+        joint,
+        {link: robot.in_root(link) for link in robot.visuals},
+    )
 
 
-def door_joint(robot: Urdf, what: str) -> UrdfJoint:
+def _door_joint(robot: Urdf, model: OfficialModel) -> UrdfJoint:
     """The joint that turns most of the model's meshes: its door. ArchiveError if none turns."""
-    turning = [j for j in robot.joints.values() if j.kind in ("revolute", "continuous")]
-    with_limits = [j for j in turning if j.limits[0] < j.limits[1]]
-    if not with_limits:
-        raise ArchiveError(f"{what} has no joint that turns, which its door needs")
 
     def size(joint: UrdfJoint) -> int:
         files = (use.file for link in robot.moved_by(joint.child) for use in robot.visuals[link])
         return sum(file.stat().st_size for file in files if file.is_file())
 
+    turning = [j for j in robot.joints.values() if j.kind in ("revolute", "continuous")]
+    with_limits = [j for j in turning if j.limits[0] < j.limits[1]]
+    if not with_limits:
+        raise ArchiveError(f"{model} has no joint that turns, which its door needs")
     return max(with_limits, key=size)
 
 
 def _of_links(
-    archive: Archive, robot: Urdf, links: Sequence[str], what: str, whole: bool = False
+    archive: Archive, robot: Urdf, links: Iterable[str], what: object, whole: bool = False
 ) -> Body:
-    """Links of a URDF file as one body in the root's frame, all joints at 0."""
-
-    def uses(of: dict[str, tuple[MeshUse, ...]]) -> list[MeshUse]:
-        return [
+    """Links of a URDF file as one body in the root's frame, all joints at 0. ArchiveError, naming
+    `what` has no meshes. With `whole` it collides as one hull around each mesh."""
+    drawn, solid = (
+        [
             MeshUse(use.file, robot.in_root(link) @ use.transform)
             for link in links
-            for use in of[link]
+            for use in uses[link]
         ]
-
-    drawn, solid = uses(dict(robot.visuals)), uses(dict(robot.collisions))
+        for uses in (robot.visuals, robot.collisions)
+    )
     if not drawn and not solid:
         raise ArchiveError(f"{what} has no meshes where its parts should be")
     return _body(archive, drawn or solid, solid or drawn, whole)
-
-
-def hull_of(archive: Archive, robot: Urdf, what: str) -> Body:
-    """A URDF file as one body that collides as a hull around each of its meshes."""
-    return _of_links(archive, robot, list(robot.visuals), what, whole=True)
 
 
 def _body(
@@ -299,7 +287,8 @@ def make_thing(archive: Archive, name: object) -> ObjectModel:
     if not path.is_file():
         raise ArchiveError(f"the thing {name!r} is missing in the assets' folder")
     what = f"the thing {name!r} of the assets' folder"
-    body = hull_of(archive, read_urdf(path, archive.inside), what)
+    robot = read_urdf(path, archive.inside)
+    body = _of_links(archive, robot, robot.visuals, what, whole=True)
     points = np.concatenate([corners for corners, _ in body.pieces])
     low, high = points.min(axis=0), points.max(axis=0)
     if not SIZES[0] <= float(np.ptp(points, axis=0).max()) <= SIZES[1]:
@@ -309,7 +298,7 @@ def make_thing(archive: Archive, name: object) -> ObjectModel:
     return ObjectModel(
         asset=THING,
         shapes=convex_shapes(body.pieces),
-        size=vector(high - low),
+        size=vec3(high - low),
         radius=float(np.hypot(points[:, 0], points[:, 1]).max()),
         noun=noun,
         phrases=(noun,),

@@ -15,14 +15,17 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
+import msgspec
 import numpy as np
+from msgspec import Meta
 
-from robospa.geometry import Pose, Vec3, from_matrix
+from robospa.geometry import Pose, Vec3, from_matrix, vec3
 from robospa.harness.packs.archive import ArchiveError
 from robospa.harness.packs.convex import planes
 from robospa.harness.packs.mesh_files import Floats, Piece
+from robospa.schema import read
 from robospa.tasks.objects.build import MAX_WIDTH, points_of
 from robospa.tasks.official import OfficialModel, official_size
 from robospa.tasks.shapes import Grasp, ObjectModel
@@ -31,16 +34,36 @@ from robospa.tasks.shapes import Grasp, ObjectModel
 
 LARGEST_DATA = 4 << 20
 """Bytes that such a file may have; the largest official one has some tens of kilobytes."""
-MOST_POINTS = 256
+Points = Annotated[list[Any], Meta(max_length=256)]
 KEYS = {
     "contact": ("contact_points_pose", "contact_points", "contact_pose"),
     "functional": ("functional_matrix", "functional_points"),
 }
 """Names of the lists of points, newest first: 48 official files have older ones."""
-SCALES = (1e-4, 1e4)
-LARGEST, LONGEST = 1e6, 1e12
-"""What no place of such a file reaches, and no other number: JSON may hold NaN, and whole numbers
-of any length."""
+SCALES, SIZES = (1e-4, 1e4), (-1e12, 1e12)
+LARGEST = 1e6
+"""What no place of such a file reaches."""
+
+
+Three = float | tuple[float, float, float]
+"""One number counts for all three axes."""
+
+
+class _File(msgspec.Struct):
+    """Such a file. A mass that is given link by link counts as none."""
+
+    scale: Three = 1.0
+    extents: Three | None = None
+    mass: float | dict[str, Any] | list[Any] | None = None
+    contact_points_pose: Points | None = None
+    contact_points: Points | None = None
+    contact_pose: Points | None = None
+    functional_matrix: Points | None = None
+    functional_points: Points | None = None
+
+    def points(self, kind: str) -> list[Any]:
+        """The list of points of a kind."""
+        return next((rows for key in KEYS[kind] if (rows := getattr(self, key))), [])
 
 
 @dataclass(frozen=True)
@@ -76,83 +99,47 @@ class ModelData:
         has no such point."""
         kind, _, number = name.partition(" ")
         frames = self.contact if kind == "contact" else self.functional
-        if int(number) >= len(frames):
-            return None
-        x, y, z = (frames[int(number), :3, 3] * self.scale).tolist()
-        return (x, y, z)
+        return vec3(frames[int(number), :3, 3] * self.scale) if int(number) < len(frames) else None
 
 
 def read_model_data(path: Path) -> ModelData:
     """What `path` says. ArchiveError, in one sentence, if it is not such a file."""
+    if path.stat().st_size > LARGEST_DATA:
+        raise ArchiveError(f"{str(path)!r} is larger than {LARGEST_DATA >> 20} MB")
     try:
-        if path.stat().st_size > LARGEST_DATA:
-            raise ArchiveError(f"{str(path)!r} is larger than {LARGEST_DATA >> 20} MB")
         data = json.loads(path.read_bytes())
     except (OSError, ValueError, RecursionError) as error:
-        if isinstance(error, ArchiveError):
-            raise
         raise ArchiveError(f"{str(path)!r} is no readable JSON file: {error}") from error
-    if not isinstance(data, dict):
-        raise ArchiveError(f"{str(path)!r} must hold a JSON object with a scale and points")
-    scale = _three(data.get("scale", (1.0, 1.0, 1.0)), path, "scale")
-    if not all(SCALES[0] <= s <= SCALES[1] for s in scale):
-        raise ArchiveError(f"{str(path)!r} has the scale {list(scale)}, which no model can have")
-    extents = data.get("extents")
+    what = repr(str(path))
+    said = read(_File, data, what, ArchiveError)
+    mass = said.mass if isinstance(said.mass, float) else None
+    if mass is not None and not 0 < mass < 1e3:
+        raise ArchiveError(f"{what} gives the mass {mass}, which no object can have")
     return ModelData(
-        scale,
-        _frames(data, "contact", path),
-        _frames(data, "functional", path),
-        None if extents is None else _three(extents, path, "extents"),
-        _mass(data.get("mass"), path),
-        {kind: tuple(_link(row) for row in _listed(data, kind)) for kind in KEYS},
+        _three(said.scale, SCALES, f"{what} has the scale"),
+        *(_frames(said.points(kind), f"{what} has {kind} points") for kind in KEYS),
+        None if said.extents is None else _three(said.extents, SIZES, f"{what} has the extents"),
+        mass,
+        {kind: tuple(map(_link, said.points(kind))) for kind in KEYS},
     )
 
 
-def _mass(value: object, path: Path) -> float | None:
-    """A body's mass [kg]; None where it is not given, or given link by link."""
-    if value is None or isinstance(value, dict | list):
-        return None
-    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < 1e3:
-        raise ArchiveError(
-            f"{str(path)!r} gives the mass {repr(value)[:80]}, which no object can have"
-        )
-    return float(value)
-
-
-def _three(value: object, path: Path, what: str) -> Vec3:
-    """Three numbers; one number counts for all three axes."""
-    if isinstance(value, int | float) and not isinstance(value, bool):
-        value = [value] * 3
-    if (
-        not isinstance(value, list | tuple)
-        or len(value) != 3
-        or not all(isinstance(v, int | float) and abs(v) < LONGEST for v in value)
-    ):
-        raise ArchiveError(
-            f"{str(path)!r} must give three numbers as {what}, not {repr(value)[:80]}"
-        )
-    return (float(value[0]), float(value[1]), float(value[2]))
-
-
-def _frames(data: dict[str, Any], kind: str, path: Path) -> Floats:
-    """(n, 4, 4) frames of a list of points, (0, 4, 4) if there is none."""
-    listed = _listed(data, kind)
-    if not isinstance(listed, list) or len(listed) > MOST_POINTS:
-        raise ArchiveError(
-            f"{str(path)!r} must list its {kind} points, {MOST_POINTS} of them at most"
-        )
-    rows = [_matrix(row) for row in listed]
-    try:
-        found = np.array(rows, dtype=float).reshape(-1, 4, 4)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise ArchiveError(f"{str(path)!r} has {kind} points that are no 4x4 frames") from error
-    if not np.isfinite(found).all() or np.abs(found).max(initial=0.0) > LARGEST:
-        raise ArchiveError(f"{str(path)!r} has {kind} points at places that no object can have")
+def _three(value: Three, bounds: tuple[float, float], what: str) -> Vec3:
+    found = vec3(value if isinstance(value, tuple) else (value,) * 3)
+    if not all(bounds[0] <= number <= bounds[1] for number in found):
+        raise ArchiveError(f"{what} {list(found)}, which no model can have")
     return found
 
 
-def _listed(data: dict[str, Any], kind: str) -> Any:
-    return next((data[key] for key in KEYS[kind] if data.get(key)), [])
+def _frames(rows: list[Any], what: str) -> Floats:
+    """(n, 4, 4) frames of a list of points, (0, 4, 4) if there is none."""
+    try:
+        found = np.array([*map(_matrix, rows)], dtype=float).reshape(-1, 4, 4)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise ArchiveError(f"{what} that are no 4x4 frames") from error
+    if not np.isfinite(found).all() or np.abs(found).max(initial=0.0) > LARGEST:
+        raise ArchiveError(f"{what} at places that no object can have")
+    return found
 
 
 def _link(row: object) -> str:
@@ -163,9 +150,8 @@ def _link(row: object) -> str:
 
 def _matrix(row: object) -> object:
     """The frame of a point; models with joints also name the link that it belongs to."""
-    if isinstance(row, dict):
-        return next((value for value in row.values() if isinstance(value, list)), row)
-    return row
+    values = row.values() if isinstance(row, dict) else ()
+    return next((value for value in values if isinstance(value, list)), row)
 
 
 # -- where it stands ---------------------------------------------------------------------------
@@ -191,8 +177,7 @@ class Placing:
 
     def points(self, points: Floats) -> Floats:
         """Where points (n, 3) of the archive's model are in the body frame."""
-        placed: Floats = (points * self.scale) @ self.turn.T + self.shift
-        return placed
+        return self.scaled_points(points * self.scale)
 
     def scaled_points(self, points: Floats) -> Floats:
         """The same of points that are scaled already."""
@@ -202,34 +187,28 @@ class Placing:
     @property
     def pose(self) -> Pose:
         """Turn and shift as a pose."""
-        x, y, z = self.shift.tolist()
-        return Pose((x, y, z), from_matrix(self.turn))
+        return Pose(vec3(self.shift), from_matrix(self.turn))
 
 
 def place(
-    points: Floats,
-    drawn: Floats,
-    data: ModelData,
-    model: OfficialModel,
-    builtin: ObjectModel,
-    what: str,
+    points: Floats, drawn: Floats, data: ModelData, model: OfficialModel, builtin: ObjectModel
 ) -> Placing:
     """How a model is placed in our frame: `points` (n, 3) are of what collides, `drawn` (2, 3) the
     corners of the box of what is drawn, both unscaled.
 
-    ArchiveError, naming `what` it is, for a model of the wrong size or without a point it needs.
+    ArchiveError for a model of the wrong size or without a point that it needs.
     """
     scaled = points * data.scale
     turn = np.eye(3) if model.lies or model.jointed else Y_UP
     turn = _about_z(model.turns * math.pi / 2) @ turn
     if model.faces:
-        turn = _about_z(_bearing_off(scaled @ turn.T, turn, data, model, builtin, what)) @ turn
+        turn = _about_z(_bearing_off(scaled @ turn.T, turn, data, model, builtin)) @ turn
     turned = scaled @ turn.T
     low, high = turned.min(axis=0), turned.max(axis=0)
     shift = np.array([0.0, 0.0, -low[2]])
     if model.jointed or model.lies:  # our own origins: the archive's are in the middle of the mesh
         shift[:2] = (_box(builtin).sum(axis=0) - (low + high))[:2] / 2
-    _check_size(drawn * data.scale, model, what)
+    _check_size(drawn * data.scale, model)
     return Placing(data.scale, turn, shift, low + shift, high + shift)
 
 
@@ -239,12 +218,7 @@ def _about_z(angle: float) -> Floats:
 
 
 def _bearing_off(
-    turned: Floats,
-    turn: Floats,
-    data: ModelData,
-    model: OfficialModel,
-    builtin: ObjectModel,
-    what: str,
+    turned: Floats, turn: Floats, data: ModelData, model: OfficialModel, builtin: ObjectModel
 ) -> float:
     """By how much [rad] the model must be turned about z to look where the built-in one does."""
     point, _, frame = model.faces.partition(" = ")
@@ -253,13 +227,13 @@ def _bearing_off(
     else:
         found = data.point(point)
         if found is None:
-            raise ArchiveError(f"{what} has no {point} point, by which it is turned")
+            raise ArchiveError(f"{model} has no {point} point, by which it is turned")
         x, y, _ = (turn @ np.asarray(found)).tolist()
     ours = builtin.frames[frame].position
     return math.atan2(ours[1], ours[0]) - math.atan2(y, x)
 
 
-def _check_size(corners: Floats, model: OfficialModel, what: str) -> None:
+def _check_size(corners: Floats, model: OfficialModel) -> None:
     """ArchiveError if the model is not as large as the archive's, which says so in its own axes."""
     listed = official_size(model)
     if listed is None:
@@ -269,7 +243,7 @@ def _check_size(corners: Floats, model: OfficialModel, what: str) -> None:
     fits = SHORTER <= up / listed.size[1] <= TALLER
     if not fits or not all(NARROWER <= share <= WIDER for share in wide):
         raise ArchiveError(
-            f"{what} is {across:.3g} x {up:.3g} x {deep:.3g} m large where the official one is "
+            f"{model} is {across:.3g} x {up:.3g} x {deep:.3g} m large where the official one is "
             f"{' x '.join(f'{size:.3g}' for size in listed.size)} m: its scale or its file is wrong"
         )
 
@@ -299,8 +273,7 @@ class Likeness:
 
     def point(self, point: Vec3) -> Vec3:
         """Where `point` of the built-in model has gone."""
-        x, y, z = (self.low + self.factors * (np.asarray(point) - self.origin)).tolist()
-        return (x, y, z)
+        return vec3(self.low + self.factors * (np.asarray(point) - self.origin))
 
 
 def frames(
@@ -309,7 +282,6 @@ def frames(
     placing: Placing,
     data: ModelData,
     model: OfficialModel,
-    what: str,
 ) -> dict[str, Pose]:
     """The frames that tasks and skills need: at the archive's points where the table names one,
     else at the like place. They are turned as the built-in ones.
@@ -323,9 +295,9 @@ def frames(
     for name, point in model.points.items():
         place = data.point(point)
         if place is None:
-            raise ArchiveError(f"{what} has no {point} point, where its {name} is")
-        x, y, z = placing.scaled_points(np.array([place]))[0].tolist()
-        found[name] = replace(builtin.frames[name], position=(x, y, z))
+            raise ArchiveError(f"{model} has no {point} point, where its {name} is")
+        at = vec3(placing.scaled_points(np.array([place]))[0])
+        found[name] = replace(builtin.frames[name], position=at)
     return found
 
 
@@ -351,30 +323,27 @@ def grasp_points(
 ) -> tuple[Grasp, ...]:
     """All that fingers fit around; `pieces` are in the body frame [m]."""
     faces = [planes(*piece) for piece in pieces]
-    found = []
-    for grasp in builtin.grasps:
-        found.append((likeness.point(grasp.point), grasp.approach, grasp.closing, grasp.tilt))
+    found = [(likeness.point(g.point), g.approach, g.closing, g.tilt) for g in builtin.grasps]
     used = {point for point in model.points.values() if point.startswith("contact")}
     for number, frame in enumerate(data.contact):
         if f"contact {number}" in used:
             continue
-        x, y, z = placing.points(frame[None, :3, 3])[0].tolist()
         closing, approach = (_unit(placing.turn @ frame[:3, k]) for k in (0, 2))
         if approach[2] <= UPWARDS:
-            found.append(((x, y, z), approach, closing, TILT))
+            at = vec3(placing.points(frame[None, :3, 3])[0])
+            found.append((at, approach, closing, TILT))
     made = []
     for point, approach, closing, tilt in found:
         held = _between(faces, np.array(point), np.array(approach), np.array(closing))
         if held is None or not 1e-3 < held[1] <= MAX_WIDTH:
             continue
-        x, y, z = (np.array(point) + held[0] * np.array(closing)).tolist()
-        made.append(Grasp((x, y, z), approach, closing, held[1], tilt))
+        middle = vec3(np.array(point) + held[0] * np.array(closing))
+        made.append(Grasp(middle, approach, closing, held[1], tilt))
     return tuple(dict.fromkeys(made))
 
 
 def _unit(vector: Floats) -> Vec3:
-    x, y, z = (vector / max(float(np.linalg.norm(vector)), 1e-9)).tolist()
-    return (x, y, z)
+    return vec3(vector / max(float(np.linalg.norm(vector)), 1e-9))
 
 
 def _between(
@@ -398,7 +367,6 @@ def _between(
             high = at[slope > 1e-9].min(initial=np.inf)
             if low < high:
                 spans.append((float(low), float(high)))
-    low, high = 0.0, 0.0
     near = sorted(span for span in spans if span[0] < REACH and span[1] > -REACH)
     if not near:
         return None

@@ -43,6 +43,9 @@ class OfficialModel:
         """As the official scene files and object descriptions write it: "071_can/base3"."""
         return f"{self.folder}/base{self.model}"
 
+    def __str__(self) -> str:
+        return f"the official model {self.name}"
+
 
 @dataclass(frozen=True)
 class OfficialSize:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import shutil
@@ -19,7 +18,6 @@ from mesh_writers import Piece, glb, glb_bytes
 from robospa.harness.packs.archive import ArchiveError, open_archive
 from robospa.harness.packs.index import fault
 from robospa.harness.packs.official import OfficialPack
-from robospa.harness.packs.placing import read_model_data
 from robospa.harness.textures import TextureFolder
 from robospa.tasks.official import official_models
 from robospa.tasks.packs import PackError
@@ -198,28 +196,6 @@ def test_a_pack_names_the_tasks_that_cannot_run(root: Path) -> None:
 def test_a_thing_whose_picture_is_not_there_is_drawn_without(root: Path) -> None:
     (root / THING / "textured.png").unlink()
     assert OfficialPack(open_archive(root)).model("objaverse", {"thing": "marker/0"}).skin
-
-
-@pytest.mark.parametrize(
-    ("key", "value", "sentence"),
-    [
-        ("scale", [float("nan")] * 3, "three numbers as scale"),
-        ("scale", [10**400] * 3, "three numbers as scale"),
-        ("extents", [1, 10**400, 1], "three numbers as extents"),
-        ("mass", 10**400, "which no object can have"),
-        ("mass", True, "which no object can have"),
-        ("contact_points_pose", [[[10**400] * 4] * 4], "no 4x4 frames"),
-        ("contact_points_pose", [[[float("inf")] * 4] * 4], "no object can have"),
-    ],
-)
-def test_numbers_that_json_allows_and_no_model_has(
-    tmp_path: Path, key: str, value: object, sentence: str
-) -> None:
-    path = tmp_path / "model_data0.json"
-    path.write_text(json.dumps({"scale": [1, 1, 1], key: value}))
-    with pytest.raises(ArchiveError, match=sentence) as refused:
-        read_model_data(path)
-    assert len(str(refused.value)) < 300
 
 
 @pytest.mark.parametrize(
