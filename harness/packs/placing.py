@@ -117,7 +117,8 @@ def read_model_data(path: Path) -> ModelData:
         raise ArchiveError(f"{what} gives the mass {mass}, which no object can have")
     return ModelData(
         _three(said.scale, SCALES, f"{what} has the scale"),
-        *(_frames(said.points(kind), f"{what} has {kind} points") for kind in KEYS),
+        _frames(said, "contact", what),
+        _frames(said, "functional", what),
         None if said.extents is None else _three(said.extents, SIZES, f"{what} has the extents"),
         mass,
         {kind: tuple(map(_link, said.points(kind))) for kind in KEYS},
@@ -131,14 +132,14 @@ def _three(value: Three, bounds: tuple[float, float], what: str) -> Vec3:
     return found
 
 
-def _frames(rows: list[Any], what: str) -> Floats:
-    """(n, 4, 4) frames of a list of points, (0, 4, 4) if there is none."""
+def _frames(said: _File, kind: str, what: str) -> Floats:
+    """(n, 4, 4) frames of a kind of points, (0, 4, 4) if there are none."""
     try:
-        found = np.array([*map(_matrix, rows)], dtype=float).reshape(-1, 4, 4)
+        found = np.array([*map(_matrix, said.points(kind))], dtype=float).reshape(-1, 4, 4)
     except (TypeError, ValueError, OverflowError) as error:
-        raise ArchiveError(f"{what} that are no 4x4 frames") from error
+        raise ArchiveError(f"{what} has {kind} points that are no 4x4 frames") from error
     if not np.isfinite(found).all() or np.abs(found).max(initial=0.0) > LARGEST:
-        raise ArchiveError(f"{what} at places that no object can have")
+        raise ArchiveError(f"{what} has {kind} points at places that no object can have")
     return found
 
 

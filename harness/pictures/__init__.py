@@ -1,1 +1,1 @@
-"""Pictures: galleries, object sheets, the page of tasks, videos."""
+"""Pictures: galleries of scenes, and videos of trials."""
