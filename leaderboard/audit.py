@@ -23,7 +23,7 @@ from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.harness.trial import TrialSetup, task_parts
 from robospa.leaderboard.agreement import Counts, agreement
 from robospa.leaderboard.rules import shipped, spec_of
-from robospa.leaderboard.traces import Trace, joint_path, with_joints
+from robospa.leaderboard.traces import Trace, split_trace, with_joints
 from robospa.leaderboard.verify import read_traces, verify
 from robospa.results.records.runs import Run, action_path, finished, read_run
 from robospa.results.records.trial_record import TrialRecord
@@ -87,8 +87,7 @@ def audit(
 
 
 def executed_paths(path: Path, count: int) -> tuple[Run, dict[TrialKey, Trace]]:
-    """The run, and the joint actions that `count` of its successful trials executed; trials whose
-    traces lack them are left out."""
+    """The run, and the joint actions that `count` of its successful trials executed."""
     bundle = verify(path, shipped(), practice=True) if path.is_file() else None
     run = bundle.run if bundle else read_run(path)
     good = [key for key in run.keys if key in run.records and run.records[key].success]
@@ -101,8 +100,7 @@ def executed_paths(path: Path, count: int) -> tuple[Run, dict[TrialKey, Trace]]:
         read = {key: read_actions(file) for key, file in files.items()}
         spaces = {key: space for key, (_, space) in read.items()}
         traces = {key: with_joints(read[key][0], read_joints(file)) for key, file in files.items()}
-    paths = {key: joint_path(traces[key], key.embodiment, spaces[key]) for key in chosen}
-    return run, {key: trace for key, trace in paths.items() if trace is not None}
+    return run, {k: split_trace(traces[k], k.embodiment, spaces[k])[1] for k in chosen}
 
 
 def _spread(keys: list[TrialKey], count: int) -> list[TrialKey]:

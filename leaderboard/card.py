@@ -24,8 +24,7 @@ from typing import Annotated, get_args, get_origin
 from msgspec import Meta, Struct
 from msgspec.structs import fields
 
-from robospa.leaderboard.bundle import MEGA, BundleError
-from robospa.leaderboard.untrusted import check_text
+from robospa.leaderboard.bundle import MEGA, BundleError, check_text
 from robospa.results.paper.published import TITLES, load
 from robospa.schema import Sha256, one_of, pattern, read
 

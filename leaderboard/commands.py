@@ -25,7 +25,7 @@ from robospa.harness.running.request import make_request
 from robospa.harness.running.status import cores
 from robospa.harness.settings import EvaluationSettings, updated
 from robospa.leaderboard import card, evidence, packing, replay, reproduce, rules, site, submission
-from robospa.leaderboard.untrusted import parse_map
+from robospa.leaderboard.bundle import parse_map
 from robospa.leaderboard.verify import Valid, verify
 from robospa.results.records.runs import read_run
 

@@ -274,17 +274,7 @@ def evidence_lines(evidence: BadgeEvidence) -> list[tuple[str, str]]:
         text = f"{again.sentence} {what_it_catches(again.trials, again.sampled)}"
         lines += [(BADGES[evidence.badges[1]], text), ("challenge", again.challenge)]
     if fresh:
-        text = (
-            f"{fresh.overall.fresh} of {fresh.trials} trials on hidden scenes succeeded at the "
-            "first choice, where the claim leads one to expect "
-            f"{fresh.overall.expected:.1f}: p = {fresh.overall.p:.2g}, tested at {fresh.alpha:g}, "
-            "as is every cell, corrected after Holm. Had every rate been "
-            f"{100 * LIE:g} points lower than claimed, this would have shown with "
-            f"{100 * fresh.notices:.0f} %. Ranked in {len(fresh.ranks)} of {len(fresh.cells)} "
-            f"cells, where {100 * CELL_LIE:g} points less would have shown with "
-            f"{100 * LEAST_POWER:g} %. {fresh.repeated} of the trials had to be repeated and "
-            "count as failures."
-        )
+        text = " ".join(fresh.sentences())
         lines += [("reproduced", text), ("commitment", fresh.commitment)]
     return lines
 

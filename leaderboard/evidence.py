@@ -43,7 +43,6 @@ INVENTED = (0.05, 0.02, 0.01)
 APART = 20.0
 """The most that half of the replayed trials may lie apart [mm]. A start moved by 1e-7 m moves the
 end of half the trials by 0.001 mm, but that of a bottle that is dropped by 320 mm."""
-CATCHES = ("catches_5_percent", "catches_2_percent", "catches_1_percent")
 
 
 def announced(suite: str, keys: Iterable[TrialKey]) -> list[TrialKey]:
@@ -115,20 +114,15 @@ def catch_probability(trials: int, forged: int, sampled: int) -> float:
     return -math.expm1(missed)
 
 
-def catches(trials: int, sampled: int) -> dict[float, float]:
-    """The chance that a sample holds an invented outcome, by the share of them among all."""
-    return {
-        share: catch_probability(trials, max(1, math.floor(share * trials)), sampled)
-        for share in INVENTED
-    }
-
-
 def what_it_catches(trials: int, sampled: int) -> str:
-    """`catches` as a sentence."""
-    chances = catches(trials, sampled).items()
-    words = ", ".join(f"{100 * chance:.1f} % for {100 * share:g} %" for share, chance in chances)
+    """The chance that a sample holds an invented outcome, as a sentence."""
+    words = []
+    for share in INVENTED:
+        chance = catch_probability(trials, max(1, math.floor(share * trials)), sampled)
+        words.append(f"{100 * chance:.1f} % for {100 * share:g} %")
     return (
-        f"The chance that such a sample holds one of the outcomes, if some were invented: {words}."
+        "The chance that such a sample holds one of the outcomes, if some were invented: "
+        f"{', '.join(words)}."
     )
 
 
@@ -161,8 +155,8 @@ class Validity(Struct, frozen=True):
 
 
 class ReplayEvidence(Struct, frozen=True, kw_only=True):
-    """Level 2: how many of the sampled trials came again identically, alike, or differently, what
-    such a sample catches, and versions that are others than the run's. Of the `placed` trials,
+    """Level 2: how many of the sampled trials came again identically, alike, or differently, and
+    versions that are others than the run's. Of the `placed` trials,
     whose records say where objects came to lie, the `median` and the `most` of how far one lay
     apart [mm]."""
 
@@ -173,10 +167,6 @@ class ReplayEvidence(Struct, frozen=True, kw_only=True):
     identical: Count
     agrees: Count
     different: Count
-    least: Count = 0
-    catches_5_percent: Number = 0.0
-    catches_2_percent: Number = 0.0
-    catches_1_percent: Number = 0.0
     changed_versions: tuple[str, ...] = ()
     different_trials: tuple[str, ...] = ()
     ran_on: tuple[Processor, ...] = ()

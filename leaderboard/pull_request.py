@@ -22,7 +22,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from robospa.leaderboard import bundle as layout
-from robospa.leaderboard.bundle import IN_REPOSITORY, BundleError
+from robospa.leaderboard.bundle import IN_REPOSITORY, BundleArchive, BundleError, parse_map
 from robospa.leaderboard.card import check_folder, read_card, to_card
 from robospa.leaderboard.submission import (
     ASKED,
@@ -36,7 +36,6 @@ from robospa.leaderboard.submission import (
     read_announced,
     size_of,
 )
-from robospa.leaderboard.untrusted import BundleArchive, parse_map
 
 HOME = PurePosixPath("leaderboard/submissions")
 README = str(HOME / "README.md")

@@ -28,11 +28,8 @@ from robospa.harness.worlds import open_world
 from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.evidence import (
     APART,
-    CATCHES,
     ReplayEvidence,
-    catches,
     drawn,
-    least_sample,
     what_it_catches,
 )
 from robospa.leaderboard.rules import Reference, spec_of
@@ -124,17 +121,14 @@ def replay(
     trials = tuple(found[key] for key in keys)
     kinds = Counter(trial.kind for trial in trials)
     apart = [trial.apart for trial in trials if trial.apart is not None]
-    listed, five_two_one = len(valid.keys), catches(len(valid.keys), len(trials)).values()
     evidence = ReplayEvidence(
         bundle=valid.manifest.bundle,
         challenge=challenge.strip(),
         sampled=len(trials),
-        trials=listed,
+        trials=len(valid.keys),
         identical=kinds[IDENTICAL],
         agrees=kinds[AGREES],
         different=kinds[DIFFERENT],
-        least=least_sample(listed),
-        **dict(zip(CATCHES, five_two_one, strict=True)),
         changed_versions=_changed(valid.run.manifest.about),
         different_trials=tuple(trial.key.slug for trial in trials if trial.kind == DIFFERENT),
         ran_on=valid.run.manifest.about.processors,
@@ -200,7 +194,7 @@ def _again(world: World, parts: Callable[[TrialKey], TrialSetup], job: Job) -> R
             claimed.key,
             actions,
             space,
-            joints=joints,
+            joints=None if joints is trace else joints,
             policy_seed=claimed.policy_seed,
             parts=parts,
         )

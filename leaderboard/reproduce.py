@@ -40,10 +40,9 @@ from robospa.leaderboard.agreement import (
     power,
     trials_needed,
 )
-from robospa.leaderboard.bundle import MEGA, BundleError, canonical, sha256
+from robospa.leaderboard.bundle import MEGA, BundleError, canonical, parse_map, sha256
 from robospa.leaderboard.evidence import RANKED, TESTED, Reproduction
 from robospa.leaderboard.rules import Reference
-from robospa.leaderboard.untrusted import parse_map
 from robospa.leaderboard.verify import Valid
 from robospa.results.records.runs import Run
 from robospa.results.records.trial_record import TrialRecord

@@ -16,14 +16,13 @@ from itertools import groupby
 from typing import Any
 
 import numpy as np
-from msgspec import to_builtins
 from numpy.typing import NDArray
 
 from robospa.action_space import KINDS
 from robospa.harness.factory import load_function
 from robospa.harness.pool import JobProcess, Pool
 from robospa.harness.worlds import SAPIEN_NAME, TASK_PARTS
-from robospa.leaderboard.bundle import BundleError
+from robospa.leaderboard.bundle import BundleError, canonical
 from robospa.leaderboard.card import Card
 from robospa.leaderboard.traces import Trace
 from robospa.results.records.manifest import (
@@ -39,9 +38,8 @@ from robospa.tasks.scene import SUITE
 from robospa.trial import REFERENCE, TrialKey
 
 LEVELS = (1, 2, 3, 4, 5)
-Steps = NDArray[np.int64]
-Durations = Callable[[str, str, Trace], tuple[Steps, Steps]]
-"""(robot, action space, actions) -> the fewest and the most physics steps of each action."""
+Durations = Callable[[str, Trace], NDArray[np.int64]]
+"""(robot, joint actions) -> the physics steps of each."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +57,7 @@ class Reference:
     """`seeds` of a task, level, robot and scene mode, and `facts` of a task and level, raise
     LookupError if there are none. `members` are the tasks of a category. `world` and `parts` are
     `module:function` paths: the only world whose runs count, and what finds a trial's scene and
-    goal. `durations` finds the fewest and the most physics steps of a trial's actions; None if
+    goal. `durations` finds the physics steps of a trial's joint actions; None if
     nothing is known of the world."""
 
     seeds: Callable[[str, int, str, str], Sequence[int]]
@@ -135,8 +133,8 @@ VERSIONS = {
     "sapien": r"3\.0\.[^ ]{1,20}",
 }
 """What a run has to say of its software, as far as ours runs with it."""
-LONGEST, MOST_WARNINGS = 1000, 20
-"""Characters of a text in what a run says of itself, and warnings, at most."""
+MOST_SAID = 20_000
+"""Bytes of all that a run says of its software, machine, world and warnings."""
 
 
 def manifest_of(data: object, what: str = "the run") -> RunManifest:
@@ -208,21 +206,8 @@ def _check_about(run: RunManifest) -> None:
     cores = about.machine.get("cores", 1)
     if not re.fullmatch("[0-9a-f]{16}", about.code) or type(cores) is not int or cores < 1:
         raise BundleError("the run has a hash of its code, or cores of its machine, that cannot be")
-    stack: list[object] = [to_builtins(about)]
-    longest = 0
-    while stack:
-        value = stack.pop()
-        if isinstance(value, dict):
-            stack += [*value, *value.values()]
-        elif isinstance(value, (list, tuple)):
-            stack += value
-        elif isinstance(value, str):
-            longest = max(longest, len(value))
-    if longest > LONGEST or len(about.warnings) > MOST_WARNINGS:
-        raise BundleError(
-            f"the run has {len(about.warnings)} warnings, and a text of {longest} characters; "
-            f"{MOST_WARNINGS} and {LONGEST} are the most"
-        )
+    if (size := len(canonical(about))) > MOST_SAID:
+        raise BundleError(f"the run says {size} bytes of itself; {MOST_SAID} are the most")
 
 
 def check_card_fits(card: Card, settings: RunSettings, task: str) -> None:

@@ -29,14 +29,7 @@ from msgspec import Struct, to_builtins
 
 from robospa.harness.running.atomic_file import replace_file
 from robospa.leaderboard import bundle as layout
-from robospa.leaderboard.bundle import (
-    IN_REPOSITORY,
-    MEGA,
-    BundleError,
-    BundleLimits,
-    BundleManifest,
-    is_sha256,
-)
+from robospa.leaderboard.bundle import IN_REPOSITORY, BundleError
 from robospa.leaderboard.card import (
     LINK,
     Card,
@@ -48,7 +41,6 @@ from robospa.leaderboard.card import (
 )
 from robospa.leaderboard.evidence import BADGES, BadgeEvidence, read_evidence
 from robospa.leaderboard.rules import manifest_of
-from robospa.leaderboard.untrusted import BundleArchive, parse_map
 from robospa.leaderboard.verify import Valid
 from robospa.results.failures.labels import NAMES, distribution, failures_of
 from robospa.results.records.manifest import RunManifest
@@ -57,7 +49,7 @@ from robospa.results.report.run_card import END_NAMES
 from robospa.results.report.trials import trial_rows
 from robospa.schema import Count, one_of, pattern, read
 
-MOST = 8 * MEGA
+MOST = 8 * layout.MEGA
 """The most bytes of a bundle in the repository, which never becomes smaller again."""
 
 
@@ -92,10 +84,10 @@ def check_recipes(card: Card, clone: Path) -> None:
             raise BundleError(f"the model card names {script}, which this repository does not have")
 
 
-def check_contents(folder: Path, manifest: BundleManifest, where: str) -> None:
+def check_contents(folder: Path, manifest: layout.BundleManifest, where: str) -> None:
     """BundleError unless the bundle in `folder` holds the files that `manifest` lists."""
     size_of(folder)
-    with BundleArchive(folder / IN_REPOSITORY, BundleLimits(packed=MOST)) as archive:
+    with layout.BundleArchive(folder / IN_REPOSITORY, layout.BundleLimits(packed=MOST)) as archive:
         if set(archive.sizes) != {*manifest.files, layout.MANIFEST}:
             raise BundleError(f"{where}: {IN_REPOSITORY} has other files than the manifest lists")
         for name, listed in manifest.files.items():
@@ -218,7 +210,7 @@ def add(
         evidence["address"] = address
     read_evidence(evidence, valid.manifest.bundle, "the submission")
     filmed = {key: r for key, r in valid.run.records.items() if r.video}
-    with BundleArchive(valid.path) as archive:
+    with layout.BundleArchive(valid.path) as archive:
         for name, source in KEPT.items():
             replace_file(folder / name, archive.read(source))
         for record in filmed.values():
@@ -260,7 +252,7 @@ def read_announced(folder: Path) -> Announced:
         raise BundleError(
             f"{path} is not three lines: https address (or {IN_REPOSITORY}), bytes, hash"
         )
-    if not is_sha256(lines[2]):
+    if not layout.is_sha256(lines[2]):
         raise BundleError(f"{path} has no bundle hash of 64 hexadecimal digits")
     most = MOST if inside else layout.BundleLimits().packed
     if int(lines[1]) > most:
@@ -298,8 +290,10 @@ def read_submission(folder: Path) -> Submission:
     if not SLUG.fullmatch(folder.name):
         raise BundleError(f"{where} has a name of other than small letters, digits and hyphens")
     data = {name: _bytes(folder / name, where) for name in (*KEPT, EVIDENCE, TRIALS)}
-    parts = {name: parse_map(raw, f"{where}, {name}") for name, raw in data.items()}
-    manifest = read(BundleManifest, parts[layout.MANIFEST], f"{where}: the manifest", BundleError)
+    parts = {name: layout.parse_map(raw, f"{where}, {name}") for name, raw in data.items()}
+    manifest = read(
+        layout.BundleManifest, parts[layout.MANIFEST], f"{where}: the manifest", BundleError
+    )
     if manifest.bundle != layout.bundle_hash(parts[layout.MANIFEST]):
         raise BundleError(f"{where}: the manifest was changed, its hash is not the bundle's")
     if manifest.practice:
@@ -331,7 +325,7 @@ def read_submission(folder: Path) -> Submission:
 
 def _bytes(path: Path, where: str) -> bytes:
     try:
-        if path.is_symlink() or path.stat().st_size > 16 * MEGA:
+        if path.is_symlink() or path.stat().st_size > 16 * layout.MEGA:
             raise BundleError(f"{where}: {path.name} is a link or larger than it can be")
         return path.read_bytes()
     except OSError as error:
@@ -345,7 +339,7 @@ def _read_trials(
     trials = read(TrialsFile, data, f"{where}, {TRIALS}", BundleError)
     for film in trials.films:
         path = folder / film.video
-        if path.is_symlink() or not path.is_file() or path.stat().st_size > 16 * MEGA:
+        if path.is_symlink() or not path.is_file() or path.stat().st_size > 16 * layout.MEGA:
             raise BundleError(f"{where}: {film.video} is missing or no plain file")
     rows = data["films"]
     assert isinstance(rows, list)

@@ -15,7 +15,6 @@ head, so nothing is allocated that the file does not hold.
 Behind each action of a pose policy stands the joint action that was executed. A pose becomes joint
 targets by kinematics, which a later version may compute otherwise; the joint actions beside it are
 replayed instead, so an old bundle is replayed to the bit, and their physics steps follow from them.
-Bundles of older versions lack them.
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ from numpy.typing import NDArray
 
 from robospa.action_space import LARGEST, STEPS_PER_UNIT, is_quantized
 from robospa.harness.robots import embodiment
-from robospa.harness.sim.motion import action_steps, step_count
+from robospa.harness.sim.motion import action_steps
 from robospa.leaderboard.bundle import BundleError
 
 MAGIC = b"rspa-a2\n"
@@ -128,45 +127,23 @@ def with_joints(actions: Trace, joints: Trace | None) -> Trace:
     return actions if joints is None else np.hstack([actions, joints])
 
 
-def split_trace(trace: Trace, robot: str, space: str) -> tuple[Trace, Trace | None]:
-    """The actions of a trace, and the joint actions executed in their place, if it has any."""
-    if space == "joint" or not len(trace):
-        return trace, None
-    body = embodiment(robot)
-    width, joints = (body.action_space(kind).width for kind in (space, "joint"))
-    if trace.shape[1] != width + joints:  # whether it has another width is for others to refuse
-        return trace, None
-    return trace[:, :width], trace[:, width:]
-
-
-def joint_path(trace: Trace, robot: str, space: str) -> Trace | None:
-    """The joint actions that were executed, whether they were sent or follow from poses; None for
-    poses of older versions, whose traces lack them."""
-    actions, joints = split_trace(trace, robot, space)
-    return actions if space == "joint" else joints
-
-
-Steps = NDArray[np.int64]
-
-
-def durations(robot: str, space: str, trace: Trace) -> tuple[Steps, Steps]:
-    """The fewest and the most physics steps of each action of `trace`, float32 (T, D).
-
-    BundleError if `trace` has another number of columns than such actions.
-    """
-    body = embodiment(robot)
-    width = body.action_space(space).width
-    if trace.shape[1] != width:
+def split_trace(trace: Trace, robot: str, space: str) -> tuple[Trace, Trace]:
+    """The actions of a trace as they were sent, and the joint actions that were executed;
+    BundleError if it has other columns."""
+    kinds = dict.fromkeys((space, "joint"))
+    sent, *more = (embodiment(robot).action_space(kind).width for kind in kinds)
+    if len(trace) and trace.shape[1] != (width := sent + sum(more)):
         raise BundleError(f"{space} actions of {robot} have {width} numbers, not {trace.shape[1]}")
-    if space != "joint":
-        reach = max(joint.upper - joint.lower for arm in body.arms for joint in arm.joints)
-        return np.ones(len(trace), np.int64), np.full(len(trace), step_count(reach))
-    columns = body.action_space(space)
-    values = trace.astype(np.float64)
-    change = np.empty((len(trace), 2))
-    for a, (part, arm) in enumerate(zip(columns.arms, body.arms, strict=True)):
+    return trace[:, :sent], trace[:, sent:] if more else trace
+
+
+def durations(robot: str, joints: Trace) -> NDArray[np.int64]:
+    """The physics steps of each joint action, float32 (T, D)."""
+    body = embodiment(robot)
+    values = joints.astype(np.float64)
+    change = np.empty((len(joints), 2))
+    for a, (part, arm) in enumerate(zip(body.action_space("joint").arms, body.arms, strict=True)):
         lower, upper = ([getattr(j, side) for j in arm.joints] for side in ("lower", "upper"))
-        joints = np.clip(values[:, part.body.start : part.body.stop], lower, upper)
-        change[:, a] = np.abs(np.diff(joints, axis=0, prepend=[arm.home])).max(axis=1)
-    exact = action_steps(change)
-    return exact, exact
+        goals = np.clip(values[:, part.body.start : part.body.stop], lower, upper)
+        change[:, a] = np.abs(np.diff(goals, axis=0, prepend=[arm.home])).max(axis=1)
+    return action_steps(change)

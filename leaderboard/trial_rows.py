@@ -23,10 +23,9 @@ from numpy.typing import NDArray
 
 from robospa.harness.sim.motion import RATE
 from robospa.harness.trial import policy_seed
-from robospa.leaderboard.bundle import BundleError, is_sha256, sha256
+from robospa.leaderboard.bundle import BundleError, check_text, is_sha256, parse_row, sha256
 from robospa.leaderboard.rules import Reference, VariantFacts, spec_of
 from robospa.leaderboard.traces import Trace, split_trace
-from robospa.leaderboard.untrusted import check_text, parse_row
 from robospa.results.records.manifest import PolicySpecification, RunSettings
 from robospa.results.records.runs import FIELDS, KEY_FIELDS, finished, from_data
 from robospa.results.records.trial_record import EventRow, TrialRecord
@@ -34,9 +33,7 @@ from robospa.results.scoring.repeats import repeats
 from robospa.tasks.events import KINDS, Event, outcome
 
 ROW_FIELDS = {"previous", "trace", "record"}
-EVENT = frozenset(("time", "kind", "object", "index", "note"))
-EVENT_FIELDS = (EVENT, EVENT | {"step"})
-"""What an event has: records of older versions do not say the step."""
+EVENT_FIELDS = frozenset(("time", "kind", "object", "index", "note", "step"))
 LATENCY = {"p50", "p95", "p99", "max"}
 SERVER_LATENCY = {"queue", "infer", "batch"}
 """Entries of the latency that are only there if the policy's server sent them."""
@@ -110,7 +107,7 @@ def _record(data: object, where: str) -> TrialRecord:
         raise BundleError(f"{where}: the trial record lacks the field {min(missing)!r}")
     if record.latency and record.latency.keys() - SERVER_LATENCY != LATENCY:
         raise BundleError(f"{where}: latency is not p50, p95, p99 and max")
-    if any(event.keys() not in EVENT_FIELDS for event in data["events"]):
+    if any(event.keys() != EVENT_FIELDS for event in data["events"]):
         raise BundleError(f"{where} has an event with fields that no event has")
     if len(record.timing) > MOST_TIMES or _items(record.diagnostics) > MOST_DIAGNOSTICS:
         raise BundleError(f"{where} has more times or diagnostics than any trial")
@@ -204,10 +201,10 @@ def _events(record: TrialRecord) -> str:
             return f"has an event of the unknown kind {event['kind'][:40]!a}"
         if event["kind"] in SUBTASK and not 0 <= event["index"] < record.total:
             return f"has an event of subtask {event['index']}; there are {record.total}"
-        if not 0 <= event["time"] <= last or not 0 <= event.get("step", 0) <= record.steps:
+        if not 0 <= event["time"] <= last or not 0 <= event["step"] <= record.steps:
             return f"has an event ({event['kind']}) outside the trial's time"
     for one, two in pairwise(record.events):
-        if two["time"] < one["time"] or two.get("step", 0) < one.get("step", 0):
+        if two["time"] < one["time"] or two["step"] < one["step"]:
             return f"has events that go back in time ({one['kind']}, {two['kind']})"
     return ""
 
@@ -230,7 +227,7 @@ def _end(record: TrialRecord) -> str:
         return f"ends in {record.end}, which its events do not say once"
     ended = record.physics_steps / RATE
     for event in deciding:
-        if abs(event["time"] - ended) > CLOCK or event.get("step", record.steps) != record.steps:
+        if abs(event["time"] - ended) > CLOCK or event["step"] != record.steps:
             return f"goes on after its {event['kind']}"
     return ""
 
@@ -269,21 +266,17 @@ def check_trace(
     if actions != record.steps and not refused:
         raise BundleError(f"{slug} has {record.steps} actions in its record and {actions} stored")
     sent, joints = split_trace(trace, record.key.embodiment, space)
-    if joints is not None:
-        digest, trace, space = trace_hash(sent), joints, "joint"
+    if joints is not trace:
+        digest = trace_hash(sent)
     if not refused and digest != record.actions_digest:
         raise BundleError(f"{slug}: the stored actions are not those of its record")
     if reference.durations is None or not actions:
         return
-    least, most = reference.durations(record.key.embodiment, space, trace)
+    steps = reference.durations(record.key.embodiment, joints)
+    least = most = int(steps.sum())
     if record.end in DECIDING.values():  # the last action ends when the goal is met or lost
-        least = np.append(least[:-1], 1)
-    if not least.sum() <= record.physics_steps <= most.sum():
+        least += 1 - int(steps[-1])
+    if not least <= record.physics_steps <= most:
         raise BundleError(
-            f"{slug} has {record.physics_steps} physics steps; its actions take "
-            f"{_between(int(least.sum()), int(most.sum()))}"
+            f"{slug} has {record.physics_steps} physics steps; its actions take {least} to {most}"
         )
-
-
-def _between(least: int, most: int) -> str:
-    return str(least) if least == most else f"{least} to {most}"

@@ -22,13 +22,7 @@ from msgspec import Meta, Struct, to_builtins
 
 from robospa.harness.running.status import cores
 from robospa.leaderboard import bundle as layout
-from robospa.leaderboard.bundle import (
-    BundleError,
-    BundleLimits,
-    BundleManifest,
-    FileEntry,
-    RowChain,
-)
+from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.card import Card, check_checkpoints, to_card
 from robospa.leaderboard.evidence import Validity, announced
 from robospa.leaderboard.rules import (
@@ -45,7 +39,6 @@ from robospa.leaderboard.rules import (
 )
 from robospa.leaderboard.traces import Trace, decode, most_bytes
 from robospa.leaderboard.trial_rows import check_record, check_trace, read_rows, trace_hash
-from robospa.leaderboard.untrusted import BundleArchive, parse
 from robospa.results.comparison.compare import Difference, compare_results, over_levels
 from robospa.results.lint import lint_run
 from robospa.results.records.manifest import RunManifest, RunSettings, seed_hash
@@ -71,7 +64,7 @@ class Valid:
     the badge."""
 
     path: Path
-    manifest: BundleManifest
+    manifest: layout.BundleManifest
     card: Card
     run: Run
     traces: Mapping[TrialKey, str]
@@ -92,7 +85,7 @@ def verify(
     path: Path,
     reference: Reference,
     practice: bool = False,
-    limits: BundleLimits | None = None,
+    limits: layout.BundleLimits | None = None,
     workers: int = 0,
     done: Done = lambda count, trials: None,
 ) -> Valid:
@@ -101,7 +94,7 @@ def verify(
     `practice` also accepts bundles that were packed for practice and enter no leaderboard. Scenes
     are made again in `workers` processes (0: one a core); `done` hears how many of how many are.
     """
-    with BundleArchive(path, limits) as archive:
+    with layout.BundleArchive(path, limits) as archive:
         manifest = _manifest(archive, reference, practice)
         archive.listed = manifest.files
         claimed = manifest_of(said := archive.read_map(layout.RUN))
@@ -188,7 +181,9 @@ def _no_collection() -> Iterator[None]:
             gc.enable()
 
 
-def _manifest(archive: BundleArchive, reference: Reference, practice: bool) -> BundleManifest:
+def _manifest(
+    archive: layout.BundleArchive, reference: Reference, practice: bool
+) -> layout.BundleManifest:
     """The manifest, held against the archive."""
     data = archive.read_map(layout.MANIFEST)
     version = data.get("format")
@@ -196,7 +191,7 @@ def _manifest(archive: BundleArchive, reference: Reference, practice: bool) -> B
         raise BundleError("the manifest does not say which format the bundle has")
     if version != layout.FORMAT:
         raise BundleError(f"the bundle has format {version}; this robospa reads {layout.FORMAT}")
-    manifest = read(BundleManifest, data, "the manifest", BundleError)
+    manifest = read(layout.BundleManifest, data, "the manifest", BundleError)
     if manifest.suite != reference.suite:
         raise BundleError(
             f"the bundle is of the suite {manifest.suite[:40]!a}; this robospa has "
@@ -212,7 +207,7 @@ def _manifest(archive: BundleArchive, reference: Reference, practice: bool) -> B
     return manifest
 
 
-def _check_files(archive: BundleArchive, listed: Mapping[str, FileEntry]) -> None:
+def _check_files(archive: layout.BundleArchive, listed: Mapping[str, layout.FileEntry]) -> None:
     """BundleError unless `listed` are exactly the archive's files with their sizes."""
     there = set(archive.sizes) - {layout.MANIFEST}
     if lost := sorted(set(listed) - there):
@@ -228,7 +223,7 @@ def _check_files(archive: BundleArchive, listed: Mapping[str, FileEntry]) -> Non
             raise BundleError(f"the bundle has no {name}")
 
 
-def _keys(run: RunManifest, limits: BundleLimits) -> tuple[TrialKey, ...]:
+def _keys(run: RunManifest, limits: layout.BundleLimits) -> tuple[TrialKey, ...]:
     """The listed trials, by task, level and seed."""
     if sum(len(group.seeds) for group in run.trials) > limits.rows:
         raise BundleError(f"the run lists more than {limits.rows} trials")
@@ -237,7 +232,7 @@ def _keys(run: RunManifest, limits: BundleLimits) -> tuple[TrialKey, ...]:
 
 def _check_lists(
     lists: Mapping[str, object],
-    manifest: BundleManifest,
+    manifest: layout.BundleManifest,
     keys: Sequence[TrialKey],
     run: RunManifest,
 ) -> None:
@@ -261,7 +256,7 @@ def seed_lists(keys: Sequence[TrialKey]) -> dict[str, list[int]]:
 
 
 def _records(
-    archive: BundleArchive, manifest: BundleManifest, keys: Sequence[TrialKey]
+    archive: layout.BundleArchive, manifest: layout.BundleManifest, keys: Sequence[TrialKey]
 ) -> tuple[dict[TrialKey, TrialRecord], dict[TrialKey, str]]:
     """Every record and the hash of its actions, from the chain of rows."""
     records: dict[TrialKey, TrialRecord] = {}
@@ -282,7 +277,7 @@ def _records(
         records[key], traces[key] = row.record, row.trace
     if len(records) < len(keys):
         raise BundleError(f"the rows end before {keys[len(records)].slug}: trials are missing")
-    if manifest.chain != RowChain(len(records), last):
+    if manifest.chain != layout.RowChain(len(records), last):
         raise BundleError("the chain of rows does not end as the manifest says")
     if digest.hexdigest() != manifest.files[layout.RECORDS].sha256:
         raise BundleError(f"{layout.RECORDS} was changed: its hash is not the manifest's")
@@ -297,7 +292,7 @@ def _variants(records: Mapping[TrialKey, TrialRecord]) -> Iterator[list[TrialRec
 
 
 def _check_actions(
-    archive: BundleArchive, run: Run, traces: Mapping[TrialKey, str], reference: Reference
+    archive: layout.BundleArchive, run: Run, traces: Mapping[TrialKey, str], reference: Reference
 ) -> None:
     """BundleError unless every stored array has its row's and record's hash.
 
@@ -317,7 +312,7 @@ def _check_actions(
 
 
 def _check_variant(
-    archive: BundleArchive,
+    archive: layout.BundleArchive,
     found: Sequence[TrialRecord],
     traces: Mapping[TrialKey, str],
     reference: Reference,
@@ -343,7 +338,7 @@ def read_traces(valid: Valid, wanted: Sequence[TrialKey]) -> dict[TrialKey, Trac
     for records in _variants(valid.run.records):
         places.update({record.key: place for place, record in enumerate(records)})
     found: dict[TrialKey, Trace] = {}
-    with BundleArchive(valid.path) as archive:
+    with layout.BundleArchive(valid.path) as archive:
         for variant in dict.fromkeys(key.variant for key in wanted):
             name = layout.actions_name(*variant)
             stored = decode(archive.read(name), name)
@@ -354,9 +349,9 @@ def read_traces(valid: Valid, wanted: Sequence[TrialKey]) -> dict[TrialKey, Trac
     return found
 
 
-def _check_derived(archive: BundleArchive, run: Run) -> None:
+def _check_derived(archive: layout.BundleArchive, run: Run) -> None:
     """BundleError if a number is not what follows from the records."""
-    given = parse(archive.read(layout.SCORES), layout.SCORES)
+    given = layout.parse(archive.read(layout.SCORES), layout.SCORES)
     if where := compare_scores(scores_of(run), given):
         raise BundleError(f"{layout.SCORES} is not what the records give: {where}")
     if archive.read_map(layout.OUTCOMES) != to_builtins(outcomes_of(run)):
@@ -364,7 +359,9 @@ def _check_derived(archive: BundleArchive, run: Run) -> None:
 
 
 def _check_videos(
-    archive: BundleArchive, manifest: BundleManifest, records: Mapping[TrialKey, TrialRecord]
+    archive: layout.BundleArchive,
+    manifest: layout.BundleManifest,
+    records: Mapping[TrialKey, TrialRecord],
 ) -> None:
     """BundleError unless the announced trials, and only they, have a video."""
     chosen = {layout.video_name(key): key for key in announced(manifest.suite, records)}

@@ -18,13 +18,13 @@ import tempfile
 from pathlib import Path
 
 from robospa.leaderboard import bundle as layout
+from robospa.leaderboard.bundle import BundleArchive, parse_map
 from robospa.leaderboard.card import to_card
 from robospa.leaderboard.packing import write_bundle
 from robospa.leaderboard.rules import manifest_of, shipped
 from robospa.leaderboard.submission import ASKED, BUNDLE, EVIDENCE, add
 from robospa.leaderboard.traces import Trace, decode
 from robospa.leaderboard.trial_rows import TrialRow, read_rows
-from robospa.leaderboard.untrusted import BundleArchive, parse_map
 from robospa.leaderboard.verify import verify
 from robospa.results.records.runs import Run
 from robospa.trial import TrialKey

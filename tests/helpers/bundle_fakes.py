@@ -118,7 +118,7 @@ REFERENCE = Reference(
     lambda category: MEMBERS[category],
     world="bundle_fakes:World",
     parts="run_fakes:parts",
-    durations=lambda robot, space, trace: (np.ones(len(trace), int), np.ones(len(trace), int)),
+    durations=lambda robot, trace: np.ones(len(trace), int),
 )
 
 
@@ -185,8 +185,8 @@ def rows_of(files: Files) -> list[dict[str, Any]]:
 
 def success_event(record: Mapping[str, Any]) -> dict[str, Any]:
     """The event that ends a trial of as many physics steps as `record` has."""
-    time = record["physics_steps"] / RATE
-    return {"time": time, "kind": "success", "object": "", "index": -1, "note": ""}
+    at = {"time": record["physics_steps"] / RATE, "step": record["steps"]}
+    return {**at, "kind": "success", "object": "", "index": -1, "note": ""}
 
 
 def put_rows(files: Files, rows: Sequence[Mapping[str, Any]]) -> None:

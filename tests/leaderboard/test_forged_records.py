@@ -49,7 +49,7 @@ def put(**fields: Any) -> Change:
 
 
 def event(kind: str, **fields: Any) -> dict[str, Any]:
-    return {"time": 0.0, "kind": kind, "object": "", "index": -1, "note": "", **fields}
+    return {"time": 0.0, "kind": kind, "object": "", "index": -1, "note": "", "step": 0, **fields}
 
 
 def and_event(*more: Mapping[str, Any]) -> Change:
@@ -93,7 +93,12 @@ CASES: list[tuple[str, str, Change, str]] = [
         put(end="goal_lost", physics_steps=6),
         "which its events do not say once",
     ),
-    ("lost unsaid", "step_limit", and_event(event("failed", time=20 / RATE)), "do not say once"),
+    (
+        "lost unsaid",
+        "step_limit",
+        and_event(event("failed", time=20 / RATE, step=20)),
+        "do not say once",
+    ),
     ("succeeded twice", "success", last_event(kind="grasped"), "its events say False"),
     ("goes on", "success", put(physics_steps=21), "goes on after"),
     ("won before", "success", last_event(step=0), "go back in time|goes on after"),
@@ -208,8 +213,8 @@ def test_physics_steps_are_those_of_the_actions(valid: Valid) -> None:
 
 
 def test_the_last_action_ends_with_the_goal(valid: Valid) -> None:
-    def slow(robot: str, space: str, trace: Trace) -> Any:
-        return (np.full(len(trace), 100),) * 2
+    def slow(robot: str, trace: Trace) -> Any:
+        return np.full(len(trace), 100)
 
     record = of_end(valid, "success")
     [trace] = read_traces(valid, [record.key]).values()

@@ -65,8 +65,9 @@ def test_a_submission_has_its_badges_and_their_evidence(kept: Path, tmp_path: Pa
     assert "overall" not in model["values"]["sr"], "most categories were not run"
     page = (tmp_path / "out" / "models" / "fake-1" / "index.html").read_text()
     for text in ("20 of 20 trials were played again", "0123456789abcdef",
-                 "1210 of 2000 trials on hidden scenes",
-                 "shown with 97 %",
+                 "1210 of 2000 fresh trials succeeded",
+                 "5 points 97 %",
+                 "In 2 of 3 cells, GAC/0, Pick_Blocks_Size/0,",
                  "https://example.org/bundle.zip", "Filmed trials", "50, 50, 50",
                  "ran 1 of 56 tasks"):  # fmt: skip
         assert text in page

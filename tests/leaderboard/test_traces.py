@@ -26,7 +26,6 @@ from robospa.leaderboard.traces import (
     decode,
     durations,
     encode,
-    joint_path,
     split_trace,
     with_joints,
 )
@@ -77,24 +76,20 @@ def test_a_trace_comes_apart_as_it_was_put_together() -> None:
     (stored,) = decode(encode([with_joints(POSES, JOINTS)]), "a file")
     actions, joints = split_trace(stored, REFERENCE, "ee")
     assert np.array_equal(actions, POSES) and np.array_equal(joints, JOINTS)
-    assert np.array_equal(joint_path(stored, REFERENCE, "ee"), JOINTS)
-    for whole in (POSES, POSES[:0], np.zeros((2, 29), np.float32)):
-        actions, joints = split_trace(whole, REFERENCE, "ee")
-        assert actions is whole and joints is None
-        assert joint_path(whole, REFERENCE, "ee") is None
-    assert split_trace(np.zeros((2, 28), np.float32), REFERENCE, "joint")[1] is None
-    assert joint_path(JOINTS, REFERENCE, "joint") is JOINTS
+    for whole in (POSES, np.zeros((2, 29), np.float32)):
+        with pytest.raises(BundleError, match="have 30 numbers"):
+            split_trace(whole, REFERENCE, "ee")
+    assert split_trace(JOINTS, REFERENCE, "joint")[1] is JOINTS
 
 
 def test_an_audit_compares_what_pose_policies_executed(tmp_path: Path) -> None:
-    keys = [TrialKey(PICK, 1, seed) for seed in SEEDS[:3]]
+    keys = [TrialKey(PICK, 1, seed) for seed in SEEDS[:2]]
     folder = make_run(tmp_path / "run", keys)
     write_actions(folder, keys[0], POSES, "ee", JOINTS)
-    write_actions(folder, keys[1], POSES, "ee")  # of an older version
-    write_actions(folder, keys[2], JOINTS, "joint")
+    write_actions(folder, keys[1], JOINTS, "joint")
     run, paths = audit.executed_paths(folder, 10)
-    assert run.keys == tuple(keys) and list(paths) == [keys[0], keys[2]]
-    assert np.array_equal(paths[keys[0]], JOINTS) and np.array_equal(paths[keys[2]], JOINTS)
+    assert run.keys == tuple(keys) == tuple(paths)
+    assert np.array_equal(paths[keys[0]], JOINTS) and np.array_equal(paths[keys[1]], JOINTS)
     assert audit.expert_likeness(paths, lambda key: JOINTS).suspicious
 
 
@@ -113,15 +108,7 @@ def test_actions_take_what_their_trajectories_have() -> None:
 def test_a_robot_starts_at_home_with_open_grippers() -> None:
     home = np.concatenate([[*arm.home, 1.0] for arm in embodiment(REFERENCE).arms])
     trace = np.array([home, *[home + 0.25 * (np.arange(14) == 2)] * 2], np.float32)
-    least, most = durations(REFERENCE, "joint", trace)
-    assert least.tolist() == most.tolist() == [HOLD_STEPS, step_count(0.25), HOLD_STEPS]
-
-
-def test_of_poses_only_bounds_are_known() -> None:
-    least, most = durations(REFERENCE, "ee", np.zeros((3, 16), np.float32))
-    assert least.tolist() == [1, 1, 1] and (most > 1000).all() and (most < 6000).all()
-    with pytest.raises(BundleError, match="have 14 numbers, not 16"):
-        durations(REFERENCE, "joint", np.zeros((3, 16), np.float32))
+    assert durations(REFERENCE, trace).tolist() == [HOLD_STEPS, step_count(0.25), HOLD_STEPS]
 
 
 def checked(trace: Trace, physics_steps: int) -> None:
@@ -132,10 +119,9 @@ def checked(trace: Trace, physics_steps: int) -> None:
 
 
 def test_the_joints_decide_how_long_a_pose_action_takes() -> None:
-    steps = int(durations(REFERENCE, "joint", JOINTS)[0].sum())
+    steps = int(durations(REFERENCE, JOINTS).sum())
     checked(with_joints(POSES, JOINTS), steps)
-    with pytest.raises(BundleError, match=f"its actions take {steps}"):
+    with pytest.raises(BundleError, match=f"its actions take {steps} to"):
         checked(with_joints(POSES, JOINTS), steps + 1)
-    checked(POSES, steps + 1)  # of an older version: only bounds are known
     with pytest.raises(BundleError, match="not those of its record"):
         checked(with_joints(POSES + np.float32(0.5), JOINTS), 100)

@@ -30,10 +30,9 @@ from robospa.harness.running.request import client_options
 from robospa.harness.selection import parse_seeds
 from robospa.harness.settings import SettingsError
 from robospa.leaderboard import bundle as layout
-from robospa.leaderboard.bundle import BundleError, canonical
+from robospa.leaderboard.bundle import BundleArchive, BundleError, canonical
 from robospa.leaderboard.packing import pack
 from robospa.leaderboard.traces import decode, encode
-from robospa.leaderboard.untrusted import BundleArchive
 from robospa.leaderboard.verify import verify
 from robospa.results.records.manifest import RunError, read_manifest, seed_hash
 from robospa.results.records.runs import finished, from_line, merge, read_file, read_run, to_line
