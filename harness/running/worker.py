@@ -218,8 +218,6 @@ class Worker:
             self._close_policy()
         if self._policy is None:
             options = dict(self.config.options)
-            if target in self.config.expects:
-                options["expect"] = self.config.expects[target]
             if target in self.config.identities:
                 options["identity"] = self.config.identities[target]
             if "timeouts" in options and not self.config.alone:
