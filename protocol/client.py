@@ -119,8 +119,9 @@ class Identity:
         )
 
     def repeated_in(self, again: Identity) -> Identity:
-        """This identity without what differs in a second greeting of the same server."""
-        names = {*self.parts, *again.parts}
+        """This identity without what differs in a second greeting of the same server; a spec never
+        may."""
+        names = {n for n in (*self.parts, *again.parts) if not n.startswith("spec.")}
         changed = {n for n in names if self.parts.get(n) != again.parts.get(n)}
         kept = {name: value for name, value in self.parts.items() if name not in changed}
         return Identity(kept, self.volatile | changed)

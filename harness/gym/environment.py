@@ -12,19 +12,22 @@ from typing import Any
 
 import gymnasium
 import numpy as np
+from gymnasium import spaces
 from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
+from robospa.action_space import ActionSpace
 from robospa.extras import need
 from robospa.harness.factory import load_function
-from robospa.harness.gym.spaces import action_space, check_spec, observation_space
 from robospa.harness.robots import embodiment as robot_named
+from robospa.harness.robots.embodiment import Embodiment
+from robospa.harness.robots.kinematics import chain_of
 from robospa.harness.seeds.lists import find_list
 from robospa.harness.settings import SettingsError
 from robospa.harness.trial import TrialState, open_trial, policy_seed, record_of, step_limit
 from robospa.harness.world import ActionError, StepResult, World
 from robospa.harness.worlds import SAPIEN_NAME, TASK_PARTS, open_world
-from robospa.observation import CAMERAS, DEFAULT_CAMERAS, CameraSpec
+from robospa.observation import CAMERAS, DEFAULT_CAMERAS, WIDTH, CameraSpec
 from robospa.protocol.errors import PolicyError
 from robospa.protocol.policy import PolicySpec
 from robospa.results.records.trial_record import TrialRecord
@@ -330,3 +333,86 @@ def register_tasks() -> None:
     for name in tasks():
         if env_id(name) not in registration.registry:
             registration.register(env_id(name), entry_point=ENTRY, kwargs={"task": name})
+
+
+# ---------------------------------------------------------------- spaces
+
+SENTENCE = 1000
+"""Most characters of an instruction."""
+LETTERS = "".join(map(chr, range(32, 127)))
+"""What instructions are written in: printable ASCII."""
+BEYOND = 0.5
+"""How far [rad], or of a gripper's unit, a measured joint may be beyond its limit."""
+FARTHEST = 3.0
+"""[m] No end effector is that far from the world's origin."""
+
+Bounds = tuple[NDArray[np.float32], NDArray[np.float32]]
+
+
+def check_spec(spec: PolicySpec) -> None:
+    """SettingsError for what an environment cannot give."""
+    if spec.history:
+        raise SettingsError(
+            "an environment gives no history: stack its observations with Gymnasium's wrappers"
+        )
+    if spec.privileged:
+        raise SettingsError(
+            "an environment gives no privileged state: ask for environment_state, which is numbers"
+        )
+
+
+def action_space(robot: Embodiment, kind: str) -> spaces.Box:
+    """Of one action, float32 (D,): joints within the limits in which the robot's own kinematics
+    looks, positions [m] over the table, quaternions, grippers from 0 (closed) to 1 (open).
+
+    It is what is sampled from. What lies outside is executed too, as a policy's would be.
+    """
+    space = robot.action_space(kind)
+    low, high = _joint_bounds(robot, working=True) if kind == "joint" else _pose_bounds(space)
+    return spaces.Box(low, high, dtype=np.float32)
+
+
+def _joint_bounds(robot: Embodiment, working: bool) -> Bounds:
+    space = robot.action_space("joint")
+    low, high = np.zeros(space.width, np.float32), np.ones(space.width, np.float32)
+    for columns, arm in zip(space.arms, robot.arms, strict=True):
+        chain = chain_of(arm)
+        low[columns.body] = chain.working_lower if working else chain.lower
+        high[columns.body] = chain.working_upper if working else chain.upper
+    return low, high
+
+
+def _pose_bounds(space: ActionSpace) -> Bounds:
+    low, high = np.zeros(space.width, np.float32), np.ones(space.width, np.float32)
+    reach = 0.05 if space.kind == "delta_ee" else 1.0
+    for columns in space.arms:
+        low[columns.position], high[columns.position] = -reach, reach
+        low[columns.quaternion], high[columns.quaternion] = -1.0, 1.0
+        if space.kind == "ee":
+            low[columns.position][2], high[columns.position][2] = 0.7, 1.2
+    return low, high
+
+
+def observation_space(spec: PolicySpec, robot: Embodiment, limit: int) -> spaces.Dict:
+    """Of an observation (`robospa.Observation`) as `spec` asks for it; `limit` is the number of
+    actions that a trial may have. `ee`: per arm x y z [m], qw qx qy qz, gripper."""
+    images: dict[str, spaces.Space[object]] = {
+        camera.name: spaces.Box(0, 255, (camera.height, camera.width, 3), np.uint8)
+        for camera in spec.cameras
+    }
+    parts: dict[str, spaces.Space[object]] = {"images": spaces.Dict(images)} if images else {}
+    if spec.state != "none":
+        low, high = _joint_bounds(robot, working=False)
+        parts["state"] = spaces.Box(
+            low - np.float32(BEYOND), high + np.float32(BEYOND), dtype=np.float32
+        )
+    high = np.ones((2, 8), np.float32) * 1.01
+    high[:, :3], high[:, 7] = FARTHEST, 1.0 + BEYOND
+    low = -high
+    low[:, 7] = -BEYOND
+    parts["ee"] = spaces.Box(low, high, dtype=np.float32)
+    if spec.environment_state:
+        parts["environment_state"] = spaces.Box(-np.inf, np.inf, (WIDTH,), np.float32)
+    parts["instruction"] = spaces.Text(SENTENCE, charset=LETTERS)
+    parts["step"] = spaces.Discrete(limit + 1)
+    return spaces.Dict(parts)

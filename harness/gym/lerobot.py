@@ -89,7 +89,7 @@ def _with_success(info: Info) -> Info:
 
 @EnvConfig.register_subclass("robospa")
 @dataclass
-class RoboSPAEnv(EnvConfig):
+class RoboSPAConfig(EnvConfig):
     """`--env.type=robospa`: every field is `--env.NAME`; `task` and `levels` are those of
     `robospa eval`, and each variant is evaluated for itself."""
 

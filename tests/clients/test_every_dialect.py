@@ -5,25 +5,17 @@ from __future__ import annotations
 import socket
 import threading
 from collections.abc import Callable
+from http.server import HTTPServer, SimpleHTTPRequestHandler
 from typing import Any
 
 import numpy as np
 import pytest
-from standins import (
-    QUICK,
-    TRIAL,
-    Go1,
-    OpenPi,
-    RoboTwin,
-    VlaEval,
-    XPolicyLab,
-    XVla,
-    joint_chunk,
-    observation,
-)
+from standins import DIALECTS, QUICK, TRIAL, answered, joint_chunk, observation, talking
 
 from robospa.clients import connect, dialect
 from robospa.clients.dialect import dialects
+from robospa.harness.cli.check import target_of
+from robospa.protocol.conformance import check
 from robospa.protocol.connection_limits import ServerOptions
 from robospa.protocol.errors import (
     CallTimeout,
@@ -37,17 +29,6 @@ from robospa.protocol.policy import PolicySpec
 from robospa.protocol.server import ServerThread
 from robospa.protocol.transport import Timeouts
 
-JOINT = {
-    "go1": Go1,
-    "openpi": OpenPi,
-    "xpolicylab": XPolicyLab,
-    "vla-eval": VlaEval,
-    "robotwin": RoboTwin,
-    "xvla": lambda *args: XVla(*args, proprio=14),
-}
-"""Servers whose model answers (T, 14)."""
-QUERY = {"xvla": "?space=joint"}
-
 
 def free_port() -> int:
     with socket.socket() as sock:
@@ -56,38 +37,42 @@ def free_port() -> int:
     return port
 
 
+every_dialect = pytest.mark.parametrize("name", DIALECTS)
+
+
+def served(name: str, *args: Any) -> tuple[Any, str]:
+    """A stand-in server, and the query that it needs."""
+    make, _, query = DIALECTS[name]
+    return make(*args), query
+
+
 def ask(name: str, model: Callable[[Any], Any], **options: object) -> Any:
     """The chunk that `name`'s client makes of what `model` answers."""
-    with (
-        JOINT[name](model) as url,
-        connect(url + QUERY.get(name, ""), timeouts=QUICK, options=options) as policy,
-    ):
-        policy.reset(TRIAL)
-        return policy.infer(observation())
+    return answered(*served(name, model), **options)
 
 
-@pytest.mark.parametrize("name", JOINT)
+@every_dialect
 def test_the_same_chunk_through_every_dialect(name: str) -> None:
     chunk = ask(name, lambda seen: joint_chunk())
     assert chunk.dtype == np.float32
     assert np.array_equal(chunk, joint_chunk().astype(np.float32))
 
 
-@pytest.mark.parametrize("name", JOINT)
+@every_dialect
 @pytest.mark.parametrize("shape", [(2, 13), (2, 15), (0, 14), (10_001, 14), (1, 2, 14)])
 def test_a_chunk_of_another_shape_is_the_policys_error(name: str, shape: Any) -> None:
     with pytest.raises(PolicyAnswerError, match="the policy answered"):
         ask(name, lambda seen: np.zeros(shape))
 
 
-@pytest.mark.parametrize("name", JOINT)
+@every_dialect
 @pytest.mark.parametrize("length", [1, 31, 65, 101])
 def test_a_length_that_the_server_did_not_declare_is_taken_as_sent(name: str, length: int) -> None:
     chunk = ask(name, lambda seen: joint_chunk(length))
     assert np.array_equal(chunk, joint_chunk(length).astype(np.float32))
 
 
-@pytest.mark.parametrize("name", JOINT)
+@every_dialect
 def test_a_declared_length_is_checked_and_its_option_named(name: str) -> None:
     assert len(ask(name, lambda seen: joint_chunk(4), horizon=4)) == 4
     with pytest.raises(PolicyAnswerError, match=r"\?horizon=5 .* with execute=4") as caught:
@@ -95,12 +80,9 @@ def test_a_declared_length_is_checked_and_its_option_named(name: str) -> None:
     assert "T from 1 to its horizon 4" in str(caught.value)
 
 
-@pytest.mark.parametrize("name", [name for name in JOINT if name != "go1"])
+@pytest.mark.parametrize("name", [name for name in DIALECTS if name != "go1"])
 def test_what_the_model_reads_of_an_instruction_is_declared(name: str) -> None:
-    with (
-        JOINT[name]() as url,
-        connect(url + QUERY.get(name, ""), timeouts=QUICK, options={"text_budget": 7}) as policy,
-    ):
+    with talking(*served(name), text_budget=7) as policy:
         assert policy.spec.text_budget == 7
 
 
@@ -118,10 +100,9 @@ MAPS = ("openpi", "xpolicylab", "vla-eval", "xvla", "robotwin")
 
 
 def ask_with(name: str, **extra: Any) -> Any:
-    server = JOINT[name](lambda seen: joint_chunk())
+    server, query = served(name)
     server.extra = extra
-    with server as url, connect(url + QUERY.get(name, ""), timeouts=QUICK) as policy:
-        return policy.infer(observation())
+    return answered(server, query)
 
 
 @pytest.mark.parametrize("name", MAPS)
@@ -141,7 +122,7 @@ STRICT_JSON = ("go1", "xvla")
 """Servers that cannot send NaN: they fail in the attempt, and give no reason."""
 
 
-@pytest.mark.parametrize("name", JOINT)
+@every_dialect
 @pytest.mark.parametrize("bad", [np.nan, np.inf, 1e300])
 def test_numbers_that_are_not_finite_are_the_policys_error(name: str, bad: float) -> None:
     chunk = joint_chunk()
@@ -154,7 +135,7 @@ def test_numbers_that_are_not_finite_are_the_policys_error(name: str, bad: float
         ask(name, lambda seen: chunk)
 
 
-@pytest.mark.parametrize("name", JOINT)
+@every_dialect
 def test_a_model_that_fails_is_the_servers_error(name: str) -> None:
     with pytest.raises(ServerError, match="the server reported") as caught:
         ask(name, lambda seen: 1 / 0)
@@ -169,16 +150,16 @@ def test_a_server_that_is_down(scheme: str) -> None:
         connect(f"{scheme}://127.0.0.1:{port}", timeouts=QUICK)
 
 
-@pytest.mark.parametrize("name", [name for name in JOINT if name != "vla-eval"])
+@pytest.mark.parametrize("name", [name for name in DIALECTS if name != "vla-eval"])
 def test_greetings_hold_what_a_run_keeps(name: str) -> None:
-    with JOINT[name]() as url, connect(url + QUERY.get(name, ""), timeouts=QUICK) as policy:
+    with talking(*served(name)) as policy:
         hello = policy.hello
     assert hello["spec"] == policy.spec.to_json()
     assert hello["warnings"]
     assert "horizon" in hello["options"] and "execute" in hello["options"]
 
 
-@pytest.mark.parametrize("name", JOINT)
+@every_dialect
 def test_a_server_that_does_not_answer_in_time(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(dialect, "SECONDS", 0.05)
     wake = threading.Event()
@@ -188,10 +169,7 @@ def test_a_server_that_does_not_answer_in_time(name: str, monkeypatch: pytest.Mo
         return joint_chunk()
 
     short = Timeouts(connect=10, hello=10, reset=10, first_infer=0.05, infer=0.05, close=0.2)
-    with (
-        JOINT[name](slow) as url,
-        connect(url + QUERY.get(name, ""), timeouts=short) as policy,
-    ):
+    with talking(*served(name, slow), short) as policy:
         with pytest.raises(CallTimeout, match=r"within 0\.05 s"):
             policy.infer(observation())
         wake.set()
@@ -201,12 +179,12 @@ def test_a_server_that_does_not_answer_in_time(name: str, monkeypatch: pytest.Mo
 
 
 LOOKS = {
-    "go1": "looks like GO-1's server; try go1+http://127.0.0.1:",
-    "xvla": "looks like X-VLA's server; try xvla+http://127.0.0.1:",
-    "openpi": "looks like an openpi server; try openpi://127.0.0.1:",
-    "xpolicylab": "looks like an XPolicyLab policy server; try xpolicylab://127.0.0.1:",
-    "vla-eval": "looks like a vla-eval model server; try vla-eval://127.0.0.1:",
-    "robotwin": "looks like RoboTwin's model server; try robotwin+tcp://127.0.0.1:",
+    "go1": "GO-1's server",
+    "xvla": "X-VLA's server",
+    "openpi": "an openpi server",
+    "xpolicylab": "an XPolicyLab policy server",
+    "vla-eval": "a vla-eval model server",
+    "robotwin": "RoboTwin's model server",
 }
 SPOKEN = {
     "go1": "go1+http",
@@ -220,7 +198,7 @@ SPOKEN = {
 HASTY = Timeouts(connect=1, hello=1, reset=1, first_infer=1, infer=1, end=1, close=0.2)
 WRONG = [
     (server, spoken)
-    for server in JOINT
+    for server in DIALECTS
     for spoken in (SPOKEN if server != "robotwin" else ("go1", "vla-eval", "ours"))
     if server != spoken and (server, spoken) != ("openpi", "ours")
 ]
@@ -240,9 +218,10 @@ def test_the_wrong_dialect_is_told_which_it_looks_like(
 ) -> None:
     """When connecting or at the first question; a HandshakeError, so the run stops at once."""
     monkeypatch.setattr(dialect, "SECONDS", 1.0 if server == "robotwin" else 20.0)
-    with JOINT[server]() as url, pytest.raises(HandshakeError) as caught:
+    with DIALECTS[server][0]() as url, pytest.raises(HandshakeError) as caught:
         use(url.replace(SPOKEN[server], SPOKEN[spoken]))
-    assert LOOKS[server] in str(caught.value)
+    advice = f"looks like {LOOKS[server]}; try {SPOKEN[server]}://127.0.0.1:"
+    assert advice in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
@@ -259,27 +238,21 @@ def test_something_that_never_answers_is_not_guessed_at(
 
 
 def test_an_http_server_of_another_kind() -> None:
-    from http.server import BaseHTTPRequestHandler, HTTPServer
-    from threading import Thread
-
-    class Quiet(BaseHTTPRequestHandler):
+    class Quiet(SimpleHTTPRequestHandler):
         def log_message(self, *_: object) -> None:
             return None
 
         def do_GET(self) -> None:
             self.send_error(404)
 
-    server = HTTPServer(("127.0.0.1", 0), Quiet)
-    thread = Thread(target=server.serve_forever, daemon=True)
-    thread.start()
-    try:
+    with HTTPServer(("127.0.0.1", 0), Quiet) as server:
+        thread = threading.Thread(target=server.serve_forever, daemon=True)
+        thread.start()
         for scheme in ("go1+http", "xvla+http", "openpi", "ws", "vla-eval"):
             with pytest.raises(HandshakeError, match="an HTTP server of another kind"):
                 connect(f"{scheme}://127.0.0.1:{server.server_port}", timeouts=HASTY)
-    finally:
         server.shutdown()
         thread.join(5)
-        server.server_close()
 
 
 class Zeros:
@@ -311,13 +284,11 @@ def test_our_own_server_is_recognised() -> None:
                 use(f"{scheme}://127.0.0.1:{port}")
 
 
-@pytest.mark.parametrize("name", JOINT)
+@every_dialect
 def test_robospa_check_finds_every_dialect_fit(name: str) -> None:
-    from robospa.protocol.conformance import check
-
-    with JOINT[name]() as url:
-        address = url + QUERY.get(name, "")
-        results = check(url, timeouts=QUICK, connector=lambda: connect(address, timeouts=QUICK))
+    server, query = served(name)
+    with server as url:
+        results = check(url, timeouts=QUICK, connector=lambda: connect(url + query, timeouts=QUICK))
     assert [result for result in results if result.passed is False] == []
     assert sum(result.passed is True for result in results) >= 3
     assert results[0].detail.startswith("speaks the dialect ")
@@ -331,10 +302,7 @@ def test_which_servers_have_one_state_for_all_connections() -> None:
 @pytest.mark.parametrize("name", ["xpolicylab", "robotwin"])
 def test_check_asks_a_server_with_one_state_one_trial_at_a_time(name: str) -> None:
     """Two trials at once would pass, and be mixed in a run."""
-    from robospa.harness.cli.check import target_of
-    from robospa.protocol.conformance import check
-
-    with JOINT[name]() as url:
+    with DIALECTS[name][0]() as url:
         target = target_of(url)
         assert target.shared_state
         connector = target.connect

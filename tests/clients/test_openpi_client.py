@@ -14,6 +14,7 @@ from model_fakes import COLORS, install, seen, trial
 from standins import (
     HEAD,
     LEFT,
+    OPENPI,
     QUICK,
     RIGHT,
     STATE,
@@ -22,7 +23,6 @@ from standins import (
     image,
     joint_chunk,
     observation,
-    openpi_out,
 )
 
 from robospa.action_space import ActionSpace
@@ -42,7 +42,7 @@ def reply(actions: Any) -> bytes:
     """An answer whose time is a numpy scalar, as openpi sends it."""
     timing = {"infer_ms": {b"__npgeneric__": True, b"data": 2.5, b"dtype": "<f8"}}
     message = {"actions": np.asarray(actions), "server_timing": timing}
-    packed: bytes = msgpack.packb(message, default=openpi_out)
+    packed: bytes = msgpack.packb(message, default=OPENPI.write)
     return packed
 
 
@@ -100,7 +100,7 @@ def test_metadata_that_openpis_own_client_reads_is_read() -> None:
     "actions", [[[1] * 14] * 2, np.ones((2, 14), np.int64), np.ones((2, 14), ">f8")], ids=type
 )
 def test_actions_that_openpis_own_client_takes_are_taken(actions: Any) -> None:
-    answer = msgpack.packb({"actions": actions}, default=openpi_out)
+    answer = msgpack.packb({"actions": actions}, default=OPENPI.write)
     with OpenPi(None, answer) as url, connect(url, timeouts=QUICK) as policy:
         assert policy.infer(observation()).tolist() == [[1] * 14] * 2
 
@@ -169,7 +169,7 @@ def test_after_a_text_frame_the_connection_is_gone() -> None:
         (msgpack.packb([1]), ProtocolViolation),
         (msgpack.packb({"a": 1}), PolicyAnswerError),
         (
-            msgpack.packb({"actions": np.array([["1"] * 14])}, default=openpi_out),
+            msgpack.packb({"actions": np.array([["1"] * 14])}, default=OPENPI.write),
             PolicyAnswerError,
         ),
     ],

@@ -10,6 +10,7 @@ import struct
 import threading
 import traceback
 from collections.abc import Callable
+from dataclasses import dataclass
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any, ClassVar
 
@@ -104,68 +105,36 @@ def json_numpy(value: Any) -> Any:
     return value
 
 
-def openpi_in(value: dict[Any, Any]) -> Any:
-    if b"__ndarray__" in value:
-        return np.frombuffer(value[b"data"], np.dtype(value[b"dtype"])).reshape(value[b"shape"])
-    return value
+@dataclass(frozen=True)
+class Form:
+    """The names under which a project writes an array; `coded`: its bytes are base64 text."""
+
+    mark: Any
+    data: Any
+    dtype: Any
+    shape: Any
+    more: tuple[tuple[Any, Any], ...] = ()
+    coded: bool = False
+
+    def read(self, value: dict[Any, Any]) -> Any:
+        if value.get(self.mark) is not True:
+            return value
+        data = value[self.data]
+        raw = base64.b64decode(data) if self.coded else data
+        return np.frombuffer(raw, np.dtype(value[self.dtype])).reshape(value[self.shape])
+
+    def write(self, value: Any) -> Any:
+        raw = value.tobytes()
+        data = base64.b64encode(raw).decode() if self.coded else raw
+        kind = str(value.dtype) if self.coded else value.dtype.str
+        named = {self.data: data, self.dtype: kind, self.shape: list(value.shape)}
+        return {self.mark: True, **dict(self.more), **named}
 
 
-def openpi_out(value: Any) -> Any:
-    return {
-        b"__ndarray__": True,
-        b"data": value.tobytes(),
-        b"dtype": value.dtype.str,
-        b"shape": list(value.shape),
-    }
-
-
-def nd_in(value: dict[Any, Any]) -> Any:
-    """msgpack-numpy's reading."""
-    if value.get(b"nd") is True:
-        return np.frombuffer(value[b"data"], np.dtype(value[b"type"])).reshape(value[b"shape"])
-    return value
-
-
-def nd_out(value: Any) -> Any:
-    return {
-        b"nd": True,
-        b"type": value.dtype.str,
-        b"kind": b"",
-        b"shape": value.shape,
-        b"data": value.tobytes(),
-    }
-
-
-def named_in(value: dict[Any, Any]) -> Any:
-    if "__ndarray__" in value:
-        return np.frombuffer(value["data"], np.dtype(value["dtype"])).reshape(value["shape"])
-    return value
-
-
-def named_out(value: Any) -> Any:
-    return {
-        "__ndarray__": True,
-        "data": value.tobytes(),
-        "dtype": value.dtype.str,
-        "shape": list(value.shape),
-    }
-
-
-def framed_in(value: dict[str, Any]) -> Any:
-    if "__numpy_array__" in value:
-        data = base64.b64decode(value["data"])
-        return np.frombuffer(data, value["dtype"]).reshape(value["shape"])
-    return value
-
-
-def framed_out(value: Any) -> Any:
-    data = base64.b64encode(value.tobytes()).decode()
-    return {
-        "__numpy_array__": True,
-        "data": data,
-        "dtype": str(value.dtype),
-        "shape": list(value.shape),
-    }
+OPENPI = Form(b"__ndarray__", b"data", b"dtype", b"shape")
+ND = Form(b"nd", b"data", b"type", b"shape", ((b"kind", b""),))
+NAMED = Form("__ndarray__", "data", "dtype", "shape")
+FRAMED = Form("__numpy_array__", "data", "dtype", "shape", coded=True)
 
 
 # ---------------------------------------------------------------- HTTP
@@ -332,12 +301,12 @@ class OpenPi(Socket):
     names = ("cam_high", "cam_low", "cam_left_wrist", "cam_right_wrist")
 
     def talk(self, socket: Any) -> None:
-        socket.send(msgpack.packb(self.metadata, default=openpi_out))
+        socket.send(msgpack.packb(self.metadata, default=OPENPI.write))
         while True:
             data = socket.recv()
             self.raw.append(data)
             try:
-                seen = msgpack.unpackb(data, object_hook=openpi_in, strict_map_key=False)
+                seen = msgpack.unpackb(data, object_hook=OPENPI.read, strict_map_key=False)
                 wrong = set(seen["images"]) - set(self.names)
                 if wrong:
                     raise ValueError(f"Expected images to contain {self.names}, got {wrong}")
@@ -351,7 +320,7 @@ class OpenPi(Socket):
                 socket.send(self.instead)
                 continue
             reply = {"actions": actions, "policy_timing": {"infer_ms": 12.5}, **self.extra}
-            socket.send(msgpack.packb(reply, default=openpi_out))
+            socket.send(msgpack.packb(reply, default=OPENPI.write))
 
 
 class XPolicyLab(Socket):
@@ -371,7 +340,7 @@ class XPolicyLab(Socket):
         while True:
             data = socket.recv()
             try:
-                seen = msgpack.unpackb(data, object_hook=nd_in, strict_map_key=False)
+                seen = msgpack.unpackb(data, object_hook=ND.read, strict_map_key=False)
                 kind = seen["message_type"]
                 seen["message_id"], seen["evaluation_id"]
                 wanted = self.answers[kind]
@@ -387,7 +356,7 @@ class XPolicyLab(Socket):
                 wanted = "error"
                 payload = {"code": "INFER_FAILED", "message": str(error), "details": {}}
             reply = {**seen, "message_type": wanted, "payload": payload}
-            socket.send(msgpack.packb(reply, default=nd_out, use_bin_type=True))
+            socket.send(msgpack.packb(reply, default=ND.write, use_bin_type=True))
 
     broken: tuple[str, ...] = ()
 
@@ -412,7 +381,7 @@ class VlaEval(Socket):
 
     def talk(self, socket: Any) -> None:
         while True:
-            seen = msgpack.unpackb(socket.recv(), object_hook=named_in)
+            seen = msgpack.unpackb(socket.recv(), object_hook=NAMED.read)
             kind, _, _ = seen["type"], seen["payload"], seen["timestamp"]
             self.requests.append(seen)
             if kind == "hello":
@@ -436,7 +405,7 @@ class VlaEval(Socket):
 
     def reply(self, socket: Any, seen: Any, kind: str, payload: Any) -> None:
         message = {"type": kind, "payload": payload, "seq": seen["seq"], "timestamp": 0.0}
-        socket.send(msgpack.packb(message, default=named_out))
+        socket.send(msgpack.packb(message, default=NAMED.write))
 
 
 # ---------------------------------------------------------------- TCP
@@ -476,7 +445,7 @@ class RoboTwin(StandIn):
                 return False
             data += piece
         try:
-            seen = json.loads(data, object_hook=framed_in)
+            seen = json.loads(data, object_hook=FRAMED.read)
             if seen["cmd"] not in self.methods:
                 raise AttributeError(f"No model method named '{seen['cmd']}'")
             self.requests.append(seen)
@@ -485,7 +454,7 @@ class RoboTwin(StandIn):
         except Exception as error:
             text = f"Error handling request: {error}"
             reply, good = {"error": text, "traceback": traceback.format_exc()}, False
-        answer = json.dumps(reply, default=framed_out).encode()
+        answer = json.dumps(reply, default=FRAMED.write).encode()
         frame = struct.pack(">I", len(answer)) + answer
         if self.instead is not None and seen["cmd"] == "get_action":
             frame = self.instead
@@ -494,9 +463,32 @@ class RoboTwin(StandIn):
         return good
 
 
+DIALECTS: dict[str, tuple[Callable[..., Any], str, str]] = {
+    "go1": (Go1, "http", ""),
+    "openpi": (OpenPi, "socket", ""),
+    "xpolicylab": (XPolicyLab, "socket", ""),
+    "vla-eval": (VlaEval, "socket", ""),
+    "robotwin": (RoboTwin, "tcp", ""),
+    "xvla": (lambda *args: XVla(*args, proprio=14), "http", "?space=joint"),
+}
+"""Stand-ins whose model answers (T, 14), how they frame messages, and the query they need."""
+
+
+@contextlib.contextmanager
+def talking(server: Any, query: str = "", timeouts: Timeouts = QUICK, **options: Any) -> Any:
+    """A client of ours to `server`, as long as that listens."""
+    with server as url, connect(url + query, timeouts=timeouts, options=options) as policy:
+        yield policy
+
+
+def answered(server: Any, query: str = "", seen: Any = None, **options: Any) -> Any:
+    """The chunk that our client gets of `server` to its first question of a trial."""
+    with talking(server, query, **options) as policy:
+        policy.reset(TRIAL)
+        return policy.infer(observation() if seen is None else seen)
+
+
 def first_request(server: Any, query: str = "", seen: Any = None) -> Any:
     """What our client sends `server` first in a trial; `query` has its options."""
-    with server as url, connect(url + query, timeouts=QUICK) as policy:
-        policy.reset(TRIAL)
-        policy.infer(observation() if seen is None else seen)
+    answered(server, query, seen)
     return server.requests[0]

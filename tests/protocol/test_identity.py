@@ -60,6 +60,8 @@ def test_what_differs_in_two_greetings_is_left_out_for_good() -> None:
     assert known.changes(identity_of(greeting(served=3))) == []
     assert known.changes(identity_of(greeting(served=3, checkpoint="b"))) != []
     assert known.hash == identity_of(greeting(served=9), known.volatile).hash
+    other = {**HELLO, "spec": {**HELLO["spec"], "horizon": 9}}
+    assert identity_of(HELLO).repeated_in(identity_of(other)) == identity_of(HELLO)
 
 
 @pytest.mark.parametrize(
