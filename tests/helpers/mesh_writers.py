@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import struct
+import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -65,6 +66,18 @@ def palette_png(colours: Sequence[tuple[int, int, int]], side: int = 4) -> bytes
     stream = io.BytesIO()
     Image.fromarray(np.repeat(row, side, axis=0)).save(stream, "PNG")
     return stream.getvalue()
+
+
+def empty_png(width: int, height: int) -> bytes:
+    """A picture of which only the header is true."""
+
+    def chunk(kind: bytes, data: bytes) -> bytes:
+        return (
+            struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+        )
+
+    head = chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 6, 0, 0, 0))
+    return b"\x89PNG\r\n\x1a\n" + head + chunk(b"IDAT", zlib.compress(bytes(100)))
 
 
 def glb(pieces: Sequence[Piece], textured: bool = True) -> tuple[dict[str, Any], bytes]:

@@ -22,25 +22,6 @@ def nothing_noted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("ROBOSPA_ASSETS", raising=False)
 
 
-def test_a_file_and_a_closed_folder_are_said_to_be_that(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / "objects.zip").touch()
-    with pytest.raises(ArchiveError, match="is a file, not a folder; unpack"):
-        open_archive(tmp_path / "objects.zip")
-
-    def closed(path: Path) -> bool:
-        raise PermissionError(13, "Permission denied", str(path))
-
-    archive = archive_with(tmp_path, "model_data3.json")
-    monkeypatch.setattr(Path, "is_dir", closed)
-    with pytest.raises(ArchiveError, match="Permission denied"):
-        open_archive(tmp_path)
-    monkeypatch.setattr(Path, "is_file", closed)
-    with pytest.raises(ArchiveError, match=r"base3\.glb': Permission denied"):
-        archive.files(CAN)
-
-
 def archive_with(root: Path, *files: str) -> Archive:
     for file in files:
         path = root / "objects" / "071_can" / file
@@ -49,9 +30,34 @@ def archive_with(root: Path, *files: str) -> Archive:
     return open_archive(root)
 
 
-def test_without_a_folder_the_user_is_told_how_to_name_one() -> None:
-    with pytest.raises(ArchiveError, match="`robospa official assets DIR --add` or ROBOSPA_ASSETS"):
-        open_archive()
+def test_what_is_no_folder_of_assets_says_why(tmp_path: Path) -> None:
+    (tmp_path / "objects.zip").touch()
+    (tmp_path / "other").mkdir()
+    for folder, keyword in (
+        (None, "robospa official assets DIR --add"),
+        (tmp_path / "objects.zip", "is a file"),
+        (tmp_path / "other", "holds none of"),
+        (tmp_path / "none", "does not exist"),
+    ):
+        with pytest.raises(ArchiveError, match=keyword):
+            open_archive(folder)
+
+
+def test_what_is_closed_to_us_is_said_to_be(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def closed(path: Path) -> bool:
+        raise PermissionError(13, "Permission denied", str(path))
+
+    archive = archive_with(tmp_path, "model_data3.json")
+    with pytest.raises(ArchiveError, match=r"base3\.glb' is missing"):
+        archive.files(CAN)
+    monkeypatch.setattr(Path, "is_dir", closed)
+    with pytest.raises(ArchiveError, match="Permission denied"):
+        open_archive(tmp_path)
+    monkeypatch.setattr(Path, "is_file", closed)
+    with pytest.raises(ArchiveError, match=r"base3\.glb': Permission denied"):
+        archive.files(CAN)
 
 
 def test_a_folder_is_named_noted_or_in_the_environment(
@@ -71,15 +77,6 @@ def test_a_checkout_that_holds_the_assets_will_do(tmp_path: Path) -> None:
     assert open_archive(tmp_path).root == tmp_path / "assets"
 
 
-@pytest.mark.parametrize("made", [True, False])
-def test_a_folder_of_something_else_is_refused(tmp_path: Path, made: bool) -> None:
-    if made:
-        (tmp_path / "other").mkdir()
-    message = "holds none of objects, embodiments" if made else "does not exist"
-    with pytest.raises(ArchiveError, match=message):
-        open_archive(tmp_path / "other")
-
-
 @pytest.mark.parametrize(
     ("there", "visual", "collision"),
     [
@@ -95,12 +92,6 @@ def test_meshes_are_looked_for_as_officially(
     files = archive_with(tmp_path, "model_data3.json", *there).files(CAN)
     folder = tmp_path / "objects" / "071_can"
     assert (files.visual, files.collision) == (folder / visual, folder / collision)
-
-
-def test_a_missing_file_is_named(tmp_path: Path) -> None:
-    archive = archive_with(tmp_path, "visual/base3.glb")
-    with pytest.raises(ArchiveError, match=r"'objects/071_can/model_data3.json' is missing"):
-        archive.files(CAN)
 
 
 def test_nothing_outside_the_parts_is_read(tmp_path: Path) -> None:
@@ -175,9 +166,7 @@ def test_a_damaged_entry_is_thrown_away(tmp_path: Path) -> None:
     assert cache.load_arrays(cache.cached((file,), "how", make))["a"].tolist() == [2, 2, 2]
 
 
-def test_nothing_half_written_is_left_under_the_entry(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_nothing_half_written_is_left_under_the_entry(tmp_path: Path) -> None:
     file = tmp_path / "a"
     file.write_bytes(b"mesh")
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import struct
-import zlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from made_archive import READS_MESHES
-from mesh_writers import Piece, glb, glb_bytes, palette_png, write_glb, write_obj
+from mesh_writers import Piece, empty_png, glb, glb_bytes, write_glb, write_obj, write_textured_obj
 
 from robospa.harness.packs import mesh_files as checks
 from robospa.harness.packs.archive import Archive, ArchiveError
@@ -63,23 +62,13 @@ def with_picture(picture: bytes) -> bytes:
     return glb_bytes(header, data)
 
 
-def huge_png(side: int) -> bytes:
-    """The header of a picture that would take gigabytes."""
-    head = b"IHDR" + struct.pack(">IIBBBBB", side, side, 8, 6, 0, 0, 0)
-    body = b"IDAT" + zlib.compress(b"\0" * 1000)
-    chunks = [
-        struct.pack(">I", len(c) - 4) + c + struct.pack(">I", zlib.crc32(c)) for c in (head, body)
-    ]
-    return b"\x89PNG\r\n\x1a\n" + b"".join(chunks)
-
-
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (with_picture(huge_png(9000)), "a picture of 9000x9000 pixels, more than 8192"),
-        (with_picture(huge_png(200_000)), "unreadable picture"),
+        (with_picture(empty_png(9000, 16)), "9000x16 pixels"),
+        (with_picture(empty_png(200_000, 200_000)), "unreadable picture"),
         (with_picture(b"no picture at all"), "unreadable picture"),
-        (with_picture(huge_png(64)), "image file is truncated"),
+        (with_picture(empty_png(64, 64)), "image file is truncated"),
         (glb_bytes(*glb([Piece(CORNERS * np.nan, FACES)])), "places that no object can have"),
         (glb_bytes(*glb([Piece(CORNERS, FACES + 9)])), "base0.glb"),
     ],
@@ -105,22 +94,14 @@ def test_a_missing_file_and_other_formats_are_named(tmp_path: Path) -> None:
 @pytest.mark.parametrize("inside", [True, False])
 def test_an_obj_file_takes_nothing_from_outside(tmp_path: Path, inside: bool) -> None:
     path = tmp_path / "objects" / "x" / "a.obj"
-    write_obj(path, [Piece(CORNERS, FACES)])
-    lines = path.read_text().replace("f ", "vt 0.5 0.5\nf ", 1).splitlines()
-    path.write_text(
-        "\n".join(
-            " ".join(["f", *(f"{i}/1" for i in line.split()[1:])]) if line[:2] == "f " else line
-            for line in lines
-        )
-    )
-    name = "own.png" if inside else "../../secret.png"
-    (path.parent / name).write_bytes(palette_png([(10, 200, 250)]))
-    path.with_suffix(".mtl").write_text(f"newmtl colour_0\nmap_Kd {name}\n")
-    if inside:
+    write_textured_obj(path, Piece(CORNERS, FACES, (10, 200, 250)))
+    if not inside:
+        (path.parent / "textured.png").rename(tmp_path / "secret.png")
+        path.with_name("textured.mtl").write_text("newmtl picture\nmap_Kd ../../secret.png\n")
+        with pytest.raises(ArchiveError, match="leads out"):
+            read_mesh(path, Archive(tmp_path).inside)
+    else:
         assert (10, 200, 250) in colours(read_mesh(path, Archive(tmp_path).inside))
-        return
-    with pytest.raises(ArchiveError, match="leads out of the assets' folder"):
-        read_mesh(path, Archive(tmp_path).inside)
 
 
 TRIANGLE = Piece(np.eye(3), np.array([[0, 1, 2]]))
@@ -138,41 +119,41 @@ def test_a_sound_file_passes_and_says_where_its_pictures_are(tmp_path: Path) -> 
     assert path.read_bytes()[offset : offset + length].startswith(b"\x89PNG")
 
 
-def deep(header: dict[str, Any]) -> None:
-    header["nodes"] = [{"children": [1]}, {"children": [0]}]
+def changed(kind: str, **values: Any) -> Callable[[dict[str, Any]], object]:
+    """A header whose first entry of a kind has other values; None is left out."""
+
+    def change(header: dict[str, Any]) -> None:
+        header[kind][0].update(values)
+        header[kind][0] = {k: v for k, v in header[kind][0].items() if v is not None}
+
+    return change
 
 
-def copies(header: dict[str, Any]) -> None:
-    """Few vertices, drawn by many nodes."""
-    header["nodes"] = [{"mesh": 0}] * 60_000
-
-
-def shared(header: dict[str, Any]) -> None:
-    """A pyramid of nodes, each of which holds the next twice."""
-    header["nodes"] = [{"children": [k + 1, k + 1]} for k in range(40)] + [{"mesh": 0}]
+def holding(*children: list[int]) -> Callable[[dict[str, Any]], object]:
+    return lambda header: header.update(nodes=[{"children": some} for some in children])
 
 
 CASES: dict[str, tuple[Callable[[dict[str, Any]], object], str]] = {
-    "huge count": (lambda h: h["accessors"][0].update(count=10**12), "promises 1000000000000 num"),
-    "no data": (lambda h: h["accessors"][0].pop("bufferView"), "numbers that are not in the file"),
-    "sparse": (lambda h: h["accessors"][0].update(sparse={}), "numbers that are not in the file"),
-    "negative": (lambda h: h["accessors"][0].update(count=-1), "where a count or number must"),
-    "not whole": (lambda h: h["accessors"][0].update(count=1.5), "where a count or number must"),
-    "strange type": (lambda h: h["accessors"][0].update(type="VEC9"), "no valid GLB file"),
-    "long view": (lambda h: h["bufferViews"][0].update(byteLength=10**9), "beyond its data"),
-    "far view": (lambda h: h["bufferViews"][0].update(byteOffset=10**9), "beyond its data"),
-    "long buffer": (lambda h: h["buffers"][0].update(byteLength=10**9), "bytes of data and has"),
-    "other file": (lambda h: h["buffers"][0].update(uri="../../etc/passwd"), "in another file"),
-    "other picture": (lambda h: h["images"].append({"uri": "x.png"}), "a picture in another file"),
-    "compressed": (
-        lambda h: h.update(extensionsRequired=["KHR_draco_mesh_compression"]),
-        "compressed by KHR_draco_mesh_compression",
-    ),
-    "ring": (deep, "hold each other"),
-    "copies": (copies, "vertices, more than"),
-    "pyramid": (shared, "a node in two places"),
+    "huge count": (changed("accessors", count=10**12), "promises 1000000000000 num"),
+    "wide stride": (changed("bufferViews", byteStride=2**40), "promises 3 numbers"),
+    "no data": (changed("accessors", bufferView=None), "not in the file"),
+    "sparse": (changed("accessors", sparse={}), "not in the file"),
+    "negative": (changed("accessors", count=-1), "where a count"),
+    "not whole": (changed("accessors", count=1.5), "where a count"),
+    "strange type": (changed("accessors", type="VEC9"), "no valid GLB"),
+    "long view": (changed("bufferViews", byteLength=10**9), "beyond its data"),
+    "far view": (changed("bufferViews", byteOffset=10**9), "beyond its data"),
+    "long buffer": (changed("buffers", byteLength=10**9), "bytes of data"),
+    "other file": (changed("buffers", uri="../../etc/passwd"), "another file"),
+    "other picture": (lambda h: h["images"].append({"uri": "x.png"}), "picture in another file"),
+    "compressed": (lambda h: h.update(extensionsRequired=["KHR_draco_mesh_compression"]), "KHR_"),
+    "ring": (holding([1], [0]), "hold each other"),
+    "copies": (lambda h: h.update(nodes=[{"mesh": 0}] * 60_000), "vertices, more than"),
+    "pyramid": (holding(*([k + 1, k + 1] for k in range(40)), []), "a node in two places"),
     "many nodes": (lambda h: h.update(nodes=[{}] * 200_000), "200000 nodes"),
-    "no list": (lambda h: h.update(accessors=7), "no valid GLB file"),
+    "no list": (lambda h: h.update(accessors=7), "no valid GLB"),
+    "a map of nodes": (lambda h: h.update(nodes={"a": 1}), "no valid GLB"),
+    "no primitives": (lambda h: h.update(meshes=[{"primitives": 5}]), "no valid GLB"),
 }
 
 
