@@ -47,10 +47,8 @@ class ActionProblem:
 @dataclass(frozen=True)
 class StepResult:
     """One executed action: how many physics steps it took, and whether the poll ended it.
-
     `problems` says what was executed otherwise than it was sent: clipped, or not at all. Of a pose
-    action `joints` (D,) is the joint action that was executed in its place.
-    """
+    action `joints` (D,) is the joint action that was executed in its place."""
 
     physics_steps: int
     stopped: bool
@@ -91,19 +89,14 @@ class World(Protocol):
     """One simulated table with robot. Not thread-safe; one trial at a time."""
 
     def load(self, scene: Scene, contacts: bool = False) -> None:
-        """Build `scene` afresh and settle it; nothing of an earlier trial survives.
-
-        Simulated time is 0 afterwards. `contacts`: fill `Snapshot.contacts` when polling (costs
-        time). Raises SceneUnstable.
-        """
+        """Build `scene` afresh and settle it; nothing of an earlier trial survives. Simulated time
+        is 0 afterwards. `contacts`: fill `Snapshot.contacts` when polling (costs time). Raises
+        SceneUnstable."""
 
     def step(self, action: NDArray[np.float32], space: str, poll: Poll) -> StepResult:
         """Execute one policy action of `space` "joint", "ee" or "delta_ee", or when a trial is
-        played again JOINTS_FROM_EE; raises ActionError.
-
-        `poll` is called whenever simulated time passes a multiple of 1/50 s. After a refused
-        action (ActionError) nothing has moved.
-        """
+        played again JOINTS_FROM_EE; raises ActionError. `poll` is called whenever simulated time
+        passes a multiple of 1/50 s. After a refused action (ActionError) nothing has moved."""
         ...
 
     def observe(self, spec: PolicySpec) -> Observation:

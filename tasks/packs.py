@@ -36,9 +36,7 @@ class Pack(Protocol):
 
     def model(self, asset: str, params: Params) -> ObjectModel:
         """The model of `asset`, its frame as that of the built-in one: z up, standing on z = 0.
-
-        PackError if it cannot be made.
-        """
+        PackError if it cannot be made."""
 
     def digest(self) -> str:
         """Hash of the files that models are made of, for manifests; empty without files."""

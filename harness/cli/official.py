@@ -120,7 +120,7 @@ def instructions(
     sentences = read_checkout(checkout, variants)
     rows = survey(sentences, variants, seed)
     if as_json:
-        print_json([row.to_json() for row in rows])
+        print_json(rows)
     else:
         for row in rows:
             print(row)

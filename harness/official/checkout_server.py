@@ -71,10 +71,8 @@ def packed(header: Mapping[str, Any], arrays: Arrays | None = None) -> bytes:
 
 
 def unpacked(read: Callable[[int], bytes]) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
-    """The message that `read`, which returns exactly as many bytes as asked for, gives.
-
-    Raises ValueError if it is none, and what `read` raises.
-    """
+    """The message that `read`, which returns exactly as many bytes as asked for, gives. Raises
+    ValueError if it is none, and what `read` raises."""
     (length,) = struct.unpack(">I", read(4))
     if length > MOST_HEADER:
         raise ValueError(f"a header of {length} bytes is none of this protocol")

@@ -192,10 +192,8 @@ class CheckoutStill:
 
 
 class CheckoutWorld:
-    """The checkout at `folder`, run by `python` in a process of its own.
-
-    `config` is a file of its task_config, by default that of the scene mode. Raises CheckoutFailed.
-    """
+    """The checkout at `folder`, run by `python` in a process of its own. `config` is a file of its
+    task_config, by default that of the scene mode. Raises CheckoutFailed."""
 
     def __init__(
         self, folder: str, python: str = "python", config: str = "", patience: float = 1.0

@@ -99,10 +99,8 @@ class OfficialLayout:
 
 
 def use_archive(simulation: Simulation) -> None:
-    """Let this process and its workers find the archive that `simulation` names.
-
-    Raises SettingsError if that is no folder.
-    """
+    """Let this process and its workers find the archive that `simulation` names. Raises
+    SettingsError if that is no folder."""
     folder = simulation.assets
     if folder is None:
         return
@@ -122,11 +120,9 @@ def archive_pack() -> OfficialPack:
 def parse_official(
     world: str, named: bool = False, tasks: Collection[str] = ()
 ) -> tuple[OfficialOptions, OfficialLayout]:
-    """The options that `world` names, and the layout they make on this machine.
-
-    Raises SettingsError if official objects are asked for, by an option or by an archive that is
-    `named`, and not there; or if the archive lacks something of `tasks`.
-    """
+    """The options that `world` names, and the layout they make on this machine. Raises
+    SettingsError if official objects are asked for, by an option or by an archive that is `named`,
+    and not there; or if the archive lacks something of `tasks`."""
     try:
         options = read_options(OfficialOptions, url_options(world.partition("?")[2]))
         chosen(options.switches)
@@ -227,10 +223,8 @@ def official_scenes(
     key: TrialKey, layout: OfficialLayout, episodes: Episodes
 ) -> tuple[Scene, Scene]:
     """The scene of `key` of which its sentence is made, and as it is shown: what only shows is
-    switched after the sentence was made, so that colours are named by their words.
-
-    A seed's place among `episodes` is its episode number.
-    """
+    switched after the sentence was made, so that colours are named by their words. A seed's place
+    among `episodes` is its episode number."""
     switches = chosen(layout.switches)
     number = list(episodes.get(key.variant, (key.seed,))).index(key.seed)
     drawn = build_scene(key.task, key.level, key.seed, key.embodiment, key.mode)

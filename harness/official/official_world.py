@@ -25,11 +25,9 @@ MOST_TURN = math.radians(3.0)
 
 
 class OfficialWorld(SapienWorld):
-    """A world that settles scenes as ours, or, with `settle` "official", for 11 s.
-
-    Then a scene is unstable if anything turned by more than 3 degrees in the last 0.8 s, officially
-    the only thing that is looked at.
-    """
+    """A world that settles scenes as ours, or, with `settle` "official", for 11 s. Then a scene is
+    unstable if anything turned by more than 3 degrees in the last 0.8 s, officially the only thing
+    that is looked at."""
 
     def __init__(
         self,

@@ -24,13 +24,15 @@ import stat
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
+import msgspec
 import numpy as np
+from msgspec import Meta
 
 from robospa.harness.official.slots import NoOfficialSentence, Value, arms, official_values
 from robospa.harness.trial import TrialSetup, task_parts
-from robospa.schema import parse_json
+from robospa.schema import parse_json, read
 from robospa.tasks.catalog import build_scene
 from robospa.tasks.catalog import task as find_task
 from robospa.tasks.instructions import similarity
@@ -45,9 +47,6 @@ SPLITS = {"train": SEEN, "heldout": UNSEEN}
 TEMPLATES = Path("description", "task_instruction")
 DESCRIPTIONS = Path("description", "objects_description")
 MOST_BYTES = 2**20
-MOST_TEXTS = 2000
-LONGEST = 500
-"""Characters of a template or description."""
 _PLACEHOLDER = re.compile(r"\{([^{}]+)\}")
 
 
@@ -83,9 +82,7 @@ class OfficialSentences:
 
     def instruction(self, scene: Scene, split: str, salt: str = "") -> str:
         """The sentence of this trial, of SEEN or UNSEEN; raises NoOfficialSentence, CheckoutError.
-
-        It depends on suite, task, level, seed, split and `salt` alone.
-        """
+        It depends on suite, task, level, seed, split and `salt` alone."""
         return self.instruction_of(scene, official_values(scene), split, salt)
 
     def instruction_of(
@@ -156,10 +153,8 @@ def fits(template: str, keys: Collection[str]) -> bool:
 
 
 def read_checkout(folder: Path, variants: Iterable[tuple[str, int]]) -> OfficialSentences:
-    """The sentences of `variants`, (task, level), in the checkout at `folder`.
-
-    Raises CheckoutError, naming the file, if one is missing or broken.
-    """
+    """The sentences of `variants`, (task, level), in the checkout at `folder`. Raises
+    CheckoutError, naming the file, if one is missing or broken."""
     if not (folder / TEMPLATES).is_dir():
         raise CheckoutError(
             f"{folder} is no checkout of RoboSPA: it has no folder {TEMPLATES}; name the folder "
@@ -179,10 +174,8 @@ def read_checkout(folder: Path, variants: Iterable[tuple[str, int]]) -> Official
 
 
 def spoken_parts(key: TrialKey, sentences: OfficialSentences, salt: str = "") -> TrialSetup:
-    """Scene and goal of `key` from the catalog, with a sentence of the checkout.
-
-    Raises KeyError or ValueError if something of `key` is unknown, or has no official sentence.
-    """
+    """Scene and goal of `key` from the catalog, with a sentence of the checkout. Raises KeyError or
+    ValueError if something of `key` is unknown, or has no official sentence."""
     task = find_task(key.task)
     scene = build_scene(key.task, key.level, key.seed, key.embodiment, key.mode, salt)
     said = sentences.instruction(scene, key.split, salt)
@@ -193,6 +186,16 @@ def unspoken_parts(key: TrialKey, salt: str = "") -> TrialSetup:
     """The same without the checkout, for what only shows a trial that has been run: its sentence
     is one of ours, and tells nothing."""
     return task_parts(replace(key, split="heldout"), salt)
+
+
+Line = Annotated[str, Meta(min_length=1, max_length=500)]
+Lines = Annotated[tuple[Line, ...], Meta(max_length=2000)]
+
+
+class _File(msgspec.Struct):
+    seen: Lines = ()
+    unseen: Lines = ()
+    raw_description: Line | None = None
 
 
 def _read(path: Path, described: bool = False) -> Texts:
@@ -208,29 +211,14 @@ def _read(path: Path, described: bool = False) -> Texts:
         ) from error
     except (OSError, ValueError) as error:
         raise CheckoutError(f"{path} cannot be read: {str(error)[:200]}") from error
-    if not isinstance(data, dict):
-        raise CheckoutError(f"{path} is no JSON map with the lists seen and unseen")
-    seen, unseen = (_texts(data, name, path) for name in ("seen", "unseen"))
-    plain = data.get("raw_description", "")
-    if described:
-        plain = plain if isinstance(plain, str) and 0 < len(plain) <= LONGEST else ""
-        if not plain or not seen:
-            raise CheckoutError(f"{path} describes no object: raw_description or seen is missing")
-    elif not (seen and unseen):
+    said = read(_File, data, str(path), CheckoutError)
+    if not all(text.isprintable() for text in (*said.seen, *said.unseen)):
+        raise CheckoutError(f"{path} has an entry that is no line of text")
+    if described and not (said.raw_description and said.seen):
+        raise CheckoutError(f"{path} describes no object: raw_description or seen is missing")
+    if not described and not (said.seen and said.unseen):
         raise CheckoutError(f"{path} has no sentences: seen or unseen is empty")
-    return Texts(seen, unseen, plain)
-
-
-def _texts(data: Mapping[str, Any], name: str, path: Path) -> tuple[str, ...]:
-    found = data.get(name, [])
-    if not isinstance(found, list) or len(found) > MOST_TEXTS:
-        raise CheckoutError(f"{path}: {name} is no list of at most {MOST_TEXTS} texts")
-    for text in found:
-        if not isinstance(text, str) or not 0 < len(text) <= LONGEST or not text.isprintable():
-            raise CheckoutError(
-                f"{path}: {name} has an entry that is no line of 1 to {LONGEST} characters"
-            )
-    return tuple(found)
+    return Texts(said.seen, said.unseen, said.raw_description or "")
 
 
 def _generator(scene: Scene, split: str, salt: str) -> np.random.Generator:
@@ -268,30 +256,21 @@ def overlap(texts: Texts) -> Overlap:
     return Overlap(len(tests), len(equal), near, equal)
 
 
-def overlaps(sentences: OfficialSentences) -> Mapping[tuple[str, int], Overlap]:
-    """The overlap of every variant that was read."""
-    return {variant: overlap(texts) for variant, texts in sentences.templates.items()}
-
-
-def report(sentences: OfficialSentences) -> dict[str, object]:
+def report(sentences: OfficialSentences) -> dict[str, Any]:
     """For a run's manifest: the sums over all variants, and each variant, as JSON values."""
-    found = overlaps(sentences)
-    return {
-        "hash": sentences.digest,
-        "tests": sum(one.tests for one in found.values()),
-        "equal": sum(one.equal for one in found.values()),
-        "near": sum(one.near for one in found.values()),
-        "variants": {f"{task} {level}": asdict(one) for (task, level), one in found.items()},
-    }
+    found = {f"{task} {level}": overlap(of) for (task, level), of in sentences.templates.items()}
+    sums = {n: sum(getattr(o, n) for o in found.values()) for n in ("tests", "equal", "near")}
+    rows = {name: asdict(one) for name, one in found.items()}
+    return {"hash": sentences.digest, **sums, "variants": rows}
 
 
 def sentence_of(sentences: OfficialSentences) -> str:
     """The sums in words."""
-    found = overlaps(sentences).values()
-    tests, equal, near = (sum(getattr(o, n) for o in found) for n in ("tests", "equal", "near"))
+    found = report(sentences)
     return (
-        f"official sentences: of {tests} test templates of {len(found)} variants, {equal} stand in "
-        f"training word for word and {near} are alike or equal to one of training"
+        f"official sentences: of {found['tests']} test templates of {len(found['variants'])} "
+        f"variants, {found['equal']} stand in training word for word and {found['near']} are alike "
+        "or equal to one of training"
     )
 
 
@@ -317,10 +296,6 @@ class VariantSurvey:
         same = f"{self.overlap.equal} equal, {self.overlap.near} alike of {self.overlap.tests}"
         return f"{self.task} {self.level}: fit {fit}; {same}; {self.trouble or self.example}"
 
-    def to_json(self) -> dict[str, Any]:
-        """Plain JSON values."""
-        return asdict(self)
-
 
 def survey(
     sentences: OfficialSentences, variants: Iterable[tuple[str, int]], seed: int
@@ -334,15 +309,7 @@ def survey(
             example = sentences.instruction(scene, UNSEEN)
         except ValueError as error:
             trouble = str(error)
-        rows.append(
-            VariantSurvey(
-                task,
-                level,
-                (len(sentences.usable(scene, SEEN)), len(texts.seen)),
-                (len(sentences.usable(scene, UNSEEN)), len(texts.unseen)),
-                overlap(texts),
-                example,
-                trouble,
-            )
-        )
+        seen = len(sentences.usable(scene, SEEN)), len(texts.seen)
+        unseen = len(sentences.usable(scene, UNSEEN)), len(texts.unseen)
+        rows.append(VariantSurvey(task, level, seen, unseen, overlap(texts), example, trouble))
     return rows

@@ -34,10 +34,8 @@ class NoOfficialSentence(ValueError):
 
 
 def official_values(scene: Scene) -> Values:
-    """The value of every official placeholder of `scene`, by its name.
-
-    Raises NoOfficialSentence for a task that is not of the official benchmark.
-    """
+    """The value of every official placeholder of `scene`, by its name. Raises NoOfficialSentence
+    for a task that is not of the official benchmark."""
     found = next((made for name, made in SLOTS.items() if fnmatchcase(scene.task, name)), None)
     if found is None:
         raise NoOfficialSentence(f"{scene.task} is no official task: it has no official sentences")

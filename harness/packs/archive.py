@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import json
 import os
 import zipfile
 from collections.abc import Callable, Mapping
@@ -79,18 +80,14 @@ class Archive:
                 urdf=self._existing(folder / model.model / "mobility.urdf"),
             )
         name = f"base{model.model}.glb"
-        flat = [folder / name, folder / f"textured{model.model}.obj"]
-        visual = self._first(folder / "visual" / name, *flat)
+        meshes = folder / "visual" / name, folder / name, folder / f"textured{model.model}.obj"
+        visual = self._existing(next((path for path in meshes if path.is_file()), meshes[0]))
         collision = folder / "collision" / name
         return ModelFiles(
             data=self._existing(folder / f"model_data{model.model}.json"),
             visual=visual,
             collision=self.inside(collision) if collision.is_file() else visual,
         )
-
-    def _first(self, *paths: Path) -> Path:
-        """The first that exists; ArchiveError, naming the first, if none does."""
-        return self._existing(next((path for path in paths if path.is_file()), paths[0]))
 
     def _existing(self, path: Path) -> Path:
         if not path.is_file():
@@ -100,20 +97,22 @@ class Archive:
             )
         return self.inside(path)
 
-    def textures(self, split: str) -> Path | None:
-        """Folder of the background pictures of a split, "seen" or "unseen"; None if not there."""
-        folder = self.root / "background_texture" / split
-        return folder if folder.is_dir() else None
-
-    def embodiment(self, robot: str) -> Path | None:
-        """Folder of one of our robots; None if it is not there."""
-        folder = self.root / "embodiments" / robot
-        return folder if folder.is_dir() else None
-
     def clutter(self) -> tuple[str, ...]:
         """Things of the objaverse that lie about, as "category/id", sorted."""
         found = (self.root / "objects" / "objaverse").glob("*/*/model.urdf")
         return tuple(sorted(f"{path.parent.parent.name}/{path.parent.name}" for path in found))
+
+
+def read_json(path: Path, most: int) -> Any:
+    """The JSON in a file of the archive; ArchiveError if it is none or has more bytes."""
+    try:
+        if path.stat().st_size > most:
+            raise ArchiveError(f"{str(path)!r} is larger than {most >> 20} MB")
+        return json.loads(path.read_bytes())
+    except ArchiveError:
+        raise
+    except (OSError, ValueError, RecursionError) as error:
+        raise ArchiveError(f"{str(path)!r} is no readable JSON file: {error}") from error
 
 
 def noted() -> Path:
@@ -123,10 +122,8 @@ def noted() -> Path:
 
 def open_archive(path: Path | str | None = None) -> Archive:
     """The archive at `path`, or in ROBOSPA_ASSETS, or as `robospa official assets --add` noted it.
-
     A folder whose `assets` folder holds the parts, such as a RoboTwin checkout, will do as well.
-    ArchiveError, saying what to do, if none is named or it holds none of the parts.
-    """
+    ArchiveError, saying what to do, if none is named or it holds none of the parts."""
     named = path or os.environ.get(VARIABLE) or _note()
     if not named:
         raise ArchiveError(

@@ -36,10 +36,8 @@ sheet."""
 
 
 def convex_pieces(meshes: Sequence[Piece]) -> list[Piece]:
-    """Corners (C, 3) and outward triangles (T, 3) of each piece, largest first.
-
-    `meshes` are vertices (V, 3) and faces (F, 3). ArchiveError if nothing of them has a volume.
-    """
+    """Corners (C, 3) and outward triangles (T, 3) of each piece, largest first. `meshes` are
+    vertices (V, 3) and faces (F, 3). ArchiveError if nothing of them has a volume."""
     from scipy.spatial import ConvexHull, QhullError
 
     span = float(np.ptp(np.concatenate([points for points, _ in meshes]), axis=0).max())
@@ -203,9 +201,7 @@ Y = 1
 def is_filled(archive: Archive, model: OfficialModel) -> bool:
     """Whether `model` should be hollow and its collision pieces, which are read or taken from the
     cache, close its mouth; False where meshes cannot be read, because trimesh is not installed.
-
-    ArchiveError, in one sentence, for a file that cannot be used.
-    """
+    ArchiveError, in one sentence, for a file that cannot be used."""
     if not model.hollow or not reads_meshes():
         return False
     collision = archive.files(model).collision

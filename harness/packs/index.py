@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from robospa.harness.packs.archive import Archive, ArchiveError, ModelFiles
+import msgspec
+
+from robospa.harness.packs.archive import Archive, ArchiveError, read_json
 from robospa.harness.packs.convex import is_filled
 from robospa.harness.packs.mesh_files import check_glb
 from robospa.harness.packs.placing import LARGEST_DATA, ModelData, read_model_data
 from robospa.harness.packs.urdf import check_uses, read_urdf
 from robospa.harness.robots import embodiments
+from robospa.schema import read
 from robospa.tasks.official import (
     OfficialModel,
     needs,
@@ -21,7 +23,6 @@ from robospa.tasks.official import (
     official_size,
 )
 
-TEXTURE_ENDING = "*.png"
 THING = "objaverse"
 """The folder of things that only lie about, and what such a thing is called as the asset of an
 object; its parameter "thing" is "category/id"."""
@@ -70,10 +71,8 @@ class Index:
 
 
 def index(archive: Archive) -> Index:
-    """Look at every model's files: that they are there, and that lengths, counts and sizes fit.
-
-    Of meshes only what collides of hollow things is read, and kept in the cache.
-    """
+    """Look at every model's files: that they are there, and that lengths, counts and sizes fit. Of
+    meshes only what collides of hollow things is read, and kept in the cache."""
     models = {asset: _models(asset) for asset in official_assets()}
     faults = {m.name: text for some in models.values() for m in some if (text := fault(archive, m))}
     closed: dict[str, list[str]] = {}
@@ -104,16 +103,14 @@ def index(archive: Archive) -> Index:
             for task, assets in needs().items()
             if (found := tuple(name for asset in assets for name in closed.get(asset, ())))
         },
-        robots=tuple(name for name in embodiments() if archive.embodiment(name) is not None),
-        textures={split: _pictures(archive, split) for split in ("seen", "unseen")},
+        robots=tuple(n for n in embodiments() if (archive.root / "embodiments" / n).is_dir()),
+        textures={
+            split: sum(1 for _ in (archive.root / "background_texture" / split).glob("*.png"))
+            for split in ("seen", "unseen")
+        },
         clutter=sum(map(len, clutter_things(archive).values())),
         digest=digest_of(archive),
     )
-
-
-def _pictures(archive: Archive, split: str) -> int:
-    folder = archive.textures(split)
-    return 0 if folder is None else sum(1 for _ in folder.glob(TEXTURE_ENDING))
 
 
 def _models(asset: str) -> list[OfficialModel]:
@@ -136,7 +133,7 @@ def fault(archive: Archive, model: OfficialModel) -> str:
     try:
         files = archive.files(model)
         data = read_model_data(files.data)
-        for file in {files.visual, files.collision} - {None}:
+        for file in {files.visual, files.collision}:
             if file is not None and file.suffix == ".glb":
                 check_glb(file)
         if files.urdf is not None:
@@ -169,7 +166,8 @@ def digest_of(archive: Archive) -> str:
         for model in official_models(asset):
             try:
                 files = archive.files(model)
-                sizes = _sizes(files)
+                made_of = (file for file in (files.visual, files.collision, files.urdf) if file)
+                sizes = " ".join(str(file.stat().st_size) for file in made_of)
                 with files.data.open("rb") as file:
                     said = file.read(LARGEST_DATA)
             except (ArchiveError, OSError):
@@ -181,16 +179,9 @@ def digest_of(archive: Archive) -> str:
     return found.hexdigest()[:16]
 
 
-def _sizes(files: ModelFiles) -> str:
-    present = (file for file in (files.visual, files.collision, files.urdf) if file is not None)
-    return " ".join(str(file.stat().st_size) for file in present)
-
-
 def clutter_things(archive: Archive) -> Mapping[str, tuple[str, ...]]:
-    """The ids of each category that are in the archive and in its list, sorted.
-
-    ArchiveError for a list that cannot be read.
-    """
+    """The ids of each category that are in the archive and in its list, sorted. ArchiveError for a
+    list that cannot be read."""
     found: dict[str, list[str]] = {}
     listed = _listed(archive)
     for name in archive.clutter():
@@ -212,20 +203,15 @@ def files_text(archive: Archive) -> str:
     return "".join(rows)
 
 
+class _List(msgspec.Struct):
+    list_of_items: dict[str, list[str | int]]
+
+
 def _listed(archive: Archive) -> Mapping[str, frozenset[str]] | None:
     """The ids of each category in the list; None without one."""
     path = archive.root / "objects" / THING / LIST
     if not path.is_file():
         return None
-    path = archive.inside(path)
-    try:
-        if path.stat().st_size > LARGEST_LIST:
-            raise ArchiveError(f"{str(path)!r} is larger than {LARGEST_LIST >> 20} MB")
-        rows = json.loads(path.read_bytes())["list_of_items"]
-        return {str(name): frozenset(map(str, ids)) for name, ids in rows.items()}
-    except ArchiveError:
-        raise
-    except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
-        raise ArchiveError(
-            f"{str(path)!r} is no JSON file whose list_of_items has the ids of each category"
-        ) from error
+    data = read_json(archive.inside(path), LARGEST_LIST)
+    rows = read(_List, data, repr(str(path)), ArchiveError).list_of_items
+    return {name: frozenset(map(str, ids)) for name, ids in rows.items()}

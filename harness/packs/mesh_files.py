@@ -56,10 +56,8 @@ class RawMesh:
 
 
 def read_mesh(path: Path, inside: Callable[[Path], Path], side: int = PICTURE) -> RawMesh:
-    """The mesh in `path`; `inside` refuses files that are not the archive's.
-
-    ArchiveError, in one sentence, for a file that cannot be read or is too large.
-    """
+    """The mesh in `path`; `inside` refuses files that are not the archive's. ArchiveError, in one
+    sentence, for a file that cannot be read or is too large."""
     parts = _parts(path, inside)
     textures = [_Texture.of(part.visual) for part in parts]
     looks = {texture.key: texture for texture in textures}
@@ -115,10 +113,7 @@ def _tiled(
 
 def read_shapes(path: Path, inside: Callable[[Path], Path]) -> list[Piece]:
     """Vertices (V, 3) and faces (F, 3) of each node in `path`, in the file's frame and unit: its
-    materials, which are not read, do not divide it.
-
-    ArchiveError as `read_mesh`.
-    """
+    materials, which are not read, do not divide it. ArchiveError as `read_mesh`."""
     return [
         (np.asarray(part.vertices, dtype=float), np.asarray(part.faces, dtype=np.int64))
         for part in _parts(path, inside, by_node=True)
@@ -198,9 +193,7 @@ def _check_picture(path: Path, offset: int, length: int) -> None:
 
 class _Inside:
     """Gives trimesh the files that a mesh names, such as pictures, if they are the archive's.
-
-    `trouble` is why one was refused; one that is not there leaves the mesh without its colours.
-    """
+    `trouble` is why one was refused; one that is not there leaves the mesh without its colours."""
 
     def __init__(self, folder: Path, inside: Callable[[Path], Path]) -> None:
         self._folder, self._inside = folder, inside
@@ -332,10 +325,8 @@ COMPRESSED = ("draco", "meshopt", "basisu")
 
 
 def check_glb(path: Path) -> tuple[tuple[int, int], ...]:
-    """Where its pictures are in the file: offset and length [bytes] of each.
-
-    ArchiveError, in one sentence, if `path` is no GLB file that can be read within bounds.
-    """
+    """Where its pictures are in the file: offset and length [bytes] of each. ArchiveError, in one
+    sentence, if `path` is no GLB file that can be read within bounds."""
     data, binary, start = _chunks(path)
     try:
         _check_header(data, binary)

@@ -10,7 +10,6 @@ fingers close; how wide a part is there is measured on the convex pieces.
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -22,7 +21,7 @@ import numpy as np
 from msgspec import Meta
 
 from robospa.geometry import Pose, Vec3, from_matrix, vec3
-from robospa.harness.packs.archive import ArchiveError
+from robospa.harness.packs.archive import ArchiveError, read_json
 from robospa.harness.packs.convex import planes
 from robospa.harness.packs.mesh_files import Floats, Piece
 from robospa.schema import read
@@ -104,14 +103,8 @@ class ModelData:
 
 def read_model_data(path: Path) -> ModelData:
     """What `path` says. ArchiveError, in one sentence, if it is not such a file."""
-    if path.stat().st_size > LARGEST_DATA:
-        raise ArchiveError(f"{str(path)!r} is larger than {LARGEST_DATA >> 20} MB")
-    try:
-        data = json.loads(path.read_bytes())
-    except (OSError, ValueError, RecursionError) as error:
-        raise ArchiveError(f"{str(path)!r} is no readable JSON file: {error}") from error
     what = repr(str(path))
-    said = read(_File, data, what, ArchiveError)
+    said = read(_File, read_json(path, LARGEST_DATA), what, ArchiveError)
     mass = said.mass if isinstance(said.mass, float) else None
     if mass is not None and not 0 < mass < 1e3:
         raise ArchiveError(f"{what} gives the mass {mass}, which no object can have")
@@ -195,10 +188,8 @@ def place(
     points: Floats, drawn: Floats, data: ModelData, model: OfficialModel, builtin: ObjectModel
 ) -> Placing:
     """How a model is placed in our frame: `points` (n, 3) are of what collides, `drawn` (2, 3) the
-    corners of the box of what is drawn, both unscaled.
-
-    ArchiveError for a model of the wrong size or without a point that it needs.
-    """
+    corners of the box of what is drawn, both unscaled. ArchiveError for a model of the wrong size
+    or without a point that it needs."""
     scaled = points * data.scale
     turn = np.eye(3) if model.lies or model.jointed else Y_UP
     turn = _about_z(model.turns * math.pi / 2) @ turn
@@ -285,10 +276,8 @@ def frames(
     model: OfficialModel,
 ) -> dict[str, Pose]:
     """The frames that tasks and skills need: at the archive's points where the table names one,
-    else at the like place. They are turned as the built-in ones.
-
-    ArchiveError if the archive has no such point.
-    """
+    else at the like place. They are turned as the built-in ones. ArchiveError if the archive has no
+    such point."""
     found = {
         name: replace(frame, position=likeness.point(frame.position))
         for name, frame in builtin.frames.items()
@@ -350,10 +339,8 @@ def _unit(vector: Floats) -> Vec3:
 def _between(
     faces: Sequence[tuple[Floats, Floats]], point: Floats, approach: Floats, closing: Floats
 ) -> tuple[float, float] | None:
-    """Middle and width [m], along `closing` from `point`, of the part between the fingertips.
-
-    None if there is nothing. Parts that touch or overlap along the line are one.
-    """
+    """Middle and width [m], along `closing` from `point`, of the part between the fingertips. None
+    if there is nothing. Parts that touch or overlap along the line are one."""
     spans = []
     for depth in DEPTHS:
         start = point + depth * approach

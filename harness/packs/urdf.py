@@ -78,10 +78,8 @@ class Urdf:
 
 
 def read_urdf(path: Path, inside: Callable[[Path], Path]) -> Urdf:
-    """What `path` says; `inside` refuses files that are not the archive's.
-
-    ArchiveError, in one sentence, for one that cannot be read safely.
-    """
+    """What `path` says; `inside` refuses files that are not the archive's. ArchiveError, in one
+    sentence, for one that cannot be read safely."""
     path = inside(path)
     if path.stat().st_size > LARGEST_FILE:
         raise ArchiveError(f"{str(path)!r} is larger than {LARGEST_FILE >> 20} MB")

@@ -73,8 +73,7 @@ def _welded(mesh: RawMesh) -> RawMesh:
 
 def _proper(faces: Ints) -> Ints:
     """Faces of three different corners, each once."""
-    a, b, c = faces.T
-    faces = faces[(a != b) & (b != c) & (a != c)]
+    faces = faces[_distinct(faces)]
     first = np.argmin(faces, axis=1)[:, None]
     turned = np.take_along_axis(faces, (first + np.arange(3)) % 3, axis=1)
     return np.unique(turned, axis=0)
@@ -111,11 +110,9 @@ def _means(values: Floats, group: Ints, count: int) -> Floats:
 
 
 def shaded(mesh: RawMesh) -> tuple[Floats, Floats, Floats, Ints]:
-    """Vertices (V, 3), unit normals (V, 3), places in the picture (V, 2) and triangles (F, 3).
-
-    A corner's normal is the area-weighted mean over the faces at its place that lie within the
-    crease angle of its own: smooth across flat angles, sharp across creases.
-    """
+    """Vertices (V, 3), unit normals (V, 3), places in the picture (V, 2) and triangles (F, 3). A
+    corner's normal is the area-weighted mean over the faces at its place that lie within the crease
+    angle of its own: smooth across flat angles, sharp across creases."""
     points, faces = mesh.vertices, mesh.faces
     a, b, c = (points[faces[:, i]] for i in range(3))
     areas = np.cross(b - a, c - a)
@@ -181,19 +178,15 @@ MOST_FILES = 200
 @dataclass(frozen=True)
 class RobotSkins:
     """What is drawn of the links of the left and of the right arm instead of our shapes, by link.
-
-    If `stand`, what stands still beside the arms is among it, with the left arm's base.
-    """
+    If `stand`, what stands still beside the arms is among it, with the left arm's base."""
 
     arms: tuple[Mapping[str, Skin], Mapping[str, Skin]]
     stand: bool = False
 
 
 def robot_skins(archive: Archive, robot: Embodiment, full: bool = False) -> RobotSkins:
-    """The meshes of `robot`, every triangle of them if `full`.
-
-    ArchiveError, in one sentence, if they are not there or cannot be read.
-    """
+    """The meshes of `robot`, every triangle of them if `full`. ArchiveError, in one sentence, if
+    they are not there or cannot be read."""
     left, right = robot.arms
     urdf = _robot_urdf(archive, robot)
     own = {joint.name for joint in right.joints} - {joint.name for joint in left.joints}
@@ -213,8 +206,8 @@ def check_robot(archive: Archive, robot: Embodiment) -> None:
 
 
 def _robot_urdf(archive: Archive, robot: Embodiment) -> Urdf:
-    folder = archive.embodiment(robot.name)
-    if folder is None:
+    folder = archive.root / "embodiments" / robot.name
+    if not folder.is_dir():
         raise ArchiveError(
             f"there are no meshes of {robot.name} in {str(archive.root / 'embodiments')!r}; unpack "
             "embodiments.zip of the official data there"

@@ -58,10 +58,8 @@ class GalleryRow:
 def first_frame(
     world: World, scene: Scene, camera: str = "head", size: tuple[int, int] = CELL
 ) -> NDArray[np.uint8]:
-    """The settled scene as `camera` sees it: RGB, uint8 (height, width, 3).
-
-    Raises SceneUnstable or RenderUnavailable.
-    """
+    """The settled scene as `camera` sees it: RGB, uint8 (height, width, 3). Raises SceneUnstable or
+    RenderUnavailable."""
     world.load(scene)
     return world.render(CameraSpec(camera, *size))
 
@@ -171,9 +169,7 @@ def save_jpeg(
     qualities: Iterable[int] = (90, 85, 80, 75, 70, 60, 50),
 ) -> int:
     """Write `page` at the best quality that stays below `limit` bytes; returns the size [bytes].
-
-    ValueError, with nothing written, if even the lowest quality is larger.
-    """
+    ValueError, with nothing written, if even the lowest quality is larger."""
     data = b""
     for quality in qualities:
         buffer = BytesIO()

@@ -64,9 +64,7 @@ class VideoBuffer:
 
 class FilmRecorder:
     """A `Recorder` that draws a trial while it is played, all `cameras` side by side, as an MP4.
-
-    While nothing moves, one picture serves for all.
-    """
+    While nothing moves, one picture serves for all."""
 
     def __init__(self, cameras: Sequence[CameraSpec] = (CameraSpec(CAMERA),)) -> None:
         self._cameras = tuple(cameras)

@@ -215,9 +215,7 @@ Source = MadeTextures | TextureFolder
 
 
 def source() -> Source:
-    """The user's folder if one is named, else the textures of this package.
-
-    ValueError, in one sentence, for a folder that is not as it should be.
-    """
+    """The user's folder if one is named, else the textures of this package. ValueError, in one
+    sentence, for a folder that is not as it should be."""
     named = os.environ.get(VARIABLE)
     return TextureFolder(Path(named)) if named else MadeTextures()

@@ -110,9 +110,7 @@ def turned(slope: float, x: Field = X, y: Field = Y) -> tuple[Field, Field]:
 
 class Cells:
     """Jittered points on a grid: which one is nearest, how far it and the second nearest are.
-
-    Distances are in cells. `number` is the nearest point's, from 0.
-    """
+    Distances are in cells. `number` is the nearest point's, from 0."""
 
     def __init__(self, draw: Draw, across: int, down: int, jitter: float = 0.9) -> None:
         wide = across + 2

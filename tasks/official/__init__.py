@@ -21,12 +21,10 @@ POINTS = frozenset({"press", "touched", "support", "left", "right", "tip", "hand
 
 @dataclass(frozen=True)
 class OfficialModel:
-    """A model of the archive, and how its frame becomes ours (see models.toml).
-
-    A `jointed` one is a URDF file in a sub-folder called `model`, one with a `hinge` has a door; a
-    `hollow` one is open at its top.
-    `points` gives for some of our frames the archive's point where they lie, such as "contact 2".
-    """
+    """A model of the archive, and how its frame becomes ours (see models.toml). A `jointed` one is
+    a URDF file in a sub-folder called `model`, one with a `hinge` has a door; a `hollow` one is
+    open at its top. `points` gives for some of our frames the archive's point where they lie, such
+    as "contact 2"."""
 
     folder: str
     model: str
