@@ -74,7 +74,31 @@ class _CheckoutKind(WorldKind):
     def selection(self, settings: EvaluationSettings) -> Selection:
         """With the official splits, because a checkout has sentences of its own."""
         super().selection(settings)
-        return _selection(settings)
+        folder, options = parse_checkout(settings.simulation.world)
+        selection, simulation = settings.selection, settings.simulation
+        timed = settings.timing.action_rate is not None or settings.timing.clock != PAUSED
+        filmed = settings.recording.video != "none"
+        for setting, given, why in (
+            ("instructions", selection.instructions, "has its own sentences"),
+            ("video", filmed, "does not play a trial again, which is how films are made"),
+            ("control", simulation.control != "rest_to_rest", "executes actions in its own way"),
+            ("action_rate and clock", timed, "executes actions in its own way"),
+            ("parts", simulation.parts, "has goals of its own"),
+            ("shuffle_instructions", simulation.shuffle_instructions, "has its own sentences"),
+        ):
+            if given:
+                raise SettingsError(f"a checkout {why}: leave {setting} out")
+        if selection.seeds is None:
+            raise SettingsError(
+                "a checkout's valid seeds are not ours: find some with `robospa official checkout "
+                "DIR --find FILE` and name the file with seeds"
+            )
+        if not options.config and not {*selection.mode.split(",")} <= {*CONFIGS}:
+            raise SettingsError(
+                f"a checkout has the scene modes {' and '.join(CONFIGS)}, or a file of its own "
+                "with checkout:DIR?config=NAME"
+            )
+        return replace(selection, instructions=folder)
 
     def arguments(self, settings: EvaluationSettings) -> dict[str, object]:
         """The folder and the options that the world names."""
@@ -87,44 +111,6 @@ class _CheckoutKind(WorldKind):
 
 
 CHECKOUT = _CheckoutKind("checkout", "robospa.harness.official.checkout_world:CheckoutWorld")
-
-
-def _selection(settings: EvaluationSettings) -> Selection:
-    folder, options = parse_checkout(settings.simulation.world)
-    selection, simulation = settings.selection, settings.simulation
-    for wrong, sentence in (
-        (selection.instructions, "a checkout has its own sentences: leave instructions out"),
-        (
-            selection.seeds is None,
-            "a checkout's valid seeds are not ours: find some with `robospa official "
-            "checkout DIR --find FILE` and name the file with seeds",
-        ),
-        (
-            settings.recording.video != "none",
-            "a checkout does not play a trial again, which is how films are made: leave video out",
-        ),
-        (
-            simulation.control != "rest_to_rest",
-            "a checkout executes actions in its own way: leave control out",
-        ),
-        (
-            settings.timing.action_rate is not None or settings.timing.clock != PAUSED,
-            "a checkout executes actions in its own way: leave action_rate and clock out",
-        ),
-        (simulation.parts, "a checkout has goals of its own: leave parts out"),
-        (
-            simulation.shuffle_instructions,
-            "a checkout has its own sentences: leave shuffle_instructions out",
-        ),
-        (
-            not options.config and any(m not in CONFIGS for m in selection.mode.split(",")),
-            f"a checkout has the scene modes {' and '.join(CONFIGS)}, or a file of its own with "
-            "checkout:DIR?config=NAME",
-        ),
-    ):
-        if wrong:
-            raise SettingsError(sentence)
-    return replace(selection, instructions=folder)
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,7 +26,6 @@ from numpy.typing import NDArray
 from robospa.geometry import Pose
 from robospa.harness.official import checkout_server
 from robospa.harness.official.checkout import CONFIGS, CheckoutSnapshot, checkout_parts
-from robospa.harness.official.checkout_server import packed, unpacked
 from robospa.harness.official.sentences import UNSEEN, OfficialSentences, read_checkout
 from robospa.harness.robots import embodiment
 from robospa.harness.world import ActionError, Poll, RenderUnavailable, SceneUnstable, StepResult
@@ -35,7 +34,7 @@ from robospa.protocol.errors import printable
 from robospa.protocol.policy import PolicySpec
 from robospa.tasks.scene import Scene
 from robospa.tasks.snapshot import Contact
-from robospa.trial import TrialKey
+from robospa.trial import REFERENCE, TrialKey
 from robospa.workcell import grasp_points
 
 SENTENCE = 500
@@ -56,10 +55,10 @@ class CheckoutProcess:
     """A process of `python` that runs the checkout at `folder`; `hello` is its greeting."""
 
     def __init__(
-        self, folder: Path, python: str = "python", seconds: Mapping[str, float] | None = None
+        self, folder: Path, python: str = "python", seconds: Mapping[str, float] = SECONDS
     ) -> None:
         """Raises CheckoutFailed if it does not come up."""
-        self._seconds = {**SECONDS, **(seconds or {})}
+        self._seconds = seconds
         script = Path(checkout_server.__file__).resolve()
         # Nothing of ours may be imported there: our packages need another Python.
         environment = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"}
@@ -87,19 +86,16 @@ class CheckoutProcess:
             raise
 
     def ask(
-        self,
-        do: str,
-        arrays: Mapping[str, NDArray[Any]] | None = None,
-        **request: object,
+        self, do: str, arrays: Mapping[str, NDArray[Any]] | None = None, **request: object
     ) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
         """The answer to one request; raises CheckoutFailed, after which it is of no use any more,
         or BadScene."""
         deadline = time.monotonic() + self._seconds[do]
         assert self._process.stdin is not None
         try:
-            self._process.stdin.write(packed({"do": do, **request}, arrays))
+            self._process.stdin.write(checkout_server.packed({"do": do, **request}, arrays))
             self._process.stdin.flush()
-            header, found = unpacked(lambda count: self._read(count, deadline, do))
+            header, found = checkout_server.unpacked(lambda n: self._read(n, deadline, do))
         except (BrokenPipeError, EOFError):
             code = self._ended()
             raise CheckoutFailed(
@@ -198,8 +194,6 @@ class CheckoutWorld:
     def __init__(
         self, folder: str, python: str = "python", config: str = "", patience: float = 1.0
     ) -> None:
-        from robospa.harness.official.checkout_world import SECONDS
-
         self._folder, self._config = Path(folder), config
         seconds = {name: patience * value for name, value in SECONDS.items()}
         self._process = CheckoutProcess(self._folder, python, seconds)
@@ -298,15 +292,15 @@ class CheckoutWorld:
     def snapshot(self) -> CheckoutSnapshot:
         """The robot and the checkout's verdict; no object is known."""
         scene, joints = self._loaded(), self._joints()
-        left, right = self._ends()
-        ends = (_pose(left), _pose(right))
+        rows = self._ends().tolist()
+        left, right = (Pose((x, y, z), (a, b, c, d)) for x, y, z, a, b, c, d in rows)
         flags = self._state.get("flags", [])
         return CheckoutSnapshot(
             time=self.physics_steps * TIMESTEP,
             poses={},
             gripper=(float(joints[0][-1]), float(joints[1][-1])),
-            end_effector=ends,
-            grasp_points=grasp_points(embodiment(scene.embodiment).grippers, ends),
+            end_effector=(left, right),
+            grasp_points=grasp_points(embodiment(scene.embodiment).grippers, (left, right)),
             joints=(tuple(joints[0][:-1].tolist()), tuple(joints[1][:-1].tolist())),
             success=self._state.get("success") is True,
             flags=tuple(bool(flag) for flag in flags) if isinstance(flags, list) else (),
@@ -355,20 +349,11 @@ class CheckoutWorld:
 
 def official_robot(name: str) -> list[object]:
     """What a checkout calls the robot `name`: one of two arms, or two and their distance [m]."""
-    from robospa.trial import REFERENCE
-
     if name == REFERENCE:
         return [name]
     pair, _, distance = name.partition(":")
     left, _, right = pair.partition("+")
-    robot = embodiment(name)
-    gap = float(distance) if distance else robot.distance
-    return [left, right or left, gap]
-
-
-def _pose(row: NDArray[np.float64]) -> Pose:
-    x, y, z, *turn = (float(v) for v in row)
-    return Pose((x, y, z), (turn[0], turn[1], turn[2], turn[3]))
+    return [left, right or left, float(distance) if distance else embodiment(name).distance]
 
 
 PINS = {"sapien": "3.0.0b1", "mplib": "0.2.1", "torch": "2.4.1", "warp": "1.12.0"}

@@ -20,7 +20,8 @@ import os
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from itertools import groupby, islice
 from pathlib import Path
 from typing import Any
 
@@ -83,10 +84,7 @@ def find_recordings(folder: Path) -> list[OfficialRecording]:
         )
     rows = sorted((path.parent, int(found[1]), path) for path, found in files)
     beside = {parent: _beside(parent.parent) for parent, _, _ in rows}
-    return [
-        replace(_with(number, *beside[parent]), path=path, variant=variant_of(path))
-        for parent, number, path in rows
-    ]
+    return [_recording(path, number, *beside[parent]) for parent, number, path in rows]
 
 
 def recording_of(path: Path) -> OfficialRecording:
@@ -95,9 +93,7 @@ def recording_of(path: Path) -> OfficialRecording:
     found = _FILE.fullmatch(path.name)
     if found is None:
         return OfficialRecording(path, 0)
-    return replace(
-        _with(int(found[1]), *_beside(path.parent.parent)), path=path, variant=variant_of(path)
-    )
+    return _recording(path, int(found[1]), *_beside(path.parent.parent))
 
 
 def variant_of(path: Path) -> tuple[str, int] | None:
@@ -121,10 +117,13 @@ def key_of(episode: Episode) -> TrialKey | None:
     return TrialKey(str(task), level, seed, robot, mode, str(about.get("split", "train")))
 
 
-def _with(number: int, scenes: Mapping[str, Any], seeds: list[int]) -> OfficialRecording:
+def _recording(
+    path: Path, number: int, scenes: Mapping[str, Any], seeds: list[int]
+) -> OfficialRecording:
     scene = scenes.get(f"episode_{number}", {})
     seed = seeds[number] if number < len(seeds) else None
-    return OfficialRecording(Path(), number, None, seed, scene if isinstance(scene, dict) else {})
+    known = scene if isinstance(scene, dict) else {}
+    return OfficialRecording(path, number, variant_of(path), seed, known)
 
 
 def _beside(folder: Path) -> tuple[Mapping[str, Any], list[int]]:
@@ -238,9 +237,8 @@ def _ours(name: str) -> tuple[str, dict[str, Any]]:
 
 def _turn(model: ObjectModel, episode: Episode) -> float:
     """The turn about z [rad] in which the gripper takes `model` as it was taken in `episode`."""
-    told = episode.ee[:, :, -1]
-    closing = [(int(np.argmax(told[:, arm] < CLOSED)), arm) for arm in (0, 1)
-               if (told[:, arm] < CLOSED).any()]  # fmt: skip
+    closed = episode.ee[:, :, -1] < CLOSED
+    closing = [(int(np.argmax(closed[:, arm])), arm) for arm in (0, 1) if closed[:, arm].any()]
     if not closing or not model.grasps:
         return 0.0
     t, arm = min(closing)
@@ -307,38 +305,27 @@ def in_checkout(recording: OfficialRecording, episode: Episode) -> tuple[TrialKe
 
 
 def chosen(recordings: Iterable[OfficialRecording], most: int) -> list[OfficialRecording]:
-    """At most the first `most` of each folder."""
-    counts: Counter[Path] = Counter()
-    found = []
-    for recording in recordings:
-        counts[recording.path.parent] += 1
-        if counts[recording.path.parent] <= most:
-            found.append(recording)
-    return found
+    """At most the first `most` of each folder; those of a folder follow each other."""
+    folders = groupby(recordings, key=lambda recording: recording.path.parent)
+    return [one for _, some in folders for one in islice(some, most)]
 
 
 def summary(replays: Sequence[RecordingReplay]) -> list[str]:
     """The counts in words: a line for each variant, and why some could not be played."""
     lines = []
-    for name, some in _by_variant(replays).items():
-        played = [replay for replay in some if replay.success is not None]
-        met = sum(bool(replay.success) for replay in played)
+    by_variant: dict[str, list[RecordingReplay]] = {}
+    for one in replays:
+        variant = one.recording.variant
+        folders = "/".join(one.recording.path.parts[-4:-2])
+        name = f"{variant[0]} level {variant[1]}" if variant else folders
+        by_variant.setdefault(name, []).append(one)
+    for name, some in by_variant.items():
+        played = [bool(replay.success) for replay in some if replay.success is not None]
         line = f"{name}: {len(some)} recordings"
         if played:
-            line += (
-                f", {met} of {len(played)} meet their goal again ({100 * met / len(played):.0f} %)"
-            )
+            share = 100 * sum(played) / len(played)
+            line += f", {sum(played)} of {len(played)} meet their goal again ({share:.0f} %)"
         lines.append(line)
         reasons = Counter(replay.reason for replay in some if replay.success is None)
         lines += [f"  {count} not played: {reason}" for reason, count in reasons.most_common()]
     return lines
-
-
-def _by_variant(replays: Iterable[RecordingReplay]) -> dict[str, list[RecordingReplay]]:
-    found: dict[str, list[RecordingReplay]] = {}
-    for one in replays:
-        variant = one.recording.variant
-        folders = one.recording.path.parts[-4:-2]
-        name = f"{variant[0]} level {variant[1]}" if variant else "/".join(folders)
-        found.setdefault(name, []).append(one)
-    return found

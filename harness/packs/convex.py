@@ -14,15 +14,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from robospa.geometry import Pose, from_matrix, vec3
+from robospa.harness.packs import mesh_files
 from robospa.harness.packs.archive import Archive, ArchiveError, Arrays, cached, load_arrays
-from robospa.harness.packs.mesh_files import (
-    Floats,
-    Ints,
-    Piece,
-    connected,
-    read_shapes,
-    reads_meshes,
-)
+from robospa.harness.packs.mesh_files import Floats, Ints, Piece
 from robospa.harness.packs.urdf import MeshUse, key_of
 from robospa.tasks.official import OfficialModel
 from robospa.tasks.shapes import Box, Mesh, Shape
@@ -69,7 +63,7 @@ def connected_parts(vertices: Floats, faces: Ints) -> list[Piece]:
         np.round(vertices / span, 6), axis=0, return_index=True, return_inverse=True
     )
     places, faces = vertices[first], index.ravel()[faces]
-    label = connected(faces, len(places))
+    label = mesh_files.connected(faces, len(places))
     return [(places, faces[label[faces[:, 0]] == part]) for part in range(label.max() + 1)]
 
 
@@ -132,7 +126,7 @@ def _packed(archive: Archive, solid: Sequence[MeshUse], whole: bool) -> Arrays:
     pieces: list[Piece] = []
     for use in solid:
         turn, shift = use.transform[:3, :3].T, use.transform[:3, 3]
-        shapes = read_shapes(use.file, archive.inside)
+        shapes = mesh_files.read_shapes(use.file, archive.inside)
         if whole:
             shapes = [_joined(shapes)]
         elif use.file.suffix.lower() in (".stl", ".ply"):
@@ -202,7 +196,7 @@ def is_filled(archive: Archive, model: OfficialModel) -> bool:
     """Whether `model` should be hollow and its collision pieces, which are read or taken from the
     cache, close its mouth; False where meshes cannot be read, because trimesh is not installed.
     ArchiveError, in one sentence, for a file that cannot be used."""
-    if not model.hollow or not reads_meshes():
+    if not model.hollow or not mesh_files.reads_meshes():
         return False
     collision = archive.files(model).collision
     if collision is None:

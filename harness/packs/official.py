@@ -19,24 +19,13 @@ from pathlib import Path
 import numpy as np
 
 from robospa.geometry import vec3
-from robospa.harness.packs.archive import (
-    Archive,
-    ArchiveError,
-    ModelFiles,
-    load_arrays,
-    open_archive,
-)
+from robospa.harness.packs import archive as archives
+from robospa.harness.packs import placing as placings
+from robospa.harness.packs.archive import Archive, ArchiveError, ModelFiles
 from robospa.harness.packs.convex import colliding_pieces, convex_shapes
 from robospa.harness.packs.index import THING, clutter_things, digest_of, task_faults
 from robospa.harness.packs.mesh_files import Floats, Piece
-from robospa.harness.packs.placing import (
-    Likeness,
-    Placing,
-    frames,
-    grasp_points,
-    place,
-    read_model_data,
-)
+from robospa.harness.packs.placing import Likeness, Placing
 from robospa.harness.packs.urdf import MeshUse, Urdf, UrdfJoint, read_urdf
 from robospa.harness.packs.visuals import skin_of
 from robospa.tasks.colors import NAMED
@@ -108,7 +97,7 @@ class OfficialPack:
 
 def open_pack() -> OfficialPack:
     """The pack of the folder that `open_archive` finds."""
-    return OfficialPack(open_archive())
+    return OfficialPack(archives.open_archive())
 
 
 def make_model(
@@ -116,14 +105,14 @@ def make_model(
 ) -> ObjectModel:
     """The archive's `chosen` model with all that its `builtin` likeness has."""
     files = archive.files(chosen)
-    data = read_model_data(files.data)
+    data = placings.read_model_data(files.data)
     parts = bodies_of(archive, files, chosen)
     data = data.in_root(parts.links)
     bodies = [parts.body, *([parts.door] if parts.door else [])]
     points = np.concatenate([corners for body in bodies for corners, _ in body.pieces])
     drawn = np.concatenate([body.box for body in bodies])
     box = np.stack([drawn.min(axis=0), drawn.max(axis=0)])
-    placing = place(points, box, data, chosen, builtin)
+    placing = placings.place(points, box, data, chosen, builtin)
     likeness = Likeness.of(builtin, placing)
     placed = _placed(parts.body, placing)
     placed_points = placing.points(points)
@@ -137,8 +126,8 @@ def make_model(
         bottom=0.0,
         mass=data.mass or builtin.mass,
         friction=builtin.friction,
-        grasps=grasp_points(placed, builtin, likeness, placing, data, chosen),
-        frames=frames(builtin, likeness, placing, data, chosen),
+        grasps=placings.grasp_points(placed, builtin, likeness, placing, data, chosen),
+        frames=placings.frames(builtin, likeness, placing, data, chosen),
         hinge=_hinge(parts, placing, builtin, chosen, tint),
         skin=Skin(str(parts.body.skin), placing.scale, placing.pose, tint),
     )
@@ -253,7 +242,9 @@ def _body(
     archive: Archive, drawn: Sequence[MeshUse], solid: Sequence[MeshUse], whole: bool = False
 ) -> Body:
     skin = skin_of(archive, drawn)
-    return Body(skin, load_arrays(skin, "box")["box"], colliding_pieces(archive, solid, whole))
+    return Body(
+        skin, archives.load_arrays(skin, "box")["box"], colliding_pieces(archive, solid, whole)
+    )
 
 
 # -- things that lie about ---------------------------------------------------------------------

@@ -16,13 +16,12 @@ from pathlib import Path
 
 import numpy as np
 
-from robospa.geometry import Vec3
+from robospa.geometry import Vec3, vec3
 from robospa.harness.packs.archive import ArchiveError
 from robospa.harness.packs.mesh_files import Floats
 
 LARGEST_FILE = 16 << 20
 MOST_PARTS = 4096
-MOVES = ("revolute", "continuous", "prismatic")
 
 
 @dataclass(frozen=True)
@@ -59,21 +58,19 @@ class Urdf:
     def in_root(self, link: str) -> Floats:
         """(4, 4) frame of `link` in the root's, all joints at 0."""
         found = np.eye(4)
-        while link in self.joints:
-            joint = self.joints[link]
-            found = joint.origin @ found
-            link = joint.parent
+        for one in self.above(link)[:-1]:
+            found = self.joints[one].origin @ found
         return found
 
     def moved_by(self, child: str) -> frozenset[str]:
         """The links that the joint above `child` moves: it and all that hangs on it."""
-        return frozenset(link for link in self.visuals if child in self._above(link))
+        return frozenset(link for link in self.visuals if child in self.above(link))
 
-    def _above(self, link: str) -> set[str]:
-        found = {link}
-        while link in self.joints:
-            link = self.joints[link].parent
-            found.add(link)
+    def above(self, link: str) -> list[str]:
+        """`link` and all links that it hangs on, upwards."""
+        found = [link]
+        while found[-1] in self.joints:
+            found.append(self.joints[found[-1]].parent)
         return found
 
 
@@ -166,7 +163,7 @@ def _uses(part: ET.Element, path: Path, inside: Callable[[Path], Path]) -> list[
 
 def _joint(element: ET.Element) -> UrdfJoint:
     axis, limit = element.find("axis"), element.find("limit")
-    x, y, z = _numbers(axis.get("xyz", "1 0 0") if axis is not None else "1 0 0")
+    about = _numbers(axis.get("xyz", "1 0 0") if axis is not None else "1 0 0")
     lower, upper = (
         float(limit.get(name, 0.0)) if limit is not None else 0.0 for name in ("lower", "upper")
     )
@@ -178,7 +175,7 @@ def _joint(element: ET.Element) -> UrdfJoint:
         parent=element.findall("parent")[0].attrib["link"],
         child=element.findall("child")[0].attrib["link"],
         origin=_origin(element),
-        axis=(x, y, z),
+        axis=vec3(about),
         limits=(lower, upper),
     )
 

@@ -20,17 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.geometry import to_transform
+from robospa.harness.packs import mesh_files
 from robospa.harness.packs.archive import Archive, ArchiveError, Arrays, cached
-from robospa.harness.packs.mesh_files import (
-    LARGE_PICTURE,
-    PICTURE,
-    Floats,
-    Ints,
-    RawMesh,
-    connected,
-    joined_meshes,
-    read_mesh,
-)
+from robospa.harness.packs.mesh_files import Floats, Ints, RawMesh
 from robospa.harness.packs.urdf import MeshUse, Urdf, check_files, key_of, read_urdf
 from robospa.harness.robots.embodiment import Arm, Embodiment, Joint
 from robospa.tasks.shapes import Skin
@@ -48,7 +40,7 @@ def thinned(mesh: RawMesh, triangles: int = TRIANGLES) -> RawMesh:
     welded = _welded(mesh)
     if len(welded.faces) <= triangles:
         return welded
-    patches = connected(welded.faces, len(welded.vertices))
+    patches = mesh_files.connected(welded.faces, len(welded.vertices))
     low, high = COARSEST, FINEST
     best = _clustered(welded, patches, low)
     while low < high - 1:
@@ -148,9 +140,9 @@ def skin_of(archive: Archive, drawn: Sequence[MeshUse], full: bool = False) -> P
 
 
 def _skin(archive: Archive, drawn: Sequence[MeshUse], full: bool) -> Arrays:
-    side = LARGE_PICTURE if full else PICTURE
-    meshes = [(use, read_mesh(use.file, archive.inside, side)) for use in drawn]
-    joined = joined_meshes([_moved(mesh, use.transform) for use, mesh in meshes], side)
+    side = mesh_files.LARGE_PICTURE if full else mesh_files.PICTURE
+    meshes = [(use, mesh_files.read_mesh(use.file, archive.inside, side)) for use in drawn]
+    joined = mesh_files.joined_meshes([_moved(mesh, use.transform) for use, mesh in meshes], side)
     chosen = joined if full else thinned(joined, TRIANGLES)
     vertices, normals, uvs, triangles = shaded(chosen)
     return {
@@ -270,11 +262,7 @@ def _arm_skins(
 def _carrier(urdf: Urdf, link: str, moving: frozenset[str]) -> str:
     """The nearest of the links in `moving` that `link` is or hangs on; "" if there is none. Other
     joints (wheels, a second pair of arms) stay at 0."""
-    while link not in moving:
-        if link not in urdf.joints:
-            return ""
-        link = urdf.joints[link].parent
-    return link
+    return next((one for one in urdf.above(link) if one in moving), "")
 
 
 def _frames_at_zero(arm: Arm) -> dict[str, Floats]:

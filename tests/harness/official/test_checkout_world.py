@@ -22,6 +22,7 @@ from robospa.harness.official.checkout import (
     parse_checkout,
 )
 from robospa.harness.official.checkout_world import (
+    SECONDS,
     CheckoutFailed,
     CheckoutProcess,
     CheckoutSnapshot,
@@ -168,7 +169,7 @@ def test_what_a_checkout_cannot_do_is_one_sentence(world: CheckoutWorld) -> None
 
 
 def test_a_process_that_dies_or_hangs_is_ended_with_one_sentence(checkout: Path) -> None:
-    process = CheckoutProcess(checkout, sys.executable, {"load": 1.0})
+    process = CheckoutProcess(checkout, sys.executable, {**SECONDS, "load": 1.0})
     request = {"task": "Click_Bell_Repeat_2", "episode": 0, "config": "demo_clean",
                "embodiment": ["aloha-agilex"]}  # fmt: skip
     started = time.monotonic()

@@ -9,7 +9,7 @@ import pytest
 from made_archive import READS_MESHES, make_archive
 from mesh_writers import Piece, hollow_staves, merged, write_glb
 
-from robospa.harness.packs import convex
+from robospa.harness.packs import convex, mesh_files
 from robospa.harness.packs.archive import ArchiveError, open_archive
 from robospa.harness.packs.convex import CORNERS, connected_parts, convex_pieces
 from robospa.harness.packs.index import index
@@ -154,6 +154,6 @@ def test_a_model_in_one_node_is_named_with_its_tasks(root: Path) -> None:
 
 
 def test_without_the_library_nothing_is_said(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(convex, "reads_meshes", lambda: False)
+    monkeypatch.setattr(mesh_files, "reads_meshes", lambda: False)
     monkeypatch.setattr(convex, "colliding_pieces", None)
     assert not index(open_archive(root)).filled

@@ -131,19 +131,11 @@ def test_scenes_of_our_own_suite_are_what_they_were_to_the_bit() -> None:
     assert task_parts(KEY).scene.digest == digest
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("[]", "is no JSON file whose list_of_items"),
-        ('{"list_of_items": {"bottle": 3}}', "is no JSON file whose list_of_items"),
-        ("{", "is no JSON file whose list_of_items"),
-        ("[" * 100_000, "is no JSON file whose list_of_items"),
-    ],
-)
-def test_a_broken_list_is_refused_in_a_sentence(tmp_path: Path, text: str, message: str) -> None:
+@pytest.mark.parametrize("text", ["[]", '{"list_of_items": {"bottle": 3}}', "{", "[" * 100_000])
+def test_a_broken_list_is_refused_in_a_sentence(tmp_path: Path, text: str) -> None:
     archive = open_archive(make_archive(tmp_path, [], ("clutter",)))
     (tmp_path / "objects" / THING / "list.json").write_text(text)
-    with pytest.raises(ArchiveError, match=message):
+    with pytest.raises(ArchiveError, match=r"list\.json"):
         clutter_things(archive)
 
 
