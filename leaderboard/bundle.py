@@ -3,7 +3,6 @@
     manifest.json            versions, size and hash of every other file, the bundle's own hash
     model.json               the model card
     run.json                 resolved settings, list of trials, versions, machine
-    seeds.json               the seeds of every variant
     records.jsonl            one hash-chained row a trial, by task, level and seed
     actions/TASK-L1.bin      the actions of a variant's trials
     videos/TRIAL.mp4         the announced sample, one trial a base task
@@ -49,7 +48,6 @@ FORMAT = 2
 MANIFEST = "manifest.json"
 CARD = "model.json"
 RUN = "run.json"
-SEEDS = "seeds.json"
 RECORDS = "records.jsonl"
 SCORES = "report/scores.json"
 OUTCOMES = "report/outcomes.json"
@@ -59,7 +57,7 @@ _TASK = r"[A-Za-z0-9_]{1,64}"
 _SETTING = r"[A-Za-z0-9_.-]{1,250}"
 KINDS: tuple[tuple[re.Pattern[str], int], ...] = (
     (re.compile(r"manifest\.json|model\.json"), MEGA),
-    (re.compile(r"run\.json|seeds\.json"), 2 * MEGA),
+    (re.compile(r"run\.json"), 2 * MEGA),
     (re.compile(r"report/(scores|outcomes)\.json"), 2 * MEGA),
     (re.compile(r"records\.jsonl"), 192 * MEGA),
     (re.compile(rf"actions/{_TASK}-L[1-5]\.bin"), 32 * MEGA),
@@ -100,14 +98,13 @@ class RowChain(Struct, frozen=True, forbid_unknown_fields=True):
 
 class BundleManifest(Struct, frozen=True, forbid_unknown_fields=True):
     """`manifest.json`. `robospa` is the version that packed it, `inputs` the hash of what was fixed
-    before the first trial, `seeds` that of the seed lists, `bundle` that of all the rest."""
+    before the first trial, `bundle` that of all the rest."""
 
     format: int
     suite: str
     robospa: str
     practice: bool
     inputs: Sha256
-    seeds: Sha256
     chain: RowChain
     files: dict[str, FileEntry]
     bundle: str = ""
@@ -160,12 +157,12 @@ def bundle_hash(manifest: Mapping[str, object]) -> str:
     return sha256(canonical({k: v for k, v in manifest.items() if k != "bundle"}))
 
 
-def inputs_hash(run: RunManifest, lists: Mapping[str, object]) -> str:
+def inputs_hash(run: RunManifest) -> str:
     """Hash of what is fixed before the first trial: the chain of rows starts from it."""
     names = ("embodiment", "mode", "split", "run_seed", "step_scale", "policy", "policies")
     fixed = {name: getattr(run.settings, name) for name in names}
     fixed["policies"] = fixed["policies"] or None
-    return sha256(canonical({"suite": run.suite, "seeds": lists, "settings": fixed}))
+    return sha256(canonical({"suite": run.suite, "trials": run.trials, "settings": fixed}))
 
 
 SUSPECT = re.compile(

@@ -95,15 +95,10 @@ def pack(
     for packed in packing.pack(run, about, out, reference, how):
         validity = packed.valid.evidence
         if as_json:
-            size = {"path": packed.valid.path, "bytes": packed.size, "parts": packed.parts}
+            size = {"path": packed.valid.path, "bytes": packed.size}
             bundles.append({**size, "evidence": validity})
             continue
         print(f"{packed.valid.path}: {packed.size / 1e6:.1f} MB, {validity.trials} trials")
-        total = sum(packed.parts.values())
-        shares = [
-            f"{n} {100 * s / total:.0f} %" for n, s in packed.parts.items() if s > total / 100
-        ]
-        print("of which " + ", ".join(shares))
         for warning in validity.warnings:
             print(warning)
         print(f"bundle {validity.bundle}")

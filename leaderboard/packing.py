@@ -36,7 +36,6 @@ from robospa.leaderboard.verify import (
     check_run,
     outcomes_of,
     scores_of,
-    seed_lists,
     verify,
 )
 from robospa.results.records.manifest import PolicySettings, RunAbout, make_manifest
@@ -55,11 +54,10 @@ Note = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Packed:
-    """A bundle on disk, found valid, and how many of its bytes each kind of file takes."""
+    """A bundle on disk, found valid, and its bytes."""
 
     valid: Valid
     size: int
-    parts: Mapping[str, int]
 
 
 @dataclass(frozen=True)
@@ -139,7 +137,7 @@ def _pack(
         part.replace(out)
     finally:
         part.unlink(missing_ok=True)
-    return Packed(replace(valid, path=out), out.stat().st_size, _sizes(out))
+    return Packed(replace(valid, path=out), out.stat().st_size)
 
 
 def merged(runs: Sequence[Run]) -> Run:
@@ -225,8 +223,7 @@ def write_bundle(
 ) -> None:
     """Write the bundle of `run` to `path` without looking at it; `trace` finds a trial's actions,
     `films` has the videos by name."""
-    lists = seed_lists(run.keys)
-    inputs = layout.inputs_hash(run.manifest, lists)
+    inputs = layout.inputs_hash(run.manifest)
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=6) as archive:
         writer = _Writer(archive)
         for name, film in films.items():
@@ -235,7 +232,6 @@ def write_bundle(
         writer.add(layout.RECORDS, b"".join(line + b"\n" for line in lines))
         for name, content in (
             (layout.RUN, run.manifest.to_json()),
-            (layout.SEEDS, lists),
             (layout.CARD, card),
             (layout.SCORES, scores_of(run)),
             (layout.OUTCOMES, outcomes_of(run)),
@@ -247,7 +243,6 @@ def write_bundle(
             robospa=own_version(),
             practice=practice,
             inputs=inputs,
-            seeds=layout.sha256(layout.canonical(lists)),
             chain=RowChain(len(lines), layout.sha256(lines[-1])),
             files=writer.files,
         )
@@ -304,13 +299,3 @@ def _films(
         if world is not None:
             world.close()
     return films
-
-
-def _sizes(path: Path) -> dict[str, int]:
-    """Bytes in the zip file by kind of file, most first."""
-    found: dict[str, int] = {}
-    with zipfile.ZipFile(path) as archive:
-        for entry in archive.infolist():
-            kind = entry.filename.partition("/")[0]
-            found[kind] = found.get(kind, 0) + entry.compress_size
-    return dict(sorted(found.items(), key=lambda pair: -pair[1]))

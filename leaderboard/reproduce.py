@@ -18,12 +18,14 @@ that gives a seed twice.
 from __future__ import annotations
 
 import json
-import re
 import secrets
 from collections.abc import Callable, Sequence
-from dataclasses import astuple, dataclass, replace
+from dataclasses import astuple, replace
 from operator import attrgetter
 from pathlib import Path
+from typing import Annotated
+
+from msgspec import Meta, Struct, to_builtins
 
 from robospa.harness.running.atomic_file import replace_file
 from robospa.harness.running.evaluate import Request
@@ -48,6 +50,7 @@ from robospa.results.records.runs import Run
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.scoring.first_choice import first_choice
 from robospa.results.scoring.repeats import was_repeated, with_repeated_failed
+from robospa.schema import pattern, read
 from robospa.tasks.scene import SUITE
 from robospa.tasks.seeds import ListKey
 from robospa.trial import CATEGORIES, DIMENSIONS, REFERENCE, TrialKey
@@ -58,28 +61,22 @@ FIRST, LAST = 10**9, 2**53
 """Hidden seeds lie here: far from the shipped ones, and exact in any JSON reader."""
 SALT = 32
 """Bytes of the salt."""
-FIELDS = {"format", "suite", "salt", "seeds"}
-PLACE = re.compile(r"([A-Za-z0-9_]{1,64})/([1-5])")
-MOST = 100_000
+Place = Annotated[str, pattern(r"[A-Za-z0-9_]{1,64}/[1-5]", "TASK/LEVEL")]
+Seeds = tuple[Annotated[int, Meta(ge=FIRST, lt=LAST)], ...]
 
 
-@dataclass(frozen=True)
-class Block:
-    """Hidden seeds by (task, level)."""
+class Block(Struct, frozen=True, forbid_unknown_fields=True):
+    """Hidden seeds by "TASK/LEVEL"."""
 
-    seeds: dict[tuple[str, int], tuple[int, ...]]
-    salt: str
+    seeds: Annotated[dict[Place, Annotated[Seeds, Meta(min_length=1)]], Meta(min_length=1)]
+    salt: Annotated[str, pattern(rf"[0-9a-f]{{{2 * SALT}}}", f"{SALT} bytes in hexadecimal")]
     suite: str = SUITE
-
-    def to_json(self) -> dict[str, object]:
-        """Plain JSON values."""
-        lists = {f"{task}/{level}": list(found) for (task, level), found in self.seeds.items()}
-        return {"format": FORMAT, "suite": self.suite, "salt": self.salt, "seeds": lists}
+    format: int = FORMAT
 
     @property
     def commitment(self) -> str:
         """The hash to publish before the block."""
-        return sha256(canonical(self.to_json()))
+        return sha256(canonical(self))
 
 
 def draw_block(
@@ -98,7 +95,7 @@ def draw_block(
     """
     if count < 1:
         raise BundleError(f"a block of {count} trials a variant shows nothing; draw at least 1")
-    seeds: dict[tuple[str, int], tuple[int, ...]] = {}
+    seeds: dict[str, tuple[int, ...]] = {}
     salt = secrets.token_hex(SALT)
     with expert_pool(workers, salt) as pool:
         for task, level in variants:
@@ -113,7 +110,7 @@ def draw_block(
                 futures = [pool.submit((key, seed)) for seed in wanted]
                 attempts = [future.result() for future in futures]
                 found += [item.seed for item in attempts if item.accepted]
-            seeds[task, level] = tuple(sorted(set(found)))
+            seeds[f"{task}/{level}"] = tuple(sorted(set(found)))
             note(f"{task} level {level}: {len(found)} of {tried} seeds accepted")
     return Block(seeds, salt)
 
@@ -126,7 +123,7 @@ def write_block(block: Block, path: Path) -> None:
     """Write `block` to a new file."""
     if path.exists():
         raise BundleError(f"{path} is already there; a block is never written over")
-    replace_file(path, (json.dumps(block.to_json(), indent=1) + "\n").encode())
+    replace_file(path, (json.dumps(to_builtins(block), indent=1) + "\n").encode())
 
 
 def read_block(path: Path, commitment: str) -> Block:
@@ -137,38 +134,17 @@ def read_block(path: Path, commitment: str) -> Block:
         data = parse_map(path.read_bytes(), path.name)
     except OSError as error:
         raise BundleError(f"the block {path} cannot be read: {error.strerror}") from None
-    version = data.get("format")
-    if type(version) is not int or version != FORMAT or set(data) != FIELDS:
-        raise BundleError(f"{path.name} is no block of hidden seeds of format {FORMAT}")
     if sha256(canonical(data)) != commitment.strip().lower():
         raise BundleError(
             f"{path.name} is not the block that was committed to: its hash is "
             f"{sha256(canonical(data))}, not {commitment.strip()[:64]}"
         )
-    salt, lists = data["salt"], data["seeds"]
-    if not isinstance(salt, str) or not re.fullmatch(rf"[0-9a-f]{{{2 * SALT}}}", salt):
-        raise BundleError(f"{path.name} has no salt of {SALT} bytes")
-    if data["suite"] != SUITE:
-        raise BundleError(f"{path.name} is of another suite than {SUITE!r}")
-    return Block(_seeds(lists, path.name), salt)
-
-
-def _seeds(lists: object, what: str) -> dict[tuple[str, int], tuple[int, ...]]:
-    if not isinstance(lists, dict) or not lists:
-        raise BundleError(f"{what} has no seeds")
-    seeds: dict[tuple[str, int], tuple[int, ...]] = {}
-    for place, found in lists.items():
-        match = PLACE.fullmatch(place)
-        if not match or not isinstance(found, list) or not found:
-            raise BundleError(f"{what} has no list of seeds under {place[:80]!a}")
-        if not all(type(seed) is int and FIRST <= seed < LAST for seed in found):
-            raise BundleError(f"{what}, {place}: hidden seeds lie from {FIRST} to {LAST}")
-        if len(set(found)) < len(found):
-            raise BundleError(f"{what}, {place}: a seed is there twice")
-        seeds[match[1], int(match[2])] = tuple(found)
-    if sum(map(len, seeds.values())) > MOST:
-        raise BundleError(f"{what} has more than {MOST} seeds")
-    return seeds
+    block = read(Block, data, path.name, BundleError)
+    if (block.suite, block.format) != (SUITE, FORMAT):
+        raise BundleError(f"{path.name} is no block of {SUITE} and of format {FORMAT}")
+    if twice := [place for place, found in block.seeds.items() if len(set(found)) < len(found)]:
+        raise BundleError(f"{path.name}, {twice[0]}: a seed is there twice")
+    return block
 
 
 MOST_ALPHA = 0.1
@@ -230,19 +206,16 @@ RANKED_ROWS = frozenset(f"{row}/0" for row in (*DIMENSIONS, *CATEGORIES))
 
 def hidden_keys(valid: Valid, block: Block, reference: Reference) -> list[TrialKey]:
     """The trials of a block under the bundle's settings; BundleError if they do not fit it."""
-    there = {key.variant for key in valid.keys}
-    if lacking := sorted(there - set(block.seeds)):
-        raise BundleError(
-            f"the block lacks {lacking[0][0]} level {lacking[0][1]} of the bundle; draw one for it"
-        )
+    there = set(claims_of(valid))
+    if differ := sorted(there ^ set(block.seeds)):
+        raise BundleError(f"only one of block and bundle has {differ[0]}; draw a block for it")
     model = valid.keys[0]
     keys = []
-    for (task, level), seeds in block.seeds.items():
-        if (task, level) not in there:
-            raise BundleError(f"the block has {task} level {level}, which the bundle has not")
+    for place, seeds in block.seeds.items():
+        task, level = place[:-2], int(place[-1])
         listed = reference.seeds(task, level, model.embodiment, model.mode)
         if shown := set(seeds) & set(listed):
-            raise BundleError(f"seed {min(shown)} of {task} level {level} is not hidden")
+            raise BundleError(f"seed {min(shown)} of {place} is not hidden")
         keys += [TrialKey(task, level, s, model.embodiment, model.mode, model.split) for s in seeds]
     return keys
 

@@ -8,12 +8,10 @@ The first thing that is not as it has to be ends it, in one sentence.
 
 from __future__ import annotations
 
-import gc
 import hashlib
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -101,11 +99,13 @@ def verify(
         if where := compare_scores(claimed.to_json(), said):
             raise BundleError(f"{layout.RUN} says what no run says: {where}")
         keys = _keys(claimed, archive.limits)
-        _check_lists(archive.read_map(layout.SEEDS), manifest, keys, claimed)
+        if claimed.seed_hash != seed_hash(keys):
+            raise BundleError("the run's hash of its list of trials is another")
+        if manifest.inputs != layout.inputs_hash(claimed):
+            raise BundleError("the hash of the run's inputs is not the manifest's")
         card = to_card(archive.read_map(layout.CARD))
         check_listed(claimed, keys, card, reference, manifest.practice)
-        with _no_collection():
-            records, traces = _records(archive, manifest, keys)
+        records, traces = _records(archive, manifest, keys)
         run = Run(path, claimed, keys, records)
         warnings = check_records(run, reference)
         _check_actions(archive, run, traces, reference)
@@ -169,18 +169,6 @@ def check_records(run: Run, reference: Reference) -> list[str]:
     return warnings
 
 
-@contextmanager
-def _no_collection() -> Iterator[None]:
-    """Records are many small objects that all stay: do not look for garbage among them."""
-    before = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if before:
-            gc.enable()
-
-
 def _manifest(
     archive: layout.BundleArchive, reference: Reference, practice: bool
 ) -> layout.BundleManifest:
@@ -217,7 +205,7 @@ def _check_files(archive: layout.BundleArchive, listed: Mapping[str, layout.File
     for name, entry in listed.items():
         if entry.size != archive.sizes[name]:
             raise BundleError(f"{name} was changed: its size is not the manifest's")
-    needed = (layout.CARD, layout.RUN, layout.SEEDS, layout.RECORDS, layout.SCORES, layout.OUTCOMES)
+    needed = (layout.CARD, layout.RUN, layout.RECORDS, layout.SCORES, layout.OUTCOMES)
     for name in needed:
         if name not in listed:
             raise BundleError(f"the bundle has no {name}")
@@ -228,31 +216,6 @@ def _keys(run: RunManifest, limits: layout.BundleLimits) -> tuple[TrialKey, ...]
     if sum(len(group.seeds) for group in run.trials) > limits.rows:
         raise BundleError(f"the run lists more than {limits.rows} trials")
     return tuple(sorted(run.keys))
-
-
-def _check_lists(
-    lists: Mapping[str, object],
-    manifest: layout.BundleManifest,
-    keys: Sequence[TrialKey],
-    run: RunManifest,
-) -> None:
-    """BundleError unless the seed lists are those of the trials and hash to what is claimed."""
-    if run.seed_hash != seed_hash(keys):
-        raise BundleError("the run's hash of its list of trials is another")
-    if lists != seed_lists(keys):
-        raise BundleError("seeds.json does not hold the seeds of the run's trials")
-    if manifest.seeds != layout.sha256(layout.canonical(lists)):
-        raise BundleError("the hash of the seed lists is not the manifest's")
-    if manifest.inputs != layout.inputs_hash(run, lists):
-        raise BundleError("the hash of the run's inputs is not the manifest's")
-
-
-def seed_lists(keys: Sequence[TrialKey]) -> dict[str, list[int]]:
-    """The seeds of every variant, ascending, under "TASK/LEVEL"."""
-    lists: dict[str, list[int]] = {}
-    for key in sorted(keys):
-        lists.setdefault(f"{key.task}/{key.level}", []).append(key.seed)
-    return lists
 
 
 def _records(

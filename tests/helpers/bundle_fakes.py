@@ -25,7 +25,7 @@ from robospa.leaderboard import bundle as layout
 from robospa.leaderboard.bundle import BundleError, BundleLimits
 from robospa.leaderboard.card import to_card
 from robospa.leaderboard.rules import Reference, facts_of, manifest_of
-from robospa.leaderboard.verify import seed_lists, verify
+from robospa.leaderboard.verify import verify
 from robospa.results.records.manifest import (
     RunAbout,
     RunSettings,
@@ -203,16 +203,15 @@ def put_rows(files: Files, rows: Sequence[Mapping[str, Any]]) -> None:
 def seal(files: Files, **changes: Any) -> Files:
     """Make every hash hold again, as a forger with our code would."""
     manifest = json.loads(files[layout.MANIFEST])
-    lists, run = json.loads(files[layout.SEEDS]), json.loads(files[layout.RUN])
+    run = json.loads(files[layout.RUN])
     lines = files[layout.RECORDS].splitlines()
     manifest["files"] = {
         name: {"size": len(data), "sha256": layout.sha256(data)}
         for name, data in files.items()
         if name != layout.MANIFEST
     }
-    manifest["seeds"] = layout.sha256(layout.canonical(lists))
     with suppress(BundleError):  # of a run that is none
-        manifest["inputs"] = layout.inputs_hash(manifest_of(run), lists)
+        manifest["inputs"] = layout.inputs_hash(manifest_of(run))
     manifest["chain"] = {"rows": len(lines), "last": layout.sha256(lines[-1]) if lines else ""}
     manifest.update(changes)
     manifest["bundle"] = layout.bundle_hash(manifest)
@@ -225,9 +224,8 @@ def relist(files: Files, keys: Sequence[TrialKey]) -> None:
     run = json.loads(files[layout.RUN])
     run["trials"], run["seed_hash"] = to_builtins(trial_groups(keys)), seed_hash(keys)
     files[layout.RUN] = layout.canonical(run)
-    files[layout.SEEDS] = layout.canonical(seed_lists(keys))
     manifest = json.loads(files[layout.MANIFEST])
-    manifest["inputs"] = layout.inputs_hash(manifest_of(run), json.loads(files[layout.SEEDS]))
+    manifest["inputs"] = layout.inputs_hash(manifest_of(run))
     files[layout.MANIFEST] = layout.canonical(manifest)
 
 

@@ -299,7 +299,7 @@ def test_actions_that_unpack_to_more_than_their_trials_have(
     assert_refused(zip_up(tmp_path / "b.zip", seal(files)), f"{ACTIONS} unpacks to")
 
 
-@pytest.mark.parametrize("name", [layout.RUN, layout.SEEDS, layout.SCORES])
+@pytest.mark.parametrize("name", [layout.RUN, layout.SCORES])
 def test_json_that_takes_many_times_its_size_in_memory(
     files: Files, tmp_path: Path, name: str
 ) -> None:
@@ -307,7 +307,7 @@ def test_json_that_takes_many_times_its_size_in_memory(
     assert_refused(zip_up(tmp_path / "b.zip", files), f"'{name}' unpacks to")
 
 
-@pytest.mark.parametrize("name", [layout.CARD, layout.RUN, layout.SEEDS, layout.SCORES])
+@pytest.mark.parametrize("name", [layout.CARD, layout.RUN, layout.SCORES])
 def test_a_file_changed_behind_the_manifest(files: Files, tmp_path: Path, name: str) -> None:
     same_size = files[name].replace(b":", b";", 1)
     for data in (files[name][:-1] + b" }", same_size):

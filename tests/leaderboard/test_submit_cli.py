@@ -111,7 +111,7 @@ def test_hidden_seeds_run_against_a_server(packed: Path) -> None:
     done = submit("pack", packed / "run", "--model", packed / "model.toml", "-o", bundle, *more)
     assert done.code == 0, done.err
     hidden = tuple(FIRST + n for n in range(5))
-    block = Block({(PICK, level): hidden for level in (1, 2)}, "ab" * 32)
+    block = Block({f"{PICK}/{level}": hidden for level in (1, 2)}, "ab" * 32)
     write_block(block, packed / "block.json")
     told = ["--block", packed / "block.json", "--commitment", block.commitment]
     with ServerThread(policy_factory=Weak) as server:
@@ -173,7 +173,7 @@ def test_inflated_numbers_are_not_reproduced(packed: Path, tmp_path: Path) -> No
     more = ["--practice", "--no-videos", *FAKES]
     submit("pack", packed / "run", "--model", packed / "model.toml", "-o", bundle, *more)
     hidden = tuple(FIRST + n for n in range(8))
-    block = Block({(PICK, 1): hidden, (PICK, 2): hidden}, "ab" * 32)
+    block = Block({f"{PICK}/1": hidden, f"{PICK}/2": hidden}, "ab" * 32)
     write_block(block, tmp_path / "block.json")
     told = ["--block", tmp_path / "block.json", "--commitment", block.commitment]
     with ServerThread(policy_factory=Worse) as server:
@@ -190,7 +190,7 @@ def test_another_server_than_the_bundles_is_refused(packed: Path, tmp_path: Path
     bundle = tmp_path / "b.zip"
     more = ["--practice", "--no-videos", *FAKES]
     submit("pack", packed / "run", "--model", packed / "model.toml", "-o", bundle, *more)
-    block = Block({(PICK, 1): (FIRST,), (PICK, 2): (FIRST,)}, "ab" * 32)
+    block = Block({f"{PICK}/1": (FIRST,), f"{PICK}/2": (FIRST,)}, "ab" * 32)
     write_block(block, tmp_path / "block.json")
     told = ["--block", tmp_path / "block.json", "--commitment", block.commitment]
     assert FakePolicy().spec != other().spec

@@ -40,7 +40,7 @@ def put(value: Any, path: tuple[Any, ...], new: Any) -> Any:
 def test_wrong_types_anywhere_are_refused_in_a_sentence(honest: Path, tmp_path: Path) -> None:
     files = unzip(honest)
     cases: list[tuple[str, tuple[Any, ...], Any]] = []
-    for name in (layout.RUN, layout.CARD, layout.SEEDS, layout.SCORES, layout.MANIFEST):
+    for name in (layout.RUN, layout.CARD, layout.SCORES, layout.MANIFEST):
         cases += [(name, p, v) for p in places(json.loads(files[name])) for v in VALUES]
     cases += [(layout.RECORDS, p, v) for p in places(rows_of(files)[0]) for v in VALUES]
     for name, path, value in random.Random(7).sample(cases, min(CASES, len(cases))):
