@@ -37,7 +37,7 @@ from robospa.results.statistics.intervals import (
 )
 from robospa.results.statistics.samples import Sample, onta_of_percent, rate
 from robospa.results.tables import MISSING, TableCell
-from robospa.trial import BASIC, CATEGORIES, DIMENSIONS, METRIC_CATEGORIES, RATES, SPATIAL
+from robospa.trial import BASIC, CATEGORIES, METRIC_CATEGORIES, RATES, SPATIAL
 
 
 def published_cell(published: Published, model: str, task: str, level: int) -> VariantScore:
@@ -180,18 +180,11 @@ class Column:
 
         Empty where the column has no value of the row.
         """
-        if self.value("sr", row, level) is None:
+        part = self.part(row, level)
+        if not isinstance(part, AverageScore) or self.value("sr", row, level) is None:
             return [], []
-        members = load().members
-        categories = DIMENSIONS.get(row, METRIC_CATEGORIES["sr"])
-        samples, shares = [], []
-        for category in (row,) if row in members else categories:
-            found = [self.scores.cells.get((task, level)) for task in members[category]]
-            cells = [cell for cell in found if cell is not None and cell.trials]
-            for cell in cells:
-                samples.append(rate(cell.successes, cell.trials))
-                shares.append(1 / len(cells))
-        return samples, [share / sum(shares) for share in shares]
+        below = part.samples.get("sr", ())
+        return [sample for sample, _ in below], [share for _, share in below]
 
     def missing(self, row: str, level: int) -> int:
         """Listed trials below this row that have no result."""
