@@ -48,10 +48,12 @@ CAMERAS = {
     "front": "front_camera",
 }
 PACKAGES = ("sapien", "mplib", "torch", "numpy", "warp")
+REQUESTS = ("hello", "load", "step", "observe")
 NEEDED = ("setup_demo", "play_once", "check_success", "take_action", "get_obs", "close_env")
 """What a task's class has to have."""
 
 Arrays = Mapping[str, np.ndarray]
+Answer = tuple[dict[str, Any], dict[str, np.ndarray]]
 
 
 class Refused(Exception):
@@ -102,7 +104,7 @@ class Session:
         self.name = ""
         self.steps = 0
 
-    def hello(self, request: Mapping[str, Any]) -> dict[str, Any]:
+    def hello(self, request: Mapping[str, Any]) -> Answer:
         """Import the checkout; who it is and what it stands on."""
         missing = [n for n in LAYOUT if not os.path.isdir(os.path.join(self.folder, n))]
         if missing:
@@ -118,9 +120,9 @@ class Session:
         importlib.import_module("envs")
         versions = {name: _version(name) for name in PACKAGES}
         versions["python"] = sys.version.split()[0]
-        return {"version": VERSION, "checkout": self.folder, "versions": versions}
+        return {"version": VERSION, "checkout": self.folder, "versions": versions}, {}
 
-    def load(self, request: Mapping[str, Any]) -> dict[str, Any]:
+    def load(self, request: Mapping[str, Any]) -> Answer:
         """Make the scene as the official evaluation does."""
         name, seed, episode = str(request["task"]), int(request["seed"]), int(request["episode"])
         self._close_scene()
@@ -131,15 +133,16 @@ class Session:
         self._setup(env, arguments)
         env.step_lim = NO_LIMIT
         self._count(env)
-        return {"values": values, **self._state(), "total": int(getattr(env, "stage_sum", 0) or 0)}
+        total = int(getattr(env, "stage_sum", 0) or 0)
+        return {"values": values, **self._state(), "total": total}, {}
 
-    def step(self, request: Mapping[str, Any], action: np.ndarray) -> dict[str, Any]:
+    def step(self, request: Mapping[str, Any], action: np.ndarray) -> Answer:
         """Execute one action."""
         env, before = self._loaded(), self.steps
         env.take_action(np.asarray(action, dtype=np.float64), action_type=str(request["kind"]))
-        return {**self._state(), "physics_steps": self.steps - before}
+        return {**self._state(), "physics_steps": self.steps - before}, {}
 
-    def observe(self, request: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+    def observe(self, request: Mapping[str, Any]) -> Answer:
         """The images asked for, as the checkout draws them."""
         found = self._loaded().get_obs()
         images = {}
@@ -291,15 +294,9 @@ def answer(session: Session, request: Mapping[str, Any], arrays: Arrays) -> byte
     """The answer to one request, as bytes; what goes wrong is an answer too."""
     try:
         what = request.get("do")
-        if what == "hello":
-            return packed(session.hello(request))
-        if what == "load":
-            return packed(session.load(request))
-        if what == "step":
-            return packed(session.step(request, arrays["action"]))
-        if what == "observe":
-            return packed(*session.observe(request))
-        raise Refused("failed", f"there is no request {what!r}")
+        if what not in REQUESTS:
+            raise Refused("failed", f"there is no request {what!r}")
+        return packed(*getattr(session, what)(request, **arrays))
     except Refused as error:
         return packed({"error": error.kind, "text": str(error)})
     except Exception as error:

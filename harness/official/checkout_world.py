@@ -114,7 +114,6 @@ class CheckoutProcess:
         return header, found
 
     def _read(self, count: int, deadline: float, do: str) -> bytes:
-        """Exactly `count` bytes."""
         assert self._process.stdout is not None
         pipe, parts = self._process.stdout.fileno(), []
         with selectors.DefaultSelector() as ready:

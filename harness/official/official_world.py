@@ -82,6 +82,5 @@ def _wait(physics: Physics, where: str) -> None:
 
 
 def _turns(physics: Physics, names: list[str]) -> np.ndarray:
-    """Rotations (N, 4) of the named objects."""
     poses = np.frombuffer(physics.packed(), dtype=np.float32).reshape(-1, FLOATS)
     return poses[[physics.rows[name] for name in names], :4].astype(np.float64)

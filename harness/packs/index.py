@@ -114,7 +114,6 @@ def index(archive: Archive) -> Index:
 
 
 def _models(asset: str) -> list[OfficialModel]:
-    """Each of the asset's models once."""
     return list({model.name: model for model in official_models(asset)}.values())
 
 

@@ -135,8 +135,7 @@ def _parts(path: Path, inside: Callable[[Path], Path], by_node: bool = False) ->
     if kind == ".glb":
         for offset, length in check_glb(path):
             _check_picture(path, offset, length)
-    if path.stat().st_size > LARGEST_FILE:
-        raise ArchiveError(f"{str(path)!r} is larger than {LARGEST_FILE >> 20} MB")
+    _bounded(path)
     content = path.read_bytes()
     if by_node and kind == ".obj":
         content = _MATERIAL.sub(b"", content)
@@ -171,6 +170,14 @@ def _parts(path: Path, inside: Callable[[Path], Path], by_node: bool = False) ->
     return parts
 
 
+def _bounded(path: Path) -> int:
+    """The file's bytes; ArchiveError if they are too many."""
+    size = path.stat().st_size
+    if size > LARGEST_FILE:
+        raise ArchiveError(f"{str(path)!r} is larger than {LARGEST_FILE >> 20} MB")
+    return size
+
+
 def _check_picture(path: Path, offset: int, length: int) -> None:
     """ArchiveError for a picture in a file that nobody could unpack; reads its header alone."""
     from PIL import Image
@@ -203,9 +210,7 @@ class _Inside:
         """The content of the file that is called so from the mesh's folder."""
         try:
             path = self._inside(self._folder / name)
-            size = path.stat().st_size
-            if size > LARGEST_FILE:
-                raise ArchiveError(f"{str(path)!r} is larger than {LARGEST_FILE >> 20} MB")
+            size = _bounded(path)
             if path.suffix.lower() in PICTURES:
                 _check_picture(path, 0, size)
         except ArchiveError as error:
@@ -274,12 +279,6 @@ class _Texture:
         tile[..., :3] = np.round(255 * np.array(self.colour))
         if self.image is None:
             return tile
-        width, height = self.image.size
-        if max(width, height) > LARGEST_PICTURE:
-            raise ArchiveError(
-                f"{str(path)!r} has a picture of {width}x{height} pixels, more than "
-                f"{LARGEST_PICTURE} along a side"
-            )
         from PIL import Image
 
         try:
@@ -344,16 +343,12 @@ def check_glb(path: Path) -> tuple[tuple[int, int], ...]:
 
 def _chunks(path: Path) -> tuple[Mapping[str, Any], int, int]:
     """The file's JSON, and length and offset of its binary chunk."""
-    size = path.stat().st_size
-    if size > LARGEST_FILE:
-        raise ArchiveError(f"{str(path)!r} is larger than {LARGEST_FILE >> 20} MB")
+    size = _bounded(path)
     with path.open("rb") as file:
         head = file.read(20)
         if len(head) < 20 or head[:4] != b"glTF":
             raise ArchiveError(f"{str(path)!r} is no GLB file; unpack the archive again")
-        version, total, length, kind = struct.unpack("<II", head[4:12]) + struct.unpack(
-            "<I4s", head[12:20]
-        )
+        version, total, length, kind = struct.unpack("<III4s", head[4:])
         if version != 2 or kind != b"JSON":
             raise ArchiveError(f"{str(path)!r} is no GLB file of version 2")
         if total > size or length > min(size - 20, LARGEST_HEADER):

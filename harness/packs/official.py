@@ -76,7 +76,6 @@ class OfficialPack:
         return ClutterKind(kind.asset, looks)
 
     def _there(self, asset: str, params: Params) -> bool:
-        """Whether the archive has the model's files."""
         model = official_model(asset, params["look"])
         try:
             return model is not None and bool(self.archive.files(model))

@@ -119,7 +119,6 @@ def sheet(rows: Sequence[GalleryRow], title: str) -> Image.Image:
 
 
 def _paste(page: Image.Image, cell: Cell, left: int, top: int) -> None:
-    """Picture and caption of one cell."""
     from PIL import Image, ImageDraw
 
     page.paste(Image.fromarray(cell.image).resize(CELL, Image.Resampling.BOX), (left, top))

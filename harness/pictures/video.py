@@ -30,48 +30,40 @@ CAMERA = "head"
 """What a film shows if nobody asks for more."""
 
 
-class VideoBuffer:
-    """An H.264 file that grows in memory; all frames have the size of the first, an even one."""
+class FilmRecorder:
+    """A `Recorder` that draws a trial while it is played, all `cameras` side by side, as an H.264
+    file that grows in memory. While nothing moves, one picture serves for all."""
 
-    def __init__(self, fps: int = FPS) -> None:
-        import av
-
-        self._av = av
+    def __init__(self, cameras: Sequence[CameraSpec] = (CameraSpec(CAMERA),)) -> None:
+        self._cameras = tuple(cameras)
         self._bytes = io.BytesIO()
-        self._fps = fps
-        self._file: Any = av.open(self._bytes, "w", format="mp4")
+        self._file: Any = None
         self._stream: Any = None
+        self._drawn: RenderableState | None = None
+        self._image = np.zeros((0, 0, 3), np.uint8)
+        self._due = EVERY
 
     def add(self, image: NDArray[np.uint8]) -> None:
-        """Append one RGB frame, uint8 (height, width, 3)."""
-        if self._stream is None:
-            stream = self._file.add_stream("libx264", rate=self._fps)
+        """Append one RGB frame, uint8 (height, width, 3); all have the size of the first, an even
+        one."""
+        import av
+
+        if self._file is None:
+            self._file = av.open(self._bytes, "w", format="mp4")
+            stream = self._stream = self._file.add_stream("libx264", rate=FPS)
             stream.height, stream.width = image.shape[:2]
             stream.pix_fmt = "yuv420p"
             stream.options = {"crf": "23", "preset": "veryfast"}
             stream.codec_context.thread_count = 1
-            self._stream = stream
-        frame = self._av.VideoFrame.from_ndarray(np.ascontiguousarray(image), format="rgb24")
+        frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(image), format="rgb24")
         self._file.mux(self._stream.encode(frame))
 
     def finish(self) -> bytes:
-        """The whole file; nothing can be added any more."""
-        if self._stream is not None:
+        """The film; nothing can be added any more."""
+        if self._file is not None:
             self._file.mux(self._stream.encode())
-        self._file.close()
+            self._file.close()
         return self._bytes.getvalue()
-
-
-class FilmRecorder:
-    """A `Recorder` that draws a trial while it is played, all `cameras` side by side, as an MP4.
-    While nothing moves, one picture serves for all."""
-
-    def __init__(self, cameras: Sequence[CameraSpec] = (CameraSpec(CAMERA),)) -> None:
-        self._cameras = tuple(cameras)
-        self._video = VideoBuffer()
-        self._drawn: RenderableState | None = None
-        self._image = np.zeros((0, 0, 3), np.uint8)
-        self._due = EVERY
 
     def started(self, world: World) -> None:
         """Show the first view."""
@@ -89,14 +81,6 @@ class FilmRecorder:
     def ended(self, world: World) -> None:
         """Show the last view for half a second."""
         self._show(world, FPS // 2)
-
-    def add(self, image: NDArray[np.uint8]) -> None:
-        """Take one RGB frame, uint8 (height, width, 3)."""
-        self._video.add(image)
-
-    def finish(self) -> bytes:
-        """The film; nothing can be added any more."""
-        return self._video.finish()
 
     def _show(self, world: World, frames: int = 1) -> None:
         still = world.still()

@@ -137,7 +137,6 @@ SHARP = 40.0
 
 
 def _paper(draw: f.Draw, picture: f.Picture) -> f.Picture:
-    """The print on slightly uneven paper."""
     return f.shaded(picture, 0.95 + 0.07 * f.noise(draw, 60, 60, 3))
 
 

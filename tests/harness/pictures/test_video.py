@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from run_fakes import FakePolicy, FakeStill, FakeWorld, parts
 
-from robospa.harness.pictures.video import FPS, FilmRecorder, VideoBuffer
+from robospa.harness.pictures.video import FPS, FilmRecorder
 from robospa.harness.trial import run_trial
 from robospa.observation import CameraSpec
 from robospa.trial import TrialKey
@@ -20,7 +20,7 @@ KEY = TrialKey("Pick_Fake", 2, 100009)
 
 
 def test_frames_come_back_in_yuv420p() -> None:
-    buffer = VideoBuffer()
+    buffer = FilmRecorder()
     for shade in (0, 120, 240):
         buffer.add(np.full((240, 320, 3), shade, np.uint8))
     with av.open(io.BytesIO(buffer.finish())) as file:
