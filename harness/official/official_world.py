@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -29,17 +30,8 @@ class OfficialWorld(SapienWorld):
     unstable if anything turned by more than 3 degrees in the last 0.8 s, officially the only thing
     that is looked at."""
 
-    def __init__(
-        self,
-        render: bool | None = None,
-        control: str = "rest_to_rest",
-        action_steps: int = 10,
-        settle: str = "usual",
-        robot_assets: str = "builtin",
-    ) -> None:
-        super().__init__(
-            render=render, control=control, action_steps=action_steps, robot_assets=robot_assets
-        )
+    def __init__(self, settle: str = "usual", **arguments: Any) -> None:
+        super().__init__(**arguments)
         self._settle = settle
 
     def load(self, scene: Scene, contacts: bool = False) -> None:

@@ -132,10 +132,6 @@ def _apart(scene: Scene) -> Values:
     return {"A": f"{facts[f'{side}_color']} block", "B": side}
 
 
-def _cards(scene: Scene) -> Values:
-    return {"A": scene.object(scene.facts["boxes"][0])} if scene.level == 1 else {}
-
-
 def _bowls(scene: Scene) -> Values:
     plate, bowls = _thing(scene, "plate"), scene.facts["bowls"]
     bowl = scene.object(bowls[0])
@@ -152,31 +148,10 @@ def _food(scene: Scene) -> Values:
     return {"A": facts[f"{way}_kind"], "B": way, "a": _side(scene, facts[way][0])}
 
 
-def _hammer(scene: Scene) -> Values:
-    return {"A": _thing(scene, "hammer"), "a": _side(scene, scene.facts["hammer"])}
-
-
 def _in_order(scene: Scene) -> Values:
     order = scene.facts["order"]
     things = _letters([scene.object(name) for name in order])
     return things | _letters([_side(scene, name) for name in order], "a")
-
-
-def _stamps(scene: Scene) -> Values:
-    pads = [color.capitalize() for color in scene.facts["colors"]]
-    return {"A": _thing(scene, "seal")} | _letters(pads, "B")
-
-
-def _bells(scene: Scene) -> Values:
-    return {"B": "top bell" if scene.level == 5 else scene.object(scene.facts["order"][0])}
-
-
-def _covers(scene: Scene) -> Values:
-    return {"A": ", ".join(scene.facts["colors"])}
-
-
-def _counts(scene: Scene) -> Values:
-    return _letters([str(count) for count in scene.facts["counts"]])
 
 
 def _nothing(scene: Scene) -> Values:
@@ -217,13 +192,20 @@ SLOTS: Mapping[str, Callable[[Scene], Values]] = {
     "Click_Bell_Repeat": _repeat("bell", one_arm=True),
     "Put_Bottles_Dustbin": _bottles,
     "Move_Blocks_Apart": _apart,
-    "Move_Playing_Cards_Away": _cards,
+    "Move_Playing_Cards_Away": lambda scene: (
+        {"A": scene.object(scene.facts["boxes"][0])} if scene.level == 1 else {}
+    ),
     "Place_Bowls_Plates": _bowls,
     "Separate_Fries_Bread": _food,
-    "Hit_Blocks_Hammer_Order": _hammer,
+    "Hit_Blocks_Hammer_Order": _chain((1, "A", "hammer"), (1, "a", "side:hammer")),
     "Click_Objects_Order": _in_order,
-    "Stamp_Seals_Order": _stamps,
-    "Click_Bell_Clockwise_Order": _bells,
+    "Stamp_Seals_Order": lambda scene: (
+        {"A": _thing(scene, "seal")}
+        | _letters([color.capitalize() for color in scene.facts["colors"]], "B")
+    ),
+    "Click_Bell_Clockwise_Order": lambda scene: {
+        "B": "top bell" if scene.level == 5 else scene.object(scene.facts["order"][0])
+    },
     "Place_Phone_Press_Stapler": _chain(
         (1, "A", "phone"), (1, "B", "phone_stand"), (1, "a", "right"), (2, "C", "stapler"),
         (2, "c", "right"), (5, "D", "table_trash_bin"), (5, "E", "dustbin"), (5, "d", "left"),
@@ -255,8 +237,8 @@ SLOTS: Mapping[str, Callable[[Scene], Values]] = {
         (3, "c", "left"), (4, "A", "object"), (4, "B", "reference"), (4, "d", "side:object"),
         (5, "e", "left"),
     ),
-    "Remember_Color_Cover": _covers,
-    "Press_Stapler_Memory": _counts,
+    "Remember_Color_Cover": lambda scene: {"A": ", ".join(scene.facts["colors"])},
+    "Press_Stapler_Memory": lambda scene: _letters([str(n) for n in scene.facts["counts"]]),
     # What the names of several tasks have in common; the first that fits counts.
     "Pick_*_Distance*": _distance,
     "Pick_*_Canonical*": _canonical,

@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from robospa.extras import MissingPackage, need
 from robospa.harness.packs.archive import ArchiveError
 
 Floats = NDArray[np.float64]
@@ -123,7 +124,10 @@ def read_shapes(path: Path, inside: Callable[[Path], Path]) -> list[Piece]:
 def _parts(path: Path, inside: Callable[[Path], Path], by_node: bool = False) -> list[Any]:
     """The file's trimesh meshes, moved to where the file has them: one for each material, or
     `by_node` one for each node of a GLB file and each object of an OBJ file."""
-    trimesh = _library()
+    try:
+        trimesh = need("trimesh")
+    except MissingPackage as error:
+        raise ArchiveError(f"official assets cannot be read: {error}") from error
     kind = path.suffix.lower()
     if kind not in FORMATS:
         raise ArchiveError(
@@ -232,16 +236,6 @@ class _Inside:
 def reads_meshes() -> bool:
     """Whether the library that reads meshes is installed."""
     return importlib.util.find_spec("trimesh") is not None
-
-
-def _library() -> Any:
-    try:
-        import trimesh
-    except ModuleNotFoundError as error:
-        raise ArchiveError(
-            "reading official assets needs trimesh; install it with: pip install 'robospa[assets]'"
-        ) from error
-    return trimesh
 
 
 @dataclass(frozen=True)
