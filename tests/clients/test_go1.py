@@ -20,6 +20,7 @@ from standins import (
     first_request,
     image,
     observation,
+    talking,
 )
 
 from robospa.clients import connect, go1
@@ -53,7 +54,7 @@ def test_go1_wrists_are_swapped_only_on_request() -> None:
 
 
 def test_go1_greeting_holds_options_and_warnings() -> None:
-    with Go1() as url, connect(url + "?wrists=swapped", timeouts=QUICK) as policy:
+    with talking(Go1(), "?wrists=swapped") as policy:
         hello = policy.hello
     assert hello["options"]["wrists"] == "swapped"
     assert hello["options"]["ctrl_freq"] == 30

@@ -20,9 +20,11 @@ from standins import (
     STATE,
     TRIAL,
     OpenPi,
+    answered,
     image,
     joint_chunk,
     observation,
+    talking,
 )
 
 from robospa.action_space import ActionSpace
@@ -62,7 +64,7 @@ def test_a_server_that_does_not_select_our_protocol_is_spoken_to_in_openpis() ->
 
 def test_openpi_is_sent_what_its_server_reads() -> None:
     server = OpenPi()
-    with server as url, connect(url, timeouts=QUICK) as policy:
+    with talking(server) as policy:
         policy.reset(TRIAL)
         chunk = policy.infer(observation())
         assert policy.hello["metadata"] == {"reset_pose": [0, -1.5, 1.5, 0, 0, 0]}
@@ -90,7 +92,7 @@ def test_metadata_that_openpis_own_client_reads_is_read() -> None:
         "when": np.datetime64("2026-01-01"),
         b"stats": {b"mean": np.float32(0.5)},
     }
-    with server as url, connect(url, timeouts=QUICK) as policy:
+    with talking(server) as policy:
         assert policy.hello["metadata"]["gains"] == [1.5, 2]
         assert policy.hello["metadata"]["names"] == "array of <U5 [2]"
         assert policy.infer(observation()).shape == (3, 14)
@@ -101,8 +103,7 @@ def test_metadata_that_openpis_own_client_reads_is_read() -> None:
 )
 def test_actions_that_openpis_own_client_takes_are_taken(actions: Any) -> None:
     answer = msgpack.packb({"actions": actions}, default=OPENPI.write)
-    with OpenPi(None, answer) as url, connect(url, timeouts=QUICK) as policy:
-        assert policy.infer(observation()).tolist() == [[1] * 14] * 2
+    assert answered(OpenPi(None, answer)).tolist() == [[1] * 14] * 2
 
 
 def test_openpis_key_is_sent_as_its_client_sends_it() -> None:
@@ -117,7 +118,7 @@ def test_openpis_key_is_sent_as_its_client_sends_it() -> None:
 def test_openpi_other_cameras_names_and_keys() -> None:
     server = OpenPi()
     query = '?cameras=head&names=head:cam_high&extra={"seed":3}&horizon=3&execute=2'
-    with server as url, connect(url + query, timeouts=QUICK) as policy:
+    with talking(server, query) as policy:
         assert [camera.name for camera in policy.spec.cameras] == ["head"]
         policy.infer(observation(images={"head": image(HEAD)}))
         assert (policy.spec.horizon, policy.spec.execute) == (3, 2)
@@ -142,7 +143,7 @@ def test_openpis_own_codec_reads_and_is_read() -> None:
     original = pytest.importorskip("openpi_client.msgpack_numpy")
     answer = {"actions": joint_chunk(), "server_timing": {"infer_ms": np.float64(3.5)}}
     server = OpenPi(None, original.packb(answer))
-    with server as url, connect(url, timeouts=QUICK) as policy:
+    with talking(server) as policy:
         chunk = policy.infer(observation())
         assert policy.last_timing["infer_ms"] == 3.5
     assert np.array_equal(chunk, joint_chunk().astype(np.float32))
@@ -154,7 +155,7 @@ def test_openpis_own_codec_reads_and_is_read() -> None:
 
 def test_after_a_text_frame_the_connection_is_gone() -> None:
     trace = 'Traceback (most recent call last):\n  File "policy.py"\nKeyError: "cam_high"\n'
-    with OpenPi(None, trace) as url, connect(url, timeouts=QUICK) as policy:
+    with talking(OpenPi(None, trace)) as policy:
         with pytest.raises(ServerError, match=r'KeyError: "cam_high"$') as caught:
             policy.infer(observation())
         assert caught.value.retriable
@@ -175,21 +176,13 @@ def test_after_a_text_frame_the_connection_is_gone() -> None:
     ],
 )
 def test_answers_that_cannot_be(frame: bytes, error: Any) -> None:
-    with (
-        OpenPi(None, frame) as url,
-        connect(url, timeouts=QUICK) as policy,
-        pytest.raises(error),
-    ):
-        policy.infer(observation())
+    with pytest.raises(error):
+        answered(OpenPi(None, frame))
 
 
 def test_a_camera_without_openpi_name_is_named() -> None:
     seen = observation(images={"third": np.zeros((6, 8, 3), np.uint8)})
-    with (
-        OpenPi() as url,
-        connect(url, timeouts=QUICK) as policy,
-        pytest.raises(EncodeError, match="'third'"),
-    ):
+    with talking(OpenPi()) as policy, pytest.raises(EncodeError, match="'third'"):
         policy.infer(seen)
 
 

@@ -14,17 +14,18 @@ from standins import (
     EE,
     HEAD,
     LEFT,
-    QUICK,
     RIGHT,
     STATE,
     TRIAL,
     RoboTwin,
+    answered,
     image,
     joint_chunk,
     observation,
+    talking,
 )
 
-from robospa.clients import check_options, connect
+from robospa.clients import check_options
 from robospa.protocol.errors import (
     ConnectionLost,
     PolicyAnswerError,
@@ -39,7 +40,7 @@ def calls(server: Any) -> list[str]:
 
 def test_the_nested_observation() -> None:
     server = RoboTwin()
-    with server as url, connect(url, timeouts=QUICK) as policy:
+    with talking(server) as policy:
         policy.reset(TRIAL)
         chunk = policy.infer(observation())
         policy.end({})
@@ -64,7 +65,7 @@ def test_the_nested_observation() -> None:
 
 def test_the_layout_of_dp() -> None:
     server = RoboTwin()
-    with server as url, connect(url + "?layout=dp", timeouts=QUICK) as policy:
+    with talking(server, "?layout=dp") as policy:
         policy.infer(observation())
     sent = server.requests[0]["obs"]
     assert sent.keys() == {"head_cam", "left_cam", "right_cam", "agent_pos"}
@@ -77,7 +78,7 @@ def test_the_layout_of_dp() -> None:
 
 def test_update_and_then_ask() -> None:
     server = RoboTwin()
-    with server as url, connect(url + "?calls=update&reset=none", timeouts=QUICK) as policy:
+    with talking(server, "?calls=update&reset=none") as policy:
         policy.reset(TRIAL)
         policy.infer(observation())
     assert calls(server) == ["update_obs", "get_action"]
@@ -135,7 +136,7 @@ def documented_url() -> str:
 
 def test_the_documented_url_gives_robotwins_dp_the_windows_of_its_own_client() -> None:
     server = Windows()
-    with server as url, connect(url + documented_url(), timeouts=QUICK) as policy:
+    with talking(server, documented_url()) as policy:
         policy.reset(TRIAL)
         for step in (0, 6, 12, 18):
             policy.infer(at(step, policy.spec.history))
@@ -145,7 +146,7 @@ def test_the_documented_url_gives_robotwins_dp_the_windows_of_its_own_client() -
 
 def test_earlier_steps_are_told_once() -> None:
     server = RoboTwin()
-    with server as url, connect(url + "?layout=dp&history=2", timeouts=QUICK) as policy:
+    with talking(server, "?layout=dp&history=2") as policy:
         assert policy.spec.history == (-2, -1)
         policy.reset(TRIAL)
         for step in (0, 1, 5):
@@ -158,18 +159,16 @@ def test_earlier_steps_are_told_once() -> None:
 def test_answers_may_come_in_any_pieces() -> None:
     server = RoboTwin()
     server.slowly = True
-    with server as url, connect(url, timeouts=QUICK) as policy:
-        assert policy.infer(observation()).shape == (3, 14)
+    assert answered(server).shape == (3, 14)
 
 
 def test_an_array_is_understood_too() -> None:
     answer = joint_chunk().astype(np.float32)
-    with RoboTwin(lambda seen: answer) as url, connect(url, timeouts=QUICK) as policy:
-        assert np.array_equal(policy.infer(observation()), answer)
+    assert np.array_equal(answered(RoboTwin(lambda seen: answer)), answer)
 
 
 def test_a_servers_error_is_told_and_ends_the_connection() -> None:
-    with RoboTwin(lambda seen: 1 / 0) as url, connect(url, timeouts=QUICK) as policy:
+    with talking(RoboTwin(lambda seen: 1 / 0)) as policy:
         with pytest.raises(ServerError, match=r"division by zero \(in get_action\)") as caught:
             policy.infer(observation())
         assert caught.value.retriable
@@ -182,8 +181,7 @@ def test_a_servers_error_is_told_and_ends_the_connection() -> None:
 
 def test_a_method_that_the_model_lacks() -> None:
     with (
-        RoboTwin() as url,
-        connect(url + "?reset=reset_obs", timeouts=QUICK) as policy,
+        talking(RoboTwin(), "?reset=reset_obs") as policy,
         pytest.raises(ServerError, match="No model method named 'reset_obs'"),
     ):
         policy.reset(TRIAL)
@@ -216,9 +214,5 @@ def frame(text: bytes) -> bytes:
     ],
 )
 def test_answers_that_cannot_be(instead: bytes, error: Any, reason: str) -> None:
-    with (
-        RoboTwin(None, instead) as url,
-        connect(url, timeouts=QUICK) as policy,
-        pytest.raises(error, match=reason),
-    ):
-        policy.infer(observation())
+    with pytest.raises(error, match=reason):
+        answered(RoboTwin(None, instead))

@@ -15,9 +15,11 @@ from standins import (
     STATE,
     TRIAL,
     VlaEval,
+    answered,
     image,
     joint_chunk,
     observation,
+    talking,
 )
 
 from robospa.clients import connect
@@ -31,7 +33,7 @@ from robospa.protocol.errors import (
 
 def test_vla_eval_is_sent_what_its_server_reads() -> None:
     server = VlaEval()
-    with server as url, connect(url, timeouts=QUICK) as policy:
+    with talking(server) as policy:
         assert policy.hello["server"] == "Dummy 0.8.0"
         policy.reset(TRIAL)
         chunk = policy.infer(observation())
@@ -57,8 +59,7 @@ def test_vla_eval_is_sent_what_its_server_reads() -> None:
 
 
 def test_vla_eval_single_actions_are_chunks_of_one() -> None:
-    with VlaEval(lambda seen: STATE) as url, connect(url, timeouts=QUICK) as policy:
-        assert np.array_equal(policy.infer(observation()), STATE[None])
+    assert np.array_equal(answered(VlaEval(lambda seen: STATE)), STATE[None])
 
 
 def test_vla_eval_of_a_whole_chunk_the_first_action_alone_is_executed() -> None:
@@ -73,8 +74,7 @@ def test_vla_eval_of_a_whole_chunk_the_first_action_alone_is_executed() -> None:
 def test_vla_eval_order_of_cameras_and_names_of_state() -> None:
     server = VlaEval()
     query = "?cameras=right_wrist,head&state_keys=state,states&grippers=closed"
-    with server as url, connect(url + query, timeouts=QUICK) as policy:
-        chunk = policy.infer(observation())
+    chunk = answered(server, query)
     seen = next(r["payload"] for r in server.requests if r["type"] == "observation")
     assert list(seen["images"]) == ["right_camera", "head_camera"]
     assert "joint_state" not in seen
@@ -87,7 +87,7 @@ def test_vla_eval_a_failed_start_does_not_shift_the_actions() -> None:
     """The known defect of its own client: from then on every action is of another observation."""
     server = VlaEval()
     server.broken_start = True
-    with server as url, connect(url, timeouts=QUICK) as policy:
+    with talking(server) as policy:
         policy.reset(TRIAL)
         with pytest.raises(ServerError, match="earlier message: episode_start_failed"):
             policy.infer(observation())
@@ -106,7 +106,7 @@ def test_vla_eval_another_version_is_refused() -> None:
 
 
 def test_vla_eval_actions_of_another_size_are_doubted_at_once() -> None:
-    with VlaEval() as url, connect(url + "?space=ee", timeouts=QUICK) as policy:
+    with talking(VlaEval(), "?space=ee") as policy:
         assert any("announces 14 numbers" in text for text in policy.hello["warnings"])
 
 
@@ -126,7 +126,7 @@ def test_vla_eval_an_error_leaves_the_connection_good() -> None:
             raise KeyError("image")
         return STATE
 
-    with VlaEval(model) as url, connect(url, timeouts=QUICK) as policy:
+    with talking(VlaEval(model)) as policy:
         with pytest.raises(ServerError, match="observation_failed: KeyError"):
             policy.infer(observation(instruction="fail"))
         assert policy.infer(observation()).shape == (1, 14)
@@ -155,9 +155,5 @@ def test_arrays_that_cannot_be_are_refused(broken: Any) -> None:
     frame = msgpack.packb(
         {"type": "action", "payload": {"actions": broken}, "seq": 2, "timestamp": 0.0}
     )
-    with (
-        VlaEval(None, frame) as url,
-        connect(url, timeouts=QUICK) as policy,
-        pytest.raises(ProtocolViolation, match="cannot be read"),
-    ):
-        policy.infer(observation())
+    with pytest.raises(ProtocolViolation, match="cannot be read"):
+        answered(VlaEval(None, frame))

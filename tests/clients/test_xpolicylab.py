@@ -12,17 +12,17 @@ from standins import (
     EE,
     HEAD,
     LEFT,
-    QUICK,
     RIGHT,
     STATE,
     TRIAL,
     XPolicyLab,
+    answered,
     image,
     joint_chunk,
     observation,
+    talking,
 )
 
-from robospa.clients import connect
 from robospa.protocol.errors import (
     ConnectionLost,
     PolicyAnswerError,
@@ -46,7 +46,7 @@ def steps(chunk: Any) -> list[dict[str, Any]]:
 
 def test_xpolicylab_is_sent_what_its_server_reads() -> None:
     server = XPolicyLab(lambda seen: steps(joint_chunk()))
-    with server as url, connect(url, timeouts=QUICK) as policy:
+    with talking(server) as policy:
         assert policy.hello["server"] == "demo_policy_server"
         policy.reset(TRIAL)
         chunk = policy.infer(observation(5))
@@ -78,7 +78,7 @@ def test_xpolicylab_is_sent_what_its_server_reads() -> None:
 
 def test_xpolicylab_state_is_split_by_arm() -> None:
     server = XPolicyLab(lambda seen: steps(joint_chunk()))
-    with server as url, connect(url, timeouts=QUICK) as policy:
+    with talking(server) as policy:
         policy.infer(observation())
     state = server.requests[-1]["payload"]["observation"]["state"]
     assert all(value.dtype == np.float32 for value in state.values())
@@ -97,10 +97,7 @@ def test_xpolicylab_state_is_split_by_arm() -> None:
 def test_xpolicylab_answers_poses() -> None:
     pose = {"left_ee_pose": EE[0, :7], "right_ee_pose": EE[1, :7]}
     grip = {"left_ee_joint_state": np.ones(1), "right_ee_joint_state": np.zeros(1)}
-    with (
-        XPolicyLab(lambda seen: [pose | grip]) as url,
-        connect(url + "?space=ee", timeouts=QUICK) as policy,
-    ):
+    with talking(XPolicyLab(lambda seen: [pose | grip]), "?space=ee") as policy:
         chunk = policy.infer(observation())
     assert chunk.shape == (1, 16)
     assert np.array_equal(chunk[0, :7], EE[0, :7])
@@ -109,17 +106,13 @@ def test_xpolicylab_answers_poses() -> None:
 
 
 def test_xpolicylab_grippers_can_be_turned_round() -> None:
-    with (
-        XPolicyLab(lambda seen: np.zeros((1, 14))) as url,
-        connect(url + "?grippers=closed", timeouts=QUICK) as policy,
-    ):
+    with talking(XPolicyLab(lambda seen: np.zeros((1, 14))), "?grippers=closed") as policy:
         assert policy.infer(observation())[0].tolist() == [0] * 6 + [1] + [0] * 6 + [1]
 
 
 def ask(answer: Any, query: str = "") -> Any:
     """The chunk that our client makes of `answer`."""
-    with XPolicyLab(lambda seen: answer) as url, connect(url + query, timeouts=QUICK) as policy:
-        return policy.infer(observation())
+    return answered(XPolicyLab(lambda seen: answer), query)
 
 
 def test_a_gripper_that_is_not_named_stays_when_grippers_are_turned_round() -> None:
@@ -228,7 +221,7 @@ def test_foreign_names_are_safe_to_print_and_short() -> None:
 
 def test_xpolicylab_a_failed_reset_is_an_error_and_a_failed_preparation_is_not() -> None:
     server = XPolicyLab(lambda seen: np.zeros((1, 14)))
-    with server as url, connect(url, timeouts=QUICK) as policy:
+    with talking(server) as policy:
         server.broken = ("prepare_case",)
         policy.reset(TRIAL)
         assert policy.infer(observation()).shape == (1, 14)
@@ -246,7 +239,7 @@ def test_xpolicylab_an_error_leaves_the_connection_good() -> None:
             raise trouble
         return np.zeros((1, 14))
 
-    with XPolicyLab(model) as url, connect(url, timeouts=QUICK) as policy:
+    with talking(XPolicyLab(model)) as policy:
         with pytest.raises(ServerError, match="INFER_FAILED: no such camera"):
             policy.infer(observation())
         assert policy.infer(observation()).shape == (1, 14)
@@ -267,7 +260,7 @@ def test_xpolicylab_an_error_leaves_the_connection_good() -> None:
     ],
 )
 def test_xpolicylab_frames_that_are_no_answer(frame: Any, reason: str) -> None:
-    with XPolicyLab(None, frame) as url, connect(url, timeouts=QUICK) as policy:
+    with talking(XPolicyLab(None, frame)) as policy:
         with pytest.raises(ProtocolViolation, match=reason):
             policy.infer(observation())
         with pytest.raises(ConnectionLost):

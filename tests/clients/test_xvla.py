@@ -11,18 +11,19 @@ from standins import (
     EE,
     HEAD,
     LEFT,
-    QUICK,
     RIGHT,
     STATE,
     TRIAL,
     XVla,
+    answered,
     first_request,
     image,
     joint_chunk,
     observation,
+    talking,
 )
 
-from robospa.clients import connect, xvla
+from robospa.clients import xvla
 from robospa.clients.model_policy import ModelMissing
 from robospa.protocol.errors import PolicyAnswerError, ProtocolViolation, ServerError
 
@@ -75,7 +76,7 @@ def test_xvla_rotations_can_be_right() -> None:
 def test_xvla_poses_come_back_as_ours() -> None:
     """The unturned rotation is q = (w 1, x 0, y 0, z 0); through the slip it is x y z w."""
     for query, quaternion in (("?quaternions=wxyz", [1, 0, 0, 0]), ("", [0, 0, 0, 1])):
-        with XVla(lambda seen: ee6d()) as url, connect(url + query, timeouts=QUICK) as policy:
+        with talking(XVla(lambda seen: ee6d()), query) as policy:
             assert policy.spec.action == "ee"
             chunk = policy.infer(observation())
         assert chunk.shape == (2, 16)
@@ -93,15 +94,13 @@ def test_xvla_grippers_close_above_the_threshold() -> None:
         chunk[:, 9] = [0.69, 0.71, 0.3]
         return chunk
 
-    with XVla(model) as url, connect(url, timeouts=QUICK) as policy:
-        assert policy.infer(observation())[:, 7].tolist() == [1, 0, 1]
-    with XVla(model) as url, connect(url + "?closed_above=0.2", timeouts=QUICK) as policy:
-        assert policy.infer(observation())[:, 7].tolist() == [0, 0, 0]
+    assert answered(XVla(model))[:, 7].tolist() == [1, 0, 1]
+    assert answered(XVla(model), "?closed_above=0.2")[:, 7].tolist() == [0, 0, 0]
 
 
 def test_xvla_is_told_the_last_command_from_the_second_query_on() -> None:
     server = XVla(lambda seen: ee6d() + np.linspace(0, 0.1, 2)[:, None] * (np.arange(20) % 10 < 3))
-    with server as url, connect(url, timeouts=QUICK) as policy:
+    with talking(server) as policy:
         policy.reset(TRIAL)
         policy.infer(observation(0))
         policy.infer(observation(2))
@@ -130,7 +129,7 @@ def test_xvla_in_joint_space(meaning: str, sign: int) -> None:
     chunk[:, [6, 13]] = 0.125
     server = XVla(lambda seen: chunk, proprio=14)
     query = f"?space=joint&joint_grippers={meaning}"
-    with server as url, connect(url + query, timeouts=QUICK) as policy:
+    with talking(server, query) as policy:
         assert policy.spec.action == "joint"
         answer = policy.infer(observation())
     assert answer[:, 6].tolist() == [0.125 if sign == 1 else 0.875] * 3
@@ -141,7 +140,7 @@ def test_xvla_in_joint_space(meaning: str, sign: int) -> None:
 
 
 def test_xvlas_silent_400_points_to_its_log() -> None:
-    with XVla(lambda seen: 1 / 0) as url, connect(url, timeouts=QUICK) as policy:
+    with talking(XVla(lambda seen: 1 / 0)) as policy:
         with pytest.raises(ServerError, match=r"HTTP 400: Request failed.*its log") as caught:
             policy.infer(observation())
         assert caught.value.retriable
@@ -157,12 +156,8 @@ def test_xvlas_silent_400_points_to_its_log() -> None:
     ],
 )
 def test_xvla_answers_that_cannot_be(answer: Any, error: Any, words: str) -> None:
-    with (
-        XVla(None, answer) as url,
-        connect(url, timeouts=QUICK) as policy,
-        pytest.raises(error, match=words),
-    ):
-        policy.infer(observation())
+    with pytest.raises(error, match=words):
+        answered(XVla(None, answer))
 
 
 class OfficialXvla:

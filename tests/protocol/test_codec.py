@@ -190,12 +190,6 @@ def test_numbers_are_aligned_wherever_they_lie(pad: int) -> None:
     assert array.tolist() == [0, 1, 2, 3, 4]
 
 
-@pytest.mark.parametrize("shape", [(5, 6, 1), (5, 6), (1, 1, 1), (5, 6, 4)])
-def test_images_of_any_channel_count_survive(shape: tuple[int, ...]) -> None:
-    image = np.arange(np.prod(shape), dtype=np.uint8).reshape(shape)
-    assert same(image, decode(encode(image)))
-
-
 def test_views_and_foreign_byte_orders_are_sent_as_their_values() -> None:
     array = np.arange(12, dtype=">i4").reshape(3, 4)[::-1, ::2]
     assert decode(encode(array)).tolist() == array.tolist()

@@ -12,6 +12,7 @@ from wire_helpers import QUICK, SPEC, Recall, Scripted, answer
 
 from robospa.observation import CameraSpec
 from robospa.protocol.conformance import CHECKS, check, synthetic_observation, trial_for
+from robospa.protocol.connection_limits import ServerOptions
 from robospa.protocol.messages import Actions, Hello, Ready, pack
 from robospa.protocol.policy import PolicySpec, check_observation
 
@@ -54,7 +55,8 @@ def test_a_server_of_another_version() -> None:
 def test_a_bad_chunk_fails_the_check_of_actions(start: Any, bad: Any) -> None:
     policy = Recall()
     policy.answer = bad
-    assert verdicts(start(policy).url)["actions"] is False
+    options = ServerOptions(patience=0.05)
+    assert verdicts(start(policy, options=options).url)["actions"] is False
 
 
 def test_a_broken_promise_of_repeatability(start: Any) -> None:

@@ -1,30 +1,47 @@
-"""The server and the network: whatever a client does, it harms only itself.
-
-Everybody is on loopback. Every test ends with a real client that is served.
-"""
+"""Who is let in, and that whatever a client does, it harms only itself."""
 
 from __future__ import annotations
 
 import base64
 import contextlib
+import http.client
 import logging
 import os
 import socket
+import ssl
 import struct
+import subprocess
+import threading
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
-from wire_helpers import QUICK, TRIAL, Recall, ask, observation, raw, until
+from run_fakes import FakePolicy
+from websockets.datastructures import Headers
+from websockets.exceptions import InvalidStatus
+from websockets.http11 import Request, Response
+from websockets.sync.client import connect as open_socket
+from websockets.sync.server import serve
+from websockets.typing import Origin
+from wire_helpers import QUICK, TRIAL, Recall, observation, raw, until
 
-from robospa.protocol.client import connect
+from robospa.clients import connect
+from robospa.protocol.client import connect as connect_ours
 from robospa.protocol.codec import encode
 from robospa.protocol.connection_limits import FRAMES, ServerOptions
-from robospa.protocol.errors import ConnectionLost, TransportError
-from robospa.protocol.messages import Error, Infer, Reset, pack
+from robospa.protocol.errors import (
+    ConnectFailed,
+    ConnectionLost,
+    HandshakeError,
+    TransportError,
+    Unauthorized,
+)
+from robospa.protocol.messages import Infer, Reset, pack
 from robospa.protocol.server import ServerThread
+from robospa.protocol.transport import Address, Transport, _moved
 
 KEY = base64.b64encode(b"0123456789abcdef").decode()
 HANDSHAKE = (
@@ -149,25 +166,6 @@ def test_of_many_handshakes_the_oldest_are_dropped(start: Any, dial: Any) -> Non
     idle = [dial(server) for _ in range(30)]
     assert served(server)
     assert ended(idle[0]) == b""
-
-
-def test_a_thousand_idle_connections(start: Any, dial: Any) -> None:
-    """Half of them say nothing at all, half finish the handshake and then say nothing."""
-    half = 500 if _may_open(2500) else 100
-    server = start(policy_factory=Recall, options=ServerOptions(max_connections=64))
-    idle = [dial(server) for _ in range(half)] + [dial(server, HANDSHAKE) for _ in range(half)]
-    assert served(server)
-    assert server.load.sockets <= 64 + 128 + half
-    assert len(idle) == 2 * half
-
-
-def _may_open(files: int) -> bool:
-    import resource
-
-    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    if soft < files <= hard:
-        resource.setrlimit(resource.RLIMIT_NOFILE, (files, hard))
-    return hard >= files
 
 
 def test_without_file_descriptors_it_waits_and_says_so(
@@ -329,20 +327,6 @@ def test_a_model_that_hangs_does_not_keep_the_places_of_those_who_left(start: An
     assert served(server)
 
 
-@pytest.mark.parametrize(
-    "name", ["../../etc/passwd", "a/b", "a\\b", "..", ".x", "a\x00b", "a" * 500]
-)
-@pytest.mark.parametrize("field", ["task", "embodiment", "id"])
-def test_names_that_could_be_paths_are_refused(start: Any, name: str, field: str) -> None:
-    policy = Recall()
-    transport = raw(start(policy).url)
-    answer = ask(transport, pack(Reset(1, replace(TRIAL, **{field: name}))))
-    assert isinstance(answer, Error) and answer.code == "bad_message"
-    assert field in answer.message and len(answer.message) < 300
-    assert not policy.trials
-    transport.close()
-
-
 def test_who_never_asks_gives_way(start: Any, caplog: pytest.LogCaptureFixture) -> None:
     server = start(policy_factory=Recall, options=ServerOptions(max_connections=2))
     busy = connect(server.url, timeouts=QUICK)
@@ -363,7 +347,7 @@ def test_a_crowd_that_asks_keeps_its_places(start: Any) -> None:
         one.reset(TRIAL)
         two.reset(TRIAL)
         with pytest.raises(TransportError, match="all 2 places"):
-            connect(server.url, timeouts=QUICK)
+            connect_ours(server.url, timeouts=QUICK)
 
 
 def test_the_log_is_one_line_a_fault(
@@ -403,3 +387,130 @@ def test_unfinished_messages_have_a_limit_together(
     for sock in held:
         sock.close()
     until(lambda: server._limiter._held < 400_000)
+
+
+def test_the_token_is_needed(start: Any) -> None:
+    url = start(policy_factory=Recall, token="s3cret").url
+    connect(url, token="s3cret", timeouts=QUICK).close()
+    for token in (None, "", "wrong", "s3cret2"):
+        with pytest.raises(Unauthorized, match="missing or wrong token"):
+            connect(url, token=token, timeouts=QUICK)
+
+
+def test_another_version_is_refused(start: Any) -> None:
+    url = start(Recall()).url
+    with pytest.raises(HandshakeError, match=r"speaks robospa\.v1, not robospa\.v2"):
+        Transport(Address(url), QUICK, subprotocol="robospa.v2")
+
+
+def test_browsers_are_refused(start: Any) -> None:
+    url = start(Recall()).url
+    with pytest.raises(InvalidStatus), open_socket(url, origin=Origin("https://example.org")):
+        pass
+
+
+def test_health(start: Any) -> None:
+    port = int(start(Recall(), token="s3cret").url.rsplit(":", 1)[1])
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=10)
+    connection.request("GET", "/healthz")
+    response = connection.getresponse()
+    assert (response.status, response.read()) == (200, b"OK\n")
+    connection.close()
+
+
+def test_a_taken_port_is_an_error(start: Any) -> None:
+    port = int(start(Recall()).url.rsplit(":", 1)[1])
+    with pytest.raises(OSError, match="address already in use"):
+        ServerThread(Recall(), port=port).start()
+
+
+def test_tls(start: Any, tmp_path: Path) -> None:
+    key, certificate = tmp_path / "key.pem", tmp_path / "certificate.pem"
+    command = [
+        *("openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "1"),
+        *("-subj", "/CN=localhost", "-addext", "subjectAltName=IP:127.0.0.1"),
+        *("-keyout", str(key), "-out", str(certificate)),
+    ]
+    try:
+        subprocess.run(command, check=True, capture_output=True, timeout=60)
+    except FileNotFoundError:
+        pytest.skip("openssl is not installed")
+    inside = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    inside.load_cert_chain(certificate, key)
+    url = start(policy_factory=Recall, ssl=inside, token="s3cret").url
+    assert url.startswith("wss://")
+    trust = ssl.create_default_context(cafile=certificate)
+    with connect(url, token="s3cret", timeouts=QUICK, ssl=trust) as remote:
+        remote.reset(TRIAL)
+        assert remote.infer(observation(1))[0, 0] == 1
+    with pytest.raises(ConnectFailed, match="CERTIFICATE_VERIFY_FAILED"):
+        connect(url, token="s3cret", timeouts=QUICK)
+
+
+@contextmanager
+def redirecting(location: str) -> Iterator[tuple[str, list[Request]]]:
+    """A WebSocket server that sends everybody to `location`; its URL, and what it was asked."""
+    asked: list[Request] = []
+
+    def answer(connection: Any, request: Request) -> Response:
+        asked.append(request)
+        return Response(302, "Found", Headers({"Location": location, "Content-Length": "0"}), b"")
+
+    server = serve(lambda connection: None, "127.0.0.1", 0, process_request=answer)
+    thread = threading.Thread(target=server.serve_forever, daemon=True)
+    thread.start()
+    try:
+        yield f"ws://127.0.0.1:{server.socket.getsockname()[1]}", asked
+    finally:
+        server.shutdown()
+        thread.join(5)
+
+
+def test_another_host_is_not_followed_and_gets_no_token() -> None:
+    with ServerThread(FakePolicy(), token="secret") as other:
+        target = other.url.replace("127.0.0.1", "localhost")
+        with (
+            redirecting(target) as (url, _),
+            pytest.raises(HandshakeError, match=r"redirects to ws://localhost:.*not followed"),
+        ):
+            connect(url, "secret", QUICK)
+        assert other.load.sessions == 0
+
+
+def test_another_address_of_the_same_host_is_followed_and_recorded() -> None:
+    with ServerThread(FakePolicy()) as other, redirecting(other.url) as (url, asked):
+        with connect(url, timeouts=QUICK) as policy:
+            assert policy.hello["redirected_to"] == other.url
+            policy.reconnect()
+        assert len(asked) == 2
+    with ServerThread(FakePolicy()) as server, connect(server.url, timeouts=QUICK) as policy:
+        assert "redirected_to" not in policy.hello
+
+
+def test_a_circle_ends() -> None:
+    with redirecting("/again") as (url, asked), pytest.raises(HandshakeError, match="for ever"):
+        connect_ours(url, timeouts=QUICK)
+    assert 1 < len(asked) < 6
+
+
+@pytest.mark.parametrize(
+    ("url", "location", "target"),
+    [
+        ("ws://gpu:8000", "/v2", "ws://gpu:8000/v2"),
+        ("ws://gpu:8000", "https://gpu/v2", "wss://gpu/v2"),
+        ("ws://gpu:8000", "wss://GPU:8443", "wss://GPU:8443"),
+        ("wss://gpu", "wss://gpu:1/", "wss://gpu:1/"),
+        ("wss://gpu", "ws://gpu", None),
+        ("ws://gpu", "wss://gpu.evil.org", None),
+        ("ws://gpu", "wss://gpu@evil.org", None),
+        ("ws://gpu", "//evil.org/", None),
+        ("ws://gpu", "file:///etc/passwd", None),
+        ("ws://gpu", "", None),
+    ],
+)
+def test_where_a_redirect_may_lead(url: str, location: str, target: str | None) -> None:
+    if target is None:
+        with pytest.raises(HandshakeError, match="redirects to"):
+            _moved(Address(url), location)
+    else:
+        assert _moved(Address(url, "token"), location) == Address(target, "token")

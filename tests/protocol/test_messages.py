@@ -182,6 +182,14 @@ def test_another_major_version_is_refused() -> None:
         unpack(pack(Hello(0, "99.0", "s", SPEC)))
 
 
+@pytest.mark.parametrize("name", ["../../etc", "a/b", "a\\b", "..", ".x", "a\x00b", "a" * 500])
+@pytest.mark.parametrize("field", ["task", "embodiment", "id"])
+def test_names_that_could_be_paths_are_refused(name: str, field: str) -> None:
+    with pytest.raises(DecodeError, match=f"trial.{field}") as caught:
+        unpack(pack(Reset(1, replace(TRIAL, **{field: name}))))
+    assert len(str(caught.value)) < 300
+
+
 def test_an_observation_needs_its_step() -> None:
     with pytest.raises(DecodeError, match="'step'"):
         unpack(encode({"type": "infer", "id": 1, "observation": {}}))

@@ -45,17 +45,13 @@ def test_a_failing_policy_sends_openpis_client_a_traceback(start: Any) -> None:
     policy.fail_infer = 1
     server = start(policy)
     client = openpi_client(server.url)
-    with pytest.raises(RuntimeError, match="CUDA error: device lost"):
+    with pytest.raises(RuntimeError) as caught:
         client.infer(openpi_observation())
+    assert "CUDA error: device lost" in str(caught.value).splitlines()[1]
+    assert "Traceback" in str(caught.value)
     again = openpi_client(server.url)
     assert again.infer(openpi_observation())["actions"].shape == (2, 14)
     again._ws.close()
-
-
-def test_an_openpi_observation_without_its_camera_is_refused(start: Any) -> None:
-    client = openpi_client(start(Recall()).url)
-    with pytest.raises(RuntimeError, match="lacks the image of camera 'head'"):
-        client.infer(openpi_observation(images={}))
 
 
 def test_an_image_of_another_size_is_refused_in_one_sentence(start: Any) -> None:
@@ -66,15 +62,6 @@ def test_an_image_of_another_size_is_refused_in_one_sentence(start: Any) -> None
     assert first.startswith("DecodeError: image cam_high is 224x224, but this policy reads 8x6: ")
     assert first.endswith("or serve the policy with CameraSpec('head', 224, 224)")
     assert "Traceback" not in str(caught.value)
-
-
-def test_a_failure_says_its_reason_first(start: Any) -> None:
-    policy = Recall()
-    policy.fail_infer = 1
-    with pytest.raises(RuntimeError) as caught:
-        openpi_client(start(policy).url).infer(openpi_observation())
-    assert "CUDA error: device lost" in str(caught.value).splitlines()[1]
-    assert "Traceback" in str(caught.value)
 
 
 def test_openpis_api_key_is_a_token(start: Any) -> None:

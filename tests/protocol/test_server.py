@@ -1,24 +1,41 @@
-"""The server: errors that leave it usable, clients that harm only themselves."""
+"""The server: errors that leave it usable, and sessions that are kept apart."""
 
 from __future__ import annotations
 
 import json
+import socket
+import threading
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
-from wire_helpers import QUICK, SPEC, TRIAL, Recall, ask, observation, raw
+from wire_helpers import (
+    QUICK,
+    SPEC,
+    TRIAL,
+    Recall,
+    Together,
+    ask,
+    observation,
+    raw,
+    until,
+    websocket,
+)
 
 from robospa.protocol.client import connect
 from robospa.protocol.codec import encode
 from robospa.protocol.connection_limits import ServerOptions
 from robospa.protocol.errors import (
+    CallTimeout,
+    ConnectFailed,
     ConnectionLost,
     PolicyAnswerError,
     ServerError,
 )
 from robospa.protocol.messages import End, Error, Infer, Message, Ready, Reset, pack, unpack
+from robospa.protocol.server import ServerThread
 
 
 def test_a_failed_reset_shifts_no_answer(start: Any) -> None:
@@ -175,3 +192,185 @@ def test_a_silent_connection_is_closed_in_the_end(start: Any) -> None:
     transport = raw(server.url)
     with pytest.raises(ConnectionLost):
         transport.receive(10, "nothing")
+
+
+def test_every_connection_has_a_policy_of_its_own(start: Any) -> None:
+    made: list[Recall] = []
+
+    def create() -> Recall:
+        made.append(Recall())
+        return made[-1]
+
+    server = start(policy_factory=create)
+    with connect(server.url, timeouts=QUICK) as a, connect(server.url, timeouts=QUICK) as b:
+        a.reset(replace(TRIAL, policy_seed=1))
+        b.reset(replace(TRIAL, policy_seed=2))
+        a.infer(observation(10))
+        b.infer(observation(20))
+    assert [[t.policy_seed for t in policy.trials] for policy in made] == [[1], [2]]
+    assert [[o["step"] for o in policy.seen] for policy in made] == [[10], [20]]
+
+
+def test_a_factory_that_fails_says_why(start: Any) -> None:
+    made: list[Recall] = []
+
+    def create() -> Recall:
+        if made:
+            raise MemoryError("no room for a second model")
+        made.append(Recall())
+        return made[0]
+
+    server = start(policy_factory=create)
+    with (
+        connect(server.url, timeouts=QUICK),
+        pytest.raises(ConnectionLost, match="no room for a second model"),
+    ):
+        connect(server.url, timeouts=QUICK)
+
+
+def test_a_policy_that_knows_no_sessions_serves_one_connection(start: Any) -> None:
+    server = start(Recall(), options=ServerOptions(patience=0.05))
+    with connect(server.url, timeouts=QUICK) as first:
+        with pytest.raises(ConnectFailed, match="all 1 places"):
+            connect(server.url, timeouts=QUICK)
+        first.reset(TRIAL)
+    connect(server.url, timeouts=QUICK).close()
+
+
+def test_reconnecting_finds_the_place_that_it_left(start: Any) -> None:
+    with connect(start(Recall()).url, timeouts=QUICK) as remote:
+        for _ in range(5):
+            remote.reconnect()
+            remote.reset(TRIAL)
+
+
+def test_a_client_that_leaves_during_inference_harms_nobody(start: Any) -> None:
+    policy = Together()
+    server = start(policy)
+    with websocket(server.url) as connection:
+        connection.send(pack(Reset(1, TRIAL)))
+        connection.recv(10)
+        connection.send(pack(Infer(2, observation(1))))
+        policy.started.wait(10)
+        connection.socket.shutdown(socket.SHUT_RDWR)
+    policy.open.set()
+    with connect(server.url, timeouts=QUICK) as remote:
+        remote.reset(TRIAL)
+        assert remote.infer(observation(5))[0, 0] == 5
+
+
+def test_stopping_a_server_whose_model_hangs() -> None:
+    policy = Together()
+    server = ServerThread(policy).start()
+    transport = raw(server.url)
+    transport.send(pack(Reset(1, TRIAL)))
+    transport.receive(10, "ready")
+    transport.send(pack(Infer(2, observation(1))))
+    assert policy.started.wait(10)
+    server.stop()
+    with pytest.raises(ConnectionLost):
+        transport.receive(10, "actions")
+    policy.open.set()
+
+
+def test_requests_that_wait_together_become_one_call(start: Any) -> None:
+    policy = Together()
+    server = start(policy)
+    remotes = [connect(server.url, timeouts=QUICK) for _ in range(4)]
+    for remote in remotes:
+        remote.reset(TRIAL)
+    with ThreadPoolExecutor(4) as pool:
+        first = pool.submit(remotes[0].infer, observation(0))
+        assert policy.started.wait(10)
+        rest = [pool.submit(remotes[n].infer, observation(n)) for n in (1, 2, 3)]
+        until(lambda: server.load.waiting == 3)
+        policy.open.set()
+        assert [future.result(10)[0, 0] for future in (first, *rest)] == [0, 1, 2, 3]
+    assert [sorted(batch) for batch in policy.batches] == [[0], [1, 2, 3]]
+    assert remotes[1].last_timing["batch"] == 3
+    for remote in remotes:
+        remote.close()
+
+
+def crowd(server: ServerThread, policy: Together, third: Any) -> tuple[list[Any], Any]:
+    """One request in the model, one waiting, and `third`(remote) with a queue that is full."""
+    remotes = [connect(server.url, timeouts=QUICK) for _ in range(3)]
+    for remote in remotes:
+        remote.reset(TRIAL)
+    with ThreadPoolExecutor(3) as pool:
+        first = pool.submit(remotes[0].infer, observation(0))
+        assert policy.started.wait(10)
+        second = pool.submit(remotes[1].infer, observation(1))
+        until(lambda: server.load.waiting == 1)
+        found = third(pool, remotes[2])
+        policy.open.set()
+        answers = [first.result(10)[0, 0], second.result(10)[0, 0]]
+        if hasattr(found, "result"):
+            found = found.result(10)
+    for remote in remotes:
+        remote.close()
+    return answers, found
+
+
+def test_too_many_waiting_requests_are_refused(start: Any) -> None:
+    def third(pool: Any, remote: Any) -> Any:
+        remote.timeouts = replace(QUICK, first_infer=0.1)
+        with pytest.raises(CallTimeout, match=r"was busy for 0.1 s \(the server is busy"):
+            remote.infer(observation(2))
+
+    policy = Together(size=1)
+    answers, _ = crowd(start(policy, options=ServerOptions(queue=1)), policy, third)
+    assert answers == [0, 1]
+
+
+def test_a_busy_server_is_waited_for_within_the_trial(
+    start: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    refused = threading.Event()
+    monkeypatch.setattr("robospa.protocol.client.time.sleep", lambda s: refused.set())
+
+    def third(pool: Any, remote: Any) -> Any:
+        asked = pool.submit(remote.infer, observation(2))
+        assert refused.wait(10)
+        return asked
+
+    policy = Together(size=1)
+    answers, chunk = crowd(start(policy, options=ServerOptions(queue=1)), policy, third)
+    assert answers == [0, 1]
+    assert chunk[0, 0] == 2
+
+
+def test_a_batch_policy_is_told_which_session_resets_and_ends(start: Any) -> None:
+    class Aware(Together):
+        def __init__(self) -> None:
+            super().__init__()
+            self.log: list[tuple[str, int]] = []
+            self.gone = threading.Event()
+            self.open.set()
+
+        def reset_session(self, session: int, trial: Any) -> None:
+            self.log.append(("reset", session))
+
+        def end_session(self, session: int) -> None:
+            self.log.append(("end", session))
+            self.gone.set()
+
+    policy = Aware()
+    with connect(start(policy).url, timeouts=QUICK) as remote:
+        remote.reset(TRIAL)
+    assert policy.gone.wait(10)
+    assert [name for name, _ in policy.log] == ["reset", "end"]
+    assert len({session for _, session in policy.log}) == 1
+
+
+def test_a_session_that_fails_is_in_the_log(
+    start: Any, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def broken(session: Any) -> None:
+        raise ZeroDivisionError("a mistake of ours")
+
+    monkeypatch.setattr("robospa.protocol.server.ConnectionHandler.run", broken)
+    server = start(policy_factory=Recall)
+    with pytest.raises(ConnectionLost):
+        connect(server.url, timeouts=QUICK)
+    assert "the session with 127.0.0.1" in caplog.text and "a mistake of ours" in caplog.text

@@ -7,26 +7,158 @@ then what stops a run, each by itself.
 from __future__ import annotations
 
 import re
+import struct
 from collections.abc import Iterable
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
+import fault_server as do
+import msgpack
+import numpy as np
 import pytest
-from fault_cases import CASES, CLIPPED, POLICY, REPEATED, STOPS, UNHARMED, WAITED, Case
-from fault_server import ALWAYS, ONCE, SOUND, FaultyServer
-from run_fakes import SPEC, FakePolicy, FakeWorld, parts
+from fault_server import ALWAYS, ONCE, ONES, SOUND, Fault, FaultyServer
+from run_fakes import KEYED, SPEC, FakePolicy, FakeWorld, parts
 
 from robospa.harness.running.executor import RunAborted
 from robospa.harness.running.policy_probe import probe
 from robospa.harness.running.runner import Runner, RunOptions
 from robospa.harness.running.worker import WorkerConfig
 from robospa.harness.trial import run_trial
+from robospa.protocol.codec import encode
 from robospa.protocol.errors import WireError
+from robospa.protocol.messages import Error, Hello, Ready
 from robospa.protocol.transport import Timeouts
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.scoring.scores import score
 from robospa.trial import TrialKey
+
+REPEATED = "repeated, then missing"
+POLICY = "policy error"
+CLIPPED = "clipped, and counted"
+STOPS = "the run stops"
+UNHARMED = "no trial is touched"
+WAITED = "waited for, then missing"
+HEAD = {"name": "head"}
+HUGE = {"name": "head", "width": 10**9, "height": 1}
+LARGE = {"name": "head", "width": 8192, "height": 8192}
+
+
+@dataclass(frozen=True)
+class Case:
+    """One fault. `point`: see `fault_server`. `words` are in what the user is told. `hasty`: the
+    deadlines are short."""
+
+    name: str
+    point: str
+    fault: Fault
+    end: str
+    words: str = ""
+    hasty: bool = False
+
+    @property
+    def seeds(self) -> tuple[int, ...]:
+        """Sound trials, and one or two that the fault strikes."""
+        once = self.hasty or self.point == "hello" or self.fault is do.restart
+        return (SOUND, ONCE) if once else (SOUND, ONCE, ALWAYS)
+
+
+def hello(**changes: Any) -> bytes:
+    """A greeting whose spec says something else than was agreed."""
+    greeting = {"type": "hello", "id": 0, "version": "1.1", "server": "faulty"}
+    spec = {**KEYED.to_json(), "cameras": [], **changes}
+    return encode({**greeting, "spec": spec})
+
+
+def array(**changes: Any) -> Fault:
+    """An answer whose chunk is an array that cannot be, as bytes that our own codec refuses."""
+    good = {"__ndarray__": True, "data": bytes(112), "dtype": "<f4", "shape": [2, 14]}
+    binary = {key.encode(): value for key, value in {**good, **changes}.items()}
+
+    def fault(talk: do.Talk, id: int) -> None:
+        message = {"type": "actions", "id": id, "chunk": binary, "timing": {}}
+        talk.say(msgpack.packb(message))
+
+    return fault
+
+
+def spoiled(value: float) -> Any:
+    chunk = ONES.copy()
+    chunk[1, 3] = value
+    return chunk
+
+
+def other(shape: tuple[int, ...], dtype: Any = np.float32) -> Any:
+    return np.ones(shape, dtype)
+
+
+def back_as(name: str, greeting: bytes | Hello, words: str) -> Case:
+    """A server that comes back as another."""
+    return Case(name, "first", do.come_back_as(greeting), STOPS, words)
+
+
+SHAPE = "not (T, D) with T from 1 to its horizon 4"
+DROPPED = "closed without a reason"
+_ROWS = (
+    Case("open", "open", do.silence, WAITED, "finish the handshake", True),
+    Case("greeting", "hello", do.silence, REPEATED, "did not send hello", True),
+    Case("reset", "reset", do.silence, REPEATED, "did not send ready", True),
+    Case("infer", "first", do.silence, REPEATED, "did not send actions", True),
+    Case("late", "later", do.silence, REPEATED, "did not send actions", True),
+    Case("drip", "first", do.drip, REPEATED, "did not send actions", True),
+    Case("close", "later", do.hang_up, REPEATED, "1001: going down for maintenance"),
+    Case("crash", "first", do.cut, REPEATED, DROPPED),
+    Case("half", "first", do.cut_in_message, REPEATED, DROPPED),
+    Case("restart", "later", do.restart, REPEATED, DROPPED),
+    Case("between", "end", do.restart, UNHARMED),
+    Case("nan", "first", do.chunk(spoiled(np.nan)), POLICY, "nan in action 1, dimension 3"),
+    Case("infinite", "later", do.chunk(spoiled(-np.inf)), POLICY, "-inf in action 1, dimension 3"),
+    Case("many", "first", do.chunk(other((5, 14))), POLICY, SHAPE),
+    Case("million", "first", do.chunk(other((10**6, 14))), POLICY, SHAPE),
+    Case("none", "first", do.chunk(other((0, 14))), POLICY, SHAPE),
+    Case("flat", "first", do.chunk(other((14,))), POLICY, SHAPE),
+    Case("narrow", "first", do.chunk(other((2, 7))), POLICY, "7 numbers per action"),
+    Case("double", "first", do.chunk(other((2, 14), np.float64)), POLICY, "float64"),
+    Case("whole", "first", do.chunk(other((2, 14), np.int64)), POLICY, "int64"),
+    Case("far", "first", do.chunk(np.full((2, 14), 3.4e38, np.float32)), CLIPPED, "its limit 10"),
+    Case("times", "first", do.chunk(ONES, infer_ms=np.nan, queue_ms=np.inf), UNHARMED),
+    Case("object", "first", array(dtype="|O"), REPEATED, "dtype '|O' is no plain number"),
+    Case("string", "first", array(dtype="<U4"), REPEATED, "dtype '<U4' is no plain number"),
+    Case("claimed", "first", array(shape=[40_000_000, 14]), REPEATED, "112 bytes, not 2240000000"),
+    Case("frame", "first", do.raw(struct.pack(">BBQ", 0x82, 127, 2**31)), REPEATED, "67108864"),
+    Case("text", "first", do.instead("Traceback:\n\x1b[31mboom"), REPEATED, "a text frame came"),
+    Case("truncated", "first", do.truncated, REPEATED, "112 bytes announced, 100 left"),
+    Case("deep", "first", do.instead(b"\x91" * 100_000 + b"\xc0"), REPEATED, "nested deeper"),
+    Case("noise", "first", do.raw(b"\xf2\x05noise"), REPEATED, "rules of WebSocket"),
+    Case("id", "later", do.of_other_id(-1), REPEATED, "came to request"),
+    Case("twice", "first", do.twice, REPEATED, "came to request"),
+    Case("unasked", "first", do.unasked, REPEATED, "answer 1000000 came to request"),
+    Case("type", "later", do.of_other_type, REPEATED, "ready came where actions was expected"),
+    Case("again", "first", do.error("policy_failed", "CUDA error", True), POLICY, "CUDA error"),
+    Case("never", "reset", do.error("policy_failed", "no checkpoint"), POLICY, "no checkpoint"),
+    Case(
+        "long",
+        "first",
+        do.error("policy_failed", "\x1b[31mCUDA\x07 error\r\n" + 10**6 * "A", True),
+        POLICY,
+        f"CUDA error {286 * 'A'}...; its traceback",
+    ),
+    Case("answer", "first", do.error("bad_answer", "answered a list"), POLICY, "answered a list"),
+    Case("goodbye", "first", do.instead(Error(0, "going", "pre-empted")), REPEATED, "pre-empted"),
+    Case("garbage", "hello", do.instead(b"\xc1"), REPEATED, "type 0xc1 does not exist"),
+    Case("first-words", "hello", do.instead(Ready(0)), REPEATED, "where hello was expected"),
+    Case("horizon", "hello", do.instead(hello(horizon=-5)), REPEATED, "'spec.horizon' must be"),
+    Case("cameras", "hello", do.instead(hello(cameras=[HEAD] * 10_000)), REPEATED, "camera twice"),
+    Case("pixels", "hello", do.instead(hello(cameras=[HUGE])), REPEATED, "cameras[0].width' must"),
+    Case("name", "hello", do.instead(hello(name="\x1b[2Jbest")), REPEATED, "'\\x1b[2Jbest'"),
+    back_as("too-large", hello(cameras=[LARGE]), "201 MB of images"),
+    back_as("other", hello(horizon=9), "horizon was 4 and is 9"),
+    back_as("checkpoint", hello(checkpoint="step 2000"), "checkpoint was '' and is 'step 2000'"),
+    back_as("version", Hello(0, "2.0", "", SPEC), "protocol 2.0 and this is 1.1"),
+)
+CASES = {case.name: case for case in _ROWS}
+
 
 RUN = [case for case in CASES.values() if case.end != STOPS]
 STOPPING = [case for case in CASES.values() if case.end == STOPS]

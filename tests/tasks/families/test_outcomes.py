@@ -10,12 +10,20 @@ from functools import cache
 from pathlib import Path
 
 import pytest
-from adversarial_cases import CYCLES, FREE, MEMORY, ORDERS, PRESSES, Case
-from adversarial_chains import CHAINS, PICKS
+from adversarial_cases import (
+    CHAINS,
+    CYCLES,
+    FREE,
+    MEMORY,
+    ORDERS,
+    PICKS,
+    PRESSES,
+    UNDONE,
+    Case,
+)
 from drawn_scenes import each_task, kept
 from hands import Hands
 from official_limits import LIMITS, Limit
-from undone_cases import CASES as UNDONE
 
 from robospa.tasks.catalog import build_scene, task
 from robospa.tasks.goals.checklist import Checklist
