@@ -1,8 +1,8 @@
-"""Aloha-AgileX: two ARX arms side by side, the benchmark's default embodiment.
+"""Aloha-AgileX, two ARX arms side by side, the default embodiment; ARX-X5, each on its own base.
 
 Joint origins, axes, bases, fingers, wrist cameras and the end-effector frame are those of the robot
 description that the official simulator loads. It leaves the joint limits open (+-10 rad), so a
-policy may command any angle; `arx.WORKING` are the limits of the same arm's own description, within
+policy may command any angle; `WORKING` are the limits of the same arm's own description, within
 which our own inverse kinematics looks. Link shapes are ours: boxes and cylinders fitted to the
 listed sizes.
 """
@@ -10,18 +10,65 @@ listed sizes.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from robospa.geometry import Pose, Quat, Vec3, axis_rotation, multiply, yaw_rotation
-from robospa.harness.robots import arx
 from robospa.harness.robots.embodiment import Arm, Embodiment, Joint
-from robospa.harness.robots.links import ALONG_X, FRONT, THIRD, bar, box, drawn, pin, solid
+from robospa.harness.robots.links import (
+    ALONG_X,
+    FRONT,
+    SINGLE_ARM_CAMERAS,
+    THIRD,
+    Row,
+    bar,
+    box,
+    drawn,
+    pin,
+    serial_chain,
+    solid,
+)
 from robospa.tasks.shapes import Box, Color, Cylinder, Shape
-from robospa.workcell import WORKCELL
+from robospa.workcell import WORKCELL, Gripper
 
 BLACK: Color = (0.028, 0.028, 0.032)
 DARK: Color = (0.07, 0.07, 0.08)
 STEEL: Color = (0.36, 0.37, 0.39)
 RED: Color = (0.45, 0.03, 0.03)
+
+WORKING = (
+    (-math.pi, math.pi),
+    (-0.05, 3.4),
+    (-0.05, 3.4),
+    (-math.pi / 2, math.pi / 2),
+    (-1.67, 1.67),
+    (-math.pi / 2 - 0.1, math.pi / 2 + 0.1),
+)
+"""Limits [rad] within which inverse kinematics of an ARX arm looks: those of the arm's own
+description, a little widened; the one that the official simulator loads leaves them open."""
+SEEDS = (
+    (0.0, 1.6, 1.5, 0.0, 0.0, 0.0),
+    (0.0, 2.2, 1.6, -0.9, 0.0, 0.0),
+    (0.0, 1.2, 1.2, 1.2, 0.0, 0.0),
+    (0.0, 2.2, 1.2, 0.3, 0.0, 0.0),
+)
+"""Postures from which a numerical solution starts."""
+
+GRIPPER = Gripper(
+    grasp_centre=0.12,  # official gripper_bias, ahead of link 6
+    opening=0.088,
+    fingertip=0.035,
+    hold=0.012,
+    finger_half_width=0.010,
+    finger_thickness=0.008,
+    radius=0.05,
+    palm_back=(0.095, 0.125, 0.155),
+    palm_half=(0.08, 0.026),
+    hand_back=0.09,
+    hand_half=(0.09, 0.03),
+    wrist_back=0.22,
+    wrist_half=0.09,
+)
+"""The arm's gripper, with the fingertips where Aloha-AgileX has them."""
 
 WRIST_CAMERA = Pose((0.07, 0.032, 0.065), axis_rotation((0, 1, 0), 0.4))
 """In link 6, above and left of the palm and tilted to the fingers, as officially mounted."""
@@ -149,11 +196,11 @@ def _arm(name: str, prefix: str, base: Vec3, yaw: float) -> Arm:
         joints=joints,
         fingers=fingers,
         travel=(-0.01, 0.045),
-        gripper=arx.GRIPPER,
+        gripper=GRIPPER,
         tool=Pose((0.0, 0.0, 0.0)),
         home=(0.0,) * 6,
-        seeds=arx.SEEDS,
-        working=arx.WORKING,
+        seeds=SEEDS,
+        working=WORKING,
         shapes=shapes,
         camera=WRIST_CAMERA,
         geometry="arx",
@@ -168,4 +215,56 @@ ALOHA_AGILEX = Embodiment(
     ),
     cameras={"head": WORKCELL.head, "front": FRONT, "third": THIRD},
     body=STAND_SHAPES,
+)
+
+
+X5_LINK_SHAPES: tuple[tuple[Shape, ...], ...] = (
+    (
+        *LINK_SHAPES[0],
+        box((0.0, 0.0, -0.022), (0.05, 0.05, 0.022), STEEL),
+        box((-0.045, 0.0, -0.392), (0.04, 0.05, 0.392), DARK),
+    ),
+    *LINK_SHAPES[1:],
+)
+X5_DISTANCE = 0.6
+"""Between the bases of ARX-X5, as its official maintainers name it [m]."""
+X5_OPEN = (-OPEN, OPEN)
+
+X5_CHAIN: tuple[Row, ...] = (
+    ("joint1", (0.0, 0.0, 0.0605), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), X5_OPEN),
+    ("joint2", (0.02, 0.0, 0.04), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), X5_OPEN),
+    ("joint3", (-0.264, 0.0, 0.0), (3.1416, 0.0, 0.0), (0.0, 1.0, 0.0), X5_OPEN),
+    ("joint4", (0.245, 0.0, -0.056), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), X5_OPEN),
+    ("joint5", (0.06775, 0.0005, -0.0865), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), X5_OPEN),
+    ("joint6", (0.02895, 0.0, 0.0865), (-3.1416, 0.0, 0.0), (1.0, 0.0, 0.0), (-3.14, 3.14)),
+)
+X5_FINGERS = (
+    ("joint7", (0.08657, 0.0249, -0.00024), 1.0),
+    ("joint8", (0.08657, -0.0249, -0.00024), -1.0),
+)
+
+
+def _x5_arm(name: str, x: float) -> Arm:
+    shapes = (*X5_LINK_SHAPES, *FINGER_SHAPES)
+    joints, fingers, named = serial_chain(
+        X5_CHAIN, Pose().rotation, X5_FINGERS, (0.0, 0.044), shapes
+    )
+    return replace(
+        ALOHA_AGILEX.arms[0],
+        name=name,
+        base=Pose((x, -0.35, 0.784), yaw_rotation(PI / 2)),
+        base_link=joints[0].parent,
+        joints=joints,
+        fingers=fingers,
+        gripper=replace(GRIPPER, fingertip=0.0375),
+        shapes=named,
+        camera=Pose((0.0845, 0.0, 0.05), axis_rotation((0, 1, 0), 0.349)),
+    )
+
+
+ARX_X5 = Embodiment(
+    name="ARX-X5",
+    arms=(_x5_arm("left", -X5_DISTANCE / 2), _x5_arm("right", X5_DISTANCE / 2)),
+    cameras=SINGLE_ARM_CAMERAS,
+    distance=X5_DISTANCE,
 )

@@ -63,7 +63,7 @@ class Arm:
     """Wrist camera in the last arm link: x looks forward, z is up in the image."""
     working: tuple[tuple[float, float], ...] = ()
     geometry: str = "any"
-    """"arx" if `robospa.harness.robots.arx` gives this arm's solution to a few mm, else "any"."""
+    """"arx" if the closed form in `kinematics` gives this arm to a few mm, else "any"."""
     stiffness: float = 1000.0
     damping: float = 200.0
     link_mass: float = 1.0

@@ -1,9 +1,15 @@
 """Forward and inverse kinematics of one arm in plain numpy, many poses at a time.
 
-Inverse kinematics of ARX arms starts from a closed form that is right to a few millimetres (`arx`)
-and ends with Newton steps; that of others is damped least squares on the end-effector pose from a
-few postures aimed at the target. No simulator, no global state: the same
-arguments give the same bits on one machine.
+Inverse kinematics of ARX arms (yaw, three parallel pitches, yaw, roll) starts in closed form and
+ends with Newton steps; that of others is damped least squares on the end-effector pose from a few
+postures aimed at the target. No simulator, no global state: the same arguments give the same bits
+on one machine.
+
+In an ideal ARX arm joint 5's axis lies in the arm's vertical plane and meets the approach axis, so
+the plane follows from the target alone, and what is left is two links in that plane. There is one
+solution with the arm facing its target and the elbow up. A real arm's joints are a few millimetres
+and hundredths of a radian off. Rotations in the plane are complex numbers: x - i z turns by
+exp(i angle).
 """
 
 from __future__ import annotations
@@ -16,7 +22,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.geometry import Array, Pose, from_transform, to_transform, turning_vector
-from robospa.harness.robots import arx
 from robospa.harness.robots.embodiment import Arm
 
 POSITION_TOLERANCE = 2e-5  # [m]
@@ -37,6 +42,77 @@ LIMIT_SLACK = 1e-9  # [rad]
 EYE = np.eye(3)
 
 
+BACKWARDS = -0.55
+"""Joint 2 [rad] below this is counted a turn higher."""
+
+
+@dataclass(frozen=True)
+class Links:
+    """Distances [m] between the axes, from the joint origins of the chain."""
+
+    rise: float  # base to joint 1
+    shoulder: complex  # joint 1 to joint 2
+    upper: float  # joint 2 to joint 3
+    fore: complex  # joint 3 to joint 4
+    wrist: float  # joint 4 to joint 5, along the hand
+    offset: float  # sideways, of joint 5 from the plane
+    hand: float  # joint 5 to the end-effector frame, along the approach
+
+
+def links_of(origins: Array, tool: Array) -> Links:
+    """Link lengths of a chain's joint origins (6, 4, 4) and tool transform (4, 4)."""
+    at = origins[:, :3, 3]
+    wrist = np.eye(4)
+    for origin in origins[:5]:
+        wrist = wrist @ origin
+    return Links(
+        rise=float(at[0, 2]),
+        shoulder=complex(at[1, 0], -at[1, 2]),
+        upper=-float(at[2, 0]),
+        # frame 3 is turned by half a turn about x: its z counts the other way
+        fore=complex(at[3, 0], at[3, 2]),
+        wrist=float(at[4, 0]),
+        offset=float(wrist[1, 3]),
+        hand=float(at[5, 0] + tool[0, 3]),
+    )
+
+
+def closed_start(links: Links, local: Array) -> Array:
+    """Joints (N, 6) [rad] for end-effector transforms (N, 4, 4) in the base frame.
+
+    A target out of reach gets the stretched-out arm.
+    """
+    approach = local[:, :3, 0]
+    wrist = local[:, :3, 3] - links.hand * approach
+    x, y, z = wrist[:, 0], wrist[:, 1], wrist[:, 2] - links.rise
+    far = np.maximum(np.hypot(x, y), 1e-9)
+    q1 = np.arctan2(y, x) - np.arcsin(np.clip(links.offset / far, -1, 1))
+    c1, s1 = np.cos(q1), np.sin(q1)
+    # into the arm's plane: turn everything back by q1
+    turn = np.zeros((len(local), 3, 3))
+    turn[:, 0, 0], turn[:, 0, 1], turn[:, 1, 0], turn[:, 1, 1] = c1, s1, -s1, c1
+    turn[:, 2, 2] = 1
+    plane = turn @ local[:, :3, :3]
+    ax, ay, az = plane[:, 0, 0], plane[:, 1, 0], plane[:, 2, 0]
+    q5 = -np.arcsin(np.clip(ay, -1, 1))
+    pitch = np.arctan2(-az, ax)
+    hand = np.exp(1j * pitch)
+    reach = (c1 * x + s1 * y) - 1j * z - links.shoulder - links.wrist * hand
+    long, short = links.upper, abs(links.fore)
+    cosine = (long**2 + short**2 - np.abs(reach) ** 2) / (2 * long * short)
+    bend = np.arccos(np.clip(cosine, -1, 1))
+    q3 = np.angle(links.fore) + bend
+    q2 = np.angle(reach / (short * np.exp(-1j * bend) - long))
+    q2 = np.where(q2 < BACKWARDS, q2 + 2 * np.pi, q2)
+    q4 = np.angle(np.exp(1j * (q2 - q3 - pitch)))
+    cp, sp, c5, s5 = np.cos(pitch), np.sin(pitch), np.cos(q5), np.sin(q5)
+    # columns y and z of Ry(pitch) Rz(-q5), to read the roll from
+    side = np.stack([cp * s5, c5, -sp * s5], axis=1)
+    up = np.stack([sp, np.zeros_like(sp), cp], axis=1)
+    q6 = np.arctan2((up * plane[:, :, 1]).sum(axis=1), (side * plane[:, :, 1]).sum(axis=1))
+    return np.stack([q1, q2, q3, q4, q5, q6], axis=1)
+
+
 @dataclass(frozen=True)
 class Chain:
     """An arm's joints as arrays, in the world frame, shared: nobody writes to them."""
@@ -52,7 +128,7 @@ class Chain:
     working_lower: Array  # (J,) limits within which inverse kinematics looks
     working_upper: Array  # (J,)
     seeds: Array  # (S, J)
-    links: arx.Links | None = None
+    links: Links | None = None
 
 
 @cache
@@ -71,7 +147,7 @@ def chain_of(arm: Arm) -> Chain:
         cross=cross,
         cross_twice=cross @ cross,
         tool=tool,
-        links=arx.links_of(origins, tool) if arm.geometry == "arx" else None,
+        links=links_of(origins, tool) if arm.geometry == "arx" else None,
         working_lower=np.array([low for low, _ in working]),
         working_upper=np.array([high for _, high in working]),
         lower=np.array([j.lower for j in arm.joints]),
@@ -208,7 +284,7 @@ def inverse(
     count = len(targets)
     if chain.links is not None:
         local = np.linalg.inv(chain.base) @ goal_frames
-        return _polish(chain, goal_frames, arx.start(chain.links, local))
+        return _polish(chain, goal_frames, closed_start(chain.links, local))
     if near is not None:
         start = np.broadcast_to(np.asarray(near, dtype=float), (count, len(chain.axes)))
         return _descend(chain, goal_frames, start)
