@@ -20,8 +20,6 @@ KINDS = ("joint", "ee", "delta_ee")
 ARMS = ("left", "right")
 
 POSE = ("x", "y", "z", "qw", "qx", "qy", "qz")
-POSE_WIDTH = len(POSE) + 1
-"""Columns of an arm in `ee` and `delta_ee`: the pose and the gripper."""
 
 SIX_JOINT_ARMS = (6, 6)
 """Joints of the arms that policies of RoboTwin's data drive: whose server does not say is taken to
@@ -96,18 +94,6 @@ class ActionSpace:
             parts = joints if self.kind == "joint" else list(POSE)
             names += [f"{arm} {part}" for part in (*parts, "gripper")]
         return names
-
-
-def equal_arms(kind: str, width: int) -> ActionSpace:
-    """The space of `width` columns for two arms with the same number of joints.
-
-    Raises ValueError if there is none.
-    """
-    joints = (width // 2 - 1, width // 2 - 1) if kind == "joint" else SIX_JOINT_ARMS
-    space = ActionSpace(kind, joints)
-    if space.width != width or width < 4:
-        raise ValueError(f"{width} numbers are no {kind} action of two equal arms")
-    return space
 
 
 # -- quantised actions ---------------------------------------------------------------------------

@@ -88,21 +88,17 @@ class StateLayout:
 class LazySnapshot(Snapshot):
     """A `Snapshot` of a running world: the same values, computed when first asked for."""
 
-    __slots__ = (
-        "_commanded",
-        "_ends",
-        "_floats",
-        "_grasps",
-        "_grippers",
-        "_layout",
-        "_measure",
-        "_packed",
-        "_points",
-        "_rows",
+    GIVEN = (
         "_steps",
-        "_table",
         "_touching",
+        "_packed",
+        "_floats",
+        "_rows",
+        "_layout",
+        "_commanded",
+        "_measure",
     )
+    __slots__ = (*GIVEN, "_ends", "_grasps", "_grippers", "_points", "_table")
 
     _packed: bytes
     _floats: memoryview
@@ -233,18 +229,7 @@ class LazySnapshot(Snapshot):
 
 
 # Slots of a frozen class can only be filled from outside; their descriptors do so fastest.
-_time, _steps, _touching, _hinges, _packed, _floats, _rows, _layout, _commanded, _measure = (
-    getattr(cls, name).__set__
-    for cls, name in (
-        (Snapshot, "time"),
-        (LazySnapshot, "_steps"),
-        (LazySnapshot, "_touching"),
-        (Snapshot, "hinges"),
-        (LazySnapshot, "_packed"),
-        (LazySnapshot, "_floats"),
-        (LazySnapshot, "_rows"),
-        (LazySnapshot, "_layout"),
-        (LazySnapshot, "_commanded"),
-        (LazySnapshot, "_measure"),
-    )
+_time, _hinges = (getattr(Snapshot, name).__set__ for name in ("time", "hinges"))
+_steps, _touching, _packed, _floats, _rows, _layout, _commanded, _measure = (
+    getattr(LazySnapshot, name).__set__ for name in LazySnapshot.GIVEN
 )

@@ -329,8 +329,3 @@ def camera_view(embodiment: Embodiment, name: str, links: Links) -> CameraView:
         return CameraView(fixed.pose, fixed.fov, HEAD_NEAR)
     known = ", ".join([*fixed_cameras, *WRISTS])
     raise ValueError(f"{embodiment.name} has no camera {name!r}; it has {known}")
-
-
-def focal_length(height: int, fov: float) -> float:
-    """Focal length [px] of square pixels for an image `height` px high."""
-    return height / 2 / math.tan(fov / 2)

@@ -14,7 +14,7 @@ import numpy as np
 from robospa.geometry import Array
 from robospa.tasks.colors import nearest
 from robospa.tasks.families import distance
-from robospa.tasks.families.picking import PickFacts, lifted, pick_target
+from robospa.tasks.families.table import PickFacts, lifted, pick_target
 from robospa.tasks.goals.lifting import Lift
 from robospa.tasks.instructions import Slots, TaskText
 from robospa.tasks.scene import Scene

@@ -16,8 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from robospa.geometry import Array, Pose, Vec3, yaw_rotation
-from robospa.tasks.families.picking import PickFacts, lifted, pick_target
-from robospa.tasks.families.table import drawn_color
+from robospa.tasks.families.table import PickFacts, drawn_color, lifted, pick_target
 from robospa.tasks.goals.lifting import Lift
 from robospa.tasks.instructions import Slots, TaskText, ordinal
 from robospa.tasks.sampling.places import Area, Mask, Points, Range, scatter, spread

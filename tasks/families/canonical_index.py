@@ -17,8 +17,15 @@ from itertools import combinations
 
 import numpy as np
 
-from robospa.tasks.families.picking import PickFacts, lifted, pick_name, pick_target, put_down
-from robospa.tasks.families.table import draw_variant, drawn_color
+from robospa.tasks.families.table import (
+    PickFacts,
+    draw_variant,
+    drawn_color,
+    lifted,
+    pick_name,
+    pick_target,
+    put_down,
+)
 from robospa.tasks.goals.lifting import Lift
 from robospa.tasks.instructions import Slots, TaskText, ordinal
 from robospa.tasks.sampling.grid import GapGrid, Grid, GridLayout

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.geometry import Array
-from robospa.tasks.families import picking
+from robospa.tasks.families import table
 from robospa.tasks.goals.lifting import Lift
 from robospa.tasks.instructions import Slots, TaskText
 from robospa.tasks.sampling.places import Fits, LayoutError, Mask, pool, walk
@@ -200,7 +200,7 @@ def layouts(workcell: Workcell, spread: ObjectSpread, level: int) -> Array:
 
 
 @dataclass(frozen=True)
-class Facts(picking.PickFacts):
+class Facts(table.PickFacts):
     """Target, viewer, and the extreme in the robot's frame and in the viewer's words."""
 
     extreme: str
@@ -218,10 +218,10 @@ def drawer(spread: ObjectSpread, views: tuple[str, ...]) -> Draw:
         view = views[int(rng.integers(len(views)))]
         known = layouts(workcell, spread, level)
         if spread.alike:
-            things = [(spread.assets[0], picking.draw_params(rng, spread.assets[0]))] * count
+            things = [(spread.assets[0], table.draw_params(rng, spread.assets[0]))] * count
         else:
             kinds = [spread.assets[int(i)] for i in rng.permutation(len(spread.assets))[:count]]
-            things = [(kind, picking.draw_params(rng, kind)) for kind in kinds]
+            things = [(kind, table.draw_params(rng, kind)) for kind in kinds]
 
         def lying() -> tuple[tuple[Array, list[int]], list[Turnable]]:
             points = known[int(rng.integers(len(known)))][None].copy()
@@ -242,7 +242,7 @@ def drawer(spread: ObjectSpread, views: tuple[str, ...]) -> Draw:
             viewpoint=view,
             position=SEEN_AS[view][extreme],
         )
-        return SceneSample(picking.put_down(items, yaws), facts)
+        return SceneSample(table.put_down(items, yaws), facts)
 
     return draw
 
@@ -262,12 +262,12 @@ def spread_task(spread: ObjectSpread, basic: bool = False) -> Task:
     kind = spread.kind
     seen = "the robot" if basic else "a named side"
     return Task(
-        name=f"Basic_Position_{kind}" if basic else picking.pick_name(kind, "Multi_View"),
+        name=f"Basic_Position_{kind}" if basic else table.pick_name(kind, "Multi_View"),
         category="EPG" if basic else "CVR",
         levels={k: Level(min(n, 4), 1, 150) for k, n in OBJECTS.items()},
         draw=drawer(spread, VIEWS[:1] if basic else VIEWS),
-        goal=picking.lifted(Lift(rise=0.06, closed=True, touching=True)),
-        plan=picking.pick_target,
+        goal=table.lifted(Lift(rise=0.06, closed=True, touching=True)),
+        plan=table.pick_target,
         templates=TEXT.templates,
         slots=slots,
         summary=f"Pick the extreme one of 3 to 7 {spread.what} as seen from {seen}.",

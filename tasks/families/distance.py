@@ -17,8 +17,15 @@ import numpy as np
 
 from robospa.geometry import Array
 from robospa.tasks.colors import NAMED, nearest
-from robospa.tasks.families.picking import PickFacts, lifted, pick_name, pick_target
-from robospa.tasks.families.table import draw_variant, standing, variant_phrasings
+from robospa.tasks.families.table import (
+    PickFacts,
+    draw_variant,
+    lifted,
+    pick_name,
+    pick_target,
+    standing,
+    variant_phrasings,
+)
 from robospa.tasks.goals.lifting import Lift
 from robospa.tasks.instructions import Phrasings, Slots, TaskText, ordinal
 from robospa.tasks.objects import object_model

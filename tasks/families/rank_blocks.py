@@ -16,7 +16,7 @@ import numpy as np
 
 from robospa.geometry import Vec3
 from robospa.tasks.families import table
-from robospa.tasks.families.stack_blocks import NEAR_BAND
+from robospa.tasks.families.towers import NEAR_BAND
 from robospa.tasks.goals.placing import bring_alone, row
 from robospa.tasks.instructions import COMMON, NUMBERS, Phrasings, Slots, TaskText, by_count
 from robospa.tasks.plan import Skill

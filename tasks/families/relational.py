@@ -16,7 +16,7 @@ from functools import cache
 import numpy as np
 
 from robospa.geometry import Array
-from robospa.tasks.families import picking
+from robospa.tasks.families import table
 from robospa.tasks.goals.lifting import Lift
 from robospa.tasks.instructions import Slots, TaskText
 from robospa.tasks.sampling.grid import StraightLines
@@ -116,16 +116,16 @@ def weights(level: int) -> Array:
     middle of the grid, so that a guess without reading could beat chance.
     """
     shape = SHAPES[level]
-    table = np.array(
+    chances = np.array(
         [
             [float((c - dx, r - dy) in shape.cells) for c, r in shape.cells]
             for dx, dy in DIRECTIONS.values()
         ]
     )
     for _ in range(200):
-        table /= table.sum(axis=1, keepdims=True) * table.shape[0]
-        table /= table.sum(axis=0, keepdims=True) * table.shape[1]
-    return table
+        chances /= chances.sum(axis=1, keepdims=True) * chances.shape[0]
+        chances /= chances.sum(axis=0, keepdims=True) * chances.shape[1]
+    return chances
 
 
 def least_distances(crowd: Crowd, families: Sequence[SpacedKind], scale: float) -> Array:
@@ -175,7 +175,7 @@ def _in_line(a: tuple[int, int], b: tuple[int, int]) -> bool:
 
 
 @dataclass(frozen=True)
-class Facts(picking.PickFacts):
+class Facts(table.PickFacts):
     """Target, its direction from the reference, and the name of the reference's place."""
 
     reference: str
@@ -188,8 +188,8 @@ def drawer(crowd: Crowd) -> Draw:
 
     def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
         shape = SHAPES[level]
-        cells, table = shape.cells, weights(level).ravel()
-        pick = min(int(np.searchsorted(np.cumsum(table), rng.random())), len(table) - 1)
+        cells, chances = shape.cells, weights(level).ravel()
+        pick = min(int(np.searchsorted(np.cumsum(chances), rng.random())), len(chances) - 1)
         direction = list(DIRECTIONS)[pick // len(cells)]
         target = cells[pick % len(cells)]
         dx, dy = DIRECTIONS[direction]
@@ -207,7 +207,7 @@ def drawer(crowd: Crowd) -> Draw:
             order = rng.permutation(len(crowd.families))[: len(used)]
             families = tuple(crowd.families[int(i)] for i in order)
         families = families[: len(used)]
-        params = [picking.draw_params(rng, f.asset) for f in families[: 1 if crowd.alike else None]]
+        params = [table.draw_params(rng, f.asset) for f in families[: 1 if crowd.alike else None]]
         params = params * (len(families) if crowd.alike else 1)
 
         def lying() -> tuple[None, list[Turnable]]:
@@ -224,7 +224,7 @@ def drawer(crowd: Crowd) -> Draw:
             relation=direction,
             reference_label=_label(shape, reference, used),
         )
-        return SceneSample(picking.put_down(items, yaws), facts)
+        return SceneSample(table.put_down(items, yaws), facts)
 
     return draw
 
@@ -262,12 +262,12 @@ def crowd_task(crowd: Crowd) -> Task:
         return _slots(facts.relation, facts.reference_label, scene.level, crowd.noun)
 
     return Task(
-        name=picking.pick_name(crowd.kind, "Relational"),
+        name=table.pick_name(crowd.kind, "Relational"),
         category="RRR",
         levels={k: Level(s.count, 1, 150) for k, s in SHAPES.items()},
         draw=drawer(crowd),
-        goal=picking.lifted(Lift(rise=0.06, closed=True)),
-        plan=picking.pick_target,
+        goal=table.lifted(Lift(rise=0.06, closed=True)),
+        plan=table.pick_target,
         templates=lambda level: TEXT.templates(level, crowd.wording),
         slots=slots,
         summary=f"Pick the one next to a named one among 2 to 9 {crowd.what}, in one of eight "

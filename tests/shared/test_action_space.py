@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from robospa.action_space import KINDS, POSE, ActionSpace, equal_arms
+from robospa.action_space import KINDS, POSE, ActionSpace
 
 UNEQUAL = (6, 7)
 
@@ -48,17 +48,6 @@ def test_a_joint_action_has_no_pose() -> None:
     arm = ActionSpace("joint").arms[1]
     row = list(range(14))
     assert row[arm.position] == row[arm.quaternion] == []
-
-
-def test_equal_arms_are_known_by_the_width() -> None:
-    assert equal_arms("joint", 16) == ActionSpace("joint", (7, 7))
-    assert equal_arms("ee", 16).kind == "ee"
-
-
-@pytest.mark.parametrize(("kind", "width"), [("joint", 15), ("joint", 2), ("ee", 14)])
-def test_a_width_of_no_equal_arms_is_refused(kind: str, width: int) -> None:
-    with pytest.raises(ValueError, match=f"{width} numbers are no {kind} action"):
-        equal_arms(kind, width)
 
 
 def test_an_unknown_kind_is_refused() -> None:

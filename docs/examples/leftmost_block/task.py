@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from robospa.geometry import Array, Pose, yaw_rotation
-from robospa.tasks.families.picking import PickFacts
+from robospa.tasks.families.table import PickFacts
 from robospa.tasks.goals.lifting import Lift, PickTracker
 from robospa.tasks.instructions import Slots, TaskText
 from robospa.tasks.plan import Pick, Skill

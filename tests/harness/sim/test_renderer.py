@@ -18,7 +18,7 @@ from robospa.harness.sim.bodies import to_sapien
 from robospa.harness.sim.cameras import new_camera, pixels
 from robospa.harness.sim.furniture import SHADOW_CENTRE, SHADOW_HALF, SUN_DIRECTION, DrawnFurniture
 from robospa.harness.sim.render_bodies import render_body
-from robospa.harness.sim.renderer import camera_view, focal_length, open_render_system
+from robospa.harness.sim.renderer import camera_view, open_render_system
 from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.harness.world import RenderUnavailable
 from robospa.observation import CAMERAS, CameraSpec
@@ -72,15 +72,11 @@ def test_an_object_is_where_its_projection_says(world: SapienWorld) -> None:
     world.load(scene(block("one", 0.1, -0.05)))
     view = camera_view(ROBOT, "head", ())
     x, y, z = view.pose.inverse().apply(world.snapshot().poses["one"].position)
-    focal = focal_length(240, view.fov)
+    focal = 120 / math.tan(view.fov / 2)
     column, row = 160 - focal * y / x, 120 - focal * z / x
     image = world.render(CameraSpec("head")).astype(int)
     rows, columns = np.nonzero(image[..., 0] > 1.5 * image[..., 1])
     assert (columns.mean(), rows.mean()) == pytest.approx((column, row), abs=4)
-
-
-def test_focal_length_is_that_of_the_official_camera() -> None:
-    assert focal_length(240, math.radians(37)) == pytest.approx(358.6, abs=0.1)
 
 
 def test_objects_of_the_last_trial_are_gone(world: SapienWorld) -> None:

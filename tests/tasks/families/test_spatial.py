@@ -15,7 +15,7 @@ from robospa.tasks.colors import NAMED
 from robospa.tasks.families import cross_view, distance, relational
 from robospa.tasks.families.block_measures import none_hidden
 from robospa.tasks.families.canonical_index import LINES
-from robospa.tasks.families.picking import pick_name
+from robospa.tasks.families.table import pick_name
 from robospa.tasks.instructions import SPLITS
 from robospa.tasks.objects import model_of, object_model, variant_count
 from robospa.tasks.objects.tint import TINTS

@@ -1,9 +1,12 @@
-"""Stack_Blocks_Color_Order, Size_Order, Length_Order: a tower in a given order.
+"""Stack_Blocks_Color_Order, Size_Order, Length_Order, Place_Bowls_Plates: things on each other.
 
-Draw: k blocks scattered in front of the robot: equal cubes coloured red, green, blue, yellow,
-purple (the first k); cubes of one random colour and fixed sizes, the largest at the bottom; bars of
-one colour and one cross-section, their lengths clearly different, the longest at the bottom. Level
-1 has a single block, which is brought to the middle of the near edge instead (official).
+Blocks, stacked in a given order; k scattered in front: equal cubes coloured red, green,
+blue, yellow, purple (the first k); cubes of one random colour and fixed sizes, the largest at the
+bottom; bars of one colour and one cross-section, their lengths clearly different, the longest at
+the bottom. Level 1 has a single block, which is brought to the middle of the near edge (official).
+
+Bowls: one fixed plate left or right of the middle, k equal bowls farther away, all to be stacked on
+the plate in any order.
 """
 
 from __future__ import annotations
@@ -14,15 +17,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from robospa.geometry import Array, Vec3
+from robospa.tasks import objects
 from robospa.tasks.families import table
 from robospa.tasks.goals.checklist import Checklist
 from robospa.tasks.goals.conditions import Region
-from robospa.tasks.goals.placing import HEIGHT_TOLERANCE, bring_alone, stack
+from robospa.tasks.goals.placing import HEIGHT_TOLERANCE, bring_alone, nest, stack
 from robospa.tasks.instructions import COMMON, NUMBERS, Slots, TaskText, by_count, color_orders
 from robospa.tasks.plan import Pick, Place, Skill
 from robospa.tasks.sampling import places
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Draw, SceneFacts, SceneSample, Task
+from robospa.tasks.task import Draw, SceneFacts, SceneSample, Task, Tracker
 from robospa.text import listed
 from robospa.workcell import Workcell
 
@@ -310,4 +315,101 @@ LENGTH = _task(
     lambda scene: _tower_slots(LENGTHS, scene),
     "from the longest at the bottom to the shortest on top",
     "next longer one",
+)
+
+
+BOWLS_TEXT = TaskText.beside(__file__, "nest_bowls.toml")
+
+PLATE_X, PLATE_SPREAD, PLATE_Y = 0.12, 0.03, (-0.15, -0.10)
+BOWLS_AREA, BOWLS_MIDDLE = places.Area((-0.28, 0.28), (-0.05, 0.20), True), 0.08
+TRIES, RESTARTS = 100, 80
+BOWLS_DISTANCE = 0.13
+"""Least distance [m] of bowls from each other and from the plate."""
+BOWL = {"look": 2}
+"""All bowls are of the one official model."""
+
+
+@dataclass(frozen=True)
+class BowlsFacts(SceneFacts):
+    """The plate and the bowls."""
+
+    plate: str
+    bowls: tuple[str, ...]
+
+
+def _draw_bowls(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
+    left = rng.random() < 0.5
+    plate_x = (-PLATE_X if left else PLATE_X) + float(rng.uniform(-PLATE_SPREAD, PLATE_SPREAD))
+    plate = (plate_x, float(rng.uniform(*PLATE_Y)))
+    model = objects.object_model("bowl", BOWL)
+
+    def free(x: Array, y: Array) -> places.Mask:
+        off_plate: places.Mask = np.hypot(x - plate[0], y - plate[1]) >= BOWLS_DISTANCE
+        return off_plate & workcell.in_reach(x, y)
+
+    shape, height = (level, TRIES), model.size[2]
+    propose = places.candidates(
+        workcell, BOWLS_AREA, shape, model.radius, height, BOWLS_MIDDLE, free
+    )
+    points = places.shuffled(rng, places.scatter(rng, propose, BOWLS_DISTANCE, restarts=RESTARTS))
+    items = [
+        table.Item(
+            "plate", "plate", table.standing(plate), table.draw_variant(rng, "plate"), fixed=True
+        )
+    ]
+    items += [
+        table.Item(str(i), "bowl", table.standing(point), BOWL) for i, point in enumerate(points)
+    ]
+    scene_objects, names = table.named(rng, items)
+    return SceneSample(
+        scene_objects, BowlsFacts(names["plate"], tuple(names[str(i)] for i in range(level)))
+    )
+
+
+def _bowls_goal(scene: Scene) -> Tracker:
+    return nest(BowlsFacts.of(scene).bowls, BowlsFacts.of(scene).plate)
+
+
+def _bowls_plan(scene: Scene) -> tuple[Skill, ...]:
+    plate = BowlsFacts.of(scene).plate
+    at = {name: scene.object(name).pose.position for name in BowlsFacts.of(scene).bowls}
+    here = table.side_of(scene, plate)
+    skills: list[Skill] = []
+    below: str | None = None
+    for name in sorted(at, key=lambda n: (table.side(at[n][0]) != here, at[n][1])):
+        arm = table.side(at[name][0])
+        skills.append(Pick(name, lift=0.10, arm=arm))
+        if below is None:
+            skills.append(Place(name, on=plate, arm=arm))
+        else:
+            skills.append(Place(name, _nested(scene, below), on=below, arm=arm))
+        below = name
+    return tuple(skills)
+
+
+def _nested(scene: Scene, below: str) -> Vec3:
+    frames = objects.model_of(scene.object(below)).frames
+    return (0.0, 0.0, frames["nest"].position[2] - frames["support"].position[2])
+
+
+def _bowls_slots(scene: Scene) -> Slots:
+    count = len(BowlsFacts.of(scene).bowls)
+    bowls = "bowl" if count == 1 else f"bowls.{by_count(count)}"
+    return BOWLS_TEXT.slots("plate", bowls, count=count, word=NUMBERS[count])
+
+
+BOWLS = Task(
+    name="Place_Bowls_Plates",
+    category="OFE",
+    levels=table.LEVELS,
+    draw=_draw_bowls,
+    goal=_bowls_goal,
+    plan=_bowls_plan,
+    templates=BOWLS_TEXT.templates,
+    slots=_bowls_slots,
+    summary="Stack all bowls on the plate.",
+    success=(
+        "All bowls stand in one stack on the plate, each within 4 cm of the one below it, and both "
+        "grippers are open. Level 1: the bowl is within 5 cm of the plate's centre."
+    ),
 )
