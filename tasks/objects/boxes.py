@@ -87,17 +87,13 @@ def tissue_box(look: int, params: Params) -> ObjectModel:
     """A low carton with a paper tissue sticking out of its slot."""
     base, mark, word = TISSUES[look]
     half = (0.042, 0.0295, 0.023)
-    dots = [
-        on_side(m.ellipse(0.0065, 0.0065, 8, 0.2), half, side) for side in SIDES for _ in range(1)
-    ]
+    dots = [on_side(m.ellipse(0.0065, 0.0065, 8, 0.2), half, side) for side in SIDES]
     for side in SIDES:
-        span = (-0.026, 0.026) if round(math.sin(side)) else (-0.017, 0.017)
+        u = 0.026 if round(math.sin(side)) else 0.017
         dots += [
-            on_side(m.ellipse(0.005, 0.005, 8), half, side)
-            if u is None
-            else on_side([(a + u, b + v) for a, b in m.ellipse(0.005, 0.005, 8)], half, side)
-            for u in span
-            for v in (-0.011, 0.011)
+            on_side([(a + x, b + y) for a, b in m.ellipse(0.005, 0.005, 8)], half, side)
+            for x in (-u, u)
+            for y in (-0.011, 0.011)
         ]
     slot = m.flat(m.ellipse(0.027, 0.012, 14), 2 * half[2] + 0.0004)
     parts = [
@@ -120,33 +116,14 @@ def tissue_box(look: int, params: Params) -> ObjectModel:
 
 
 def _tissue(z: float) -> Mesh:
-    low = [
-        (0.021, 0.004),
-        (0.0, 0.006),
-        (-0.021, 0.004),
-        (-0.02, -0.004),
-        (0.0, -0.006),
-        (0.02, -0.004),
-    ]
-    mid = [
-        (0.016, 0.011),
-        (0.002, 0.005),
-        (-0.018, 0.009),
-        (-0.015, -0.006),
-        (-0.002, -0.01),
-        (0.017, -0.004),
-    ]
-    top = [
-        (0.019, 0.002),
-        (0.001, 0.009),
-        (-0.013, 0.003),
-        (-0.019, -0.002),
-        (0.003, -0.004),
-        (0.009, -0.006),
-    ]
-    rise = [(0.024, 0.02, 0.027, 0.022, 0.017, 0.025)]
+    low = [(0.021, 0.004), (0.0, 0.006), (-0.021, 0.004)]
+    low += [(-0.02, -0.004), (0.0, -0.006), (0.02, -0.004)]
+    mid = [(0.016, 0.011), (0.002, 0.005), (-0.018, 0.009)]
+    mid += [(-0.015, -0.006), (-0.002, -0.01), (0.017, -0.004)]
+    top = [(0.019, 0.002, 0.024), (0.001, 0.009, 0.02), (-0.013, 0.003, 0.027)]
+    top += [(-0.019, -0.002, 0.022), (0.003, -0.004, 0.017), (0.009, -0.006, 0.025)]
     rings = [[(x, y, z) for x, y in low], [(x, y, z + 0.011) for x, y in mid]]
-    rings.append([(x, y, z + h) for (x, y), h in zip(top, rise[0], strict=True)])
+    rings.append([(x, y, z + h) for x, y, h in top])
     return m.loft(rings)
 
 

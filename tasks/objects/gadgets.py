@@ -265,10 +265,8 @@ def toycar(look: int, params: Params) -> ObjectModel:
         m.flat(m.rectangle(0.0040, 0.0098, 0.0, 0.0075), 0.0354),
         m.mesh(
             [
-                (-0.004, -0.0315, 0.0194),
-                (0.004, -0.0315, 0.0194),
-                (0.004, -0.0125, 0.0224),
-                (-0.004, -0.0125, 0.0224),
+                (x, y, 0.0194 if y < -0.02 else 0.0224)
+                for x, y in m.rectangle(0.004, 0.0095, y=-0.022)
             ],
             [(0, 1, 2), (0, 2, 3)],
         ),
@@ -305,15 +303,13 @@ def toycar(look: int, params: Params) -> ObjectModel:
         visual(m.merge(*lamps), srgb("#fff3b0")),
         visual(m.merge(*tails), srgb("#a3101a") if body != "red" else srgb("#ffb0a0")),
         visual(m.merge(*bumper), build.STEEL, roughness=0.3, metallic=0.3),
-        visual(
-            m.merge(*(m.moved(tyre, (x, y, 0.0088), build.ALONG_X) for x, y in wheels)),
-            srgb("#18181a"),
-            roughness=0.9,
-        ),
-        visual(
-            m.merge(*(m.moved(hub, (x, y, 0.0088), build.ALONG_X) for x, y in wheels)),
-            srgb("#cfd3d8"),
-            roughness=0.3,
+        *(
+            visual(
+                m.merge(*(m.moved(part, (x, y, 0.0088), build.ALONG_X) for x, y in wheels)),
+                srgb(color),
+                roughness=roughness,
+            )
+            for part, color, roughness in ((tyre, "#18181a", 0.9), (hub, "#cfd3d8", 0.3))
         ),
     ]
     phrases = build.fill_phrases(

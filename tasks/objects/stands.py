@@ -47,12 +47,8 @@ def phone_stand(look: int, params: Params) -> ObjectModel:
         return low_y + along * c - out * s, low_z + along * s + out * c
 
     def board(low: float, high: float, inner: float, outer: float) -> list[m.Point]:
-        return [
-            on_back(low, inner),
-            on_back(low, outer),
-            on_back(high, outer),
-            on_back(high, inner),
-        ]
+        ends = ((low, inner), (low, outer), (high, outer), (high, inner))
+        return [on_back(along, out) for along, out in ends]
 
     plate = m.side_prism(board(-0.0060, long, 0.0, -2 * thick), wide)
     lip = m.side_prism(board(-0.0060, 0.0, 0.0150, -2 * thick), wide)
@@ -233,12 +229,8 @@ def mug_rack(look: int, params: Params) -> ObjectModel:
     back = [(0.0, post_y, root_z + 0.030), (0.0, post_y + 0.030, root_z + 0.042)]
     pegs = m.merge(m.tube([root, knee, tip], PEG_RADIUS, 10), m.tube(back, PEG_RADIUS, 10))
     knob = [(0.0, -0.0052), (0.0036, -0.0037), (0.0052, 0.0), (0.0036, 0.0037), (0.0, 0.0052)]
-    head = [
-        (0.0065, tall - 0.010),
-        (0.0095, tall - 0.003),
-        (0.0065, tall + 0.004),
-        (0.0, tall + 0.006),
-    ]
+    head = [(0.0065, tall - 0.010), (0.0095, tall - 0.003), (0.0065, tall + 0.004)]
+    head += [(0.0, tall + 0.006)]
     knobs = [m.moved(m.lathe(knob, 10), p) for p in (tip, back[1])]
     parts = [
         collision(Box((0.052, 0.052, 0.007)), (0.0, 0.0, 0.007)),
