@@ -54,7 +54,10 @@ MARGIN = (0.02, 0.02)
 """Whole objects are this far inside the head image."""
 
 
-@dataclass(frozen=True)
+COUNTS = (3, 4, 5, 6, 7)
+
+
+@dataclass(frozen=True, kw_only=True)
 class Rules:
     """Where things may lie; the tuples have one value per level.
 
@@ -64,10 +67,10 @@ class Rules:
     found from subsets of the places `starts`.
     """
 
-    counts: tuple[int, ...]
+    counts: tuple[int, ...] = COUNTS
     apart: tuple[float, ...]
     gap: tuple[float, ...]
-    region: tuple[tuple[float, float], tuple[float, float]]
+    region: tuple[tuple[float, float], tuple[float, float]] = ((-0.22, 0.22), (-0.18, 0.08))
     radius: float
     tall: float
     starts: tuple[tuple[float, float], ...]
@@ -310,9 +313,6 @@ def distance_task(family: ObjectSet, name: str, what: str) -> Task:
     )
 
 
-REGION = ((-0.22, 0.22), (-0.18, 0.08))
-COUNTS = (3, 4, 5, 6, 7)
-
 BLOCK_COLORS = (
     *("red", "green", "blue", "yellow", "purple"),
     *("orange", "cyan", "pink", "brown", "gray"),
@@ -393,10 +393,8 @@ STARTS = tuple((x, y) for y, xs in (
 MUGS = ObjectSet(
     "Mugs",
     Rules(
-        counts=COUNTS,
         apart=(0.158, 0.158, 0.155, 0.164, 0.158),
         gap=(0.100, 0.085, 0.075, 0.065, 0.058),
-        region=REGION,
         radius=0.052,
         tall=0.110,
         starts=STARTS,
@@ -408,10 +406,8 @@ MUGS = ObjectSet(
 PILL_BOTTLES = ObjectSet(
     "Pill_Bottles",
     Rules(
-        counts=COUNTS,
         apart=(0.158, 0.158, 0.155, 0.164, 0.161),
         gap=(0.085, 0.085, 0.075, 0.065, 0.058),
-        region=REGION,
         radius=0.040,
         tall=0.155,
         starts=STARTS,
@@ -456,10 +452,8 @@ PACKED = (
 MIXED_A = ObjectSet(
     "Mixed_Objects_A",
     Rules(
-        counts=COUNTS,
         apart=(0.161, 0.158, 0.158, 0.158, 0.158),
         gap=(0.025, 0.030, 0.035, 0.042, 0.050),
-        region=REGION,
         radius=0.057,
         tall=0.156,
         starts=PACKED,
@@ -471,10 +465,8 @@ MIXED_A = ObjectSet(
 MIXED_B = ObjectSet(
     "Mixed_Objects_B",
     Rules(
-        counts=COUNTS,
         apart=(0.158, 0.158, 0.158, 0.158, 0.161),
         gap=(0.058,) * 5,
-        region=REGION,
         radius=0.065,
         tall=0.12,
         starts=PACKED,

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from robospa import extras, registry
+from robospa.extras import user_cache
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -64,3 +65,25 @@ def test_a_part_of_ours_that_lacks_an_extra_names_it(monkeypatch: pytest.MonkeyP
         registry.load("robospa.harness.sim.sapien_world:SapienWorld")
     with pytest.raises(registry.UnknownName, match="cannot load 'mine:Policy': No module named"):
         registry.load("mine:Policy")
+
+
+@pytest.mark.parametrize(
+    ("platform", "variables", "expected"),
+    [
+        ("linux", {}, "home/.cache/robospa"),
+        ("linux", {"XDG_CACHE_HOME": "/x"}, "/x/robospa"),
+        ("darwin", {"XDG_CACHE_HOME": "/x"}, "home/Library/Caches/robospa"),
+        ("win32", {}, "home/AppData/Local/robospa"),
+        ("win32", {"LOCALAPPDATA": "/local"}, "/local/robospa"),
+        ("linux", {"ROBOSPA_CACHE": "/mine", "XDG_CACHE_HOME": "/x"}, "/mine"),
+    ],
+)
+def test_the_folder_of_caches(
+    platform: str, variables: dict[str, str], expected: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("ROBOSPA_CACHE", "XDG_CACHE_HOME", "LOCALAPPDATA"):
+        monkeypatch.delenv(name, raising=False)
+    for name, value in {"HOME": "home", **variables}.items():
+        monkeypatch.setenv(name, value)
+    monkeypatch.setattr("sys.platform", platform)
+    assert user_cache() == Path(expected)

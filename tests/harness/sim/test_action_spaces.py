@@ -1,24 +1,33 @@
-"""The same motions in every action space: an oracle in disguise must still solve its trial."""
+"""The same motions in every action space, and actions that no robot could follow."""
 
 from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 import pytest
 from disguised_oracle import Disguised
+from numpy.typing import NDArray
+from run_fakes import FakeWorld, parts
 from unequal_arms import READY, unequal_arms
+from world_scenes import go_on
 
 from robospa.action_space import is_quantized
 from robospa.harness import action_decoder
 from robospa.harness.replay import replay
 from robospa.harness.running.record_store import ActionRecorder
 from robospa.harness.sim import sapien_world
-from robospa.harness.trial import run_trial
-from robospa.protocol.policy import PolicySpec
+from robospa.harness.sim.sapien_world import SapienWorld
+from robospa.harness.trial import TrialSetup, run_trial, task_parts
+from robospa.harness.world import World
+from robospa.protocol.policy import PolicySpec, TrialInfo
 from robospa.tasks.catalog import build_scene
 from robospa.trial import TrialKey
 
+pytestmark = pytest.mark.sim
 
-@pytest.mark.sim
+
 @pytest.mark.parametrize("space", ["ee", "delta_ee"])
 def test_an_oracle_in_disguise_solves_its_trial(space: str) -> None:
     key = TrialKey("Pick_Blocks_Size", 2, 7_000_000)
@@ -27,14 +36,13 @@ def test_an_oracle_in_disguise_solves_its_trial(space: str) -> None:
     assert "unreachable_actions" not in record.diagnostics
 
 
-@pytest.mark.sim
 def test_a_robot_whose_arms_have_different_joint_counts(monkeypatch: pytest.MonkeyPatch) -> None:
     robot = unequal_arms()
     monkeypatch.setattr(sapien_world, "embodiment_named", lambda name: robot)
     world = sapien_world.SapienWorld(render=False)
     world.load(build_scene("Pick_Blocks_Size", 1, 100_000))
     action = np.array([*READY, 0.25, *READY, 0.3, 0.75], np.float32)
-    world.step(action, "joint", lambda snapshot: False)
+    world.step(action, "joint", go_on)
     for state in ("commanded", "measured"):
         seen = world.observe(PolicySpec("test", (), state=state))
         assert seen["state"] == pytest.approx(action, abs=0.1)
@@ -42,7 +50,6 @@ def test_a_robot_whose_arms_have_different_joint_counts(monkeypatch: pytest.Monk
     world.close()
 
 
-@pytest.mark.sim
 @pytest.mark.parametrize("space", ["ee", "delta_ee"])
 def test_recorded_joints_are_replayed_to_the_bit_whatever_the_kinematics(
     space: str, monkeypatch: pytest.MonkeyPatch
@@ -57,3 +64,69 @@ def test_recorded_joints_are_replayed_to_the_bit_whatever_the_kinematics(
     assert again.actions_digest == record.actions_digest
     assert (again.digest, again.physics_steps) == (record.digest, record.physics_steps)
     assert again.end == "success"
+
+
+KEY = TrialKey("Pick_Blocks_Size", 1, 100_009)
+ACTIONS = 6
+
+
+class Absurd:
+    """Holds still, but for the third action of a chunk of three."""
+
+    def __init__(self, space: str, third: NDArray[np.float32]) -> None:
+        self.spec = PolicySpec("absurd", cameras=(), state="none", action=space, horizon=3)
+        self._third = third
+
+    def reset(self, trial: TrialInfo) -> None:
+        """Nothing depends on the trial."""
+
+    def infer(self, observation: Mapping[str, Any]) -> NDArray[np.float32]:
+        chunk = np.zeros((3, len(self._third)), np.float32)
+        if self.spec.action == "delta_ee":
+            chunk[:, [3, 11]] = 1.0
+        chunk[2] = self._third
+        return chunk
+
+
+def joints(**changed: float) -> NDArray[np.float32]:
+    action = np.zeros(14, np.float32)
+    for name, value in changed.items():
+        action[int(name[1:])] = value
+    return action
+
+
+FAR = np.array([4.0, 0, 0, 1, 0, 0, 0, 55.0] * 2, np.float32)
+CASES = {
+    "everything": ("joint", np.full(14, -3.4e38, np.float32)),
+    "degrees": ("joint", joints(_1=90.0, _9=-45.0)),
+    "gripper in percent": ("joint", joints(_6=100.0)),
+    "far away": ("delta_ee", FAR),
+    "just above the limits": ("joint", joints(_0=-10.03, _6=1.03)),
+}
+
+
+def problems(world: World, find: Callable[..., TrialSetup], case: str) -> dict[str, Any]:
+    """What the record of a trial of ACTIONS actions says of them."""
+    limit = find(KEY).task.levels[KEY.level].steps
+    policy = Absurd(*CASES[case])
+    record = run_trial(world, policy, KEY, policy_seed=0, parts=find, step_scale=ACTIONS / limit)
+    assert (record.end, record.steps) == ("step_limit", ACTIONS), record.message
+    words = ("unreachable", "clipped")
+    return {k: v for k, v in record.diagnostics.items() if any(word in k for word in words)}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_the_simulator_counts_absurd_actions_as_the_fake_world_does(case: str) -> None:
+    seen = problems(SapienWorld(render=False), task_parts, case)
+    assert seen == problems(FakeWorld(), parts, case)
+    counts = {name: value for name, value in seen.items() if isinstance(value, int)}
+    assert (
+        counts
+        == {
+            "everything": {"clipped_joints": 2, "clipped_grippers": 2},
+            "degrees": {"clipped_joints": 2},
+            "gripper in percent": {"clipped_grippers": 2},
+            "far away": {"unreachable_actions": 2, "clipped_grippers": 2},
+            "just above the limits": {},
+        }[case]
+    )

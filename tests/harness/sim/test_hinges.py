@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 import pytest
-from world_scenes import block, scene, two_blocks, wandering
+from world_scenes import block, go_on, joint_action, scene, two_blocks
 
 from robospa.geometry import Pose
 from robospa.harness.robots import embodiment
@@ -22,6 +21,11 @@ from robospa.workcell import TABLE_TOP
 pytestmark = pytest.mark.sim
 
 
+@pytest.fixture
+def world() -> SapienWorld:
+    return SapienWorld(render=False)
+
+
 def with_microwave(x: float = -0.07, fixed: bool = True) -> Scene:
     oven = SceneObject("oven", "microwave", Pose((x, 0.17, TABLE_TOP)), {"look": 2}, fixed)
     return scene(block("one", 0.15, -0.1), oven)
@@ -33,13 +37,12 @@ def opened(world: SapienWorld, loaded: Scene) -> Snapshot:
     expert = Expert(loaded, world.snapshot(), (Open("oven", arm="left"),))
     for _ in range(3):
         for row in expert.next(world.snapshot()):
-            world.step(row, "joint", lambda snapshot: False)
+            world.step(row, "joint", go_on)
     assert expert.failures == []
     return world.snapshot()
 
 
-def test_a_door_starts_closed_and_opens_by_its_handle() -> None:
-    world = SapienWorld(render=False)
+def test_a_door_starts_closed_and_opens_by_its_handle(world: SapienWorld) -> None:
     world.load(with_microwave())
     assert world.snapshot().hinges == {"oven": pytest.approx(0.0, abs=1e-3)}
     hinge = object_model("microwave").hinge
@@ -47,44 +50,31 @@ def test_a_door_starts_closed_and_opens_by_its_handle() -> None:
     assert opened(world, with_microwave()).hinges["oven"] > 0.6 * hinge.upper
 
 
-def test_a_door_stays_where_it_is_left() -> None:
-    world = SapienWorld(render=False)
+def test_a_door_stays_where_it_is_left(world: SapienWorld) -> None:
     before = opened(world, with_microwave()).hinges["oven"]
     for _ in range(10):
-        joints = world.snapshot().joints
-        action = np.array([*joints[0], 1.0, *joints[1], 1.0], dtype=np.float32)
-        world.step(action, "joint", lambda snapshot: False)
+        world.step(joint_action(*world.snapshot().joints), "joint", go_on)
     assert world.snapshot().hinges["oven"] == pytest.approx(before, abs=0.01)
 
 
-def test_opening_repeats_to_the_bit() -> None:
-    world = SapienWorld(render=False)
+def test_opening_changes_the_digest_and_repeats_to_the_bit(world: SapienWorld) -> None:
+    world.load(with_microwave())
+    closed = world.digest()
     opened(world, with_microwave())
     first = world.digest()
+    assert first != closed
     world.load(two_blocks())
     opened(world, with_microwave())
     assert world.digest() == first
 
 
-def test_a_pushed_door_changes_the_digest() -> None:
-    world = SapienWorld(render=False)
-    world.load(with_microwave())
-    closed = world.digest()
-    opened(world, with_microwave())
-    assert world.digest() != closed
-
-
-def test_scenes_without_doors_report_none() -> None:
-    world = SapienWorld(render=False)
+def test_scenes_without_doors_report_none(world: SapienWorld) -> None:
     world.load(two_blocks())
-    for action in wandering(1, 0):
-        world.step(action, "joint", lambda snapshot: False)
     assert world.snapshot().hinges == {}
     assert "hinges" not in snapshot_to_json(world.snapshot())
 
 
-def test_angles_survive_json() -> None:
-    world = SapienWorld(render=False)
+def test_angles_survive_json(world: SapienWorld) -> None:
     seen = opened(world, with_microwave())
     again = snapshot_from_json(snapshot_to_json(seen), embodiment("aloha-agilex").grippers)
     assert again.hinges == seen.hinges

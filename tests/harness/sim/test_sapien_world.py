@@ -2,33 +2,32 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
-from world_scenes import READY, block, joint_action, run_digest, scene, two_blocks
+from world_scenes import READY, block, go_on, joint_action, run_digest, scene, two_blocks, wandering
 
-from robospa.geometry import Pose
+from robospa.geometry import Pose, look_rotation
 from robospa.harness.robots import embodiment
+from robospa.harness.robots.kinematics import chain_of, end_effector, inverse
+from robospa.harness.sim.bodies import dynamic_body
 from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.harness.world import ActionError, RenderUnavailable, SceneUnstable
 from robospa.observation import CameraSpec
 from robospa.protocol.policy import PolicySpec
 from robospa.results.records.action_problems import UNREACHABLE
-from robospa.tasks.objects import object_model
-from robospa.tasks.scene import Scene, SceneObject
-from robospa.tasks.snapshot import Snapshot, snapshot_from_json
+from robospa.tasks.objects import assets, object_model
+from robospa.tasks.scene import SceneObject
+from robospa.tasks.snapshot import Snapshot, snapshot_from_json, snapshot_to_json
 from robospa.workcell import TABLE_TOP
 
 pytestmark = pytest.mark.sim
 
 BLIND = PolicySpec("blind", cameras=())
-
-
-def go_on(snapshot: Snapshot) -> bool:
-    return False
 
 
 @pytest.fixture
@@ -60,8 +59,6 @@ def test_a_trial_repeats_to_the_bit_in_another_process(world: SapienWorld) -> No
 def test_gathering_contacts_changes_nothing(world: SapienWorld) -> None:
     plain = run_digest(world, two_blocks(), seed=3)
     world.load(two_blocks(), contacts=True)
-    from world_scenes import wandering
-
     for action in wandering(4, 3):
         world.step(action, "joint", go_on)
     assert world.digest() == plain
@@ -96,8 +93,6 @@ def test_arms_arrive_where_they_are_told(world: SapienWorld) -> None:
 
 
 def test_the_end_effector_is_where_kinematics_says(world: SapienWorld) -> None:
-    from robospa.harness.robots.kinematics import chain_of, end_effector
-
     world.load(scene())
     world.step(joint_action(), "joint", go_on)
     snapshot = world.snapshot()
@@ -185,6 +180,7 @@ def test_the_privileged_state_is_the_snapshot(world: SapienWorld) -> None:
 def test_short_cuts_of_a_snapshot_say_what_its_poses_say(world: SapienWorld) -> None:
     world.load(two_blocks())
     seen = world.snapshot()
+    assert seen.contacts == ()  # unless they are asked for
     names = list(seen.poses)
     assert [seen.position(name) for name in names] == [seen.poses[n].position for n in names]
     assert seen.heights([*names, "later"]) == [*(seen.height(name) for name in names), None]
@@ -192,8 +188,6 @@ def test_short_cuts_of_a_snapshot_say_what_its_poses_say(world: SapienWorld) -> 
 
 
 def test_a_snapshot_stays_as_it_was_when_the_world_moves_on(world: SapienWorld) -> None:
-    from robospa.tasks.snapshot import snapshot_to_json
-
     world.load(two_blocks())
     early, late = world.snapshot(), world.snapshot()
     before = snapshot_to_json(early)
@@ -231,10 +225,6 @@ def test_an_object_beside_the_table_is_unstable(world: SapienWorld) -> None:
 
 
 def test_an_object_weighs_what_its_model_says() -> None:
-    from robospa.geometry import Pose
-    from robospa.harness.sim.bodies import dynamic_body
-    from robospa.tasks.objects import assets, object_model
-
     for name in assets():
         model = object_model(name)
         if model.hinge or not any(shape.collision for shape in model.shapes):
@@ -251,15 +241,7 @@ def test_contacts_name_both_bodies(world: SapienWorld) -> None:
     assert all(c.point[2] == pytest.approx(TABLE_TOP + 0.04, abs=1e-3) for c in contacts)
 
 
-def test_contacts_are_empty_unless_asked_for(world: SapienWorld) -> None:
-    world.load(two_blocks())
-    assert world.snapshot().contacts == ()
-
-
 def test_a_gripper_holds_what_it_closes_on(world: SapienWorld) -> None:
-    from robospa.geometry import Pose, look_rotation
-    from robospa.harness.robots.kinematics import chain_of, inverse
-
     chain = chain_of(embodiment("aloha-agilex").arms[0])
     down = look_rotation((0, 0, -1), (-1, 0, 0))
     spot = (-0.2, -0.1)
@@ -298,41 +280,26 @@ def test_nothing_can_be_done_before_loading(world: SapienWorld) -> None:
 
 
 def test_info_is_json_and_names_the_simulator(world: SapienWorld) -> None:
-    import json
-
     assert json.loads(json.dumps(world.info()))["simulator"] == "sapien"
 
 
 PAD = SceneObject("pad", "pad", Pose((0.0, -0.1, TABLE_TOP)), {"look": 2}, fixed=True)
-
 CUBE = SceneObject("cube", "block", Pose((0.0, -0.1, TABLE_TOP + 0.02)), {"look": 0})
 
 
-def scene_with(*objects: SceneObject) -> Scene:
-    return Scene("Test", 1, 0, "aloha-agilex", "default", objects, {})
-
-
-def test_a_pad_that_is_only_seen_carries_nothing() -> None:
-    from robospa.harness.sim.sapien_world import SapienWorld
-
-    world = SapienWorld(render=False)
-    world.load(scene_with(PAD, CUBE))
+def test_a_pad_that_is_only_seen_carries_nothing(world: SapienWorld) -> None:
+    world.load(scene(PAD, CUBE))
     assert world.snapshot().poses["cube"].position[2] == pytest.approx(TABLE_TOP + 0.02, abs=2e-4)
     assert world.snapshot().poses["pad"].position == pytest.approx((0.0, -0.1, TABLE_TOP), abs=1e-6)
 
 
-def test_a_solid_pad_carries_what_stands_on_it() -> None:
-    from robospa.harness.sim.sapien_world import SapienWorld
-
+def test_a_solid_pad_carries_what_stands_on_it(world: SapienWorld) -> None:
     solid = SceneObject("pad", "pad", PAD.pose, {"look": 2, "solid": True}, fixed=True)
     above = SceneObject("cube", "block", Pose((0.0, -0.1, TABLE_TOP + 0.022)), {"look": 0})
-    world = SapienWorld(render=False)
-    world.load(scene_with(solid, above))
+    world.load(scene(solid, above))
     assert world.snapshot().poses["cube"].position[2] == pytest.approx(TABLE_TOP + 0.021, abs=3e-4)
 
 
 def test_what_moves_must_be_able_to_collide() -> None:
-    from robospa.harness.sim.bodies import dynamic_body
-
     with pytest.raises(ValueError, match="no colliding shape"):
         dynamic_body(object_model("pad"), "pad", Pose(), fixed=False)

@@ -18,12 +18,10 @@ from robospa.tasks.modes.clutter import (
     candidates,
     color_words,
     colors_asked,
-    keep_out,
 )
 from robospa.tasks.objects import assets, object_model, variant_count
 from robospa.tasks.plan import Place
 from robospa.tasks.scene import Scene, SceneObject
-from robospa.workcell import WORKCELL
 
 NAMES = sorted(tasks())
 SEEDS = (1, 2)
@@ -73,25 +71,6 @@ def test_clutter_leaves_room_for_what_a_task_needs(name: str) -> None:
                     moved = radius(scene.object(skill.object))
                     far = math.dist(item.pose.position[:2], skill.position[:2])
                     assert far >= radius(item) + moved + 0.019
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_no_clutter_hides_an_object_from_the_head_camera(name: str) -> None:
-    """Seen from the camera, what is nearer lies beside: their boxes in the picture do not meet."""
-    for seed in SEEDS:
-        scene = scene_of(name, seed)
-        seen = keep_out(scene)
-        for item in scene.clutter:
-            model = object_model(item.asset, item.params)
-            x, y = (np.array([v]) for v in item.pose.position[:2])
-            left, right, top, bottom = (
-                v[0] for v in WORKCELL.head.box(
-                    x, y, model.radius, scene.table_top, scene.table_top + model.size[2]
-                )
-            )  # fmt: skip
-            for (a, b, c, d), nearest in zip(seen.boxes, seen.nearest, strict=True):
-                beside = left > b or right < a or top > d or bottom < c
-                assert beside or item.pose.position[1] - model.radius > nearest
 
 
 def test_nothing_on_the_table_can_be_taken_for_an_object_of_the_task() -> None:

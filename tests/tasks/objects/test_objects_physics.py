@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from robospa.geometry import Pose, Vec3, look_rotation
+from robospa.geometry import Pose, Vec3, axis_rotation, look_rotation, rotate, yaw_rotation
 from robospa.tasks.objects import assets, object_model, variant_count
 from robospa.tasks.shapes import Box, Grasp, ObjectModel, Shape
 
@@ -35,18 +35,31 @@ TIP, FINGER = 0.012, (0.0475, 0.004, 0.010)
 """How far fingertips reach beyond the grasp centre [m]; half sizes of a finger [m]."""
 
 
-def on_the_ground(model: ObjectModel, above: float = 0.0) -> tuple[Any, Any]:
-    import sapien
-    from sapien import physx
+class Bench:
+    """The ground and what is put there, without a robot."""
 
-    from robospa.harness.sim.bodies import dynamic_body, ground_body
+    def __init__(self) -> None:
+        import sapien
+        from sapien import physx
 
-    scene = sapien.Scene([physx.PhysxCpuSystem()])
-    scene.set_timestep(1 / 250)
-    scene.add_entity(ground_body("ground"))
-    entity, _ = dynamic_body(model, "thing", Pose((0.0, 0.0, above - model.bottom)), False)
-    scene.add_entity(entity)
-    return scene, entity
+        from robospa.harness.sim.bodies import ground_body
+
+        self.scene: Any = sapien.Scene([physx.PhysxCpuSystem()])
+        self.scene.set_timestep(1 / 250)
+        self.scene.add_entity(ground_body("ground"))
+
+    def put(self, model: ObjectModel, pose: Pose | None = None, fixed: bool = False) -> Any:
+        """The body there; without a pose, standing on the ground."""
+        from robospa.harness.sim.bodies import dynamic_body
+
+        pose = pose or Pose((0.0, 0.0, -model.bottom))
+        entity, _ = dynamic_body(model, model.asset, pose, fixed)
+        self.scene.add_entity(entity)
+        return entity
+
+    def wait(self, seconds: float) -> None:
+        for _ in range(round(seconds * 250)):
+            self.scene.step()
 
 
 def turned(entity: Any) -> float:
@@ -58,9 +71,9 @@ def turned(entity: Any) -> float:
 def test_objects_stay_where_they_stand(asset: str, look: int) -> None:
     """Half a second after a fall of 1 mm: not 2 mm away, not 2 degrees turned."""
     model = object_model(asset, {"look": look})
-    scene, entity = on_the_ground(model, 0.001)
-    for _ in range(125):
-        scene.step()
+    bench = Bench()
+    entity = bench.put(model, Pose((0.0, 0.0, 0.001 - model.bottom)))
+    bench.wait(0.5)
     x, y, z = (float(c) for c in entity.pose.p)
     assert math.hypot(x, y) < 0.002
     assert z == pytest.approx(-model.bottom, abs=0.001)
@@ -113,20 +126,21 @@ def floating_gripper(scene: Any, grasp: Grasp, centre: Vec3, opening: float) -> 
 
 def lifted(model: ObjectModel, *grasps: Grasp) -> tuple[float, float]:
     """(height gained [m], angle turned [rad]) after closing on `grasps` and rising by 0.12 m."""
-    scene, entity = on_the_ground(model)
+    bench = Bench()
+    entity = bench.put(model)
     hands = []
     for grasp in grasps:
         x, y, z = grasp.point
         centre = (x, y, max(z - model.bottom, TIP * -grasp.approach[2] + 0.003))
         opening = min(0.044, grasp.width / 2 + 0.009)
-        hands.append((opening, floating_gripper(scene, grasp, centre, opening).active_joints))
+        hands.append((opening, floating_gripper(bench.scene, grasp, centre, opening).active_joints))
     for step in range(450):
         close, rise = min(1.0, step / 150), max(0.0, (step - 200) / 250)
         for opening, (lift, *fingers) in hands:
             for finger in fingers:
                 finger.set_drive_target(opening + (-0.01 - opening) * close)
             lift.set_drive_target(0.12 * rise)
-        scene.step()
+        bench.scene.step()
     return float(entity.pose.p[2]) + model.bottom, turned(entity)
 
 
@@ -145,3 +159,95 @@ def test_two_hands_lift_it_level(asset: str) -> None:
     height, angle = lifted(model, *model.grasps)
     assert height > 0.105
     assert angle < math.radians(3)
+
+
+def pose_of(entity: Any) -> Pose:
+    p, q = entity.pose.p.tolist(), entity.pose.q.tolist()
+    return Pose((p[0], p[1], p[2]), (q[0], q[1], q[2], q[3]))
+
+
+def put_by(frame: Vec3, at: Vec3, yaw: float) -> Pose:
+    """The pose of a body turned by `yaw` whose point `frame` is at `at`."""
+    x, y, z = rotate(yaw_rotation(yaw), frame)
+    return Pose((at[0] - x, at[1] - y, at[2] - z), yaw_rotation(yaw))
+
+
+@pytest.mark.parametrize("look", range(variant_count("mug")))
+@pytest.mark.parametrize(("yaw", "off"), [(0.0, -0.003), (math.pi, 0.003)])
+def test_a_mug_let_go_on_the_peg_hangs_there(look: int, yaw: float, off: float) -> None:
+    rack, mug = object_model("mug_rack"), object_model("mug", {"look": look})
+    x, y, z = rack.frames["hang"].position
+    handle = mug.frames["handle"].position
+    bench = Bench()
+    bench.put(rack, Pose(), fixed=True)
+    entity = bench.put(mug, put_by(handle, (x + off, y, z), yaw))
+    bench.wait(3.0)
+    end = pose_of(entity).apply(handle)
+    assert abs(end[0] - x) < 0.02 and abs(end[1] - y) < 0.02
+    assert end[2] > 0.12
+    # by its handle, leaning on the post
+    assert rotate(pose_of(entity).rotation, (1, 0, 0))[2] > 0.5
+
+
+@pytest.mark.parametrize("look", range(variant_count("phone")))
+def test_a_phone_on_its_stand_stays(look: int) -> None:
+    stand, phone = object_model("phone_stand"), object_model("phone", {"look": look})
+    frame = stand.frames["support"]
+    bench = Bench()
+    bench.put(stand, Pose(), fixed=True)
+    x, y, z = rotate(frame.rotation, (0.0, 0.0, 0.004))
+    a, b, c = frame.position
+    entity = bench.put(phone, Pose((a + x, b + y, c + z), frame.rotation))
+    bench.wait(2.0)
+    assert np.abs(np.subtract(pose_of(entity).position, frame.position)).max() < 0.005
+    slope = rotate(pose_of(entity).rotation, (0, 1, 0))[2]
+    assert slope == pytest.approx(rotate(frame.rotation, (0, 1, 0))[2], abs=0.05)
+
+
+def test_bowls_nest_at_the_frame() -> None:
+    plate, bowl = object_model("plate"), object_model("bowl")
+    bench = Bench()
+    bench.put(plate, Pose(), fixed=True)
+    nest, floor = bowl.frames["nest"].position[2], plate.frames["support"].position[2]
+    stack = [bench.put(bowl, Pose((0.0, 0.0, floor + 0.001 + nest * i))) for i in range(5)]
+    bench.wait(2.0)
+    heights = [pose_of(entity).position[2] for entity in stack]
+    assert heights == pytest.approx([floor + nest * i for i in range(5)], abs=0.002)
+
+
+def test_a_bin_keeps_its_garbage_until_it_is_turned_over() -> None:
+    trash_bin, ball = object_model("table_trash_bin"), object_model("garbage")
+    bench = Bench()
+    bench.put(trash_bin, Pose(), fixed=True)
+    high = Pose((0.3, 0.0, 0.3), axis_rotation((1, 0, 0), 2.0))
+    bench.put(trash_bin, high, fixed=True)
+    kept = bench.put(ball, Pose((0.008, -0.006, 0.04)))
+    poured = bench.put(ball, Pose(high.apply((0.0, 0.0, 0.02))))
+    bench.wait(1.5)
+    assert math.hypot(*pose_of(kept).position[:2]) < 0.025
+    assert pose_of(poured).position[2] < 0.02  # it rolls, and is not quite round
+
+
+@pytest.mark.parametrize("name", ["left", "right"])
+@pytest.mark.parametrize("asset", ["hamburger", "french_fries"])
+def test_the_tray_has_two_places(asset: str, name: str) -> None:
+    tray, food = object_model("tray"), object_model(asset)
+    x, y, z = tray.frames[name].position
+    bench = Bench()
+    bench.put(tray, Pose(), fixed=True)
+    entity = bench.put(food, Pose((x, y, z + 0.002)))
+    bench.wait(0.5)
+    assert pose_of(entity).position == pytest.approx((x, y, z), abs=0.001)
+
+
+def test_the_hammer_strikes_with_the_face_it_stands_on() -> None:
+    head = object_model("hammer").frames["head"].position
+    block = object_model("block", {"half": [0.025, 0.025, 0.025]})
+    bench = Bench()
+    bench.put(block, Pose((0.0, 0.0, 0.025)), fixed=True)
+    hammer = bench.put(object_model("hammer"), Pose((-head[0], -head[1], 0.0505)))
+    bench.wait(0.2)
+    contacts = bench.scene.physx_system.get_contacts()
+    touching = {body.name for contact in contacts for body in contact.bodies}
+    assert {"block", "hammer"} <= touching
+    assert np.hypot(*pose_of(hammer).apply(head)[:2]) < 0.02
