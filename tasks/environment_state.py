@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from robospa.geometry import Pose, rotate
 from robospa.observation import FEATURES, KIND_BITS, SLOTS, TURNS
-from robospa.tasks.scene import Scene, SceneObject
+from robospa.tasks.scene import Scene
 from robospa.tasks.shapes import Box, Color, Cylinder, Geometry, ObjectModel, Params, Sphere
 from robospa.tasks.snapshot import Snapshot
 
@@ -41,7 +41,8 @@ class EnvironmentState:
                 f"{scene.task} level {scene.level} has {len(scene.objects)} objects, and an "
                 f"environment state holds {SLOTS}: choose another task"
             )
-        self._names = [item.name for item in sorted(scene.objects, key=_from_left)]
+        from_left = [(*o.pose.position, *o.pose.rotation, o.asset, o.name) for o in scene.objects]
+        self._names = [name for *_, name in sorted(from_left)]
         self._fixed = np.zeros((SLOTS, len(FEATURES)), np.float32)
         first = FEATURES.index("half_x")
         for slot, name in enumerate(self._names):
@@ -61,10 +62,6 @@ class EnvironmentState:
             rows[slot, :measured] = [1.0, *_pose_numbers(snapshot.poses[name])]
             rows[slot, hinge] = snapshot.hinges.get(name, 0.0)
         return rows.ravel()
-
-
-def _from_left(item: SceneObject) -> tuple[object, ...]:
-    return (*item.pose.position, *item.pose.rotation, item.asset, item.name)
 
 
 def _pose_numbers(pose: Pose) -> list[float]:

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from robospa.tasks.families.distance import block_color
+from robospa.tasks.colors import nearest
 from robospa.tasks.scene import Scene, SceneObject
 
 
@@ -36,7 +36,7 @@ def targets_of(scene: Scene) -> list[str]:
 def color_of(item: SceneObject) -> str:
     """The word for an object's colour in the basic tasks."""
     if item.asset == "block":
-        return block_color(item)
+        return nearest(tuple(item.params["color"]))
     return "brown" if item.asset == "bread" else str(item.params["tint"])
 
 

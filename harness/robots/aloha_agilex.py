@@ -11,22 +11,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 from robospa.geometry import Pose, Quat, Vec3, axis_rotation, multiply, yaw_rotation
+from robospa.harness.robots import links
 from robospa.harness.robots.embodiment import Arm, Embodiment, Joint
-from robospa.harness.robots.links import (
-    ALONG_X,
-    FRONT,
-    SINGLE_ARM_CAMERAS,
-    THIRD,
-    Row,
-    bar,
-    box,
-    drawn,
-    pin,
-    serial_chain,
-    solid,
-)
+from robospa.harness.robots.links import Row
 from robospa.tasks.shapes import Box, Color, Cylinder, Shape
 from robospa.workcell import WORKCELL, Gripper
 
@@ -76,45 +66,45 @@ WRIST_CAMERA = Pose((0.07, 0.032, 0.065), axis_rotation((0, 1, 0), 0.4))
 
 LINK_SHAPES: tuple[tuple[Shape, ...], ...] = (
     (
-        drawn(Shape(Cylinder(0.038, 0.008), Pose((0, 0, 0.008)), STEEL)),
-        drawn(Shape(Cylinder(0.03, 0.031), Pose((0, 0, 0.031)), DARK)),
+        links.drawn(Shape(Cylinder(0.038, 0.008), Pose((0, 0, 0.008)), STEEL)),
+        links.drawn(Shape(Cylinder(0.03, 0.031), Pose((0, 0, 0.031)), DARK)),
     ),
     (
-        box((0.01, 0, 0.012), (0.026, 0.03, 0.012), DARK),
-        box((0.018, 0.034, 0.032), (0.02, 0.005, 0.025), STEEL),
-        box((0.018, -0.034, 0.032), (0.02, 0.005, 0.025), STEEL),
-        pin((0.025, 0, 0.042), 0.026, 0.0395, STEEL),
+        links.box((0.01, 0, 0.012), (0.026, 0.03, 0.012), DARK),
+        links.box((0.018, 0.034, 0.032), (0.02, 0.005, 0.025), STEEL),
+        links.box((0.018, -0.034, 0.032), (0.02, 0.005, 0.025), STEEL),
+        links.pin((0.025, 0, 0.042), 0.026, 0.0395, STEEL),
     ),
     (
-        bar((0.0, 0.0), (-0.26396, 0.0), (0.031, 0.029), 0.026, BLACK),
-        bar((-0.06, 0.0), (-0.205, 0.0), (0.012, 0.012), 0.0285, DARK),
-        pin((-0.26396, 0, 0), 0.022, 0.037, STEEL),
+        links.bar((0.0, 0.0), (-0.26396, 0.0), (0.031, 0.029), 0.026, BLACK),
+        links.bar((-0.06, 0.0), (-0.205, 0.0), (0.012, 0.012), 0.0285, DARK),
+        links.pin((-0.26396, 0, 0), 0.022, 0.037, STEEL),
     ),
     (
-        bar((0.0, 0.0), (0.05, -0.045), (0.03, 0.034), 0.03, BLACK),
-        bar((0.05, -0.045), (0.246, -0.06), (0.034, 0.027), 0.03, BLACK),
-        bar((0.085, -0.0485), (0.19, -0.0565), (0.012, 0.011), 0.0325, DARK),
-        pin((0.246, 0, -0.06), 0.02, 0.038, STEEL),
-        solid((0.12, 0, -0.045), (0.125, 0.03, 0.026), 0.18),
+        links.bar((0.0, 0.0), (0.05, -0.045), (0.03, 0.034), 0.03, BLACK),
+        links.bar((0.05, -0.045), (0.246, -0.06), (0.034, 0.027), 0.03, BLACK),
+        links.bar((0.085, -0.0485), (0.19, -0.0565), (0.012, 0.011), 0.0325, DARK),
+        links.pin((0.246, 0, -0.06), 0.02, 0.038, STEEL),
+        links.solid((0.12, 0, -0.045), (0.125, 0.03, 0.026), 0.18),
     ),
     (
-        bar((0.0, 0.0), (0.06, -0.055), (0.0175, 0.03), 0.027, DARK),
-        box((0.0677, 0.0015, -0.082), (0.024, 0.024, 0.005), STEEL),
-        solid((0.045, 0, -0.035), (0.042, 0.028, 0.026), 0.7),
+        links.bar((0.0, 0.0), (0.06, -0.055), (0.0175, 0.03), 0.027, DARK),
+        links.box((0.0677, 0.0015, -0.082), (0.024, 0.024, 0.005), STEEL),
+        links.solid((0.045, 0, -0.035), (0.042, 0.028, 0.026), 0.7),
     ),
     (
-        drawn(Shape(Cylinder(0.0295, 0.0515), Pose((0, 0, 0.0565)), BLACK)),
-        drawn(Shape(Cylinder(0.024, 0.004), Pose((0.027, 0, 0.0855), ALONG_X), STEEL)),
+        links.drawn(Shape(Cylinder(0.0295, 0.0515), Pose((0, 0, 0.0565)), BLACK)),
+        links.drawn(Shape(Cylinder(0.024, 0.004), Pose((0.027, 0, 0.0855), links.ALONG_X), STEEL)),
     ),
     (
-        drawn(Shape(Cylinder(0.027, 0.012), Pose((0.01, 0, 0), ALONG_X), STEEL)),
-        box((0.035, 0, 0), (0.021, 0.045, 0.026), BLACK),
-        box((0.052, 0, 0), (0.013, 0.087, 0.017), DARK),
-        box((0.0655, 0, 0.0), (0.0015, 0.08, 0.006), STEEL),
+        links.drawn(Shape(Cylinder(0.027, 0.012), Pose((0.01, 0, 0), links.ALONG_X), STEEL)),
+        links.box((0.035, 0, 0), (0.021, 0.045, 0.026), BLACK),
+        links.box((0.052, 0, 0), (0.013, 0.087, 0.017), DARK),
+        links.box((0.0655, 0, 0.0), (0.0015, 0.08, 0.006), STEEL),
         # bracket and housing of the wrist camera, behind its optical centre
-        box((0.045, 0.02, 0.042), (0.003, 0.012, 0.018), STEEL),
-        box((0.056, 0.02, 0.0645), (0.006, 0.042, 0.011), DARK, 0.4),
-        solid((0.03, 0, 0), (0.03, 0.045, 0.026)),
+        links.box((0.045, 0.02, 0.042), (0.003, 0.012, 0.018), STEEL),
+        links.box((0.056, 0.02, 0.0645), (0.006, 0.042, 0.011), DARK, 0.4),
+        links.solid((0.03, 0, 0), (0.03, 0.045, 0.026)),
     ),
 )
 """Base link and links 1 to 6."""
@@ -129,17 +119,17 @@ def _finger(side: float) -> tuple[Shape, ...]:
     inner = -side * 0.0205
     return (
         Shape(Box(_FINGER_HALF), Pose((_MIDDLE, inner, 0.0)), BLACK, visual=False),
-        box((_MIDDLE, inner + side * 0.0008, 0.0), (0.043, 0.0032, 0.010), DARK),
-        box((0.05, inner - side * 0.0031, 0.0), (0.0208, 0.0009, 0.0095), STEEL),
-        box((-0.012, inner + side * 0.008, 0.0), (0.011, 0.008, 0.0125), BLACK),
+        links.box((_MIDDLE, inner + side * 0.0008, 0.0), (0.043, 0.0032, 0.010), DARK),
+        links.box((0.05, inner - side * 0.0031, 0.0), (0.0208, 0.0009, 0.0095), STEEL),
+        links.box((-0.012, inner + side * 0.008, 0.0), (0.011, 0.008, 0.0125), BLACK),
     )
 
 
 FINGER_SHAPES: tuple[tuple[Shape, ...], tuple[Shape, ...]] = (_finger(1.0), _finger(-1.0))
 
 STAND_SHAPES: tuple[Shape, ...] = (
-    box((0.0035, -0.45, 0.755), (0.36, 0.05, 0.0225), STEEL),
-    box((0.0035, -0.60, 0.37), (0.25, 0.20, 0.37), DARK),
+    links.box((0.0035, -0.45, 0.755), (0.36, 0.05, 0.0225), STEEL),
+    links.box((0.0035, -0.60, 0.37), (0.25, 0.20, 0.37), DARK),
 )
 
 
@@ -168,42 +158,39 @@ ROOT = Pose((0.0, -0.65, 0.0), yaw_rotation(PI / 2))
 """Where the robot stands in the world."""
 
 
+COMMON: dict[str, Any] = {
+    "travel": (-0.01, 0.045), "home": (0.0,) * 6, "seeds": SEEDS, "working": WORKING,
+    "geometry": "arx",
+}  # fmt: skip
+"""What both robots' arms have in common besides their shapes."""
+
+
 def _arm(name: str, prefix: str, base: Vec3, yaw: float) -> Arm:
     """An arm whose base stands at `base` [m] of the robot's frame, turned by `yaw` [rad]."""
-    links = [f"{prefix}_base_link", *(f"{prefix}_link{i}" for i in range(1, 9))]
+    names = [f"{prefix}_base_link", *(f"{prefix}_link{i}" for i in range(1, 9))]
     joints = tuple(
-        Joint(f"{prefix}_joint{i + 1}", links[i], links[i + 1], Pose(xyz, rot), axis, -OPEN, OPEN)
+        Joint(f"{prefix}_joint{i + 1}", names[i], names[i + 1], Pose(xyz, rot), axis, -OPEN, OPEN)
         for i, (xyz, rot, axis) in enumerate(CHAIN)
     )
-    fingers = tuple(
-        Joint(
-            f"{prefix}_joint{7 + i}",
-            links[6],
-            links[7 + i],
-            Pose((0.08457, y, -0.0001)),
-            (0.0, math.copysign(1.0, y), 0.0),
-            0.0,
-            FINGER_TRAVEL,
-            "prismatic",
+    fingers = []
+    for i, y in (7, 0.02449), (8, -0.0245):
+        frame, axis = Pose((0.08457, y, -0.0001)), (0.0, math.copysign(1.0, y), 0.0)
+        limits = (0.0, FINGER_TRAVEL)
+        fingers.append(
+            Joint(f"{prefix}_joint{i}", names[6], names[i], frame, axis, *limits, "prismatic")
         )
-        for i, y in enumerate((0.02449, -0.0245))
-    )
-    shapes = dict(zip(links, (*LINK_SHAPES, *FINGER_SHAPES), strict=True))
+    shapes = dict(zip(names, (*LINK_SHAPES, *FINGER_SHAPES), strict=True))
     return Arm(
         name=name,
         base=ROOT * Pose(base, yaw_rotation(yaw)),
-        base_link=links[0],
+        base_link=names[0],
         joints=joints,
-        fingers=fingers,
-        travel=(-0.01, 0.045),
+        fingers=tuple(fingers),
         gripper=GRIPPER,
         tool=Pose((0.0, 0.0, 0.0)),
-        home=(0.0,) * 6,
-        seeds=SEEDS,
-        working=WORKING,
         shapes=shapes,
         camera=WRIST_CAMERA,
-        geometry="arx",
+        **COMMON,
     )
 
 
@@ -213,7 +200,7 @@ ALOHA_AGILEX = Embodiment(
         _arm("left", "fl", (0.2305, 0.297, 0.782), 0.02),
         _arm("right", "fr", (0.2315, -0.3063, 0.781), 0.01),
     ),
-    cameras={"head": WORKCELL.head, "front": FRONT, "third": THIRD},
+    cameras={"head": WORKCELL.head, "front": links.FRONT, "third": links.THIRD},
     body=STAND_SHAPES,
 )
 
@@ -221,8 +208,8 @@ ALOHA_AGILEX = Embodiment(
 X5_LINK_SHAPES: tuple[tuple[Shape, ...], ...] = (
     (
         *LINK_SHAPES[0],
-        box((0.0, 0.0, -0.022), (0.05, 0.05, 0.022), STEEL),
-        box((-0.045, 0.0, -0.392), (0.04, 0.05, 0.392), DARK),
+        links.box((0.0, 0.0, -0.022), (0.05, 0.05, 0.022), STEEL),
+        links.box((-0.045, 0.0, -0.392), (0.04, 0.05, 0.392), DARK),
     ),
     *LINK_SHAPES[1:],
 )
@@ -245,26 +232,22 @@ X5_FINGERS = (
 
 
 def _x5_arm(name: str, x: float) -> Arm:
-    shapes = (*X5_LINK_SHAPES, *FINGER_SHAPES)
-    joints, fingers, named = serial_chain(
-        X5_CHAIN, Pose().rotation, X5_FINGERS, (0.0, 0.044), shapes
-    )
-    return replace(
-        ALOHA_AGILEX.arms[0],
+    return links.serial_arm(
+        X5_CHAIN,
+        X5_FINGERS,
+        (0.0, 0.044),
+        (*X5_LINK_SHAPES, *FINGER_SHAPES),
         name=name,
         base=Pose((x, -0.35, 0.784), yaw_rotation(PI / 2)),
-        base_link=joints[0].parent,
-        joints=joints,
-        fingers=fingers,
         gripper=replace(GRIPPER, fingertip=0.0375),
-        shapes=named,
         camera=Pose((0.0845, 0.0, 0.05), axis_rotation((0, 1, 0), 0.349)),
+        **COMMON,
     )
 
 
 ARX_X5 = Embodiment(
     name="ARX-X5",
     arms=(_x5_arm("left", -X5_DISTANCE / 2), _x5_arm("right", X5_DISTANCE / 2)),
-    cameras=SINGLE_ARM_CAMERAS,
+    cameras=links.SINGLE_ARM_CAMERAS,
     distance=X5_DISTANCE,
 )

@@ -9,37 +9,26 @@ from __future__ import annotations
 import math
 
 from robospa.geometry import Pose, Vec3, look_rotation, yaw_rotation
+from robospa.harness.robots import links
 from robospa.harness.robots.embodiment import Arm, Embodiment
-from robospa.harness.robots.links import (
-    SINGLE_ARM_CAMERAS,
-    Row,
-    block,
-    box,
-    capped,
-    drawn,
-    rod,
-    serial_chain,
-    shell,
-)
+from robospa.harness.robots.links import DARK, STEEL
 from robospa.tasks.objects.meshes import loft, rounded_rectangle
 from robospa.tasks.shapes import Box, Color, Shape
 from robospa.workcell import Gripper
 
 WHITE: Color = (0.80, 0.81, 0.82)
 CAP: Color = (0.52, 0.54, 0.56)
-DARK: Color = (0.05, 0.05, 0.055)
-STEEL: Color = (0.36, 0.37, 0.39)
 
 HAND = look_rotation((0, 0, 1), (-1, -1, 0))
 """Rotation of the hand in link 7: x approaches, y is the closing direction."""
 
 
 def _housing(start: Vec3, end: Vec3, radius: float) -> tuple[Shape, ...]:
-    return capped(start, end, radius, WHITE, CAP, DARK)
+    return links.capped(start, end, radius, WHITE, CAP, DARK)
 
 
 def _seam(x: float, y: float, z: float, radius: float) -> Shape:
-    return rod((x, y, z), (x, y, z + 0.014), radius, DARK)
+    return links.rod((x, y, z), (x, y, z + 0.014), radius, DARK)
 
 
 def _hand_body() -> Shape:
@@ -48,7 +37,7 @@ def _hand_body() -> Shape:
     outlines = [(x, rounded_rectangle(wide, deep, 0.022)) for x, wide, deep in sides]
     rings = [[(y, z, x) for y, z in outline] for x, outline in outlines]
     upright = Pose((0.0, 0.0, 0.14), HAND) * Pose(rotation=TO_APPROACH)
-    return drawn(Shape(loft(rings), upright, WHITE))
+    return links.drawn(Shape(loft(rings), upright, WHITE))
 
 
 TO_APPROACH = look_rotation((0, 1, 0), (0, 0, 1))
@@ -56,53 +45,53 @@ TO_APPROACH = look_rotation((0, 1, 0), (0, 0, 1))
 
 LINK_SHAPES: tuple[tuple[Shape, ...], ...] = (
     (
-        shell((-0.10, 0.0, 0.03), (0.07, 0.0, 0.03), 0.075, WHITE, 0.8),
-        box((-0.05, 0.0, 0.02), (0.10, 0.085, 0.02), WHITE),
-        shell((0.0, 0.0, 0.0), (0.0, 0.0, 0.14), 0.068, WHITE),
-        box((-0.04, 0.0, -0.375), (0.13, 0.12, 0.375), STEEL),
+        links.shell((-0.10, 0.0, 0.03), (0.07, 0.0, 0.03), 0.075, WHITE, 0.8),
+        links.box((-0.05, 0.0, 0.02), (0.10, 0.085, 0.02), WHITE),
+        links.shell((0.0, 0.0, 0.0), (0.0, 0.0, 0.14), 0.068, WHITE),
+        links.box((-0.04, 0.0, -0.375), (0.13, 0.12, 0.375), STEEL),
     ),
     (
         _seam(0.0, 0.0, -0.197, 0.0585),
-        shell((0.0, 0.0, -0.185), (0.0, 0.0, 0.02), 0.056, WHITE),
+        links.shell((0.0, 0.0, -0.185), (0.0, 0.0, 0.02), 0.056, WHITE),
         *_housing((0.0, -0.129, 0.0), (0.0, 0.055, 0.0), 0.056),
     ),
     (
-        shell((0.0, 0.0, -0.055), (0.0, 0.0, 0.1295), 0.054, WHITE),
-        shell((0.0, 0.03, 0.0), (0.0, -0.18, 0.0), 0.055, WHITE),
-        rod((0.0, -0.182, 0.0), (0.0, -0.196, 0.0), 0.057, DARK),
+        links.shell((0.0, 0.0, -0.055), (0.0, 0.0, 0.1295), 0.054, WHITE),
+        links.shell((0.0, 0.03, 0.0), (0.0, -0.18, 0.0), 0.055, WHITE),
+        links.rod((0.0, -0.182, 0.0), (0.0, -0.196, 0.0), 0.057, DARK),
     ),
     (
-        shell((0.0, 0.0, -0.121), (0.0, 0.0, 0.03), 0.0545, WHITE),
-        shell((0.0, 0.025, 0.0), (0.0825, 0.025, 0.0), 0.05, WHITE),
+        links.shell((0.0, 0.0, -0.121), (0.0, 0.0, 0.03), 0.0545, WHITE),
+        links.shell((0.0, 0.025, 0.0), (0.0825, 0.025, 0.0), 0.05, WHITE),
         *_housing((0.0825, -0.055, 0.0), (0.0825, 0.111, 0.0), 0.056),
     ),
     (
-        shell((0.0, 0.0, -0.055), (0.0, 0.0, 0.111), 0.054, WHITE),
-        shell((0.0, 0.025, 0.0), (-0.0825, 0.025, 0.0), 0.05, WHITE),
-        shell((-0.0825, -0.03, 0.0), (-0.0825, 0.112, 0.0), 0.0545, WHITE),
-        rod((-0.0825, 0.112, 0.0), (-0.0825, 0.126, 0.0), 0.057, DARK),
+        links.shell((0.0, 0.0, -0.055), (0.0, 0.0, 0.111), 0.054, WHITE),
+        links.shell((0.0, 0.025, 0.0), (-0.0825, 0.025, 0.0), 0.05, WHITE),
+        links.shell((-0.0825, -0.03, 0.0), (-0.0825, 0.112, 0.0), 0.0545, WHITE),
+        links.rod((-0.0825, 0.112, 0.0), (-0.0825, 0.126, 0.0), 0.057, DARK),
     ),
     (
-        shell((0.0, 0.0, -0.2646), (0.0, 0.0, -0.11), 0.054, WHITE),
-        shell((0.0, 0.03, -0.20), (0.0, 0.075, 0.02), 0.042, WHITE, 1.0),
+        links.shell((0.0, 0.0, -0.2646), (0.0, 0.0, -0.11), 0.054, WHITE),
+        links.shell((0.0, 0.03, -0.20), (0.0, 0.075, 0.02), 0.042, WHITE, 1.0),
         *_housing((0.0, -0.05, 0.0), (0.0, 0.13, 0.0), 0.049),
-        block(Pose((0.0, 0.03, -0.12)), (0.05, 0.06, 0.14)),
+        links.block(Pose((0.0, 0.03, -0.12)), (0.05, 0.06, 0.14)),
     ),
     (
-        shell((0.0, 0.0, -0.044), (0.0, 0.0, 0.056), 0.048, WHITE),
-        shell((-0.02, 0.0, 0.0), (0.11, 0.0, 0.0), 0.042, WHITE, 0.9),
+        links.shell((0.0, 0.0, -0.044), (0.0, 0.0, 0.056), 0.048, WHITE),
+        links.shell((-0.02, 0.0, 0.0), (0.11, 0.0, 0.0), 0.042, WHITE, 0.9),
         *_housing((0.088, -0.05, 0.0), (0.088, 0.082, 0.0), 0.044),
-        rod((0.088, -0.060, 0.0), (0.088, -0.047, 0.0), 0.0455, DARK),
-        block(Pose((0.045, 0.015, 0.0)), (0.085, 0.06, 0.045)),
+        links.rod((0.088, -0.060, 0.0), (0.088, -0.047, 0.0), 0.0455, DARK),
+        links.block(Pose((0.045, 0.015, 0.0)), (0.085, 0.06, 0.045)),
     ),
     (
-        shell((0.0, 0.0, 0.045), (0.0, 0.0, 0.092), 0.043, WHITE),
-        rod((0.0, 0.0, 0.090), (0.0, 0.0, 0.109), 0.032, DARK),
+        links.shell((0.0, 0.0, 0.045), (0.0, 0.0, 0.092), 0.043, WHITE),
+        links.rod((0.0, 0.0, 0.090), (0.0, 0.0, 0.109), 0.032, DARK),
         _hand_body(),
-        drawn(Shape(Box((0.004, 0.09, 0.012)), Pose((0.0, 0.0, 0.171), HAND), DARK)),
+        links.drawn(Shape(Box((0.004, 0.09, 0.012)), Pose((0.0, 0.0, 0.171), HAND), DARK)),
         # housing of the wrist camera, behind its optical centre
-        drawn(Shape(Box((0.012, 0.03, 0.012)), Pose((0.011, -0.039, 0.112), HAND), DARK)),
-        block(Pose((0.0, 0.0, 0.14), HAND), (0.033, 0.102, 0.0315)),
+        links.drawn(Shape(Box((0.012, 0.03, 0.012)), Pose((0.011, -0.039, 0.112), HAND), DARK)),
+        links.block(Pose((0.0, 0.0, 0.14), HAND), (0.033, 0.102, 0.0315)),
     ),
 )
 """Base link and links 1 to 7."""
@@ -113,8 +102,8 @@ def _finger(side: float) -> tuple[Shape, ...]:
     pose = Pose((0.027, side * 0.0075, 0.0))
     return (
         Shape(Box((0.027, 0.0075, 0.0105)), pose, visual=False),
-        drawn(Shape(Box((0.018, 0.011, 0.009)), Pose((0.013, side * 0.013, 0.0)), STEEL)),
-        drawn(Shape(Box((0.014, 0.006, 0.0105)), Pose((0.040, side * 0.0065, 0.0)), DARK)),
+        links.drawn(Shape(Box((0.018, 0.011, 0.009)), Pose((0.013, side * 0.013, 0.0)), STEEL)),
+        links.drawn(Shape(Box((0.014, 0.006, 0.0105)), Pose((0.040, side * 0.0065, 0.0)), DARK)),
     )
 
 
@@ -125,7 +114,7 @@ DISTANCE = 0.8
 QUARTER = math.pi / 2
 Z = (0.0, 0.0, 1.0)
 
-CHAIN: tuple[Row, ...] = (
+CHAIN: tuple[links.Row, ...] = (
     ("panda_joint1", (0.0, 0.0, 0.333), (0.0, 0.0, 0.0), Z, (-2.8973, 2.8973)),
     ("panda_joint2", (0.0, 0.0, 0.0), (-QUARTER, 0.0, 0.0), Z, (-1.7628, 1.7628)),
     ("panda_joint3", (0.0, -0.316, 0.0), (QUARTER, 0.0, 0.0), Z, (-2.8973, 2.8973)),
@@ -168,20 +157,18 @@ SEEDS = (
 
 
 def _arm(name: str, x: float) -> Arm:
-    shapes = (*LINK_SHAPES, *FINGER_SHAPES)
-    joints, fingers, named = serial_chain(CHAIN, TOOL.rotation, FINGERS, (0.0, 0.04), shapes)
-    return Arm(
+    return links.serial_arm(
+        CHAIN,
+        FINGERS,
+        (0.0, 0.04),
+        (*LINK_SHAPES, *FINGER_SHAPES),
+        TOOL,
         name=name,
         base=Pose((x, -0.65, 0.75), yaw_rotation(math.pi / 2)),
-        base_link=joints[0].parent,
-        joints=joints,
-        fingers=fingers,
         travel=(-0.01, 0.05),
         gripper=GRIPPER,
-        tool=TOOL,
         home=(0.0, 0.19635, 0.0, -2.61799, 0.0, 2.94159, 0.785398),
         seeds=SEEDS,
-        shapes=named,
         camera=Pose((0.00707, -0.04243, 0.124), look_rotation((0, 0, 1), (-1, -1, 0))),
     )
 
@@ -189,6 +176,6 @@ def _arm(name: str, x: float) -> Arm:
 FRANKA_PANDA = Embodiment(
     name="franka-panda",
     arms=(_arm("left", -DISTANCE / 2), _arm("right", DISTANCE / 2)),
-    cameras=SINGLE_ARM_CAMERAS,
+    cameras=links.SINGLE_ARM_CAMERAS,
     distance=DISTANCE,
 )

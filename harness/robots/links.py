@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 from robospa.geometry import Pose, Quat, Vec3, axis_rotation, look_rotation, multiply, yaw_rotation
-from robospa.harness.robots.embodiment import Joint
+from robospa.harness.robots.embodiment import Arm, Joint
 from robospa.tasks.objects.meshes import lathe
 from robospa.tasks.shapes import Box, Color, Cylinder, Mesh, Shape
 from robospa.workcell import WORKCELL, FixedCamera
@@ -15,6 +16,7 @@ from robospa.workcell import WORKCELL, FixedCamera
 ALONG_Y = axis_rotation((1, 0, 0), math.pi / 2)
 ALONG_X = axis_rotation((0, 1, 0), math.pi / 2)
 """Rotations that bring a cylinder's axis, z, along y and along x."""
+HERE = Pose()
 ARC = 7
 """Corners of a drawn half circle."""
 ROUND, EDGE = 16, 2
@@ -133,14 +135,15 @@ def rpy_rotation(roll: float, pitch: float, yaw: float) -> Quat:
     return multiply(yaw_rotation(yaw), multiply(about_y, axis_rotation((1, 0, 0), roll)))
 
 
-def serial_chain(
+def serial_arm(
     rows: Sequence[Row],
-    tool: Quat,
     fingers: Sequence[tuple[str, Vec3, float]],
     limits: tuple[float, float],
     shapes: Sequence[tuple[Shape, ...]],
-) -> tuple[tuple[Joint, ...], tuple[Joint, ...], dict[str, tuple[Shape, ...]]]:
-    """Joints, fingers and shapes of an arm whose links are link0, the base, to link6 or link7.
+    tool: Pose = HERE,
+    **more: Any,
+) -> Arm:
+    """An arm whose links are link0, the base, to link6 or link7; `more` is the rest of it.
 
     `fingers` are name, origin [m] in the last link and side: they slide away from the middle, by
     `limits` [m], and their frames are turned like the end-effector frame, `tool` in the last link:
@@ -150,26 +153,26 @@ def serial_chain(
         Joint(name, f"link{i}", f"link{i + 1}", Pose(xyz, rpy_rotation(*rpy)), axis, low, high)
         for i, (name, xyz, rpy, axis, (low, high)) in enumerate(rows)
     )
-    sliding = tuple(
-        Joint(
-            name,
-            joints[-1].child,
-            f"finger{i}",
-            Pose(origin, tool),
-            (0.0, math.copysign(1.0, side), 0.0),
-            *limits,
-            "prismatic",
+    sliding = []
+    for i, (name, origin, side) in enumerate(fingers, 1):
+        frame, axis = Pose(origin, tool.rotation), (0.0, math.copysign(1.0, side), 0.0)
+        sliding.append(
+            Joint(name, joints[-1].child, f"finger{i}", frame, axis, *limits, "prismatic")
         )
-        for i, (name, origin, side) in enumerate(fingers, 1)
+    base = joints[0].parent
+    named = dict(zip((base, *(j.child for j in (*joints, *sliding))), shapes, strict=True))
+    return Arm(
+        base_link=base, joints=joints, fingers=tuple(sliding), tool=tool, shapes=named, **more
     )
-    names = (joints[0].parent, *(joint.child for joint in (*joints, *sliding)))
-    return joints, sliding, dict(zip(names, shapes, strict=True))
 
 
 FRONT = FixedCamera((0.0, -0.45, 0.85), (0, 1, -0.1), (-1, 0, 0), math.radians(37))
 """Low above the table's near edge; officially only a robot with both arms in one model has it."""
 THIRD = FixedCamera((0.0, 0.23, 1.33), (0, -1, -1.02), (1, 0, 0), math.radians(93))
 """Looks back at the robot, for films: no camera of the official benchmark."""
+
+DARK: Color = (0.05, 0.05, 0.055)
+STEEL: Color = (0.36, 0.37, 0.39)
 
 SINGLE_ARM_CAMERAS: Mapping[str, FixedCamera] = {"head": WORKCELL.head, "third": THIRD}
 """Of a robot made of two single arms."""

@@ -9,24 +9,13 @@ from __future__ import annotations
 import math
 
 from robospa.geometry import Pose, Vec3, look_rotation, yaw_rotation
+from robospa.harness.robots import links
 from robospa.harness.robots.embodiment import Arm, Embodiment
-from robospa.harness.robots.links import (
-    SINGLE_ARM_CAMERAS,
-    Row,
-    block,
-    box,
-    capped,
-    drawn,
-    rod,
-    serial_chain,
-    shell,
-)
+from robospa.harness.robots.links import DARK, STEEL
 from robospa.tasks.shapes import Box, Color, Shape
 from robospa.workcell import Gripper
 
 WHITE: Color = (0.78, 0.79, 0.80)
-DARK: Color = (0.05, 0.05, 0.055)
-STEEL: Color = (0.36, 0.37, 0.39)
 
 UPPER_END = (0.28358, 0.028726, 0.0)
 FORE_END = (-0.24221, 0.068514, 0.0)
@@ -38,46 +27,46 @@ FORE_HEADING = 2.8659
 
 
 def _joint(start: Vec3, end: Vec3, radius: float) -> tuple[Shape, ...]:
-    return capped(start, end, radius, DARK, WHITE, STEEL)
+    return links.capped(start, end, radius, DARK, WHITE, STEEL)
 
 
 LINK_SHAPES: tuple[tuple[Shape, ...], ...] = (
     (
-        box((-0.009, 0.0, 0.008), (0.058, 0.05, 0.008), DARK),
-        shell((-0.009, 0.0, 0.0), (-0.009, 0.0, 0.082), 0.043, WHITE, 0.4),
-        box((-0.050, 0.0, 0.035), (0.012, 0.028, 0.024), WHITE),
-        rod((0.0, 0.0, 0.080), (0.0, 0.0, 0.088), 0.037, DARK),
-        box((-0.009, 0.0, -0.375), (0.05, 0.06, 0.375), STEEL),
+        links.box((-0.009, 0.0, 0.008), (0.058, 0.05, 0.008), DARK),
+        links.shell((-0.009, 0.0, 0.0), (-0.009, 0.0, 0.082), 0.043, WHITE, 0.4),
+        links.box((-0.050, 0.0, 0.035), (0.012, 0.028, 0.024), WHITE),
+        links.rod((0.0, 0.0, 0.080), (0.0, 0.0, 0.088), 0.037, DARK),
+        links.box((-0.009, 0.0, -0.375), (0.05, 0.06, 0.375), STEEL),
     ),
     (
-        shell((0.0, 0.0, -0.036), (0.0, 0.0, 0.030), 0.036, WHITE, 0.6),
+        links.shell((0.0, 0.0, -0.036), (0.0, 0.0, 0.030), 0.036, WHITE, 0.6),
         *_joint((0.0, -0.040, 0.0), (0.0, 0.040, 0.0), 0.030),
     ),
     (
         *_joint((0.0, 0.0, -0.045), (0.0, 0.0, 0.045), 0.035),
-        shell((0.0, 0.0, 0.0), UPPER_END, 0.030, WHITE),
-        rod(ALONG_UPPER[0], ALONG_UPPER[1], 0.0312, STEEL),
+        links.shell((0.0, 0.0, 0.0), UPPER_END, 0.030, WHITE),
+        links.rod(ALONG_UPPER[0], ALONG_UPPER[1], 0.0312, STEEL),
     ),
     (
         *_joint((0.0, 0.0, -0.040), (0.0, 0.0, 0.040), 0.032),
-        shell((0.0, 0.0, 0.0), FORE_END, 0.028, WHITE),
-        rod(ALONG_FORE[0], ALONG_FORE[1], 0.0290, DARK),
-        block(Pose((-0.12, 0.034, 0.0), yaw_rotation(FORE_HEADING)), (0.12, 0.028, 0.03)),
+        links.shell((0.0, 0.0, 0.0), FORE_END, 0.028, WHITE),
+        links.rod(ALONG_FORE[0], ALONG_FORE[1], 0.0290, DARK),
+        links.block(Pose((-0.12, 0.034, 0.0), yaw_rotation(FORE_HEADING)), (0.12, 0.028, 0.03)),
     ),
     _joint((0.0, 0.0, -0.036), (0.0, 0.0, 0.0285), 0.031),
     (
-        shell((0.0, -0.02, 0.0), (0.0, 0.078, 0.0), 0.029, WHITE),
-        rod((0.0, 0.076, 0.0), (0.0, 0.091, 0.0), 0.030, DARK),
-        block(Pose((0.0, 0.035, 0.0)), (0.028, 0.052, 0.028)),
+        links.shell((0.0, -0.02, 0.0), (0.0, 0.078, 0.0), 0.029, WHITE),
+        links.rod((0.0, 0.076, 0.0), (0.0, 0.091, 0.0), 0.030, DARK),
+        links.block(Pose((0.0, 0.035, 0.0)), (0.028, 0.052, 0.028)),
     ),
     (
-        rod((0.0, 0.0, 0.0), (0.0, 0.0, 0.02), 0.03, DARK),
-        box((0.0, 0.0, 0.040), (0.026, 0.072, 0.022), WHITE),
-        box((0.0, 0.0, 0.062), (0.018, 0.068, 0.004), DARK),
-        box((0.0, 0.0, 0.034), (0.0275, 0.030, 0.012), STEEL),
+        links.rod((0.0, 0.0, 0.0), (0.0, 0.0, 0.02), 0.03, DARK),
+        links.box((0.0, 0.0, 0.040), (0.026, 0.072, 0.022), WHITE),
+        links.box((0.0, 0.0, 0.062), (0.018, 0.068, 0.004), DARK),
+        links.box((0.0, 0.0, 0.034), (0.0275, 0.030, 0.012), STEEL),
         # housing of the wrist camera, behind its optical centre
-        box((-0.05, 0.02, 0.028), (0.012, 0.042, 0.01), DARK, 0.46),
-        block(Pose((0.0, 0.0, 0.0335)), (0.03, 0.0725, 0.0335)),
+        links.box((-0.05, 0.02, 0.028), (0.012, 0.042, 0.01), DARK, 0.46),
+        links.block(Pose((0.0, 0.0, 0.0335)), (0.03, 0.0725, 0.0335)),
     ),
 )
 """Base link and links 1 to 6."""
@@ -87,8 +76,8 @@ def _finger(side: float) -> tuple[Shape, ...]:
     """A finger in a frame whose x approaches; its inner face is at y = 0, it lies to `side` y."""
     return (
         Shape(Box((0.0383, 0.006, 0.011)), Pose((-0.0333, side * 0.006, 0.0)), visual=False),
-        drawn(Shape(Box((0.0383, 0.006, 0.011)), Pose((-0.0333, side * 0.006, 0.0)), DARK)),
-        drawn(Shape(Box((0.012, 0.012, 0.02)), Pose((-0.058, side * 0.0125, 0.0)), STEEL)),
+        links.drawn(Shape(Box((0.0383, 0.006, 0.011)), Pose((-0.0333, side * 0.006, 0.0)), DARK)),
+        links.drawn(Shape(Box((0.012, 0.012, 0.02)), Pose((-0.058, side * 0.0125, 0.0)), STEEL)),
     )
 
 
@@ -98,7 +87,7 @@ FINGER_SHAPES: tuple[tuple[Shape, ...], tuple[Shape, ...]] = (_finger(-1.0), _fi
 DISTANCE = 0.6
 Z = (0.0, 0.0, 1.0)
 
-CHAIN: tuple[Row, ...] = (
+CHAIN: tuple[links.Row, ...] = (
     ("joint1", (0.0, 0.0, 0.123), (0.0, 0.0, -1.5708), Z, (-2.618, 2.618)),
     ("joint2", (0.0, 0.0, 0.0), (1.5708, 0.0, -1.5708), Z, (0.0, 3.14)),
     ("joint3", (0.28358, 0.028726, 0.0), (0.0, 0.0, 0.10095), Z, (-2.697, 2.697)),
@@ -135,20 +124,18 @@ SEEDS = (
 
 
 def _arm(name: str, x: float) -> Arm:
-    shapes = (*LINK_SHAPES, *FINGER_SHAPES)
-    joints, fingers, named = serial_chain(CHAIN, TOOL.rotation, FINGERS, (0.0, 0.04), shapes)
-    return Arm(
+    return links.serial_arm(
+        CHAIN,
+        FINGERS,
+        (0.0, 0.04),
+        (*LINK_SHAPES, *FINGER_SHAPES),
+        TOOL,
         name=name,
         base=Pose((x, -0.45, 0.75), yaw_rotation(math.pi / 2)),
-        base_link=joints[0].parent,
-        joints=joints,
-        fingers=fingers,
         travel=(-0.01, 0.04),
         gripper=GRIPPER,
-        tool=TOOL,
         home=(0.0,) * 6,
         seeds=SEEDS,
-        shapes=named,
         camera=Pose(
             (-0.055, 0.032, 0.038), look_rotation((0.44314, 0.0, 0.89645), (0.0, 1.0, 0.0))
         ),
@@ -158,6 +145,6 @@ def _arm(name: str, x: float) -> Arm:
 PIPER = Embodiment(
     name="piper",
     arms=(_arm("left", -DISTANCE / 2), _arm("right", DISTANCE / 2)),
-    cameras=SINGLE_ARM_CAMERAS,
+    cameras=links.SINGLE_ARM_CAMERAS,
     distance=DISTANCE,
 )

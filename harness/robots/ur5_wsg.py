@@ -9,90 +9,80 @@ maintainers name for this robot. The description counts a finger's travel from -
 from __future__ import annotations
 
 from robospa.geometry import Pose, Vec3, look_rotation
+from robospa.harness.robots import links
 from robospa.harness.robots.embodiment import Arm, Embodiment
-from robospa.harness.robots.links import (
-    SINGLE_ARM_CAMERAS,
-    Row,
-    block,
-    box,
-    drawn,
-    rod,
-    serial_chain,
-    shell,
-)
+from robospa.harness.robots.links import DARK, STEEL
 from robospa.tasks.shapes import Box, Color, Shape
 from robospa.workcell import Gripper
 
 GREY: Color = (0.48, 0.50, 0.52)
 BLUE: Color = (0.13, 0.40, 0.68)
-DARK: Color = (0.05, 0.05, 0.055)
-STEEL: Color = (0.36, 0.37, 0.39)
 
 
 def stand(height: float) -> tuple[Shape, ...]:
     """Base link of an arm that stands `height` [m] above the floor, on its column."""
     return (
-        rod((0.0, 0.0, 0.0), (0.0, 0.0, 0.03), 0.073, GREY),
-        box((0.0, 0.0, -height / 2), (0.09, 0.09, height / 2), STEEL),
+        links.rod((0.0, 0.0, 0.0), (0.0, 0.0, 0.03), 0.073, GREY),
+        links.box((0.0, 0.0, -height / 2), (0.09, 0.09, height / 2), STEEL),
     )
 
 
 def _cap(start: Vec3, end: Vec3, radius: float) -> tuple[Shape, ...]:
     x, y, z = (a + 0.25 * (b - a) for a, b in zip(start, end, strict=True))
     return (
-        rod(start, (x, y, z), 0.97 * radius, DARK),
-        shell((x, y, z), end, radius, BLUE, 0.3),
+        links.rod(start, (x, y, z), 0.97 * radius, DARK),
+        links.shell((x, y, z), end, radius, BLUE, 0.3),
     )
 
 
 LINK_SHAPES: tuple[tuple[Shape, ...], ...] = (
     (
-        shell((0.0, 0.0, -0.06), (0.0, 0.0, 0.06), 0.059, GREY, 0.5),
-        rod((0.0, 0.0, -0.062), (0.0, 0.0, -0.056), 0.0605, DARK),
-        shell((0.0, -0.05, 0.0), (0.0, 0.062, 0.0), 0.057, GREY),
+        links.shell((0.0, 0.0, -0.06), (0.0, 0.0, 0.06), 0.059, GREY, 0.5),
+        links.rod((0.0, 0.0, -0.062), (0.0, 0.0, -0.056), 0.0605, DARK),
+        links.shell((0.0, -0.05, 0.0), (0.0, 0.062, 0.0), 0.057, GREY),
         *_cap((0.0, -0.05, 0.0), (0.0, -0.07, 0.0), 0.056),
     ),
     (
-        shell((0.0, -0.06, 0.0), (0.0, 0.062, 0.0), 0.059, GREY),
+        links.shell((0.0, -0.06, 0.0), (0.0, 0.062, 0.0), 0.059, GREY),
         *_cap((0.0, 0.060, 0.0), (0.0, 0.082, 0.0), 0.057),
-        rod((0.0, 0.0, 0.0), (0.0, 0.0, 0.425), 0.045, GREY),
-        rod((0.0, 0.0, 0.060), (0.0, 0.0, 0.072), 0.0475, STEEL),
-        rod((0.0, 0.0, 0.345), (0.0, 0.0, 0.357), 0.0475, STEEL),
-        shell((0.0, -0.06, 0.425), (0.0, 0.060, 0.425), 0.054, GREY),
+        links.rod((0.0, 0.0, 0.0), (0.0, 0.0, 0.425), 0.045, GREY),
+        links.rod((0.0, 0.0, 0.060), (0.0, 0.0, 0.072), 0.0475, STEEL),
+        links.rod((0.0, 0.0, 0.345), (0.0, 0.0, 0.357), 0.0475, STEEL),
+        links.shell((0.0, -0.06, 0.425), (0.0, 0.060, 0.425), 0.054, GREY),
         *_cap((0.0, 0.058, 0.425), (0.0, 0.078, 0.425), 0.052),
     ),
     (
-        shell((0.0, -0.055, 0.0), (0.0, 0.053, 0.0), 0.053, GREY),
-        rod((0.0, 0.0, 0.0), (0.0, 0.0, 0.392), 0.037, GREY),
-        rod((0.0, 0.0, 0.055), (0.0, 0.0, 0.066), 0.0395, STEEL),
-        rod((0.0, 0.0, 0.325), (0.0, 0.0, 0.336), 0.0395, STEEL),
-        shell((0.0, -0.05, 0.392), (0.0, 0.047, 0.392), 0.040, GREY),
+        links.shell((0.0, -0.055, 0.0), (0.0, 0.053, 0.0), 0.053, GREY),
+        links.rod((0.0, 0.0, 0.0), (0.0, 0.0, 0.392), 0.037, GREY),
+        links.rod((0.0, 0.0, 0.055), (0.0, 0.0, 0.066), 0.0395, STEEL),
+        links.rod((0.0, 0.0, 0.325), (0.0, 0.0, 0.336), 0.0395, STEEL),
+        links.shell((0.0, -0.05, 0.392), (0.0, 0.047, 0.392), 0.040, GREY),
         *_cap((0.0, -0.048, 0.392), (0.0, -0.066, 0.392), 0.039),
-        block(Pose((0.0, 0.0, 0.2)), (0.038, 0.038, 0.23)),
+        links.block(Pose((0.0, 0.0, 0.2)), (0.038, 0.038, 0.23)),
     ),
     (
-        shell((0.0, 0.0475, 0.0), (0.0, 0.13, 0.0), 0.039, GREY),
+        links.shell((0.0, 0.0475, 0.0), (0.0, 0.13, 0.0), 0.039, GREY),
         *_cap((0.0, 0.128, 0.0), (0.0, 0.144, 0.0), 0.038),
-        rod((0.0, 0.0465, 0.0), (0.0, 0.051, 0.0), 0.040, DARK),
-        shell((0.0, 0.09, -0.057), (0.0, 0.09, 0.0475), 0.038, GREY),
-        block(Pose((0.0, 0.09, -0.005)), (0.037, 0.042, 0.05)),
+        links.rod((0.0, 0.0465, 0.0), (0.0, 0.051, 0.0), 0.040, DARK),
+        links.shell((0.0, 0.09, -0.057), (0.0, 0.09, 0.0475), 0.038, GREY),
+        links.block(Pose((0.0, 0.09, -0.005)), (0.037, 0.042, 0.05)),
     ),
     (
-        shell((0.0, 0.0, 0.049), (0.0, 0.0, 0.133), 0.039, GREY),
-        rod((0.0, 0.0, 0.047), (0.0, 0.0, 0.052), 0.040, DARK),
+        links.shell((0.0, 0.0, 0.049), (0.0, 0.0, 0.133), 0.039, GREY),
+        links.rod((0.0, 0.0, 0.047), (0.0, 0.0, 0.052), 0.040, DARK),
         *_cap((0.0, 0.0, 0.131), (0.0, 0.0, 0.147), 0.038),
-        shell((0.0, -0.057, 0.0913), (0.0, 0.0475, 0.0913), 0.038, GREY),
+        links.shell((0.0, -0.057, 0.0913), (0.0, 0.0475, 0.0913), 0.038, GREY),
         *_cap((0.0, -0.055, 0.0913), (0.0, -0.070, 0.0913), 0.037),
-        block(Pose((0.0, -0.005, 0.0913)), (0.037, 0.05, 0.042)),
+        links.block(Pose((0.0, -0.005, 0.0913)), (0.037, 0.05, 0.042)),
     ),
     (
-        rod((0.0, 0.047, 0.0), (0.0, 0.082, 0.0), 0.0375, GREY),
-        box((0.0, 0.1195, 0.0), (0.073, 0.037, 0.025), DARK),
-        box((0.0, 0.154, 0.0), (0.072, 0.003, 0.012), STEEL),
+        links.rod((0.0, 0.047, 0.0), (0.0, 0.082, 0.0), 0.0375, GREY),
+        links.box((0.0, 0.1195, 0.0), (0.073, 0.037, 0.025), DARK),
+        links.box((0.0, 0.154, 0.0), (0.072, 0.003, 0.012), STEEL),
         # housing of the wrist camera, behind its optical centre
-        box((0.0, 0.092, 0.072), (0.045, 0.012, 0.0125), STEEL),
-        box((0.0, 0.088, 0.045), (0.012, 0.005, 0.02), STEEL),
-        block(Pose((0.0, 0.1195, 0.0)), (0.073, 0.037, 0.025)),
+        links.box((0.0, 0.092, 0.072), (0.045, 0.012, 0.0125), STEEL),
+        links.box((0.0, 0.088, 0.045), (0.012, 0.005, 0.02), STEEL),
+        links.block(Pose((0.0, 0.1195, 0.0)), (0.073, 0.037, 0.025)),
     ),
 )
 """Links 1 to 6; the last one carries the gripper."""
@@ -103,8 +93,8 @@ def _finger(side: float) -> tuple[Shape, ...]:
     pose = Pose((0.1075, side * 0.006, 0.0))
     return (
         Shape(Box((0.0325, 0.006, 0.010)), pose, visual=False),
-        drawn(Shape(Box((0.0325, 0.006, 0.010)), pose, STEEL)),
-        drawn(Shape(Box((0.006, 0.014, 0.012)), Pose((0.08, side * 0.012, 0.0)), DARK)),
+        links.drawn(Shape(Box((0.0325, 0.006, 0.010)), pose, STEEL)),
+        links.drawn(Shape(Box((0.006, 0.014, 0.012)), Pose((0.08, side * 0.012, 0.0)), DARK)),
     )
 
 
@@ -117,7 +107,7 @@ FULL = (-3.141592653589793, 3.141592653589793)
 Y, Z = (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 LEVEL = (0.0, 0.0, 0.0)
 
-CHAIN: tuple[Row, ...] = (
+CHAIN: tuple[links.Row, ...] = (
     ("shoulder_pan_joint", (0.0, 0.0, 0.089159), LEVEL, Z, (-3.142, 3.142)),
     ("shoulder_lift_joint", (0.0, 0.13585, 0.0), (0.0, QUARTER, 0.0), Y, (-3.142, 0.0)),
     ("elbow_joint", (0.0, -0.1197, 0.425), LEVEL, Y, (-3.142, 3.142)),
@@ -159,20 +149,18 @@ SEEDS = (
 
 
 def _arm(name: str, x: float, height: float) -> Arm:
-    shapes = (stand(height), *LINK_SHAPES, *FINGER_SHAPES)
-    joints, fingers, named = serial_chain(CHAIN, TOOL.rotation, FINGERS, (0.0027, 0.055), shapes)
-    return Arm(
+    return links.serial_arm(
+        CHAIN,
+        FINGERS,
+        (0.0027, 0.055),
+        (stand(height), *LINK_SHAPES, *FINGER_SHAPES),
+        TOOL,
         name=name,
         base=Pose((x, -0.65, height)),
-        base_link=joints[0].parent,
-        joints=joints,
-        fingers=fingers,
         travel=(-0.01, 0.06),
         gripper=GRIPPER,
-        tool=TOOL,
         home=(-1.5447, -1.5447, -1.5447, -1.5794, 1.5794, 0.0),
         seeds=SEEDS,
-        shapes=named,
         camera=Pose((0.0, 0.105, 0.075), look_rotation((0, 1, 0), (-1, 0, 0))),
     )
 
@@ -180,6 +168,6 @@ def _arm(name: str, x: float, height: float) -> Arm:
 UR5_WSG = Embodiment(
     name="ur5-wsg",
     arms=(_arm("left", -DISTANCE / 2, 0.65), _arm("right", DISTANCE / 2, 0.75)),
-    cameras=SINGLE_ARM_CAMERAS,
+    cameras=links.SINGLE_ARM_CAMERAS,
     distance=DISTANCE,
 )

@@ -12,24 +12,10 @@ import numpy as np
 
 from robospa.geometry import Array, Pose, Vec3, axis_rotation, look_rotation, rotate, yaw_rotation
 from robospa.harness.robots.kinematics import inverse
+from robospa.harness.skills import pick as grasping
+from robospa.harness.skills import place as placing
 from robospa.harness.skills.clearance import TOUCH, arm_depth, edge_depth
 from robospa.harness.skills.motion import go, travel
-from robospa.harness.skills.pick import (
-    GraspCandidate,
-    GraspFilter,
-    arms_for,
-    pick,
-    reachable_grasps,
-)
-from robospa.harness.skills.place import (
-    YAWS,
-    Placement,
-    can_follow,
-    grip_offset,
-    place,
-    place_targets,
-    reachable_placements,
-)
 from robospa.harness.skills.workspace import (
     SkillFailed,
     Steps,
@@ -71,7 +57,7 @@ def _plan(ws: Workspace, call: Press) -> tuple[int, Array, Array]:
     """
     frame = ws.pose(call.object) * ws.models[call.object].frames[call.frame]
     x, y, z = frame.position
-    wanted = arms_for(call.arm)
+    wanted = grasping.arms_for(call.arm)
     arms = (0, 1) if x < 0 else (1, 0)
     if len(wanted) == 1:
         arms = (wanted[0], 1 - wanted[0])
@@ -139,12 +125,14 @@ ATTEMPTS = 3
 def stamp(ws: Workspace, call: Stamp) -> Steps:
     """All stamps with one grasp; the last one leaves the object on its target."""
     down = Place(call.object, on=call.on, drop=PRESSED, arm=call.arm)
-    yield from pick(ws, Pick(call.object, LIFT, call.arm), partial(can_follow, ws, down))
+    yield from grasping.pick(
+        ws, Pick(call.object, LIFT, call.arm), partial(placing.can_follow, ws, down)
+    )
     arm = ws.held.index(call.object)
     for _ in range(call.times - 1):
-        offset = grip_offset(ws, arm, call.object)
-        found = reachable_placements(
-            ws, arm, offset, place_targets(ws, down), call.lift, ws.joints[arm]
+        offset = placing.grip_offset(ws, arm, call.object)
+        found = placing.reachable_placements(
+            ws, arm, offset, placing.place_targets(ws, down), call.lift, ws.joints[arm]
         )
         if not found:
             raise SkillFailed(f"{call.object} cannot be brought to {call.on}")
@@ -152,7 +140,7 @@ def stamp(ws: Workspace, call: Stamp) -> Steps:
         ws.add(arm, found[0].joints)
         ws.add(arm, found[0].above)
         yield from ws.flush()
-    yield from place(ws, down)
+    yield from placing.place(ws, down)
 
 
 ABOVE = 0.07
@@ -178,7 +166,7 @@ def hit(ws: Workspace, call: Hit) -> Steps:
     left = list(call.targets)
     home = ws.pose(call.tool)
     for _ in range(ATTEMPTS):
-        yield from pick(ws, Pick(call.tool, LIFT, call.arm), _fitting(ws, call, left))
+        yield from grasping.pick(ws, Pick(call.tool, LIFT, call.arm), _fitting(ws, call, left))
         arm = ws.held.index(call.tool)
         while left:
             done = yield from _strike(ws, arm, call.tool, left[0])
@@ -187,15 +175,17 @@ def hit(ws: Workspace, call: Hit) -> Steps:
             left.pop(0)
         if not left:
             return
-        yield from place(ws, _back(ws, arm, call.tool, home))
+        yield from placing.place(ws, _back(ws, arm, call.tool, home))
     raise SkillFailed(f"{call.tool} did not hit {left[0]} in {ATTEMPTS} grasps")
 
 
 def _back(ws: Workspace, arm: int, tool: str, home: Pose) -> Place:
     w, _, _, z = home.rotation
     call = Place(tool, home.position, yaw=2 * math.atan2(z, w))
-    offset = grip_offset(ws, arm, tool)
-    if reachable_placements(ws, arm, offset, place_targets(ws, call), ABOVE, ws.joints[arm]):
+    offset = placing.grip_offset(ws, arm, tool)
+    if placing.reachable_placements(
+        ws, arm, offset, placing.place_targets(ws, call), ABOVE, ws.joints[arm]
+    ):
         return call
     return Place(tool, home.position)
 
@@ -203,7 +193,7 @@ def _back(ws: Workspace, arm: int, tool: str, home: Pose) -> Place:
 def _strike(ws: Workspace, arm: int, tool: str, name: str) -> Generator[Array, Snapshot, bool]:
     """Down on the object and up again; whether the head met its middle."""
     for k in range(TRIES):
-        offset = grip_offset(ws, arm, tool)
+        offset = placing.grip_offset(ws, arm, tool)
         level = _spots(ws, arm, offset, tool, name, LEVEL)
         found = level or _spots(ws, arm, offset, tool, name, TIPPED)
         if len(found) <= k:
@@ -222,10 +212,10 @@ def _strike(ws: Workspace, arm: int, tool: str, name: str) -> Generator[Array, S
     return False
 
 
-def _fitting(ws: Workspace, call: Hit, names: list[str]) -> GraspFilter:
+def _fitting(ws: Workspace, call: Hit, names: list[str]) -> grasping.GraspFilter:
     """Accepts grasps with SPARE placements on every object, or as many as the best grasp has."""
 
-    def ways(grasp: GraspCandidate, tips: tuple[float, ...]) -> int:
+    def ways(grasp: grasping.GraspCandidate, tips: tuple[float, ...]) -> int:
         offset = grasp.pose.inverse() * ws.pose(call.tool)
         found = SPARE
         for name in names:
@@ -233,7 +223,7 @@ def _fitting(ws: Workspace, call: Hit, names: list[str]) -> GraspFilter:
                 found = min(found, len(_spots(ws, grasp.arm, offset, call.tool, name, tips)))
         return found
 
-    options = reachable_grasps(ws, call.tool, arms_for(call.arm))
+    options = grasping.reachable_grasps(ws, call.tool, grasping.arms_for(call.arm))
     for tips in (LEVEL, LEVEL + TIPPED):
         best = 0
         for option in options:
@@ -254,12 +244,12 @@ def _targets(ws: Workspace, tool: str, name: str, tips: tuple[float, ...]) -> li
         * Pose((0.0, 0.0, 0.0), axis_rotation((1.0, 0.0, 0.0), tip))
         * head
         for tip in tips
-        for yaw in YAWS
+        for yaw in placing.YAWS
     ]
 
 
 def _spots(
     ws: Workspace, arm: int, offset: Pose, tool: str, name: str, tips: tuple[float, ...]
-) -> list[Placement]:
+) -> list[placing.Placement]:
     targets = _targets(ws, tool, name, tips)
-    return reachable_placements(ws, arm, offset, targets, ABOVE, ws.joints[arm])
+    return placing.reachable_placements(ws, arm, offset, targets, ABOVE, ws.joints[arm])

@@ -142,9 +142,9 @@ def draw(
     ranges = measure.ranges(level)
     count = len(ranges)
     ranks = [int(r) + 1 for r in rng.permutation(count)]
-    values = [float(rng.uniform(*ranges[r - 1])) for r in ranks]
+    values = [rng.uniform(*ranges[r - 1]) for r in ranks]
     color = drawn_color(rng)
-    shared = tuple(float(rng.uniform(*r)) for r in measure.shared)
+    shared = tuple(rng.uniform(*r) for r in measure.shared)
     halves = [measure.half(v, shared, level) for v in values]
     radius, height = (np.array(c)[:, None] for c in zip(*map(measure.seen, halves), strict=True))
 

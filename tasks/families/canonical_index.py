@@ -17,19 +17,11 @@ from itertools import combinations
 
 import numpy as np
 
-from robospa.tasks.families.table import (
-    PickFacts,
-    draw_variant,
-    drawn_color,
-    lifted,
-    pick_name,
-    pick_target,
-    put_down,
-)
+from robospa.tasks.families import table
 from robospa.tasks.goals.lifting import Lift
 from robospa.tasks.instructions import Slots, TaskText, ordinal
 from robospa.tasks.sampling.grid import GapGrid, Grid, GridLayout
-from robospa.tasks.sampling.places import retry
+from robospa.tasks.sampling.places import NoRoom, retry
 from robospa.tasks.sampling.turns import Turnable, between
 from robospa.tasks.scene import Scene
 from robospa.tasks.shapes import Params
@@ -48,7 +40,7 @@ def alike(asset: str) -> Things:
     """All objects the same: one variant for the scene."""
 
     def things(rng: np.random.Generator, count: int) -> Sequence[Thing]:
-        return [(asset, draw_variant(rng, asset))] * count
+        return [(asset, table.draw_variant(rng, asset))] * count
 
     return things
 
@@ -69,7 +61,7 @@ VARIANTS: Mapping[str, tuple[int, ...]] = {"alarm_clock": (2,), "phone_stand": (
 
 def _variant(rng: np.random.Generator, asset: str) -> dict[str, int]:
     some = VARIANTS.get(asset)
-    return {"look": int(rng.choice(some))} if some else draw_variant(rng, asset)
+    return {"look": int(rng.choice(some))} if some else table.draw_variant(rng, asset)
 
 
 @dataclass(frozen=True)
@@ -100,7 +92,7 @@ class Line:
 
 
 @dataclass(frozen=True)
-class Facts(PickFacts):
+class Facts(table.PickFacts):
     """Target, and its column and row, counted from 1 in the directions; no row in a single line."""
 
     column: int
@@ -120,7 +112,7 @@ def drawer(line: Line, fixed: bool) -> Draw:
         count = grid.rows * grid.columns
         things = line.things(rng, count)
 
-        def lying() -> tuple[list[int], list[tuple[Turnable, float]]] | None:
+        def lying() -> tuple[list[int], list[tuple[Turnable, float]]]:
             place = grid.places(rng, workcell)
             cells = [int(c) for c in rng.permutation(count)]
             items = [
@@ -130,8 +122,9 @@ def drawer(line: Line, fixed: bool) -> Draw:
                 )
                 for k, (asset, params) in enumerate(things)
             ]
-            free = all(between(a, b) >= 0.0 for a, b in combinations(items, 2))
-            return (cells, items) if free else None
+            if any(between(a, b) < 0.0 for a, b in combinations(items, 2)):
+                raise NoRoom("two things would touch")
+            return cells, items
 
         cells, items = retry(lying, f"grid of {count} {line.noun}s")
         row, column = int(rng.integers(grid.rows)), int(rng.integers(grid.columns))
@@ -149,7 +142,7 @@ def drawer(line: Line, fixed: bool) -> Draw:
                 row=grid.rows - row if from_far else row + 1,
                 row_direction="far_to_near" if from_far else "near_to_far",
             )
-        return SceneSample(put_down(*zip(*items, strict=True)), facts)
+        return SceneSample(table.put_down(*zip(*items, strict=True)), facts)
 
     return draw
 
@@ -179,12 +172,12 @@ def line_task(line: Line, basic: bool = False) -> Task:
     wording = "noun" if basic else line.wording
     counted = ", counted from the left and from the far side" if basic else ""
     return Task(
-        name=f"Basic_Ordinal_{line.kind}" if basic else pick_name(line.kind, "Canonical"),
+        name=f"Basic_Ordinal_{line.kind}" if basic else table.pick_name(line.kind, "Canonical"),
         category="SOI" if basic else "CPI",
         levels={k: Level(g.rows * g.columns, 1, 150) for k, g in line.layouts.items()},
         draw=drawer(line, basic),
-        goal=lifted(Lift(rise=0.04, steady=line.steady)),
-        plan=pick_target,
+        goal=table.lifted(Lift(rise=0.04, steady=line.steady)),
+        plan=table.pick_target,
         templates=lambda level: TEXT.templates(level, wording),
         slots=slots,
         summary=f"Pick the one at a counted place of a grid of 3 to 12 {line.what}{counted}.",
@@ -206,8 +199,8 @@ SET_B = (
 
 def blocks(rng: np.random.Generator, count: int) -> Sequence[Thing]:
     """Equal cubes of 28 to 40 mm in one colour, not so dark or pale that it is lost."""
-    half = float(rng.uniform(0.014, 0.020))
-    color = drawn_color(rng, 0.05, 0.95)
+    half = rng.uniform(0.014, 0.020)
+    color = table.drawn_color(rng, 0.05, 0.95)
     return [("block", {"half": [half] * 3, "color": color})] * count
 
 

@@ -19,7 +19,7 @@ from robospa.tasks.goals.conditions import Condition
 from robospa.tasks.goals.counters import PRESS_BOX, PressCounter
 from robospa.tasks.instructions import Slots, Templates
 from robospa.tasks.plan import Pick, Place, Press, Skill
-from robospa.tasks.sampling.places import Point, Range, retry
+from robospa.tasks.sampling.places import NoRoom, Point, Range, retry
 from robospa.tasks.sampling.turns import Turnable, free_beside
 from robospa.tasks.scene import Scene
 from robospa.tasks.shapes import Params
@@ -51,8 +51,8 @@ class Station:
 class ActionChain:
     """A chain of actions. `steps` are the letters of each level, `limits` its step limits.
 
-    `items` draws a level's things, None if they do not fit; their roles are the fields of `facts`.
-    Both grippers have to be open at the end at the levels `released`. A thing is held within
+    `items` draws a level's things or raises NoRoom; their roles are the fields of `facts`. Both
+    grippers have to be open at the end at the levels `released`. A thing is held within
     `radius` [m] of its origin. Letters in `turns` share a turn. The expert ends with `end`.
     """
 
@@ -60,7 +60,7 @@ class ActionChain:
     steps: Mapping[int, str]
     limits: Mapping[int, int]
     facts: type[SceneFacts]
-    items: Callable[[int, np.random.Generator, Workcell], Sequence[Item] | None]
+    items: Callable[[int, np.random.Generator, Workcell], Sequence[Item]]
     station: Callable[[Scene, str], Station]
     released: Container[int] = ()
     radius: float = 0.12
@@ -164,17 +164,17 @@ def placed(
     others: Sequence[tuple[Turnable, float, float]],
     gap: float,
     off_middle: float = 0.0,
-) -> tuple[Turnable, float] | None:
+) -> tuple[Turnable, float]:
     """A place and a turn, whole in view, free of `others` (thing, turn, least distance [m]).
 
-    Footprints are `gap` [m] apart, |x| is at least `off_middle` [m]. None if none is found.
+    Footprints are `gap` [m] apart, |x| is at least `off_middle` [m]. NoRoom if none is found.
     """
     x, y, most = region
     for _ in range(TRIES):
-        point: Point = (float(rng.uniform(*x)), float(rng.uniform(*y)))
-        item, turn = Turnable(*thing, point), float(rng.uniform(-most, most))
+        point: Point = (rng.uniform(*x), rng.uniform(*y))
+        item, turn = Turnable(*thing, point), rng.uniform(-most, most)
         apart = all(math.dist(point, other.place) >= least for other, _, least in others)
         free = apart and abs(point[0]) >= off_middle
         if free and free_beside(workcell, item, turn, [(o, t) for o, t, _ in others], gap):
             return item, turn
-    return None
+    raise NoRoom(f"no free place of a {thing[0]}")

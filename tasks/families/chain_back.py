@@ -21,7 +21,7 @@ from robospa.tasks.families.chain import ActionChain, Region, Station
 from robospa.tasks.goals.conditions import Rests, on_spot
 from robospa.tasks.instructions import Slots, TaskText
 from robospa.tasks.plan import Place
-from robospa.tasks.sampling.places import Point, free_point
+from robospa.tasks.sampling.places import NoRoom, Point, free_point
 from robospa.tasks.sampling.turns import Turnable
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import SceneFacts
@@ -69,9 +69,7 @@ class ScaleFacts(SceneFacts):
     cards: str = ""
 
 
-def _scale_items(
-    level: int, rng: np.random.Generator, workcell: Workcell
-) -> list[table.Item] | None:
+def _scale_items(level: int, rng: np.random.Generator, workcell: Workcell) -> list[table.Item]:
     items: list[table.Item] = []
     taken: dict[str, tuple[Turnable, float]] = {}
     thing = THINGS[int(rng.integers(len(THINGS)))]
@@ -86,17 +84,11 @@ def _scale_items(
             for other, there in taken.items()
         ]
         off = CARDS_OFF if cards else 0.0
-        found = chain.placed(rng, workcell, (asset, variant), region, others, SCALE_GAP, off)
-        if found is None:
-            return None
-        taken[role] = found
-        pose = table.standing(found[0].place, found[1])
-        items.append(table.Item(role, asset, pose, variant, fixed=role in FIXED))
+        item, turn = taken[role] = chain.placed(
+            rng, workcell, (asset, variant), region, others, SCALE_GAP, off
+        )
+        items.append(table.thing(role, asset, item.place, variant, turn, fixed=role in FIXED))
     return items
-
-
-def _lower(pose: Pose, start: Pose) -> bool:
-    return abs(pose.position[2] - start.position[2]) < BACK
 
 
 def _scale_station(scene: Scene, step: str) -> Station:
@@ -109,7 +101,11 @@ def _scale_station(scene: Scene, step: str) -> Station:
     place = Place(name, on=on, arm="left" if bell else "right")
     if step.isupper():
         after = steps.index(step.lower())
-        return chain.back(scene, place, Rests(name, _lower, grip=SCALE_GRIP, after=after))
+
+        def lower(pose: Pose, start: Pose) -> bool:
+            return abs(pose.position[2] - start.position[2]) < BACK
+
+        return chain.back(scene, place, Rests(name, lower, grip=SCALE_GRIP, after=after))
     near = on_spot(ON, BELOW, ABOVE, Pose(), table.frame_of(scene, on, "support"))
     latched = step.upper() in steps
     rests = Rests(name, near, grip=SCALE_GRIP, targets=(on,), latched=latched)
@@ -162,24 +158,22 @@ class TrayFacts(SceneFacts):
     bell: str = ""
 
 
-def _tray_items(
-    level: int, rng: np.random.Generator, workcell: Workcell
-) -> list[table.Item] | None:
+def _tray_items(level: int, rng: np.random.Generator, workcell: Workcell) -> list[table.Item]:
     variant = table.draw_variant(rng, "tray")
-    middle = (0.0, float(rng.uniform(*TRAY_Y)))
-    items = [table.Item("tray", "tray", table.standing(middle), variant, fixed=True)]
+    middle = (0.0, rng.uniform(*TRAY_Y))
+    items = [table.thing("tray", "tray", middle, variant, fixed=True)]
     width, depth, _ = objects.object_model("tray", variant).size
     taken: list[tuple[Point, float]] = []
     for key, (role, asset) in FOOD.items():
         if key in TRAY_STEPS[level]:
             variant = table.draw_variant(rng, asset)
             seen = table.in_view(workcell, asset, variant)
-            point = free_point(rng, X[role], FOOD_Y, [], allowed=seen)
+            point = free_point(rng, X[role], FOOD_Y, allowed=seen)
             room = table.radius(asset, variant)
-            if point is None or abs(point[0]) < width / 2 + room + TRAY_GAP:
-                return None
+            if abs(point[0]) < width / 2 + room + TRAY_GAP:
+                raise NoRoom("the food would lie on the tray")
             taken.append((point, room))
-            items.append(table.Item(role, asset, table.standing(point), variant))
+            items.append(table.thing(role, asset, point, variant))
     if "c" in TRAY_STEPS[level]:
         variant = table.draw_variant(rng, "bell")
         room = table.radius("bell", variant) + TRAY_GAP
@@ -191,9 +185,7 @@ def _tray_items(
 
         far = [(p, r + room) for p, r in taken]
         place = free_point(rng, BELL_X, BELL_Y, far, allowed=allowed)
-        if place is None:
-            return None
-        items.append(table.Item("bell", "bell", table.standing(place), variant, fixed=True))
+        items.append(table.thing("bell", "bell", place, variant, fixed=True))
     return items
 
 

@@ -23,7 +23,7 @@ from robospa.tasks.goals.conditions import Opened, Rests, level_with
 from robospa.tasks.goals.counters import PressCounter
 from robospa.tasks.instructions import Slots, TaskText
 from robospa.tasks.plan import Home, Open, Pick, Place, Press
-from robospa.tasks.sampling.places import Point, Range, free_point
+from robospa.tasks.sampling.places import NoRoom, Point, Range, free_point, tried_point
 from robospa.tasks.scene import Scene
 from robospa.tasks.shapes import Hinge, Params
 from robospa.tasks.task import SceneFacts
@@ -58,7 +58,7 @@ class CanFacts(SceneFacts):
     pad: str = ""
 
 
-def _can_items(level: int, rng: np.random.Generator, workcell: Workcell) -> list[table.Item] | None:
+def _can_items(level: int, rng: np.random.Generator, workcell: Workcell) -> list[table.Item]:
     can = table.draw_variant(rng, "can")
     items: list[table.Item] = []
     far: list[tuple[Point, float]] = []  # what the can must keep away from, and how far [m]
@@ -68,32 +68,22 @@ def _can_items(level: int, rng: np.random.Generator, workcell: Workcell) -> list
             0.1, table.radius("bread_basket", basket) + table.radius("bread", bread) + GAP
         )
         at = free_point(rng, BREAD_X, BREAD_Y, [(BASKET, between)])
-        if at is None:
-            return None
-        turn = float(rng.uniform(-math.pi, math.pi))
-        items.append(
-            table.Item("basket", "bread_basket", table.standing(BASKET, turn), basket, fixed=True)
-        )
-        turn = float(rng.uniform(-BREAD_YAW, BREAD_YAW))
-        items.append(table.Item("bread", "bread", table.standing(at, turn), bread))
+        turn = rng.uniform(-math.pi, math.pi)
+        items.append(table.thing("basket", "bread_basket", BASKET, basket, turn, fixed=True))
+        turn = rng.uniform(-BREAD_YAW, BREAD_YAW)
+        items.append(table.thing("bread", "bread", at, bread, turn))
         far += [(BASKET, 0.18), (at, 0.18)]
     if level >= 4:
         variant = table.draw_variant(rng, "pill_bottle")
-        bottle = free_point(rng, BOTTLE_X, LEFT_Y, [])
-        pad = free_point(rng, PAD_X, LEFT_Y, [(bottle, 0.1)] if bottle else [])
-        if bottle is None or pad is None:
-            return None
+        bottle = free_point(rng, BOTTLE_X, LEFT_Y)
+        pad = free_point(rng, PAD_X, LEFT_Y, [(bottle, 0.1)])
         square = {"half": list(PAD_HALF), "color": list(NAMED["blue"])}
-        items.append(table.Item("pill_bottle", "pill_bottle", table.standing(bottle), variant))
-        items.append(
-            table.Item("pad", "block", table.standing(pad, 0.0, PAD_HALF[2]), square, fixed=True)
-        )
+        items.append(table.thing("pill_bottle", "pill_bottle", bottle, variant))
+        items.append(table.thing("pad", "block", pad, square, fixed=True, height=PAD_HALF[2]))
         far += [(bottle, 0.1), (pad, 0.1)]
     first_y = CAN_FIRST_Y if level >= 2 else CAN_Y
-    place = free_point(rng, CAN_X, first_y, far, tries=1) or free_point(rng, CAN_X, CAN_Y, far)
-    if place is None:
-        return None
-    return [*items, table.Item("can", "can", table.standing(place), can, fixed=True)]
+    place = tried_point(rng, CAN_X, first_y, far, 1) or free_point(rng, CAN_X, CAN_Y, far)
+    return [*items, table.thing("can", "can", place, can, fixed=True)]
 
 
 def _can_station(scene: Scene, step: str) -> Station:
@@ -176,29 +166,28 @@ class MicrowaveFacts(SceneFacts):
     reference: str = ""
 
 
-def _items(level: int, rng: np.random.Generator, workcell: Workcell) -> list[table.Item] | None:
+def _items(level: int, rng: np.random.Generator, workcell: Workcell) -> list[table.Item]:
     bell, variant = _point(rng, BELL_X, BELL_Y), table.draw_variant(rng, "bell")
-    items = [table.Item("bell", "bell", table.standing(bell), variant, fixed=True)]
+    items = [table.thing("bell", "bell", bell, variant, fixed=True)]
     if level >= 2:
         oven, finish = _point(rng, MICROWAVE_X, MICROWAVE_Y), table.draw_variant(rng, "microwave")
-        items.append(table.Item("microwave", "microwave", table.standing(oven), finish, fixed=True))
+        items.append(table.thing("microwave", "microwave", oven, finish, fixed=True))
         if level >= 4:
             axis = _door(finish).point
             hinge = (oven[0] + axis[0], oven[1] + axis[1])
             far = [(bell, table.radius("bell", variant) + ELBOW), (hinge, SWING)]
-            things = _things(rng, workcell, far, oven)
-            return things and [*items, *things]
+            items += _things(rng, workcell, far, oven)
     return items
 
 
 def _point(rng: np.random.Generator, x: Range, y: Range) -> Point:
-    return (float(rng.uniform(*x)), float(rng.uniform(*y)))
+    return (rng.uniform(*x), rng.uniform(*y))
 
 
 def _things(
     rng: np.random.Generator, workcell: Workcell, far: list[tuple[Point, float]], oven: Point
-) -> list[table.Item] | None:
-    """Two things, either of which has room to the left of the other; None if there is no room.
+) -> list[table.Item]:
+    """Two things, either of which has room to the left of the other.
 
     Which of the two is to be moved is a toss, so that the scene does not tell.
     """
@@ -218,13 +207,11 @@ def _things(
             fits &= np.hypot(*(at - point).T) >= room + size
         fits &= workcell.in_view(at[:, 0], at[:, 1], size, 0.0, (0.0, 0.0))
     if not fits.any():
-        return None
+        raise NoRoom("no free places of two things")
     first = int(np.argmax(fits))
     roles = ("object", "reference") if rng.random() < 0.5 else ("reference", "object")
     return [
-        table.Item(
-            role, kind, table.standing((x, y), float(rng.uniform(-math.pi, math.pi))), variant
-        )
+        table.thing(role, kind, (x, y), variant, rng.uniform(-math.pi, math.pi))
         for role, kind, variant, (x, y) in zip(
             roles, kinds, variants, (west[first].tolist(), east[first].tolist()), strict=True
         )

@@ -20,7 +20,7 @@ from robospa.tasks.families.dustbin import reachable
 from robospa.tasks.goals.conditions import Near, Rests
 from robospa.tasks.instructions import Slots, TaskText
 from robospa.tasks.plan import Hang, Pick, Place
-from robospa.tasks.sampling.places import Point, Range, free_point
+from robospa.tasks.sampling.places import NoRoom, Point, Range, free_point
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import SceneFacts
 from robospa.workcell import Workcell
@@ -69,26 +69,21 @@ class Facts(SceneFacts):
     yellow: str = ""
 
 
-def _items(level: int, rng: np.random.Generator, workcell: Workcell) -> list[table.Item] | None:
+def _items(level: int, rng: np.random.Generator, workcell: Workcell) -> list[table.Item]:
     mug, rack = table.draw_variant(rng, "mug"), table.draw_variant(rng, "mug_rack")
-    at = free_point(rng, MUG_X, MUG_Y, [], allowed=table.in_view(workcell, "mug", mug))
-    stand = free_point(rng, RACK_X, RACK_Y, [], allowed=partial(_rack_seen, workcell))
-    if at is None or stand is None:
-        return None
+    at = free_point(rng, MUG_X, MUG_Y, allowed=table.in_view(workcell, "mug", mug))
+    stand = free_point(rng, RACK_X, RACK_Y, allowed=partial(_rack_seen, workcell))
     if math.dist(at, stand) < table.radius("mug", mug) + table.radius("mug_rack", rack):
-        return None
-    turn = float(rng.uniform(-MUG_YAW, MUG_YAW))
-    items = [table.Item("mug", "mug", table.standing(at, turn), mug)]
-    turn = RACK_TURN + float(rng.uniform(-RACK_YAW, RACK_YAW))
-    items.append(table.Item("rack", "mug_rack", table.standing(stand, turn), rack, fixed=True))
+        raise NoRoom("the mug is too near to the rack")
+    turn = rng.uniform(-MUG_YAW, MUG_YAW)
+    items = [table.thing("mug", "mug", at, mug, turn)]
+    turn = RACK_TURN + rng.uniform(-RACK_YAW, RACK_YAW)
+    items.append(table.thing("rack", "mug_rack", stand, rack, turn, fixed=True))
     points: list[Point] = [PLACE]
     for color in list(COLORS)[: level - 1]:
-        point = _block_point(rng, workcell, BLOCK_Y[level], points)
-        if point is None:
-            return None
-        points.append(point)
-        yaw = float(rng.uniform(-BLOCK_YAW, BLOCK_YAW))
-        items.append(table.block(color, point, HALF, COLORS[color], yaw))
+        points.append(_block_point(rng, workcell, BLOCK_Y[level], points))
+        yaw = rng.uniform(-BLOCK_YAW, BLOCK_YAW)
+        items.append(table.block(color, points[-1], HALF, COLORS[color], yaw))
     return items
 
 
@@ -100,15 +95,14 @@ def _rack_seen(workcell: Workcell, point: Point) -> bool:
 
 def _block_point(
     rng: np.random.Generator, workcell: Workcell, y: Range, others: list[Point]
-) -> Point | None:
+) -> Point:
     """A free place: off the far middle, where the official scenes draw another y."""
     far = [(other, DISTANCE) for other in others]
     allowed = partial(reachable, workcell)
     point = free_point(rng, BLOCK_X, y, far, allowed=allowed)
-    if point is None or abs(point[0]) >= MIDDLE or point[1] <= 0:
+    if abs(point[0]) >= MIDDLE or point[1] <= 0:
         return point
-    x = (point[0], point[0])
-    return free_point(rng, x, (y[0], 0.0), far, 1, allowed)
+    return free_point(rng, (point[0], point[0]), (y[0], 0.0), far, 1, allowed)
 
 
 def _hangs(handle: Pose, peg: Pose, above: float) -> Near:

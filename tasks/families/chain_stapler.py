@@ -17,12 +17,12 @@ import numpy as np
 from robospa.geometry import Pose
 from robospa.tasks.families.chain import ActionChain, Region, Station, button, placed, pressing_arm
 from robospa.tasks.families.dustbin import BIN, TABLE_SHIFT, container
-from robospa.tasks.families.table import Item, draw_variant, frame_of, radius, standing
+from robospa.tasks.families.table import Item, draw_variant, frame_of, radius, thing
 from robospa.tasks.goals.conditions import Inside, Near, Rests
 from robospa.tasks.goals.counters import StampCounter, inside_box
 from robospa.tasks.instructions import Slots, TaskText, times
 from robospa.tasks.plan import Dock, Home, Pour, Press, Stamp
-from robospa.tasks.sampling.places import Point, free_point
+from robospa.tasks.sampling.places import Point, free_point, tried_point
 from robospa.tasks.sampling.turns import Turnable
 from robospa.tasks.scene import Scene
 from robospa.tasks.task import SceneFacts
@@ -64,7 +64,7 @@ class PhoneFacts(SceneFacts):
     dustbin: str = ""
 
 
-def _phone_items(level: int, rng: np.random.Generator, workcell: Workcell) -> list[Item] | None:
+def _phone_items(level: int, rng: np.random.Generator, workcell: Workcell) -> list[Item]:
     items: list[Item] = []
     taken: list[tuple[Turnable, float]] = []
     wanted = ["phone", "phone_stand", *(["stapler"] if PRESSES[level] else [])]
@@ -72,14 +72,11 @@ def _phone_items(level: int, rng: np.random.Generator, workcell: Workcell) -> li
         variant = draw_variant(rng, asset, VARIANTS.get(asset))
         least = PHONE_DISTANCE if asset == "phone_stand" else 0.0
         others = [(thing, turn, least) for thing, turn in taken]
-        found = placed(rng, workcell, (asset, variant), REGIONS[asset], others, GAP)
-        if found is None:
-            return None
-        taken.append(found)
-        pose = standing(found[0].place, found[1])
-        items.append(Item(asset, asset, pose, variant, fixed=asset in ("phone_stand", "stapler")))
+        taken.append(placed(rng, workcell, (asset, variant), REGIONS[asset], others, GAP))
+        (item, turn), fixed = taken[-1], asset in ("phone_stand", "stapler")
+        items.append(thing(asset, asset, item.place, variant, turn, fixed))
     if level == DUMP_LEVEL:
-        dx, dy = (float(rng.uniform(-GARBAGE_XY, GARBAGE_XY)) for _ in range(2))
+        dx, dy = (rng.uniform(-GARBAGE_XY, GARBAGE_XY) for _ in range(2))
         bin_x, bin_y = taken[-1][0].place
         start = Pose((bin_x + dx, bin_y + dy, GARBAGE_Z))
         items.append(Item("garbage", "garbage", start, {"look": 0}))
@@ -158,30 +155,25 @@ class SealsFacts(SceneFacts):
     stapler: str = ""
 
 
-def _seals_items(level: int, rng: np.random.Generator, workcell: Workcell) -> list[Item] | None:
+def _seals_items(level: int, rng: np.random.Generator, workcell: Workcell) -> list[Item]:
     items: list[Item] = []
     taken: list[tuple[Point, float]] = []
     for at in ("left", "right")[: 1 + ("r" in SEALS_STEPS[level])]:
         x, y = X[at], Y[level]
-        seal = free_point(rng, x, y, [])
-        pad = free_point(rng, x, y, [(seal, DISTANCE)], 1) if seal else None
-        if seal and pad is None:
-            pad = free_point(rng, x, (y[0], PAD_FAR_Y), [(seal, DISTANCE)])
-        if seal is None or pad is None:
-            return None
+        seal = free_point(rng, x, y)
+        near = [(seal, DISTANCE)]
+        pad = tried_point(rng, x, y, near, 1) or free_point(rng, x, (y[0], PAD_FAR_Y), near)
         variant = draw_variant(rng, "seal")
-        items.append(Item(f"{at}_seal", "seal", standing(seal), variant))
+        items.append(thing(f"{at}_seal", "seal", seal, variant))
         color = draw_variant(rng, "pad")
-        items.append(Item(f"{at}_pad", "pad", standing(pad), color, fixed=True))
+        items.append(thing(f"{at}_pad", "pad", pad, color, fixed=True))
         taken += [(seal, radius("seal", variant)), (pad, radius("pad", color))]
     if "s" in SEALS_STEPS[level]:
         variant = draw_variant(rng, "stapler")
         room = radius("stapler", variant) + GAP
         spot = free_point(rng, STAPLER_X, STAPLER_Y, [(p, r + room) for p, r in taken])
-        if spot is None:
-            return None
-        pose = standing(spot, float(rng.uniform(-math.pi, math.pi)))
-        items.append(Item("stapler", "stapler", pose, variant, fixed=True))
+        turn = rng.uniform(-math.pi, math.pi)
+        items.append(thing("stapler", "stapler", spot, variant, turn, fixed=True))
     return items
 
 

@@ -20,14 +20,7 @@ from robospa.tasks.families import table
 from robospa.tasks.families.table import standing
 from robospa.tasks.goals.clicks import ClickInOrder
 from robospa.tasks.goals.counters import PRESS_BOX, PressCounter
-from robospa.tasks.instructions import (
-    NUMBERS,
-    Slots,
-    TaskText,
-    Templates,
-    acting_arm,
-    one_after_another,
-)
+from robospa.tasks.instructions import NUMBERS, Slots, TaskText, acting_arm, one_after_another
 from robospa.tasks.plan import Press, Skill
 from robospa.tasks.sampling import places
 from robospa.tasks.sampling.turns import Turnable, outline, turned
@@ -173,7 +166,7 @@ def _draw_bells(level: int, rng: np.random.Generator, workcell: Workcell) -> Sce
     params = clickable(rng, "bell")
     points = _ring(level, rng, table.in_view(workcell, "bell", params))
     items = [
-        table.Item(f"bell {i}", "bell", standing(point), params, fixed=True)
+        table.thing(f"bell {i}", "bell", point, params, fixed=True)
         for i, point in enumerate(points)
     ]
     scene_objects, names = table.named(rng, items)
@@ -188,7 +181,7 @@ def _ring(
         ring = _pair(rng) if level == 2 else _round(level, rng) if level > 2 else [(0.0, 0.0)]
         if _regular(ring, APART[level]):
             shift = [
-                float(rng.uniform(low - min(p[k] for p in ring), high - max(p[k] for p in ring)))
+                rng.uniform(low - min(p[k] for p in ring), high - max(p[k] for p in ring))
                 for k, (low, high) in enumerate((X, Y))
             ]
             ring = [(x + shift[0], y + shift[1]) for x, y in ring]
@@ -198,21 +191,18 @@ def _ring(
 
 
 def _pair(rng: np.random.Generator) -> list[places.Point]:
-    base = float(rng.uniform(0.10, 0.15))
-    return [
-        (float(rng.uniform(-0.015, 0.015)), way * base * float(rng.uniform(0.92, 1.10)))
-        for way in (1, -1)
-    ]
+    base = rng.uniform(0.10, 0.15)
+    return [(rng.uniform(-0.015, 0.015), way * base * rng.uniform(0.92, 1.10)) for way in (1, -1)]
 
 
 def _round(level: int, rng: np.random.Generator) -> list[places.Point]:
-    base = float(rng.uniform(*BASE[level]))
-    wide, deep = float(rng.uniform(0.80, 1.18)), float(rng.uniform(0.80, 1.14))
+    base = rng.uniform(*BASE[level])
+    wide, deep = rng.uniform(0.80, 1.18), rng.uniform(0.80, 1.14)
     ring = []
     for i in range(level):
         angle = math.pi / 2 - 2 * math.pi * i / level
         angle += float(rng.uniform(-0.05, 0.05) if i == 0 else rng.uniform(-0.22, 0.22))
-        radius = base * float(rng.uniform(0.85, 1.18))
+        radius = base * rng.uniform(0.85, 1.18)
         dx, dy = (float(v) for v in rng.uniform(-0.012, 0.012, 2))
         ring.append((wide * radius * math.cos(angle) + dx, deep * radius * math.sin(angle) + dy))
     return ring
@@ -248,10 +238,6 @@ def _bell_slots(scene: Scene) -> Slots:
     return phrases | acting_arm(table.side_of(scene, order[0]))
 
 
-def _bell_templates(level: int) -> Templates:
-    return (TEXT if level < 3 else BELLS_TEXT).templates(level)
-
-
 BELLS = Task(
     name="Click_Bell_Clockwise_Order",
     category="OCE",
@@ -259,7 +245,7 @@ BELLS = Task(
     draw=_draw_bells,
     goal=lambda scene: in_order(scene, Facts.of(scene).order, standing=False),
     plan=plan,
-    templates=_bell_templates,
+    templates=lambda level: (TEXT if level < 3 else BELLS_TEXT).templates(level),
     slots=_bell_slots,
     summary="Click the bells clockwise, beginning with the one farthest from the robot.",
     success=(

@@ -17,15 +17,7 @@ import numpy as np
 
 from robospa.geometry import Array
 from robospa.tasks.colors import NAMED, nearest
-from robospa.tasks.families.table import (
-    PickFacts,
-    draw_variant,
-    lifted,
-    pick_name,
-    pick_target,
-    standing,
-    variant_phrasings,
-)
+from robospa.tasks.families import table
 from robospa.tasks.goals.lifting import Lift
 from robospa.tasks.instructions import Phrasings, Slots, TaskText, ordinal
 from robospa.tasks.objects import object_model
@@ -245,7 +237,7 @@ def put_down(
     The first layout in which all can be turned so that they are free, whole in view and graspable.
     """
     order = [int(i) for i in rng.permutation(len(things))]
-    variants = [things[i][1] or draw_variant(rng, things[i][0]) for i in order]
+    variants = [things[i][1] or table.draw_variant(rng, things[i][0]) for i in order]
 
     def lying() -> tuple[Array, list[Turnable]]:
         points = places()
@@ -258,13 +250,13 @@ def put_down(
     objects = []
     for k, (item, turn) in enumerate(zip(items, turns, strict=True)):
         height = -object_model(item.asset, item.params).bottom
-        pose = standing(item.place, turn, height)
+        pose = table.standing(item.place, turn, height)
         objects.append(SceneObject(f"object_{k}", item.asset, pose, dict(item.params)))
     return points, tuple(objects), order
 
 
 @dataclass(frozen=True)
-class Facts(PickFacts):
+class Facts(table.PickFacts):
     """Target, reference, and the target's rank; rank 1 is the farthest."""
 
     reference: str
@@ -304,8 +296,8 @@ def distance_task(family: ObjectSet, name: str, what: str) -> Task:
         category="SDE",
         levels=family.rules.levels,
         draw=lambda level, rng, workcell: draw(level, rng, workcell, family),
-        goal=lifted(Lift(above=0.82)),
-        plan=pick_target,
+        goal=table.lifted(Lift(above=0.82)),
+        plan=table.pick_target,
         templates=TEXT.templates,
         slots=slots,
         summary=f"Pick the k-th farthest of {what} from a named one.",
@@ -326,19 +318,14 @@ HALF_EDGES = (
 
 def blocks(level: int, rng: np.random.Generator) -> list[Thing]:
     """Equal cubes of different colours."""
-    half = float(rng.uniform(*HALF_EDGES[level - 1]))
+    half = rng.uniform(*HALF_EDGES[level - 1])
     colors = [NAMED[word] for word in BLOCK_COLORS][: BLOCKS.rules.counts[level - 1]]
     order = rng.permutation(len(colors))
     return [("block", {"half": [half] * 3, "color": list(colors[i])}) for i in order]
 
 
-def block_color(item: SceneObject) -> str:
-    """The colour word of a block."""
-    return nearest(tuple(item.params["color"]))
-
-
 def _block_names(item: SceneObject) -> Phrasings:
-    return TEXT.phrasings("colored.block", color=block_color(item))
+    return TEXT.phrasings("colored.block", color=nearest(tuple(item.params["color"])))
 
 
 BLOCKS = ObjectSet(
@@ -432,7 +419,7 @@ def _category_names(item: SceneObject) -> Phrasings:
     Those with a modifier behind the noun are left out: "the object farthest from the bowl that is
     blue" could be read as a blue object.
     """
-    own = variant_phrasings(object_model(item.asset, item.params))
+    own = table.variant_phrasings(object_model(item.asset, item.params))
     usable = ([p for p in some if not MODIFIERS & set(p.split())] for some in own)
     plain = TEXT.phrasings(f"reference.{item.asset}")
     train, held = (tuple(dict.fromkeys((*a, *b))) for a, b in zip(plain, usable, strict=True))
@@ -486,4 +473,4 @@ WHAT = {
     "Mixed_Objects_B": "3 to 7 different objects",
 }
 
-TASKS = tuple(distance_task(f, pick_name(f.name, "Distance"), WHAT[f.name]) for f in FAMILIES)
+TASKS = tuple(distance_task(f, table.pick_name(f.name, "Distance"), WHAT[f.name]) for f in FAMILIES)

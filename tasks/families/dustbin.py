@@ -19,7 +19,7 @@ from robospa.tasks import objects
 from robospa.tasks.families import chain, table
 from robospa.tasks.goals.conditions import Container, Inside, Rests, on_spot
 from robospa.tasks.goals.placing import collect
-from robospa.tasks.instructions import NUMBERS, Slots, TaskText, Templates, by_count
+from robospa.tasks.instructions import NUMBERS, Slots, TaskText, by_count
 from robospa.tasks.plan import Drop, Pick, Place, Skill
 from robospa.tasks.sampling.places import Point, Range, apart, free_point, scatter_points
 from robospa.tasks.scene import Scene, SceneObject
@@ -94,9 +94,7 @@ def draw(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSampl
     variants = rng.choice(count, size=level, replace=level > min(3, count))
     items = [table.Item("dustbin", "dustbin", BIN, {"look": 0}, fixed=True)]
     for i, (point, variant) in enumerate(zip(points, variants, strict=True)):
-        items.append(
-            table.Item(f"bottle {i}", "bottle", table.standing(point), {"look": int(variant)})
-        )
+        items.append(table.thing(f"bottle {i}", "bottle", point, {"look": int(variant)}))
     scene_objects, names = table.named(rng, items)
     facts = Facts(names["dustbin"], tuple(names[f"bottle {i}"] for i in range(level)))
     return SceneSample(scene_objects, facts, TABLE_SHIFT)
@@ -187,11 +185,11 @@ class CupFacts(SceneFacts):
         return tuple(name for name in names if name)
 
 
-def _items(level: int, rng: np.random.Generator, workcell: Workcell) -> list[table.Item] | None:
+def _items(level: int, rng: np.random.Generator, workcell: Workcell) -> list[table.Item]:
     items = [table.Item("dustbin", "dustbin", BIN, {"look": 0}, fixed=True)]
     points: list[Point] = []
 
-    def put(role: str, x: Range, y: Range, far: list[tuple[Point, float]]) -> Point | None:
+    def put(role: str, x: Range, y: Range, far: list[tuple[Point, float]]) -> Point:
         asset = role.split("_")[0]
         variant = CUP if asset == "cup" else table.draw_variant(rng, asset)
         wide = table.radius(asset, variant)
@@ -205,24 +203,17 @@ def _items(level: int, rng: np.random.Generator, workcell: Workcell) -> list[tab
             return point[0] - wide > TABLE_LEFT + EDGE and seen(point)
 
         point = free_point(rng, x, y, far, allowed=allowed)
-        if point is not None:
-            points.append(point)
-            items.append(
-                table.Item(role, asset, table.standing(point), variant, fixed=asset == "coaster")
-            )
+        points.append(point)
+        items.append(table.thing(role, asset, point, variant, fixed=asset == "coaster"))
         return point
 
     right = {1: (), 2: (ALONE_X,)}.get(BOTTLE_COUNT[level], (NEXT_X, LAST_X))
     for i, x in enumerate((LEFT_X, *right)):
-        if put(f"bottle_{i}", x, BOTTLE_Y, [(p, BOTTLE_DISTANCE) for p in points]) is None:
-            return None
+        put(f"bottle_{i}", x, BOTTLE_Y, [(p, BOTTLE_DISTANCE) for p in points])
     for i in range(CUP_COUNT[level]):
         cup = put(f"cup_{i}", CUP_X[i], CUP_Y, [(p, CUP_DISTANCE) for p in points])
-        if cup is None:
-            return None
         far = [(p, PAIR_DISTANCE if p == cup else CUP_DISTANCE) for p in points]
-        if put(f"coaster_{i}", COASTER_X[i], CUP_Y, far) is None:
-            return None
+        put(f"coaster_{i}", COASTER_X[i], CUP_Y, far)
     return items
 
 
@@ -273,11 +264,6 @@ def _cup_slots(scene: Scene) -> Slots:
     return phrases | (CUPS_TEXT.slots(*words) if cups else {})
 
 
-def _cup_templates(level: int) -> Templates:
-    """Bottles alone up to level 3, cups too from level 4 on."""
-    return (CUPS_TEXT if CUP_COUNT[level] else TEXT).templates(level)
-
-
 CUPS = chain.ActionChain(
     "Place_Bottle_Cup",
     steps={n: "123"[: BOTTLE_COUNT[n]] + "xy"[: CUP_COUNT[n]] for n in range(1, 6)},
@@ -290,7 +276,7 @@ CUPS = chain.ActionChain(
     turns={"1": 0, "2": 0, "3": 0, "x": 1, "y": 1},
     table_shift=TABLE_SHIFT,
 ).task(
-    _cup_templates,
+    lambda level: (CUPS_TEXT if CUP_COUNT[level] else TEXT).templates(level),
     _cup_slots,
     summary="Throw the bottles into the dustbin, then put the cups on the coasters.",
     success=(

@@ -202,7 +202,7 @@ def _draw_objects(level: int, rng: np.random.Generator, workcell: Workcell) -> S
     places = click_order.laid_out(rng, workcell, TABLE_AREA, OFF_MIDDLE, APART, things, turns)
     items = [wall(0.05, 0.32), OBJECTS_STAND]
     for (kind, variant), x, place in zip(things, row(level, SHOWN_X), places, strict=True):
-        turn = float(rng.uniform(-SHOWN_TURN, SHOWN_TURN)) if kind == "bread" else 0.0
+        turn = rng.uniform(-SHOWN_TURN, SHOWN_TURN) if kind == "bread" else 0.0
         pose = Pose((x, OBJECTS_STAND.pose.position[1], STAND_TOP), yaw_rotation(turn))
         items.append(table.Item(f"{kind} shown", kind, pose, variant, fixed=True))
         items.append(table.Item(kind, kind, table.standing(*place), variant, fixed=True))
@@ -220,10 +220,6 @@ def _objects_goal(scene: Scene) -> AfterCue:
     return AfterCue(click_order.in_order(scene, facts.order, standing=True), [facts.wall])
 
 
-def _objects_plan(scene: Scene) -> tuple[Skill, ...]:
-    return (HOLD_STILL, *click_order.clicks(scene, ObjectsFacts.of(scene).order))
-
-
 def _objects_slots(scene: Scene) -> Slots:
     """What is shown and which way round to go; no object is named."""
     count = len(ObjectsFacts.of(scene).order)
@@ -236,7 +232,7 @@ OBJECTS = Task(
     levels=levels(candidates=1),
     draw=_draw_objects,
     goal=_objects_goal,
-    plan=_objects_plan,
+    plan=lambda scene: (HOLD_STILL, *click_order.clicks(scene, ObjectsFacts.of(scene).order)),
     templates=OBJECTS_TEXT.templates,
     slots=_objects_slots,
     summary="Remember the row of objects shown and click the same ones in that order.",
@@ -275,13 +271,11 @@ def _draw_turned(level: int, rng: np.random.Generator, workcell: Workcell) -> Sc
     variant = int(rng.integers(objects.variant_count("t_block")))
     items = [wall(0.10)]
     for i, (x, turn) in enumerate(zip(row(level, FAR_X), shown, strict=True)):
-        pose = table.standing((x, FAR_Y), TURNS[turn])
-        items.append(table.Item(f"far {i}", "t_block", pose, {"look": variant, "kind": far_kind}))
+        look = {"look": variant, "kind": far_kind}
+        items.append(table.thing(f"far {i}", "t_block", (x, FAR_Y), look, TURNS[turn]))
     for i, (x, turn) in enumerate(zip(row(level, NEAR_X), start, strict=True)):
-        pose = table.standing((x, NEAR_Y), TURNS[turn])
-        items.append(
-            table.Item(f"near {i}", "t_block", pose, {"look": variant, "kind": 1 - far_kind})
-        )
+        look = {"look": variant, "kind": 1 - far_kind}
+        items.append(table.thing(f"near {i}", "t_block", (x, NEAR_Y), look, TURNS[turn]))
     scene_objects, names = table.named(rng, items)
     facts = TurnedFacts(
         near=tuple(names[f"near {i}"] for i in range(level)),
@@ -368,17 +362,11 @@ class CountsFacts(SceneFacts):
 
 
 def _draw_counts(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
-    y = float(rng.uniform(*STAPLERS_Y))
-    items = [
-        table.Item(
-            f"stapler {i}",
-            "stapler",
-            table.standing((x, y), float(rng.uniform(-math.pi, math.pi))),
-            table.draw_variant(rng, "stapler"),
-            fixed=True,
-        )
-        for i, x in enumerate(STAPLER_ROWS[level])
-    ]
+    y = rng.uniform(*STAPLERS_Y)
+    items = []
+    for i, x in enumerate(STAPLER_ROWS[level]):
+        turn, look = rng.uniform(-math.pi, math.pi), table.draw_variant(rng, "stapler")
+        items.append(table.thing(f"stapler {i}", "stapler", (x, y), look, turn, fixed=True))
     counts = tuple(int(n) for n in rng.integers(1, MOST + 1, level))
     scene_objects, names = table.named(rng, items)
     return SceneSample(

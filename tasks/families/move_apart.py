@@ -81,7 +81,7 @@ def _squares(rng: np.random.Generator, count: int, half: float) -> list[Square]:
     for _ in range(places.LAYOUTS):
         found: list[Square] = []
         for _ in range(places.TRIES_PER_POINT * count):
-            x, y, yaw = (float(rng.uniform(*ends)) for ends in (X, Y, (-YAW, YAW)))
+            x, y, yaw = (rng.uniform(*ends) for ends in (X, Y, (-YAW, YAW)))
             square = Square(x, y, yaw, half)
             if all(square.clear_of(other) for other in found):
                 found.append(square)
@@ -97,7 +97,7 @@ def _draw_blocks(level: int, rng: np.random.Generator, workcell: Workcell) -> Sc
     first, second = (list(COLORS)[int(i)] for i in rng.permutation(len(COLORS))[:2])
     right = TO_RIGHT[level] if level > 1 else int(rng.integers(2))
     words = [first] * right + [second] * (level - right)
-    half = float(rng.uniform(*HALF))
+    half = rng.uniform(*HALF)
     items = [
         table.block(str(i), (square.x, square.y), half, COLORS[word], square.yaw)
         for i, (word, square) in enumerate(zip(words, _squares(rng, level, half), strict=True))
@@ -187,7 +187,7 @@ def _draw_cards(level: int, rng: np.random.Generator, workcell: Workcell) -> Sce
     variants = [table.draw_variant(rng, "playing_cards") for _ in points]
     lying = [Turnable("playing_cards", *thing) for thing in zip(variants, points, strict=True)]
     items = [
-        table.Item(str(i), box.asset, table.standing(box.place, yaw), box.params)
+        table.thing(str(i), box.asset, box.place, box.params, yaw)
         for i, (box, yaw) in enumerate(zip(lying, free_turns(rng, workcell, lying), strict=True))
     ]
     scene_objects, names = table.named(rng, items)
@@ -285,17 +285,15 @@ def _draw_food(level: int, rng: np.random.Generator, workcell: Workcell) -> Scen
     """Which kind goes forward is a fair coin, and so is the direction at level 1."""
     kinds = ["bread", "fries"] if rng.random() < 0.5 else ["fries", "bread"]
     first = FIRST[level] if level > 1 else int(rng.integers(2))
-    y = float(rng.uniform(*ROW_Y))
+    y = rng.uniform(*ROW_Y)
     items = []
     centres, spread = SLOTS_X[level]
     for centre, index in zip(centres, rng.permutation(level), strict=True):
         kind = kinds[0] if int(index) < first else kinds[1]
         variant = table.draw_variant(rng, ASSETS[kind])
-        yaw = float(rng.uniform(-BREAD_YAW, BREAD_YAW)) if kind == "bread" else 0.0
-        x = MIDDLE + centre + float(rng.uniform(-spread, spread))
-        items.append(
-            table.Item(str(int(index)), ASSETS[kind], table.standing((x, y), yaw), variant)
-        )
+        yaw = rng.uniform(-BREAD_YAW, BREAD_YAW) if kind == "bread" else 0.0
+        x = MIDDLE + centre + rng.uniform(-spread, spread)
+        items.append(table.thing(str(int(index)), ASSETS[kind], (x, y), variant, yaw))
     scene_objects, names = table.named(rng, items)
     foods = tuple(names[str(i)] for i in range(level))
     return SceneSample(scene_objects, FoodFacts(foods[:first], foods[first:], kinds[0], kinds[1]))

@@ -65,15 +65,15 @@ class Facts(SceneFacts):
 
 
 def _heights(level: int, rng: np.random.Generator) -> list[Block]:
-    half, color = float(rng.uniform(0.013, 0.015)), table.drawn_color(rng)
+    half, color = rng.uniform(0.013, 0.015), table.drawn_color(rng)
     if level == 1:
         return [((half, half, half), color)]
     ranges = HALF_HEIGHTS if level == 5 else HALF_HEIGHTS[1 : level + 1]
-    return [((half, half, float(rng.uniform(*ends))), color) for ends in ranges]
+    return [((half, half, rng.uniform(*ends)), color) for ends in ranges]
 
 
 def _colors(level: int, rng: np.random.Generator) -> list[Block]:
-    half = float(rng.uniform(0.015, 0.025))
+    half = rng.uniform(0.015, 0.025)
     return [
         ((half, half, half), color) for color in map(list, list(table.ORDERED.values())[:level])
     ]
@@ -82,9 +82,9 @@ def _colors(level: int, rng: np.random.Generator) -> list[Block]:
 def _sizes(level: int, rng: np.random.Generator) -> list[Block]:
     color = table.drawn_color(rng)
     ranges = HALF_SIZES if level == 5 else HALF_SIZES[1 : level + 1]
-    halves = [float(rng.uniform(*ends)) for ends in ranges]
+    halves = [rng.uniform(*ends) for ends in ranges]
     if level == 1:
-        halves = [float(rng.uniform(0.015, 0.025))]
+        halves = [rng.uniform(0.015, 0.025)]
     return [((half, half, half), color) for half in halves]
 
 
@@ -122,7 +122,7 @@ def _places(
 
 def _draw(looks: Sequence[Block], rng: np.random.Generator, workcell: Workcell) -> SceneSample:
     items = [
-        table.block(str(rank), point, half, color, float(rng.uniform(-YAW, YAW)))
+        table.block(str(rank), point, half, color, rng.uniform(-YAW, YAW))
         for rank, ((half, color), point) in enumerate(
             zip(looks, _places(looks, rng, workcell), strict=True)
         )

@@ -149,11 +149,12 @@ def _places(
     gap_x, gap_y = (round(shape.scale * max(f.spacing[k] for f in families), 4) for k in (0, 1))
     lines = StraightLines(pitch, shape.jitter, (gap_x, gap_y), shape.x, shape.y)
     least = least_distances(crowd, families, shape.scale)
-    return lines.places(rng, used, least, lambda points: _seen(workcell, points))
-
-
-def _seen(workcell: Workcell, points: Array) -> bool:
-    return bool(workcell.in_view(points[:, 0], points[:, 1], 0.0, 0.0, MARGIN).all())
+    return lines.places(
+        rng,
+        used,
+        least,
+        lambda at: bool(workcell.in_view(at[:, 0], at[:, 1], 0.0, 0.0, MARGIN).all()),
+    )
 
 
 def _label(shape: SlotGrid, slot: tuple[int, int], used: list[tuple[int, int]]) -> str:

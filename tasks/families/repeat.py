@@ -68,9 +68,9 @@ class StaplerFacts(SceneFacts):
 
 
 def _draw_stapler(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
-    point = (float(rng.uniform(*X)), float(rng.uniform(*Y)))
-    pose = table.standing(point, float(rng.uniform(-math.pi, math.pi)))
-    items = [table.Item("stapler", "stapler", pose, table.draw_variant(rng, "stapler"), fixed=True)]
+    point, turn = (rng.uniform(*X), rng.uniform(*Y)), rng.uniform(-math.pi, math.pi)
+    look = table.draw_variant(rng, "stapler")
+    items = [table.thing("stapler", "stapler", point, look, turn, fixed=True)]
     scene_objects, names = table.named(rng, items)
     return SceneSample(scene_objects, StaplerFacts(names["stapler"], level))
 
@@ -120,13 +120,13 @@ def _draw_bell(level: int, rng: np.random.Generator, workcell: Workcell) -> Scen
     """One bell in view and off the middle strip; left and right are equally likely."""
     variant = table.draw_variant(rng, "bell")
     model = objects.object_model("bell", variant)
-    y = float(rng.uniform(*BELL_Y))
+    y = rng.uniform(*BELL_Y)
     low, high = workcell.view_span(y, model.radius, model.size[2])
     if rng.random() < 0.5:
-        x = float(rng.uniform(max(-BELL_FAR, low), -BELL_MIDDLE))
+        x = rng.uniform(max(-BELL_FAR, low), -BELL_MIDDLE)
     else:
-        x = float(rng.uniform(BELL_MIDDLE, min(BELL_FAR, high)))
-    items = [table.Item("bell", "bell", table.standing((x, y)), variant, fixed=True)]
+        x = rng.uniform(BELL_MIDDLE, min(BELL_FAR, high))
+    items = [table.thing("bell", "bell", (x, y), variant, fixed=True)]
     scene_objects, names = table.named(rng, items)
     return SceneSample(scene_objects, BellFacts(names["bell"], level))
 
@@ -206,10 +206,6 @@ def _pot_tests(scene: Scene, name: str) -> tuple[counters.PoseTest, counters.Pos
     return up, counters.put_down(name, DOWN, ASIDE)
 
 
-def _fan_tests(scene: Scene, name: str) -> tuple[counters.PoseTest, counters.PoseTest]:
-    return counters.raised(name, FAN_UP), counters.back_home(name, FAN_WAY, FAN_TURN)
-
-
 THINGS = (
     Lifted(
         "pot",
@@ -231,7 +227,10 @@ THINGS = (
         (-0.15, -0.05),
         0.0,
         0.08,
-        _fan_tests,
+        lambda scene, name: (
+            counters.raised(name, FAN_UP),
+            counters.back_home(name, FAN_WAY, FAN_TURN),
+        ),
         False,
         (0, 1),  # official models
         "As often as asked, the fan was lifted by 5 cm and then was back within 4 cm and about "
@@ -243,11 +242,9 @@ THINGS = (
 def _draw_lifted(
     thing: Lifted, level: int, rng: np.random.Generator, workcell: Workcell
 ) -> SceneSample:
-    point = (float(rng.uniform(*thing.x)), float(rng.uniform(*thing.y)))
-    pose = table.standing(point, float(rng.uniform(-thing.yaw, thing.yaw)))
-    items = [
-        table.Item("thing", thing.asset, pose, table.draw_variant(rng, thing.asset, thing.variants))
-    ]
+    point, turn = (rng.uniform(*thing.x), rng.uniform(*thing.y)), rng.uniform(-thing.yaw, thing.yaw)
+    look = table.draw_variant(rng, thing.asset, thing.variants)
+    items = [table.thing("thing", thing.asset, point, look, turn)]
     scene_objects, names = table.named(rng, items)
     return SceneSample(scene_objects, LiftFacts(names["thing"], level))
 

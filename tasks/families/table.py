@@ -115,6 +115,19 @@ def standing(point: Point, yaw: float = 0.0, height: float = 0.0) -> Pose:
     return Pose((point[0], point[1], TABLE_TOP + height), yaw_rotation(yaw))
 
 
+def thing(
+    role: str,
+    asset: str,
+    point: Point,
+    params: Params,
+    turn: float = 0.0,
+    fixed: bool = False,
+    height: float = 0.0,
+) -> Item:
+    """A thing at rest on the table, see `standing`."""
+    return Item(role, asset, standing(point, turn, height), params, fixed)
+
+
 def in_view(workcell: Workcell, asset: str, params: Params) -> Callable[[Point], bool]:
     """Whether the head camera sees the whole asset when it stands at a point."""
     model = objects.object_model(asset, params)

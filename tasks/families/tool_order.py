@@ -67,11 +67,9 @@ def _draw_hammer(level: int, rng: np.random.Generator, workcell: Workcell) -> Sc
 
     first, *others = places.scatter(rng, propose, DISTANCE)
     points = [first, *places.shuffled(rng, others)]
-    items = [
-        table.Item("hammer", "hammer", table.standing(HAMMER_AT), table.draw_variant(rng, "hammer"))
-    ]
+    items = [table.thing("hammer", "hammer", HAMMER_AT, table.draw_variant(rng, "hammer"))]
     for (color, rgb), point in zip(table.ORDERED.items(), points, strict=False):
-        yaw = float(rng.uniform(-YAW, YAW))
+        yaw = rng.uniform(-YAW, YAW)
         items.append(table.block(color, point, HALF, rgb, yaw, fixed=True))
     scene_objects, names = table.named(rng, items)
     colors = tuple(table.ORDERED)[:level]
@@ -154,11 +152,9 @@ def _draw_seal(level: int, rng: np.random.Generator, workcell: Workcell) -> Scen
     colors = tuple(group[int(rng.integers(len(group)))] for group in groups)
     variant = table.draw_variant(rng, "seal")
     points, seal = _layout(level, rng, workcell, variant)
-    items = [table.Item("seal", "seal", table.standing(seal), variant)]
+    items = [table.thing("seal", "seal", seal, variant)]
     for color, point in zip(colors, points, strict=True):
-        items.append(
-            table.Item(color, "pad", table.standing(point), {"look": PADS.index(color)}, fixed=True)
-        )
+        items.append(table.thing(color, "pad", point, {"look": PADS.index(color)}, fixed=True))
     scene_objects, names = table.named(rng, items)
     facts = SealFacts(names["seal"], colors, tuple(names[c] for c in colors))
     return SceneSample(scene_objects, facts)
@@ -174,16 +170,16 @@ def _layout(
     for _ in range(LAYOUTS):
         if level == 1:
             way = 1 if rng.random() < 0.5 else -1
-            found = places.free_point(rng, ONE_X, ONE_Y, [], 1)
-            pads = [(way * found[0], found[1])] if found else []
+            found = (rng.uniform(*ONE_X), rng.uniform(*ONE_Y))
+            pads = [(way * found[0], found[1])]
             x = (ONE_X[0], ONE_X[1]) if way > 0 else (-ONE_X[1], -ONE_X[0])
-            seal = places.free_point(rng, x, ONE_Y, [(p, ONE_APART) for p in pads])
+            seal = places.tried_point(rng, x, ONE_Y, [(p, ONE_APART) for p in pads], 100)
         else:
-            y = float(rng.uniform(*ROW_Y))
-            pads = [(float(rng.uniform(*span)), y) for span in ROWS[level]]
+            y = rng.uniform(*ROW_Y)
+            pads = [(rng.uniform(*span), y) for span in ROWS[level]]
             if any(a[0] - b[0] < PADS_APART for a, b in pairwise(pads)):
                 continue
-            seal = places.free_point(rng, SEAL_X, SEAL_Y, [(p, APART) for p in pads], 40)
+            seal = places.tried_point(rng, SEAL_X, SEAL_Y, [(p, APART) for p in pads], 40)
         if seal and seal_seen(seal) and all(pad_seen(p) for p in pads):
             return pads, seal
     raise places.LayoutError(f"no free place of the seal beside {level} pads; skip this seed")

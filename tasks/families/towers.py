@@ -27,7 +27,7 @@ from robospa.tasks.instructions import COMMON, NUMBERS, Slots, TaskText, by_coun
 from robospa.tasks.plan import Pick, Place, Skill
 from robospa.tasks.sampling import places
 from robospa.tasks.scene import Scene
-from robospa.tasks.task import Draw, SceneFacts, SceneSample, Task, Tracker
+from robospa.tasks.task import Draw, SceneFacts, SceneSample, Task
 from robospa.text import listed
 from robospa.workcell import Workcell
 
@@ -70,7 +70,7 @@ def _building_place(
     """Where the expert builds; not part of the task's rule."""
     x, y = ((-0.01, 0.01), (-0.20, -0.10)) if level == 1 else ((-0.03, 0.03), (-0.15, -0.11))
     for _ in range(100):
-        point = (float(rng.uniform(*x)), float(rng.uniform(*y)))
+        point = (rng.uniform(*x), rng.uniform(*y))
         if places.apart(point, blocks, CLEARANCE):
             return point
     return (0.0, -0.16)
@@ -145,7 +145,7 @@ def _draw_colors(level: int, rng: np.random.Generator, workcell: Workcell) -> Sc
 
     points = places.scatter_points(rng, level, X, Y, DISTANCE, allowed, near_middle=True)
     items = [
-        table.block(color, point, COLOR_HALF, rgb, float(rng.uniform(-YAW, YAW)))
+        table.block(color, point, COLOR_HALF, rgb, rng.uniform(-YAW, YAW))
         for (color, rgb), point in zip(table.ORDERED.items(), points, strict=False)
     ]
     return _sample(level, rng, items, points, tuple(item.role for item in items))
@@ -238,13 +238,13 @@ AREA, MIDDLE = places.Area((-0.28, 0.28), (-0.08, 0.05), clear_middle=True), (0.
 
 
 def _draw_sizes(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
-    halves = HALVES.get(level) or (round(float(rng.uniform(*ONE)), 5),)
+    halves = HALVES.get(level) or (round(rng.uniform(*ONE), 5),)
     cubes = [(half, half, half) for half in halves]
     ground = places.Ground(AREA, 0.05, MIDDLE, 0.10 if level == 1 else 0.15)
     points = places.scatter_blocks(rng, workcell, ground, cubes, lambda i, j: DISTANCE)
     color = table.drawn_color(rng)
     items = [
-        table.block(f"block {i}", point, half, color, float(rng.uniform(-YAW, YAW)))
+        table.block(f"block {i}", point, half, color, rng.uniform(-YAW, YAW))
         for i, (half, point) in enumerate(zip(halves, points, strict=True))
     ]
     return _sample(level, rng, items, points)
@@ -286,7 +286,7 @@ GAP, BAR_YAW = 0.045, 0.20
 
 def _draw_lengths(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
     half_y, half_z = (round(float(v), 5) for v in rng.uniform(*SECTION, 2))
-    halves = [(round(float(rng.uniform(*ends)), 5), half_y, half_z) for ends in HALF_LENGTHS[level]]
+    halves = [(round(rng.uniform(*ends), 5), half_y, half_z) for ends in HALF_LENGTHS[level]]
     reach = [math.hypot(half[0], half_y) for half in halves]
 
     def wide(found: places.Points) -> bool:
@@ -302,7 +302,7 @@ def _draw_lengths(level: int, rng: np.random.Generator, workcell: Workcell) -> S
     points = places.scatter_blocks(rng, workcell, GROUNDS[min(level, 2)], halves, gap, wide)
     color = table.drawn_color(rng)
     items = [
-        table.block(f"block {i}", point, half, color, float(rng.uniform(-BAR_YAW, BAR_YAW)))
+        table.block(f"block {i}", point, half, color, rng.uniform(-BAR_YAW, BAR_YAW))
         for i, (half, point) in enumerate(zip(halves, points, strict=True))
     ]
     return _sample(level, rng, items, points)
@@ -339,8 +339,8 @@ class BowlsFacts(SceneFacts):
 
 def _draw_bowls(level: int, rng: np.random.Generator, workcell: Workcell) -> SceneSample:
     left = rng.random() < 0.5
-    plate_x = (-PLATE_X if left else PLATE_X) + float(rng.uniform(-PLATE_SPREAD, PLATE_SPREAD))
-    plate = (plate_x, float(rng.uniform(*PLATE_Y)))
+    plate_x = (-PLATE_X if left else PLATE_X) + rng.uniform(-PLATE_SPREAD, PLATE_SPREAD)
+    plate = (plate_x, rng.uniform(*PLATE_Y))
     model = objects.object_model("bowl", BOWL)
 
     def free(x: Array, y: Array) -> places.Mask:
@@ -352,22 +352,12 @@ def _draw_bowls(level: int, rng: np.random.Generator, workcell: Workcell) -> Sce
         workcell, BOWLS_AREA, shape, model.radius, height, BOWLS_MIDDLE, free
     )
     points = places.shuffled(rng, places.scatter(rng, propose, BOWLS_DISTANCE, restarts=RESTARTS))
-    items = [
-        table.Item(
-            "plate", "plate", table.standing(plate), table.draw_variant(rng, "plate"), fixed=True
-        )
-    ]
-    items += [
-        table.Item(str(i), "bowl", table.standing(point), BOWL) for i, point in enumerate(points)
-    ]
+    items = [table.thing("plate", "plate", plate, table.draw_variant(rng, "plate"), fixed=True)]
+    items += [table.thing(str(i), "bowl", point, BOWL) for i, point in enumerate(points)]
     scene_objects, names = table.named(rng, items)
     return SceneSample(
         scene_objects, BowlsFacts(names["plate"], tuple(names[str(i)] for i in range(level)))
     )
-
-
-def _bowls_goal(scene: Scene) -> Tracker:
-    return nest(BowlsFacts.of(scene).bowls, BowlsFacts.of(scene).plate)
 
 
 def _bowls_plan(scene: Scene) -> tuple[Skill, ...]:
@@ -403,7 +393,7 @@ BOWLS = Task(
     category="OFE",
     levels=table.LEVELS,
     draw=_draw_bowls,
-    goal=_bowls_goal,
+    goal=lambda scene: nest(BowlsFacts.of(scene).bowls, BowlsFacts.of(scene).plate),
     plan=_bowls_plan,
     templates=BOWLS_TEXT.templates,
     slots=_bowls_slots,

@@ -61,10 +61,6 @@ class _Hold:
     below: float
 
 
-def _nowhere(position: Vec3) -> bool:
-    return False
-
-
 class LiftTracker:
     """Follows `names`; `radius` [m] bounds the distance from grasp centre to a held origin.
 
@@ -76,7 +72,7 @@ class LiftTracker:
         self,
         names: Iterable[str],
         radius: float = 0.12,
-        may_fall: Callable[[Vec3], bool] = _nowhere,
+        may_fall: Callable[[Vec3], bool] = lambda position: False,
         middles: Mapping[str, Vec3] = MappingProxyType({}),
     ) -> None:
         self._names = tuple(names)

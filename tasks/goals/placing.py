@@ -12,18 +12,8 @@ from itertools import pairwise
 
 from robospa.geometry import Pose, Vec3
 from robospa.tasks.events import Event, ObjectRole
+from robospa.tasks.goals import conditions
 from robospa.tasks.goals.checklist import Checklist, Watch
-from robospa.tasks.goals.conditions import (
-    HELD_RADIUS,
-    Condition,
-    Container,
-    Given,
-    Inside,
-    Region,
-    Rests,
-    lying_in,
-    put_into,
-)
 from robospa.tasks.goals.lifting import closed_near
 from robospa.tasks.snapshot import Snapshot
 
@@ -40,8 +30,8 @@ class Destination:
     """`name` belongs into one of the regions `to`; `astray` are those it was not asked for."""
 
     name: str
-    to: tuple[Region, ...]
-    astray: tuple[Region, ...] = ()
+    to: tuple[conditions.Region, ...]
+    astray: tuple[conditions.Region, ...] = ()
 
 
 def bring(parts: Sequence[Destination], table_top: float, released: bool = False) -> Checklist:
@@ -52,9 +42,9 @@ def bring(parts: Sequence[Destination], table_top: float, released: bool = False
     """
     lowest = table_top - FALLEN
     return Checklist(
-        [Rests(part.name, lying_in(part.to, lowest)) for part in parts],
+        [conditions.Rests(part.name, conditions.lying_in(part.to, lowest)) for part in parts],
         released,
-        HELD_RADIUS,
+        conditions.HELD_RADIUS,
         handled=[part.name for part in parts],
         watch=_Strays(parts, lowest),
     )
@@ -87,7 +77,7 @@ class _Strays(Watch):
         return {"astray": len(self._astray), "fallen": len(self._fallen)}
 
 
-def bring_alone(name: str, region: Region, released: bool = True) -> Checklist:
+def bring_alone(name: str, region: conditions.Region, released: bool = True) -> Checklist:
     """One object in a region of the table, let go of there; latched.
 
     The official rule has no height test; here the object must be at most HEIGHT_TOLERANCE above or
@@ -99,18 +89,20 @@ def bring_alone(name: str, region: Region, released: bool = True) -> Checklist:
         level = abs(pose.position[2] - home.position[2]) <= HEIGHT_TOLERANCE
         return level and region.over(pose.position)
 
-    return Checklist([Rests(name, near, latched=True, open_grippers=released)], radius=0.06)
+    return Checklist(
+        [conditions.Rests(name, near, latched=True, open_grippers=released)], radius=0.06
+    )
 
 
-def gather(targets: Sequence[str], others: Sequence[str], region: Region) -> Checklist:
+def gather(targets: Sequence[str], others: Sequence[str], region: conditions.Region) -> Checklist:
     """All of `targets` in `region` at once and let go of, none of `others` ever.
 
     A target counts while it lies no higher than before; the official rule also counts what is
     carried through. A wrong object in the region, at any height, fails for good (official).
     """
-    near = put_into(region, HEIGHT_TOLERANCE)
+    near = conditions.put_into(region, HEIGHT_TOLERANCE)
     return Checklist(
-        [Rests(name, near, held_radius=CLOSE) for name in targets],
+        [conditions.Rests(name, near, held_radius=CLOSE) for name in targets],
         released=True,
         radius=0.06,
         handled=(*targets, *others),
@@ -121,7 +113,7 @@ def gather(targets: Sequence[str], others: Sequence[str], region: Region) -> Che
 class Bystanders(Watch):
     """Objects that no one asked for: lifted, or in the `region` where they fail for good."""
 
-    def __init__(self, names: Sequence[str], region: Region | None = None) -> None:
+    def __init__(self, names: Sequence[str], region: conditions.Region | None = None) -> None:
         self.roles = {name: ObjectRole() for name in names}
         self._region = region
         self._lifts = 0
@@ -140,14 +132,14 @@ class Bystanders(Watch):
         return {"wrong_lifts": self._lifts}
 
 
-def collect(names: Sequence[str], container: Container, lost_below: float) -> Checklist:
+def collect(names: Sequence[str], container: conditions.Container, lost_below: float) -> Checklist:
     """Every object of `names` at rest inside `container`, until it leaves its walls again.
 
     `lost_below` [m] is the height under which an object outside the container cannot be fetched
     any more; it is reported as dropped, and the trial goes on (official).
     """
     return Checklist(
-        [Inside(name, container) for name in names],
+        [conditions.Inside(name, container) for name in names],
         radius=0.2,
         handled=names,
         watch=_Lost(names, container, lost_below),
@@ -157,7 +149,7 @@ def collect(names: Sequence[str], container: Container, lost_below: float) -> Ch
 class _Lost(Watch):
     """Objects that lie beside the container, too low to be fetched."""
 
-    def __init__(self, names: Sequence[str], container: Container, below: float) -> None:
+    def __init__(self, names: Sequence[str], container: conditions.Container, below: float) -> None:
         self._names = tuple(names)
         self._container = container
         self._below = below
@@ -184,7 +176,7 @@ RAISED = 0.01
 
 
 @dataclass
-class Pair(Condition):
+class Pair(conditions.Condition):
     """`left` and `name` are neighbours of the row: down, in line, nothing holding either."""
 
     left: str
@@ -208,7 +200,7 @@ class Pair(Condition):
         )
         if not in_place or before:
             return in_place
-        return not any(closed_near(snapshot, place, HELD_RADIUS) for place in places)
+        return not any(closed_near(snapshot, place, conditions.HELD_RADIUS) for place in places)
 
 
 class _ChancePairs(Watch):
@@ -236,9 +228,9 @@ def row(order: Sequence[str], released: bool) -> Checklist:
     """
     pairs = [Pair(right, left) for left, right in pairwise(order)]
     return Checklist(
-        [Given(order[0]), *pairs],
+        [conditions.Given(order[0]), *pairs],
         released,
-        radius=HELD_RADIUS,
+        radius=conditions.HELD_RADIUS,
         handled=order,
         watch=_ChancePairs(pairs),
     )
@@ -252,7 +244,7 @@ PART_RADIUS = 0.03
 
 
 @dataclass
-class Layer(Condition):
+class Layer(conditions.Condition):
     """`name` is straight above `below`, higher than `bottom` by `rise` [m], and was let go of."""
 
     below: str
@@ -287,7 +279,7 @@ def stack(
         rise += (thick_below + thick_above) / 2
         layers.append(Layer(above, below, order[0], rise, within))
     return Checklist(
-        [Given(order[0], moved=True), *layers],
+        [conditions.Given(order[0], moved=True), *layers],
         released=True,
         radius=0.06,
         early=lambda i, flags: i > 0 and not flags.held[i - 1],
@@ -348,7 +340,7 @@ class _Vessels:
 
 
 @dataclass
-class Nested(Condition):
+class Nested(conditions.Condition):
     """`name` is one of the vessels that stand in each other, and was let go of there."""
 
     vessels: _Vessels

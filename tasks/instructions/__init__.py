@@ -192,10 +192,6 @@ Chain = Callable[[Sequence[str]], str]
 """From the clauses of two or more steps to a sentence, or several."""
 
 
-def _numbered(steps: Sequence[str]) -> str:
-    return " ".join(f"step {i}: {step}." for i, step in enumerate(steps, 1))
-
-
 def _announced(steps: Sequence[str]) -> str:
     words = ("first", "next", "after that", "then")[: len(steps) - 1]
     last = "and then" if len(steps) == 2 else "and finally"
@@ -216,7 +212,7 @@ CHAINS: tuple[Chain, ...] = (
     lambda steps: ", then ".join(steps) + ".",
     _announced,
     lambda steps: "in this order: " + "; ".join(steps) + ".",
-    _numbered,
+    lambda steps: " ".join(f"step {i}: {step}." for i, step in enumerate(steps, 1)),
     lambda steps: listed(steps) + ", in that order.",
     lambda steps: "do the following one after another: " + ", ".join(steps) + ".",
     _sentences,

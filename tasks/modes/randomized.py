@@ -58,7 +58,7 @@ def _height(scene: Scene, part: Part, strength: float, textures: str) -> Scene:
 def _texture(scene: Scene, part: Part, strength: float, textures: str) -> Scene:
     rng = part("textures")
     wall, table = (Texture(textures, int(rng.integers(TEXTURES[textures]))) for _ in range(2))
-    wall_plain, table_plain = (float(rng.random()) >= strength for _ in range(2))
+    wall_plain, table_plain = (rng.random() >= strength for _ in range(2))
     return replace(
         scene,
         surroundings=replace(
@@ -71,11 +71,11 @@ def _texture(scene: Scene, part: Part, strength: float, textures: str) -> Scene:
 
 def _light(scene: Scene, part: Part, strength: float, textures: str) -> Scene:
     rng = part("lights")
-    flickers = float(rng.random()) < FLICKERING
+    flickers = rng.random() < FLICKERING
     usual = Lights()
 
     def mixed(color: Color) -> Color:
-        r, g, b = (c + strength * (float(rng.random()) - c) for c in color)
+        r, g, b = (c + strength * (rng.random() - c) for c in color)
         return (r, g, b)
 
     sun, left, right = (mixed(color) for color in (usual.sun, *usual.lamps))

@@ -37,17 +37,8 @@ from robospa.tasks.shapes import ObjectModel, Params
 __all__ = ["assets", "model_of", "object_model", "variant_count"]
 
 FAMILIES = (
-    boxes,
-    cans,
-    containers,
-    food,
-    desk,
-    gadgets,
-    groceries,
-    stands,
-    tableware,
-    tools,
-    appliances,
+    *(boxes, cans, containers, food, desk, gadgets),
+    *(groceries, stands, tableware, tools, appliances),
 )
 
 

@@ -215,4 +215,4 @@ def _handle(oven: Oven, metallic: float) -> list[Shape]:
     ]
 
 
-ASSETS = {"microwave": build.Asset(len(MICROWAVES), microwave)}
+ASSETS = build.library((microwave, MICROWAVES))

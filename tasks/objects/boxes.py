@@ -315,11 +315,8 @@ def rubikscube(look: int, params: Params) -> ObjectModel:
     )
 
 
-ASSETS = {
-    "tea_box": build.Asset(len(TEAS), tea_box),
-    "tissue_box": build.Asset(len(TISSUES), tissue_box),
-    "playing_cards": build.Asset(len(CARDS), playing_cards),
-    "soap": build.Asset(len(SOAPS), soap),
-    "block": build.Asset(len(BLOCK_COLORS), block, frozenset({"half", "color"})),
-    "rubikscube": build.Asset(len(CUBES), rubikscube),
-}
+ASSETS = build.library(
+    (tea_box, TEAS), (tissue_box, TISSUES), (playing_cards, CARDS), (soap, SOAPS),
+    (block, BLOCK_COLORS), (rubikscube, CUBES),
+    block={"half", "color"},
+)  # fmt: skip

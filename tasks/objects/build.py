@@ -7,7 +7,7 @@ underside, front towards -y).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence, Sized
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -49,6 +49,14 @@ class Asset:
     look_count: int
     build: Callable[[int, Params], ObjectModel]
     params: frozenset[str] = frozenset()
+
+
+def library(
+    *assets: tuple[Callable[[int, Params], ObjectModel], Sized], **params: set[str]
+) -> dict[str, Asset]:
+    """Assets, named as what makes them: that and their looks; further parameters by asset."""
+    found = {made.__name__: Asset(len(looks), made) for made, looks in assets}
+    return found | {k: replace(found[k], params=frozenset(v)) for k, v in params.items()}
 
 
 def srgb(code: str) -> Color:

@@ -301,10 +301,6 @@ def _drop(size: float) -> list[m.Point]:
     return [(u * size, v * size) for u, v in ring]
 
 
-ASSETS = {
-    "sauce_can": build.Asset(len(SAUCES), sauce_can),
-    "can": build.Asset(len(CANS), can),
-    "bottle": build.Asset(len(BOTTLES), bottle),
-    "pill_bottle": build.Asset(len(PILLS), pill_bottle),
-    "glue": build.Asset(len(GLUES), glue),
-}
+ASSETS = build.library(
+    (sauce_can, SAUCES), (can, CANS), (bottle, BOTTLES), (pill_bottle, PILLS), (glue, GLUES),
+)  # fmt: skip

@@ -419,12 +419,7 @@ def garbage(look: int, params: Params) -> ObjectModel:
     )
 
 
-ASSETS = {
-    "bowl": build.Asset(len(BOWLS), bowl),
-    "mug": build.Asset(len(MUGS), mug),
-    "bread_basket": build.Asset(len(BASKETS), bread_basket),
-    "dustbin": build.Asset(len(BINS), dustbin),
-    "cover": build.Asset(len(COVERS), cover),
-    "table_trash_bin": build.Asset(len(TRASH_BINS), table_trash_bin),
-    "garbage": build.Asset(len(BALLS), garbage),
-}
+ASSETS = build.library(
+    (bowl, BOWLS), (mug, MUGS), (bread_basket, BASKETS), (dustbin, BINS), (cover, COVERS),
+    (table_trash_bin, TRASH_BINS), (garbage, BALLS),
+)  # fmt: skip

@@ -304,10 +304,6 @@ def _blades() -> Mesh:
     return m.merge(*parts)
 
 
-ASSETS = {
-    "stapler": build.Asset(len(STAPLERS), stapler),
-    "seal": build.Asset(len(SEALS), seal),
-    "mouse": build.Asset(len(MICE), mouse),
-    "bell": build.Asset(len(BELLS), bell),
-    "fan": build.Asset(len(FANS), fan),
-}
+ASSETS = build.library(
+    (stapler, STAPLERS), (seal, SEALS), (mouse, MICE), (bell, BELLS), (fan, FANS),
+)  # fmt: skip

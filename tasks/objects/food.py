@@ -340,8 +340,4 @@ def bread(look: int, params: Params) -> ObjectModel:
     return build.model("bread", shapes, "bread", phrases, grasps)
 
 
-ASSETS = {
-    "hamburger": build.Asset(len(BURGERS), hamburger),
-    "french_fries": build.Asset(len(FRIES), french_fries),
-    "bread": build.Asset(len(BREADS), bread),
-}
+ASSETS = build.library((hamburger, BURGERS), (french_fries, FRIES), (bread, BREADS))

@@ -330,9 +330,6 @@ def _cabin(low: float, high: float) -> Mesh:
     )
 
 
-ASSETS = {
-    "phone": build.Asset(len(PHONES), phone),
-    "remote_control": build.Asset(len(REMOTES), remote_control),
-    "alarm_clock": build.Asset(len(CLOCKS), alarm_clock),
-    "toycar": build.Asset(len(CARS), toycar),
-}
+ASSETS = build.library(
+    (phone, PHONES), (remote_control, REMOTES), (alarm_clock, CLOCKS), (toycar, CARS),
+)  # fmt: skip

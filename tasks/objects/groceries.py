@@ -287,10 +287,6 @@ def _waves(half: tuple[float, float, float], side: float, size: float, at: float
     return m.merge(*arcs)
 
 
-ASSETS = {
-    "cup": build.Asset(len(CUPS), cup),
-    "apple": build.Asset(len(APPLES), apple),
-    "perfume": build.Asset(len(PERFUMES), perfume),
-    "coffee_box": build.Asset(len(COFFEES), coffee_box),
-    "payment_sign": build.Asset(len(SIGNS), payment_sign),
-}
+ASSETS = build.library(
+    (cup, CUPS), (apple, APPLES), (perfume, PERFUMES), (coffee_box, COFFEES), (payment_sign, SIGNS),
+)  # fmt: skip

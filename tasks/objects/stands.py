@@ -256,9 +256,7 @@ def _middle(a: Vec3, b: Vec3) -> Vec3:
     return ((a[0] + b[0]) / 2, (a[1] + b[1]) / 2, (a[2] + b[2]) / 2)
 
 
-ASSETS = {
-    "display_stand": build.Asset(len(DISPLAYS), display_stand),
-    "electronic_scale": build.Asset(len(SCALES), electronic_scale),
-    "mug_rack": build.Asset(len(RACKS), mug_rack),
-    "phone_stand": build.Asset(len(PHONE_STANDS), phone_stand),
-}
+ASSETS = build.library(
+    (display_stand, DISPLAYS), (electronic_scale, SCALES), (mug_rack, RACKS),
+    (phone_stand, PHONE_STANDS),
+)  # fmt: skip

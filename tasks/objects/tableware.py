@@ -186,9 +186,4 @@ def tray(look: int, params: Params) -> ObjectModel:
     return build.with_frames(made, **{side: Pose(p) for side, p in places.items()})
 
 
-ASSETS = {
-    "kitchen_pot": build.Asset(len(POTS), kitchen_pot),
-    "plate": build.Asset(len(PLATES), plate),
-    "coaster": build.Asset(len(COASTERS), coaster),
-    "tray": build.Asset(len(TRAYS), tray),
-}
+ASSETS = build.library((kitchen_pot, POTS), (plate, PLATES), (coaster, COASTERS), (tray, TRAYS))

@@ -197,9 +197,8 @@ def wooden_block(look: int, params: Params) -> ObjectModel:
     return build.model("wooden_block", made.shapes, "wooden block", phrases, grasps)
 
 
-ASSETS = {
-    "t_block": build.Asset(len(TEES), t_block, frozenset({"kind"})),
-    "wooden_block": build.Asset(len(WOODS), wooden_block),
-    "hammer": build.Asset(len(HAMMERS), hammer),
-    "pad": build.Asset(len(PADS), pad, frozenset({"half", "color", "solid"})),
-}
+ASSETS = build.library(
+    (t_block, TEES), (wooden_block, WOODS), (hammer, HAMMERS),
+    (pad, PADS),
+    t_block={"kind"}, pad={"half", "color", "solid"},
+)  # fmt: skip

@@ -72,8 +72,8 @@ class Grid:
         self, rng: np.random.Generator, workcell: Workcell
     ) -> Callable[[int, int], tuple[float, float]]:
         """Centre and jitter of every object, uniform."""
-        centre_y = float(rng.uniform(*self.y))
-        centre_x = float(rng.uniform(*self.centre_x(centre_y, workcell)))
+        centre_y = rng.uniform(*self.y)
+        centre_x = rng.uniform(*self.centre_x(centre_y, workcell))
         jitter = rng.uniform(-1, 1, (self.rows * self.columns, 2)) * self.jitter
 
         def place(k: int, cell: int) -> tuple[float, float]:

@@ -15,6 +15,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -33,6 +34,10 @@ Drawn = TypeVar("Drawn")
 
 class LayoutError(RuntimeError):
     """No layout was found within the allowed work: this seed is not valid."""
+
+
+class NoRoom(LayoutError):
+    """What was drawn so far leaves no room for the rest: it may be drawn anew, see `retry`."""
 
 
 @dataclass(frozen=True)
@@ -79,21 +84,36 @@ TRIES_PER_POINT = 100
 LAYOUTS = 200
 
 
-def free_point(
+def tried_point(
     rng: np.random.Generator,
     x: Range,
     y: Range,
     far: Iterable[tuple[Point, float]],
-    tries: int = TRIES_PER_POINT,
+    tries: int,
     allowed: Callable[[Point], bool] = lambda point: True,
 ) -> Point | None:
     """A uniform allowed point of the rectangle at least so far [m] from each given one, or None."""
     far = tuple(far)
     for _ in range(tries):
-        point = (float(rng.uniform(*x)), float(rng.uniform(*y)))
+        point = (rng.uniform(*x), rng.uniform(*y))
         if all(apart(point, [other], distance) for other, distance in far) and allowed(point):
             return point
     return None
+
+
+def free_point(
+    rng: np.random.Generator,
+    x: Range,
+    y: Range,
+    far: Iterable[tuple[Point, float]] = (),
+    tries: int = TRIES_PER_POINT,
+    allowed: Callable[[Point], bool] = lambda point: True,
+) -> Point:
+    """The same; NoRoom instead of None."""
+    point = tried_point(rng, x, y, far, tries, allowed)
+    if point is None:
+        raise NoRoom(f"no free point in x {x}, y {y}")
+    return point
 
 
 def scatter_points(
@@ -131,12 +151,14 @@ def scatter_points(
     )
 
 
-def retry(attempt: Callable[[], Drawn | None], what: str) -> Drawn:
-    """The first result that `attempt` has in 200 tries; LayoutError naming `what` if none."""
+def retry(attempt: Callable[[], Drawn], what: str) -> Drawn:
+    """The first result that `attempt` has in 200 tries; LayoutError naming `what` if none.
+
+    Each ends with a result or with NoRoom.
+    """
     for _ in range(LAYOUTS):
-        found = attempt()
-        if found is not None:
-            return found
+        with suppress(NoRoom):
+            return attempt()
     raise LayoutError(f"no free layout of the {what} in {LAYOUTS} draws; skip this seed")
 
 

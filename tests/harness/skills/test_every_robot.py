@@ -13,14 +13,7 @@ from robot_at_home import at_home
 from robospa.geometry import Pose, rotate
 from robospa.harness.robots import embodiment, embodiments
 from robospa.harness.robots.kinematics import end_effector, link_frames
-from robospa.harness.skills.clearance import (
-    TOUCH,
-    arm_depth,
-    bounding_box,
-    finger_points,
-    own_boxes,
-    palm_points,
-)
+from robospa.harness.skills import clearance
 from robospa.harness.skills.open import Pull, _clear, _ways, pull_open
 from robospa.harness.skills.pick import TOO_THIN, reachable_grasps
 from robospa.harness.skills.touch import DEPTH, press
@@ -95,14 +88,14 @@ def test_fingers_and_palm_stay_out_of_the_pot_whose_handle_they_take(name: str) 
     ws = at_home(
         name, SceneObject("pot", "kitchen_pot", Pose((0.0, -0.05, TABLE_TOP)), {"look": 0})
     )
-    own = own_boxes(ws.models["pot"], ws.pose("pot"))
-    whole = bounding_box(ws.models["pot"], ws.pose("pot"))
+    own = clearance.own_boxes(ws.models["pot"], ws.pose("pot"))
+    whole = clearance.bounding_box(ws.models["pot"], ws.pose("pot"))
     for arm in (0, 1):
         best = reachable_grasps(ws, "pot", (arm,))[0]
         closed, opened = ws.robot.arms[arm].travel
         opening = 2 * (closed + best.opening * (opened - closed))
-        assert own.depth(finger_points(ws.hand(arm), best.pose, opening)) == 0.0
-        assert whole.depth(palm_points(ws.hand(arm), best.pose)) == 0.0
+        assert own.depth(clearance.finger_points(ws.hand(arm), best.pose, opening)) == 0.0
+        assert whole.depth(clearance.palm_points(ws.hand(arm), best.pose)) == 0.0
 
 
 RIMS = ("bowl", "cup", "mug", "table_trash_bin")
@@ -159,10 +152,12 @@ def test_at_the_last_attempt_a_door_is_pulled_along_a_way_on_which_the_arm_is_in
     beside.snapshot = replace(beside.snapshot, hinges={"oven": 0.7})
 
     def depth(way: Pull) -> float:
-        return float(arm_depth(beside, way.arm, np.stack([way.before, way.at, *way.arc])).max())
+        return float(
+            clearance.arm_depth(beside, way.arm, np.stack([way.before, way.at, *way.arc])).max()
+        )
 
     taken = _clear(beside, _ways(beside, call, hinge))
-    assert taken is not None and depth(first) > TOUCH >= depth(taken)
+    assert taken is not None and depth(first) > clearance.TOUCH >= depth(taken)
 
 
 def test_of_no_way_none_is_taken() -> None:

@@ -13,16 +13,6 @@ from robospa.geometry import Pose, look_rotation, multiply, rotate, yaw_rotation
 from robospa.harness.robots import embodiment
 from robospa.harness.robots.kinematics import chain_of, end_effector, inverse
 from robospa.harness.skills import bring_in, place
-from robospa.harness.skills.bring_in import (
-    ASIDE,
-    DEEPER,
-    MARGIN,
-    NarrowPassage,
-    approach_joints,
-    put_down,
-    slide_out,
-    translated,
-)
 from robospa.harness.skills.place import FAR, reachable_placements, release_opening
 from robospa.harness.skills.workspace import Workspace
 from robospa.tasks.catalog import build_scene
@@ -99,7 +89,7 @@ def holding_a_cube(gripper: float) -> Workspace:
 def test_what_is_held_is_lowered_to_where_it_lay_before_the_gripper_opens() -> None:
     ws = holding_a_cube(0.0)
     ws.held[0] = "cube"
-    rows = next(put_down(ws, 0, TABLE_TOP + 0.02))
+    rows = next(bring_in.put_down(ws, 0, TABLE_TOP + 0.02))
     opened = int(np.flatnonzero(rows[:, 6] == 1.0)[0])
     before = end_effector(ws.chains[0], rows[opened - 1, :6])
     assert before.position[2] == pytest.approx(HELD.position[2] - LIFTED, abs=1e-4)
@@ -108,12 +98,12 @@ def test_what_is_held_is_lowered_to_where_it_lay_before_the_gripper_opens() -> N
 
 def test_what_jams_in_the_open_gripper_is_lowered_and_left_sideways() -> None:
     ws = holding_a_cube(1.0)
-    rows = next(slide_out(ws, 0, "cube", TABLE_TOP + 0.02))
+    rows = next(bring_in.slide_out(ws, 0, "cube", TABLE_TOP + 0.02))
     _, down, _, beside, *_ = [end_effector(ws.chains[0], row[:6]).position for row in rows]
     assert (rows[:, 6] == 1.0).all()
-    assert down[2] == pytest.approx(HELD.position[2] - LIFTED - DEEPER, abs=1e-3)
+    assert down[2] == pytest.approx(HELD.position[2] - LIFTED - bring_in.DEEPER, abs=1e-3)
     assert beside[2] == pytest.approx(down[2], abs=1e-3)
-    assert math.dist(beside[:2], down[:2]) == pytest.approx(ASIDE, abs=1e-3)
+    assert math.dist(beside[:2], down[:2]) == pytest.approx(bring_in.ASIDE, abs=1e-3)
     assert beside[1] < down[1], "it goes towards the robot"
 
 
@@ -132,7 +122,6 @@ def test_a_thing_is_turned_by_the_wrist_and_not_by_swinging_the_whole_arm_over()
     assert there.position == pytest.approx(turned.position, abs=2e-3)
 
 
-ROBOT = embodiment("aloha-agilex")
 UPWARDS = (0.0, 0.0, 1.0)
 
 
@@ -144,20 +133,22 @@ def workspace(name: str, level: int) -> tuple[Scene, Workspace]:
 def test_a_path_ends_at_the_target_and_starts_where_it_is_told() -> None:
     _, ws = workspace("Hang_Mug_Stack_Blocks", 1)
     here = ws.snapshot.end_effector[1]
-    target = translated(here, (0.0, 0.05, 0.0))
-    way = approach_joints(
+    target = bring_in.translated(here, (0.0, 0.05, 0.0))
+    way = bring_in.approach_joints(
         ws, 1, Pose(), [target], [(0.0, 0.0, 0.04), (0.0, 0.0, 0.0)], ws.joints[1]
     )
     assert way is not None
     ends = [end_effector(ws.chains[1], tuple(joints)).position for joints in way]
     assert ends[1] == pytest.approx(target.position, abs=2e-3)
-    assert ends[0] == pytest.approx(translated(target, (0.0, 0.0, 0.04)).position, abs=2e-3)
+    assert ends[0] == pytest.approx(
+        bring_in.translated(target, (0.0, 0.0, 0.04)).position, abs=2e-3
+    )
 
 
 def test_there_is_no_path_to_what_is_out_of_reach() -> None:
     _, ws = workspace("Hang_Mug_Stack_Blocks", 1)
     far = Pose((0.0, 3.0, 1.0))
-    assert approach_joints(ws, 1, Pose(), [far], [(0.0, 0.0, 0.0)], ws.joints[1]) is None
+    assert bring_in.approach_joints(ws, 1, Pose(), [far], [(0.0, 0.0, 0.0)], ws.joints[1]) is None
 
 
 def test_a_mug_is_brought_with_the_peg_through_its_handle() -> None:
@@ -168,7 +159,7 @@ def test_a_mug_is_brought_with_the_peg_through_its_handle() -> None:
     for target in bring_in._targets(peg, handle, bring_in.WOBBLES):
         middle = (target * handle).position
         assert middle == pytest.approx(
-            translated(peg, (0.0, 0.0, -bring_in.SAG)).position, abs=1e-9
+            bring_in.translated(peg, (0.0, 0.0, -bring_in.SAG)).position, abs=1e-9
         )
         through = rotate(target.rotation, (0.0, 1.0, 0.0))
         along = rotate(peg.rotation, (0.0, 1.0, 0.0))
@@ -185,7 +176,7 @@ def test_a_way_past_a_rack_is_free_only_where_the_hand_does_not_meet_it(
     below = Pose((x + aside, y + 0.12, z - 0.15))  # the post goes through the fingers
     snapshot = replace(ws.snapshot, poses=ws.snapshot.poses | {rack: below})
     here = Workspace(scene, ROBOT, snapshot)
-    narrow = NarrowPassage(here, 1, rack, Pose())
+    narrow = bring_in.NarrowPassage(here, 1, rack, Pose())
     assert narrow.free([here.joints[1], here.joints[1]]) is free
 
 
@@ -196,8 +187,10 @@ def test_a_way_is_above_the_table_only_where_what_is_held_stays_so(
     scene, ws = workspace("Hang_Mug_Stack_Blocks", 1)
     end = ws.snapshot.end_effector[1]
     x, y, z = end.position
-    assert (z - below > ws.scene.table_top + MARGIN) is above
-    narrow = NarrowPassage(ws, 1, scene.facts["rack"], end.inverse() * Pose((x, y, z - below)))
+    assert (z - below > ws.scene.table_top + bring_in.MARGIN) is above
+    narrow = bring_in.NarrowPassage(
+        ws, 1, scene.facts["rack"], end.inverse() * Pose((x, y, z - below))
+    )
     assert narrow.above_table([ws.joints[1], ws.joints[1]]) is above
 
 
@@ -209,7 +202,7 @@ def test_a_mug_is_carried_past_a_rack_only_where_they_do_not_meet(aside: float, 
     x, y, _ = stands.position
     ws.held[1] = mug
     held_at = Pose((x + aside, y, ws.scene.table_top), ws.pose(mug).rotation)
-    narrow = NarrowPassage(ws, 1, rack, here.inverse() * held_at)
+    narrow = bring_in.NarrowPassage(ws, 1, rack, here.inverse() * held_at)
     assert narrow.carried_past([ws.joints[1], ws.joints[1]]) is past
 
 
@@ -218,7 +211,7 @@ def test_targets_of_the_last_attempt_keep_the_handle_at_the_peg_and_turn_it_fart
     peg = ws.pose(scene.facts["rack"]) * ws.models[scene.facts["rack"]].frames["hang"]
     handle = ws.models[scene.facts["mug"]].frames["handle"]
     targets = bring_in._far_targets(peg, handle)
-    under = translated(peg, (0.0, 0.0, -bring_in.SAG)).position
+    under = bring_in.translated(peg, (0.0, 0.0, -bring_in.SAG)).position
     assert all((t * handle).position == pytest.approx(under, abs=1e-9) for t in targets)
     upright = [rotate(t.rotation, UPWARDS)[2] for t in targets]
     usual = [

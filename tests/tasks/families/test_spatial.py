@@ -11,7 +11,7 @@ import pytest
 from drawn_scenes import apart, assert_near_uniform, index_of, kept, many, places
 
 from robospa.tasks.catalog import task, tasks
-from robospa.tasks.colors import NAMED
+from robospa.tasks.colors import NAMED, nearest
 from robospa.tasks.families import cross_view, distance, relational
 from robospa.tasks.families.block_measures import none_hidden
 from robospa.tasks.families.canonical_index import LINES
@@ -166,7 +166,7 @@ NOUNS = {"payment_sign": "sign|stand", "cup": "cup|tumbler", "bread": BREAD, "ap
 
 
 def color_word(item: SceneObject) -> str:
-    return item.params.get("tint") or distance.block_color(item)
+    return item.params.get("tint") or nearest(tuple(item.params["color"]))
 
 
 @each_variant(DISTANCES)

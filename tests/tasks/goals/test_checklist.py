@@ -10,18 +10,9 @@ from snapshots_by_hand import AWAY, TICK, held, kinds, play, snap
 
 from robospa.geometry import Pose, Vec3, axis_rotation
 from robospa.tasks.events import outcome
+from robospa.tasks.goals import counters
 from robospa.tasks.goals.checklist import CHAIN, Checklist, by_turns
 from robospa.tasks.goals.conditions import Container, Inside, Opened, Rests, level_with, on_spot
-from robospa.tasks.goals.counters import (
-    FIGURES,
-    CycleCounter,
-    PressCounter,
-    StampCounter,
-    back_home,
-    held_up,
-    put_down,
-    raised,
-)
 from robospa.tasks.snapshot import Contact, Snapshot
 
 START: dict[str, Vec3] = {
@@ -39,7 +30,7 @@ IN_BASKET: Vec3 = (0.11, -0.19, 0.75)
 def goal() -> Checklist:
     """Click, bread into the basket, click."""
     bread = Rests("bread", level_with(0.05, 0.73, 0.80), targets=("basket",))
-    counter = PressCounter("can", Pose((0.0, 0.0, 0.1)), (0.03, 0.03, 0.04))
+    counter = counters.PressCounter("can", Pose((0.0, 0.0, 0.1)), (0.03, 0.03, 0.04))
     early = by_turns(range(3))
     return Checklist([counter, bread, counter], released=True, early=early, figures=CHAIN)
 
@@ -120,7 +111,7 @@ def test_a_placement_counts_once_it_is_let_go() -> None:
 @pytest.mark.parametrize(("latched", "done"), [(True, 1), (False, 0)])
 def test_a_latched_placement_stays_and_another_does_not(latched: bool, done: int) -> None:
     rests = Rests("cup", NEAR, targets=("mat",), latched=latched)
-    tracker = Checklist([rests, PressCounter("mat", Pose())])
+    tracker = Checklist([rests, counters.PressCounter("mat", Pose())])
     assert outcome(play(tracker, CUP, cup(ON_MAT), cup((0.3, 0.0, 0.74))), 2).done == done
 
 
@@ -170,7 +161,7 @@ PRESSED: Vec3 = (0.1, 0.02, 0.79)
 
 
 def presses(times: int) -> Checklist:
-    return Checklist([PressCounter("s", FRAME)] * times, figures=FIGURES)
+    return Checklist([counters.PressCounter("s", FRAME)] * times, figures=counters.FIGURES)
 
 
 def touches(pattern: str, point: Vec3 = PRESSED) -> list[Snapshot]:
@@ -213,7 +204,7 @@ def test_chatter_shorter_than_the_rearm_time_counts_once(gap: int) -> None:
     [("oooocccc", 1), ("cccooooooccc", 1), ("cooooocooooocoooooc", 1), ("oooooooo", 0)],
 )
 def test_a_gripper_that_opens_on_the_object_has_not_left_it(hand: str, count: int) -> None:
-    counter = PressCounter("s", FRAME, arm=0)
+    counter = counters.PressCounter("s", FRAME, arm=0)
     counter.start(snap(0, AT, (0.0, 1.0)))
     for i, mark in enumerate(hand, 1):
         gripper = (0.0 if mark == "c" else 1.0, 1.0)
@@ -243,8 +234,8 @@ def test_a_reported_contact_presses_and_only_one_with_an_impulse_touches() -> No
 # Stamps
 
 
-def stamps(*heights: float) -> StampCounter:
-    counter = StampCounter("seal", "pad")
+def stamps(*heights: float) -> counters.StampCounter:
+    counter = counters.StampCounter("seal", "pad")
     snapshots = [
         snap(i * TICK, {"seal": (0.1 if z > 0.1 else 0.0, 0.0, 0.74 + z), "pad": (0.0, 0.0, 0.74)})
         for i, z in enumerate(heights)
@@ -271,7 +262,7 @@ def test_stamps_come_down_and_need_two_centimetres_between(
 
 
 def test_a_stamp_too_many_is_repeated_and_carried_things_are_not_pressed() -> None:
-    tracker = Checklist([StampCounter("cup", "mat")])
+    tracker = Checklist([counters.StampCounter("cup", "mat")])
     assert not tracker.roles["cup"].pressed and not tracker.needs_contacts
     up, down = cup((0.0, 0.0, 0.78)), cup((0.0, 0.0, 0.74))
     assert kinds(play(tracker, up, down, up, down)).count("repeated") == 1
@@ -284,7 +275,9 @@ HANDLES: tuple[Vec3, Vec3] = ((-0.1, 0.0, 0.05), (0.1, 0.0, 0.05))
 
 
 def fan(times: int) -> Checklist:
-    counter = CycleCounter("f", raised("f", 0.05), back_home("f", 0.04, 0.05))
+    counter = counters.CycleCounter(
+        "f", counters.raised("f", 0.05), counters.back_home("f", 0.04, 0.05)
+    )
     return Checklist([counter] * times, radius=counter.radius, figures=("lifts", "released"))
 
 
@@ -315,7 +308,7 @@ def test_a_place_beside_home_is_not_home() -> None:
 def test_home_asks_for_the_first_turn(angle: float, home: bool) -> None:
     turned = Pose(HOME, axis_rotation((0, 0, 1), angle))
     snapshot = replace(snap(0.0, {}), poses={"f": turned})
-    assert back_home("f", 0.04, 0.05)(snapshot, Pose(HOME)) is home
+    assert counters.back_home("f", 0.04, 0.05)(snapshot, Pose(HOME)) is home
 
 
 def hanging(rise: float, slip: float = 0.0, lean: float = 0.0) -> Snapshot:
@@ -344,8 +337,8 @@ def hanging(rise: float, slip: float = 0.0, lean: float = 0.0) -> Snapshot:
 def test_a_pot_hangs_upright_on_both_handles_and_comes_down_upright(
     snapshot: Snapshot, up: bool, down: bool
 ) -> None:
-    assert held_up("p", 0.82, HANDLES)(snapshot, Pose(HOME)) is up
-    assert put_down("p", (-0.03, 0.07), 0.08)(snapshot, Pose(HOME)) is down
+    assert counters.held_up("p", 0.82, HANDLES)(snapshot, Pose(HOME)) is up
+    assert counters.put_down("p", (-0.03, 0.07), 0.08)(snapshot, Pose(HOME)) is down
 
 
 def test_lowering_without_letting_go_counts_and_is_told_apart() -> None:

@@ -10,15 +10,8 @@ from snapshots_by_hand import AWAY, TICK, held, kinds, play, snap
 
 from robospa.geometry import Pose, Vec3, yaw_rotation
 from robospa.tasks.events import Event, outcome
+from robospa.tasks.goals import memory
 from robospa.tasks.goals.conditions import Region
-from robospa.tasks.goals.memory import (
-    MOVED_EARLY,
-    AfterCue,
-    Cover,
-    OrientationTarget,
-    restore,
-    uncover,
-)
 from robospa.tasks.goals.placing import gather
 from robospa.tasks.snapshot import Snapshot
 
@@ -35,9 +28,11 @@ def reached(y: float) -> tuple[Vec3, Vec3]:
     return (left, (x, y0 + y, z))
 
 
-def gathered(*after: Snapshot, before: tuple[Snapshot, ...] = ()) -> tuple[AfterCue, list[Event]]:
+def gathered(
+    *after: Snapshot, before: tuple[Snapshot, ...] = ()
+) -> tuple[memory.AfterCue, list[Event]]:
     """Two blocks to bring and one to leave; `after` the wall has come."""
-    goal = AfterCue(gather(["a", "b"], ["x"], STRIP), ["wall"])
+    goal = memory.AfterCue(gather(["a", "b"], ["x"], STRIP), ["wall"])
     return goal, play(goal, START, *before, {**START, **WALL}, *after)
 
 
@@ -69,7 +64,7 @@ def test_before_the_wall_nothing_counts_and_stillness_does() -> None:
     _, events = gathered(before=(snap(0, {**START, **NEAR}),) * 3)
     assert kinds(events) == ["cue_hidden"]
     _, events = gathered(there("a", "b"), before=(snap(0, START, grasp=reached(0.031)),))
-    assert [(e.kind, e.note) for e in events] == [("failed", MOVED_EARLY)]
+    assert [(e.kind, e.note) for e in events] == [("failed", memory.MOVED_EARLY)]
     goal, events = gathered(before=(snap(0, START, grasp=reached(0.029)),))
     assert kinds(events) == ["cue_hidden"]
     assert goal.diagnostics()["motion_before"] == pytest.approx(0.029)
@@ -111,8 +106,8 @@ QUARTER, HALF = math.pi / 2, math.pi
 )
 def test_blocks_turned_at_their_places(steps: list[Snapshot], found: list[str]) -> None:
     wanted = {"a": QUARTER, "b": HALF}
-    targets = [OrientationTarget(n, yaw_rotation(yaw), 0.77) for n, yaw in wanted.items()]
-    assert kinds(play(restore(targets, []), turned(0, 0), *steps)) == found
+    targets = [memory.OrientationTarget(n, yaw_rotation(yaw), 0.77) for n, yaw in wanted.items()]
+    assert kinds(play(memory.restore(targets, []), turned(0, 0), *steps)) == found
 
 
 # Covers
@@ -121,8 +116,8 @@ PLACES = {"a": (-0.2, -0.05), "b": (0.0, -0.05), "c": (0.2, -0.05)}
 CLOSED: dict[str, Vec3] = {name: (x, -0.18, 0.74) for name, (x, _) in PLACES.items()}
 
 
-def covers() -> AfterCue:
-    return uncover([Cover(name, PLACES[name], below=0.745) for name in "bca"])
+def covers() -> memory.AfterCue:
+    return memory.uncover([memory.Cover(name, PLACES[name], below=0.745) for name in "bca"])
 
 
 def opened(*names: str, **elsewhere: Vec3) -> dict[str, Vec3]:

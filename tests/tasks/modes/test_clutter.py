@@ -10,15 +10,7 @@ import numpy as np
 import pytest
 
 from robospa.tasks.catalog import build_scene, tasks
-from robospa.tasks.modes.clutter import (
-    EDGE,
-    FURNITURE,
-    LOOK_ALIKES,
-    TALL,
-    candidates,
-    color_words,
-    colors_asked,
-)
+from robospa.tasks.modes import clutter
 from robospa.tasks.objects import assets, object_model, variant_count
 from robospa.tasks.plan import Place
 from robospa.tasks.scene import Scene, SceneObject
@@ -50,10 +42,10 @@ def test_clutter_keeps_the_official_distances(name: str) -> None:
         for item in scene.clutter:
             model = object_model(item.asset, item.params)
             x, y, z = item.pose.position
-            assert abs(x - scene.table_shift[0]) + model.radius <= EDGE[0] + 1e-9
-            assert abs(y) + model.radius <= EDGE[1] + 1e-9
+            assert abs(x - scene.table_shift[0]) + model.radius <= clutter.EDGE[0] + 1e-9
+            assert abs(y) + model.radius <= clutter.EDGE[1] + 1e-9
             assert z + model.bottom == pytest.approx(scene.table_top)
-            assert model.size[2] <= TALL or y >= model.radius
+            assert model.size[2] <= clutter.TALL or y >= model.radius
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -79,8 +71,8 @@ def test_nothing_on_the_table_can_be_taken_for_an_object_of_the_task() -> None:
             scene = scene_of(name, 1, level)
             there = {item.asset for item in scene.objects}
             found = {item.asset for item in scene.clutter}
-            assert not found & (there | FURNITURE)
-            assert not any(group & there and group & found for group in LOOK_ALIKES)
+            assert not found & (there | clutter.FURNITURE)
+            assert not any(group & there and group & found for group in clutter.LOOK_ALIKES)
 
 
 def test_where_colours_are_asked_for_no_clutter_has_them() -> None:
@@ -92,23 +84,23 @@ def test_where_colours_are_asked_for_no_clutter_has_them() -> None:
     ):
         for seed in range(5):
             scene = scene_of(name, seed)
-            colors = colors_asked(scene)
+            colors = clutter.colors_asked(scene)
             asked += len(colors)
             for item in scene.clutter:
                 phrases = object_model(item.asset, item.params).phrases
-                assert not color_words(" ".join(phrases)) & colors
+                assert not clutter.color_words(" ".join(phrases)) & colors
     assert asked > 15
-    assert not colors_asked(scene_of("Pick_Cups_Canonical", 1))
+    assert not clutter.colors_asked(scene_of("Pick_Cups_Canonical", 1))
 
 
 def test_there_is_enough_to_choose_from() -> None:
     """Officially 124 categories with 415 models, of which a scene's look-alikes are left out."""
     known = set(assets())
-    assert known >= FURNITURE and set().union(*LOOK_ALIKES) <= known
-    kinds = known - FURNITURE
+    assert known >= clutter.FURNITURE and set().union(*clutter.LOOK_ALIKES) <= known
+    kinds = known - clutter.FURNITURE
     assert len(kinds) >= 30 and sum(map(variant_count, kinds)) >= 150
     for name in NAMES:
-        assert len(candidates(scene_of(name, 1))) >= 10  # fewer where many kinds are mixed
+        assert len(clutter.candidates(scene_of(name, 1))) >= 10  # fewer where many kinds are mixed
 
 
 def test_ten_things_nearly_always_find_a_place_and_sometimes_none_is_wanted() -> None:
