@@ -99,9 +99,8 @@ class FailingOracle(Oracle):
         self.applies = True
 
     def _planned(self, scene: Scene, snapshot: Snapshot) -> Expert:
-        expert = ChangedExpert(scene, snapshot, ())
         try:
-            plan, self.applies = wrong_plan(self.kind, scene, expert.workspace), True
+            plan, self.applies = wrong_plan(self.kind, scene), True
         except ValueError:
             plan, self.applies = (), False
         return ChangedExpert(scene, snapshot, plan)

@@ -27,8 +27,8 @@ from types import SimpleNamespace
 import numpy as np
 from frame import RESULTS, Figure, Json, Result, gather, main
 
-from robospa.harness.datasets.jobs import EpisodeJob, attempt_job
 from robospa.harness.datasets.maker import EpisodeMaker
+from robospa.harness.datasets.workers import EpisodeJob, attempt_job
 from robospa.harness.demonstrations.changed_plans import occasions
 from robospa.harness.demonstrations.demonstration import DemonstrationWorld, replay, show
 from robospa.harness.demonstrations.recorder import FrameRecorder, frame_steps

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from robospa.clients import connect as connect
     from robospa.geometry import Pose as Pose
-    from robospa.harness.datasets.api import collect as collect
+    from robospa.harness.datasets.collect import collect as collect
     from robospa.harness.running.api import evaluate as evaluate
     from robospa.harness.settings import EvaluationSettings as EvaluationSettings
     from robospa.observation import CameraSpec as CameraSpec
@@ -48,7 +48,7 @@ _HOMES = {
     "TrialKey": "robospa.trial:TrialKey",
     "TrialRecord": "robospa.results.records.trial_record:TrialRecord",
     "build_scene": "robospa.tasks.catalog:build_scene",
-    "collect": "robospa.harness.datasets.api:collect",
+    "collect": "robospa.harness.datasets.collect:collect",
     "compare": "robospa.results.comparison.compare:compare",
     "connect": "robospa.clients:connect",
     "evaluate": "robospa.harness.running.api:evaluate",

@@ -14,7 +14,7 @@ from collect_fakes import FakePool, fake_pack
 from fake_runs import make_run, shown
 from PIL import Image
 
-from robospa.harness.datasets import api, collect
+from robospa.harness.datasets import collect
 from robospa.tasks import catalog
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
@@ -59,7 +59,7 @@ def test_collect_data(
     def opener(*_: object) -> Iterator[type[FakePool]]:
         yield FakePool
 
-    monkeypatch.setattr(api, "pool_opener", opener)
+    monkeypatch.setattr(collect, "pool_opener", opener)
     monkeypatch.setattr(collect, "versions", dict)
     monkeypatch.setattr(collect, "pack", fake_pack)
     run("collect_data", str(tmp_path / "data"), "--episodes=2", "--cameras=head")

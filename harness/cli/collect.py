@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 import typer
 
 from robospa.harness.cli.options import SEED, TRIALS, AsJson, aside, print_json, with_flags
-from robospa.harness.datasets.jobs import MakerError
 from robospa.harness.datasets.settings import Collection
+from robospa.harness.datasets.workers import MakerError
 from robospa.harness.running.atomic_file import StorageError
 from robospa.harness.settings import Compute, SettingsError
 
@@ -102,17 +102,16 @@ def collect(
     if out is None:
         raise SettingsError("name a folder for the data set with --out")
     from robospa.harness.cli.eval import terminable
-    from robospa.harness.datasets import api
-    from robospa.harness.datasets.collect import Order
+    from robospa.harness.datasets import collect as collecting
     from robospa.harness.running.executor import RunAborted
 
-    order, compute = Order(_group(Collection, given), layout, out), _group(Compute, given)
+    order = collecting.Order(_group(Collection, given), layout, out)
     again = f"the same command with --out {out} --resume goes on from here"
     try:
         with terminable():
-            result = api.collect_order(
+            result = collecting.collect_order(
                 order,
-                compute,
+                _group(Compute, given),
                 resume=resume,
                 keep_episodes=keep_episodes,
                 say=aside if as_json else print,
@@ -181,11 +180,9 @@ def _import(folder: Path, most: int, world: str | None, as_json: bool) -> None:
 def _convert(folder: Path, out: Path, layout: str, images: str, as_json: bool) -> None:
     """Make a data set of the official recordings below `folder`, and say what is not in it."""
     from robospa.harness.datasets.imports import import_recordings
-    from robospa.harness.datasets.settings import AUTO
     from robospa.harness.official.recordings import find_recordings
 
-    codec = "" if images == AUTO else images
-    found = import_recordings(find_recordings(folder), folder, layout, out, codec)
+    found = import_recordings(find_recordings(folder), folder, layout, out, images)
     for why, count in found.left_out.most_common():
         print(f"robospa: {count} recordings are left out: {why}", file=sys.stderr)
     lacks = list(found.made.settings["absent"])

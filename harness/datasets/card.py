@@ -6,8 +6,9 @@ variants, not of episodes.
 
 from __future__ import annotations
 
+import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -52,7 +53,8 @@ class CardFacts:
         self.labels = np.zeros(len(LABELS), np.int64)
         self.lengths: Counter[tuple[int, int]] = Counter()
         """Episodes by level and number of frames."""
-        self.pictures: list[SheetPicture] = []
+        self.pictures: list[tuple[NDArray[np.uint8], str]] = []
+        """(height, width, 3) RGB each, with what stands below it."""
         count = min(PICTURED, self.expected)
         self._pictured = set(np.linspace(0, self.expected - 1, count).round().astype(int).tolist())
 
@@ -60,8 +62,9 @@ class CardFacts:
         """Count the next episode; keep a picture of some."""
         key = episode.key
         if self.episodes in self._pictured and episode.pictures:
-            sentence = f"L{key.level} {episode.instructions[0]}"
-            self.pictures.append(SheetPicture(_middle(episode), sentence))
+            seen = episode.pictures.get("head") or next(iter(episode.pictures.values()))
+            middle = next(islice(all_pictures(seen), len(episode) // 2, None))
+            self.pictures.append((middle, f"L{key.level} {episode.instructions[0]}"))
         self.about = self.about or dict(episode.about)
         self.episodes, self.frames = self.episodes + 1, self.frames + len(episode)
         self.successes += episode.success
@@ -71,34 +74,39 @@ class CardFacts:
         self.labels += np.bincount(episode.label, minlength=len(LABELS))
         self.lengths[key.level, len(episode)] += 1
 
+    @property
+    def cameras(self) -> str:
+        """The cameras in words."""
+        seen = self.layout.cameras.items()
+        return ", ".join(f"{name} ({c.width}x{c.height}, {c.codec})" for name, c in seen)
 
-def _middle(episode: DatasetEpisode) -> NDArray[np.uint8]:
-    """The picture in the episode's middle, of the head camera or the first that there is."""
-    seen = episode.pictures.get("head") or next(iter(episode.pictures.values()))
-    return next(islice(all_pictures(seen), len(episode) // 2, None))
 
-
-def write_card(
-    folder: Path, facts: CardFacts, text: Callable[[CardFacts], str] | None = None
-) -> None:
-    """Write README.md and its pictures; `text` makes another card than `card_text`."""
+def write_card(folder: Path, facts: CardFacts) -> None:
+    """Write README.md, which says otherwise of imported recordings, and its pictures."""
     if facts.pictures:
         draw_sheet(folder / SHEET, facts.pictures)
     draw_lengths(folder / LENGTHS, facts.lengths)
-    (folder / CARD).write_text((text or card_text)(facts), encoding="utf-8")
+    text = imported_card if "left_out" in facts.manifest.settings else card_text
+    (folder / CARD).write_text(text(facts), encoding="utf-8")
 
 
 def card_text(facts: CardFacts) -> str:
     """The card, in Markdown with a YAML head."""
-    parts = [head(facts), _opening(facts)]
+    parts = [head(facts, LICENSE), _opening(facts)]
     if facts.pictures:
         parts.append(f"![Pictures from the middle of {len(facts.pictures)} episodes]({SHEET})")
-    parts += [_made(facts), _counts(facts), _failures(facts), files_part()]
+    parts.append(
+        "## How it was made\n\n"
+        f"```\n{facts.manifest.command}\n```\n\n"
+        "The same command with the same version gives the same bytes. "
+        "`robospa collect --verify DIR` checks every file's hash, all counts, and replays a sample."
+    )
+    parts += [_counts(facts), _failures(facts), files_part()]
     parts.append("## License\n\nMIT, like `robospa`, whose scenes and expert it comes from.")
     return "\n\n".join(parts) + "\n"
 
 
-def head(facts: CardFacts, license: str = LICENSE) -> str:
+def head(facts: CardFacts, license: str) -> str:
     """The YAML head that dataset hubs read."""
     size = next((name for most, name in SIZES if facts.frames < most), "n>1M")
     tags = ["robospa", facts.layout.robot, *(["LeRobot"] if "lerobot" in facts.format else [])]
@@ -112,31 +120,18 @@ def head(facts: CardFacts, license: str = LICENSE) -> str:
 
 def _opening(facts: CardFacts) -> str:
     made = facts.about
-    joints = f"{facts.layout.space.width} numbers an action"
-    cameras = ", ".join(
-        f"{name} ({c.width}x{c.height}, {c.codec})" for name, c in facts.layout.cameras.items()
-    )
     return (
         f"# {facts.episodes:,} demonstrations of RoboSPA tasks by {facts.layout.robot}\n\n"
         f"{facts.episodes:,} episodes, {facts.frames:,} frames, "
         f"{len(facts.variants)} variants (base task and level), as {facts.title}. "
         f"Suite `{made.get('suite', '?')}`, made with robospa {made.get('version', '?')}. "
-        f"{joints[0].upper()}{joints[1:]}; cameras: {cameras or 'none'}. "
+        f"{facts.layout.space.width} numbers an action; cameras: {facts.cameras or 'none'}. "
         f"Every episode was replayed from what is written here: {facts.successes:,} of "
         f"{facts.episodes:,} replays meet their task's goal. Instructions are training sentences, "
         "seeds are of a range that no evaluation uses.\n\n"
         f"Frames are named {FPS} a second; `sim_time` has their exact times. The action of a frame "
         "is the command of the next one, except where noise was added: there it is what the expert "
         "meant to do."
-    )
-
-
-def _made(facts: CardFacts) -> str:
-    return (
-        "## How it was made\n\n"
-        f"```\n{facts.manifest.command}\n```\n\n"
-        "The same command with the same version gives the same bytes. "
-        "`robospa collect --verify DIR` checks every file's hash, all counts, and replays a sample."
     )
 
 
@@ -173,12 +168,8 @@ def _counts(facts: CardFacts) -> str:
 
 def _quantile(lengths: Sequence[tuple[tuple[int, int], int]], share: float) -> int:
     """The number of frames that `share` of the episodes do not exceed."""
-    wanted, seen = share * sum(count for _, count in lengths), 0
-    for (_, frames), count in lengths:
-        seen += count
-        if seen >= wanted:
-            return frames
-    return 0
+    frames = [length for (_, length), count in lengths for _ in range(count)]
+    return frames[max(0, math.ceil(share * len(frames)) - 1)]
 
 
 def _failures(facts: CardFacts) -> str:
@@ -219,31 +210,23 @@ LETTERS = 11
 MOST_BINS = 40
 
 
-@dataclass(frozen=True)
-class SheetPicture:
-    """A picture, uint8 (height, width, 3) RGB, and what stands below it."""
-
-    image: NDArray[np.uint8]
-    caption: str
-
-
-def draw_sheet(path: Path, pictures: Sequence[SheetPicture]) -> None:
+def draw_sheet(path: Path, pictures: Sequence[tuple[NDArray[np.uint8], str]]) -> None:
     """Write the contact sheet as a JPEG."""
     from PIL import Image, ImageDraw, ImageFont
 
-    tall, wide = pictures[0].image.shape[:2]
+    tall, wide = pictures[0][0].shape[:2]
     height = round(WIDTH * tall / wide)
     columns = min(COLUMNS, len(pictures))
     lines = -(-len(pictures) // columns)
     size = (GAP + columns * (WIDTH + GAP), GAP + lines * (height + CAPTION))
     page = Image.new("RGB", size, PAPER)
     draw, font = ImageDraw.Draw(page), ImageFont.load_default(LETTERS)
-    for i, picture in enumerate(pictures):
+    for i, (image, caption) in enumerate(pictures):
         left = GAP + (i % columns) * (WIDTH + GAP)
         top = GAP + (i // columns) * (height + CAPTION)
-        small = Image.fromarray(picture.image).resize((WIDTH, height), Image.Resampling.LANCZOS)
+        small = Image.fromarray(image).resize((WIDTH, height), Image.Resampling.LANCZOS)
         page.paste(small, (left, top))
-        text = wrapped(picture.caption, WIDTH, lambda line: draw.textlength(line, font))
+        text = wrapped(caption, WIDTH, lambda line: draw.textlength(line, font))
         for k, line in enumerate(text):
             draw.text((left, top + height + 3 + 14 * k), line, TEXT, font=font)
     page.save(path, "JPEG", quality=85)
@@ -296,16 +279,13 @@ def imported_card(facts: CardFacts) -> str:
     """The card, in Markdown with a YAML head."""
     settings = facts.manifest.settings
     left_out = Counter(row["why"] for row in settings["left_out"])
-    cameras = ", ".join(
-        f"{name} ({c.width}x{c.height}, {c.codec})" for name, c in facts.layout.cameras.items()
-    )
     rows = sorted((f"{task} L{level}", n) for (task, level), n in facts.variants.items())
     parts = [
-        head(facts, license="unknown"),
+        head(facts, "unknown"),
         f"# {facts.episodes:,} official recordings of RoboSPA tasks\n\n"
         f"**Official recordings**, converted and not made by robospa {facts.about.get('version')}: "
         f"{facts.episodes:,} episodes, {facts.frames:,} frames, {len(facts.variants)} variants, as "
-        f"{facts.title}. {facts.layout.space.width} numbers an action; cameras: {cameras}. "
+        f"{facts.title}. {facts.layout.space.width} numbers an action; cameras: {facts.cameras}. "
         "The action of a frame is the command of the next one. Sentences are those of `seen`; "
         "those of `unseen` are for evaluation and not here.",
         "## What they do not have\n\n"

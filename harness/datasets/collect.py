@@ -20,16 +20,13 @@ import zipfile
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
-from contextlib import AbstractContextManager
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields
 from functools import partial
 from pathlib import Path
 
-from robospa.harness.datasets.jobs import EpisodeAttempt, EpisodeJob
 from robospa.harness.datasets.manifest import MANIFEST, DatasetManifest, SeedFailure, read_record
-from robospa.harness.datasets.pack import FORMATS, check_packages, pack
+from robospa.harness.datasets.pack import check_packages, image_codec, pack
 from robospa.harness.datasets.settings import (
-    AUTO,
     KEYFRAMES,
     Collection,
     check_room,
@@ -41,12 +38,12 @@ from robospa.harness.datasets.settings import (
     trial_of,
     versions,
 )
-from robospa.harness.pool import Pool
+from robospa.harness.datasets.workers import EpisodeAttempt, EpisodeJob, OpenPool, pool_opener
 from robospa.harness.progress import Bar
 from robospa.harness.running.atomic_file import PARTIAL, replace_file, run_lock, storage_errors
 from robospa.harness.seeds.attempt import Attempt, Evidence
 from robospa.harness.seeds.sweep import Search, sweep
-from robospa.harness.settings import SettingsError
+from robospa.harness.settings import Compute, SettingsError, changed
 from robospa.registry import did_you_mean
 from robospa.results.records.runs import LOCK
 from robospa.tasks.seeds import FIRST_TRAINING_SEED, ListKey
@@ -187,10 +184,6 @@ class CollectionProgress(Bar):
         )
 
 
-OpenPool = Callable[[int], AbstractContextManager[Pool[EpisodeJob, Attempt]]]
-"""Opens the workers, at most as many as there are episodes left."""
-
-
 @dataclass(frozen=True)
 class Order:
     """What is to be collected: `settings` in the format `layout`, into `out`.
@@ -207,19 +200,13 @@ class Order:
     def images(self) -> str:
         """How pictures are kept; SettingsError if there is no such format, or it cannot hold
         them."""
-        if self.layout not in FORMATS:
-            near = did_you_mean(self.layout, FORMATS)
-            known_formats = ", ".join(FORMATS)
-            raise SettingsError(f"no format {self.layout!r}; {near}known are {known_formats}")
+        codec = image_codec(self.layout, self.settings.images)
         if self.layout == "robotwin-hdf5" and not self.settings.camera_specs():
             raise SettingsError(
                 "robotwin-hdf5 is a format of pictures: name cameras, or collect without pictures "
                 "in the format lerobot-v3"
             )
-        known, wanted = FORMATS[self.layout].images, self.settings.images
-        if wanted != AUTO and wanted not in known:
-            raise SettingsError(f"{self.layout} holds no {wanted} but {', '.join(known)}")
-        return known[0] if wanted == AUTO else wanted
+        return codec
 
     @property
     def facts(self) -> Facts:
@@ -250,6 +237,66 @@ class CollectionResult:
 
 
 def collect(
+    out: str | Path,
+    *,
+    tasks: str | Sequence[str] = "all",
+    levels: str | int | Sequence[int] = "1-5",
+    episodes: int = 50,
+    workers: int = 0,
+    format: str = "lerobot-v3",
+    resume: bool = False,
+    **settings: object,
+) -> CollectionResult | None:
+    """Collect demonstrations of the expert into `out`, and return what was made.
+
+        made = robospa.collect("data/mine", tasks="GAC", levels=1, episodes=10)
+
+    Args:
+        out: Folder of the data set.
+        tasks: Names of tasks, categories or dimensions.
+        levels: From 1 to 5.
+        episodes: Per variant.
+        workers: Worker processes; 0 for one a core.
+        format: "lerobot-v3", "lerobot-v2.1" or "robotwin-hdf5".
+        resume: Go on with the data set in `out`.
+        settings: Any other setting of `robospa collect`, such as cameras="head" or noise=0.2.
+
+    Returns:
+        The folders, the number of episodes and what is missing; None if the data set was finished.
+
+    Raises:
+        SettingsError: A setting is unknown or impossible; nothing was written.
+        RunError: Another process is at it, or `out` holds something else.
+        MakerError: An episode cannot be made on this machine; StorageError if `out` cannot be
+            written. What is done is kept, and `resume` goes on.
+    """
+    named = {"tasks": tasks, "levels": levels, "episodes": episodes, "workers": workers}
+    given = {**named, **settings}
+    names = [{field.name for field in fields(kind)} for kind in (Collection, Compute)]
+    if unknown := next((name for name in given if not any(name in of for of in names)), None):
+        known = [field.name for kind in (Collection, Compute) for field in fields(kind)]
+        near = did_you_mean(unknown, known)
+        raise SettingsError(f"there is no setting {unknown!r}; {near}known are {', '.join(known)}")
+    own, machine = ({n: v for n, v in given.items() if n in of} for of in names)
+    compute = changed(Compute(), Compute, machine)
+    order = Order(changed(Collection(), Collection, own), format, Path(out))
+    return collect_order(order, compute, resume=resume)
+
+
+def collect_order(
+    order: Order,
+    compute: Compute,
+    *,
+    resume: bool = False,
+    keep_episodes: bool = False,
+    say: Callable[[str], None] = print,
+) -> CollectionResult | None:
+    """Make the data set of `order` with the workers that `compute` asks for, as `collect`."""
+    with pool_opener(compute) as open_pool:
+        return make(order, open_pool, resume=resume, keep_episodes=keep_episodes, say=say)
+
+
+def make(
     order: Order,
     open_pool: OpenPool,
     *,
@@ -279,7 +326,7 @@ def collect(
             for key in keys
         ]
         _say_size(order, wanted, store, say)
-        _make(order, wanted, store, open_pool, lambda: lock.check(order.out), say)
+        _make_episodes(order, wanted, store, open_pool, lambda: lock.check(order.out), say)
         result = _pack(order, wanted, store, folders, say)
         _clear(order.out, store, keep_episodes)
     return result
@@ -340,7 +387,7 @@ def _say_size(
     say(f"{episodes} episodes of {variants}: {text}")
 
 
-def _make(
+def _make_episodes(
     order: Order,
     wanted: Sequence[Search],
     store: EpisodeStore,

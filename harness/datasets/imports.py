@@ -16,7 +16,8 @@ import shlex
 import shutil
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -30,13 +31,13 @@ from robospa.harness.convention_check.episodes import (
     read_episode,
     text_beside,
 )
-from robospa.harness.datasets.card import imported_card
 from robospa.harness.datasets.episode import DatasetEpisode, Pictures
 from robospa.harness.datasets.features import UNSTATED, EpisodeLayout, EpisodeMisfit, layout_of
 from robospa.harness.datasets.manifest import MANIFEST, DatasetManifest, DatasetRecord, file_hash
-from robospa.harness.datasets.pack import FORMATS, Source, Writer, pack_episodes
+from robospa.harness.datasets.pack import Source, image_codec, pack_episodes
 from robospa.harness.datasets.pictures import encode
 from robospa.harness.datasets.robotwin import RoboTwin
+from robospa.harness.datasets.settings import AUTO
 from robospa.harness.datasets.verify import RECORDINGS
 from robospa.harness.official.recordings import OfficialRecording, key_of
 from robospa.harness.official.sentences import SEEN
@@ -63,22 +64,16 @@ class Imported:
 
 
 def import_recordings(
-    recordings: Sequence[OfficialRecording], home: Path, layout: str, out: Path, images: str = ""
+    recordings: Sequence[OfficialRecording], home: Path, layout: str, out: Path, images: str = AUTO
 ) -> Imported:
     """Write the official `recordings`, which lie below `home`, as a data set in `out`.
 
-    `images` is how pictures are kept, by default as the format usually does; robotwin-hdf5 has the
-    files as they are. What cannot be read, or does not fit the first, is left out with its reason.
-    Raises SettingsError for a format that does not exist or a folder that is not empty,
-    DatasetError if no recording is left, CodecMissing, StorageError.
+    `images` is how pictures are kept; robotwin-hdf5 has the files as they are. What cannot be read,
+    or does not fit the first, is left out with its reason. Raises SettingsError for a format that
+    does not exist or a folder that is not empty, DatasetError if no recording is left,
+    CodecMissing, StorageError.
     """
-    if layout not in FORMATS:
-        raise SettingsError(
-            f"official recordings cannot be had as {layout!r} but as {', '.join(FORMATS)}"
-        )
-    codec = images or FORMATS[layout].images[0]
-    if codec not in FORMATS[layout].images:
-        raise SettingsError(f"{layout} holds no {codec} but {', '.join(FORMATS[layout].images)}")
+    codec = image_codec(layout, images)
     if (out / MANIFEST).exists() or (out.is_dir() and any(out.iterdir())):
         raise SettingsError(f"{out} is not empty: choose another --out")
     left_out: list[dict[str, str]] = []
@@ -88,22 +83,9 @@ def import_recordings(
     }  # fmt: skip
     words = ["robospa", "collect", "--import", "DATA", "--format", layout, "--out", "DIR"]
     sources = _sources(recordings, home, "png" if layout == "robotwin-hdf5" else codec, left_out)
-    copies = {source(recording, home): recording.path for recording in recordings}
-
-    def writer(folder: Path, of: EpisodeLayout) -> Writer:
-        if layout == "robotwin-hdf5":
-            return Copies(folder, of, copies)
-        return FORMATS[layout].writer(folder, of)
-
-    made = pack_episodes(
-        layout,
-        out,
-        sources,
-        DatasetManifest(shlex.join(words), settings),
-        writer=writer,
-        card=imported_card,
-        expected=len(recordings),
-    )
+    manifest = DatasetManifest(shlex.join(words), settings)
+    writer = partial(Copies, home=home) if layout == "robotwin-hdf5" else None
+    made = pack_episodes(layout, out, sources, manifest, writer=writer, expected=len(recordings))
     return Imported(made, Counter(row["why"] for row in left_out))
 
 
@@ -187,7 +169,7 @@ def _pictures(episode: Episode, codec: str) -> dict[str, Pictures]:
     """All frames of all cameras, in the sizes of their first."""
     cameras = []
     for name in episode.frames:
-        height, width = _first(episode, name).shape[:2]
+        height, width = episode.own_picture(name, 0).shape[:2]
         cameras.append(CameraSpec(name, width, height))
     images: Iterator[list[NDArray[np.uint8]]] = (
         [episode.picture(camera, t) for camera in cameras] for t in range(len(episode))
@@ -195,19 +177,12 @@ def _pictures(episode: Episode, codec: str) -> dict[str, Pictures]:
     return encode(images, cameras, codec)
 
 
-def _first(episode: Episode, camera: str) -> NDArray[np.uint8]:
-    """The first picture of a camera in its own size."""
-    one = replace(episode, frames={camera: episode.frames[camera][:1]})
-    return one.own_picture(camera, 0)
-
-
 class Copies(RoboTwin):
-    """Puts the recordings themselves, which are in this layout, below `folder`, each in the folder
-    it was in."""
+    """Puts recordings below `home`, which are in this layout, below `folder`, each where it was."""
 
-    def __init__(self, folder: Path, layout: EpisodeLayout, files: dict[str, Path]) -> None:
+    def __init__(self, folder: Path, layout: EpisodeLayout, home: Path) -> None:
         super().__init__(folder, layout)
-        self._files = files
+        self._home = home
 
     def add(self, episode: DatasetEpisode) -> str:
         """Copy the file of `episode`, and write its training sentences; its path."""
@@ -215,6 +190,6 @@ class Copies(RoboTwin):
         path = Path(episode.source)
         target = self._folder / path
         target.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(self._files[episode.source], target)
+        shutil.copyfile(self._home / path, target)
         self.write_sentences(path, episode)
         return path.as_posix()

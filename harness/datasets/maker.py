@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.harness.datasets.episode import DatasetEpisode, Pictures, episode_bytes
-from robospa.harness.datasets.jobs import PURPOSES, EpisodeAttempt, EpisodeJob, RejectedSeed
 from robospa.harness.datasets.pictures import encode, require
+from robospa.harness.datasets.workers import PURPOSES, EpisodeAttempt, EpisodeJob, RejectedSeed
 from robospa.harness.demonstrations.demonstration import (
     MISTAKE_PREFIX,
     DemonstrationWorld,
@@ -56,7 +56,7 @@ class EpisodeMaker:
         recorder = FrameRecorder(stride, job.environment_state)
         try:
             with timed(times, "expert"):
-                shown = show(self._shown, job.key, recorder, kind, lambda key: setup)
+                shown = show(self._shown, job.key, recorder, kind, setup)
         except ValueError as error:
             raise RejectedSeed(f"no occasion for {kind}: {error}") from error
         made = shown.demonstration
@@ -104,11 +104,7 @@ def episode_of(
     pictures: Mapping[str, Pictures],
 ) -> DatasetEpisode:
     """What was recorded, and what its replay has shown."""
-    columns = zip(
-        *((f.commanded, f.measured, f.ee, f.environment_state) for f in recorder.frames),
-        strict=True,
-    )
-    commanded, measured, ee, objects = (np.stack(rows).astype(np.float32) for rows in columns)
+    commanded, measured, ee, objects = recorder.columns()
     sim_time = np.array([frame.time for frame in recorder.frames])
     label, action = shown.annotate(commanded, sim_time)
     made, failure = shown.demonstration, failure_type(record)
@@ -123,10 +119,10 @@ def episode_of(
         measured=measured,
         action=action,
         ee=ee,
+        environment_state=objects,
         sim_time=sim_time,
         subtask=subtask_of_frames(made.events, sim_time),
         label=label,
-        environment_state=objects,
         prefix_action=shown.prefix_action,
         subtasks=subtask_texts(setup.tracker, setup.scene),
         events=made.events,

@@ -20,7 +20,6 @@ from typing import Annotated, Any
 
 import numpy as np
 from msgspec import Meta
-from numpy.typing import NDArray
 
 from robospa.harness.datasets.episode import DatasetEpisode
 from robospa.harness.running.atomic_file import replace_file
@@ -95,18 +94,13 @@ class EpisodeLine:
     file: str = ""
     """The episode's own file, where it has one, below the data set's folder."""
     prefix_action: tuple[tuple[float, ...], ...] = ()
+    """(P, D): actions before the first frame."""
     absent: tuple[str, ...] = ()
     """Of an imported recording: what it does not have; where these are fields here they are empty,
     and the key's seed is 0."""
     source: str = ""
     """Of an imported recording: the file that was read, below what was imported, and its hash."""
     source_sha256: str = ""
-
-    @property
-    def prefix(self) -> NDArray[np.float32]:
-        """(P, D): actions before the first frame; (0, 0) if there are none."""
-        rows = np.asarray(self.prefix_action, np.float32)
-        return rows if len(rows) else np.zeros((0, 0), np.float32)
 
 
 SAME = (

@@ -36,7 +36,10 @@ from robospa.harness.datasets.manifest import (
     write_sums,
 )
 from robospa.harness.datasets.pictures import EpisodeFilmError
+from robospa.harness.datasets.settings import AUTO
 from robospa.harness.running.atomic_file import storage_errors
+from robospa.harness.settings import SettingsError
+from robospa.registry import did_you_mean
 
 PART = ".packing"
 """Where a data set is written, in its folder, until all but `robospa.json` is there."""
@@ -92,6 +95,18 @@ FORMATS: Mapping[str, DatasetFormat] = {
 }
 
 
+def image_codec(layout: str, wanted: str) -> str:
+    """How pictures are kept in the format `layout`, if they are `wanted` so; SettingsError if there
+    is no such format, or it cannot hold them."""
+    if layout not in FORMATS:
+        near = did_you_mean(layout, FORMATS)
+        raise SettingsError(f"no format {layout!r}; {near}known are {', '.join(FORMATS)}")
+    known = FORMATS[layout].images
+    if wanted != AUTO and wanted not in known:
+        raise SettingsError(f"{layout} holds no {wanted} but {', '.join(known)}")
+    return known[0] if wanted == AUTO else wanted
+
+
 def check_packages(layout: str) -> None:
     """Raises MissingPackage if one that writes a format of `FORMATS`, or its card, is not
     installed."""
@@ -104,18 +119,15 @@ def pack(
     folder: Path,
     files: Sequence[Path],
     manifest: DatasetManifest,
-    on_episode: Callable[[int], None] = lambda count: None,
 ) -> DatasetRecord:
     """Write the episodes in `files`, in their order, to `folder` in a format of `FORMATS`.
 
-    What an earlier packing left in `folder` is replaced; anything else stays. `on_episode` is told
-    how many are written. Raises DatasetError if there are none or one does not fit the others,
-    EpisodeFileError for a file that cannot be read, StorageError if `folder` cannot be written.
+    What an earlier packing left in `folder` is replaced; anything else stays. Raises DatasetError
+    if there are none or one does not fit the others, EpisodeFileError for a file that cannot be
+    read, StorageError if `folder` cannot be written.
     """
-    if not files:
-        raise DatasetError(f"there is no episode to write to {folder}")
     read = ((str(path), read_episode_file(path)) for path in files)
-    return pack_episodes(layout, folder, read, manifest, on_episode, expected=len(files))
+    return pack_episodes(layout, folder, read, manifest, expected=len(files))
 
 
 def pack_episodes(
@@ -123,16 +135,14 @@ def pack_episodes(
     folder: Path,
     episodes: Iterator[Source],
     manifest: DatasetManifest,
-    on_episode: Callable[[int], None] = lambda count: None,
     *,
     expected: int,
     writer: MakeWriter | None = None,
-    card: Callable[[CardFacts], str] | None = None,
 ) -> DatasetRecord:
     """As `pack`, from `episodes` with their names, at most `expected` of them.
 
-    `writer` makes another one than the format has, `card` another text. What the settings of
-    `manifest` say is read after the last episode.
+    `writer` makes another one than the format has. What the settings of `manifest` say is read
+    after the last episode.
     """
     make = writer or FORMATS[layout].writer
     part = folder / PART
@@ -142,11 +152,13 @@ def pack_episodes(
         begin = next(episodes, None)
         if begin is None:
             shutil.rmtree(part)
-            raise DatasetError(f"there is no episode to write to {folder}{_why(manifest)}")
+            left_out = manifest.settings.get("left_out")
+            why = f": {left_out[0]['source']}: {left_out[0]['why']}" if left_out else ""
+            raise DatasetError(f"there is no episode to write to {folder}{why}")
         first = layout_of(begin[1])
         facts = CardFacts(layout, FORMATS[layout].title, first, manifest, expected)
-        _write(make(part, first), part, chain([begin], episodes), facts, on_episode)
-        write_card(part, facts, card)
+        _write(make(part, first), part, chain([begin], episodes), facts)
+        write_card(part, facts)
         made = DatasetRecord(
             FORMAT,
             layout,
@@ -168,18 +180,11 @@ def pack_episodes(
     return made
 
 
-def _why(manifest: DatasetManifest) -> str:
-    """Why the first of what was left out was, if anything was."""
-    left_out = manifest.settings.get("left_out")
-    return f": {left_out[0]['source']}: {left_out[0]['why']}" if left_out else ""
-
-
 def _write(
     writer: Writer,
     folder: Path,
     episodes: Iterable[Source],
     facts: CardFacts,
-    on_episode: Callable[[int], None],
 ) -> None:
     lines = EpisodeLines(folder)
     try:
@@ -190,14 +195,12 @@ def _write(
                 raise DatasetError(f"{name} cannot be packed: {error}") from error
             lines.add(index, episode, file)
             facts.add(episode)
-            on_episode(index + 1)
     finally:
         lines.close()
     writer.close()
 
 
 def _remove_packed(folder: Path) -> None:
-    """Remove what an earlier packing left, and nothing else."""
     (folder / MANIFEST).unlink(missing_ok=True)
     if not (folder / SUMS).exists():
         return

@@ -40,16 +40,9 @@ BESIDE = ("episodes", ".lock", PART, MANIFEST, SUMS)
 """What may lie in a data set's folder without being in SHA256SUMS."""
 
 
-@dataclass(frozen=True)
-class ReplayEnding:
-    """How a replay ended: whether the goal was met, and the digest of the simulator's state."""
-
-    success: bool
-    digest: str
-
-
-EpisodeReplay = Callable[[EpisodeLine, NDArray[np.float32]], ReplayEnding]
-"""Replays an episode from its commanded joints (T, D)."""
+EpisodeReplay = Callable[[EpisodeLine, NDArray[np.float32]], tuple[bool, str]]
+"""Replays an episode from its commanded joints (T, D): whether the goal was met, and the digest of
+the simulator's state at the end."""
 
 
 @dataclass(frozen=True)
@@ -69,12 +62,11 @@ def verify(
     folder: Path,
     replays: int = REPLAYS,
     replay: EpisodeReplay | None = None,
-    on_replay: Callable[[int, int], None] = lambda done, total: None,
 ) -> Verification:
     """Check the data set in `folder`, replaying so many episodes (all, if there are no more).
 
-    `replay` runs an episode; without one the simulator does. `on_replay` is told how many of how
-    many are done. Raises DatasetError where `folder` is no data set that can be checked.
+    `replay` runs an episode; without one the simulator does. Raises DatasetError where `folder` is
+    no data set that can be checked.
     """
     made = read_record(folder)
     if made.layout not in FORMATS:
@@ -102,7 +94,7 @@ def verify(
         problem = f"its scenes are of the suite {suite}, and those of this version of {SUITE}"
         return Verification((f"no episode can be replayed: {problem}",), tuple(checked))
     sample = _sample(folder, len(lines), replays, made.sums)
-    problems = tuple(_replay_problems(folder, made, sample, replay or in_simulator(), on_replay))
+    problems = tuple(_replay_problems(folder, made, sample, replay or in_simulator()))
     if not problems:
         checked.append(replayed_sentence(len(sample), len(lines)))
     return Verification(problems, tuple(checked))
@@ -195,21 +187,18 @@ def _replay_problems(
     made: DatasetRecord,
     sample: Sequence[EpisodeLine],
     replay: EpisodeReplay,
-    on_replay: Callable[[int, int], None],
 ) -> Iterator[str]:
-    for number, line in enumerate(sample, 1):
+    for line in sample:
         name = f"episode {line.episode_index} ({line.key.slug})"
         try:
-            ending = replay(line, FORMATS[made.layout].commands(folder, line))
+            success, digest = replay(line, FORMATS[made.layout].commands(folder, line))
         except Exception as error:  # whatever a simulator or a foreign task says
             yield f"{name} cannot be replayed: {error}"
             continue
-        finally:
-            on_replay(number, len(sample))
-        if ending.success is not line.success:
+        if success is not line.success:
             was, now = ("succeeded", "fails") if line.success else ("failed", "succeeds")
             yield f"{name} {was} when it was collected, and {now} when replayed"
-        elif ending.digest != line.replay_digest:
+        elif digest != line.replay_digest:
             yield (
                 f"{name} ends in another state than when it was collected, with the same success: "
                 f"it was made with robospa {made.about.get('version')}"
@@ -223,9 +212,9 @@ def in_simulator() -> EpisodeReplay:
 
     world = SapienWorld(render=False)
 
-    def run(line: EpisodeLine, commanded: NDArray[np.float32]) -> ReplayEnding:
-        prefix = line.prefix if len(line.prefix) else np.zeros((0, commanded.shape[1]), np.float32)
+    def run(line: EpisodeLine, commanded: NDArray[np.float32]) -> tuple[bool, str]:
+        prefix = np.array(line.prefix_action, np.float32).reshape(-1, commanded.shape[1])
         record = replayed(world, line.key, commanded, prefix, line.kind)
-        return ReplayEnding(record.success, record.digest)
+        return record.success, record.digest
 
     return run

@@ -22,8 +22,6 @@ import numpy as np
 from robospa.action_space import ARMS
 from robospa.geometry import Array, Pose, Vec3, axis_rotation, look_rotation, rotate
 from robospa.harness.demonstrations.clearance import depths, gaps
-from robospa.harness.robots import embodiment
-from robospa.harness.robots.kinematics import chain_of, end_effector
 from robospa.harness.skills import Expert, SkillFailed
 from robospa.harness.skills.bring_in import put_down, translated
 from robospa.harness.skills.motion import route, travel
@@ -32,6 +30,7 @@ from robospa.harness.skills.place import arm_holding
 from robospa.harness.skills.touch import press
 from robospa.harness.skills.workspace import Steps, Workspace
 from robospa.tasks.catalog import task as find_task
+from robospa.tasks.objects import object_model
 from robospa.tasks.plan import (
     Drop,
     Hit,
@@ -45,7 +44,6 @@ from robospa.tasks.plan import (
 )
 from robospa.tasks.scene import Scene
 from robospa.tasks.snapshot import Snapshot
-from robospa.workcell import grasp_points
 
 KINDS = {
     "neighbour": "picks the object nearest to the target instead",
@@ -84,17 +82,7 @@ class ActBeside:
         name, seen = self.call.object, ws.snapshot
         x, y, z = seen.poses[name].position
         shifted = Pose((x + self.by[0], y + self.by[1], z), seen.poses[name].rotation)
-        ws.snapshot = Snapshot(
-            seen.time,
-            {**seen.poses, name: shifted},
-            seen.gripper,
-            seen.end_effector,
-            seen.joints,
-            seen.measured,
-            seen.contacts,
-            seen.hinges,
-            grasp_points=seen.grasp_points,
-        )
+        ws.snapshot = replace(seen, poses={**seen.poses, name: shifted})
         steps = pick(ws, self.call) if isinstance(self.call, Pick) else press(ws, self.call)
         try:
             rows = next(steps)
@@ -152,12 +140,41 @@ class GoWrong:
 class Wander:
     """The free arms go anywhere; then the episode begins."""
 
+    def steps(self, ws: Workspace, rng: np.random.Generator) -> Steps:
+        """Their ways to free places; SkillFailed if none has any."""
+        free = [arm for arm in range(len(ARMS)) if ws.held[arm] is None]
+        went = False
+        for arm in rng.permutation(free).tolist():
+            goal = _free_place(ws, arm, rng)
+            if goal is not None and (not went or rng.uniform() < 0.5):
+                travel(ws, arm, goal, float(rng.uniform(*OPEN)))
+                went = True
+        if not went:
+            raise SkillFailed("no arm finds a free place")
+        yield from ws.flush()
+
 
 @dataclass(frozen=True)
 class Displace:
     """`object` is put down beside its place; then the episode begins."""
 
     object: str
+
+    def steps(self, ws: Workspace, rng: np.random.Generator) -> Steps:
+        """Take it, put it down, and stay there; SkillFailed without space."""
+        height = ws.pose(self.object).position[2]
+        yield from pick(ws, Pick(self.object, LOW))
+        arm = ws.held.index(self.object)
+        for _ in range(TRIES):
+            angle, far = rng.uniform(0.0, 2 * math.pi), rng.uniform(*ASIDE)
+            by = (far * math.cos(angle), far * math.sin(angle), 0.0)
+            joints = ws.solve(arm, translated(ws.snapshot.end_effector[arm], by), ws.joints[arm])
+            if joints is not None and depths(ws, arm, joints[None])[0] <= 0.0:
+                ws.add(arm, joints)
+                yield from ws.flush()
+                yield from put_down(ws, arm, height)
+                return
+        raise SkillFailed(f"there is no space beside {self.object}")
 
 
 Call = Skill | ActBeside | Hover | ReleaseAnywhere | GoWrong
@@ -190,21 +207,18 @@ class ChangedExpert(Expert):
             self.went_wrong = True
         elif isinstance(call, ActBeside | Hover | ReleaseAnywhere):
             yield from call.steps(ws)
-        elif self._rng is not None and isinstance(call, Displace):
-            yield from displace(ws, call.object, self._rng)
-            self.begun = True
-        elif self._rng is not None and isinstance(call, Wander):
-            wander(ws, self._rng)
-            yield from ws.flush()
+        elif self._rng is not None and isinstance(call, Wander | Displace):
+            yield from call.steps(ws, self._rng)
             self.begun = True
         else:
             yield from super()._single(call)
 
 
-def free_side(scene: Scene, ws: Workspace, name: str) -> tuple[float, float]:
+def free_side(scene: Scene, name: str) -> tuple[float, float]:
     """A shift [m] that leads beside `name` and away from everything else, on the table."""
     x, y, _ = scene.object(name).pose.position
-    far = ws.models[name].radius + CLEAR
+    radius = {o.name: object_model(o.asset, o.params).radius for o in scene.objects}
+    far = radius[name] + CLEAR
     best, found = 0.0, (0.0, 0.0)
     for i in range(16):
         angle = 2 * math.pi * i / 16
@@ -213,7 +227,7 @@ def free_side(scene: Scene, ws: Workspace, name: str) -> tuple[float, float]:
             continue
         space = min(
             (
-                math.dist((x + dx, y + dy), o.pose.position[:2]) - ws.models[o.name].radius
+                math.dist((x + dx, y + dy), o.pose.position[:2]) - radius[o.name]
                 for o in scene.objects
                 if o.name != name
             ),
@@ -256,7 +270,7 @@ def with_wrong_facts(scene: Scene, **facts: object) -> Scene:
     return replace(scene, facts={**scene.facts, **facts})
 
 
-def wrong_plan(kind: str, scene: Scene, ws: Workspace) -> tuple[Call, ...]:
+def wrong_plan(kind: str, scene: Scene) -> tuple[Call, ...]:
     """The plan of a policy that makes the mistake `kind`; ValueError where that makes no sense."""
     if kind not in KINDS:
         raise ValueError(f"no mistake {kind!r}; there are {', '.join(KINDS)}")
@@ -272,7 +286,7 @@ def wrong_plan(kind: str, scene: Scene, ws: Workspace) -> tuple[Call, ...]:
     if kind == "hovers" and "target" in scene.facts:
         return (Hover(scene.facts["target"]),)
     if kind in ("beside", "drops"):
-        return join_steps(plan, plan_with_failure(kind, scene, ws, steps))
+        return join_steps(plan, plan_with_failure(kind, scene, steps))
     if kind == "swaps" and "order" in scene.facts and len(steps) > 1:
         order = list(scene.facts["order"])
         i = min(1, len(order) - 2)
@@ -308,28 +322,12 @@ def marked(scene: Scene, plan: Sequence[Call]) -> tuple[Call, ...]:
 
 def occasions(scene: Scene) -> tuple[str, ...]:
     """The mistakes that the scene gives occasion for."""
-    robot = embodiment(scene.embodiment)
-    ws = Workspace(scene, robot, at_home(scene))
     found = []
     for kind in KINDS:
         with suppress(ValueError):
-            wrong_plan(kind, scene, ws)
+            wrong_plan(kind, scene)
             found.append(kind)
     return tuple(found)
-
-
-def at_home(scene: Scene) -> Snapshot:
-    """The scene as it was drawn, both arms at home."""
-    arms = embodiment(scene.embodiment).arms
-    left, right = (end_effector(chain_of(arm), arm.home) for arm in arms)
-    return Snapshot(
-        0.0,
-        {item.name: item.pose for item in scene.everything},
-        (1.0, 1.0),
-        (left, right),
-        (arms[0].home, arms[1].home),
-        grasp_points=grasp_points((arms[0].gripper, arms[1].gripper), (left, right)),
-    )
 
 
 def neighbour(scene: Scene) -> str:
@@ -339,9 +337,7 @@ def neighbour(scene: Scene) -> str:
     return min(others, key=lambda o: math.dist(o.pose.position[:2], target.pose.position[:2])).name
 
 
-def plan_with_failure(
-    kind: str, scene: Scene, ws: Workspace, steps: list[list[Skill]]
-) -> list[Sequence[Call]]:
+def plan_with_failure(kind: str, scene: Scene, steps: list[list[Skill]]) -> list[Sequence[Call]]:
     """The steps with one that goes wrong: the second pick if there is one, else the only one."""
     picks = [i for i, step in enumerate(steps) if isinstance(step[0], Pick)]
     if not picks and kind == "drops":
@@ -357,7 +353,7 @@ def plan_with_failure(
     elif not isinstance(call, Pick):
         raise ValueError(f"{scene.task} ends with {type(call).__name__}: no place beside it")
     else:
-        bad = [ActBeside(call, free_side(scene, ws, call.object))]
+        bad = [ActBeside(call, free_side(scene, call.object))]
     return [*steps[:wrong], bad, *steps[wrong + 1 :]]
 
 
@@ -421,19 +417,6 @@ def beginnings(plan: Sequence[Skill]) -> list[int]:
     return [i for i in range(last + 1) if not isinstance(plan[i], CARRIES)]
 
 
-def wander(ws: Workspace, rng: np.random.Generator) -> None:
-    """Append the free arms' ways to free places; SkillFailed if none has any."""
-    free = [arm for arm in range(len(ARMS)) if ws.held[arm] is None]
-    went = False
-    for arm in rng.permutation(free).tolist():
-        goal = _free_place(ws, arm, rng)
-        if goal is not None and (not went or rng.uniform() < 0.5):
-            travel(ws, arm, goal, float(rng.uniform(*OPEN)))
-            went = True
-    if not went:
-        raise SkillFailed("no arm finds a free place")
-
-
 def _free_place(ws: Workspace, arm: int, rng: np.random.Generator) -> Array | None:
     """Joints of a random pose above the table, to which the way is free; None if none is found."""
     for _ in range(TRIES):
@@ -458,20 +441,3 @@ def _pose(ws: Workspace, arm: int, rng: np.random.Generator) -> Pose:
     tip = ws.hand(arm).tip
     at = (x - ahead[0] * tip, y - ahead[1] * tip, z - ahead[2] * tip)
     return Pose(at, look_rotation(ahead, closing))
-
-
-def displace(ws: Workspace, name: str, rng: np.random.Generator) -> Steps:
-    """Take the object, put it down beside its place, and stay there; SkillFailed without space."""
-    height = ws.pose(name).position[2]
-    yield from pick(ws, Pick(name, LOW))
-    arm = ws.held.index(name)
-    for _ in range(TRIES):
-        angle, far = rng.uniform(0.0, 2 * math.pi), rng.uniform(*ASIDE)
-        by = (far * math.cos(angle), far * math.sin(angle), 0.0)
-        joints = ws.solve(arm, translated(ws.snapshot.end_effector[arm], by), ws.joints[arm])
-        if joints is not None and depths(ws, arm, joints[None])[0] <= 0.0:
-            ws.add(arm, joints)
-            yield from ws.flush()
-            yield from put_down(ws, arm, height)
-            return
-    raise SkillFailed(f"there is no space beside {name}")

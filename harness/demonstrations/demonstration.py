@@ -26,10 +26,10 @@ from numpy.typing import NDArray
 
 from robospa.action_space import ActionSpace, quantize
 from robospa.harness import trial
-from robospa.harness.convention_check.episodes import Episode
+from robospa.harness.convention_check.episodes import Episode, to_jpeg
 from robospa.harness.demonstrations import changed_plans
 from robospa.harness.demonstrations.noise import EXPERT, MISTAKE, STRENGTH, Noise
-from robospa.harness.demonstrations.recorder import FrameRecorder, frame_steps
+from robospa.harness.demonstrations.recorder import FrameRecorder, drawn, frame_steps
 from robospa.harness.replay import RecordedPolicy
 from robospa.harness.robots import embodiment
 from robospa.harness.sim.motion import DEMONSTRATION_LIMITS, RATE, Trajectory
@@ -37,6 +37,7 @@ from robospa.harness.sim.physics import Physics
 from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.harness.skills import Expert
 from robospa.harness.world import Poll, World
+from robospa.observation import DEFAULT_CAMERAS
 from robospa.results.records.trial_record import TrialRecord
 from robospa.tasks.catalog import build_scene
 from robospa.tasks.catalog import task as find_task
@@ -117,11 +118,6 @@ class DemonstrationRun(trial.TrialState):
         """True if an event of this kind has happened."""
         return any(event.kind == kind for event in self.events)
 
-    @property
-    def seconds(self) -> float:
-        """Simulated time until now."""
-        return self.physics_steps / RATE
-
     def act(self, rows: Rows) -> None:
         """Execute joint actions."""
         for action in quantize(rows):
@@ -131,39 +127,38 @@ class DemonstrationRun(trial.TrialState):
         """What came of it."""
         if self.recorder is not None:
             self.recorder.ended(self.world)
-        failures, events = tuple(expert.failures), tuple(self.events)
-        instruction = self.parts.instruction
-        return Demonstration(self.has("success"), self.seconds, instruction, failures, events)
+        return Demonstration(
+            self.has("success"),
+            self.physics_steps / RATE,
+            self.parts.instruction,
+            tuple(expert.failures),
+            tuple(self.events),
+        )
 
 
 def open_run(
-    world: World, key: TrialKey, setup: trial.TrialSetup, recorder: trial.Recorder
+    world: World, key: TrialKey, recorder: trial.Recorder, setup: trial.TrialSetup | None = None
 ) -> DemonstrationRun:
-    """The demonstration of `setup`, begun; passes on what `world` raises."""
+    """The demonstration of `key`, begun; passes on what `world` raises."""
+    setup = setup or trial.task_parts(key)
     run = DemonstrationRun(world, setup, embodiment(key.embodiment), recorder)
     run.load(key.split)
     run.start()
     return run
 
 
-def demonstrate(
-    world: World,
-    key: TrialKey,
-    recorder: trial.Recorder,
-    parts: Callable[[TrialKey], trial.TrialSetup] = trial.task_parts,
-    make_expert: Callable[[Scene, Snapshot], Expert] = Expert,
-) -> Demonstration:
-    """Run the expert on `key` to its plan's end, then rest.
-
-    Empty arms go home after the plan only where the goal is not met without. A goal that is lost
-    ends it. Passes on what `world` raises.
-    """
-    run = open_run(world, key, parts(key), recorder)
-    return run_expert(run, make_expert(run.parts.scene, world.snapshot()))
+def demonstrate(world: World, key: TrialKey, recorder: trial.Recorder) -> Demonstration:
+    """Run the expert on `key`; passes on what `world` raises."""
+    run = open_run(world, key, recorder)
+    return run_expert(run, Expert(run.parts.scene, world.snapshot()))
 
 
 def run_expert(run: DemonstrationRun, expert: Expert) -> Demonstration:
-    """Run `expert` to its plan's end, then rest."""
+    """Run `expert` to its plan's end, then rest.
+
+    Empty arms go home after the plan only where the goal is not met without. A goal that is lost
+    ends it.
+    """
     while not expert.finished and not run.has("failed"):
         rows = expert.next(run.world.snapshot())
         if expert.plan_done:
@@ -180,11 +175,19 @@ def recorded_expert(key: TrialKey, name: str) -> tuple[Episode, bool]:
     of official recordings, and whether it met the goal."""
     stride = frame_steps(key.task)
     recorder = FrameRecorder(stride)
+    pictures: dict[str, list[bytes]] = {camera.name: [] for camera in DEFAULT_CAMERAS}
     with closing(DemonstrationWorld(render=True)) as world:
         made = demonstrate(world, key, recorder)
-        space = embodiment(key.embodiment).action_space("joint")
-        about = {**asdict(key), "stride": stride}
-        return recorder.episode(name, made.instruction, about, space), made.success
+        for images in drawn(recorder.frames, DEFAULT_CAMERAS):
+            for of, image in zip(pictures.values(), images, strict=True):
+                of.append(to_jpeg(image))
+    commanded, measured, ee, _ = (of.astype(float) for of in recorder.columns())
+    space, about = (
+        embodiment(key.embodiment).action_space("joint"),
+        {**asdict(key), "stride": stride},
+    )
+    seen = Episode(name, commanded, ee, pictures, space, made.instruction, measured, about)
+    return seen, made.success
 
 
 @dataclass(frozen=True)
@@ -248,20 +251,21 @@ def show(
     key: TrialKey,
     recorder: trial.Recorder,
     kind: str = "expert",
-    parts: Callable[[TrialKey], trial.TrialSetup] = trial.task_parts,
+    setup: trial.TrialSetup | None = None,
     strength: float = STRENGTH,
 ) -> ShownEpisode:
-    """Make the demonstration `key` of a kind. `strength` is that of noise [m].
+    """Make the demonstration `key` of a kind. `setup` is the trial's, if it is known; `strength`
+    that of noise [m].
 
     Raises ValueError for an unknown kind and where the scene has no occasion for it; passes on what
     `world` raises.
     """
-    setup = parts(key)
+    setup = setup or trial.task_parts(key)
     if kind == "midstate":
         plan = changed_plans.middle_plan(setup.scene, generator_of(key, "midstate"))
     world.disturbance = None
     before = FrameRecorder(frame_steps(key.task))
-    run = open_run(world, key, setup, before if kind == "midstate" else recorder)
+    run = open_run(world, key, before if kind == "midstate" else recorder, setup)
     space = run.robot.action_space("joint")
     nothing = np.zeros((0, space.width), np.float32)
     if kind == "midstate":
@@ -287,19 +291,19 @@ def show(
 def _go_wrong(run: DemonstrationRun, name: str) -> tuple[Demonstration, float]:
     """The mistake `name`, and the time [s] from which on it is made; at its end nothing moves."""
     scene, start = run.parts.scene, run.world.snapshot()
-    workspace = changed_plans.ChangedExpert(scene, start, ()).workspace
-    plan = changed_plans.wrong_plan(name, scene, workspace)
+    plan = changed_plans.wrong_plan(name, scene)
     expert = changed_plans.ChangedExpert(scene, start, changed_plans.marked(scene, plan))
     wrong_from: float | None = None
     still = 0
     while not run.has("failed") and still < STILL:
         rows = expert.next(run.world.snapshot())
         if wrong_from is None and expert.went_wrong:
-            wrong_from = run.seconds
+            wrong_from = run.physics_steps / RATE
         alone = len(rows) == 1 and (not run.actions or np.array_equal(rows[0], run.actions[-1]))
         still = still + 1 if alone or expert.finished else 0
         run.act(rows)
-    return run.ended(expert), run.seconds if wrong_from is None else wrong_from
+    end = run.physics_steps / RATE
+    return run.ended(expert), end if wrong_from is None else wrong_from
 
 
 def _from_the_middle(

@@ -23,11 +23,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.action_space import ActionSpace
-from robospa.harness.convention_check.episodes import Episode, to_jpeg
 from robospa.harness.sim.motion import RATE
 from robospa.harness.world import RenderableState, StepResult, World
-from robospa.observation import DEFAULT_CAMERAS, CameraSpec
+from robospa.observation import CameraSpec
 from robospa.protocol.policy import PolicySpec
 
 STRIDE = 15
@@ -96,6 +94,11 @@ class FrameRecorder:
         """(T, D): joints [rad] and grippers as last commanded at every frame."""
         return np.stack([frame.commanded for frame in self.frames])
 
+    def columns(self) -> tuple[NDArray[np.float32], ...]:
+        """`commanded`, `measured`, `ee` and `environment_state` of all frames."""
+        rows = ((f.commanded, f.measured, f.ee, f.environment_state) for f in self.frames)
+        return tuple(np.stack(of).astype(np.float32) for of in zip(*rows, strict=True))
+
     def started(self, world: World) -> None:
         """Keep the first frame, which need not be the trial's."""
         self._ended = round(world.snapshot().time * RATE)
@@ -130,26 +133,6 @@ class FrameRecorder:
         objects = seen.get("environment_state", NOTHING)
         frame = RecordedFrame(step, seen["state"], measured, seen["ee"], world.still(), objects)
         self.frames.append(frame)
-
-    def episode(
-        self,
-        name: str,
-        instruction: str,
-        about: Mapping[str, str | int],
-        space: ActionSpace,
-        cameras: Sequence[CameraSpec] = DEFAULT_CAMERAS,
-    ) -> Episode:
-        """The recorded episode of a robot whose joint actions are of `space`.
-
-        Draws its pictures, so the world must not have loaded another scene since.
-        """
-        columns = zip(*((f.commanded, f.measured, f.ee) for f in self.frames), strict=True)
-        commanded, measured, ee = (np.stack(rows).astype(float) for rows in columns)
-        pictures: dict[str, list[bytes]] = {camera.name: [] for camera in cameras}
-        for images in drawn(self.frames, cameras):
-            for camera, image in zip(cameras, images, strict=True):
-                pictures[camera.name].append(to_jpeg(image))
-        return Episode(name, commanded, ee, pictures, space, instruction, measured, about)
 
 
 def drawn(

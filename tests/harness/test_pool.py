@@ -14,8 +14,7 @@ from pathlib import Path
 import pytest
 from collect_fakes import order
 
-from robospa.harness.datasets.api import pool_opener
-from robospa.harness.datasets.jobs import EpisodeJob, MakerError, maker_at
+from robospa.harness.datasets.workers import EpisodeJob, MakerError, maker_at, pool_opener
 from robospa.harness.pool import MOST_DEATHS, JobProcess, Pool, WorkerDied, WorkerStuck
 from robospa.harness.seeds.attempt import Attempt
 from robospa.harness.settings import Compute
@@ -171,7 +170,7 @@ probe_world(WorkerConfig(out, "hold", world="time:sleep", world_arguments={"seco
 """,
     "collection": """
 from collect_fakes import order
-from robospa.harness.datasets.api import pool_opener
+from robospa.harness.datasets.workers import pool_opener
 from robospa.harness.settings import Compute
 from robospa.tasks.seeds import ListKey
 with pool_opener(Compute(workers=1)) as opened, opened(1) as pool:

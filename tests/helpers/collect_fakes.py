@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import Future
 from pathlib import Path
 
@@ -12,9 +12,9 @@ from dataset_fakes import fake_episode
 
 from robospa.harness.datasets.collect import Order
 from robospa.harness.datasets.episode import episode_bytes, read_episode_file
-from robospa.harness.datasets.jobs import EpisodeAttempt, EpisodeJob, RejectedSeed, attempt_job
 from robospa.harness.datasets.manifest import DatasetManifest
 from robospa.harness.datasets.settings import Collection
+from robospa.harness.datasets.workers import EpisodeAttempt, EpisodeJob, RejectedSeed, attempt_job
 from robospa.harness.pool import Pool
 from robospa.harness.running.atomic_file import replace_file
 from robospa.harness.seeds.attempt import Attempt
@@ -57,7 +57,6 @@ def fake_pack(
     folder: Path,
     files: Sequence[Path],
     manifest: DatasetManifest,
-    on_episode: Callable[[int], None] = lambda count: None,
 ) -> None:
     """One file with what counts of every episode, then the manifest."""
     folder.mkdir(exist_ok=True)

@@ -6,20 +6,16 @@ Part of `make test-models`. LeRobot has no reader of version 2.1 any more, but a
 from __future__ import annotations
 
 import json
-import os
-import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
+from outside import HERE, environment, ran
 from tiny_datasets import CAMERAS, STEP, painted, tiny_dataset
 
 from robospa.harness.datasets.episode import DatasetEpisode
 from robospa.harness.demonstrations.noise import LABELS
 
-ROOT = Path(__file__).resolve().parents[2]
-HERE = Path(__file__).resolve().parent
-PYTHON = os.environ.get("ROBOSPA_MODELS_PYTHON", str(ROOT / ".venv-models" / "bin" / "python"))
 CASES = [
     ("lerobot-v3", "h264"),
     ("lerobot-v3", "av1"),
@@ -38,12 +34,8 @@ def loaded(folder: Path, layout: str) -> dict[str, np.ndarray]:
     """Every frame of the data set, as LeRobot gives it."""
     out = folder.parent / "loaded.npz"
     convert = ["--convert"] if layout == "lerobot-v2.1" else []
-    subprocess.run(
-        [PYTHON, str(HERE / "loaded.py"), *convert, str(folder), str(out)],
-        check=True,
-        timeout=300,
-        env={**os.environ, "HF_HOME": str(folder.parent / "home"), "CUDA_VISIBLE_DEVICES": ""},
-    )
+    home = environment(folder.parent / "home")
+    ran(HERE / "loaded.py", *convert, folder, out, given=home, limit=300)
     with np.load(out) as file:
         return dict(file)
 

@@ -2,28 +2,22 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
-import os
-import subprocess
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from dataset_fakes import fake_episode
+from outside import PATIENT, ran, served
 from tiny_datasets import MANIFEST, written
 
 from robospa.clients import connect
 from robospa.harness.datasets.pack import pack
 from robospa.protocol.conformance import synthetic_observation
 from robospa.protocol.policy import TrialInfo
-from robospa.protocol.transport import Timeouts
 from robospa.trial import TrialKey
 
-ROOT = Path(__file__).resolve().parents[2]
-PYTHON = os.environ.get("ROBOSPA_MODELS_PYTHON", str(ROOT / ".venv-models" / "bin" / "python"))
-PATIENT = Timeouts(wait=60, hello=60, reset=300, first_infer=300, infer=300)
 SMALL = {
     "steps": 4, "save": 2, "batch": 4, "width": 16, "heads": 2, "layers": 1, "chunk": 3,
     "threads": 1, "warmup": 1, "dropout": 0.1,
@@ -105,16 +99,6 @@ print(float((np.abs(answer[:, :, :2] - unseen.target[:, :, :2]).max(axis=(1, 2))
 pytestmark = [pytest.mark.models, pytest.mark.timeout(900)]
 
 
-def environment() -> dict[str, str]:
-    return {
-        **os.environ,
-        "PYTHONPATH": str(ROOT),
-        "PYTHONDONTWRITEBYTECODE": "1",
-        "HF_HUB_OFFLINE": "1",
-        "CUDA_VISIBLE_DEVICES": "",
-    }
-
-
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Checkpoints `one`, `two` and `half`, and what was said, in `said.json`."""
@@ -130,12 +114,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         flat = objects.reshape(5, -1)
         episodes.append(replace(made, ee=ee, environment_state=flat, pictures={}))
     pack("lerobot-v3", path / "data", written(path / "files", episodes), MANIFEST)
-    arguments = [str(path / "data"), str(path), json.dumps(SMALL)]
-    done = subprocess.run(
-        [PYTHON, "-c", TWICE, *arguments],
-        env=environment(), capture_output=True, text=True,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr[-3000:]
+    done = ran("-c", TWICE, path / "data", path, json.dumps(SMALL))
     (path / "said.json").write_text(done.stdout.splitlines()[-1])
     return path
 
@@ -150,36 +129,20 @@ def test_training_repeats_itself_to_the_bit_also_when_resumed(folder: Path) -> N
 
 
 def test_a_checkpoint_is_served_and_repeats_itself(folder: Path) -> None:
-    command = [PYTHON, "-m", "robospa", "serve", "learned", "--port", "0"]
-    option = ["--option", f"path={folder / 'one'}"]
-    server = subprocess.Popen(
-        [*command, *option], env=environment(), stdout=subprocess.PIPE, text=True
-    )
-    try:
-        assert server.stdout is not None
-        line = server.stdout.readline()
-        with connect(line.split()[3], timeouts=PATIENT) as policy:
-            assert policy.spec.environment_state and policy.spec.cameras == ()
-            seen = synthetic_observation(policy.spec)
-            chunks = []
-            for _ in range(2):
-                policy.reset(TrialInfo("Pick_Blocks_Size", "aloha-agilex", "take it"))
-                chunks.append(policy.infer(seen))
-        assert np.array_equal(*chunks) and chunks[0].shape[1] == 16
-    finally:
-        server.terminate()
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            server.wait(20)
-        server.kill()
+    option = f"--option=path={folder / 'one'}"
+    with served("learned", option) as url, connect(url, timeouts=PATIENT) as policy:
+        assert policy.spec.environment_state and policy.spec.cameras == ()
+        seen = synthetic_observation(policy.spec)
+        chunks = []
+        for _ in range(2):
+            policy.reset(TrialInfo("Pick_Blocks_Size", "aloha-agilex", "take it"))
+            chunks.append(policy.infer(seen))
+    assert np.array_equal(*chunks) and chunks[0].shape[1] == 16
 
 
 def test_it_takes_the_object_that_is_asked_for_in_scenes_that_it_has_not_seen(
     tmp_path: Path,
 ) -> None:
     """Blocks that differ by 5 mm, 210 scenes to learn from; one in three is right by chance."""
-    done = subprocess.run(
-        [PYTHON, "-c", CHOOSING, str(tmp_path)],
-        env=environment(), capture_output=True, text=True,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr[-3000:]
+    done = ran("-c", CHOOSING, tmp_path)
     assert float(done.stdout) > 0.9

@@ -5,29 +5,21 @@ Part of `make test-models`: torch is in the models' environment alone.
 
 from __future__ import annotations
 
-import contextlib
 import json
-import os
-import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
+from outside import PATIENT, ran, served
 from primitive_rows import GRASP, ROBOT, START, grasping_episode, picture_with, written_set
 
 from robospa.baselines.learned.maps.primitives import decisions_of
 from robospa.baselines.learned.progress import read_losses
 from robospa.clients import connect
 from robospa.protocol.policy import TrialInfo
-from robospa.protocol.transport import Timeouts
 
-ROOT = Path(__file__).resolve().parents[2]
-PYTHON = os.environ.get("ROBOSPA_MODELS_PYTHON", str(ROOT / ".venv-models" / "bin" / "python"))
-ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONDONTWRITEBYTECODE": "1"}
-LEARNER = "robospa.baselines.learned.maps.learner:LEARNER"
 TINY = {"width": 16, "layers": 1, "batch": 4, "warmup": 2, "threads": 1, "held_out": 0.2}
 TINY |= {"choices": 4, "compared": 4}
-PATIENT = Timeouts(wait=60, hello=60, reset=300, first_infer=300, infer=300)
 
 pytestmark = [pytest.mark.models, pytest.mark.timeout(600)]
 
@@ -142,18 +134,9 @@ assert near(plain.choice(observation, []), *warm)
 """
 
 
-def test_a_first_grasp_is_chosen_by_comparing_spots() -> None:
-    done = subprocess.run(
-        [PYTHON, "-c", CHOICE], capture_output=True, text=True, timeout=200, env=ENVIRONMENT
-    )
-    assert done.returncode == 0, done.stderr[-3000:]
-
-
-def test_places_attend_to_words_and_to_other_places_by_where_they_lie() -> None:
-    done = subprocess.run(
-        [PYTHON, "-c", NETWORK], capture_output=True, text=True, timeout=200, env=ENVIRONMENT
-    )
-    assert done.returncode == 0, done.stderr[-3000:]
+@pytest.mark.parametrize("script", [CHOICE, NETWORK], ids=["first-grasp", "attention"])
+def test_parts_of_the_network(script: str) -> None:
+    ran("-c", script, limit=200)
 
 
 @pytest.fixture(scope="module")
@@ -172,15 +155,7 @@ def trained(
     """Train a tiny network; what is printed. Stops as if killed after the checkpoint `stop` of a
     `part`."""
     words = json.dumps([str(data), str(out), resume, TINY | options, part, stop])
-    done = subprocess.run(
-        [PYTHON, "-c", TRAIN, words], capture_output=True, text=True, timeout=500, env=ENVIRONMENT
-    )
-    assert done.returncode == 0, done.stderr[-3000:]
-    return done.stdout
-
-
-def curve(out: Path) -> list[dict[str, float]]:
-    return read_losses(out)
+    return ran("-c", TRAIN, words, limit=500).stdout
 
 
 def test_a_training_repeats_itself_and_goes_on_to_the_same_bits(data: Path, tmp_path: Path) -> None:
@@ -195,8 +170,10 @@ def test_a_training_repeats_itself_and_goes_on_to_the_same_bits(data: Path, tmp_
     for file in ("network.pt", "chooser.pt"):
         weights = [(tmp_path / name / file).read_bytes() for name in ("one", "two", "cut")]
         assert weights[0] == weights[1] == weights[2]
-    assert curve(tmp_path / "one" / "choice") == curve(tmp_path / "cut" / "choice") != []
-    assert curve(tmp_path / "one") == curve(tmp_path / "cut")
+    assert (
+        read_losses(tmp_path / "one" / "choice") == read_losses(tmp_path / "cut" / "choice") != []
+    )
+    assert read_losses(tmp_path / "one") == read_losses(tmp_path / "cut")
     assert "refused" in trained(data, tmp_path / "one", steps=6, save=3), "without --resume"
     other = trained(data, tmp_path / "one", resume=True, steps=7, save=3)
     assert "of another training (options differ)" in other
@@ -204,35 +181,21 @@ def test_a_training_repeats_itself_and_goes_on_to_the_same_bits(data: Path, tmp_
 
 def test_it_learns_where_the_object_is_and_is_served(data: Path, tmp_path: Path) -> None:
     trained(data, tmp_path / "out", steps=220, save=110, batch=8, rate=4e-3, choices=110)
-    first, last = curve(tmp_path / "out")
+    first, last = read_losses(tmp_path / "out")
     assert last["place_loss"] < first["place_loss"] < 7 and last["held_out_kind_share"] == 1
     assert last["held_out_place_share"] >= 0.5, "two thirds of a thousand places are beside it"
-    assert curve(tmp_path / "out" / "choice")[-1]["held_out_choice_share"] >= 0.5
-    command = [PYTHON, "-m", "robospa.harness.cli.main", "serve"]
-    words = ["robospa.baselines.learned.serve:create", str(tmp_path / "out"), "--port=0"]
-    with subprocess.Popen(
-        [*command, *words], stdout=subprocess.PIPE, text=True, env=ENVIRONMENT
-    ) as server:
-        assert server.stdout is not None
-        try:
-            line = next((text for text in server.stdout if text.startswith("serving ")), "")
-            assert " at ws://" in line, "the server did not start; see its messages above"
-            with connect(line.split(" at ")[1].split()[0], timeouts=PATIENT) as policy:
-                policy.reset(TrialInfo("Pick_Blocks_Size", "aloha-agilex", "Pick the block.", 1))
-                chunk = policy.infer(
-                    {
-                        "images": {"head": picture_with(-0.15, -0.06, 11)},
-                        "state": START.astype(np.float32),
-                        "ee": np.zeros((2, 8), np.float32),
-                        "instruction": "Pick the block.",
-                        "step": 0,
-                    }
-                )
-        finally:
-            server.terminate()
-            with contextlib.suppress(subprocess.TimeoutExpired):
-                server.wait(20)
-            server.kill()
+    assert read_losses(tmp_path / "out" / "choice")[-1]["held_out_choice_share"] >= 0.5
+    words = ("robospa.baselines.learned.serve:create", tmp_path / "out")
+    with served(*words) as url, connect(url, timeouts=PATIENT) as policy:
+        policy.reset(TrialInfo("Pick_Blocks_Size", "aloha-agilex", "Pick the block.", 1))
+        observation = {
+            "images": {"head": picture_with(-0.15, -0.06, 11)},
+            "state": START.astype(np.float32),
+            "ee": np.zeros((2, 8), np.float32),
+            "instruction": "Pick the block.",
+            "step": 0,
+        }
+        chunk = policy.infer(observation)
     rows = np.concatenate([START[None].astype(np.float32), chunk])
     one = decisions_of(ROBOT, rows)[0].primitive
     assert one is not None and (one.kind, one.arm) == (GRASP.kind, GRASP.arm)

@@ -3,54 +3,34 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
 import tomllib
 from pathlib import Path
 
 import pytest
 from installed import installed
+from outside import HERE, ROOT, environment, ran
 
-ROOT = Path(__file__).resolve().parents[2]
-HERE = Path(__file__).resolve().parent
-PYTHON = os.environ.get("ROBOSPA_MODELS_PYTHON", str(ROOT / ".venv-models" / "bin" / "python"))
 RENAMED = {"observation.images.head": "observation.images.head_camera"}
 """Of the tiny policy, which has RoboTwin's names."""
 
 pytestmark = [pytest.mark.models, pytest.mark.timeout(600)]
 
 
-def run(tmp_path: Path, *words: str) -> None:
-    groups = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["entry-points"]
-    site = tmp_path / "site"
-    if not site.exists():  # robospa is not installed there: its robots are found by these notes
-        site.mkdir()
-        installed(site, groups)
-    path = os.pathsep.join(map(str, (ROOT, ROOT / "tests" / "helpers", site)))
-    environment = {
-        **os.environ,
-        "PYTHONPATH": path,
-        "PYTHONDONTWRITEBYTECODE": "1",
-        "HF_HUB_OFFLINE": "1",
-        "HF_HOME": str(tmp_path / "home"),
-        "CUDA_VISIBLE_DEVICES": "",
-    }
-    done = subprocess.run(
-        [PYTHON, *words], capture_output=True, text=True, timeout=400, env=environment, cwd=tmp_path
-    )
-    assert done.returncode == 0, done.stderr[-4000:]
-
-
 def test_lerobot_eval_runs_its_policy_on_two_levels(tmp_path: Path) -> None:
-    run(tmp_path, str(HERE / "tiny.py"), "make", "act", str(tmp_path / "act"))
-    run(
-        tmp_path,
+    ran(HERE / "tiny.py", "make", "act", tmp_path / "act")
+    site = tmp_path / "site"  # robospa is not installed there: its robots are found by these notes
+    site.mkdir()
+    groups = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["entry-points"]
+    installed(site, groups)
+    ran(
         *("-m", "lerobot.scripts.lerobot_eval", f"--policy.path={tmp_path / 'act'}"),
         *("--policy.device=cpu", "--env.discover_packages_path=robospa.harness.gym"),
         *("--env.type=robospa", "--env.task=Pick_Blocks_Size", "--env.levels=1,2"),
         *("--env.cameras=head", "--env.world=run_fakes:FakeWorld", "--env.parts=run_fakes:parts"),
         *("--env.step_scale=0.05", "--eval.n_episodes=2", "--eval.batch_size=1", "--seed=0"),
         *(f"--output_dir={tmp_path / 'out'}", f"--rename_map={json.dumps(RENAMED)}"),
+        given=environment(tmp_path / "home", ROOT / "tests" / "helpers", site),
+        cwd=tmp_path,
     )
     found = json.loads((tmp_path / "out" / "eval_info.json").read_text())
     tasks = [(one["task_group"], one["task_id"]) for one in found["per_task"]]

@@ -28,6 +28,7 @@ from lerobot.policies.factory import make_pre_post_processors
 
 from robospa.clients import lerobot as served
 from robospa.clients.model_policy import NotByRow, Query, seeded_rows
+from robospa.protocol.conformance import synthetic_observation
 from robospa.protocol.policy import TrialInfo
 
 VIEWS = ("head_camera", "left_camera", "right_camera")
@@ -48,14 +49,7 @@ def features(width: int, size: tuple[int, int], views: tuple[str, ...] = VIEWS) 
 def statistics(width: int, views: tuple[str, ...] = VIEWS) -> dict[str, dict[str, torch.Tensor]]:
     """Means, deviations, bounds and quantiles of a data set that never was."""
     zero, one = torch.zeros(width), torch.ones(width)
-    numbers = {
-        "mean": zero,
-        "std": 0.2 * one,
-        "min": -one,
-        "max": one,
-        "q01": -one,
-        "q99": one,
-    }
+    numbers = {"mean": zero, "std": 0.2 * one, "min": -one, "max": one, "q01": -one, "q99": one}
     image = {
         "mean": torch.full((3, 1, 1), 0.5),
         "std": torch.full((3, 1, 1), 0.25),
@@ -229,17 +223,13 @@ def pi05(folder: Path) -> Any:
     )
 
 
-MAKERS: dict[str, Callable[[Path], Any]] = {
-    "act": act,
-    "xvla": xvla,
-    "pi05": pi05,
-    "diffusion": diffusion,
-}
+MAKERS = {"act": act, "xvla": xvla, "pi05": pi05, "diffusion": diffusion}
 
 
-def make(name: str, folder: Path) -> None:
+def make(name: str, where: str) -> None:
     """Write the checkpoint and its processors."""
     torch.manual_seed(0)
+    folder = Path(where).resolve()
     folder.mkdir(parents=True, exist_ok=True)
     policy = MAKERS[name](folder)
     config = policy.config
@@ -275,26 +265,10 @@ def batch(name: str, folder: str) -> None:
     if name == "pi05":
         shrink_pi05()
     policy = served.create(options(name, folder))
-    random = np.random.default_rng(0)
     seen = []
     for session in range(3):
-        images = {
-            camera.name: random.integers(0, 255, (240, 320, 3), dtype=np.uint8)
-            for camera in policy.spec.cameras
-        }
-        state = random.uniform(-0.5, 0.5, 14).astype(np.float32)
-        ee = np.tile(np.array([0.3, 0.1, 1.0, 1, 0, 0, 0, 1], np.float32), (2, 1))
-        past = {"images": images, "state": state}
-        seen.append(
-            {
-                "images": images,
-                "state": state,
-                "ee": ee,
-                "instruction": f"{WORDS} {session}",
-                "step": 0,
-                "history": {offset: past for offset in policy.spec.history},
-            }
-        )
+        seen.append(synthetic_observation(policy.spec, seed=session))
+        seen[-1]["instruction"] = f"{WORDS} {session}"
         policy.reset_session(session, trial(session))
         policy.reset_session(session + 3, trial(session + 100))
     together = policy.infer_batch(seen, [0, 1, 2])
@@ -315,21 +289,15 @@ def batch(name: str, folder: str) -> None:
     print(json.dumps(report))
 
 
-def prompt(folder: str) -> None:
+def prompt(name: str, folder: str) -> None:
     """Print the count of state numbers in pi0.5's prompt for each option, and the last prompt."""
     shrink_pi05()
     counts: dict[str, Any] = {}
     for width in (None, 14, 32):
-        policy = served.create(replace(options("pi05", folder), state_prompt=width))
+        policy = served.create(replace(options(name, folder), state_prompt=width))
         policy.reset(trial(0))
-        image = np.zeros((240, 320, 3), np.uint8)
-        state = np.linspace(-1, 0.99, 14, dtype=np.float32)
-        seen = {
-            "images": {camera.name: image for camera in policy.spec.cameras},
-            "state": state,
-            "instruction": WORDS,
-            "step": 0,
-        }
+        seen = synthetic_observation(policy.spec)
+        seen["state"] = np.linspace(-1, 0.99, 14, dtype=np.float32)
         policy.infer(seen)
         batch = policy._batch([Query(seen, trial(0), 0)], None)
         transition = policy.before.to_transition(batch)
@@ -385,11 +353,4 @@ def trial(policy_seed: int) -> TrialInfo:
 
 if __name__ == "__main__":
     what, *rest = sys.argv[1:]
-    if what == "make":
-        make(rest[0], Path(rest[1]).resolve())
-    elif what == "batch":
-        batch(rest[0], rest[1])
-    elif what == "prompt":
-        prompt(rest[1])
-    else:
-        noise()
+    {"make": make, "batch": batch, "prompt": prompt, "noise": noise}[what](*rest)  # type: ignore[operator]

@@ -11,9 +11,8 @@ from command_line import robospa
 from tiny_datasets import tiny_dataset
 
 from robospa.harness.convention_check.episodes import read_episode
-from robospa.harness.datasets import api
+from robospa.harness.datasets import collect
 from robospa.harness.datasets.collect import CollectionResult
-from robospa.harness.datasets.verify import ReplayEnding
 
 
 def test_what_was_made_as_json(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -23,7 +22,7 @@ def test_what_was_made_as_json(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
         say("6 episodes of 2 variants")
         return None if given["resume"] else CollectionResult((out,), 5, lines)
 
-    monkeypatch.setattr(api, "collect_order", made)
+    monkeypatch.setattr(collect, "collect_order", made)
     done = robospa("collect", "--tasks", "Pick_Blocks_Size", "--out", out, "--json")
     wanted = {"out": str(out), "finished_before": False, "folders": [str(out)], "episodes": 5}
     assert done.code == 1 and json.loads(done.out) == {**wanted, "missing": list(lines)}
@@ -34,7 +33,7 @@ def test_what_was_made_as_json(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
 
 def test_what_was_verified_as_json(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (episode,) = tiny_dataset(tmp_path, "robotwin-hdf5", "png", count=1)
-    ending = ReplayEnding(True, episode.replay_digest)
+    ending = (True, episode.replay_digest)
     simulator = "robospa.harness.datasets.verify.in_simulator"
     monkeypatch.setattr(simulator, lambda: lambda line, commanded: ending)
     words = ("collect", "--verify", tmp_path, "--json")

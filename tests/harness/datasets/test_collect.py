@@ -21,7 +21,6 @@ import pytest
 from collect_fakes import FakePool, contents, fake_pack, order
 
 import robospa
-from robospa.harness.datasets import api
 from robospa.harness.datasets import collect as module
 from robospa.harness.datasets.collect import EPISODES, CollectionResult, EpisodeStore, Order
 from robospa.harness.datasets.settings import (
@@ -54,9 +53,7 @@ def _without_formats(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def run(wanted: Order, resume: bool = False, keep: bool = False) -> CollectionResult | None:
-    return module.collect(
-        wanted, FakePool, resume=resume, keep_episodes=keep, say=lambda line: None
-    )
+    return module.make(wanted, FakePool, resume=resume, keep_episodes=keep, say=lambda line: None)
 
 
 def test_the_first_good_seeds_are_kept_and_the_others_named(tmp_path: Path) -> None:
@@ -107,7 +104,7 @@ def test_kills_at_any_moment_change_nothing(tmp_path: Path) -> None:
 
 def test_neither_the_number_of_workers_nor_their_order_matters(tmp_path: Path) -> None:
     run(order(tmp_path / "a"))
-    module.collect(order(tmp_path / "b"), lambda n: FakePool(n, 7), say=lambda line: None)
+    module.make(order(tmp_path / "b"), lambda n: FakePool(n, 7), say=lambda line: None)
     assert contents(tmp_path / "a") == contents(tmp_path / "b")
 
 
@@ -122,7 +119,7 @@ def test_what_is_there_is_not_made_again(tmp_path: Path) -> None:
         pools.append(FakePool(episodes))
         return pools[0]
 
-    module.collect(
+    module.make(
         order(tmp_path / "b"), open_pool, resume=True, keep_episodes=True, say=lambda line: None
     )
     assert pools[0].made == [1_000_002]
@@ -214,7 +211,7 @@ def test_a_full_disk_is_one_sentence_and_nothing_is_lost(
 
 def test_the_space_that_it_takes_is_said(tmp_path: Path) -> None:
     lines: list[str] = []
-    module.collect(order(tmp_path / "a"), FakePool, say=lines.append)
+    module.make(order(tmp_path / "a"), FakePool, say=lines.append)
     assert lines[0].startswith("6 episodes of 2 variants: about ")
     few, many = (
         expected_bytes(Collection(episodes=10, frames=frames), [FIRST], "h264")
@@ -269,7 +266,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[Compute]:
         found.append(compute)
         yield FakePool
 
-    monkeypatch.setattr(api, "pool_opener", opener)
+    monkeypatch.setattr(module, "pool_opener", opener)
     monkeypatch.setattr(module, "versions", dict)
     return found
 

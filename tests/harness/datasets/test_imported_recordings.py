@@ -142,7 +142,7 @@ def test_nothing_to_import_and_a_full_folder_are_refused(official: Path, tmp_pat
     (tmp_path / "full" / "mine").touch()
     for layout, out, message in (
         ("lerobot-v3", "full", "is not empty"),
-        ("zarr", "new", "cannot be had as .zarr. but as lerobot-v3"),
+        ("zarr", "new", "no format .zarr."),
     ):
         with pytest.raises(SettingsError, match=message):
             import_recordings(find_recordings(official), official, layout, tmp_path / out)

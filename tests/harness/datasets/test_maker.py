@@ -11,7 +11,6 @@ from fake_runs import trial_record
 from numpy.typing import NDArray
 
 from robospa.harness.datasets.episode import DatasetEpisode, EpisodeFilm, read_episode_file
-from robospa.harness.datasets.jobs import EpisodeAttempt, EpisodeJob, attempt_job
 from robospa.harness.datasets.maker import (
     EpisodeMaker,
     replay_end,
@@ -22,6 +21,7 @@ from robospa.harness.datasets.manifest import DatasetManifest
 from robospa.harness.datasets.pack import pack
 from robospa.harness.datasets.pictures import FPS
 from robospa.harness.datasets.verify import verify
+from robospa.harness.datasets.workers import EpisodeAttempt, EpisodeJob, attempt_job
 from robospa.harness.demonstrations.demonstration import DemonstrationWorld, demonstrate
 from robospa.harness.demonstrations.recorder import KEYFRAMES
 from robospa.harness.replay import ENDED

@@ -65,11 +65,12 @@ def test_what_was_cut_short_is_no_data_set(tmp_path: Path, monkeypatch: pytest.M
     folder = tmp_path / "set"
     files = written(tmp_path / "episodes", [tiny_episode(0), tiny_episode(1)])
 
-    def stop(count: int) -> None:
+    def stop(*_: object) -> None:
         raise KeyboardInterrupt
 
-    with pytest.raises(KeyboardInterrupt):
-        pack("lerobot-v3", folder, files, SETTINGS, stop)
+    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+        patch.setattr("robospa.harness.datasets.pack.write_card", stop)
+        pack("lerobot-v3", folder, files, SETTINGS)
     assert not (folder / MANIFEST).exists() and not (folder / "meta").exists()
     pack("lerobot-v3", folder, files, SETTINGS)
     tiny_dataset(tmp_path / "other", count=2)

@@ -25,7 +25,7 @@ from robospa.harness.datasets.manifest import (
     file_hash,
 )
 from robospa.harness.datasets.pack import FORMATS, pack
-from robospa.harness.datasets.verify import REPLAYS, ReplayEnding, replayed_sentence, verify
+from robospa.harness.datasets.verify import REPLAYS, replayed_sentence, verify
 
 
 class Replayed:
@@ -34,12 +34,12 @@ class Replayed:
     def __init__(self, episodes: list[DatasetEpisode]) -> None:
         self.episodes, self.seen = episodes, list[int]()
 
-    def __call__(self, line: EpisodeLine, commanded: NDArray[np.float32]) -> ReplayEnding:
+    def __call__(self, line: EpisodeLine, commanded: NDArray[np.float32]) -> tuple[bool, str]:
         episode = self.episodes[line.episode_index]
         self.seen.append(line.episode_index)
         right = np.array_equal(commanded, episode.commanded)
-        right &= line.prefix.tolist() == episode.prefix_action.tolist()
-        return ReplayEnding(right and episode.success, episode.replay_digest)
+        right &= np.reshape(line.prefix_action, (-1, 14)).tolist() == episode.prefix_action.tolist()
+        return bool(right and episode.success), episode.replay_digest
 
 
 @pytest.mark.parametrize("layout", FORMATS)
@@ -133,7 +133,7 @@ def test_replays_that_end_otherwise_are_told(tmp_path: Path) -> None:
     first, second, third = episodes
     others = [replace(first, success=False), replace(second, replay_digest="00" * 32), third]
 
-    def broken(line: EpisodeLine, commanded: NDArray[np.float32]) -> ReplayEnding:
+    def broken(line: EpisodeLine, commanded: NDArray[np.float32]) -> tuple[bool, str]:
         if line.episode_index == 2:
             raise RuntimeError("the scene does not come to rest")
         return Replayed(others)(line, commanded)

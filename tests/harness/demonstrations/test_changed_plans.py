@@ -4,28 +4,17 @@ from __future__ import annotations
 
 import pytest
 
-from robospa.geometry import Pose
 from robospa.harness.demonstrations.changed_plans import split_steps, wrong_plan
-from robospa.harness.robots import embodiment
-from robospa.harness.skills.workspace import Workspace
 from robospa.tasks.catalog import build_scene, task
 from robospa.tasks.plan import Pick, Place, Press
 from robospa.tasks.scene import Scene
-from robospa.tasks.snapshot import Snapshot
-from robospa.workcell import grasp_points
 
 SEED = 930_000
 
 
 def planned(kind: str, name: str, level: int) -> tuple[Scene, tuple[object, ...]]:
     scene = build_scene(name, level, SEED)
-    poses = {item.name: item.pose for item in scene.objects}
-    robot = embodiment("aloha-agilex")
-    ends = (Pose(), Pose())
-    points = grasp_points(robot.grippers, ends)
-    joints = (robot.arms[0].home, robot.arms[1].home)
-    start = Snapshot(0.0, poses, (1.0, 1.0), ends, joints, grasp_points=points)
-    return scene, wrong_plan(kind, scene, Workspace(scene, robot, start))
+    return scene, wrong_plan(kind, scene)
 
 
 def test_the_neighbour_is_not_the_target() -> None:

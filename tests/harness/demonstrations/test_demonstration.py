@@ -205,8 +205,7 @@ def test_a_replayed_demonstration_succeeds_within_the_step_limit(key: TrialKey) 
     recorder = FrameRecorder(frame_steps(key.task))
     made = demonstrate(SapienWorld(render=False, limits=DEMONSTRATION_LIMITS), key, recorder)
     assert made.success and not made.failures
-    space = embodiment(key.embodiment).action_space("joint")
-    actions = recorder.episode("x", made.instruction, {}, space, ()).actions
+    actions = recorder.commanded[1:]
     limit = task(key.task).levels[key.level].steps
     done = play(SapienWorld(render=False), key, actions, "joint")
     assert done.success and done.end == "success"

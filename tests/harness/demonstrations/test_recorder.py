@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
-from robospa.action_space import ActionSpace
-from robospa.harness.convention_check.episodes import Episode
 from robospa.harness.demonstrations.recorder import (
     KEYFRAMES,
     STRIDE,
@@ -23,21 +18,8 @@ from robospa.harness.demonstrations.recorder import (
 from robospa.harness.sim.motion import HOLD_STEPS, RATE
 from robospa.harness.sim.sapien_world import POLL_STEPS
 from robospa.harness.world import StepResult
-from robospa.observation import CameraSpec
 from robospa.protocol.policy import PolicySpec
 from robospa.tasks.catalog import tasks
-
-HEAD = (CameraSpec("head"),)
-
-
-@dataclass(frozen=True)
-class Look:
-    """What `Clock` looks like."""
-
-    step: int
-
-    def draw(self, cameras: Sequence[CameraSpec]) -> list[NDArray[np.uint8]]:
-        return [np.full((c.height, c.width, 3), self.step % 256, np.uint8) for c in cameras]
 
 
 class Clock:
@@ -55,12 +37,12 @@ class Clock:
     def snapshot(self) -> SimpleNamespace:
         return SimpleNamespace(time=self.step / RATE)
 
-    def still(self) -> Look:
-        return Look(self.step)
+    def still(self) -> int:
+        return self.step
 
 
-def recorded(lengths: list[int], stride: int = 15, rests: bool = False) -> Episode:
-    """The episode of actions that take so many physics steps."""
+def recorded(lengths: list[int], stride: int = 15, rests: bool = False) -> FrameRecorder:
+    """The frames of actions that take so many physics steps."""
     recorder, world = FrameRecorder(stride), Clock(rests)
     recorder.started(world)  # type: ignore[arg-type]
     for length in lengths:
@@ -69,12 +51,11 @@ def recorded(lengths: list[int], stride: int = 15, rests: bool = False) -> Episo
             if world.step % POLL_STEPS == 0:
                 recorder.polled(world, world.step / RATE)  # type: ignore[arg-type]
         recorder.executed(world, np.zeros(14, np.float32), StepResult(length, False))  # type: ignore[arg-type]
-    recorder.ended(world)  # type: ignore[arg-type]
-    assert [f.still.step for f in recorder.frames] == [f.step for f in recorder.frames]  # type: ignore[attr-defined]
-    made = recorder.episode("x", "Go.", {"task": "T"}, ActionSpace("joint"), HEAD)
-    assert made.measured is not None and made.measured.max() == -1
-    assert len(made.frames["head"]) == len(made) == len(made.actions) + 1
-    return made
+    assert [frame.still for frame in recorder.frames] == [frame.step for frame in recorder.frames]
+    commanded, measured, _, objects = recorder.columns()
+    assert measured.max() == -1 and objects.shape == (len(recorder), 0)
+    assert np.array_equal(commanded, recorder.commanded)
+    return recorder
 
 
 @pytest.mark.parametrize(

@@ -10,8 +10,8 @@ import pytest
 from robospa.harness.cli.main import main
 from robospa.harness.datasets.episode import read_episode_file
 from robospa.harness.datasets.features import layout_of
-from robospa.harness.datasets.jobs import EpisodeJob
 from robospa.harness.datasets.robotwin import RoboTwin
+from robospa.harness.datasets.workers import EpisodeJob
 from robospa.tasks.catalog import build_scene
 from robospa.tasks.official import official_model
 from robospa.trial import TrialKey

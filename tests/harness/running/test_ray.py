@@ -19,8 +19,7 @@ from collect_fakes import FakePool, contents, fake_pack, order
 from ray_helpers import QUIET, SIZE, cluster, kill_node
 
 from robospa.harness.datasets import collect as collecting
-from robospa.harness.datasets.api import pool_opener
-from robospa.harness.datasets.collect import collect
+from robospa.harness.datasets.workers import pool_opener
 from robospa.harness.running.ray_executor import (
     NoCluster,
     RayExecutor,
@@ -130,11 +129,11 @@ def test_a_data_set_collected_over_ray_has_the_bytes_of_one_made_here(
     monkeypatch.setattr(collecting, "pack", fake_pack)
     compute = Compute(executor="ray", address=home[0].address)
     with pool_opener(compute, "collect_fakes:FakeMaker") as open_pool:
-        there = collect(
+        there = collecting.make(
             order(tmp_path / "ray"), open_pool, keep_episodes=True, say=lambda line: None
         )
     assert Path(os.environ["FAKE_DEATHS"]).exists()
-    here = collect(order(tmp_path / "here"), FakePool, keep_episodes=True, say=str)
+    here = collecting.make(order(tmp_path / "here"), FakePool, keep_episodes=True, say=str)
     assert there is not None and here is not None and there.episodes == here.episodes == 6
     assert contents(tmp_path / "ray") == contents(tmp_path / "here")
 
