@@ -1,42 +1,35 @@
-"""Recorded demonstrations: do replays meet the goal, do mistakes fail, and what does one cost?
+"""Recorded demonstrations: do replays meet the goal, and what does one cost?
 
     python benchmarks/demonstrations.py demonstrations [--trials 1] [--tasks NAME,..] [--json]
-    python benchmarks/demonstrations.py corrections [--trials 1] [--tasks NAME,..] [--json]
     python benchmarks/demonstrations.py collecting [--json]
 
 `demonstrations` records the expert on seeds of every variant that no list has, without pictures,
 and replays one recorded action a step, by the official rule and within the official step limit;
-`--json` also writes a line a variant to benchmarks/results/demonstrations.csv. `corrections` does
-so with noise of several strengths, mid-states and every mistake, at one level of three tasks of
-each category. `collecting` makes episodes as a worker of `robospa collect` does, with three films,
-of two tasks of each category at three levels: all 280 variants cost what the frames of their
-demonstrations (the CSV) say. Trials are kept in build/NAME.jsonl as they are done: stopped
-anywhere, the same command goes on there.
+`--json` also writes a line a variant to benchmarks/results/demonstrations.csv. `collecting` makes
+episodes as a worker of `robospa collect` does, with three films, of two tasks of each category at
+three levels: all 280 variants cost what the frames of their demonstrations (the CSV) say. Trials
+are kept in build/NAME.jsonl as they are done: stopped anywhere, the same command goes on there.
 """
 
 from __future__ import annotations
 
 import csv
-import time
 from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 from statistics import mean
 from types import SimpleNamespace
 
-import numpy as np
 from frame import RESULTS, Figure, Json, Result, gather, main
 
 from robospa.harness.datasets.maker import EpisodeMaker
 from robospa.harness.datasets.workers import EpisodeJob, attempt_job
-from robospa.harness.demonstrations.changed_plans import occasions
 from robospa.harness.demonstrations.demonstration import DemonstrationWorld, replay, show
 from robospa.harness.demonstrations.recorder import FrameRecorder, frame_steps
 from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.harness.world import SceneUnstable
 from robospa.observation import DEFAULT_CAMERAS
-from robospa.results.failures.labels import label
-from robospa.tasks.catalog import LEVELS, build_scene, task, tasks
+from robospa.tasks.catalog import LEVELS, task, tasks
 from robospa.trial import BASIC, CATEGORIES, TrialKey
 
 SUCCEEDED = 95.0
@@ -45,44 +38,31 @@ OFFICIAL_FRAMES = 205
 """Mean of the official data: 108 million time steps in 527 thousand trajectories (the paper)."""
 EPISODES = 50
 """Of each variant, as in the paper's experiments."""
-STRENGTHS = (0.02, 0.04, 0.08, 0.16)
-"""Of noise [m]."""
 TABLE = RESULTS / "demonstrations.csv"
 Found = SimpleNamespace
 Variant = tuple[str, int]
 
 
-def made(name: str, level: int, seed: int, kind: str = "expert", strength: float = 0.0) -> Json:
-    """Make one demonstration and replay it; `off` and `turned` are of each push [mm], [degrees]."""
+def made(name: str, level: int, seed: int) -> Json:
+    """Make one demonstration and replay it."""
     key = TrialKey(name, level, seed, split="train")
     recorder, world = FrameRecorder(frame_steps(name)), DemonstrationWorld(render=False)
-    began = time.process_time()
     try:
-        shown = show(world, key, recorder, kind, strength=strength)
-    except (SceneUnstable, ValueError) as error:
+        shown = show(world, key, recorder)
+    except SceneUnstable as error:
         return {"valid": False, "problem": str(error)}
     finally:
         world.close()
-    seconds = time.process_time() - began
-    whose, _ = shown.annotate(recorder.commanded, np.array([f.time for f in recorder.frames]))
-    pushes = shown.noise.pushes if shown.noise is not None else []
     world = SapienWorld(render=False)
-    again = replay(world, key, recorder.commanded, shown.prefix_action, kind)
+    again = replay(world, key, recorder.commanded, shown.prefix_action, shown.kind)
     world.close()
-    failure = label(again)
     return {
         "valid": True,
         "shown": shown.demonstration.success,
         "replayed": again.success,
         "actions": len(recorder.commanded) - 1,
-        "before": len(shown.prefix_action),
-        "labels": np.bincount(whose, minlength=4).tolist(),
-        "off": [round(1000 * m, 1) for m, _ in pushes],
-        "turned": [round(float(np.degrees(turn)), 1) for _, turn in pushes],
-        "failure": failure.kind if failure else "",
         "problem": " ".join(shown.demonstration.failures),
         "simulated": round(shown.demonstration.seconds, 2),
-        "seconds": round(seconds, 2),
     }
 
 
@@ -156,59 +136,6 @@ def _overall(variants: dict[Variant, list[Found]]) -> Iterator[Figure]:
             note=f"official data: {OFFICIAL_FRAMES}")  # fmt: skip
 
 
-# ---------------------------------------------------------------- noise, mid-states, mistakes
-
-
-def corrections(
-    trials: int = 1, first: int = 950_000, names: str = "", level: int = 3, workers: int = 2
-) -> Result:
-    """Demonstrations of every kind but the expert's plain ones."""
-    of = [[name for name in tasks() if task(name).category == c] for c in CATEGORIES]
-    some = [n[i] for n in of for i in sorted({0, len(n) // 2, len(n) - 1})]
-    jobs = []
-    for seed in range(first, first + trials):
-        for name in chosen(names) if names else some:
-            jobs += [(name, level, seed, "noise", strength) for strength in STRENGTHS]
-            kinds = ["midstate"] if task(name).category != "MIP" else []
-            kinds += [f"mistake:{kind}" for kind in occasions(build_scene(name, level, seed))]
-            jobs += [(name, level, seed, kind, 0.0) for kind in kinds]
-    rows = gather(Path("build/corrections.jsonl"), jobs, made, workers)
-    valid = [row for row in rows if row.valid]
-    figures = [f for strength in STRENGTHS for f in _noise(strength, valid)]
-    if midstates := [t for t in valid if t.job[3] == "midstate"]:
-        figures.append(Figure("mid-states: replays that succeed",
-            per_cent(t.shown and t.replayed for t in midstates), "%", at_least=SUCCEEDED,
-            note=f"of {len(midstates)}; {mean(t.before for t in midstates):.0f} actions before the "
-            f"first frame, {mean(t.actions + 1 for t in midstates):.0f} frames"))  # fmt: skip
-    mistakes = [t for t in valid if t.job[3].startswith("mistake:")]
-    for t in mistakes:
-        t.failed = not t.shown and not t.replayed and not t.problem
-    kinds = {t.job[3]: [u.failed for u in mistakes if u.job[3] == t.job[3]] for t in mistakes}
-    counts = (f"{k.partition(':')[2]} {sum(v)} of {len(v)}" for k, v in sorted(kinds.items()))
-    figures.append(Figure("mistakes: replays that fail", per_cent(t.failed for t in mistakes), "%",
-        note=", ".join(counts)))  # fmt: skip
-    return Result(
-        "Noise, mistakes and mid-states in demonstrations",
-        figures,
-        text="""\
-What each kind is: [demonstrations](demonstrations.md). A push is how far the noise takes the
-fingertips off the expert's way, of which the expert comes back by itself.""",
-    )
-
-
-def _noise(strength: float, valid: list[Found]) -> Iterator[Figure]:
-    trials = [t for t in valid if t.job[3:] == ("noise", strength)]
-    if trials:
-        off, turned = ([x for t in trials for x in getattr(t, name)] for name in ("off", "turned"))
-        frames = [sum(t.labels[i] for t in trials) for i in range(3)]
-        yield Figure(f"noise of {1000 * strength:g} mm: replays that succeed",
-            per_cent(t.shown and t.replayed for t in trials), "%", at_least=SUCCEEDED,
-            note=f"of {len(trials)}; {len(off) / len(trials):.1f} pushes an episode, on average of "
-            f"{mean(off or [0]):.1f} mm and {mean(turned or [0]):.1f} degrees; "
-            f"{100 * frames[1] / sum(frames):.0f} % of the frames noise, "
-            f"{100 * frames[2] / sum(frames):.0f} % recovery")  # fmt: skip
-
-
 # ---------------------------------------------------------------- what an episode costs
 
 
@@ -276,4 +203,4 @@ encoding them; it does not depend on their number of pixels, but on what is in t
 
 
 if __name__ == "__main__":
-    main(demonstrations=demonstrations, corrections=corrections, collecting=collecting)
+    main(demonstrations=demonstrations, collecting=collecting)

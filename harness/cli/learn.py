@@ -15,11 +15,6 @@ learn = typer.Typer(
 )
 
 
-@learn.callback()
-def several() -> None:
-    """Keeps `train` a command of its own, however many there are."""
-
-
 @learn.command(no_args_is_help=True)
 def train(
     learner: Annotated[

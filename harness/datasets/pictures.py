@@ -12,7 +12,6 @@ from __future__ import annotations
 import io
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, cast
@@ -20,7 +19,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.extras import remedy
+from robospa.extras import need
 from robospa.harness.datasets.episode import (
     FILM_CODECS,
     STILL_CODECS,
@@ -151,28 +150,18 @@ Picture = NDArray[np.uint8]
 
 
 class CodecMissing(Exception):
-    """What would encode the pictures is not installed here; the message says what to do."""
+    """PyAV has no such encoder here; the message says what to do."""
 
 
-@dataclass(frozen=True)
-class _Encoder:
-    """An encoder of PyAV, by its name there, with its options."""
-
-    name: str
-    options: Mapping[str, str]
-
-
-ENCODERS: Mapping[str, _Encoder] = {
-    "h264": _Encoder(
+ENCODERS: Mapping[str, tuple[str, Mapping[str, str]]] = {
+    "h264": (
         "libx264",
         {"crf": "27", "preset": "veryfast", "g": "2", "bf": "0", "rc-lookahead": "0"},
     ),
-    "av1": _Encoder(
-        "libsvtav1",
-        {"crf": "30", "preset": "12", "g": "2", "svtav1-params": "lp=1"},
-    ),
+    "av1": ("libsvtav1", {"crf": "30", "preset": "12", "g": "2", "svtav1-params": "lp=1"}),
 }
-"""AV1 as LeRobot encodes it by default; H.264 as most players and loaders read it fast.
+"""Encoders of PyAV and their options: AV1 as LeRobot encodes it by default; H.264 as most players
+and loaders read it fast.
 
 libx264 that looks ahead gives the same pictures other bytes in 1 of 130 films of 30 frames, even on
 one thread; without, in none of 4,000. Quality 27 has then the error that 23 had."""
@@ -188,11 +177,10 @@ class FilmSink:
         self._av, self._camera, self._codec = av, camera, codec
         self._bytes = io.BytesIO()
         self._file = cast(Any, av.open(self._bytes, "w", format="mp4"))
-        encoder = ENCODERS[codec]
-        self._stream = self._file.add_stream(encoder.name, rate=FPS)
+        encoder, options = ENCODERS[codec]
+        self._stream = self._file.add_stream(encoder, rate=FPS)
         self._stream.height, self._stream.width = camera.height, camera.width
-        self._stream.pix_fmt = "yuv420p"
-        self._stream.options = dict(encoder.options)
+        self._stream.pix_fmt, self._stream.options = "yuv420p", dict(options)
         self._stream.codec_context.thread_count = 1
         self._stream.time_base = Fraction(1, FPS)
         self._frames = 0
@@ -244,7 +232,7 @@ def encode(
 ) -> dict[str, Pictures]:
     """The pictures of all `frames`, of which each has one for every camera, by camera.
 
-    Raises CodecMissing.
+    Raises what `require` does.
     """
     if not cameras:
         return {}
@@ -258,43 +246,27 @@ def encode(
 
 
 def require(codec: str) -> None:
-    """Raises CodecMissing, saying what to install, if pictures cannot be encoded so here."""
+    """Raises MissingPackage or CodecMissing if pictures cannot be encoded so here."""
     if codec in STILL_CODECS:
-        try:
-            import PIL  # noqa: F401
-        except ImportError as error:
-            raise CodecMissing(
-                f"{codec} pictures need Pillow, which is not installed; {remedy('PIL')}"
-            ) from error
+        need("PIL", "demos")
         return
-    try:
-        import av
-    except ImportError as error:
-        raise CodecMissing(
-            f"{codec} films need PyAV, which is not installed; {remedy('av')}"
-        ) from error
-    if ENCODERS[codec].name not in av.codecs_available:
+    av = need("av", "demos")
+    if (encoder := ENCODERS[codec][0]) not in av.codecs_available:
         others = " or ".join(name for name in CODECS if name != codec)
-        raise CodecMissing(
-            f"PyAV {av.__version__} has no encoder {ENCODERS[codec].name} here: choose {others}"
-        )
+        raise CodecMissing(f"PyAV {av.__version__} has no encoder {encoder} here: choose {others}")
 
 
 def colours(seen: Pictures) -> ColourHistogram:
     """The colours of about `SAMPLED` evenly spread pictures."""
     found = ColourHistogram()
-    for picture in _sampled(seen):
+    if isinstance(seen, EpisodeFilm):
+        some = film_frames(seen.data, SAMPLED)
+    else:
+        places = np.linspace(0, len(seen.frames) - 1, SAMPLED).round().astype(int)
+        some = (still_picture(seen, t) for t in np.unique(places).tolist())
+    for picture in some:
         found.add(picture)
     return found
-
-
-def _sampled(seen: Pictures) -> Iterator[NDArray[np.uint8]]:
-    if isinstance(seen, EpisodeFilm):
-        yield from film_frames(seen.data, SAMPLED)
-        return
-    last = len(seen.frames) - 1
-    for t in np.unique(np.linspace(0, last, SAMPLED).round().astype(int)):
-        yield still_picture(seen, int(t))
 
 
 def still_picture(seen: Stills, t: int) -> NDArray[np.uint8]:

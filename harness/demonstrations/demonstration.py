@@ -28,7 +28,7 @@ from robospa.action_space import ActionSpace, quantize
 from robospa.harness import trial
 from robospa.harness.convention_check.episodes import Episode, to_jpeg
 from robospa.harness.demonstrations import changed_plans
-from robospa.harness.demonstrations.noise import EXPERT, MISTAKE, STRENGTH, Noise
+from robospa.harness.demonstrations.noise import EXPERT, MISTAKE, Noise
 from robospa.harness.demonstrations.recorder import FrameRecorder, drawn, frame_steps
 from robospa.harness.replay import RecordedPolicy
 from robospa.harness.robots import embodiment
@@ -252,10 +252,8 @@ def show(
     recorder: trial.Recorder,
     kind: str = "expert",
     setup: trial.TrialSetup | None = None,
-    strength: float = STRENGTH,
 ) -> ShownEpisode:
-    """Make the demonstration `key` of a kind. `setup` is the trial's, if it is known; `strength`
-    that of noise [m].
+    """Make the demonstration `key` of a kind. `setup` is the trial's, if it is known.
 
     Raises ValueError for an unknown kind and where the scene has no occasion for it; passes on what
     `world` raises.
@@ -279,7 +277,7 @@ def show(
         return ShownEpisode(kind, run_expert(run, expert), space, nothing)
     if kind != "noise":
         raise ValueError(f"no kind {kind!r}; there are expert, noise, mistake:NAME and midstate")
-    noise = Noise(world, expert.workspace, generator_of(key, "noise"), strength)
+    noise = Noise(world, expert.workspace, generator_of(key, "noise"))
     world.disturbance = noise.disturb
     try:
         made = run_expert(run, expert)

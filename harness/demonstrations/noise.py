@@ -154,21 +154,12 @@ class Noise:
     `workspace` is the expert's own: it is read, never changed.
     """
 
-    def __init__(
-        self,
-        world: World,
-        workspace: Workspace,
-        rng: np.random.Generator,
-        strength: float = STRENGTH,
-    ) -> None:
-        self._world, self._expert = world, workspace
-        self._rng, self._strength = rng, strength
+    def __init__(self, world: World, workspace: Workspace, rng: np.random.Generator) -> None:
+        self._world, self._expert, self._rng = world, workspace, rng
         snapshot = world.snapshot()
         self._seen = Workspace(workspace.scene, workspace.robot, snapshot)
         self.log = PushLog(max(len(joints) for joints in snapshot.joints))
         """What was pushed, and when."""
-        self.pushes: list[tuple[float, float]] = []
-        """How far [m] and [rad] each push brought the fingertips off their way."""
 
     def disturb(self, path: Trajectory) -> Trajectory:
         """What is driven in place of `path`."""
@@ -194,7 +185,6 @@ class Noise:
                 made = self._draw(path, arm, turn)
                 if made is not None and self._is_clear(path, {**found, arm: made}, arm):
                     found[arm] = made
-                    self.pushes.append(self._off(path, arm, made))
                     break
         return found
 
@@ -214,7 +204,7 @@ class Noise:
     def _draw(self, path: Trajectory, arm: int, turn: Array) -> Push | None:
         """A push in a random direction of the joints that move; None if it would be too weak."""
         rng, width = self._rng, len(turn)
-        size = self._strength * rng.uniform(WEAKEST, 1.0)
+        size = STRENGTH * rng.uniform(WEAKEST, 1.0)
         begin, lasts = rng.uniform(*BEGIN), rng.uniform(*LASTS)
         direction = np.where(np.abs(turn) > OFF, rng.normal(size=width), 0.0)
         fastest = int(np.abs(turn).argmax())
@@ -236,13 +226,6 @@ class Noise:
         chain, tip = self._seen.chains[arm], self._seen.hand(arm).tip
         off, turned = deviation(chain, tip, line, line + offset)
         return max(off, turned * LEVER)
-
-    def _off(self, path: Trajectory, arm: int, made: Push) -> tuple[float, float]:
-        """How far [m] and [rad] `made` brings the fingertips off `path`."""
-        chain, tip = self._seen.chains[arm], self._seen.hand(arm).tip
-        line = path.joints[arm, :, : made.shift.shape[1]]
-        rows = _places(line)
-        return deviation(chain, tip, line[rows], (line + made.offset)[rows])
 
     def _is_clear(self, path: Trajectory, pushes: dict[int, Push], arm: int) -> bool:
         """True if the arm is nowhere nearer to anything than as planned, but for margins."""

@@ -73,8 +73,7 @@ def decoded(seen: EpisodeFilm | Stills) -> list[NDArray[np.uint8]]:
 
 
 def test_an_encoder_that_is_missing_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    missing = coding._Encoder("libnone", {})
-    monkeypatch.setattr(coding, "ENCODERS", {**coding.ENCODERS, "av1": missing})
+    monkeypatch.setitem(coding.ENCODERS, "av1", ("libnone", {}))  # type: ignore[arg-type]
     with pytest.raises(CodecMissing, match="no encoder libnone here: choose h264 or png or jpeg"):
         require("av1")
 

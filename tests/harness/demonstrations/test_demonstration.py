@@ -142,7 +142,6 @@ def shown(
 def test_noise_is_recovered_from_and_repeats_to_the_bit() -> None:
     made, recorder, label, action, record = shown("noise", "Pick_Blocks_Size")
     assert np.array_equal(recorder.commanded, shown("noise", "Pick_Blocks_Size")[1].commanded)
-    assert made.noise is not None and max(off for off, _ in made.noise.pushes) > 0.005
     assert {EXPERT, NOISE, RECOVERY} == set(label.tolist())
     next_command = np.concatenate([recorder.commanded[1:], recorder.commanded[-1:]])
     differs = np.abs(action - next_command).max(axis=1) > 1e-4
