@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -82,7 +82,8 @@ class ActBeside:
         name, seen = self.call.object, ws.snapshot
         x, y, z = seen.poses[name].position
         shifted = Pose((x + self.by[0], y + self.by[1], z), seen.poses[name].rotation)
-        ws.snapshot = replace(seen, poses={**seen.poses, name: shifted})
+        of = {field.name: getattr(seen, field.name) for field in fields(Snapshot)}
+        ws.snapshot = Snapshot(**{**of, "poses": {**seen.poses, name: shifted}})
         steps = pick(ws, self.call) if isinstance(self.call, Pick) else press(ws, self.call)
         try:
             rows = next(steps)
