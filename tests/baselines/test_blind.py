@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from robot_at_home import at_home
 
 from robospa.baselines import blind
-from robospa.harness.demonstrations.changed_plans import at_home
 from robospa.tasks.catalog import build_scene
 from robospa.trial import TrialKey
 
@@ -29,10 +29,10 @@ POLICIES = {
 )
 def test_it_does_the_same_whatever_is_asked_for(planner: blind.Planner, name: str) -> None:
     scene = build_scene(name, 3, 100_000)
-    rows = []
+    rows, home = [], at_home(scene.embodiment, *scene.everything).snapshot
     for facts in (scene.facts, {}, {key: "wrong" for key in scene.facts}):
-        expert = blind.BlindExpert(replace(scene, facts=facts), at_home(scene), planner)
-        rows.append(expert.next(at_home(scene)))
+        expert = blind.BlindExpert(replace(scene, facts=facts), home, planner)
+        rows.append(expert.next(home))
     assert len(rows[0]) > 1, "it does something"
     for other in rows[1:]:
         np.testing.assert_array_equal(rows[0], other)
