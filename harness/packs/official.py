@@ -25,7 +25,7 @@ from robospa.harness.packs.archive import Archive, ArchiveError, ModelFiles
 from robospa.harness.packs.convex import colliding_pieces, convex_shapes
 from robospa.harness.packs.index import THING, clutter_things, digest_of, task_faults
 from robospa.harness.packs.mesh_files import Floats, Piece
-from robospa.harness.packs.placing import Likeness, Placing
+from robospa.harness.packs.placing import Placing
 from robospa.harness.packs.urdf import MeshUse, Urdf, UrdfJoint, read_urdf
 from robospa.harness.packs.visuals import skin_of
 from robospa.tasks.colors import NAMED
@@ -112,7 +112,6 @@ def make_model(
     drawn = np.concatenate([body.box for body in bodies])
     box = np.stack([drawn.min(axis=0), drawn.max(axis=0)])
     placing = placings.place(points, box, data, chosen, builtin)
-    likeness = Likeness.of(builtin, placing)
     placed = _placed(parts.body, placing)
     placed_points = placing.points(points)
     return ObjectModel(
@@ -125,8 +124,8 @@ def make_model(
         bottom=0.0,
         mass=data.mass or builtin.mass,
         friction=builtin.friction,
-        grasps=placings.grasp_points(placed, builtin, likeness, placing, data, chosen),
-        frames=placings.frames(builtin, likeness, placing, data, chosen),
+        grasps=placings.grasp_points(placed, builtin, placing, data, chosen),
+        frames=placings.frames(builtin, placing, data, chosen),
         hinge=_hinge(parts, placing, builtin, chosen, tint),
         skin=Skin(str(parts.body.skin), placing.scale, placing.pose, tint),
     )

@@ -11,7 +11,7 @@ fingers close; how wide a part is there is measured on the convex pieces.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -67,12 +67,12 @@ class _File(msgspec.Struct):
 
 @dataclass(frozen=True)
 class ModelData:
-    """`scale` of mesh and points along the model's axes; (n, 4, 4) frames of its points, in the
-    model's frame before scaling; extents before scaling; mass [kg], None if not given."""
+    """`scale` of mesh and points along the model's axes; (n, 4, 4) frames of its points of each of
+    KEYS, in the model's frame before scaling; extents before scaling; mass [kg], None if not given.
+    """
 
     scale: Vec3
-    contact: Floats
-    functional: Floats
+    points: Mapping[str, Floats]
     extents: Vec3 | None = None
     mass: float | None = None
     links: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
@@ -87,17 +87,13 @@ class ModelData:
             rows = [frames.get(n, np.eye(4)) @ p for n, p in zip(named, points, strict=True)]
             return np.array(rows).reshape(-1, 4, 4)
 
-        return replace(
-            self,
-            contact=moved("contact", self.contact),
-            functional=moved("functional", self.functional),
-        )
+        return replace(self, points={kind: moved(kind, of) for kind, of in self.points.items()})
 
     def point(self, name: str) -> Vec3 | None:
         """Where "contact 2" or "functional 0" lies in the model's frame, scaled; None if the model
         has no such point."""
         kind, _, number = name.partition(" ")
-        frames = self.contact if kind == "contact" else self.functional
+        frames = self.points[kind]
         return vec3(frames[int(number), :3, 3] * self.scale) if int(number) < len(frames) else None
 
 
@@ -110,8 +106,7 @@ def read_model_data(path: Path) -> ModelData:
         raise ArchiveError(f"{what} gives the mass {mass}, which no object can have")
     return ModelData(
         _three(said.scale, SCALES, f"{what} has the scale"),
-        _frames(said, "contact", what),
-        _frames(said, "functional", what),
+        {kind: _frames(said, kind, what) for kind in KEYS},
         None if said.extents is None else _three(said.extents, SIZES, f"{what} has the extents"),
         mass,
         {kind: tuple(map(_link, said.points(kind))) for kind in KEYS},
@@ -247,39 +242,23 @@ def _box(builtin: ObjectModel) -> Floats:
     return np.stack([points.min(axis=0), points.max(axis=0)])
 
 
-@dataclass(frozen=True)
-class Likeness:
+def likeness(builtin: ObjectModel, placing: Placing) -> Callable[[Vec3], Vec3]:
     """Takes points of the built-in model to the like places of the archive's: from the box of what
     collides of one to that of the other, axis by axis."""
-
-    factors: Floats
-    low: Floats
-    origin: Floats
-
-    @staticmethod
-    def of(builtin: ObjectModel, placing: Placing) -> Likeness:
-        """Between the two models' boxes."""
-        low, high = _box(builtin)
-        factors = (placing.high - placing.low) / np.maximum(high - low, 1e-9)
-        return Likeness(factors, placing.low, low)
-
-    def point(self, point: Vec3) -> Vec3:
-        """Where `point` of the built-in model has gone."""
-        return vec3(self.low + self.factors * (np.asarray(point) - self.origin))
+    low, high = _box(builtin)
+    factors = (placing.high - placing.low) / np.maximum(high - low, 1e-9)
+    return lambda point: vec3(placing.low + factors * (np.asarray(point) - low))
 
 
 def frames(
-    builtin: ObjectModel,
-    likeness: Likeness,
-    placing: Placing,
-    data: ModelData,
-    model: OfficialModel,
+    builtin: ObjectModel, placing: Placing, data: ModelData, model: OfficialModel
 ) -> dict[str, Pose]:
     """The frames that tasks and skills need: at the archive's points where the table names one,
     else at the like place. They are turned as the built-in ones. ArchiveError if the archive has no
     such point."""
+    like = likeness(builtin, placing)
     found = {
-        name: replace(frame, position=likeness.point(frame.position))
+        name: replace(frame, position=like(frame.position))
         for name, frame in builtin.frames.items()
     }
     for name, point in model.points.items():
@@ -306,16 +285,16 @@ TILT = 0.4
 def grasp_points(
     pieces: Sequence[Piece],
     builtin: ObjectModel,
-    likeness: Likeness,
     placing: Placing,
     data: ModelData,
     model: OfficialModel,
 ) -> tuple[Grasp, ...]:
     """All that fingers fit around; `pieces` are in the body frame [m]."""
     faces = [planes(*piece) for piece in pieces]
-    found = [(likeness.point(g.point), g.approach, g.closing, g.tilt) for g in builtin.grasps]
+    like = likeness(builtin, placing)
+    found = [(like(g.point), g.approach, g.closing, g.tilt) for g in builtin.grasps]
     used = {point for point in model.points.values() if point.startswith("contact")}
-    for number, frame in enumerate(data.contact):
+    for number, frame in enumerate(data.points["contact"]):
         if f"contact {number}" in used:
             continue
         closing, approach = (_unit(placing.turn @ frame[:3, k]) for k in (0, 2))

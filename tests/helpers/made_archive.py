@@ -162,9 +162,7 @@ def _write_model(folder: Path, model: OfficialModel, asset: str, look: int) -> N
     data: dict[str, object] = {"scale": [SCALE] * 3, "stable": True}
     contacts = _contacts(builtin, model, stand_in, size.contacts if size else 2)
     if size is None:
-        link = "door" if builtin.hinge else "body"
-        data["contact_points_pose"] = [{"base": link, "matrix": frame} for frame in contacts]
-        _write_jointed(folder / model.model, builtin, stand_in, data)
+        _write_jointed(folder / model.model, builtin, stand_in, data, contacts)
         return
     write_glb(
         folder / "visual" / f"base{model.model}.glb", pieces_of(builtin.shapes, False, stand_in)
@@ -207,11 +205,16 @@ def _contacts(
 
 
 def _write_jointed(
-    folder: Path, builtin: ObjectModel, stand_in: StandIn, data: dict[str, object]
+    folder: Path,
+    builtin: ObjectModel,
+    stand_in: StandIn,
+    data: dict[str, object],
+    contacts: list[list[list[float]]],
 ) -> None:
     """A URDF file whose meshes have y up, as those of the official ones, which the first joint
-    turns; a door hangs on a second joint."""
-    links = {"body": (builtin.shapes, np.zeros(3))}
+    turns; a door hangs on a second joint. Contact points are in the frame of what is taken."""
+    at = np.zeros(3)
+    links = {"body": (builtin.shapes, at)}
     joint = ""
     if builtin.hinge is not None:
         at = stand_in.points(np.array([builtin.hinge.point]))[0]
@@ -224,15 +227,10 @@ def _write_jointed(
             f'<origin xyz="{origin}"/><axis xyz="{axis}"/>'
             f'<limit lower="0" upper="{builtin.hinge.upper}"/></joint>'
         )
-        frames = [row["matrix"] for row in data["contact_points_pose"]]  # type: ignore[attr-defined]
-        data["contact_points_pose"] = [
-            {"base": "door", "matrix": _in_link(frame, at)} for frame in frames
-        ]
-    else:
-        frames = [row["matrix"] for row in data["contact_points_pose"]]  # type: ignore[attr-defined]
-        data["contact_points_pose"] = [
-            {"base": "body", "matrix": _in_link(frame, np.zeros(3))} for frame in frames
-        ]
+    taken = [*links][-1]
+    data["contact_points_pose"] = [
+        {"base": taken, "matrix": _in_link(frame, at)} for frame in contacts
+    ]
     text = ['<robot name="made_up"><link name="base"/>']
     for name, (shapes, at) in links.items():
         text.append(f'<link name="{name}">')

@@ -126,11 +126,6 @@ def test_without_such_things_the_clutter_is_that_of_the_library(
     assert official(KEY).clutter == plain.clutter
 
 
-def test_scenes_of_our_own_suite_are_what_they_were_to_the_bit() -> None:
-    digest = "35998a669e113a7b"
-    assert task_parts(KEY).scene.digest == digest
-
-
 @pytest.mark.parametrize("text", ["[]", '{"list_of_items": {"bottle": 3}}', "{", "[" * 100_000])
 def test_a_broken_list_is_refused_in_a_sentence(tmp_path: Path, text: str) -> None:
     archive = open_archive(make_archive(tmp_path, [], ("clutter",)))
