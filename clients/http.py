@@ -35,8 +35,9 @@ from robospa.protocol.errors import (
     printable,
     without_secrets,
 )
+from robospa.protocol.messages import BUSY
 from robospa.protocol.policy import PolicySpec
-from robospa.protocol.transport import MOVED, connect_until
+from robospa.protocol.transport import MOVED, NotYet, connect_until
 
 MAX_ANSWER = 64 * 2**20
 """Bytes of an answer; a chunk as JSON is some kilobytes."""
@@ -54,8 +55,6 @@ UNAVAILABLE = (
     http.HTTPStatus.GATEWAY_TIMEOUT,
 )
 """The server is not there, or has no room: what stands before it answers in its place."""
-FIRST_PAUSE, LONGEST_PAUSE = 0.02, 1.0
-"""[s] between two requests to a server that is not available."""
 STALE_CONNECTION = (http.client.RemoteDisconnected, ConnectionResetError, BrokenPipeError)
 
 
@@ -78,8 +77,17 @@ class JsonServer:
         Raises HandshakeError if it does not exist or is a WebSocket's, and what `request` does. An
         endpoint for POST answers a GET with 405, which is as good as anything else.
         """
+
+        def ask() -> None:
+            try:
+                self.request("GET", path, None, timeout)
+            except ServerError as error:
+                if error.code != BUSY:
+                    raise
+                raise NotYet(ConnectFailed(error.message)) from error
+
         try:
-            self.request("GET", path, None, timeout, patience=self._wait)
+            connect_until(self.url, self._wait, ask)
         except ServerError as error:
             if error.code in WRONG_ADDRESS:
                 raise HandshakeError(
@@ -88,34 +96,21 @@ class JsonServer:
         except ProtocolViolation:
             return  # it answered, only not in JSON
 
-    def request(
-        self,
-        method: str,
-        path: str,
-        body: bytes | None,
-        timeout: float,
-        patience: float | None = None,
-    ) -> object:
+    def request(self, method: str, path: str, body: bytes | None, timeout: float) -> object:
         """The decoded JSON answer to one request.
 
-        While the server is not available (UNAVAILABLE) the request is repeated for `patience` s, by
-        default for all of `timeout`. Raises ConnectFailed, ConnectionLost, CallTimeout,
-        Unauthorized, ServerError for any other status that is not 200, ProtocolViolation for an
-        answer that is no JSON.
+        Raises ConnectFailed, ConnectionLost, CallTimeout, Unauthorized, ServerError for any other
+        status that is not 200 (with the code BUSY while the server is not there or has no room),
+        ProtocolViolation for an answer that is no JSON.
         """
-        now, pause = time.monotonic(), FIRST_PAUSE
-        until, give_up = now + timeout, now + (timeout if patience is None else patience)
-        while True:
-            status, reason, data = self._answer(method, path, body, timeout, until)
-            if status not in UNAVAILABLE:
-                break
-            if time.monotonic() + pause > give_up:
-                raise ConnectFailed(
-                    f"{self.url}{path} answered HTTP {status}: {_reason(data) or reason}; start "
-                    "the policy server behind it, or allow more time"
-                )
-            time.sleep(pause)
-            pause = min(2 * pause, LONGEST_PAUSE)
+        until = time.monotonic() + timeout
+        status, reason, data = self._answer(method, path, body, timeout, until)
+        if status in UNAVAILABLE:
+            text = (
+                f"{self.url}{path} answered HTTP {status}: {_reason(data) or reason}; start the "
+                "policy server behind it, or allow more time"
+            )
+            raise ServerError(BUSY, text, True)
         if status in (http.HTTPStatus.UNAUTHORIZED, http.HTTPStatus.FORBIDDEN):
             raise Unauthorized(f"{self.url}{path} refused the request: {_reason(data) or reason}")
         if status != http.HTTPStatus.OK:
@@ -247,6 +242,8 @@ class HttpSession(StatelessSession):
         try:
             answer = self._server.request("POST", self.path, body, timeout)
         except ServerError as error:
+            if error.code == BUSY:
+                raise
             if error.code == self._silent[0]:
                 error = ServerError(error.code, f"{error.message}; {self._silent[1]}", True)
             raise error if self._answered else explain_error(error, self._params) from error

@@ -295,8 +295,7 @@ class Reader:
     def map(self, count: int, depth: int) -> object:
         self.count(count, 2)
         if count and self.bytes[self.pos] in _BIN:
-            array = self.usual_array()
-            return array if array is not None else self.numpy(count)
+            return self.numpy(count)
         result: dict[str | int, object] = {}
         for _ in range(count):
             key = self.value(depth + 1)
@@ -313,21 +312,6 @@ class Reader:
             raise self.fail("binary data expected")
         start = self.take(self.length(_BIN[tag]))
         return self.view[start : self.pos]
-
-    def usual_array(self) -> NDArray[np.generic] | None:
-        """An array with its keys in the order in which `encode` writes them, else None."""
-        start, items, depth = self.pos, self.items, self.limits.depth - 1
-        if self.bytes.startswith(_ARRAY_HEAD, start - 1):
-            self.pos += len(_ARRAY_HEAD) - 1
-            name = self.value(depth)
-            if self.bytes.startswith(_SHAPE_KEY, self.pos):
-                self.pos += len(_SHAPE_KEY)
-                shape = self.value(depth)
-                if self.bytes.startswith(_DATA_KEY, self.pos):
-                    self.pos += len(_DATA_KEY)
-                    return self.array(self.binary(), name, shape)
-        self.pos, self.items = start, items
-        return None
 
     def numpy(self, count: int) -> object:
         """A map with binary keys: an array, or a scalar as openpi sends it."""

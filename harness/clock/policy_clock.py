@@ -42,8 +42,8 @@ TIME = re.compile(r"(\d+(?:\.\d+)?)(ms|s)")
 POINT = re.compile(r"p(\d+(?:\.\d+)?)=(.+)")
 
 
-class LatencyError(ValueError):
-    """A latency that cannot be; the message says why and what can."""
+class ClockError(ValueError):
+    """A clock, rate, latency or rule that cannot be; the message says why and what can."""
 
 
 @dataclass(frozen=True)
@@ -55,16 +55,16 @@ class Latency:
 
     def __post_init__(self) -> None:
         if not 1 <= len(self.points) <= MOST_POINTS:
-            raise LatencyError(
+            raise ClockError(
                 f"a latency has 1 to {MOST_POINTS} percentiles, not {len(self.points)}"
             )
         percentiles, values = zip(*self.points, strict=True)
         if not all(0.0 <= p <= 100.0 for p in percentiles) or any(
             b <= a for a, b in pairwise(percentiles)
         ):
-            raise LatencyError("percentiles go from 0 to 100 and grow")
+            raise ClockError("percentiles go from 0 to 100 and grow")
         if not all(0.0 <= v <= LONGEST for v in values) or list(values) != sorted(values):
-            raise LatencyError(
+            raise ClockError(
                 f"latencies go from 0 to {LONGEST:g} ms and do not fall with the percentile"
             )
 
@@ -100,7 +100,7 @@ def _time(milliseconds: float) -> str:
 
 
 def parse_latency(text: str) -> Latency:
-    """The latency that `text` declares; a file is read now. Raises LatencyError."""
+    """The latency that `text` declares; a file is read now. Raises ClockError."""
     text = text.strip()
     if text in ("0", "0ms", "0s") or TIME.fullmatch(text):
         return Latency(((50.0, _milliseconds(text)),))
@@ -109,7 +109,7 @@ def parse_latency(text: str) -> Latency:
         for part in text.split(","):
             found = POINT.fullmatch(part.strip())
             if found is None:
-                raise LatencyError(f"{part.strip()!r} is no percentile, such as p50=120ms")
+                raise ClockError(f"{part.strip()!r} is no percentile, such as p50=120ms")
             points.append((float(found[1]), _milliseconds(found[2])))
         return Latency(tuple(points))
     return read_latency(Path(text))
@@ -120,26 +120,26 @@ def _milliseconds(text: str) -> float:
         return 0.0
     found = TIME.fullmatch(text)
     if found is None:
-        raise LatencyError(f"{text!r} is no time: write 200ms, or 0.2s")
+        raise ClockError(f"{text!r} is no time: write 200ms, or 0.2s")
     return round(float(found[1]) * (1000.0 if found[2] == "s" else 1.0), 6)
 
 
 def read_latency(path: Path) -> Latency:
     """The latency in a JSON file: `latency_ms` is a map from p0 ... p100 to milliseconds, or a
-    list of measured ones. Raises LatencyError."""
+    list of measured ones. Raises ClockError."""
     try:
         if path.stat().st_size > MOST_BYTES:
-            raise LatencyError(f"{path} has more than {MOST_BYTES} bytes")
+            raise ClockError(f"{path} has more than {MOST_BYTES} bytes")
         data = parse_json(path.read_text())
     except OSError as error:
-        raise LatencyError(
+        raise ClockError(
             f"{str(path)!r} is no latency: write 200ms, percentiles such as p50=120ms,p99=300ms, "
             f"or a file, but as a file it cannot be read ({error.strerror})"
         ) from error
-    except LatencyError:
+    except ClockError:
         raise
     except ValueError as error:
-        raise LatencyError(f"{path} is no JSON: {error}") from error
+        raise ClockError(f"{path} is no JSON: {error}") from error
     found = data.get("latency_ms") if isinstance(data, Mapping) else None
     try:
         if isinstance(found, Mapping):
@@ -147,20 +147,20 @@ def read_latency(path: Path) -> Latency:
             return Latency(tuple(sorted(points)))
         if isinstance(found, Sequence) and not isinstance(found, str):
             return of_samples([float(v) for v in found])
-    except LatencyError as error:
-        raise LatencyError(f"{path}: {error}") from error
+    except ClockError as error:
+        raise ClockError(f"{path}: {error}") from error
     except (TypeError, ValueError) as error:
-        raise LatencyError(f"{path}: 'latency_ms' has something that is no number") from error
-    raise LatencyError(
+        raise ClockError(f"{path}: 'latency_ms' has something that is no number") from error
+    raise ClockError(
         f"{path} has no 'latency_ms', a map of percentiles or a list of measured latencies"
     )
 
 
 def of_samples(samples: Sequence[float]) -> Latency:
-    """The distribution of measured latencies [ms], to the microsecond; LatencyError for none, too
+    """The distribution of measured latencies [ms], to the microsecond; ClockError for none, too
     many, or one that is no time."""
     if not 1 <= len(samples) <= MOST_SAMPLES or not all(map(math.isfinite, samples)):
-        raise LatencyError(f"a list of latencies has 1 to {MOST_SAMPLES} finite numbers")
+        raise ClockError(f"a list of latencies has 1 to {MOST_SAMPLES} finite numbers")
     percentiles = np.linspace(0.0, 100.0, min(MOST_POINTS, len(samples)))
     if len(samples) == 1:
         percentiles = np.array([50.0])
@@ -175,10 +175,6 @@ def latency_json(latency: Latency) -> dict[str, Any]:
 
 
 RULE = re.compile(r"(wait|arrival|after|ensemble|rtc)(?::([1-9][0-9]{0,4}))?")
-
-
-class SwitchingError(ValueError):
-    """A rule that does not exist; the message lists those that do."""
 
 
 @dataclass(frozen=True)
@@ -206,11 +202,11 @@ class Switching:
 
 
 def parse_switching(text: str) -> Switching:
-    """The rule that `text` names; raises SwitchingError."""
+    """The rule that `text` names; raises ClockError."""
     found = RULE.fullmatch(text)
     kind, count = (found[1], found[2]) if found else ("", None)
     if not kind or (kind == "after" and not count) or (kind in ("wait", "arrival") and count):
-        raise SwitchingError(
+        raise ClockError(
             f"no way to switch between chunks is called {text!r}; there are wait, arrival, "
             "after:K, ensemble, ensemble:K, rtc and rtc:K, K actions"
         )
@@ -221,10 +217,6 @@ PAUSED = "paused"
 REAL = "real"
 RATE_TOLERANCE = 0.01
 """A rate may be written with so much of it rounded away: 16.67 is 250 / 15."""
-
-
-class ClockError(ValueError):
-    """A clock or a rate that cannot be; the message says what can."""
 
 
 @dataclass(frozen=True)
@@ -267,8 +259,7 @@ class PolicyClock:
 
 
 def declared_latency(text: str) -> Latency | None:
-    """The latency that the clock `text` declares, None for the paused one. Raises ClockError and
-    LatencyError."""
+    """The latency that the clock `text` declares, None for the paused one. Raises ClockError."""
     if text == PAUSED:
         return None
     kind, mark, latency = text.partition(":")

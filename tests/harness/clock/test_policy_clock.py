@@ -15,9 +15,7 @@ from hypothesis import strategies as st
 from robospa.harness.clock.policy_clock import (
     ClockError,
     Latency,
-    LatencyError,
     Switching,
-    SwitchingError,
     declared_latency,
     frozen,
     latency_json,
@@ -60,7 +58,7 @@ def test_between_percentiles_it_is_linear_and_beyond_them_constant() -> None:
     ],
 )
 def test_what_cannot_be_is_refused_with_what_can(text: str, says: str) -> None:
-    with pytest.raises(LatencyError, match=says):
+    with pytest.raises(ClockError, match=says):
         parse_latency(text)
 
 
@@ -114,7 +112,7 @@ def test_a_clock_is_frozen_with_what_its_file_holds(tmp_path: Path) -> None:
 def test_a_file_that_is_no_latency_is_named(tmp_path: Path, text: str) -> None:
     file = tmp_path / "broken.json"
     file.write_text(text)
-    with pytest.raises(LatencyError, match=r"broken\.json"):
+    with pytest.raises(ClockError, match=r"broken\.json"):
         read_latency(file)
 
 
@@ -152,7 +150,7 @@ def test_rules_are_read(text: str, rule: Switching) -> None:
 
 @pytest.mark.parametrize("text", ["", "after", "after:0", "wait:2", "arrival:2", "blend", "rtc:-1"])
 def test_others_are_refused_with_those_there_are(text: str) -> None:
-    with pytest.raises(SwitchingError, match="after:K"):
+    with pytest.raises(ClockError, match="after:K"):
         parse_switching(text)
 
 
