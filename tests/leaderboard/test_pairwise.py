@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -14,10 +15,12 @@ from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.entries import entry_of
 from robospa.leaderboard.site import pairs_of, write_pairs
 from robospa.leaderboard.submission import read_submissions
-from robospa.leaderboard.verify import outcomes_of, paired, results_of
+from robospa.leaderboard.verify import compare_scores, outcomes_of, paired, results_of, scores_of
 from robospa.results.comparison.compare import compare_results
 from robospa.results.records.runs import Run, read_run
+from robospa.results.records.trial_record import EventRow
 from robospa.results.scoring.models import ModelResults, results_of_run
+from robospa.results.scoring.scores import to_json
 
 
 @pytest.fixture(scope="module")
@@ -46,6 +49,20 @@ def test_the_numbers_are_those_of_comparing_the_runs(runs: tuple[Run, Run]) -> N
             assert shown[5] == pytest.approx(row.q, rel=0.05)
     assert rows["sr"][PICK]["0"][3:5] == [5, 0], "one seed of four at each of five levels"
     assert "ps" not in rows
+
+
+def test_scores_follow_from_outcomes_alone(runs: tuple[Run, Run]) -> None:
+    """First choices and what held at the start, too, though no event is kept."""
+    blank = EventRow(time=0.0, kind="wrong_object", object="", index=-1, note="", step=0)
+    more = (blank, {**blank, "kind": "subtask_done", "index": 0})
+    records = {
+        key: replace(record, events=(*more[: key.level % 3], *record.events))
+        for key, record in runs[0].records.items()
+    }
+    run = replace(runs[0], records=records)
+    assert not compare_scores(scores_of(run), to_json(side(run).scores))
+    rate = side(run).scores.categories["GAC", 0].values
+    assert rate["sr"].value > rate["sr1"].value == pytest.approx(0.15)
 
 
 @pytest.mark.parametrize(
