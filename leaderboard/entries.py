@@ -14,7 +14,7 @@ from dataclasses import astuple, dataclass, replace
 from robospa.leaderboard.agreement import CELL_LIE, LEAST_POWER, LIE
 from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.card import Card, recipe_of
-from robospa.leaderboard.evidence import BadgeEvidence, what_it_catches
+from robospa.leaderboard.evidence import APART, BadgeEvidence, what_it_catches
 from robospa.leaderboard.submission import Submission, slug_of
 from robospa.leaderboard.verify import compare_scores, results_of
 from robospa.results.paper import rounding
@@ -100,13 +100,15 @@ MEANINGS = {
     ),
     "outcomes": (
         "A sample of the trials, chosen by a value that nobody could know before, was replayed, "
-        "and every outcome came again, though not every final state to the bit. This does not show "
+        "and every outcome came again, though not every final state to the bit, as on another kind "
+        f"of processor; half of the trials ended within {APART:g} mm of where their records say, "
+        "where they do. This does not show "
         "that a model chose the actions: those of an expert who knows the scene, the best of many "
         "runs, and a model trained on the public seeds replay just as well."
     ),
     "replayed": (
-        "The same, and every final state came again to the bit. This does not show either that a "
-        "model chose the actions."
+        "The same, and every final state came again to the bit, as on one kind of processor. This "
+        "does not show either that a model chose the actions."
     ),
     "reproduced": (
         "The server acted on hidden scenes, which nobody could know or train on, and agrees with "
