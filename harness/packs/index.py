@@ -12,16 +12,11 @@ from robospa.harness.packs.archive import Archive, ArchiveError, read_json
 from robospa.harness.packs.convex import is_filled
 from robospa.harness.packs.mesh_files import check_glb
 from robospa.harness.packs.placing import LARGEST_DATA, ModelData, read_model_data
-from robospa.harness.packs.urdf import check_uses, read_urdf
+from robospa.harness.packs.urdf import check_files, read_urdf
 from robospa.harness.robots import embodiments
 from robospa.schema import read
-from robospa.tasks.official import (
-    OfficialModel,
-    needs,
-    official_assets,
-    official_models,
-    official_size,
-)
+from robospa.tasks import official
+from robospa.tasks.official import OfficialModel
 
 THING = "objaverse"
 """The folder of things that only lie about, and what such a thing is called as the asset of an
@@ -51,11 +46,11 @@ class Index:
     @property
     def runnable(self) -> int:
         """Number of tasks that can run."""
-        return len(needs()) - len(self.missing)
+        return len(official.needs()) - len(self.missing)
 
     def summary(self) -> str:
         """Which tasks can run and what the others need, in a sentence."""
-        text = f"{self.runnable} of {len(needs())} tasks can run with this folder"
+        text = f"{self.runnable} of {len(official.needs())} tasks can run with this folder"
         lacking = [f"{task} needs {' and '.join(of)}" for task, of in self.missing.items()]
         return "; ".join([text, *lacking])
 
@@ -73,24 +68,23 @@ class Index:
 def index(archive: Archive) -> Index:
     """Look at every model's files: that they are there, and that lengths, counts and sizes fit. Of
     meshes only what collides of hollow things is read, and kept in the cache."""
-    models = {asset: _models(asset) for asset in official_assets()}
-    faults = {m.name: text for some in models.values() for m in some if (text := fault(archive, m))}
+    models = {asset: _models(asset) for asset in official.official_assets()}
+    faults: dict[str, str] = {}
     closed: dict[str, list[str]] = {}
+    unusable: dict[str, str] = {}
     for asset, some in models.items():
         for model in some:
             try:
-                if model.name not in faults and is_filled(archive, model):
+                text = fault(archive, model)
+                if not text and is_filled(archive, model):
                     closed.setdefault(asset, []).append(model.name)
             except (ArchiveError, OSError) as error:
-                faults[model.name] = str(error)
-    unusable = {
-        asset: some[0].folder
-        for asset, some in models.items()
-        if any(model.name in faults for model in some)
-    }
+                text = str(error)
+            if text:
+                faults[model.name], unusable[asset] = text, model.folder
     missing = {
         task: tuple(sorted({unusable[asset] for asset in assets if asset in unusable}))
-        for task, assets in needs().items()
+        for task, assets in official.needs().items()
         if any(asset in unusable for asset in assets)
     }
     return Index(
@@ -100,7 +94,7 @@ def index(archive: Archive) -> Index:
         missing=missing,
         filled={
             task: found
-            for task, assets in needs().items()
+            for task, assets in official.needs().items()
             if (found := tuple(name for asset in assets for name in closed.get(asset, ())))
         },
         robots=tuple(n for n in embodiments() if (archive.root / "embodiments" / n).is_dir()),
@@ -114,14 +108,14 @@ def index(archive: Archive) -> Index:
 
 
 def _models(asset: str) -> list[OfficialModel]:
-    return list({model.name: model for model in official_models(asset)}.values())
+    return list({model.name: model for model in official.official_models(asset)}.values())
 
 
 def task_faults(archive: Archive, tasks: Iterable[str]) -> dict[str, str]:
     """For each of `tasks` that cannot run a sentence that says which file is the first to blame."""
     found = {}
     for task in tasks:
-        models = (model for asset in needs().get(task, ()) for model in _models(asset))
+        models = (model for asset in official.needs().get(task, ()) for model in _models(asset))
         if text := next(filter(None, (fault(archive, model) for model in models)), ""):
             found[task] = text
     return found
@@ -136,7 +130,9 @@ def fault(archive: Archive, model: OfficialModel) -> str:
             if file is not None and file.suffix == ".glb":
                 check_glb(file)
         if files.urdf is not None:
-            check_uses(read_urdf(files.urdf, archive.inside))
+            robot = read_urdf(files.urdf, archive.inside)
+            meshes = (*robot.visuals.values(), *robot.collisions.values())
+            check_files(use.file for uses in meshes for use in uses)
     except (ArchiveError, OSError) as error:
         return str(error)
     return _misfit(model, data)
@@ -147,7 +143,7 @@ def _misfit(model: OfficialModel, data: ModelData) -> str:
     for name, point in model.points.items():
         if data.point(point) is None:
             return f"{model.name} has no {point} point, where its {name} is"
-    listed = official_size(model)
+    listed = official.official_size(model)
     if listed is None or data.extents is None:
         return ""
     up = data.extents[1] * data.scale[1]
@@ -161,8 +157,8 @@ def _misfit(model: OfficialModel, data: ModelData) -> str:
 def digest_of(archive: Archive) -> str:
     """Hash of names and sizes of all files that models are made of, and of what points say."""
     found = hashlib.sha256()
-    for asset in official_assets():
-        for model in official_models(asset):
+    for asset in official.official_assets():
+        for model in official.official_models(asset):
             try:
                 files = archive.files(model)
                 made_of = (file for file in (files.visual, files.collision, files.urdf) if file)

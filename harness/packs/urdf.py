@@ -96,12 +96,6 @@ def read_urdf(path: Path, inside: Callable[[Path], Path]) -> Urdf:
         ) from error
 
 
-def check_uses(robot: Urdf) -> None:
-    """ArchiveError, naming the first, if a mesh that `robot` names is not there."""
-    for uses in (*robot.visuals.values(), *robot.collisions.values()):
-        check_files(use.file for use in uses)
-
-
 def check_files(files: Iterable[Path]) -> None:
     """ArchiveError, naming the first, if a mesh file is not there or may not be read."""
     for file in files:
