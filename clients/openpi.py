@@ -16,17 +16,8 @@ own list, so its scripts are started from here, in openpi's environment and fold
 
     python -m robospa.clients.openpi scripts/train.py pi05_robospa_NAME --exp-name=first
 
-    our dataset                      openpi
-    observation.images.head          images.cam_high
-    observation.images.left_wrist    images.cam_left_wrist
-    observation.images.right_wrist   images.cam_right_wrist
-    observation.state                state: what was commanded
-    action                           actions, joints as differences to the state, grippers as
-                                     they are
-    the episode's sentence           prompt
-
-They are what `to_openpi` sends at evaluation. openpi's own Aloha configurations name no prompt
-among what they take from a dataset; without it, `prompt_from_task` has no effect.
+The names are those that `to_openpi` sends at evaluation. openpi's own Aloha configurations name no
+prompt among what they take from a dataset; without it, `prompt_from_task` has no effect.
 """
 
 from __future__ import annotations

@@ -24,7 +24,7 @@ import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from queue import SimpleQueue
-from typing import Protocol, TypeVar
+from typing import TypeVar
 
 from robospa.observation import Observation
 from robospa.protocol.batching import Answer, Batcher
@@ -100,19 +100,46 @@ def _as_exception(error: BaseException) -> Exception:
     return RuntimeError(f"the policy raised {type(error).__name__}: {error}")
 
 
-class PolicySession(Protocol):
-    """The policy as one connection sees it. Every call raises what the policy raises."""
+class PolicySession:
+    """The policy as one connection sees it: here an object that serves this one alone. Every call
+    raises what the policy raises.
 
-    async def reset(self, trial: TrialInfo) -> None: ...
+    `lock` is held while it is called, because a client may leave, and the next one or `close`
+    follow, while a call runs in another thread.
+    """
 
-    async def infer(self, observation: Observation) -> Answer: ...
-
-    async def end(self, outcome: Mapping[str, object]) -> None: ...
+    def __init__(
+        self, threads: PolicyThreads, policy: Policy, lock: threading.Lock, close: bool
+    ) -> None:
+        self._threads, self._policy, self._lock, self._close = threads, policy, lock, close
 
     def request_began(self) -> None:
         """The first bytes of a request have arrived."""
 
-    def close(self) -> None: ...
+    async def reset(self, trial: TrialInfo) -> None:
+        await self._threads.run(self._call, self._policy.reset, trial)
+
+    async def infer(self, observation: Observation) -> Answer:
+        return await self._threads.run(self._call, self._timed, time.perf_counter(), observation)
+
+    def _call(self, method: Callable[..., T], *args: object) -> T:
+        with self._lock:
+            return method(*args)
+
+    def _timed(self, asked: float, observation: Observation) -> Answer:
+        start = time.perf_counter()
+        answer = self._policy.infer(observation)
+        end = time.perf_counter()
+        times = {"queue_ms": (start - asked) * 1e3, "infer_ms": (end - start) * 1e3, "batch": 1.0}
+        return answer, times
+
+    async def end(self, outcome: Mapping[str, object]) -> None:
+        if has(self._policy, "end"):
+            await self._threads.run(self._call, self._policy.end, outcome)
+
+    def close(self) -> None:
+        if self._close and has(self._policy, "close"):
+            self._threads.post(self._call, self._policy.close)
 
 
 def spec_of(policy: Policy) -> PolicySpec:
@@ -164,12 +191,12 @@ class PolicyHost:
         if self._policy is not None and self._batcher is not None:
             return _BatchedSession(self._threads, self._policy, self._batcher, next(self._numbers))
         if self._policy is not None:
-            return _ExclusiveSession(self._threads, self._policy, self._lock, close=False)
+            return PolicySession(self._threads, self._policy, self._lock, close=False)
         policy, self._spare = self._spare, None
         if policy is None:
             assert self._factory is not None
             policy = await self._threads.run(self._factory)
-        return _ExclusiveSession(self._threads, policy, threading.Lock(), close=True)
+        return PolicySession(self._threads, policy, threading.Lock(), close=True)
 
     async def _infer_batch(
         self, observations: Sequence[Observation], sessions: Sequence[int]
@@ -182,45 +209,7 @@ class PolicyHost:
         self._threads.close()
 
 
-class _ExclusiveSession:
-    """A policy object that serves one connection. `lock` is held while it is called, because a
-    client may leave, and the next one or `close` follow, while a call runs in another thread."""
-
-    def __init__(
-        self, threads: PolicyThreads, policy: Policy, lock: threading.Lock, close: bool
-    ) -> None:
-        self._threads, self._policy, self._lock, self._close = threads, policy, lock, close
-
-    def request_began(self) -> None:
-        return None
-
-    async def reset(self, trial: TrialInfo) -> None:
-        await self._threads.run(self._call, self._policy.reset, trial)
-
-    async def infer(self, observation: Observation) -> Answer:
-        return await self._threads.run(self._call, self._timed, time.perf_counter(), observation)
-
-    def _call(self, method: Callable[..., T], *args: object) -> T:
-        with self._lock:
-            return method(*args)
-
-    def _timed(self, asked: float, observation: Observation) -> Answer:
-        start = time.perf_counter()
-        answer = self._policy.infer(observation)
-        end = time.perf_counter()
-        times = {"queue_ms": (start - asked) * 1e3, "infer_ms": (end - start) * 1e3, "batch": 1.0}
-        return answer, times
-
-    async def end(self, outcome: Mapping[str, object]) -> None:
-        if has(self._policy, "end"):
-            await self._threads.run(self._call, self._policy.end, outcome)
-
-    def close(self) -> None:
-        if self._close and has(self._policy, "close"):
-            self._threads.post(self._call, self._policy.close)
-
-
-class _BatchedSession:
+class _BatchedSession(PolicySession):
     """One session of a policy that serves many at once."""
 
     def __init__(

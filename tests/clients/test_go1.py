@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from model_fakes import COLORS, color_of, install, seen, trial
+from model_fakes import COLORS, color_of, first, install, seen, trial
 from standins import (
     HEAD,
     LEFT,
@@ -111,9 +111,7 @@ def served(torch: Any, **given: Any) -> go1.Go1:
 )
 def test_the_payload(torch: Any, wrists: str, right: str, left: str) -> None:
     policy = served(torch, wrists=wrists)
-    policy.reset(trial())
-    observation = seen(policy.spec)
-    policy.infer(observation)
+    observation, _ = first(policy)
     payload = policy.model.payloads[0]
     assert set(payload) == {"top", "right", "left", "instruction", "state", "ctrl_freqs"}
     assert payload["top"].shape == (240, 320, 3) and payload["top"].dtype == np.uint8

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from model_fakes import COLORS, install, seen, tensor, trial
+from model_fakes import COLORS, first, install, seen, tensor, trial
 
 from robospa.clients import lerobot as lerobot
 from robospa.clients.lerobot import match_cameras, print_state
@@ -88,9 +88,7 @@ def served(torch: Any, chosen: Any = None, **given: Any) -> lerobot.LeRobot:
 
 def test_a_batch_is_what_the_data_loader_gives(torch: Any) -> None:
     policy = served(torch)
-    policy.reset(trial())
-    observation = seen(policy.spec)
-    policy.infer(observation)
+    observation, _ = first(policy)
     batch = policy.before.seen[0]
     assert set(batch) == {*VIEWS, "observation.state", "task"}
     assert batch["task"] == [trial().instruction]
@@ -102,8 +100,7 @@ def test_a_batch_is_what_the_data_loader_gives(torch: Any) -> None:
 
 def test_sizes_may_be_left_to_the_policy_and_colours_turned(torch: Any) -> None:
     policy = served(torch, resize="no", colors="bgr")
-    policy.reset(trial())
-    policy.infer(seen(policy.spec))
+    first(policy)
     image = policy.before.seen[0]["observation.images.left_camera"]
     assert image.shape == (1, 3, 240, 320)
     np.testing.assert_allclose(image[0, ::-1, 0, 0] * 255, COLORS["left_wrist"], atol=1e-3)
@@ -121,8 +118,7 @@ def test_images_renamed_in_training_are_sent_under_the_data_sets_names(torch: An
         lerobot.LeRobotServerOptions(path="x"),
     )
     assert [camera.name for camera in policy.spec.cameras] == list(COLORS)
-    policy.reset(trial())
-    policy.infer(seen(policy.spec))
+    first(policy)
     batch = policy.before.seen[0]
     assert set(batch) == {*ours, "observation.state", "task"}
     for key, color in zip(ours, COLORS.values(), strict=True):
@@ -139,17 +135,13 @@ def test_the_state_is_as_wide_as_it_was_in_training(torch: Any, declared: int) -
         Processor(),
         lerobot.LeRobotServerOptions(path="x"),
     )
-    policy.reset(trial())
-    observation = seen(policy.spec)
-    policy.infer(observation)
+    observation, _ = first(policy)
     assert np.array_equal(policy.before.seen[0]["observation.state"][0], observation["state"])
 
 
 def test_the_answer_goes_through_the_processor_and_out(torch: Any) -> None:
     policy = served(torch, config(chunk_size=20, n_action_steps=10))
-    policy.reset(trial())
-    observation = seen(policy.spec)
-    chunk = policy.infer(observation)
+    observation, chunk = first(policy)
     assert policy.after.seen[0].shape == (1, 20, 14)
     assert chunk.shape == (20, 14) and chunk.dtype == np.float32
     np.testing.assert_allclose(chunk[:, 1:], np.tile(observation["state"][1:], (20, 1)))
@@ -167,8 +159,7 @@ def test_the_tokens_that_it_reads_are_declared(
 
 def test_nothing_outlives_a_query(torch: Any) -> None:
     policy = served(torch)
-    policy.reset(trial())
-    policy.infer(seen(policy.spec))
+    first(policy)
     policy.infer(seen(policy.spec, step=50))
     assert policy.policy.resets == 2
 
@@ -224,9 +215,8 @@ def test_earlier_frames_are_queued_oldest_first(
 
 def test_poses_in_and_out(torch: Any) -> None:
     policy = served(torch, config(state=20, action=20), closed_above=-0.5)
-    policy.reset(trial())
-    observation = seen(policy.spec)
-    chunk = policy.infer(observation).reshape(50, 2, 8)
+    observation, chunk = first(policy)
+    chunk = chunk.reshape(50, 2, 8)
     told = policy.before.seen[0]["observation.state"][0]
     assert told.shape == (20,)
     np.testing.assert_allclose(told[3:9], [1, 0, 0, 0, 0, 1], atol=1e-6)
@@ -237,8 +227,7 @@ def test_poses_in_and_out(torch: Any) -> None:
 
 def test_joint_actions_of_a_policy_that_sees_poses(torch: Any) -> None:
     policy = served(torch, config(state=16, action=14))
-    policy.reset(trial())
-    policy.infer(seen(policy.spec))
+    first(policy)
     assert policy.before.seen[0]["observation.state"].shape == (1, 16)
 
 

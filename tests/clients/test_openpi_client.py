@@ -10,7 +10,7 @@ from typing import Any
 import msgpack
 import numpy as np
 import pytest
-from model_fakes import COLORS, install, seen, trial
+from model_fakes import COLORS, first, install, seen, trial
 from standins import (
     HEAD,
     LEFT,
@@ -211,9 +211,7 @@ def served(policy: Any) -> openpi.OpenPi:
 
 def test_the_observation_is_openpis() -> None:
     policy = served(OfficialPolicy())
-    policy.reset(trial())
-    observation = seen(policy.spec)
-    chunk = policy.infer(observation)
+    observation, chunk = first(policy)
     asked = policy.policy.calls[0]
     assert set(asked) == {"state", "images", "prompt"}
     assert asked["state"].shape == (14,) and asked["prompt"] == trial().instruction
@@ -269,14 +267,14 @@ def test_a_configuration_of_robotwin_is_served(monkeypatch: pytest.MonkeyPatch) 
     assert policy.spec.text_budget == 150
 
 
+MODEL = SimpleNamespace(
+    action_horizon=50, action_dim=32, max_token_len=200, discrete_state_input=True
+)
+
+
 def configure(monkeypatch: pytest.MonkeyPatch, adapt_to_pi: bool) -> None:
     """openpi with one configuration."""
-    config = SimpleNamespace(
-        data=SimpleNamespace(adapt_to_pi=adapt_to_pi),
-        model=SimpleNamespace(
-            action_horizon=50, action_dim=32, max_token_len=200, discrete_state_input=True
-        ),
-    )
+    config = SimpleNamespace(data=SimpleNamespace(adapt_to_pi=adapt_to_pi), model=MODEL)
     install(monkeypatch, "openpi.training.config", get_config=lambda name: config)
     install(
         monkeypatch,
@@ -296,12 +294,8 @@ def configs(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     known: dict[str, Any] = {}
 
     def model(**fields: Any) -> Any:
-        sizes = {"action_horizon": 50, "action_dim": 32, "max_token_len": 200}
         return SimpleNamespace(
-            discrete_state_input=True,
-            get_freeze_filter=lambda: sorted(fields),
-            fields=fields,
-            **sizes,
+            **vars(MODEL), get_freeze_filter=lambda: sorted(fields), fields=fields
         )
 
     install(
@@ -314,17 +308,10 @@ def configs(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
         DataConfig=kept("data"),
     )
     install(monkeypatch, "openpi.models.pi0_config", Pi0Config=model)
-    install(
-        monkeypatch,
-        "openpi.transforms",
-        Group=kept("group"),
-        RepackTransform=kept("repack"),
-    )
-    install(
-        monkeypatch,
-        "openpi.training.weight_loaders",
-        CheckpointWeightLoader=kept("weights"),
-    )
+    transforms = {"Group": kept("group"), "RepackTransform": kept("repack")}
+    install(monkeypatch, "openpi.transforms", **transforms)
+    loader = {"CheckpointWeightLoader": kept("weights")}
+    install(monkeypatch, "openpi.training.weight_loaders", **loader)
     return known
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from dataclasses import fields
 from pathlib import Path
 
@@ -139,28 +138,18 @@ class Zeros:
         return np.zeros((1, 14), np.float32)
 
 
-@pytest.fixture
-def url() -> Iterator[str]:
+@pytest.mark.parametrize(("scheme", "dialect"), [("ws", "robospa.v1"), ("openpi", "openpi")])
+def test_the_scheme_chooses_the_dialect(scheme: str, dialect: str) -> None:
     with ServerThread(policy_factory=Zeros) as server:
-        yield server.url
-
-
-def test_ws_offers_our_protocol(url: str) -> None:
-    with connect(url) as policy:
-        assert policy.dialect == "robospa.v1"
-        assert policy.spec == Zeros.spec
-
-
-def test_openpi_forces_openpis_dialect(url: str) -> None:
-    with connect(url.replace("ws://", "openpi://")) as policy:
-        assert policy.dialect == "openpi"
-        assert policy.spec.horizon is None
-        assert policy.spec.text_budget == 150
-        assert [camera.name for camera in policy.spec.cameras] == [
-            "head",
-            "left_wrist",
-            "right_wrist",
-        ]
+        policy = connect(server.url.replace("ws://", f"{scheme}://"))
+        policy.close()
+    spec = policy.spec
+    assert policy.dialect == dialect
+    if scheme == "ws":
+        assert spec == Zeros.spec
+    else:
+        assert (spec.horizon, spec.text_budget) == (None, 150)
+        assert [camera.name for camera in spec.cameras] == ["head", "left_wrist", "right_wrist"]
 
 
 @pytest.mark.parametrize("url", ["http://localhost:8000", "localhost:8000", "oracle", ""])

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from model_fakes import COLORS, close, color_of, install, seen, tensor, trial
+from model_fakes import COLORS, close, color_of, first, install, seen, tensor, trial
 
 from robospa.clients import rdt as rdt
 from robospa.clients.model_policy import ModelMissing
@@ -49,8 +49,7 @@ def served(torch: Any, tmp_path: Path) -> rdt.Rdt:
 
 
 def test_there_is_no_past_at_the_first_step(served: rdt.Rdt) -> None:
-    served.reset(trial())
-    served.infer(seen(served.spec))
+    first(served)
     assert served.model.calls[0][1][:3] == [None, None, None]
 
 
@@ -66,9 +65,7 @@ def test_pictures_come_as_head_right_left_before_and_now(served: rdt.Rdt) -> Non
 
 
 def test_gripper_factors_cancel(served: rdt.Rdt) -> None:
-    served.reset(trial())
-    observation = seen(served.spec)
-    chunk = served.infer(observation)
+    observation, chunk = first(served)
     np.testing.assert_allclose(served.model.calls[0][0][0, 6], 0.25 * 4.7908, rtol=1e-6)
     np.testing.assert_allclose(served.model.calls[0][0][0, 13], 4.7888, rtol=1e-6)
     assert chunk.shape == (64, 14)
@@ -80,14 +77,12 @@ def test_a_fork_without_factors_gets_none(torch: Any, tmp_path: Path) -> None:
     policy = rdt.Rdt(
         OfficialRdt(torch), texts, rdt.RdtServerOptions(checkpoint="x", grippers="none")
     )
-    policy.reset(trial())
-    policy.infer(seen(policy.spec))
+    first(policy)
     assert float(policy.model.calls[0][0][0, 13]) == 1.0
 
 
 def test_the_text_is_that_of_the_file(served: rdt.Rdt) -> None:
-    served.reset(trial())
-    served.infer(seen(served.spec))
+    first(served)
     assert served.model.calls[0][2].shape == (1, 5, 4096)
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from model_fakes import COLORS, close, color_of, install, seen, tensor, trial
+from model_fakes import COLORS, close, color_of, first, install, seen, tensor, trial
 from standins import (
     EE,
     HEAD,
@@ -37,15 +37,8 @@ def ee6d(length: int = 2) -> Any:
 
 def test_xvla_is_sent_what_its_server_reads() -> None:
     sent = first_request(XVla(lambda seen: ee6d()))
-    assert sent.keys() == {
-        "image0",
-        "image1",
-        "image2",
-        "proprio",
-        "language_instruction",
-        "domain_id",
-        "steps",
-    }
+    images = {"image0", "image1", "image2"}
+    assert sent.keys() == images | {"proprio", "language_instruction", "domain_id", "steps"}
     for place, name in enumerate((HEAD, LEFT, RIGHT)):
         assert sent[f"image{place}"].dtype == np.uint8
         assert np.array_equal(sent[f"image{place}"], image(name))
@@ -58,19 +51,22 @@ def test_xvla_is_sent_what_its_server_reads() -> None:
     assert proprio[:, 9].tolist() == [0.5, -0.5]  # 1 - 2 g
 
 
-def test_xvla_rotations_repeat_the_official_slip() -> None:
-    """The second arm's w x y z of (0.7071, 0, 0, 0.7071), read as x y z w, is the known vector."""
-    sent = first_request(XVla(lambda seen: ee6d()))
-    assert sent["proprio"].reshape(2, 10)[1, 3:9] == pytest.approx([1, 0, 0, 0, 0, 1], abs=1e-6)
-
-
-def test_xvla_rotations_can_be_right() -> None:
-    sent = first_request(XVla(lambda seen: ee6d()), "?quaternions=wxyz")
-    assert sent["proprio"].reshape(2, 10)[1, 3:9] == pytest.approx([0, -1, 1, 0, 0, 0], abs=1e-6)
+@pytest.mark.parametrize(
+    ("query", "six"),
+    [
+        ("", [1, 0, 0, 0, 0, 1]),  # w x y z read as x y z w: the official slip
+        ("?quaternions=wxyz", [0, -1, 1, 0, 0, 0]),
+        ("?quaternions=wxyz&rotation=columns", [0, 1, 0, -1, 0, 0]),
+    ],
+)
+def test_xvla_rotations_in_every_order(query: str, six: list[float]) -> None:
+    """Of the second arm, whose w x y z are (0.7071, 0, 0, 0.7071)."""
     turned = ee6d()
-    turned.reshape(2, 2, 10)[..., 3:9] = [1, 0, 0, 0, 1, 0]
-    sent = first_request(XVla(lambda seen: turned), "?quaternions=wxyz&rotation=columns")
-    assert sent["proprio"].reshape(2, 10)[1, 3:9] == pytest.approx([0, 1, 0, -1, 0, 0], abs=1e-6)
+    turned.reshape(2, 2, 10)[..., 3:9] = (
+        [1, 0, 0, 0, 1, 0] if "columns" in query else [1, 0, 0, 1, 0, 0]
+    )
+    sent = first_request(XVla(lambda seen: turned), query)
+    assert sent["proprio"].reshape(2, 10)[1, 3:9] == pytest.approx(six, abs=1e-6)
 
 
 def test_xvla_poses_come_back_as_ours() -> None:
@@ -208,12 +204,21 @@ def served(torch: Any, **given: Any) -> xvla.Xvla:
     )
 
 
-def test_one_call_holds_what_the_official_server_would_send(torch: Any) -> None:
-    policy = served(torch)
-    policy.reset(trial())
-    policy.infer(seen(policy.spec))
-    call = policy.model.calls[0]
-    assert set(call) == {
+def asked(policy: xvla.Xvla) -> dict[str, Any]:
+    """What the model is given at the first query of a trial."""
+    first(policy)
+    call: dict[str, Any] = policy.model.calls[0]
+    return call
+
+
+@pytest.mark.parametrize(
+    ("quaternions", "six"), [("xyzw", [1, 0, 0, 0, 0, 1]), ("wxyz", [0, -1, 1, 0, 0, 0])]
+)
+def test_one_call_holds_what_the_official_server_would_send(
+    torch: Any, quaternions: str, six: list[float]
+) -> None:
+    call = asked(served(torch, quaternions=quaternions))
+    assert call.keys() == {
         "input_ids",
         "image_input",
         "image_mask",
@@ -225,30 +230,14 @@ def test_one_call_holds_what_the_official_server_would_send(torch: Any) -> None:
     assert call["domain_id"].tolist() == [6] and call["domain_id"].dtype == np.int64
     assert call["proprio"].shape == (1, 20) and call["proprio"].dtype == np.float32
     assert call["image_input"].dtype == np.float32
-
-
-def test_the_official_slip_and_the_grippers_in_proprioception(torch: Any) -> None:
-    policy = served(torch)
-    policy.reset(trial())
-    policy.infer(seen(policy.spec))
-    told = policy.model.calls[0]["proprio"][0]
-    np.testing.assert_allclose(told[3:9], [1, 0, 0, 0, 0, 1], atol=1e-6)
-    np.testing.assert_allclose(told[[9, 19]], [-1, 1])
-
-
-def test_the_correct_quaternion_order_on_request(torch: Any) -> None:
-    policy = served(torch, quaternions="wxyz")
-    policy.reset(trial())
-    policy.infer(seen(policy.spec))
-    told = policy.model.calls[0]["proprio"][0]
-    np.testing.assert_allclose(told[3:9], [0, -1, 1, 0, 0, 0], atol=1e-6)
+    np.testing.assert_allclose(call["proprio"][0][3:9], six, atol=1e-6)
+    np.testing.assert_allclose(call["proprio"][0][[9, 19]], [-1, 1])
 
 
 @pytest.mark.parametrize("colors", ["rgb", "bgr"])
 def test_views_are_head_left_right(torch: Any, colors: str) -> None:
     policy = served(torch, colors=colors)
-    policy.reset(trial())
-    policy.infer(seen(policy.spec))
+    asked(policy)
     turn = 1 if colors == "rgb" else -1
     for view, name in zip(policy.processor.views[0], COLORS, strict=True):
         assert view.size == (320, 240)
@@ -257,9 +246,8 @@ def test_views_are_head_left_right(torch: Any, colors: str) -> None:
 
 def test_poses_come_back_as_they_went(torch: Any) -> None:
     policy = served(torch)
-    policy.reset(trial())
-    observation = seen(policy.spec)
-    chunk = policy.infer(observation).reshape(30, 2, 8)
+    observation, chunk = first(policy)
+    chunk = chunk.reshape(30, 2, 8)
     ee = observation["ee"]
     assert chunk.dtype == np.float32
     np.testing.assert_allclose(chunk[:, 1, :3], np.tile(ee[1, :3], (30, 1)), atol=1e-6)
@@ -295,9 +283,7 @@ def test_a_batch_gives_what_singles_give(torch: Any) -> None:
 
 def test_a_joint_fine_tune(torch: Any) -> None:
     policy = served(torch, space="joint")
-    policy.reset(trial())
-    observation = seen(policy.spec)
-    chunk = policy.infer(observation)
+    _, chunk = first(policy)
     told = policy.model.calls[0]["proprio"][0]
     assert told.shape == (14,) and told[6] == 0.5 and told[13] == -1.0
     assert chunk.shape == (30, 14) and policy.spec.action == "joint"

@@ -220,3 +220,10 @@ def color_of(image: Any) -> tuple[int, ...]:
 
 def close(color: Sequence[int], expected: Sequence[int], within: int = 2) -> bool:
     return all(abs(a - b) <= within for a, b in zip(color, expected, strict=True))
+
+
+def first(policy: Any) -> tuple[Any, Any]:
+    """The first observation of a trial, and what `policy` answers."""
+    policy.reset(trial())
+    observation = seen(policy.spec)
+    return observation, policy.infer(observation)

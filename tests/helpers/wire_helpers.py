@@ -15,6 +15,7 @@ from websockets.sync.server import serve
 from websockets.typing import Subprotocol
 
 from robospa.observation import CameraSpec, Observation
+from robospa.protocol.client import connect
 from robospa.protocol.messages import SUBPROTOCOL, Hello, Message, pack, unpack
 from robospa.protocol.policy import PolicySpec, TrialInfo
 from robospa.protocol.transport import Address, Timeouts, Transport
@@ -134,6 +135,14 @@ HELLO = pack(Hello(0, "1.1", "scripted", SPEC))
 def answer(make: Any) -> Any:
     """A frame for `Scripted` from a function of the request's id."""
     return lambda request: pack(make(unpack(request).id))
+
+
+@contextlib.contextmanager
+def begun(server: Any) -> Iterator[Any]:
+    """A client of ours whose trial has begun."""
+    with connect(server.url, timeouts=QUICK) as remote:
+        remote.reset(TRIAL)
+        yield remote
 
 
 def raw(url: str) -> Transport:

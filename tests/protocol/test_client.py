@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from wire_helpers import HELLO, QUICK, SPEC, TRIAL, Recall, Scripted, answer, observation
+from wire_helpers import HELLO, QUICK, SPEC, TRIAL, Recall, Scripted, answer, begun, observation
 
 from robospa.protocol.client import connect
 from robospa.protocol.codec import Limits, decode_jpeg, encode_jpeg
@@ -242,21 +242,17 @@ def test_a_restarted_server_does_not_continue_a_trial(start: Any) -> None:
 
 
 def test_what_cannot_be_sent_spares_the_connection(start: Any) -> None:
-    remote = connect(start(Recall()).url, timeouts=QUICK)
-    remote.reset(TRIAL)
-    with pytest.raises(EncodeError):
-        remote.infer(observation(extra=object()))
-    assert remote.infer(observation(2))[0, 0] == 2
-    remote.close()
+    with begun(start(Recall())) as remote:
+        with pytest.raises(EncodeError):
+            remote.infer(observation(extra=object()))
+        assert remote.infer(observation(2))[0, 0] == 2
 
 
 def test_large_messages_arrive_whole(start: Any) -> None:
     policy = Recall()
-    remote = connect(start(policy).url, timeouts=QUICK)
-    remote.reset(TRIAL)
-    noise = np.random.default_rng(0).integers(0, 256, 1_000_003, dtype=np.uint8)
-    remote.infer(observation(noise=noise))
-    remote.close()
+    with begun(start(policy)) as remote:
+        noise = np.random.default_rng(0).integers(0, 256, 1_000_003, dtype=np.uint8)
+        remote.infer(observation(noise=noise))
     assert np.array_equal(policy.seen[0]["noise"], noise)
 
 
@@ -272,14 +268,12 @@ def test_a_server_that_stops_reading_is_given_up() -> None:
 
 def test_images_travel_as_jpeg_if_the_spec_says_so(start: Any) -> None:
     policy = Recall(replace(SPEC, image_codec="jpeg", history=(-1,)))
-    remote = connect(start(policy).url, timeouts=QUICK)
-    remote.reset(TRIAL)
-    flat: dict[str, Any] = {
-        "images": {"head": np.full((6, 8, 3), 100, np.uint8)},
-        "state": np.zeros(14, "f4"),
-    }
-    remote.infer(observation(**flat, history={-1: flat}))
-    remote.close()
+    with begun(start(policy)) as remote:
+        flat: dict[str, Any] = {
+            "images": {"head": np.full((6, 8, 3), 100, np.uint8)},
+            "state": np.zeros(14, "f4"),
+        }
+        remote.infer(observation(**flat, history={-1: flat}))
     for view in (policy.seen[0], policy.seen[0]["history"][-1]):
         assert view["images"]["head"].shape == (6, 8, 3)
         assert np.abs(view["images"]["head"].astype(int) - 100).max() <= 2

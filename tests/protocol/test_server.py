@@ -18,6 +18,7 @@ from wire_helpers import (
     Recall,
     Together,
     ask,
+    begun,
     observation,
     raw,
     until,
@@ -54,8 +55,7 @@ def test_a_failed_reset_shifts_no_answer(start: Any) -> None:
 
 def test_after_a_policy_error_only_a_reset_helps(start: Any) -> None:
     policy = Recall()
-    with connect(start(policy).url, timeouts=QUICK) as remote:
-        remote.reset(TRIAL)
+    with begun(start(policy)) as remote:
         policy.fail_infer = 1
         with pytest.raises(ServerError, match="RuntimeError: CUDA error"):
             remote.infer(observation(0))
@@ -85,8 +85,7 @@ def test_a_policy_that_wants_to_exit_does_not(start: Any) -> None:
         def infer(self, seen: Any) -> Any:
             raise SystemExit("out of memory")
 
-    with connect(start(Exits()).url, timeouts=QUICK) as remote:
-        remote.reset(TRIAL)
+    with begun(start(Exits())) as remote:
         with pytest.raises(ServerError, match="SystemExit: out of memory"):
             remote.infer(observation())
         remote.reset(TRIAL)
@@ -96,15 +95,12 @@ def test_a_policy_that_wants_to_exit_does_not(start: Any) -> None:
 def test_what_is_no_chunk_is_reported_as_the_policys_answer(start: Any, answer: Any) -> None:
     policy = Recall()
     policy.answer = answer
-    with connect(start(policy).url, timeouts=QUICK) as remote:
-        remote.reset(TRIAL)
-        with pytest.raises(PolicyAnswerError):
-            remote.infer(observation())
+    with begun(start(policy)) as remote, pytest.raises(PolicyAnswerError):
+        remote.infer(observation())
 
 
 def test_an_observation_that_does_not_fit_keeps_the_trial(start: Any) -> None:
-    with connect(start(Recall()).url, timeouts=QUICK) as remote:
-        remote.reset(TRIAL)
+    with begun(start(Recall())) as remote:
         with pytest.raises(ServerError, match=r"\(6, 8, 1\)") as caught:
             remote.infer(observation(images={"head": np.zeros((6, 8, 1), np.uint8)}))
         assert caught.value.code == "bad_observation"
@@ -114,8 +110,7 @@ def test_an_observation_that_does_not_fit_keeps_the_trial(start: Any) -> None:
 def test_the_privileged_state_arrives(start: Any) -> None:
     policy = Recall(replace(SPEC, privileged=True))
     state = {"bodies": {"can": {"pose": [0.1, 0.2, 0.74, 1.0, 0.0, 0.0, 0.0]}}, "contacts": []}
-    with connect(start(policy).url, timeouts=QUICK) as remote:
-        remote.reset(TRIAL)
+    with begun(start(policy)) as remote:
         remote.infer(observation(privileged=state))
     assert json.dumps(policy.seen[0]["privileged"]) == json.dumps(state)
 
@@ -254,8 +249,7 @@ def test_a_client_that_leaves_during_inference_harms_nobody(start: Any) -> None:
         policy.started.wait(10)
         connection.socket.shutdown(socket.SHUT_RDWR)
     policy.open.set()
-    with connect(server.url, timeouts=QUICK) as remote:
-        remote.reset(TRIAL)
+    with begun(server) as remote:
         assert remote.infer(observation(5))[0, 0] == 5
 
 
@@ -356,8 +350,8 @@ def test_a_batch_policy_is_told_which_session_resets_and_ends(start: Any) -> Non
             self.gone.set()
 
     policy = Aware()
-    with connect(start(policy).url, timeouts=QUICK) as remote:
-        remote.reset(TRIAL)
+    with begun(start(policy)):
+        pass
     assert policy.gone.wait(10)
     assert [name for name, _ in policy.log] == ["reset", "end"]
     assert len({session for _, session in policy.log}) == 1
