@@ -15,7 +15,14 @@ from numpy.typing import NDArray
 
 from robospa.harness.running.manifest import this_processor
 from robospa.harness.running.record_store import ActionRecorder, read_actions, read_joints
-from robospa.harness.trial import Recorder, TrialSetup, policy_seed, run_trial, task_parts, trial_id
+from robospa.harness.trial import (
+    Recorder,
+    TrialSetup,
+    policy_seed,
+    run_trial,
+    task_parts,
+    trial_id,
+)
 from robospa.harness.world import JOINTS_FROM_EE, ActionError, Poll, StepResult, World
 from robospa.observation import Observation
 from robospa.protocol.errors import PolicyAnswerError
@@ -163,13 +170,15 @@ def expert_actions(world: World, expert: Policy, key: TrialKey) -> NDArray[np.fl
     return recorder.actions
 
 
-def rehearse(world: World, policy: Policy, key: TrialKey, setup: TrialSetup) -> TrialRecord:
+def rehearse(
+    world: World, policy: Policy, run_seed: str, key: TrialKey, setup: TrialSetup
+) -> TrialRecord:
     """The record of `key` with this scene, goal and instruction, which serve for one trial."""
     return run_trial(
         world,
         policy,
         key,
-        policy_seed=policy_seed(key),
-        trial_id=trial_id(key),
+        policy_seed=policy_seed(key, run_seed),
+        trial_id=trial_id(key, run_seed),
         parts=lambda _: setup,
     )

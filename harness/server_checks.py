@@ -20,7 +20,14 @@ from dataclasses import dataclass
 
 from robospa.extras import remedy
 from robospa.harness.clock.policy_clock import Latency, of_samples
-from robospa.harness.trial import TrialSetup, policy_seed, run_trial, task_parts, trial_id
+from robospa.harness.trial import (
+    TrialSetup,
+    new_run_seed,
+    policy_seed,
+    run_trial,
+    task_parts,
+    trial_id,
+)
 from robospa.harness.world import World
 from robospa.protocol.client import RemotePolicy
 from robospa.protocol.conformance import CheckResult, synthetic_observation, trial_for
@@ -53,6 +60,7 @@ def rollouts(
     Raises nothing of the server's or the simulator's making, and stops at the first failure.
     """
     records: list[TrialRecord] = []
+    seed = new_run_seed()
     for number in range(1, count + 1):
         name = f"real trial {number}"
         try:
@@ -68,8 +76,8 @@ def rollouts(
                     world,
                     policy,
                     key,
-                    policy_seed=policy_seed(key),
-                    trial_id=trial_id(key),
+                    policy_seed=policy_seed(key, seed),
+                    trial_id=trial_id(key, seed),
                     parts=parts,
                 )
         except WireError as error:

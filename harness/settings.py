@@ -11,6 +11,7 @@ relative to the folder in which the command runs, as on the command line.
 from __future__ import annotations
 
 import json
+import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, replace
@@ -25,6 +26,7 @@ from robospa.harness.world import ROBOT_ASSETS
 from robospa.observation import CAMERAS
 from robospa.protocol.options import check_ranges, option, plain_options, read_options
 from robospa.registry import did_you_mean
+from robospa.results.records.manifest import RUN_SEED
 from robospa.trial import REFERENCE
 
 CONTROLS = ("rest_to_rest", "fixed_rate")
@@ -49,7 +51,6 @@ Trials = Annotated[int, Meta(ge=1, le=1_000_000)]
 Attempts = Annotated[int, Meta(ge=1, le=MOST_ATTEMPTS)]
 Workers = Annotated[int, Meta(ge=0, le=100_000)]
 Scale = Annotated[float, Meta(gt=0, le=100)]
-RunSeed = Annotated[int, Meta(ge=0, le=2**63 - 1)]
 Share = Annotated[float, Meta(gt=0, le=1024)]
 
 Value = bool | int | float | str | list[str] | None
@@ -104,7 +105,9 @@ class Simulation:
     """Execution of a trial; part of what decides its result."""
 
     control: str = option("rest_to_rest", "rest_to_rest or fixed_rate", CONTROLS)
-    run_seed: RunSeed = option(0, "enters the policy's seed of every trial")
+    run_seed: str | None = option(
+        None, "what trials' ids and policy seeds follow from; default: a secret of the run's own"
+    )
     step_scale: Scale = option(1.0, "multiplies the official step limits; 1 is the benchmark")
     shuffle_instructions: bool = option(
         False,
@@ -128,6 +131,10 @@ class Simulation:
 
     def __post_init__(self) -> None:
         check_values(self)
+        _check(
+            self.run_seed is None or re.fullmatch(RUN_SEED, self.run_seed) is not None,
+            f"run_seed {self.run_seed!r} is not 1 to 64 letters and digits",
+        )
         _check(
             self.parts is None or not self.shuffle_instructions,
             "shuffle_instructions goes with the suite's own trials: leave out parts",

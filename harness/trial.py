@@ -13,7 +13,7 @@ What goes wrong is sorted once, here:
 from __future__ import annotations
 
 import hashlib
-import hmac
+import secrets
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -405,20 +405,23 @@ def record_of(
     )
 
 
-def policy_seed(key: TrialKey, run_seed: int = 0, salt: str = "") -> int:
+def new_run_seed() -> str:
+    """A secret from which a run's ids and policy seeds follow: 64 hexadecimal digits."""
+    return secrets.token_hex(32)
+
+
+def policy_seed(key: TrialKey, run_seed: str | int) -> int:
     """The seed that a stochastic policy gets for `key`, 0 to 2^31 - 1.
 
     Like `trial_id` it follows from the key and the run's seed: the same in every worker and order,
-    and whenever a trial is repeated. With the salt of hidden scenes these are keyed hashes, from
-    which nobody without it learns the key. Without one they are plain hashes: whoever tries all
-    public keys can invert those, as she can tell a public scene by its sentence.
+    and whenever a trial is repeated. Who does not know the run's seed learns nothing of the key.
     """
-    return int.from_bytes(_digest(f"{run_seed}/{key.slug}", salt)[:4], "big") >> 1
+    return int.from_bytes(_digest(f"{run_seed}/{key.slug}")[:4], "big") >> 1
 
 
-def trial_id(key: TrialKey, run_seed: int = 0, salt: str = "") -> str:
+def trial_id(key: TrialKey, run_seed: str | int) -> str:
     """The name by which a policy knows the trial `key`: 16 hexadecimal digits."""
-    return _digest(f"id/{run_seed}/{key.slug}", salt)[:8].hex()
+    return _digest(f"id/{run_seed}/{key.slug}")[:8].hex()
 
 
 def salt_hash(salt: str) -> str:
@@ -426,7 +429,5 @@ def salt_hash(salt: str) -> str:
     return hashlib.sha256(salt.encode()).hexdigest()
 
 
-def _digest(text: str, salt: str) -> bytes:
-    if salt:
-        return hmac.digest(salt.encode(), text.encode(), "sha256")
+def _digest(text: str) -> bytes:
     return hashlib.sha256(text.encode()).digest()

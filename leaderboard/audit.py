@@ -20,7 +20,7 @@ from robospa.harness.factory import load_function, open_policy
 from robospa.harness.replay import expert_actions, rehearse
 from robospa.harness.running.record_store import read_actions, read_joints
 from robospa.harness.sim.sapien_world import SapienWorld
-from robospa.harness.trial import TrialSetup, task_parts
+from robospa.harness.trial import TrialSetup, new_run_seed, task_parts
 from robospa.leaderboard.agreement import Counts, agreement
 from robospa.leaderboard.rules import shipped, spec_of
 from robospa.leaderboard.traces import Trace, split_trace, with_joints
@@ -81,7 +81,8 @@ def audit(
             findings.append(expert_likeness(traces, expert))
     if policy is not None and samples:
         with closing(SapienWorld()) as world:
-            play = partial(rehearse, world, open_policy(policy, {"token": token}))
+            asked = open_policy(policy, {"token": token})
+            play = partial(rehearse, world, asked, new_run_seed())
             findings.append(sentence_reaction(play, _spread(list(run.keys), samples)))
     return findings
 

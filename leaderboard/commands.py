@@ -216,8 +216,7 @@ def reproduce_bundle(
     seeds = reproduce.read_block(block, commitment)
     keys = reproduce.hidden_keys(valid, seeds, reference)
     reproduce.plan(valid, min(map(len, seeds.seeds.values())))
-    run_seed = valid.run.manifest.settings.run_seed
-    asked = {"policy": policy, "out": out, "workers": workers, "run_seed": run_seed}
+    asked = {"policy": policy, "out": out, "workers": workers}
     request = make_request(
         updated(EvaluationSettings(), {**asked, "world": world, "parts": parts}),
         token=token,

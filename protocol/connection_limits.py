@@ -20,6 +20,7 @@ from websockets.frames import Frame
 from websockets.http11 import Request
 
 from robospa.protocol.codec import DEFAULT_LIMITS, Limits
+from robospa.protocol.transport import give_memory_back
 
 try:
     import resource
@@ -30,6 +31,8 @@ log = logging.getLogger("robospa.server")
 
 FRAMES = 4096
 """Frames (fragments, pings, pongs) that may come without a finished message."""
+MUCH = 2**24
+"""Bytes of an unfinished message whose end is worth giving memory back."""
 GRACE = 1.0
 """[s] that a new connection may be silent before its place can be given to another."""
 REPEAT = 10.0
@@ -145,6 +148,7 @@ class MonitoredConnection(ServerConnection):
         """End the connection at once, whatever waits to be sent."""
         log.warning("dropping the client %s: %s", self.client, reason)
         self.transport.abort()
+        self.protocol.reader.buffer.clear()
 
     def check(self, now: float, options: ServerOptions) -> None:
         """Drop the connection if it is too slow, close it if it is silent for too long."""
@@ -279,10 +283,14 @@ class ConnectionLimiter:
             )
             self._held -= largest.held
             largest.held = 0
+            give_memory_back()
 
     def closed(self, connection: MonitoredConnection) -> None:
         """The socket is closed. A handler that still runs keeps its place until it returns."""
         self._held -= connection.held
+        if connection.held > MUCH:
+            connection.protocol.reader.buffer.clear()
+            give_memory_back()
         connection.held = 0
         self._open.pop(connection, None)
         self._handshakes.pop(connection, None)

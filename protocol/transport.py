@@ -9,6 +9,7 @@ instead). A transport that failed once is closed and stays closed.
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import ipaddress
 import logging
 import re
@@ -354,6 +355,12 @@ def keep_freed_memory() -> None:
     has come and gone once; no page of the block is touched. Elsewhere the call does nothing.
     """
     bytearray(_LARGEST_BLOCK)
+
+
+def give_memory_back() -> None:
+    """Hand all freed memory back to the kernel, also what lies between blocks in use."""
+    with contextlib.suppress(OSError, AttributeError):  # another C library
+        ctypes.CDLL(None).malloc_trim(0)
 
 
 def enlarge_buffers(sock: socket.socket) -> None:

@@ -151,8 +151,8 @@ def write_trials(folder: Path) -> None:
         out = folder / "trials" / name
         scale = ("--step-scale", SCALES[name]) if name in SCALES else ()
         trials = () if "--trials" in options else ("--trials", "1")
-        words = ("eval", policy, *options, *trials, *scale, "--workers", "2", "--out", str(out))
-        _robospa(*words, codes=(0, 1))  # 1: some trials could not be run
+        words = ("eval", policy, *options, *trials, *scale, "--run-seed", "0", "--workers", "2")
+        _robospa(*words, "--out", str(out), codes=(0, 1))  # 1: some trials could not be run
         lines = [_stripped(line) for path in out.rglob("*.jsonl") for line in path.open()]
         (folder / f"trials-{name}.txt").write_text("".join(sorted(lines)))
 

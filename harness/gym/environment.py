@@ -234,7 +234,7 @@ class TaskEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     def _finish(self, end: str, message: str = "") -> None:
         assert self._trial is not None
         self._trial.finish()
-        seed, steps = policy_seed(self._key), len(self._trial.actions)
+        seed, steps = policy_seed(self._key, 0), len(self._trial.actions)
         self._record = record_of(self._trial, self._key, end, message, seed, steps)
 
     def _info(self) -> Info:

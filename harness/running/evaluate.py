@@ -37,7 +37,7 @@ from robospa.harness.running.status import Status
 from robospa.harness.running.tracking import CarefulTracker, open_tracker
 from robospa.harness.running.worker import WorkerConfig, describe, load_parts
 from robospa.harness.settings import FILE, Compute, EvaluationSettings, to_toml
-from robospa.harness.trial import salt_hash
+from robospa.harness.trial import new_run_seed, salt_hash
 from robospa.harness.worlds import SHUFFLED_PARTS, open_world, world_kind
 from robospa.results.records.manifest import (
     ClockSettings,
@@ -46,6 +46,7 @@ from robospa.results.records.manifest import (
     ServerFacts,
     ServerIdentity,
     WorldSettings,
+    read_manifest,
 )
 from robospa.results.records.manifest import make_manifest as new_manifest
 from robospa.results.records.runs import finished, lost_actions, read_records
@@ -225,6 +226,9 @@ def evaluate(request: Request) -> None:
     if request.config.salt:
         check_blind(policies.values())
     check_clock(request.config.clock, [policy.spec for policy in policies.values()])
+    if not request.config.run_seed:
+        seed = str(read_manifest(folder).settings.run_seed) if request.resume else new_run_seed()
+        request = replace(request, config=replace(request.config, run_seed=seed))
     manifest = make_manifest(request, policies)
     config = ready_config(request.config, request.keys, policies)
     with ExitStack() as stack:

@@ -76,7 +76,7 @@ def make_request(
         policy=servers or str(settings.policy_map),
         options=options,
         one_trial=one_trial,
-        run_seed=settings.simulation.run_seed,
+        run_seed=settings.simulation.run_seed or "",
         policies=policies,
         step_scale=settings.simulation.step_scale,
         video=settings.recording.video,

@@ -90,7 +90,8 @@ class WorkerConfig:
     called with. `video` is one of VIDEO; "first" films the trials in `samples`; films show
     `cameras` side by side. `one_trial` has the host:port of every policy whose server may do one
     trial at a time. `step_scale` multiplies the step limits. `salt` is the secret of hidden
-    scenes. `clock`: a real one, None for the paused one.
+    scenes; `run_seed` that from which ids and policy seeds follow. `clock`: a real one, None for
+    the paused one.
     """
 
     folder: Path
@@ -100,7 +101,7 @@ class WorkerConfig:
     world_arguments: Mapping[str, Any] = field(default_factory=dict)
     parts: str = TASK_PARTS
     parts_arguments: Mapping[str, Any] = field(default_factory=dict, repr=False)
-    run_seed: int = 0
+    run_seed: str = ""
     video: str = "none"
     cameras: tuple[str, ...] = ("head",)
     samples: frozenset[TrialKey] = frozenset()
@@ -169,8 +170,8 @@ class Worker:
             world,
             policy,
             key,
-            policy_seed=policy_seed(key, self.config.run_seed, self.config.salt),
-            trial_id=trial_id(key, self.config.run_seed, self.config.salt),
+            policy_seed=policy_seed(key, self.config.run_seed),
+            trial_id=trial_id(key, self.config.run_seed),
             recorder=recorder,
             parts=self.parts,
             step_scale=self.config.step_scale,

@@ -17,7 +17,16 @@ from typing import Annotated
 
 from msgspec import Meta, Struct, to_builtins
 
-from robospa.schema import MAX_INTEGER, Count, Name, Number, SettingName, parse_json, read
+from robospa.schema import (
+    MAX_INTEGER,
+    Count,
+    Name,
+    Number,
+    SettingName,
+    parse_json,
+    pattern,
+    read,
+)
 from robospa.trial import TrialKey
 
 MANIFEST = "run.json"
@@ -35,6 +44,10 @@ Facts = dict[str, object]
 
 class RunError(Exception):
     """A run's folder cannot be read; the message names file and line."""
+
+
+RUN_SEED = "[0-9A-Za-z]{1,64}"
+RunSeed = Annotated[str, pattern(RUN_SEED, "1 to 64 letters and digits")]
 
 
 class TrialGroup(Struct, frozen=True):
@@ -117,7 +130,8 @@ class RunSettings(Struct, frozen=True):
 
     `policy` stands for all tasks where there are no `policies` by task. `privileged`: it sees the
     exact state. `needs_trial_key`: it is sent what names the scenes. `step_scale` multiplies the
-    official step limits. `shuffled_instructions`: every trial has the sentence of another scene.
+    official step limits. `run_seed`: ids and policy seeds follow from it; a secret during the run,
+    unless it was given. `shuffled_instructions`: every trial has the sentence of another scene.
     `salt_sha256` is of hidden scenes. `instructions`: hash of official sentences.
     """
 
@@ -127,7 +141,7 @@ class RunSettings(Struct, frozen=True):
     policy: PolicySettings = PolicySettings()
     privileged: bool = False
     needs_trial_key: bool = False
-    run_seed: Count = 0
+    run_seed: RunSeed | Count = 0
     step_scale: Number = 1.0
     world: WorldSettings = WorldSettings()
     shuffled_instructions: bool = False

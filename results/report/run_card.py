@@ -121,7 +121,7 @@ def facts(run: Run) -> list[tuple[str, str]]:
         ("policy", policy.name or "unknown"),
         ("sees", "the exact state" if settings.privileged else f"observations: {cameras}"),
         ("actions", _words(f"{words}{spec[n]}" for n, words in ACTIONS.items() if spec.get(n))),
-        ("seeding", f"{seeded}; seed {settings.run_seed}" if spec else ""),
+        ("seeding", f"{seeded}; the run's is {str(settings.run_seed)[:8]}" if spec else ""),
         ("trials", _trials(run)),
         ("ends", _words(f"{count} {name}" for name, count in ends(run).items())),
         ("not executed as sent", "; ".join(problem_lines(run.records.values()))),

@@ -95,8 +95,6 @@ NUMBERS = [name for name, value in flat(DEFAULTS).items() if type(value) in (int
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), -5, 10**18])
 def test_no_number_is_without_bounds(tmp_path: Path, name: str, value: float) -> None:
     """In a file, as a flag or keyword, and of a group that is made by itself."""
-    if name == "run_seed" and value == 10**18:
-        return
     with pytest.raises(SettingsError, match=name):
         updated(DEFAULTS, {name: value})
     kind = GROUPS[group_of()[name]]
@@ -180,9 +178,9 @@ def test_functions_of_the_command_line_stay_short() -> None:
     """Commands are thin: what is longer than this belongs in a module that needs no terminal."""
     folder = Path(inspect.getfile(evaluate)).parent
     lengths = {
-        f"{path.name}:{node.name}": (node.end_lineno or 0) - node.lineno + 1
+        f"{path.name}:{node.name}": (node.end_lineno or 0) - node.body[0].lineno + 1
         for path in folder.glob("*.py")
         for node in ast.walk(ast.parse(path.read_text()))
         if isinstance(node, ast.FunctionDef)
     }
-    assert {name: length for name, length in lengths.items() if length > 60} == {}
+    assert {name: length for name, length in lengths.items() if length > 50} == {}

@@ -177,9 +177,9 @@ def test_the_same_trial_gives_the_same_record_after_any_other() -> None:
 
 
 def test_policy_seeds_depend_on_the_key_and_the_run_seed_only() -> None:
-    assert policy_seed(KEY) == policy_seed(replace(KEY))
-    assert policy_seed(KEY) != policy_seed(replace(KEY, seed=100005))
-    assert policy_seed(KEY) != policy_seed(KEY, run_seed=1)
+    assert policy_seed(KEY, "a") == policy_seed(replace(KEY), "a")
+    assert policy_seed(KEY, "a") != policy_seed(replace(KEY, seed=100005), "a")
+    assert policy_seed(KEY, "a") != policy_seed(KEY, "b")
 
 
 def test_the_recorder_keeps_every_executed_action() -> None:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from run_fakes import KEYED, FakePolicy, FakeWorld, parts
 
-from robospa.harness.trial import policy_seed, run_trial, salt_hash, trial_id
+from robospa.harness.trial import new_run_seed, policy_seed, run_trial, salt_hash, trial_id
 from robospa.protocol.codec import decode
 from robospa.protocol.messages import Reset, pack
 from robospa.trial import TrialKey
@@ -38,13 +38,13 @@ def test_one_that_asks_is_sent_the_key() -> None:
     assert policy.trial is not None and policy.trial.key == KEY
 
 
-def test_public_runs_repeat_and_the_salt_hides() -> None:
-    """The seed of a public trial is the one of all earlier runs."""
-    assert policy_seed(KEY) == policy_seed(KEY, 0) == 634677935
-    assert trial_id(KEY) == trial_id(KEY, 0)
+def test_ids_and_policy_seeds_follow_from_the_run_and_the_key() -> None:
+    """A run of an older version has the seed 0: its bundle must still be what it says."""
+    assert policy_seed(KEY, 0) == policy_seed(KEY, "0") == 634677935
     for value in (policy_seed, trial_id):
-        one, other = value(KEY, 0, SALT), value(KEY, 0, "cd" * 32)
-        assert len({value(KEY), value(KEY, 1), one, other}) == 4
-        assert one == value(KEY, 0, SALT) != value(replace(KEY, seed=100008), 0, SALT)
-    assert 0 <= policy_seed(KEY, 0, SALT) < 2**31
+        mine = new_run_seed()
+        made = {value(KEY, mine), value(KEY, 0), value(KEY, "1"), value(KEY, new_run_seed())}
+        assert len(made | {value(replace(KEY, seed=100008), mine)}) == 5
+        assert value(KEY, mine) in made
+    assert 0 <= policy_seed(KEY, SALT) < 2**31
     assert salt_hash(SALT) not in (SALT, salt_hash("cd" * 32))

@@ -153,7 +153,7 @@ def make_run(
     for key in keys[: len(keys) - skip]:
         recorder = ActionRecorder()
         record = run_trial(
-            world, policy, key, policy_seed=policy_seed(key), recorder=recorder, parts=parts
+            world, policy, key, policy_seed=policy_seed(key, 0), recorder=recorder, parts=parts
         )
         writer.write(record)
         write_actions(folder, key, recorder.actions, "joint")

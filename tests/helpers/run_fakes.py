@@ -139,7 +139,7 @@ def fake_task(name: str) -> Task:
 
 
 def parts(key: TrialKey, salt: str = "") -> TrialSetup:
-    facts = {"salt": trial_id(key, salt=salt)} if salt else {}
+    facts = {"salt": trial_id(key, salt)} if salt else {}
     scene = Scene(key.task, key.level, key.seed, key.embodiment, key.mode, (), facts)
     tracker = SumTracker(key.seed % 10 + 1, 2)
     return TrialSetup(
@@ -196,7 +196,8 @@ class KeyedPolicy(FakePolicy):
 
 
 class CountedPolicy(KeyedPolicy):
-    """Slow; leaves a byte for each attempt that it is sent."""
+    """Leaves a byte for each attempt that it is sent; in the first one at every third seed kills
+    the driver, or interrupts it."""
 
     def reset(self, trial: TrialInfo) -> None:
         super().reset(trial)
@@ -204,7 +205,13 @@ class CountedPolicy(KeyedPolicy):
             marks.write(b"x")
 
     def infer(self, observation: Mapping[str, Any]) -> NDArray[np.float32]:
-        time.sleep(0.03)
+        time.sleep(0.02)
+        if (
+            self.seed % 3 == 0
+            and (Path(os.environ["FAKE_MARKS"]) / str(self.seed)).stat().st_size == 1
+        ):
+            os.kill(os.getppid(), (signal.SIGKILL, signal.SIGINT)[self.seed % 2])
+            time.sleep(9)
         return super().infer(observation)
 
 

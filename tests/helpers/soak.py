@@ -183,7 +183,16 @@ class Bench:
         self.server = Server(self.environment)
         per = max(1, trials // 2)
         self.words = [*ROBOSPA, "eval", f"ws://127.0.0.1:{self.server.port}"]
-        self.words += ["--tasks", "Pick_Blocks_Size", "--levels", "1-2", "--trials", str(per)]
+        self.words += [
+            "--tasks",
+            "Pick_Blocks_Size",
+            "--levels",
+            "1-2",
+            "--trials",
+            str(per),
+            "--run-seed",
+            "1",
+        ]
         self.words += ["--workers", str(workers), "--backoff", "0.05", "--attempts", "10"]
         self.words += ["--seeds", f"100000-{100000 + per - 1}"]
         self.words += ["--world", "soak_fakes:SoakWorld", "--parts", "soak_fakes:parts"]

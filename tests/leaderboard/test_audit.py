@@ -104,7 +104,7 @@ class Reader(FakePolicy):
 )
 def test_who_does_the_same_whatever_the_sentence_says(policy: Any, suspicious: bool) -> None:
     """The reader does less than its scenes ask for when it is asked for less."""
-    play = partial(rehearse, FakeWorld(), policy)
+    play = partial(rehearse, FakeWorld(), policy, "s")
     found = sentence_reaction(play, KEYS[4:8], parts, lambda key: "level 1: sum to 2")
     assert found.suspicious == suspicious
     assert found.sentence.startswith("4 of 4 trials succeed with their own sentence and ")

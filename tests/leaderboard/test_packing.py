@@ -134,7 +134,7 @@ def setting(name: str, value: object) -> Callable[[dict[str, Any], dict[str, Any
         (setting("privileged", True), "privileged"),
         (setting("shuffled_instructions", True), "ablation"),
         (setting("step_scale", 2.0), "step limits"),
-        (setting("run_seed", 7), "the run's seed is 7"),
+        (setting("run_seed", 7), "the run's seed, 7, was given"),
         (setting("world", {"name": "my.world:Easy"}), "another world"),
         (setting("mode", ["clean", "randomised"]), "mixes modes"),
         (lambda settings, about: about.pop("versions"), "version"),

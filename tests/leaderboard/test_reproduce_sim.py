@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bundle_fakes import CARD_DATA
-from shadow import HORIZON, Shadow, Shy, Thief, ids
+from shadow import HORIZON, TOLD_SEED, Shadow, Shy, Thief, ids
 
 from robospa.baselines.oracle import Oracle
 from robospa.baselines.random import Random
@@ -52,8 +52,8 @@ LIMITS = {"timeout": 60.0, "first_timeout": 60.0, "patience": 5.0}
 
 
 def request(url: str, keys: list[TrialKey], out: Path, salt: str = "") -> Request:
-    settings = updated(EvaluationSettings(), {"policy": url, "out": out, "workers": 1, **LIMITS})
-    return make_request(settings, keys=keys, salt=salt)
+    given = {"policy": url, "out": out, "workers": 1, "run_seed": TOLD_SEED, **LIMITS}
+    return make_request(updated(EvaluationSettings(), given), keys=keys, salt=salt)
 
 
 def run(folder: Path, keys: list[TrialKey], policy: Callable[[], Shadow], salt: str = "") -> Run:
@@ -70,7 +70,7 @@ def claimed() -> list[TrialKey]:
 
 @pytest.fixture(scope="module")
 def stolen(tmp_path_factory: pytest.TempPathFactory, claimed: list[TrialKey]) -> Run:
-    """On public seeds a cheat that tries all of them knows every scene, and nothing stops it."""
+    """On public seeds a cheat that was told the run's seed knows every scene: nothing stops it."""
     return run(tmp_path_factory.mktemp("stolen") / "run", claimed, Thief)
 
 
@@ -127,6 +127,7 @@ def test_the_audit_knows_the_expert_again(
 
 
 def test_the_audit_sees_who_does_not_read(claimed: list[TrialKey]) -> None:
-    found = sentence_reaction(partial(rehearse, SapienWorld(render=False), Thief()), claimed[:2])
+    play = partial(rehearse, SapienWorld(render=False), Thief(), TOLD_SEED)
+    found = sentence_reaction(play, claimed[:2])
     assert found.suspicious
     assert found.sentence.startswith("2 of 2 trials succeed with their own sentence and 2 with")

@@ -56,7 +56,8 @@ def start(words: list[str]) -> subprocess.Popen[str]:
 
 
 def lines(folder: Path) -> list[TrialRecord]:
-    return [r for path in sorted((folder / "trials").glob("*.jsonl")) for r in read_file(path)]
+    files = sorted((folder / "trials").glob("*.jsonl"))
+    return [r for path in files for r in read_file(path) if finished(r)]
 
 
 class Gate:

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import os
-import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -14,7 +12,6 @@ import pytest
 from robospa.harness.running.executor import RunAborted
 from robospa.harness.running.runner import Runner, RunOptions
 from robospa.harness.running.worker import WorkerConfig
-from robospa.results.records.manifest import RunError
 from robospa.results.records.runs import finished, read_file, read_records
 from robospa.results.records.trial_record import TrialRecord
 from robospa.trial import TrialKey
@@ -143,12 +140,11 @@ if __name__ == "__main__":
     folder = Path(sys.argv[1])
     config = WorkerConfig(folder, "run_fakes:CountedPolicy", world="run_fakes:FakeWorld",
                           parts="run_fakes:parts")
-    keys = [TrialKey("Pick_Fake", 1, 100000 + n) for n in range(30)]
+    keys = [TrialKey("Pick_Fake", 1, 100000 + n) for n in range(int(sys.argv[2]))]
     with run_lock(folder):
         known = read_records(folder)
         owed = [k for k in keys if not finished(known.get(k))]
-        print("owed", len(owed), flush=True)
-        Runner(config, owed, RunOptions(workers=2, attempts=10), known=known).run()
+        Runner(config, owed, RunOptions(attempts=10), known=known).run()
 """
 
 
@@ -159,31 +155,14 @@ def test_killing_the_driver_loses_and_doubles_nothing_and_counts_as_an_attempt(
     script.write_text(DRIVER)
     begun.mkdir()
     monkeypatch.setenv("FAKE_MARKS", str(begun))
-    command = [sys.executable, str(script), str(folder)]
-    for kill in range(1, KILLS + 1):
-        victim = subprocess.Popen(command, stdout=subprocess.DEVNULL)
-        while _count(folder) < 30 * kill // (KILLS + 1):
-            assert victim.poll() is None
-            time.sleep(0.01)
-        victim.send_signal((signal.SIGKILL, signal.SIGINT)[kill % 2])
-        victim.wait()
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
-    assert done.returncode == 0, done.stderr
-    assert int(done.stdout.split()[1]) < 30
+    command = [sys.executable, str(script), str(folder), str(3 * KILLS)]
+    codes = [1]
+    while codes[-1]:
+        codes.append(subprocess.run(command, stderr=subprocess.DEVNULL, timeout=60).returncode)
     records = read_records(folder)
-    assert len(records) == len(results(folder)) == 30
+    assert len(records) == len(results(folder)) == 3 * KILLS
     true = {int(mark.name): mark.stat().st_size for mark in begun.iterdir()}
     counted = {key.seed: r.attempts for key, r in records.items()}
-    print(f"{KILLS} kills, {sum(true.values())} attempts, {sum(counted.values())} counted")
-    # A kill between the line on disk and the policy costs an attempt that the policy never had.
-    assert all(true[seed] <= counted[seed] <= true[seed] + 1 for seed in true)
-    assert sum(true.values()) > 30
-    causes = {row.cause for r in records.values() for row in r.retries}
-    assert causes == {"interrupted"}
-
-
-def _count(folder: Path) -> int:
-    try:
-        return len(results(folder))
-    except RunError:
-        return 0
+    print(f"{len(codes) - 2} drivers killed, {sum(true.values())} attempts")
+    assert counted == true and sum(true.values()) >= 4 * KILLS
+    assert {x.cause for r in records.values() for x in r.retries} == {"interrupted"}
