@@ -188,11 +188,12 @@ class Bench:
             "Pick_Blocks_Size",
             "--levels",
             "1-2",
-            "--trials",
-            str(per),
             "--run-seed",
             "1",
+            "--trials",
         ]
+        self.words.append(str(per))
+        self.words += ["--trials", str(per)]
         self.words += ["--workers", str(workers), "--backoff", "0.05", "--attempts", "10"]
         self.words += ["--seeds", f"100000-{100000 + per - 1}"]
         self.words += ["--world", "soak_fakes:SoakWorld", "--parts", "soak_fakes:parts"]

@@ -25,11 +25,12 @@ from robospa.harness.running import films as module
 from robospa.harness.running.atomic_file import run_lock
 from robospa.harness.running.evaluate import Request, evaluate
 from robospa.harness.running.films import FilmDone, FilmMaker, Films, FilmsInterrupted
+from robospa.harness.running.manifest import this_processor, write_manifest
 from robospa.harness.running.runner import RunOptions
 from robospa.harness.running.worker import WorkerConfig
 from robospa.harness.world import RenderUnavailable
 from robospa.observation import CameraSpec
-from robospa.results.records.manifest import RunError
+from robospa.results.records.manifest import RunAbout, RunError, RunSettings, make_manifest
 from robospa.results.records.runs import Run, film_name, films_in, read_records, read_run
 from robospa.results.records.trial_record import TrialRecord
 
@@ -200,6 +201,8 @@ def test_cameras_stand_side_by_side(tmp_path: Path) -> None:
     ("field", "words"), [("digest", "another state"), ("scene_digest", "another scene")]
 )
 def test_another_trial_is_not_shown(tmp_path: Path, field: str, words: str) -> None:
+    about = RunAbout(processors=(this_processor(),))
+    write_manifest(tmp_path, make_manifest(RunSettings(), (KEY,), about))
     record = replace(recorded(tmp_path, KEY), **{field: "other"})  # type: ignore[arg-type]
     done = FilmMaker(config(tmp_path)).make(record)
     assert words in done.trouble and KEY.slug in done.trouble and not done.stop
