@@ -18,7 +18,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("first")
     parser.add_argument("second")
-    parser.add_argument("--metric", default="sr", choices=["sr", "onta", "ps"])
+    parser.add_argument("--metric", default="sr", choices=["sr", "sr1", "onta", "onta1", "ps"])
     words = parser.parse_args()
     found = robospa.compare(words.first, words.second, words.metric)
     for note in (found.banner, *found.notes):

@@ -96,11 +96,11 @@ def make_report(
 
 
 def _tables(own: Sequence[ModelResults], columns: Sequence[Column]) -> list[ReportTable]:
-    """The paper's tables, after that of one policy's robots, scene modes or splits."""
+    """The paper's tables, after those of one policy's robots, scene modes or splits."""
     if not columns:
         return []
-    table = by_axis(own)
-    return [*([ReportTable(table, False)] if table else []), *report_tables(columns)]
+    axes = [table for metric in ("sr", "sr1") if (table := by_axis(own, metric))]
+    return [*(ReportTable(table, False) for table in axes), *report_tables(columns)]
 
 
 def banners(models: Sequence[ModelResults]) -> list[str]:
