@@ -34,8 +34,6 @@ from robospa.trial import TrialKey
 
 CHUNK = 1000
 OUTCOME = frozenset(("success", "done", "best"))
-STATE = frozenset(("digest", "physics_steps"))
-"""What differs between kinds of processors while the outcome stays."""
 ENDED = "the recorded actions end here"
 """What a record says whose goal was not met by then."""
 

@@ -12,11 +12,8 @@
 Names are matched against this list, sizes are bounded before a byte is read, and nothing in a
 bundle is ever extracted, imported or run.
 
-JSON of strangers is finite numbers, no repeated fields, no nesting without end, and text that is
-only text: no control or invisible characters, no markup or scripts. The zip is looked at whole
-before a byte is unpacked. Refused: what would make two readers see two archives; names that are not
-on the list, paths that lead elsewhere, names given twice; links, folders and encrypted entries;
-files that unpack to more than their kind or the whole may have.
+The zip is looked at whole before a byte is unpacked, so that no two readers see two archives. JSON
+of strangers is finite numbers, no repeated fields, and text that is only text, without markup.
 """
 
 from __future__ import annotations

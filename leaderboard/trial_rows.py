@@ -5,9 +5,8 @@ run's inputs, so a row cannot be changed, left out, repeated, moved or carried i
 without changing every row after it and the last hash, which the manifest and so the bundle's hash
 hold.
 
-A record that breaks one of the rules is of no trial that our harness ran: a success without an
-action, an event after the end, more queries than actions, physics steps that these actions do not
-take. Whether a possible record is a true one is not decided here: replay does that.
+A record that breaks one of the rules is of no trial that our harness ran. Whether a possible record
+is a true one is not decided here: replay does that.
 """
 
 from __future__ import annotations

@@ -208,12 +208,6 @@ def test_another_bundle_than_announced_is_refused(
         check(folder, tmp_path / "e.json", get=lambda a, path, s: shutil.copy(bundle, path))
 
 
-def test_a_bundle_that_does_not_verify_fails(bundle: Path, tmp_path: Path) -> None:
-    folder = hand_in(tmp_path, bundle)
-    with pytest.raises(BundleError, match="was not verified"):
-        check(folder, tmp_path / "e.json", get=lambda a, path, s: path.write_bytes(b"PK"))
-
-
 def test_further_files_and_links_are_refused(bundle: Path, tmp_path: Path) -> None:
     folder = hand_in(tmp_path, bundle)
     (folder / "setup.py").write_text("raise SystemExit")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -9,6 +10,8 @@ from typing import Any
 
 import pytest
 from bundle_fakes import PICK, REFERENCE, Weak, World
+from msgspec import to_builtins
+from msgspec.structs import replace as replaced
 from run_fakes import FakePolicy, parts
 from site_fakes import make_valid
 
@@ -22,6 +25,8 @@ from robospa.leaderboard.reproduce import (
     draw_block,
     hidden_keys,
     plan,
+    read_block,
+    write_block,
 )
 from robospa.leaderboard.verify import Valid
 from robospa.results.records.manifest import RunManifest, RunSettings
@@ -135,17 +140,49 @@ def test_a_test_has_a_level_at_which_it_can_refuse(large: Valid, alpha: float) -
 def test_a_bundle_of_few_trials_is_told_that_no_block_helps(valid: Valid) -> None:
     with pytest.raises(BundleError, match="with 20 trials its own rates are too uncertain"):
         plan(valid, 1000)
-    practice = replace(valid, manifest=replace_practice(valid))
+    practice = replace(valid, manifest=replaced(valid.manifest, practice=True))
     assert plan(practice, 3) == 3
-
-
-def replace_practice(valid: Valid) -> Any:
-    """The manifest of a bundle for practice."""
-    from msgspec.structs import replace as changed
-
-    return changed(valid.manifest, practice=True)
 
 
 def test_a_block_without_trials_is_never_drawn() -> None:
     with pytest.raises(BundleError, match="a block of 0 trials"):
         draw_block([(PICK, 1)], 0)
+
+
+BLOCK = Block({"Pick_Blocks_Size/1": (FIRST, FIRST + 7)}, "ab" * 32)
+
+
+def test_a_block_is_read_back_under_its_commitment_and_never_written_over(tmp_path: Path) -> None:
+    for name, other in (("seeds", {"Pick_Blocks_Size/1": (FIRST,)}), ("salt", "cd" * 32)):
+        write_block(replaced(BLOCK, **{name: other}), tmp_path / name)
+        with pytest.raises(BundleError, match="not the block that was committed to"):
+            read_block(tmp_path / name, BLOCK.commitment)
+    write_block(BLOCK, tmp_path / "b.json")
+    assert read_block(tmp_path / "b.json", BLOCK.commitment) == BLOCK
+    with pytest.raises(BundleError, match="never written over"):
+        write_block(BLOCK, tmp_path / "b.json")
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"format": 1}, "format 2"),
+        ({"salt": "short"}, "'salt' must be 32 bytes"),
+        ({"suite": "robospa-9"}, "no block of"),
+        ({"seeds": {}}, "'seeds'"),
+        ({"seeds": {"Pick_Blocks_Size/1": [100000]}}, "1000000000"),
+        ({"seeds": {"Pick_Blocks_Size/1": [FIRST, FIRST]}}, "there twice"),
+        ({"seeds": {"Pick_Blocks_Size/9": [FIRST]}}, "TASK/LEVEL"),
+        ({"seeds": {"Pick_Blocks_Size/1": [True]}}, "whole number"),
+        ({"extra": 1}, "unknown field 'extra'"),
+    ],
+)
+def test_blocks_that_are_none_are_refused(
+    tmp_path: Path, change: dict[str, Any], words: str
+) -> None:
+    from robospa.leaderboard.bundle import canonical, sha256
+
+    data = {**to_builtins(BLOCK), **change}
+    (tmp_path / "b.json").write_text(json.dumps(data))
+    with pytest.raises(BundleError, match=words):
+        read_block(tmp_path / "b.json", sha256(canonical(data)))

@@ -8,10 +8,11 @@ from pathlib import Path
 
 import pytest
 from bundle_fakes import CARD_TEXT as CARD
-from bundle_fakes import FAKES, PICK, SEEDS, Weak, make_run
-from bundle_fakes import REFERENCE as FAKE
+from bundle_fakes import FAKES, PICK, REFERENCE, SEEDS, Weak, make_run
 from command_line import Done, robospa
+from msgspec import to_builtins
 from run_fakes import KEYED, parts
+from site_fakes import REPLAYED, make_valid, of_bundle
 
 from robospa.harness.running.evaluate import evaluate
 from robospa.harness.running.request import make_request
@@ -24,7 +25,7 @@ from robospa.results.records.manifest import RunError
 from robospa.results.records.runs import read_run
 from robospa.trial import TrialKey
 
-pytestmark = pytest.mark.usefixtures("world_asked_here")
+pytestmark = pytest.mark.usefixtures("world_asked_here", "same_figures_once")
 
 TEXTS = (".json", ".jsonl", ".toml", ".log")
 
@@ -123,7 +124,7 @@ def test_hidden_seeds_run_against_a_server(packed: Path) -> None:
     evidence = json.loads((packed / "hidden.json").read_text())["reproduced"]
     assert evidence["counts"]["sr"] == {f"{PICK}/{level}": [3, 4, 4, 5] for level in (1, 2)}
     assert evidence["commitment"] == block.commitment and evidence["trials"] == 10
-    assert evidence["bundle"] == verify(bundle, FAKE, practice=True).manifest.bundle
+    assert evidence["bundle"] == verify(bundle, REFERENCE, practice=True).manifest.bundle
     manifest = (packed / "fresh" / "run.json").read_text()
     assert hashlib.sha256(block.salt.encode()).hexdigest() in manifest
     said = [p.read_text() for p in (packed / "fresh").rglob("*") if p.suffix in TEXTS]
@@ -208,12 +209,6 @@ def test_the_template_is_printed() -> None:
     assert "[checkpoints." in done.out
 
 
-def test_the_fake_bundle_has_listed_seeds() -> None:
-    from robospa.tasks.seeds import accepted
-
-    assert set(SEEDS) <= set(accepted(PICK, 1))
-
-
 def test_large_bundles_show_how_far_their_scenes_are(capsys: pytest.CaptureFixture[str]) -> None:
     show = scene_progress()
     for count in range(100, 2001, 100):
@@ -222,3 +217,29 @@ def test_large_bundles_show_how_far_their_scenes_are(capsys: pytest.CaptureFixtu
     assert len(lines) == 10 and lines[-1] == "scenes made again: 2000 of 2000"
     scene_progress()(8, 8)
     assert capsys.readouterr().err == ""
+
+
+def test_evidence_of_another_bundle_adds_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("robospa.leaderboard.rules.shipped", lambda world, parts: REFERENCE)
+    valid, path, home = make_valid(tmp_path), tmp_path / "evidence.json", tmp_path / "home"
+    words = ["leaderboard", "add", valid.path, "--evidence", path, "--submissions", home, *FAKES]
+    path.write_text(json.dumps({"valid": {"bundle": "0"}, "replayed": REPLAYED}))
+    done = robospa(*words)
+    assert done.code == 1 and "of another bundle" in done.err and not home.exists()
+    replayed = of_bundle(valid, REPLAYED)
+    path.write_text(json.dumps({"valid": to_builtins(valid.evidence), "replayed": replayed}))
+    assert robospa(*words).out.startswith("Submission: ")
+    assert (home / "fake-1" / "model.json").is_file()
+    told = json.loads(robospa(*words, "--name", "again", "--json").out)
+    assert told["submission"] == str(home / "again")
+    assert told["evidence"]["bundle"] == valid.evidence.bundle
+
+
+def test_a_broken_submission_stops_the_build_before_anything_is_written(tmp_path: Path) -> None:
+    (tmp_path / "home" / "empty").mkdir(parents=True)
+    words = ["leaderboard", "build", "--submissions", tmp_path / "home", "--out", tmp_path / "site"]
+    done = robospa(*words)
+    assert done.code == 1 and "manifest.json cannot be read" in done.err
+    assert not (tmp_path / "site").exists()

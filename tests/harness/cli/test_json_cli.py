@@ -36,7 +36,7 @@ HERE = {
     "submit verify": "test_submit_cli",
     "submit block": "test_submit_cli",
     "submit reproduce": "test_submit_cli",
-    "leaderboard add": "test_leaderboard_cli",
+    "leaderboard add": "test_submit_cli",
 }
 """Commands that need more than a run on disk, and the file of the test that parses their JSON."""
 HERE = {
