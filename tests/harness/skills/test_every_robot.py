@@ -9,6 +9,7 @@ from itertools import product
 import numpy as np
 import pytest
 from robot_at_home import at_home
+from world_scenes import block
 
 from robospa.geometry import Pose, rotate
 from robospa.harness.robots import embodiment, embodiments
@@ -17,6 +18,7 @@ from robospa.harness.skills import clearance
 from robospa.harness.skills.open import Pull, _clear, _ways, pull_open
 from robospa.harness.skills.pick import TOO_THIN, reachable_grasps
 from robospa.harness.skills.touch import DEPTH, press
+from robospa.harness.skills.workspace import Workspace
 from robospa.tasks.objects import assets, object_model, variant_count
 from robospa.tasks.objects.appliances import OVENS
 from robospa.tasks.plan import Open, Press
@@ -75,8 +77,7 @@ def test_what_is_thinner_than_the_gap_of_closed_fingers_is_a_last_choice(name: s
 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_fingers_come_to_a_block_a_margin_wider_than_it(name: str) -> None:
-    look = {"half": [0.02, 0.02, 0.02], "color": [1.0, 0.0, 0.0]}
-    ws = at_home(name, SceneObject("b", "block", Pose((0.15, -0.1, TABLE_TOP + 0.02)), look))
+    ws = at_home(name, block("b", 0.15, -0.1))
     best = reachable_grasps(ws, "b", (1,))[0]
     closed, opened = ws.robot.arms[1].travel
     assert 2 * (closed + best.opening * (opened - closed)) == pytest.approx(0.062)
@@ -112,12 +113,21 @@ def test_rims_are_thicker_than_the_gap_of_closed_fingers(name: str) -> None:
             assert min(widths) > max(gaps) + 0.0005, (asset, look)
 
 
+CALL = Open("oven", to=0.7, arm="left")
+
+
+def before_an_oven(name: str, angle: float, *others: SceneObject, look: int = 0) -> Workspace:
+    """A microwave whose door is open by `angle` [rad], and what else there is."""
+    oven = SceneObject("oven", "microwave", Pose((-0.06, 0.17, TABLE_TOP)), {"look": look}, True)
+    ws = at_home(name, oven, *others)
+    ws.snapshot = replace(ws.snapshot, hinges={"oven": angle})
+    return ws
+
+
 @pytest.mark.parametrize(("name", "look"), product(ROBOTS, (0, 1)))
 def test_fingertips_at_a_handle_stay_in_front_of_the_door(name: str, look: int) -> None:
-    oven = SceneObject("oven", "microwave", Pose((-0.06, 0.17, TABLE_TOP)), {"look": look}, True)
-    ws = at_home(name, oven)
-    ws.snapshot = replace(ws.snapshot, hinges={"oven": 0.0})
-    rows = next(pull_open(ws, Open("oven", to=0.7, arm="left")))
+    ws = before_an_oven(name, 0.0, look=look)
+    rows = next(pull_open(ws, CALL))
     side = ws.robot.action_space("joint").arms[0]
     taken = rows[rows[:, side.gripper] == 0.0][0]
     tip = end_effector(ws.chains[0], taken[side.body]).apply((ws.hand(0).tip, 0.0, 0.0))
@@ -127,10 +137,8 @@ def test_fingertips_at_a_handle_stay_in_front_of_the_door(name: str, look: int) 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_a_door_is_pulled_open_without_a_change_of_posture(name: str) -> None:
     # some arms have several postures for every pose: from one to another the hand leaves the arc
-    oven = Pose((-0.06, 0.17, TABLE_TOP))
-    ws = at_home(name, SceneObject("oven", "microwave", oven, {"look": 0}, fixed=True))
-    ws.snapshot = replace(ws.snapshot, hinges={"oven": 0.0})
-    rows = next(pull_open(ws, Open("oven", to=0.7, arm="left")))
+    ws = before_an_oven(name, 0.0)
+    rows = next(pull_open(ws, CALL))
     side = ws.robot.action_space("joint").arms[0]
     joints, gripper = rows[:, side.body], rows[:, side.gripper]
     pulling = joints[gripper == 0.0]
@@ -138,25 +146,21 @@ def test_a_door_is_pulled_open_without_a_change_of_posture(name: str) -> None:
 
 
 def test_at_the_last_attempt_a_door_is_pulled_along_a_way_on_which_the_arm_is_in_nothing() -> None:
-    oven = SceneObject("oven", "microwave", Pose((-0.06, 0.17, TABLE_TOP)), {"look": 0}, fixed=True)
-    ws = at_home("franka-panda", oven)
-    ws.snapshot = replace(ws.snapshot, hinges={"oven": 0.7})
+    ws = before_an_oven("franka-panda", 0.7)
     hinge = ws.models["oven"].hinge
     assert hinge is not None
-    call = Open("oven", to=0.7, arm="left")
-    first = next(_ways(ws, call, hinge))
+    first = next(_ways(ws, CALL, hinge))
     elbow = link_frames(ws.chains[0], first.arc[-1][None])[4][0, :3, 3]
     look = {"half": [0.02] * 3, "color": [1.0, 0.0, 0.0]}
     thing = SceneObject("thing", "block", Pose(tuple(elbow.tolist())), look, fixed=True)
-    beside = at_home("franka-panda", oven, thing)
-    beside.snapshot = replace(beside.snapshot, hinges={"oven": 0.7})
+    beside = before_an_oven("franka-panda", 0.7, thing)
 
     def depth(way: Pull) -> float:
         return float(
             clearance.arm_depth(beside, way.arm, np.stack([way.before, way.at, *way.arc])).max()
         )
 
-    taken = _clear(beside, _ways(beside, call, hinge))
+    taken = _clear(beside, _ways(beside, CALL, hinge))
     assert taken is not None and depth(first) > clearance.TOUCH >= depth(taken)
 
 

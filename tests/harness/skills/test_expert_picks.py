@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import pytest
 from robot_at_home import at_home
+from world_scenes import block
 
 from robospa.baselines.oracle import create
 from robospa.geometry import Pose, axis_rotation, multiply, rotate, to_matrix
 from robospa.harness.robots import embodiment
-from robospa.harness.robots.kinematics import chain_of, end_effector
 from robospa.harness.skills import Expert, pick
 from robospa.harness.skills.clearance import TOUCH, finger_points, neighbours, palm_points
 from robospa.harness.skills.motion import object_tops, travel_height
@@ -28,9 +28,8 @@ from robospa.tasks.catalog import build_scene, tasks
 from robospa.tasks.objects import object_model
 from robospa.tasks.plan import Pick
 from robospa.tasks.scene import SceneObject
-from robospa.tasks.snapshot import Snapshot
 from robospa.trial import TrialKey
-from robospa.workcell import TABLE_TOP, grasp_points
+from robospa.workcell import TABLE_TOP
 
 FRANKA = embodiment("franka-panda").grippers[0]
 HALF = 0.018
@@ -101,10 +100,6 @@ def thing(name: str, y: float, half: tuple[float, float, float], x: float = -0.1
     return SceneObject(name, "block", Pose((x, y, TABLE_TOP + half[2])), params)
 
 
-def block(name: str, x: float, y: float) -> SceneObject:
-    return thing(name, y, (0.02, 0.02, 0.02), x)
-
-
 def test_a_grasp_closes_on_the_object_and_clears_the_table() -> None:
     ws = at_home(ROBOT.name, block("b", -0.15, -0.1))
     best = reachable_grasps(ws, "b", (0, 1))[0]
@@ -145,11 +140,7 @@ def test_low_objects_are_taken_with_the_tips_above_the_table() -> None:
 
 def test_the_expert_holds_still_when_its_plan_is_over() -> None:
     scene = build_scene("Press_Stapler_Repeat", 1, 0)
-    left, right = (end_effector(chain_of(a), a.home) for a in ROBOT.arms)
-    points = grasp_points(ROBOT.grippers, (left, right))
-    joints = (ROBOT.arms[0].home, ROBOT.arms[1].home)
-    poses = {o.name: o.pose for o in scene.objects}
-    snapshot = Snapshot(0.0, poses, (1.0, 1.0), (left, right), joints, grasp_points=points)
+    snapshot = at_home(ROBOT.name, *scene.objects).snapshot
     expert = Expert(scene, snapshot)
     for _ in range(10):
         rows = expert.next(snapshot)

@@ -8,10 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from robot_at_home import at_home
+from world_scenes import block
 
 from robospa.geometry import Pose, look_rotation, multiply, rotate, yaw_rotation
 from robospa.harness.robots import embodiment
-from robospa.harness.robots.kinematics import chain_of, end_effector, inverse
+from robospa.harness.robots.kinematics import end_effector, inverse
 from robospa.harness.skills import bring_in, place
 from robospa.harness.skills.place import FAR, reachable_placements, release_opening
 from robospa.harness.skills.workspace import Workspace
@@ -19,7 +20,6 @@ from robospa.tasks.catalog import build_scene
 from robospa.tasks.objects import object_model
 from robospa.tasks.plan import Hang, Place, Pour
 from robospa.tasks.scene import Scene, SceneObject
-from robospa.tasks.snapshot import Snapshot
 from robospa.workcell import TABLE_TOP, grasp_points
 
 HALF = 0.018
@@ -72,14 +72,11 @@ LIFTED = 0.08
 
 def holding_a_cube(gripper: float) -> Workspace:
     """The left arm at HELD with a cube between its fingers, LIFTED above the table."""
-    half = {"half": [0.02, 0.02, 0.02], "color": [1.0, 0.0, 0.0]}
-    cube = SceneObject("cube", "block", Pose((-0.2, -0.15, TABLE_TOP + 0.02 + LIFTED)), half)
-    scene = Scene("none", 1, 0, ROBOT.name, "clean", (cube,), {})
-    right = end_effector(chain_of(ROBOT.arms[1]), ROBOT.arms[1].home)
-    points = grasp_points(ROBOT.grippers, (HELD, right))
-    start = Snapshot(0.0, {"cube": cube.pose}, (gripper, 1.0), (HELD, right),
-        (ROBOT.arms[0].home, ROBOT.arms[1].home), grasp_points=points)  # fmt: skip
-    ws = Workspace(scene, ROBOT, start)
+    ws = at_home(ROBOT.name, block("cube", -0.2, -0.15, lift=LIFTED))
+    ends = (HELD, ws.snapshot.end_effector[1])
+    points = grasp_points(ROBOT.grippers, ends)
+    grips = (gripper, 1.0)
+    ws.update_state(replace(ws.snapshot, gripper=grips, end_effector=ends, grasp_points=points))
     joints = ws.solve(0, HELD)
     assert joints is not None
     ws.joints[0] = joints
