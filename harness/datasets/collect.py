@@ -22,6 +22,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import asdict, dataclass, field, fields
 from functools import partial
+from itertools import starmap
 from pathlib import Path
 
 from robospa.harness.datasets.manifest import MANIFEST, DatasetManifest, SeedFailure, read_record
@@ -337,7 +338,7 @@ def dataset_folders(out: Path, keys: Sequence[ListKey]) -> dict[str, Path]:
 
     A data set has actions of one width.
     """
-    robots = list(dict.fromkeys(key.embodiment for key in keys))
+    robots = dict.fromkeys(key.embodiment for key in keys)
     return {r: out if len(robots) == 1 else out / path_part(r) for r in robots}
 
 
@@ -353,7 +354,6 @@ def _check_finished(order: Order, folders: Sequence[Path], resume: bool) -> None
 
 
 def _check_folder(out: Path, store: EpisodeStore, resume: bool) -> None:
-    """Raises SettingsError if `out` has something else in it, or what is not to be gone on with."""
     if store.begun:
         if not resume:
             raise SettingsError(
@@ -395,7 +395,6 @@ def _make_episodes(
     check: Callable[[], None],
     say: Callable[[str], None],
 ) -> None:
-    """Make the episodes that are missing."""
     count = order.settings.episodes
     done = {search.key: len(search.accepted) for search in wanted}
     left = sum(count - done[s.key] for s in wanted if not s.done)
@@ -433,7 +432,6 @@ def _pack(
     folders: dict[str, Path],
     say: Callable[[str], None],
 ) -> CollectionResult:
-    """Pack what was made, a data set for each robot that has one."""
     episodes = 0
     for robot, folder in folders.items():
         some = [search for search in wanted if search.key.embodiment == robot]
@@ -442,13 +440,9 @@ def _pack(
         if (folder / MANIFEST).exists() or not files:
             continue
         say(f"packing {len(files)} episodes of {robot} into {folder}")
-        failures = tuple(
-            SeedFailure(trial_of(s.key, a.seed), a.reason) for s in some for a in s.refused
-        )
-        settings = dict(order.facts["settings"])
-        manifest = DatasetManifest(
-            command_of(order.settings, order.layout), settings, tuple(failures)
-        )
+        refused = ((trial_of(s.key, a.seed), a.reason) for s in some for a in s.refused)
+        command, failures = command_of(order.settings, order.layout), starmap(SeedFailure, refused)
+        manifest = DatasetManifest(command, dict(order.facts["settings"]), tuple(failures))
         pack(order.layout, folder, files, manifest)
     return CollectionResult(tuple(folders.values()), episodes, tuple(_missing(wanted)))
 

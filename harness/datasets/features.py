@@ -3,8 +3,7 @@
 LeRobot makes every feature whose name begins with `observation` an input of the policy that it
 trains, and every one that begins with `action` an output. So only the pictures, the commanded
 state, the action and, where it was asked for, the environment state begin so; what is there for
-other uses (reward models, hierarchical policies, filtering) does not. Tables are written with
-pyarrow alone, which writes the same bytes for the same table.
+other uses (reward models, hierarchical policies, filtering) does not.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.action_space import ARMS, ActionSpace
-from robospa.harness.datasets.episode import DatasetEpisode, Pictures, Stills
+from robospa.harness.datasets.episode import ENDINGS, FILM_CODECS, DatasetEpisode, Pictures, Stills
 from robospa.harness.datasets.pictures import FPS
 from robospa.observation import NAMES
 
@@ -46,7 +45,7 @@ class Camera:
     @property
     def filmed(self) -> bool:
         """True if they are films, False if they are stills in the rows."""
-        return self.codec in ("h264", "av1")
+        return self.codec in FILM_CODECS
 
 
 @dataclass(frozen=True)
@@ -70,7 +69,7 @@ class EpisodeLayout:
 
     @property
     def stills(self) -> list[str]:
-        """The other cameras."""
+        """The others."""
         return [name for name, camera in self.cameras.items() if not camera.filmed]
 
     def check(self, episode: DatasetEpisode) -> None:
@@ -97,14 +96,11 @@ MISFITS = {
 
 def layout_of(episode: DatasetEpisode) -> EpisodeLayout:
     """The layout of a data set that begins with `episode`."""
-    joints = joint_names(episode.key.embodiment, episode.space)
+    robot, space, seen = episode.key.embodiment, episode.space, episode.pictures
+    cameras = {name: Camera(of.codec, of.width, of.height) for name, of in seen.items()}
     objects = bool(episode.environment_state.size)
-    robot, cameras = episode.key.embodiment, _cameras(episode)
-    return EpisodeLayout(robot, episode.space, joints, cameras, objects, _absent(episode))
-
-
-def _absent(episode: DatasetEpisode) -> frozenset[str]:
-    return frozenset(episode.absent) & {*ALWAYS, "measured_state"}
+    absent = frozenset(episode.absent) & {*ALWAYS, "measured_state"}
+    return EpisodeLayout(robot, space, joint_names(robot, space), cameras, objects, absent)
 
 
 def joint_names(robot: str, space: ActionSpace) -> tuple[str, ...]:
@@ -124,11 +120,6 @@ def joint_names(robot: str, space: ActionSpace) -> tuple[str, ...]:
     if len(names) != space.width:
         raise EpisodeMisfit(f"a state of {robot} has {len(names)} numbers, not {space.width}")
     return tuple(names)
-
-
-def _cameras(episode: DatasetEpisode) -> dict[str, Camera]:
-    seen = episode.pictures
-    return {name: Camera(of.codec, of.width, of.height) for name, of in seen.items()}
 
 
 def _text(value: object) -> str:
@@ -300,10 +291,8 @@ def frame_table(
     for camera in layout.stills:
         seen = pictures[camera]
         if isinstance(seen, Stills):
-            ending = {"png": "png", "jpeg": "jpg"}[seen.codec]
-            images = [
-                {"bytes": data, "path": f"frame-{t:06d}.{ending}"}
-                for t, data in enumerate(seen.frames)
-            ]
-            columns[picture_key(camera)] = pa.array(images, schema.field(picture_key(camera)).type)
+            key, ending = picture_key(camera), ENDINGS[seen.codec]
+            named = ((f"frame-{t:06d}.{ending}", data) for t, data in enumerate(seen.frames))
+            images = [{"bytes": data, "path": name} for name, data in named]
+            columns[key] = pa.array(images, schema.field(key).type)
     return pa.table([columns[name] for name in schema.names], schema=schema)

@@ -4,9 +4,8 @@
     <Task>_<level>/<configuration>/instructions/episode<i>.json     sentences; those of `seen` count
     <Task>_<level>/<configuration>/seed.txt                         seeds, if it is there
 
-They hold no measured joints, no times, no subtasks and no outcome, and do not say which robot they
-are of: `ABSENT`. The columns of these are left out of the data set, and its card says so. Nobody
-can play them again here without their scenes, so verification looks at hashes and counts alone.
+What they do not hold (`ABSENT`) is left out of the data set, and its card says so. Without their
+scenes nobody can play them again, so verification looks at hashes and counts alone.
 """
 
 from __future__ import annotations

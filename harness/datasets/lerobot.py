@@ -70,7 +70,6 @@ class LeRobotWriter:
         (folder / "meta").mkdir(parents=True, exist_ok=True)
 
     def _numbers(self, episode: DatasetEpisode) -> tuple[dict[str, NDArray[Any]], dict[str, Stats]]:
-        """Rows and statistics by feature; raises EpisodeMisfit."""
         self._layout.check(episode)
         numbers = self._written.rows(episode)
         return numbers, {n: row_stats(of.reshape(len(of), -1)) for n, of in numbers.items()}
@@ -104,7 +103,6 @@ class LeRobotWriter:
         (self._folder / "meta" / f"{name}.json").write_text(text, encoding="utf-8")
 
     def _texts(self) -> dict[str, Mapping[str, int]]:
-        """The numbered texts by what they are."""
         found: dict[str, Mapping[str, int]] = {"task": self._written.tasks}
         if "subtask_index" not in self._layout.absent:
             found["subtask"] = self._written.subtasks
@@ -164,11 +162,8 @@ class LeRobotV21(LeRobotWriter):
                 for text, number in texts.items():
                     file.write(json_line({f"{name}_index": number, name: text}))
         count = self._written.episodes
-        self._write_info(
-            total_videos=count * len(self._layout.films),
-            total_chunks=-(-count // CHUNK),
-            chunks_size=CHUNK,
-        )
+        videos, chunks = count * len(self._layout.films), -(-count // CHUNK)
+        self._write_info(total_videos=videos, total_chunks=chunks, chunks_size=CHUNK)
 
 
 class LeRobotV3(LeRobotWriter):
@@ -230,7 +225,6 @@ class LeRobotV3(LeRobotWriter):
         return found
 
     def _write_rows(self) -> None:
-        """Write the rows of the episodes that are waiting."""
         import pyarrow as pa
 
         table = pa.Table.from_pylist(self._waiting)
@@ -301,9 +295,7 @@ class TableFiles:
         if self._file is None or self._file.tell() + table.nbytes > self._limit:
             self.close()
             self._number += 1
-            path = _numbered(self._folder, self._number, "parquet")
-            path.parent.mkdir(parents=True, exist_ok=True)
-            self._file = path.open("wb")
+            self._file = _numbered(self._folder, self._number, "parquet").open("wb")
         return divmod(self._number, CHUNK)
 
     def add(self, table: pa.Table) -> tuple[int, int]:
@@ -318,10 +310,9 @@ class TableFiles:
 
     def close(self) -> None:
         """Finish the file that is open, if one is."""
-        if self._writer is not None:
-            self._writer.close()
-        if self._file is not None:
-            self._file.close()
+        for of in (self._writer, self._file):
+            if of is not None:
+                of.close()
         self._writer = self._file = None
 
 
@@ -353,9 +344,10 @@ class FilmFiles:
 
 
 def _numbered(folder: Path, number: int, ending: str) -> Path:
-    """Where a file is: `chunk-000/file-000.parquet`."""
     chunk, file = divmod(number, CHUNK)
-    return folder / f"chunk-{chunk:03d}/file-{file:03d}.{ending}"
+    path = folder / f"chunk-{chunk:03d}/file-{file:03d}.{ending}"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    return path
 
 
 def _write_texts(path: Path, name: str, texts: Sequence[str]) -> None:
@@ -401,9 +393,9 @@ def misfits(version: str, folder: Path, lines: Sequence[EpisodeLine]) -> Iterato
 
     info = json.loads((folder / "meta" / "info.json").read_text())
     frames = sum(line.frames for line in lines)
-    said = _summary(info["codebase_version"], info["total_episodes"], info["total_frames"])
-    if said != (wanted := _summary(version, len(lines), frames)):
-        yield f"meta/info.json says {said}, not {wanted}"
+    said = (info["codebase_version"], info["total_episodes"], info["total_frames"])
+    if said != (wanted := (version, len(lines), frames)):
+        yield f"meta/info.json says {said} of version, episodes and frames, not {wanted}"
     stored = {name for name, of in info["features"].items() if of["dtype"] != "video"}
     counts: Counter[int] = Counter()
     index = 0
@@ -426,7 +418,3 @@ def misfits(version: str, folder: Path, lines: Sequence[EpisodeLine]) -> Iterato
             films = sorted((folder / "videos").rglob(f"{name}/**/*.mp4"))
             if (count := sum(map(frame_count, films))) != frames:
                 yield f"the films of {name} have {count} frames, not {frames}"
-
-
-def _summary(version: str, episodes: int, frames: int) -> str:
-    return f"{version}, {episodes} episodes, {frames} frames"

@@ -1,10 +1,8 @@
 """A camera's pictures as they are kept: one film, or a still for every frame.
 
 The bytes follow from the pictures and from the versions of the encoders: one thread, no time of
-day. Frame t of an episode's film lies at t / FPS seconds. Films have two frames a group, as LeRobot
-makes them: a reader that wants one frame decodes at most two. No frame refers to later ones, so
-films are joined by copying the coded pictures and moving their times; all films of a file must
-come from one encoder with one setting.
+day. Frame t of an episode's film lies at t / FPS seconds. Films have two frames a group and none
+refers to later ones, so they are joined by copying the coded pictures and moving their times.
 """
 
 from __future__ import annotations

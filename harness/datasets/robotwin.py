@@ -3,12 +3,9 @@
     <task>/<configuration>/data/episode0.hdf5
     <task>/<configuration>/instructions/episode0.json     {"seen": [...], "unseen": []}
 
-A base task's levels share a folder and count on. The configuration is the scene mode's:
-`demo_clean`, `demo_randomized`. `seen` has all training sentences, the trial's own first; held-out
-ones belong to evaluation. Besides what `robospa collect --record` writes, a file has
-`language_instruction`, which X-VLA reads, and the group `robospa`: `action`, `sim_time`, `subtask`,
-`label`, and `environment_state` where it was asked for. Pictures are
-JPEGs with red and blue exchanged, as official ones are, and are coded here: keep PNG until then.
+A base task's levels share a folder and count on. Besides what `robospa collect --record` writes, a
+file has `language_instruction`, which X-VLA reads, and the group `robospa`. Pictures are JPEGs with
+red and blue exchanged, as official ones are, and are coded here: keep PNG until then.
 """
 
 from __future__ import annotations

@@ -78,6 +78,7 @@ class Collection:
 
     def __post_init__(self) -> None:
         check_values(self)
+        self.camera_specs()
         if self.noise and self.frames == KEYFRAMES:
             raise SettingsError(
                 "a keyframe is where the expert is back on its way, so it shows nothing of noise: "

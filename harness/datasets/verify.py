@@ -164,7 +164,6 @@ def _line_problems(made: DatasetRecord, lines: Sequence[EpisodeLine]) -> Iterato
 
 
 def _misfits(folder: Path, layout: str, lines: Sequence[EpisodeLine]) -> Iterator[str]:
-    """What is wrong in the files of the format."""
     try:
         yield from FORMATS[layout].misfits(folder, lines)
     except (OSError, ValueError, LookupError, TypeError, EpisodeError) as error:

@@ -1,13 +1,12 @@
 """Plans of the expert that are not the task's own: mistakes, and beginnings in the middle.
 
-Plans are data, so a mistake is another plan. Most are a wrong belief about the scene (the target is
-its neighbour, two steps are swapped, the cue is forgotten); the rest cut the plan short, repeat a
-part of it, or replace a skill by one that goes wrong. The failure analysis is measured on them
-(`robospa serve mistakes`), and data sets may hold them for those who learn to see failures.
+Plans are data, so a mistake is another plan: mostly a wrong belief about the scene, else one that
+is cut short, repeats a part, or has a skill that goes wrong. The failure analysis is measured on
+them.
 
 For an episode that begins in the middle the expert does the first steps of its plan, then the arms
-that are free go anywhere, or the next object is dropped a little beside where it was, as after a
-grasp that failed; then the episode begins, and the expert does the rest.
+that are free go anywhere, or the next object is dropped a little beside where it was; then the
+episode begins, and the expert does the rest.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ import numpy as np
 
 from robospa.action_space import ARMS
 from robospa.geometry import Array, Pose, Vec3, axis_rotation, look_rotation, rotate
-from robospa.harness.demonstrations.clearance import depths, gaps
+from robospa.harness.demonstrations.noise import depths, gaps
 from robospa.harness.skills import Expert, SkillFailed
 from robospa.harness.skills.bring_in import put_down, translated
 from robospa.harness.skills.motion import route, travel
@@ -314,9 +313,8 @@ def marked(scene: Scene, plan: Sequence[Call]) -> tuple[Call, ...]:
     while same < min(len(plan), len(right)) and plan[same] == right[same]:
         same += 1
     taken = plan[same - 1] if same else None
-    if isinstance(taken, Pick) and same < len(
-        plan
-    ):  # what is picked and where it goes are one step
+    # what is picked and where it goes are one step
+    if isinstance(taken, Pick) and same < len(plan):
         same -= getattr(plan[same], "object", "") == taken.object
     return (*plan[:same], GoWrong(), *plan[same:])
 
@@ -433,7 +431,6 @@ def _free_place(ws: Workspace, arm: int, rng: np.random.Generator) -> Array | No
 
 
 def _pose(ws: Workspace, arm: int, rng: np.random.Generator) -> Pose:
-    """A random end-effector pose that looks down on the table."""
     x, y = (-1, 1)[arm] * rng.uniform(*REACH_X), rng.uniform(*REACH_Y)
     z = ws.scene.table_top + rng.uniform(*REACH_Z)
     turn, tilt = rng.uniform(0.0, math.pi), rng.uniform(-TILT, TILT)

@@ -5,13 +5,9 @@
     mistake:NAME  a plan that fails on purpose (`changed_plans.KINDS`)
     midstate      one that begins in the middle of the task (`changed_plans`)
 
-An episode follows from its key and its kind. What a demonstration has commanded is what is
-replayed; the action that a learner is shown differs from it where noise was added.
-
-An evaluation ends a trial at the poll that finds the goal met: an object held 5.97 cm high where
-6.00 count as reached at the end of the lift. A recording that stopped there would lack the command
-that leads to it, so a demonstration runs on: to the plan's last motion, and then it rests. It moves
-as fast as the official expert does (`DEMONSTRATION_LIMITS`), faster than a policy's actions.
+An episode follows from its key and its kind. A demonstration goes on where an evaluation ends, at
+the poll that finds the goal met: else the command that leads there would be lacking. It moves as
+fast as the official expert does (`DEMONSTRATION_LIMITS`).
 """
 
 from __future__ import annotations

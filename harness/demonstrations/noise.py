@@ -2,30 +2,31 @@
 
 As in DART (Laskey et al. 2017) what is executed is disturbed, and what is recorded as the action is
 what the expert would do in the state that the robot is in. Only motions with clearance around them
-are disturbed, with nothing or a held object in the hand; what is grasped, put down or pressed is
-never. The pushes come from a generator of the trial's own, so an episode follows from its key.
+are disturbed. The pushes come from a generator of the trial's own.
 
 A motion goes along a straight joint line, and `progress` is how much of it is done. A push moves
-the beginning of that line, as it were, by a `shift` that grows smoothly from nothing while the push
-lasts and stays as it is from then on; what the arm is off its plan is what of it the rest of the
-line has, `(1 - progress) * shift`. So once the push is over the arm moves straight from where
-it is to the motion's goal, in the time that is left: that is how the expert itself would go on.
+the beginning of that line by a `shift` that grows smoothly while the push lasts and stays from then
+on, so the arm is off its plan by `(1 - progress) * shift`: once the push is over it moves straight
+from where it is to the motion's goal, in the time that is left.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robospa.action_space import ARMS, ActionSpace
-from robospa.harness.demonstrations.clearance import depths, gaps
+from robospa.geometry import Pose, from_transform
 from robospa.harness.robots.kinematics import Chain, forward
 from robospa.harness.sim.motion import RATE, Trajectory
+from robospa.harness.skills.clearance import Boxes, arm_points, finger_points, palm_points, standing
 from robospa.harness.skills.workspace import Workspace
 from robospa.harness.world import World
+from robospa.workcell import WORKCELL
 
 Array = NDArray[np.float64]
 
@@ -173,7 +174,6 @@ class Noise:
         return replace(path, joints=joints, velocities=velocities) if pushes else path
 
     def _pushes(self, path: Trajectory) -> dict[int, Push]:
-        """A push for every arm that moves with clearance, by arm."""
         self._look()
         found: dict[int, Push] = {}
         for arm in range(len(ARMS)):
@@ -189,7 +189,6 @@ class Noise:
         return found
 
     def _look(self) -> None:
-        """Take over the state at this instant."""
         seen, snapshot = self._seen, self._world.snapshot()
         seen.update_state(snapshot)
         seen.held = list(self._expert.held)
@@ -212,20 +211,16 @@ class Noise:
         progress = (line[:, fastest] - line[0, fastest]) / turn[fastest]
         full = push(progress, 10.0 * direction, begin, begin + lasts)  # as strong as may be
         rows = _places(line)
-        peak = self._distance(arm, line[rows], full.offset[rows])
+        chain = self._seen.chains[arm]
+        off, turned = deviation(
+            chain, self._seen.hand(arm).tip, line[rows], line[rows] + full.offset[rows]
+        )
+        peak = max(off, turned * LEVER)
         if min(size, peak) < LEAST:
             return None
         made = full.scaled(min(1.0, size / peak))
-        chain = self._seen.chains[arm]
         inside = (line + made.offset >= chain.lower) & (line + made.offset <= chain.upper)
         return made if bool(inside.all()) else None
-
-    def _distance(self, arm: int, line: Array, offset: Array) -> float:
-        """The farthest [m] that `offset` (N, J) brings the fingertips off `line` (N, J); turns
-        count as well."""
-        chain, tip = self._seen.chains[arm], self._seen.hand(arm).tip
-        off, turned = deviation(chain, tip, line, line + offset)
-        return max(off, turned * LEVER)
 
     def _is_clear(self, path: Trajectory, pushes: dict[int, Push], arm: int) -> bool:
         """True if the arm is nowhere nearer to anything than as planned, but for margins."""
@@ -255,3 +250,63 @@ def deviation(chain: Chain, tip: float, line: Array, moved: Array) -> tuple[floa
 def _places(line: Array) -> NDArray[np.intp]:
     """Indices of the rows (n, J) at which a way is looked at, both ends left out."""
     return np.linspace(0, len(line) - 1, PLACES + 2).round().astype(np.intp)[1:-1]
+
+
+# ---------------------------------------------------------------- clearance
+
+MARGIN = 0.01
+"""How much larger than they are [m] objects count, besides what the expert's own clearance adds."""
+ABOVE_TABLE = 0.015
+"""Clearance [m] between the table and what moves."""
+
+
+def _points(ws: Workspace, arm: int, joints: Array) -> Array:
+    """Points (N, M, 3) [m, world] on arm, fingers and palm, and on the box around what the arm
+    holds, at joints (N, J)."""
+    frames, _ = forward(ws.chains[arm], joints)
+    side, hand = ws.robot.arms[arm], ws.hand(arm)
+    closed, opened = side.travel
+    opening = 2 * (closed + ws.gripper[arm] * (opened - closed))
+    load = _load_points(ws, arm)
+    rows = []
+    for frame in frames:
+        pose = from_transform(frame)
+        parts = [finger_points(hand, pose, opening), palm_points(hand, pose)]
+        rows.append(np.concatenate([*parts, load @ frame[:3, :3].T + frame[:3, 3]]))
+    return np.concatenate([arm_points(ws, arm, joints), np.stack(rows)], axis=1)
+
+
+def _load_points(ws: Workspace, arm: int) -> Array:
+    """Corners and middles (M, 3) [m] of that box in the arm's end-effector frame."""
+    name = ws.held[arm]
+    if name is None:
+        return np.empty((0, 3))
+    model = ws.models[name]
+    middle = Pose((0.0, 0.0, model.bottom + model.size[2] / 2))
+    at = ws.snapshot.end_effector[arm].inverse() * ws.pose(name) * middle
+    shares = product((-0.5, 0.0, 0.5), repeat=3)
+    return np.array([at.apply(np.array(share) * model.size) for share in shares])
+
+
+def depths(ws: Workspace, arm: int, joints: Array) -> Array:
+    """How deep (N,) [m] the arm at joints (N, J), with hand and load, is in the margin around the
+    table and all objects but its load."""
+    points = _points(ws, arm, joints)
+    half_x, half_y = WORKCELL.table.size[0] / 2, WORKCELL.table.size[1] / 2
+    over = (np.abs(points[..., 0]) < half_x) & (np.abs(points[..., 1]) < half_y)
+    below = np.where(over, ws.scene.table_top + ABOVE_TABLE - points[..., 2], 0.0)
+    held = ws.held[arm]
+    boxes: Boxes = standing(ws, *([] if held is None else [held]))
+    around = replace(boxes, half=boxes.half + MARGIN).depths(points)
+    found: Array = np.maximum(below.max(axis=1, initial=0.0), around)
+    return found
+
+
+def gaps(ws: Workspace, left: Array, right: Array) -> Array:
+    """Distance (N,) [m] of the nearest two points on the arms at joints (N, J) of left and right.
+
+    Points lie up to 5 cm apart on an arm.
+    """
+    sides = [_points(ws, a, joints) for a, joints in enumerate((left, right))]
+    between = [np.linalg.norm(a[:, None] - b, axis=2).min() for a, b in zip(*sides, strict=True)]
+    return np.array(between)

@@ -1,18 +1,13 @@
 """Which instants of a trial become frames of its recording.
 
 Officially a frame is kept at the start of every motion, every so many physics steps after that,
-and at the motion's end. So here; a motion is an action. As its end is kept, a replay that goes from
-frame to frame passes through every corner of the recorded way, and closes the gripper where it was
-closed.
+and at the motion's end. So here; a motion is an action. So a replay from frame to frame passes
+through every corner of the recorded way, and closes the gripper where it was closed.
 
-A frame is an action of whoever learns from it, so frames have to fit the task's step limit, with
-slack for a learner that is slower: a task whose demonstrations would take more than three quarters
-of its limit at some level has a longer stride. None is longer than the 50 steps that an action
-takes in which nothing moves, so a replay never waits less than the expert did
-(`benchmarks/demonstrations.py`).
-
-Drawing is nearly all that a recording costs, so nothing is drawn while it is made: a frame keeps a
-still of a few kilobytes, and who wants the recording has the pictures drawn afterwards.
+A frame is an action of whoever learns from it, so frames have to fit three quarters of the task's
+step limit; none is longer than the 50 steps that an action takes in which nothing moves
+(`benchmarks/demonstrations.py`). Nothing is drawn while a recording is made: a frame keeps a still
+of a few kilobytes, to be drawn afterwards.
 """
 
 from __future__ import annotations

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
 from dataclasses import replace
-from fractions import Fraction
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 from dataset_fakes import fake_episode
@@ -16,13 +15,13 @@ from robospa.harness.datasets.episode import (
     DatasetEpisode,
     EpisodeFilm,
     Pictures,
-    Stills,
     episode_bytes,
 )
 from robospa.harness.datasets.manifest import DatasetManifest, SeedFailure
 from robospa.harness.datasets.pack import pack
-from robospa.harness.datasets.pictures import FPS
+from robospa.harness.datasets.pictures import ENCODERS, encode
 from robospa.harness.running.atomic_file import replace_file
+from robospa.observation import CameraSpec
 from robospa.trial import TrialKey
 
 CAMERAS = ("head", "left_wrist", "right_wrist")
@@ -44,35 +43,18 @@ def painted(seed: int, frames: int) -> NDArray[np.uint8]:
     return (coarse[None] + steps).astype(np.uint8)
 
 
-def film_of(pictures: NDArray[np.uint8], codec: str = "h264") -> bytes:
-    """An MP4 file of `pictures`, frame t at t / FPS seconds."""
-    import av
-
-    encoder, options = OPTIONS[codec]
-    stream = io.BytesIO()
-    with av.open(stream, "w", format="mp4") as file:
-        out = file.add_stream(encoder, rate=FPS)
-        out.height, out.width = pictures.shape[1:3]
-        out.pix_fmt, out.options = "yuv420p", options
-        out.codec_context.thread_count = 1
-        for t, picture in enumerate(pictures):
-            frame = av.VideoFrame.from_ndarray(picture, format="rgb24")
-            frame.pts, frame.time_base = t, Fraction(1, FPS)
-            file.mux(out.encode(frame))
-        file.mux(out.encode())
-    return stream.getvalue()
+def seen_as(codec: str, *cameras: NDArray[np.uint8]) -> dict[str, Pictures]:
+    """What each of CAMERAS saw, (T, height, width, 3), so encoded that frames can be told apart."""
+    specs = [CameraSpec(n, *of.shape[2:0:-1]) for n, of in zip(CAMERAS, cameras, strict=False)]
+    with patch.dict(ENCODERS, OPTIONS):
+        return encode(zip(*cameras, strict=True), specs, codec)
 
 
-def stills_of(pictures: NDArray[np.uint8], codec: str) -> tuple[bytes, ...]:
-    """Every picture as a PNG or JPEG file."""
-    from PIL import Image
-
-    files = []
-    for picture in pictures:
-        stream = io.BytesIO()
-        Image.fromarray(picture).save(stream, codec.upper())
-        files.append(stream.getvalue())
-    return tuple(files)
+def film_of(pictures: NDArray[np.uint8]) -> bytes:
+    """An MP4 file of `pictures`."""
+    film = seen_as("h264", pictures)["head"]
+    assert isinstance(film, EpisodeFilm)
+    return film.data
 
 
 def tiny_episode(number: int, codec: str = "h264", frames: int | None = None) -> DatasetEpisode:
@@ -80,25 +62,14 @@ def tiny_episode(number: int, codec: str = "h264", frames: int | None = None) ->
     frames if not told."""
     frames = frames or 6 + number % 5
     key = TrialKey(TASKS[number % 2], 1 + number % 5, 1_000_000 + number, split="train")
-    pictures: dict[str, Pictures] = {}
-    for i, camera in enumerate(CAMERAS):
-        seen = painted(10 * number + i, frames)
-        if codec in OPTIONS:
-            pictures[camera] = EpisodeFilm(codec, *SIZE, film_of(seen, codec))
-        else:
-            pictures[camera] = Stills(codec, *SIZE, stills_of(seen, codec))
+    pictures = seen_as(codec, *(painted(10 * number + i, frames) for i in range(len(CAMERAS))))
     made = fake_episode(key, frames)
-    subtask = np.minimum(np.arange(frames) // 3 - 1, 1).astype(np.int32)
-    sentences = (f"pick block {number % 3}", f"take block {number % 3}", "grasp it")
-    texts = ("reach", f"grasp {number % 2}")
     return replace(
         made,
-        instructions=sentences,
-        subtasks=texts,
-        subtask=subtask,
-        failure="",
+        instructions=(f"pick block {number % 3}", f"take block {number % 3}", "grasp it"),
+        subtasks=("reach", f"grasp {number % 2}"),
+        subtask=np.minimum(np.arange(frames) // 3 - 1, 1).astype(np.int32),
         pictures=pictures,
-        about={"suite": "robospa-2", "version": "0.1"},
     )
 
 

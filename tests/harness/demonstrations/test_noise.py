@@ -10,7 +10,6 @@ from robot_at_home import at_home
 
 from robospa.action_space import ActionSpace
 from robospa.geometry import Pose
-from robospa.harness.demonstrations.clearance import depths, gaps
 from robospa.harness.demonstrations.noise import (
     ACCELERATION,
     EXPERT,
@@ -20,7 +19,9 @@ from robospa.harness.demonstrations.noise import (
     TURN,
     Noise,
     PushLog,
+    depths,
     deviation,
+    gaps,
     push,
     smooth_step,
 )
