@@ -2,7 +2,7 @@
 bodies look like.
 
 Pure data: it comes from a world (`robospa.harness.viewer.show`) and is shown by a browser
-(`robospa.harness.viewer.server`), and knows neither. Shapes are those of the simulator's pictures,
+(`robospa.harness.viewer.show`), and knows neither. Shapes are those of the simulator's pictures,
 without its lights and textures; robots are drawn with the shapes that are built in.
 """
 

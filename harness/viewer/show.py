@@ -1,15 +1,22 @@
-"""What `robospa view RUN TRIAL` and `robospa tasks NAME --view` show, and how long.
+"""What `robospa view RUN TRIAL` and `robospa tasks NAME --view` show, and where: in the browser.
 
-Nothing is drawn here: the world runs without its renderer, and the poses of its bodies are kept.
+Nothing is drawn here: the world runs without its renderer, and the poses of its bodies are kept. A
+playback then stands in a scene in the browser that can be turned, on this machine only: viser
+serves page and scene, what is shown at which time is `Playback.shown`, and the page loads nothing
+from elsewhere.
 """
 
 from __future__ import annotations
 
+import io
+import socket
+import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, redirect_stdout
 from functools import partial
 from pathlib import Path
-from typing import Protocol, cast
+from typing import TYPE_CHECKING, Any, Protocol, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +25,13 @@ from robospa.extras import need
 from robospa.geometry import Pose
 from robospa.harness.replay import replay_record
 from robospa.harness.trial import TrialSetup, run_trial, task_parts
-from robospa.harness.viewer.playback import DrawnBody, Playback, drawn_bodies, playback_of
+from robospa.harness.viewer.playback import (
+    DrawnBody,
+    DrawnMesh,
+    Playback,
+    drawn_bodies,
+    playback_of,
+)
 from robospa.harness.world import StepResult, World
 from robospa.protocol.policy import Policy
 from robospa.results.records.manifest import RunError
@@ -26,6 +39,9 @@ from robospa.results.records.runs import Run, finished, read_run
 from robospa.results.records.trial_record import TrialRecord
 from robospa.tasks.descriptions import describe_objects
 from robospa.trial import TrialKey
+
+if TYPE_CHECKING:
+    import viser
 
 EVERY = 0.1
 """Simulated seconds between two frames."""
@@ -164,8 +180,6 @@ def of_expert(key: TrialKey) -> tuple[Playback, list[DrawnBody]]:
 
 def show(playback: Playback, bodies: Sequence[DrawnBody], port: int, minutes: float) -> None:
     """Serve `playback` until Ctrl-C, or for so many minutes if they are not 0."""
-    from robospa.harness.viewer.server import play, serving
-
     until = time.monotonic() + 60 * minutes if minutes > 0 else float("inf")
     with serving(playback, bodies, port) as (address, advance):
         print(f"{playback.title} is at {address} (Ctrl-C stops it)", flush=True)
@@ -177,6 +191,221 @@ def show(playback: Playback, bodies: Sequence[DrawnBody], port: int, minutes: fl
 
 def write_html(playback: Playback, bodies: Sequence[DrawnBody], path: Path) -> None:
     """Write `playback` as one HTML page; OSError if it cannot be written."""
-    from robospa.harness.viewer.server import as_html
-
     path.write_text(as_html(playback, bodies), encoding="utf-8")
+
+
+HOST = "127.0.0.1"
+RATE = 20
+"""Pictures a second while it plays."""
+EXPORT_RATE = 10
+"""Frames a simulated second of a page for itself: as many as a playback has."""
+SPEEDS = ("0.25", "0.5", "1", "2", "4")
+EYE, AT = (0.3, -1.0, 1.65), (0.0, -0.05, 0.74)
+"""Where the view begins and what it looks at [m, world]: from above the robot to the table."""
+WANTED = (40, 190, 90)
+"""sRGB of the box around an object that is still to be moved or pressed."""
+PLAIN, FAILED = "gray", "red"
+"""Of the buttons of events and of the failure."""
+MARGIN = 0.015
+"""So much wider than the object is that box [m]."""
+
+
+class Scene3D:
+    """The bodies of a playback in viser's scene; `show` moves them to a time."""
+
+    def __init__(self, scene: Any, playback: Playback, bodies: Sequence[DrawnBody]) -> None:
+        self._playback = playback
+        self._nodes: dict[str, Any] = {}
+        self._boxes: dict[str, Any] = {}
+        self._labels: dict[str, Any] = {}
+        scene.set_up_direction("+z")
+        scene.configure_default_lights(cast_shadow=False)
+        for number, body in enumerate(bodies):
+            self._add(scene, f"/{number}", body)
+
+    def _add(self, scene: Any, path: str, body: DrawnBody) -> None:
+        node = scene.add_frame(path, show_axes=False)
+        for index, mesh in enumerate(body.meshes):
+            self._mesh(scene, f"{path}/{index}", mesh)
+        if body.pose is not None:
+            _place(node, body.pose)
+        else:
+            self._nodes[body.name] = node
+        name = self._playback.names.get(body.name)
+        if name is None:
+            return
+        centre, size = body.box
+        top = (float(centre[0]), float(centre[1]), float(centre[2] + size[2] / 2 + 0.03))
+        self._labels[body.name] = scene.add_label(
+            f"{path}/name", name, position=top, anchor="bottom-center", font_screen_scale=0.8
+        )
+        if body.name in self._playback.subtasks:
+            self._boxes[body.name] = scene.add_box(
+                f"{path}/wanted",
+                WANTED,
+                tuple(float(s) + 2 * MARGIN for s in size),
+                opacity=0.4,
+                position=tuple(map(float, centre)),
+                cast_shadow=False,
+            )
+
+    @staticmethod
+    def _mesh(scene: Any, path: str, mesh: DrawnMesh) -> None:
+        if mesh.colors.ndim == 1:
+            color = tuple(map(int, mesh.colors))
+            scene.add_mesh_simple(path, mesh.vertices, mesh.faces, color=color)
+            return
+        made = need("trimesh").Trimesh(
+            mesh.vertices, mesh.faces, vertex_colors=mesh.colors, process=False
+        )
+        scene.add_mesh_trimesh(path, made)
+
+    def show(self, time: float) -> int:
+        """Put everything where it is at `time` [s]; how many moments have passed by then."""
+        shown = self._playback.shown(time)
+        for name, node in self._nodes.items():
+            pose = shown.poses.get(name)
+            node.visible = pose is not None
+            if pose is not None:
+                _place(node, pose)
+        for name, box in self._boxes.items():
+            box.visible = name in shown.wanted
+        return shown.happened
+
+    def name_objects(self, wanted: bool) -> None:
+        """Show the objects' names, or not."""
+        for label in self._labels.values():
+            label.visible = wanted
+
+
+def _place(node: Any, pose: Pose) -> None:
+    node.position = pose.position
+    node.wxyz = pose.rotation
+
+
+class Panel:
+    """What stands beside the scene: the sentence, the time, and what happened."""
+
+    def __init__(self, server: viser.ViserServer, scene: Scene3D, playback: Playback) -> None:
+        self._server, self._scene, self._playback = server, scene, playback
+        self._lock = threading.Lock()
+        gui = server.gui
+        gui.add_markdown(
+            f"**{_plain(playback.title)}**\n\n{_plain(playback.instruction)}\n\n"
+            f"{_plain(playback.outcome)}"
+            + f"\n\n{_plain(playback.failure)}"
+            * bool(playback.failure)
+        )
+        step = 1 / RATE
+        self._time = gui.add_slider(
+            "time [s]", min=0.0, max=max(playback.end, step), step=step, initial_value=0.0
+        )
+        self._play = gui.add_checkbox("play", initial_value=True)
+        self._speed = gui.add_dropdown("speed", SPEEDS, initial_value="1")
+        names = gui.add_checkbox("names", initial_value=True)
+        self._now = gui.add_markdown("")
+        self._time.on_update(lambda _: self._show())
+        names.on_update(lambda _: scene.name_objects(names.value))
+        with gui.add_folder("events"):
+            for moment in playback.moments:
+                color = FAILED if moment.failure else PLAIN
+                button = gui.add_button(f"{moment.time:.1f} s  {moment.text}", color=color)
+                button.on_click(self._jump(moment.time))
+        self._show()
+
+    def _jump(self, when: float) -> Callable[[object], None]:
+        def go(_: object) -> None:
+            self._play.value = False
+            self._time.value = min(when, self._playback.end)
+
+        return go
+
+    def _show(self) -> None:
+        with self._lock, self._server.atomic():
+            happened = self._scene.show(self._time.value)
+            last = self._playback.moments[happened - 1].text if happened else "the trial begins"
+            self._now.content = f"**last:** {_plain(last)}"
+
+    def advance(self, seconds: float) -> None:
+        """Play on by `seconds` of real time; at its end it begins again."""
+        if self._play.value:
+            later = self._time.value + seconds * float(self._speed.value)
+            self._time.value = later if later < self._playback.end + 1.0 else 0.0
+
+
+def _plain(text: str) -> str:
+    """`text` as Markdown that shows its very characters."""
+    return "".join(f"\\{c}" if c in "\\`*_{}[]<>()#+-.!|~" else c for c in text)
+
+
+@contextmanager
+def serving(
+    playback: Playback, bodies: Sequence[DrawnBody], port: int = 0
+) -> Iterator[tuple[str, Callable[[float], None]]]:
+    """Serve `playback` on this machine: its address, and a function that plays on by some seconds.
+
+    Raises MissingPackage without viser, of the extra `view`, and OSError for a port that is taken.
+    """
+    made = need("viser")
+    _check_port(port)
+    with _silent():
+        server = made.ViserServer(host=HOST, port=port, label="robospa", verbose=False)
+    try:
+        server.gui.configure_theme(
+            control_layout="fixed",
+            control_width="large",
+            show_logo=False,
+            show_share_button=False,
+        )
+        server.initial_camera.position = EYE
+        server.initial_camera.look_at = AT
+        scene = Scene3D(server.scene, playback, bodies)
+        panel = Panel(server, scene, playback)
+        yield f"http://{HOST}:{server.get_port()}", panel.advance
+    finally:
+        with _silent():
+            server.stop()
+
+
+def _silent() -> redirect_stdout[io.StringIO]:
+    """For when viser starts and stops, which it prints."""
+    return redirect_stdout(io.StringIO())
+
+
+def _check_port(port: int) -> None:
+    """viser takes the next free port in place of one that is taken."""
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        probe.bind((HOST, port))
+
+
+def play(advance: Callable[[float], None], until: float) -> None:
+    """Play until the monotonic clock says `until` [s]."""
+    before = time.monotonic()
+    while (now := time.monotonic()) < until:
+        advance(now - before)
+        before = now
+        time.sleep(min(1 / RATE, max(0.0, until - now)))
+
+
+def as_html(playback: Playback, bodies: Sequence[DrawnBody]) -> str:
+    """`playback` as one HTML page that needs no server: the scene, which plays and can be turned.
+
+    Raises MissingPackage without viser.
+    """
+    made = need("viser")
+    with _silent():
+        server = made.ViserServer(host=HOST, port=0, verbose=False)
+    try:
+        server.initial_camera.position = EYE
+        server.initial_camera.look_at = AT
+        scene = Scene3D(server.scene, playback, bodies)
+        scene.show(0.0)
+        recording = server.get_scene_serializer()
+        for frame in range(1, int(playback.end * EXPORT_RATE) + 2):
+            recording.insert_sleep(1 / EXPORT_RATE)
+            scene.show(frame / EXPORT_RATE)
+        return str(recording.as_html())
+    finally:
+        with _silent():
+            server.stop()

@@ -79,40 +79,6 @@ def test_a_session_that_is_due_soon_is_waited_for(window: AdaptiveBatchWindow) -
     assert wait(window) == pytest.approx(0.1 + SLACK)
 
 
-def test_nobody_else_nothing_to_wait_for() -> None:
-    window = AdaptiveBatchWindow()
-    window.answered([1], 9.0, 10.0)
-    assert wait(window) == 0
-
-
-def test_who_is_late_is_not_waited_for(window: AdaptiveBatchWindow) -> None:
-    assert wait(window, 10.2) == 0
-
-
-def test_a_session_in_a_long_simulation_is_not_waited_for(window: AdaptiveBatchWindow) -> None:
-    window.forget(2)
-    used(window, 3, 5.0)
-    assert wait(window) == 0
-
-
-def test_a_wait_that_costs_more_than_it_brings_is_not_made(window: AdaptiveBatchWindow) -> None:
-    window.forget(2)
-    used(window, 4, 0.4)
-    assert 4 / (1 + 0.4) < 3 / 1
-    assert wait(window, 10.0, 1, 2, 3) == 0
-
-
-def test_a_resting_session_is_forgotten(window: AdaptiveBatchWindow) -> None:
-    window.forget(2)
-    assert wait(window) == 0
-
-
-def test_without_a_measured_call_nobody_waits() -> None:
-    window = AdaptiveBatchWindow()
-    used(window, 2, 0.1)
-    assert wait(window) == 0
-
-
 def test_a_request_whose_first_bytes_have_come_is_waited_for(window: AdaptiveBatchWindow) -> None:
     window.forget(2)
     window.request_began(5, 1.0)
@@ -121,22 +87,52 @@ def test_a_request_whose_first_bytes_have_come_is_waited_for(window: AdaptiveBat
     assert 0 < wait(window, 10.001) < 0.01
 
 
-def test_who_sends_byte_by_byte_is_not_waited_for(window: AdaptiveBatchWindow) -> None:
+def long_simulation(window: AdaptiveBatchWindow) -> None:
+    window.forget(2)
+    used(window, 3, 5.0)
+
+
+def costs_more_than_it_brings(window: AdaptiveBatchWindow) -> None:
+    window.forget(2)
+    used(window, 4, 0.4)
+    assert 4 / (1 + 0.4) < 3 / 1
+
+
+def byte_by_byte(window: AdaptiveBatchWindow) -> None:
     window.forget(2)
     window.request_began(5, 1.0)
     window.arrived(5, 1.02)
     window.request_began(6, 9.0)
-    assert wait(window) == 0
 
 
-def test_a_model_that_gains_nothing_from_batches_is_not_waited_for(
-    window: AdaptiveBatchWindow,
-) -> None:
+def no_gain_from_batches(window: AdaptiveBatchWindow) -> None:
     window.cost = CallCost()
     for size in (1, 4, 2, 8):
         window.cost.add(size, 0.25 * size)
     assert window.cost(4) == pytest.approx(1.0)
-    assert wait(window) == 0
+
+
+def no_call_measured(window: AdaptiveBatchWindow) -> None:
+    window.cost = CallCost()
+
+
+@pytest.mark.parametrize(
+    ("state", "now", "waiting"),
+    [
+        (lambda window: window.forget(2), 10.0, (1,)),  # it rests, and there is nobody else
+        (lambda window: None, 10.2, (1,)),  # it is late
+        (long_simulation, 10.0, (1,)),
+        (costs_more_than_it_brings, 10.0, (1, 2, 3)),
+        (byte_by_byte, 10.0, (1,)),
+        (no_gain_from_batches, 10.0, (1,)),
+        (no_call_measured, 10.0, (1,)),
+    ],
+)
+def test_when_nobody_is_waited_for(
+    window: AdaptiveBatchWindow, state: Any, now: float, waiting: tuple[int, ...]
+) -> None:
+    state(window)
+    assert wait(window, now, *waiting) == 0
 
 
 # ---------------------------------------------------------------- calls that go wrong

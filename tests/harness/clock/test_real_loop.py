@@ -30,9 +30,13 @@ def real(latency: str, switching: str = "wait", **more: Any) -> PolicyClock:
 
 
 def play(
-    policy: FakePolicy, clock: PolicyClock | None, key: TrialKey = KEY, seed: int = 7
+    policy: FakePolicy,
+    clock: PolicyClock | None,
+    key: TrialKey = KEY,
+    seed: int = 7,
+    **more: Any,
 ) -> TrialRecord:
-    return run_trial(TargetWorld(), policy, key, policy_seed=seed, parts=parts, clock=clock)
+    return run_trial(TargetWorld(), policy, key, policy_seed=seed, parts=parts, clock=clock, **more)
 
 
 def without_times(record: TrialRecord) -> TrialRecord:
@@ -125,31 +129,14 @@ def test_another_policy_waits_equally_long() -> None:
 
 def test_the_recorded_actions_give_the_trial_again_without_a_clock() -> None:
     recorder = ActionRecorder()
-    record = run_trial(
-        TargetWorld(),
-        Walker(),
-        KEY,
-        policy_seed=7,
-        parts=parts,
-        recorder=recorder,
-        clock=real("120ms"),
-    )
+    record = play(Walker(), real("120ms"), recorder=recorder)
     again = replay(TargetWorld(), KEY, recorder.actions, "joint", policy_seed=7, parts=parts)
     assert (again.digest, again.actions_digest) == (record.digest, record.actions_digest)
 
 
 def test_a_trial_longer_than_its_step_limit_is_played_again_whole(tmp_path: Path) -> None:
     key, recorder = TrialKey("Pick_Fake", 2, 100009), ActionRecorder()
-    clock = real("60ms", seconds=60.0)
-    record = run_trial(
-        TargetWorld(),
-        Walker(length=1),
-        key,
-        policy_seed=7,
-        parts=parts,
-        recorder=recorder,
-        clock=clock,
-    )
+    record = play(Walker(length=1), real("60ms", seconds=60.0), key, recorder=recorder)
     assert record.success and record.steps == 2 * LIMIT
     action_path(tmp_path, key).parent.mkdir()
     write_actions(tmp_path, key, recorder.actions, "joint")

@@ -32,8 +32,15 @@ from robospa.harness.viewer.playback import (
     playback_of,
     srgb,
 )
-from robospa.harness.viewer.server import Scene3D, as_html, play, serving
-from robospa.harness.viewer.show import PoseRecorder, recorded_playback, trial_named
+from robospa.harness.viewer.show import (
+    PoseRecorder,
+    Scene3D,
+    as_html,
+    play,
+    recorded_playback,
+    serving,
+    trial_named,
+)
 from robospa.results.records.manifest import RunAbout, RunError, RunSettings, make_manifest
 from robospa.results.records.trial_record import TrialRecord
 from robospa.tasks.catalog import build_scene
