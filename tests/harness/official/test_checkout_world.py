@@ -247,6 +247,7 @@ def test_a_run_in_a_checkout_has_its_world_splits_and_episodes(checkout: Path) -
         ({"video": "all"}, "leave video out"),
         ({"instructions": "x"}, "leave instructions out"),
         ({"control": "fixed_rate"}, "leave control out"),
+        ({"clock": "real:200ms", "action_rate": 25.0}, "leave action_rate and clock out"),
         ({"mode": "randomized:light"}, "scene modes clean and randomized"),
         ({"world": "checkout:"}, "lacks the folder"),
         ({"world": "checkout:x?gpu=1"}, "there is no option 'gpu'"),

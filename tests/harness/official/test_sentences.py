@@ -142,6 +142,10 @@ def test_what_is_missing_or_has_no_end_is_named(tmp_path: Path) -> None:
     path.symlink_to("/dev/zero")
     with pytest.raises(CheckoutError, match=r"Size_2\.json cannot be read"):
         read_checkout(tmp_path, [SIZE])
+    model = tmp_path / "description/objects_description/048_stapler/base0.json"
+    model.write_text('{"seen": ["small"]}')
+    with pytest.raises(CheckoutError, match="describes no object"):
+        read_checkout(tmp_path, [])
 
 
 def test_the_overlap_counts_equal_and_alike_templates() -> None:

@@ -122,6 +122,7 @@ CASES = [
               backward_kind="fries"),
         {"A": "fries", "B": "backward", "a": "left"},
     ),
+    (scene("Hit_Blocks_Hammer_Order", 1, hammer=RIGHT), {"A": BELL, "a": "right"}),
     (
         scene("Click_Objects_Order", 2, order=["clock", "stapler"]),
         {"A": "<clock>", "B": "<stapler>", "a": "left", "b": "right"},

@@ -98,6 +98,9 @@ def test_the_wall_leaves_a_gap_and_the_stand_is_pale(mode: str) -> None:
     assert (made.table_rise == 0.0) is (mode == "clean")
     said = switched(made, 0, SWITCHES)
     wall = said.object(said.facts["wall"])
+    assert [o for o in said.objects if o != wall] == [
+        o for o in made.objects if o.name != wall.name
+    ]
     assert wall.pose.position[2] - wall.params["half"][2] == pytest.approx(made.table_top + 0.01)
     assert replace(said, objects=()) == replace(made, objects=())
     shown = switched(said, 0, SWITCHES, unsaid=True)
