@@ -122,6 +122,7 @@ def compare_results(
         v for v in {**first.listed, **second.listed} if category[v[0]] in categories_of(metric)
     }
     rows = [_variant_row(pair, method) for pair in pairs]
+    runs = not first.published and not second.published
     groups = _groups(pairs, listed, category, method)
     return RunComparison(
         first.name,
@@ -132,32 +133,21 @@ def compare_results(
         _corrected([g for g in groups if g.kind == "category"])
         + tuple(replace(g, q=g.p) for g in groups if g.kind != "category"),
         tuple(notes(first, second, [pair.variant for pair in pairs], listed, paired))
-        + _by_first_choice(first, second, metric, category, method)
+        + tuple(_by_first_choice(first, second, method) if runs and metric == "sr" else ())
         + (tuple(worst_and_best(first, second, metric)) if metric not in ("onta", "onta1") else ()),
         banner_of(first, second),
     )
 
 
-def _by_first_choice(
-    first: ModelResults,
-    second: ModelResults,
-    metric: str,
-    category: Mapping[str, str],
-    method: str,
-) -> tuple[str, ...]:
+def _by_first_choice(first: ModelResults, second: ModelResults, method: str) -> list[str]:
     """The whole difference of two runs in SR@1, as a note beside that in SR."""
-    if metric != "sr" or first.published or second.published:
-        return ()
-    pairs = [
-        c for c in paired_variants(first, second, "sr1")[0] if category[c.variant[0]] not in BASIC
+    found = compare_results(first, second, "sr1", method).groups[-1:]
+    return [
+        f"By the first choice: SR@1 {estimate_cell(row.estimate, '+z.1f').text} over all, "
+        f"p {chance(row.p)} (--metric sr1)."
+        for row in found
+        if row.label == "overall"
     ]
-    if not pairs:
-        return ()
-    row = _group_row("overall", "overall", 0, pairs, len(pairs), category, method)
-    e = row.estimate
-    ends = (100 * e.value, 100 * e.low, 100 * e.high)
-    text = interval_text(*ends, style="+z.1f")
-    return (f"By the first choice: SR@1 {text} over all, p {chance(row.p)} (--metric sr1).",)
 
 
 def over_levels(

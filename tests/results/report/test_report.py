@@ -12,7 +12,6 @@ import pytest
 from fake_runs import EVIL, KNOWN, RECORDS, make_run, shown
 
 from robospa.results.paper.published import load
-from robospa.results.records.manifest import RunError
 from robospa.results.records.runs import film_name, read_run
 from robospa.results.records.trial_record import EventRow
 from robospa.results.report import score_table as tables
@@ -230,11 +229,6 @@ def test_a_run_without_any_record_still_makes_a_report(tmp_path: Path) -> None:
     (run.folder / "trials" / "0000.jsonl").unlink()
     folder = write_report(make_report(read_run(run.folder)), tmp_path / "report")
     assert [t["end"] for t in trials_of(folder)] == ["not run", "not run"]
-
-
-def test_a_folder_that_is_no_run_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(RunError, match="is not a run"):
-        read_run(tmp_path)
 
 
 def test_the_terminal_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
