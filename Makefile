@@ -5,7 +5,7 @@ BIN := .venv/bin
 # A file's tests stay together: they share what is costly to make.
 SPREAD := -n auto --maxprocesses 4 --dist loadfile
 UV_COMPILE := $(BIN)/uv pip compile pyproject.toml --universal --fork-strategy fewest \
-	--python-version 3.11 --no-header -q
+	--python-version 3.11 --no-header --generate-hashes -q
 
 .PHONY: help demo learn-demo test test-models test-maniskill install install-dev lint types fast sim docs format lock clean
 

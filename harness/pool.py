@@ -204,7 +204,7 @@ def _serve(pipes: Sequence[Connection], argument: tuple[Callable[[Any], Any], An
     """All that the process of a pool does."""
     (pipe,), (make, given) = pipes, argument
     run = None
-    with suppress(EOFError, BrokenPipeError):
+    with suppress(EOFError, OSError):  # whoever gave the jobs is gone
         while True:
             job = pipe.recv()
             result, trouble = None, None

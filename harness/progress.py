@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Protocol, TextIO, TypeVar
 from robospa.harness.running.status import ServerStats, Status, server_text, shares_text
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.statistics.intervals import wilson
-from robospa.text import clock_text, percent_text, plain_console, recording_console
+from robospa.text import clock_text, counted, percent_text, plain_console, recording_console
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -184,7 +184,8 @@ class Progress(Bar):
         super().__enter__()
         self._detail = self._line - DETAILS + 2 * EVERY
         if self._screen is None:
-            self.note(f"{self.total - self.done} trials to run, {self.done} already done")
+            left = counted(self.total - self.done, "trial")
+            self.note(f"{left} to run, {self.done} already done")
         return self
 
     def add(self, record: TrialRecord) -> None:
@@ -305,7 +306,9 @@ def details(status: Status) -> list[str]:
     shares = shares_text(status.shares)
     lines = [f"{status.workers_text}; {shares}"] if shares else []
     used = [s for s in _busiest(status.servers) if s.trials or not s.up]
-    lines += [f"{s.target}: {s.trials} trials, {server_text(s, status.now)}" for s in used]
+    lines += [
+        f"{s.target}: {counted(s.trials, 'trial')}, {server_text(s, status.now)}" for s in used
+    ]
     return [*lines, status.bottleneck] if status.bottleneck else lines
 
 
@@ -313,7 +316,7 @@ def summary(shares: Mapping[str, float], status: Status) -> list[str]:
     """The same about a whole run, for its end."""
     lines = [f"time: {shares_text(shares)}, with {status.workers} workers on {status.cores} cores"]
     used = [s for s in _busiest(status.servers) if s.trials]
-    many = len(used) > 1
-    lines += [f"{s.target}: {f'{s.trials} trials, ' if many else ''}{server_text(s, status.now)}"
-              for s in used if s.means]  # fmt: skip
+    for one in used:
+        trials = f"{counted(one.trials, 'trial')}, " if len(used) > 1 else ""
+        lines += [f"{one.target}: {trials}{server_text(one, status.now)}"] if one.means else []
     return lines if shares else []

@@ -43,6 +43,8 @@ def parse_numbers(text: str, what: str) -> list[int]:
     for word in (w.strip() for w in text.split(",")):
         found = re.fullmatch(r"(\d+)(?:-(\d+))?", word)
         first, last = (int(found[1]), int(found[2] or found[1])) if found else (1, 0)
+        if last > MAX_INTEGER:
+            raise SettingsError(f"{word} in {what} is more than {MAX_INTEGER}")
         if last < first or last - first > 1_000_000:
             raise SettingsError(f"{word!r} in {what} is neither a number nor a range such as 3-5")
         numbers += range(first, last + 1)

@@ -209,8 +209,7 @@ class Recording:
 
     video: str = option(
         "none",
-        "which trials to film, beside the run and after it: none, failures, first (of each task), "
-        "all",
+        "which trials to film: none, failures, first (of each task), all",
         VIDEO,
     )
     video_cameras: str = option("head", f"what films show side by side, of {', '.join(CAMERAS)}")

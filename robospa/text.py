@@ -27,6 +27,11 @@ def percent_text(value: float, low: float, high: float, *, style: str = "z.1f") 
     return interval_text(100 * value, 100 * low, 100 * high, style=style)
 
 
+def counted(count: float, word: str) -> str:
+    """`1 trial`, `2 trials`."""
+    return f"{count:g} {word}" + "s" * (count != 1)
+
+
 def duration_text(seconds: float) -> str:
     """`3 h 05 min`, `12 min` or `40 s`, for sentences."""
     if seconds < 90:

@@ -73,7 +73,8 @@ make_environment() {
         pip_install "${torch[@]}" || fail "pip could not install ${torch[*]}: see its message above."
     fi
     say "installing the other packages of ${locks[*]}"
-    pip_install --no-deps -r <(cat "${locks[@]}" | grep -vE '^(torch|torchvision)==') ||
+    # Without the hashes that some of the files have: torch may come from another index.
+    pip_install --no-deps -r <(sed -E '/^(torch|torchvision)==/d; /^ +--hash=/d; s/ \\$//' "${locks[@]}") ||
         fail "pip could not install ${locks[*]}: see its message above."
     # Its entry points: learners, policies and robots are found by them.
     pip_install --no-deps --no-build-isolation -e . || fail "pip could not install robospa itself."

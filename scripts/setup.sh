@@ -4,7 +4,7 @@
 #   bash scripts/setup.sh [--dev] [--dry-run]
 #
 # 1. a Python >= 3.11 with venv         (apt, only if it is missing)
-# 2. .venv with the locked packages     (requirements.lock, with --dev requirements-dev.lock)
+# 2. .venv with the locked packages     (by hash: requirements.lock, with --dev requirements-dev.lock)
 # 3. robospa itself, editable
 # 4. a software Vulkan driver           (apt, only if SAPIEN finds no device that it can render with)
 #
@@ -19,7 +19,8 @@ venv=.venv
 lock=requirements.lock
 os_release=${ROBOSPA_OS_RELEASE:-/etc/os-release}
 apt_sources=/etc/apt/sources.list.d
-openpi_client="openpi-client==0.1.2" # asks for numpy 1 but runs with 2, hence installed without deps
+# Asks for numpy 1 but runs with 2, hence installed without what it depends on.
+openpi_client="openpi-client==0.1.2 --hash=sha256:2b4a64ab1f1e2d5a54ff1130314abca4f537f2568909ea0b8ec3dd4c7cd6b751 --hash=sha256:b8aa6d2ea7172d3b7c1fcf867d43930052b5ff19ea7b777966781105aa989897"
 oldest="(3, 11)"
 
 say() { printf 'setup: %s\n' "$*"; }
@@ -134,9 +135,10 @@ ensure_packages() {
     if [ "$kind" = requirements ] && # the development lock contains this one
         stamped requirements-dev "$(echo requirements-dev.lock | fingerprint)"; then return 0; fi
     say "installing the packages of $lock (a minute or two)"
-    pip_install -r "$lock" || fail "pip could not install $lock: see its message above."
+    pip_install --require-hashes -r "$lock" || fail "pip could not install $lock: see its message above."
     if [ "$kind" = requirements-dev ]; then
-        pip_install --no-deps "$openpi_client" || fail "pip could not install $openpi_client."
+        pip_install --no-deps --require-hashes -r <(echo "$openpi_client") ||
+            fail "pip could not install ${openpi_client%% *}."
     fi
     stamp "$kind" "$now"
 }

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from robospa.harness.cli.options import SHARE, AsJson, print_json
+from robospa.text import counted
 
 if TYPE_CHECKING:
     from robospa.results.comparison.compare import Difference, RunComparison
@@ -136,13 +137,13 @@ def _power(tasks: str, levels: str, base: float, as_json: bool) -> None:
             known = ", ".join(f"{100 * half:.1f} ({model})" for model, half in by_model.items())
             print(f"--trials {n} ({n * len(variants):,}) tells the overall rate to within {known}")
     for half, n in enough.items():
-        print(f"For {100 * half:g} points either way --trials {n} is enough")
+        print(f"For {counted(100 * half, 'point')} either way --trials {n} is enough")
     print(f"Trials a side to tell rates apart with probability {POWER:.0%}, first rate {base:.0%}")
     print("Equal seeds: by the correlation (phi) of both policies' outcomes on one seed.")
     for gap, needed in gaps.items():
         paired = ", ".join(f"{n} if phi is {phi:g}" for phi, n in needed.paired.items())
         print(
-            f"  {100 * gap:.0f} points: {needed.unpaired} on unrelated seeds; "
+            f"  {counted(round(100 * gap), 'point')}: {needed.unpaired} on unrelated seeds; "
             f"on equal seeds {paired or 'no such correlation is possible'}"
         )
     print("SR@1 takes what an SR of its value takes.")

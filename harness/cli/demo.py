@@ -51,10 +51,11 @@ def demo(
     ] = 75.0,
 ) -> None:
     """See a policy server evaluated: trials of each category, a table, a report with videos."""
+    from robospa.harness.running.request import new_folder
     from robospa.harness.selection import parse_levels, parse_tasks
 
     started = time.monotonic()
-    folder = out or Path("runs") / f"demo-{time.strftime('%Y%m%d-%H%M%S')}"
+    folder = out or new_folder("demo")
     names = parse_tasks(",".join(SAMPLE) if tasks == "sample" else tasks)
     page = _evaluate("oracle", _select(names, levels, trials), folder / "oracle", workers, video)
     # The tasks with the shortest trials: one pick each.

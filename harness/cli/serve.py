@@ -36,7 +36,7 @@ def serve(
         str,
         typer.Argument(
             help="learned, rdt, lerobot, go1, xvla, openpi, oracle, reactive, random, hold, "
-            "replay, or module:function"
+            "replay, mistakes, tries-all, presses-all, commonest, or module:function"
         ),
     ],
     checkpoint: Annotated[

@@ -157,7 +157,10 @@ def write_manifest(folder: Path, manifest: RunManifest) -> None:
 
 def check_folder(folder: Path, resume: bool) -> None:
     """Raises RunError if a run cannot be started in `folder`, or if there is none to resume."""
-    there = (folder / MANIFEST).exists()
+    try:
+        there = (folder / MANIFEST).exists()
+    except OSError as error:
+        raise RunError(f"{str(folder)[:80]}... cannot be a folder: {error.strerror}") from error
     if there and not resume:
         raise RunError(
             f"{folder} already holds a run; add --resume to go on with it or choose another --out"

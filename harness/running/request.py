@@ -108,7 +108,9 @@ def check_servers(settings: EvaluationSettings) -> tuple[str, ...]:
     """
     servers = settings.policy
     if bool(servers) == (settings.policy_map is not None):
-        raise SettingsError("give either the policy or --policy-map")
+        raise SettingsError(
+            "give the policy, a URL or a name, or else --policy-map FILE (see --help-all)"
+        )
     if twice := next((s for s in servers if servers.count(s) > 1), None):
         raise SettingsError(f"{twice} is named twice; several workers share a server without that")
     if len(servers) > 1 and (name := next((s for s in servers if not is_url(s)), None)):
@@ -124,9 +126,14 @@ def run_folder(settings: EvaluationSettings, resume: bool = False) -> Path:
         raise SettingsError("to resume a run, say with out which one")
     first = settings.policy[0] if settings.policy else (settings.policy_map or Path()).stem
     name = first.rpartition("/")[2] if is_url(first) else first
-    safe = "".join(c if c.isalnum() else "-" for c in name)
-    # Runs of one policy may start in the same second: the cells of a sweep, the jobs of an array.
-    return RUNS / f"{safe}-{time.strftime('%Y%m%d-%H%M%S')}-{secrets.token_hex(2)}"
+    safe = "".join(c if c.isalnum() else "-" for c in name)[:80]
+    return new_folder(safe)
+
+
+def new_folder(name: str) -> Path:
+    """A folder under RUNS that nobody has: runs of one policy may start in the same second, the
+    cells of a sweep, the jobs of an array."""
+    return RUNS / f"{name}-{time.strftime('%Y%m%d-%H%M%S')}-{secrets.token_hex(2)}"
 
 
 def connect_arguments(

@@ -118,10 +118,10 @@ class Status:
         if away := [s for s in self.servers if not s.up and not s.excluded]:
             others = "" if len(away) == len(self.servers) else "; the others get its workers"
             return f"{_some(len(away))} away{others}"
-        if busy >= FULL * self.cores:
+        if self.cores and busy >= FULL * self.cores:
             return f"the simulators are the bottleneck: they fill {_cores(self.cores)}"
         full = [s for s in used if s.saturated]
-        if used and len(full) == len(used):
+        if used and len(full) == len(used) and waiting >= NOTABLE:
             who = "the policy server is" if len(used) == 1 else "the policy servers are"
             return f"{who} the bottleneck: workers wait {100 * waiting:.0f} % of their time"
         share = f"{100 * waiting:.0f} %"
@@ -343,6 +343,8 @@ MEMORY = 0.75e9
 """Bytes that a worker may need: simulator, renderer and one batch of images."""
 FULL = 0.9
 """Share of the cores that counts as all of them."""
+NOTABLE = 0.1
+"""Share of its time that a worker has to wait before its server is what a run waits for."""
 
 
 def cores() -> int:

@@ -27,7 +27,7 @@ from robospa.results.scoring.scores import (
 )
 from robospa.results.statistics.intervals import Estimate
 from robospa.results.tables import MISSING, Table, TableCell, TableRow, html_fragment, show
-from robospa.text import interval_text, plain_console
+from robospa.text import counted, interval_text, plain_console
 from robospa.trial import BASIC, CATEGORIES, CATEGORY_NAMES, DIMENSIONS, REFERENCE
 
 
@@ -186,7 +186,7 @@ def print_scores(run: Run, scores: Scores) -> None:
 def _ends_line(run: Run) -> str:
     counts = ", ".join(f"{count} {name}" for name, count in ends(run).items())
     note = f" ({MISSING} lacks trials)" if run.missing else ""
-    return f"{len(run.keys)} trials: {counts}{note}"
+    return f"{counted(len(run.keys), 'trial')}: {counts}{note}"
 
 
 def run_table(run: Run) -> Table:
@@ -220,7 +220,7 @@ def _spread(row: TableRow, heads: tuple[str, ...], wanted: tuple[str, ...]) -> T
 def run_html(run: Run) -> str:
     """Scores, how trials ended, types of failure, and what was executed otherwise than sent."""
     counts = ", ".join(f"{count} {name}" for name, count in ends(run).items())
-    lines = [f"{len(run.keys)} trials: {counts}", *_lines(run), f"folder: {run.folder}"]
+    lines = [f"{counted(len(run.keys), 'trial')}: {counts}", *_lines(run), f"folder: {run.folder}"]
     notes = "<br>".join(escape(line) for line in lines)
     return f"{html_fragment(_scores(run))}\n<p>{notes}</p>"
 

@@ -63,6 +63,8 @@ def test_levels_that_do_not_exist_are_refused(text: str) -> None:
 
 def test_numbers_keep_their_order_and_lose_repetitions() -> None:
     assert parse_numbers("5,3-4,5", "seeds") == [5, 3, 4]
+    with pytest.raises(SettingsError, match="is more than"):
+        parse_numbers(str(10**23), "seeds")
 
 
 @pytest.mark.parametrize("text", ["{", '{"A": {"1": [1.5]}}', '{"A": {"1": [-1]}}', "{}"])

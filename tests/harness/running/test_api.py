@@ -95,7 +95,7 @@ def test_a_module_and_class_and_its_settings_again(tmp_path: Path) -> None:
         (FakePolicy, {"token": "secret"}, "token goes with policy servers"),
         ("hold", {"trails": 3}, "no setting 'trails'; did you mean trials"),
         ("hold", {"video": "some"}, "not one of none, failures, first, all"),
-        (None, {}, "either the policy or --policy-map"),
+        (None, {}, "or else --policy-map"),
     ],
 )
 def test_what_cannot_be_is_refused_before_anything_is_written(

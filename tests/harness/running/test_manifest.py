@@ -127,6 +127,7 @@ def test_a_folder_that_holds_something_is_left_alone(tmp_path: Path) -> None:
         (tmp_path / "thesis.tex", False, "is a file"),
         (tmp_path, True, "no run"),
         (tmp_path / "none", True, "no run"),
+        (tmp_path / ("n" * 300), False, "cannot be a folder: File name too long"),
     ):
         with pytest.raises(RunError, match=words):
             open_run(folder, MANIFEST, resume)

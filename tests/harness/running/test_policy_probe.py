@@ -204,7 +204,7 @@ def test_a_policy_and_a_map_are_too_much(tmp_path: Path) -> None:
     for words in (["ws://127.0.0.1:1", "--policy-map", "x.json"], []):
         code, err = evaluate(tmp_path / "run", *words)
         assert code != 0
-        assert "either the policy or --policy-map" in err
+        assert "or else --policy-map" in err
 
 
 def test_warnings_and_options_are_printed_and_kept(tmp_path: Path) -> None:

@@ -77,7 +77,7 @@ def test_options_in_a_url_are_checked_before_the_run() -> None:
 @pytest.mark.parametrize(
     ("policy", "reason"),
     [
-        ((), "either the policy or --policy-map"),
+        ((), "or else --policy-map"),
         (("ws://a", "ws://a"), "ws://a is named twice"),
         (("ws://a", "hold"), "'hold' is no URL"),
     ],

@@ -70,6 +70,8 @@ def test_a_server_whose_queue_is_longer_than_its_model_is_the_bottleneck() -> No
     full = server(queue=200.0, infer=100.0)
     assert status(0.9, full).bottleneck.startswith("the policy server is the bottleneck")
     assert "wait 90 % of their time" in status(0.9, full).bottleneck
+    assert "bottleneck" not in status(0.09, full, cores=8).bottleneck
+    assert "bottleneck" not in status(0.9, server(), cores=0).bottleneck
 
 
 def test_idle_cores_and_idle_servers_have_room_for_more_workers() -> None:
