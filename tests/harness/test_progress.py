@@ -37,7 +37,7 @@ def test_plain_lines_where_there_is_no_terminal() -> None:
         progress.add(record(SHORT, "step_limit"))
         progress.update(Status(0.0, 1, 1, 1))
     first, last = stream.getvalue().splitlines()
-    assert first == "1 trials to run, 0 already done"
+    assert first == "1 trial to run, 0 already done"
     assert last.startswith("1/1 trials, success 0.0 %")
 
 
