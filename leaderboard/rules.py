@@ -135,7 +135,7 @@ VERSIONS = {
 }
 """What a run has to say of its software, as far as ours runs with it."""
 MOST_SAID = 20_000
-"""Bytes of all that a run says of its software, machine, world and warnings."""
+"""Bytes of what a run says of software, machine, world and warnings, or of a policy."""
 
 
 def manifest_of(data: object, what: str = "the run") -> RunManifest:
@@ -207,7 +207,8 @@ def _check_about(run: RunManifest) -> None:
     cores = about.machine.get("cores", 1)
     if not re.fullmatch("[0-9a-f]{16}", about.code) or type(cores) is not int or cores < 1:
         raise BundleError("the run has a hash of its code, or cores of its machine, that cannot be")
-    if (size := len(canonical(about))) > MOST_SAID:
+    told = (about, run.settings.policy, *run.settings.policies.values())
+    if (size := max(len(canonical(one)) for one in told)) > MOST_SAID:
         raise BundleError(f"the run says {size} bytes of itself; {MOST_SAID} are the most")
 
 

@@ -239,6 +239,7 @@ FORGERIES: list[tuple[Forgery, str]] = [
     (field(layout.RUN, "about", code="x"), "cannot be"),
     (field(layout.RUN, "about", "machine", cores=0), "cannot be"),
     (field(layout.RUN, "about", warnings=["x" * 20_000]), "bytes of itself; 20000 are the most"),
+    (field(*SPEC, name="x" * 20_000), "bytes of itself; 20000 are the most"),
 ]
 
 

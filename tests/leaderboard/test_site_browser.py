@@ -40,6 +40,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("site")
     entries = many_entries(COUNT - 4)
     entries[-1] = replace(entries[-1], name=f"Last {EVIL}")
+    entries[-2] = replace(entries[-2], name="Partly", cells=("overall/0", "GAC/0"))
     (folder / "index.html").write_text(index_page(entries))
     kept = make_submission(folder, folder / "home", {"replayed": REPLAYED})
     write_model(entry_of(read_submission(kept)), folder / "models" / "fake-1")
@@ -164,9 +165,20 @@ def test_views_show_levels_categories_and_tasks(page: Page) -> None:
     assert page.run(heads) == ["rank", "GAC", "SDE", "CPI", "RRR", "CVR", "size"]
     choose(page, "view", "show", "tasks")
     choose(page, "view", "metric", "ps")
+    assert {row[0] for row in page.run(CELLS)} == {"–"}, "progress is not tested"
     choose(page, "view", "of", "OFE")
     choose(page, "view", "level", "5")
     assert page.run(heads)[:3] == ["rank", "OFE", "Put Bottles Dustbin"]
+
+
+def test_ranks_are_for_cells_in_which_a_lie_would_have_shown(page: Page) -> None:
+    choose(page, "view", "show", "categories")
+    for metric, name, rank in (("sr1", "GAC", True), ("sr1", "SDE", False), ("sr", "GAC", False)):
+        choose(page, "view", "metric", metric)
+        page.click(f"#board th[data-name={name}] button")
+        ranks = {row[1]: row[0] for row in page.run(CELLS)}
+        assert ranks["Partly"].isdigit() == rank, (metric, name)
+        assert ranks["Model 0"].isdigit() == (metric == "sr1")
 
 
 def test_two_models_side_by_side(page: Page) -> None:
