@@ -99,11 +99,12 @@ def cells(variants: Iterable[str], categories: Mapping[str, str]) -> dict[str, t
     """The `variants` ("TASK/LEVEL") behind every value of a table, by "ROW/LEVEL", level 0 being
     all. `categories` are those of the tasks."""
     found: dict[str, list[str]] = {}
+    there, means = set(categories.values()), {"overall": CATEGORIES, **DIMENSIONS}
+    whole = {row: of for row, of in means.items() if there.issuperset(of)}
     for variant in variants:
         task, _, level = variant.rpartition("/")
         own = categories[task]
-        whole = ["overall"] * (own in CATEGORIES)
-        for row in (*whole, *(d for d, of in DIMENSIONS.items() if own in of), own, task):
+        for row in (*(row for row, of in whole.items() if own in of), own, task):
             for place in (f"{row}/0", f"{row}/{level}"):
                 found.setdefault(place, []).append(variant)
     return {place: tuple(own) for place, own in found.items()}

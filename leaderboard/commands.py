@@ -134,14 +134,20 @@ def verify_bundle(
 
     if challenge is not None:
         evidence.check_challenge(challenge)
-        evidence.check_fraction(fraction)
+        evidence.sample_size(fraction, 1)
     reference = rules.shipped(world, parts)
     started = time.perf_counter()
     valid = verify(bundle, reference, practice, workers=workers, done=scene_progress())
     found: dict[str, object] = {"valid": to_builtins(valid.evidence)}
     seconds = time.perf_counter() - started
     say = aside if as_json else print
-    for line in _lines(valid.evidence, seconds):
+    counts = f"valid: {valid.evidence.trials} trials of {valid.evidence.variants} variants"
+    what = "structure, hashes, chain, seeds, records, actions, scores and scenes hold"
+    for line in (
+        f"{counts}; {what} ({seconds:.1f} s)",
+        valid.evidence.attempts,
+        *valid.evidence.warnings,
+    ):
         say(line)
     holds = True
     if challenge is not None:
@@ -285,13 +291,6 @@ def add(
         print_json({"submission": folder, "evidence": valid.evidence})
     else:
         print(f"Submission: {folder}")
-
-
-def _lines(found: evidence.Validity, seconds: float) -> list[str]:
-    """What of a bundle was found valid, in sentences."""
-    counts = f"valid: {found.trials} trials of {found.variants} variants"
-    what = "structure, hashes, chain, seeds, records, actions, scores and scenes hold"
-    return [f"{counts}; {what} ({seconds:.1f} s)", found.attempts, *found.warnings]
 
 
 def scene_progress() -> Callable[[int, int], None]:

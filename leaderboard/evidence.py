@@ -63,12 +63,6 @@ def check_challenge(challenge: str) -> None:
         )
 
 
-def check_fraction(fraction: float) -> None:
-    """BundleError unless `fraction` is above 0 and at most 1."""
-    if not 0 < fraction <= 1:
-        raise BundleError(f"the fraction {fraction:g} is not above 0 and at most 1")
-
-
 def drawn(challenge: str, bundle: str, keys: Sequence[TrialKey], count: int) -> list[TrialKey]:
     """`count` of `keys` without repeats, every set equally likely over all challenges.
 
@@ -101,7 +95,8 @@ def least_sample(trials: int) -> int:
 def sample_size(fraction: float, trials: int) -> int:
     """How many of `trials` are replayed: this `fraction`, rounded up, or `least_sample` if that is
     more. BundleError for a fraction that is none."""
-    check_fraction(fraction)
+    if not 0 < fraction <= 1:
+        raise BundleError(f"the fraction {fraction:g} is not above 0 and at most 1")
     return max(least_sample(trials), min(trials, math.ceil(fraction * trials - 1e-9)))
 
 

@@ -19,6 +19,7 @@ from robospa.leaderboard.agreement import (
     power,
     trials_needed,
 )
+from robospa.trial import SPATIAL
 
 
 def test_one_variant_is_fishers_test_by_hand() -> None:
@@ -77,11 +78,12 @@ def test_honest_claims_are_rarely_contradicted_and_a_lie_about_one_variant_alway
 
 
 def test_cells_are_the_values_of_a_table() -> None:
-    found = cells(["Task_1/2", "Task_1/3", "Task_40/2"], CATEGORY)
-    assert found["overall/2"] == ("Task_1/2", "Task_40/2")
-    assert found["spatial/0"] == found["GAC/0"] == found["Task_1/0"] == ("Task_1/2", "Task_1/3")
-    assert found["procedural/2"] == ("Task_40/2",) and "MIP/3" not in found
-    assert "overall/0" not in cells(["Task/1"], {"Task": "CBG"})
+    variants = [f"Do_{category}/{level}" for category in (*SPATIAL, "MIP") for level in (2, 3)]
+    found = cells(variants, {v[:6]: v[3:6] for v in variants})
+    assert found["spatial/2"] == tuple(f"Do_{category}/2" for category in SPATIAL)
+    assert found["GAC/0"] == found["Do_GAC/0"] == ("Do_GAC/2", "Do_GAC/3")
+    assert found["MIP/2"] == ("Do_MIP/2",) and "MIP/4" not in found
+    assert not {"procedural/0", "overall/0"} & found.keys(), "means of what was not run"
 
 
 def test_power_grows_with_the_drop() -> None:
