@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 from msgspec import structs, to_builtins
@@ -22,7 +23,7 @@ from robospa.harness.running.atomic_file import replace_file, run_lock
 from robospa.harness.running.attempts import spent_trials
 from robospa.harness.running.executor import RunAborted
 from robospa.harness.running.films import films_of, finish_films
-from robospa.harness.running.manifest import about_machine, check_folder, open_run
+from robospa.harness.running.manifest import about_machine, add_processor, check_folder, open_run
 from robospa.harness.running.policy_probe import (
     ProbedPolicy,
     check_blind,
@@ -278,6 +279,7 @@ def evaluate(request: Request) -> None:
                 progress.update(replace(status, films=films.pending))
 
             runner.on_record, runner.on_status = add, show
+            runner.on_processor = partial(add_processor, folder)
             try:
                 runner.run()
                 tracker.finish(folder)

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+from robospa.results.records.manifest import Processor
 from robospa.results.records.trial_record import RetryRow, TrialRecord
 from robospa.trial import TrialKey
 
@@ -117,9 +118,11 @@ Command = RunTrial | Proceed | Stop
 
 @dataclass(frozen=True)
 class WorkerReady:
-    """The worker takes trials and writes to the file `records`; None if the driver writes them."""
+    """The worker takes trials on its `processor` and writes to the file `records`; None if the
+    driver writes them."""
 
     records: Path | None
+    processor: Processor = Processor()
 
 
 @dataclass(frozen=True)

@@ -42,6 +42,12 @@ def _version(package: str) -> str:
         return "not installed"
 
 
+def package_versions() -> dict[str, str]:
+    """Versions that decide a record: of Python, of ours, and of what computes."""
+    found = {name: _version(name) for name in ("robospa", "numpy", "sapien")}
+    return {**found, "python": sys.version.split()[0]}
+
+
 def git_state(folder: Path) -> GitState | None:
     """The checkout that this package's `folder` is part of, if any."""
 
@@ -80,12 +86,7 @@ def this_processor() -> Processor:
 def about_machine(world: Mapping[str, object]) -> RunAbout:
     """Versions, checkout and machine, with what the `world` says about itself."""
     return RunAbout(
-        versions={
-            "robospa": _version("robospa"),
-            "python": sys.version.split()[0],
-            "numpy": _version("numpy"),
-            "sapien": _version("sapien"),
-        },
+        versions=package_versions(),
         git=git_state(Path(__file__).resolve().parent),
         code=code_hash(),
         machine={
@@ -153,6 +154,14 @@ def _identity(server: ServerFacts) -> Identity:
 def write_manifest(folder: Path, manifest: RunManifest) -> None:
     """Write `run.json` at once or not at all."""
     replace_file(folder / MANIFEST, manifest_text(manifest).encode())
+
+
+def add_processor(folder: Path, processor: Processor) -> None:
+    """Note in the manifest that trials run on this kind of processor as well."""
+    kept = read_manifest(folder)
+    if processor not in kept.about.processors:
+        about = structs.replace(kept.about, processors=(*kept.about.processors, processor))
+        write_manifest(folder, structs.replace(kept, about=about))
 
 
 def check_folder(folder: Path, resume: bool) -> None:

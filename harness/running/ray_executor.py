@@ -20,7 +20,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from importlib import import_module, metadata
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -39,6 +39,7 @@ from robospa.harness.running.executor import (
     WorkerHandle,
     WorkerReady,
 )
+from robospa.harness.running.manifest import package_versions
 from robospa.harness.running.record_store import RecordWriter
 from robospa.harness.running.worker import LocalExecutor, WorkerConfig
 from robospa.harness.settings import Compute
@@ -473,13 +474,7 @@ class WorkerReport:
 
 def versions() -> dict[str, str]:
     """What has to be the same on every node for records to be the same."""
-    found = {"python": sys.version.split()[0], "code": code_hash()}
-    for package in ("robospa", "numpy", "sapien"):
-        try:
-            found[package] = metadata.version(package)
-        except metadata.PackageNotFoundError:
-            found[package] = "missing"
-    return found
+    return {**package_versions(), "code": code_hash()}
 
 
 def version_differences(driver: Mapping[str, str]) -> str:
@@ -529,7 +524,7 @@ class WorkerActor:
             for message in self._worker.messages():
                 (beats if isinstance(message, Heartbeat) else others).append(message)
         files = self._take_files() if any(isinstance(m, TrialDone) for m in others) else {}
-        others = [WorkerReady(None) if isinstance(m, WorkerReady) else m for m in others]
+        others = [replace(m, records=None) if isinstance(m, WorkerReady) else m for m in others]
         return WorkerReport((*beats[-1:], *others), files, self._new_output(), exit_status)
 
     def close(self) -> None:

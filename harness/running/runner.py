@@ -52,6 +52,7 @@ from robospa.harness.running.slot import (
 )
 from robospa.harness.running.status import Autoscaler, Status, TimeBreakdown
 from robospa.harness.running.worker import LocalExecutor, WorkerConfig, task_finder
+from robospa.results.records.manifest import Processor
 from robospa.results.records.trial_record import RetryRow, TrialRecord
 from robospa.results.scoring.repeats import reached_policy
 from robospa.trial import TrialKey
@@ -99,7 +100,8 @@ class Runner:
     """Runs `keys` with workers of `executor`, by default processes here as `config` describes.
 
     `on_record` gets every record, `on_note` one line for every mishap, `on_status` the run's state
-    now and then. `known` has the records of earlier drivers.
+    now and then, `on_processor` the kind of every worker's. `known` has the records of earlier
+    drivers.
     """
 
     config: WorkerConfig
@@ -107,6 +109,7 @@ class Runner:
     options: RunOptions = field(default_factory=RunOptions)
     on_record: Callable[[TrialRecord], None] = lambda record: None
     on_note: Callable[[str], None] = lambda text: None
+    on_processor: Callable[[Processor], None] = lambda processor: None
     executor: Executor | None = None
     on_status: Callable[[Status], None] = lambda status: None
     known: Mapping[TrialKey, TrialRecord] = field(default_factory=dict)
@@ -219,6 +222,7 @@ class Runner:
         match message:
             case WorkerReady():
                 slot.ready, slot.records = True, message.records
+                self.on_processor(message.processor)
                 self._false_starts = 0
             case Heartbeat():
                 if slot.monitor is not None:

@@ -40,6 +40,7 @@ from robospa.harness.running.executor import (
     WorkerReady,
 )
 from robospa.harness.running.heartbeat import ComputeLock, HeartbeatSender, MonitoredPolicy
+from robospa.harness.running.manifest import this_processor
 from robospa.harness.running.policy_probe import over_budget
 from robospa.harness.running.record_store import ActionRecorder, RecordWriter, write_actions
 from robospa.harness.worlds import SAPIEN_NAME, TASK_PARTS, open_world
@@ -321,7 +322,7 @@ def _hold(
     worker = Worker(config, writer, HeartbeatSender(send, turn), announce)
     worker.heartbeat.start()
     try:
-        send(WorkerReady(writer.path))
+        send(WorkerReady(writer.path, this_processor()))
         _serve(pipe, send, worker)
     except (EOFError, ConnectionError):
         return

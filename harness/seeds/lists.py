@@ -20,6 +20,7 @@ from pathlib import Path
 from robospa.extras import user_cache
 from robospa.harness.running.atomic_file import replace_file
 from robospa.harness.running.code_hash import FOLDERS, LENGTH, code_hash
+from robospa.harness.running.manifest import this_processor
 from robospa.registry import ROBOTS, SCENE_MODES, module_of
 from robospa.tasks.catalog import home_of
 from robospa.tasks.modes import tangible
@@ -67,15 +68,18 @@ def read_levels(path: Path) -> dict[int, tuple[int, ...]]:
     """The lists in a file, by level; empty if there is none that can be read."""
     try:
         data = json.loads(path.read_text())
-        return {int(level): tuple(map(int, seeds)) for level, seeds in data.items()}
+        return {int(n): tuple(map(int, row)) for n, row in data.items() if n.isdecimal()}
     except (OSError, ValueError, TypeError, AttributeError):
         return {}
 
 
 def save(path: Path, level: int, seeds: Sequence[int]) -> None:
-    """Put a list into the file of its task, at once or not at all; none takes the old one out."""
+    """Put a list into the file of its task, at once or not at all; none takes the old one out. The
+    file begins with the kind of processor that made what is in it last."""
     lists = {**read_levels(path), level: list(seeds)}
-    rows = ",\n".join(f'"{k}": {json.dumps(list(lists[k]))}' for k in sorted(lists) if lists[k])
+    made: dict[object, object] = {"processor": str(this_processor())}
+    made |= {level: list(lists[level]) for level in sorted(lists)}
+    rows = ",\n".join(f'"{k}": {json.dumps(row)}' for k, row in made.items() if row)
     path.parent.mkdir(parents=True, exist_ok=True)
     replace_file(path, ("{\n" + rows + "\n}\n").encode())
 

@@ -67,7 +67,7 @@ def _lists(file: str) -> dict[int, tuple[int, ...]]:
     if not path.is_file():
         return {}
     data = json.loads(path.read_text())
-    return {int(level): tuple(seeds) for level, seeds in data.items()}
+    return {int(level): tuple(seeds) for level, seeds in data.items() if level.isdecimal()}
 
 
 def accepted(

@@ -19,6 +19,7 @@ from robospa.harness.running.executor import (
     TrialDone,
     WorkerReady,
 )
+from robospa.harness.running.manifest import this_processor
 from robospa.harness.running.ray_executor import WorkerActor, version_differences, versions
 from robospa.harness.running.worker import WorkerConfig
 from robospa.results.records.trial_record import RetryRow
@@ -40,7 +41,7 @@ def actor(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> WorkerActor:
     config = WorkerConfig(tmp_path / "elsewhere", "run_fakes:FakePolicy", **fakes)  # type: ignore[arg-type]
     made = WorkerActor()
     assert made.start(versions(), pickle.dumps(config), "worker-000") == ""
-    assert received(made) == ([WorkerReady(None)], set())
+    assert received(made) == ([WorkerReady(None, this_processor())], set())
     return made
 
 
