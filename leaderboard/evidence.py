@@ -136,16 +136,17 @@ class Validity(Struct, frozen=True):
     trials: Count
     variants: Count
     practice: bool = False
-    drivers: Count = 1
+    drivers: Count = 0
     repeated: Count = 0
     warnings: tuple[str, ...] = ()
 
     @property
     def attempts(self) -> str:
         """How often trials were tried, as a sentence: what may hide the best of several."""
+        drivers = self.drivers or "an unknown number of"
         return (
-            f"The run had {self.drivers} driver{'s' * (self.drivers > 1)}, and {self.repeated} of "
-            "its trials were started more than once."
+            f"The run had {drivers} driver{'s' * (drivers != 1)}, and {self.repeated} of its "
+            "trials were started more than once."
         )
 
 

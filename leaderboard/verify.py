@@ -118,7 +118,7 @@ def verify(
         trials=len(keys),
         variants=len({key.variant for key in keys}),
         practice=manifest.practice,
-        drivers=claimed.about.drivers,
+        drivers=claimed.about.drivers if claimed.about.processors else 0,  # an older version's
         repeated=sum(map(was_repeated, records.values())),
         warnings=tuple(warnings),
     )

@@ -30,20 +30,10 @@ from robospa.results.records.runs import Run
 from robospa.trial import TrialKey
 
 
-def renamed(run: dict[str, object]) -> dict[str, object]:
-    """A run.json from before worlds had names, in the present form; others as they are."""
-    settings = run["settings"]
-    assert isinstance(settings, dict)
-    world = dict(settings["world"])
-    if world.pop("factory", "").endswith(":SapienWorld"):
-        settings["world"] = {"name": "sapien", "arguments": world}
-    return run
-
-
 def rewritten(old: Path, new: Path) -> dict[TrialKey, TrialRow]:
     """Write the bundle `old` to `new` in the present form; the rows of both."""
     with BundleArchive(old) as archive:
-        run = manifest_of(renamed(archive.read_map(layout.RUN)))
+        run = manifest_of(archive.read_map(layout.RUN))
         first = str(archive.read_map(layout.MANIFEST)["inputs"])
         lines = archive.read(layout.RECORDS).splitlines()
         rows: dict[TrialKey, TrialRow] = {
