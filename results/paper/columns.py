@@ -186,11 +186,6 @@ class Column:
         below = part.samples.get("sr", ())
         return [sample for sample, _ in below], [share for _, share in below]
 
-    def missing(self, row: str, level: int) -> int:
-        """Listed trials below this row that have no result."""
-        part = self.part(row, level)
-        return 0 if part is None else part.missing
-
     def with_missing(self, entry: TableCell, metric: str, row: str, level: int) -> TableCell:
         """`entry` with what it has to say of missing trials."""
         part = self.part(row, level)

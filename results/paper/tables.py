@@ -72,12 +72,12 @@ def _open_notes(columns: Sequence[Column], level: int) -> list[str]:
     notes: list[str] = []
     for column in columns:
         notes += not_run_note(column, [level])
-        if lost := column.missing(rounding.OVERALL, level):
-            part = column.part(rounding.OVERALL, level)
-            low, high = (100 * end for end in (part and part.bounds("sr")) or (0.0, 1.0))
+        part = column.part(rounding.OVERALL, level)
+        if part is not None and part.missing:
+            low, high = (100 * end for end in part.bounds("sr") or (0.0, 1.0))
             notes.append(
-                f"{MISSING} {column.title}: {lost} trials at L{level} have no result; over what is "
-                f"listed SR lies between {rounding.text(low)} and {rounding.text(high)}."
+                f"{MISSING} {column.title}: {part.missing} trials at L{level} have no result; over "
+                f"what is listed SR lies between {rounding.text(low)} and {rounding.text(high)}."
             )
     return notes
 

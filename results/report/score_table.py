@@ -19,7 +19,6 @@ from robospa.results.scoring.repeats import policy_error_lines, repeat_lines
 from robospa.results.scoring.scores import (
     IDLE,
     AverageScore,
-    Range,
     Scores,
     VariantScore,
     level_name,
@@ -33,19 +32,16 @@ from robospa.trial import BASIC, CATEGORIES, CATEGORY_NAMES, DIMENSIONS, REFEREN
 
 def missing_lines(scores: Scores) -> list[str]:
     """One sentence for every variant that lacks trials."""
-    return [
-        f"{cell.task} L{cell.level}: {cell.missing} of {cell.listed} trials are missing; if all "
-        f"had failed SR would be {sr[0]:.1f} and SR@1 {first[0]:.1f}, if all had succeeded "
-        f"{sr[1]:.1f} and {first[1]:.1f}"
-        for cell in scores.cells.values()
-        if cell.missing
-        for sr, first in [[_percents(cell.bounds(metric)) for metric in ("sr", "sr1")]]
-    ]
-
-
-def _percents(ends: Range | None) -> Range:
-    low, high = ends or (0.0, 1.0)
-    return 100 * low, 100 * high
+    lines = []
+    for cell in scores.cells.values():
+        sr, first = (cell.bounds(metric) or (0.0, 1.0) for metric in ("sr", "sr1"))
+        text = (
+            f"{cell.task} L{cell.level}: {cell.missing} of {cell.listed} trials are missing; if "
+            f"all had failed SR would be {100 * sr[0]:.1f} and SR@1 {100 * first[0]:.1f}, if all "
+            f"had succeeded {100 * sr[1]:.1f} and {100 * first[1]:.1f}"
+        )
+        lines += [text] * bool(cell.missing)
+    return lines
 
 
 def loss_lines(run: Run, most: int = 5) -> list[str]:
