@@ -108,7 +108,6 @@ def check(
 
 
 def _check_machine(console: Console, as_json: bool) -> None:
-    """Print what this machine lacks to simulate and to draw; ends with 1 if it lacks anything."""
     from rich.table import Table
     from rich.text import Text
 
@@ -277,7 +276,6 @@ def _episode(demo: Path, instruction: str | None) -> Episode:
 
 
 def _run_checks(console: Console, target: Target, trials: int) -> list[CheckResult]:
-    """Check protocol, first actions and, if all is well, real trials; print them in one table."""
     from rich.table import Table
     from rich.text import Text
 
@@ -305,7 +303,6 @@ def _run_checks(console: Console, target: Target, trials: int) -> list[CheckResu
 
 
 def _is_hint(result: CheckResult) -> bool:
-    """Whether a check that fails nobody saw something suspicious."""
     from robospa.harness.server_checks import EXECUTED_ACTIONS
 
     return result.name in (FIRST_ACTIONS, EXECUTED_ACTIONS) and result.passed is None
@@ -338,7 +335,6 @@ def _warnings(connect: Connect) -> list[str]:
 
 
 def _replay(console: Console, target: Target, episode: Episode, points: int) -> Findings:
-    """Compare the policy's answers with a demonstration, and print the comparison."""
     from robospa.harness.convention_check.check import check_conventions
 
     with target.connect() as policy:
@@ -351,7 +347,6 @@ def _replay(console: Console, target: Target, episode: Episode, points: int) -> 
 
 
 def _again(console: Console, demo: Path, episode: Episode) -> RecordingReplay | None:
-    """Play the demonstration again in its scene; None if there is no simulator."""
     from robospa.harness.official.recordings import recording_of, replay_recording
 
     try:

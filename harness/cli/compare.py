@@ -111,8 +111,6 @@ def _table(title: str, rows: Sequence[Difference], found: RunComparison) -> None
 
 
 def _power(tasks: str, levels: str, base: float, as_json: bool) -> None:
-    """Print how well the overall rate is known by trials of every variant, if rates are like the
-    published models', and the trials that tell two rates apart."""
     from robospa.harness.selection import parse_levels, parse_tasks
     from robospa.results.comparison.sample_size import (
         POWER,

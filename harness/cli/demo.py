@@ -68,7 +68,6 @@ def demo(
 
 
 def _select(names: Sequence[str], levels: str, trials: int) -> Selection:
-    """The first accepted seeds of every variant; the first of all where no list is shipped."""
     from robospa.harness.selection import list_trials
     from robospa.harness.settings import Selection, SettingsError
 
@@ -121,7 +120,6 @@ def server(policy: str) -> Iterator[str]:
 
 
 def _url(process: subprocess.Popen[bytes], output: IO[str]) -> str:
-    """The address that the server prints once clients can connect."""
     until = time.monotonic() + START_SECONDS
     while time.monotonic() < until:
         output.seek(0)

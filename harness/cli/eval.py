@@ -170,7 +170,6 @@ def terminable() -> Iterator[None]:
 
 
 def _milliseconds(text: str) -> list[float]:
-    """The latencies; SettingsError unless these are two growing numbers or more."""
     try:
         found = [float(word) for word in text.split(",")]
     except ValueError:
@@ -189,7 +188,6 @@ def _curve(
     resume: bool,
     as_json: bool,
 ) -> None:
-    """Evaluate at every latency [ms], the same trials; write the curve beside the runs."""
     from robospa.harness.running.request import make_request
     from robospa.results.comparison.latency_curve import curve_table, latency_curve
     from robospa.results.figures.curves import draw_latency_curves

@@ -192,7 +192,6 @@ def _find(
     count: int,
     say: Callable[[str], None],
 ) -> None:
-    """Add the first `count` valid seeds of `variants`, as `like` has robot and mode, to `file`."""
     from robospa.harness.official.checkout_world import valid_seeds
     from robospa.harness.running.atomic_file import replace_file
     from robospa.schema import parse_json

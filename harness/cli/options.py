@@ -68,7 +68,6 @@ SHARE = between(0, 1)
 
 
 def _show_all(context: typer.Context, value: bool) -> None:
-    """Print the help with all options, and end."""
     if value:
         for one in context.command.params:
             if getattr(one, "rich_help_panel", None):
@@ -133,8 +132,6 @@ def _flags(
 
 
 def _completion(choices: Sequence[str]) -> Callable[[str], list[str]] | None:
-    """The `choices` that continue what is typed, for the shell; None without choices."""
-
     def continued(incomplete: str) -> list[str]:
         return [choice for choice in choices if choice.startswith(incomplete)]
 

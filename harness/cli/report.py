@@ -93,7 +93,6 @@ def report(
 
 
 def _one(runs: Sequence[Path]) -> Path:
-    """The only one of `runs`; ValueError if there are more."""
     if len(runs) > 1:
         raise ValueError("--failures, --audit and --film are of one run")
     return runs[0]
@@ -129,7 +128,6 @@ def _report(
 
 
 def _failures(folder: Path, by: str, trials: bool, film: bool, as_json: bool) -> None:
-    """Print the types of failure in a run; docs/failures.md says how they are decided."""
     from robospa.results.failures.labels import OURS, counts_table, label, trials_table
     from robospa.results.records.action_problems import problem_lines
     from robospa.results.records.runs import read_run
@@ -165,8 +163,6 @@ def _make_films(folder: Path) -> Run:
 
 
 def _lint(folders: Sequence[Path], as_json: bool) -> None:
-    """Print what is implausible in the runs, or in the paper's tables; of several runs, also what
-    keeps them out of one table."""
     from robospa.results.lint import SEVERITIES, lint_actions, lint_published, lint_run, lint_runs
     from robospa.results.records.runs import read_run
     from robospa.tasks.catalog import tasks
@@ -197,7 +193,6 @@ def _audit(
     token: str | None,
     as_json: bool,
 ) -> None:
-    """Print what speaks against a run, a sentence for each check; ends with 1 if anything does."""
     from robospa.harness.factory import load_function
 
     check = load_function("robospa.leaderboard.audit:audit")

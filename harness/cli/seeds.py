@@ -116,7 +116,6 @@ def _sweep(
 
 
 def _is_there(key: ListKey, count: int, folder: Path | None) -> bool:
-    """Whether there is a list of so many seeds: in `folder`, else one that evaluations find."""
     from robospa.harness.seeds.lists import find_list, read_levels
     from robospa.tasks.seeds import NoSeedList
 

@@ -164,7 +164,6 @@ def _hosted(
 
 
 def _changed(options: Any, made: Any) -> list[str]:
-    """The options that are not at their defaults and decide what `made` answers, as NAME=VALUE."""
     import dataclasses
 
     named = bool(getattr(getattr(made, "spec", None), "checkpoint", ""))
@@ -184,7 +183,6 @@ def _version() -> str:
 
 
 def _show_options(policy: str, make: Callable[..., object]) -> None:
-    """Print the options, one per line."""
     from robospa.protocol.options import option_table
 
     kind = options_class(make)

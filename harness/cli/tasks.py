@@ -85,7 +85,6 @@ def tasks(
 
 
 def _check(camera: str, split: str | None) -> None:
-    """BadParameter for a camera or a split that there is not."""
     from robospa.observation import CAMERAS
 
     if camera not in CAMERAS:
@@ -207,7 +206,6 @@ def describe_skill(skill: object) -> str:
 
 
 def _plain(value: object) -> str:
-    """Numbers shortened, everything else as it is."""
     if isinstance(value, float):
         return f"{value:.4g}"
     if isinstance(value, list | tuple):
@@ -337,7 +335,6 @@ def _gallery(
 
 
 def _list_json() -> list[dict[str, object]]:
-    """All tasks: name, category, dimension, and by level n, T and the step limit [actions]."""
     from robospa.tasks.catalog import tasks
 
     return [
@@ -354,7 +351,6 @@ def _list_json() -> list[dict[str, object]]:
 
 
 def _scene_json(scene: Scene, splits: Sequence[str]) -> dict[str, object]:
-    """A scene as `Scene.to_json`, with its digest, its instructions and the expert's plan."""
     from robospa.tasks.catalog import task
     from robospa.tasks.sentences import instruction
 

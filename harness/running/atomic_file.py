@@ -155,7 +155,6 @@ def run_lock(folder: Path) -> Iterator[OpenFile]:
 
 
 def _lock(file: int) -> None:
-    """Lock `file`; raises BlockingIOError if another process keeps holding it."""
     for left in reversed(range(TRIES)):
         try:
             return fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)

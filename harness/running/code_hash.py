@@ -57,7 +57,6 @@ def files_of(root: Path, folders: Sequence[str], left_out: tuple[str, ...] = ())
 
 
 def _files(root: Path, folder: str) -> Iterator[str]:
-    """Names below `root`, but for those that Python or an editor made."""
     whole = folder.endswith("/") and folder != "robospa/"
     start = root if folder == "robospa/" else root / folder.rstrip("*")
     if start.is_file():

@@ -178,7 +178,6 @@ def make_manifest(request: Request, policies: Mapping[str, ProbedPolicy]) -> Run
 
 
 def _shared(keys: Sequence[TrialKey]) -> dict[str, tuple[str, ...]]:
-    """What trials have in common; they are compared one by one as well."""
     return {
         name: tuple(sorted({getattr(key, name) for key in keys}))
         for name in ("embodiment", "mode", "split")
@@ -186,12 +185,10 @@ def _shared(keys: Sequence[TrialKey]) -> dict[str, tuple[str, ...]]:
 
 
 def _renders(policies: Mapping[str, ProbedPolicy]) -> bool:
-    """Whether the workers have to draw."""
     return any(p.spec.cameras for p in policies.values())
 
 
 def _about_policy(policy: ProbedPolicy) -> ServerFacts:
-    """Where it is and how it greeted, with its replicas."""
     identity = policy.identity
     volatile = sorted(identity.volatile)
     return ServerFacts(

@@ -305,7 +305,6 @@ def replay_config(run: Run) -> WorkerConfig:
 
 
 def _cameras(folder: Path) -> tuple[str, ...]:
-    """The cameras that the run's own settings name for its films; the usual one without them."""
     try:
         return read_settings(folder / FILE).recording.cameras
     except SettingsError:

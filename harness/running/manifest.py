@@ -120,12 +120,10 @@ def changed_settings(old: object, new: object) -> list[str]:
 
 
 def _plain(value: object) -> object:
-    """`value` as it is read back from a file."""
     return json.loads(json.dumps(to_builtins(value), default=str))
 
 
 def _list_changes(old: RunManifest, new: RunManifest) -> list[str]:
-    """What differs between the lists of trials."""
     before, after = set(old.keys), set(new.keys)
     if before == after:
         return []

@@ -81,7 +81,6 @@ def read_map(file: Path, tasks: Sequence[str], known: Collection[str]) -> dict[s
 
 
 def _is_targets(value: object) -> bool:
-    """Whether `value` is a URL or a list of different ones."""
     if not isinstance(value, list):
         return bool(value) and isinstance(value, str)
     return all(v and isinstance(v, str) for v in value) and len(set(value)) == len(value) > 0

@@ -236,7 +236,6 @@ class RayExecutor(Executor):
         }
 
     def _fitting(self, resources: Mapping[str, float]) -> int:
-        """How many workers a node with `resources` holds."""
         return fitting(resources, self._needs)
 
     def _leave_out(self, node: str, reason: str) -> None:
@@ -263,7 +262,6 @@ class RayExecutor(Executor):
     # --- workers ----------------------------------------------------------------------------------
 
     def _place_workers(self) -> None:
-        """Start those that have no actor yet, each on the node with most room."""
         for worker in self._workers:
             if worker.actor is None:
                 used = Counter(w.node for w in self._workers if w.actor is not None)
@@ -421,7 +419,6 @@ def check_address(address: str) -> None:
 
 
 def _last_cluster() -> str:
-    """Where `auto` looks; empty if Ray has not written it down here."""
     written = Path(os.environ.get("RAY_TMPDIR", "/tmp")) / "ray" / "ray_current_cluster"
     try:
         return os.environ.get("RAY_ADDRESS") or written.read_text().strip()
@@ -449,7 +446,6 @@ def error_line(error: BaseException) -> str:
 
 
 def _with_advice(text: str) -> str:
-    """What Ray says, with what helps."""
     if "Could not find any running Ray instance" in text:
         return NONE_HERE
     if any(hint in text for hint in ("uthenticat", "Failed to connect", "connection timeout")):
@@ -533,7 +529,6 @@ class WorkerActor:
         self._folder.cleanup()
 
     def _take_files(self) -> dict[str, bytes]:
-        """What the trial left beside its record, which is then removed here."""
         found: dict[str, bytes] = {}
         for path in sorted((self._path / ACTIONS).glob("[!.]*")):
             found[f"{ACTIONS}/{path.name}"] = path.read_bytes()

@@ -175,7 +175,6 @@ def client_options(url: str, file: Path | None) -> dict[str, Any]:
 
 
 def _policy_map(file: Path | None, keys: Sequence[TrialKey]) -> dict[str, Targets]:
-    """The policy, or the policies, of every task of `keys`; raises RunError."""
     if file is None:
         return {}
     from robospa.tasks.catalog import tasks
@@ -188,7 +187,6 @@ def _each(targets: Targets) -> tuple[str, ...]:
 
 
 def _clock(settings: EvaluationSettings) -> PolicyClock | None:
-    """The real clock, None for the paused one; raises SettingsError."""
     try:
         return real_clock(settings.timing, settings.simulation.control)
     except ClockError as error:

@@ -173,11 +173,9 @@ class Runner:
                 self._slots.append(Slot(more, time.monotonic() + START_SECONDS, extra=True))
 
     def _most_workers(self) -> int:
-        """How many workers there may be now."""
         return self._autoscaler.target if self.executor is None else self._workers.capacity()
 
     def _assign(self) -> None:
-        """Give every free place its next trial, as far as there are any."""
         for slot in sendable(self._slots):
             self._send(slot)
         for slot in [
@@ -210,7 +208,6 @@ class Runner:
                 self._reap(slot, f"its worker died ({ended})")
 
     def _timeout(self) -> float:
-        """Seconds until something has to be checked, at most half a second."""
         now = time.monotonic()
         deadlines = [slot.due() for slot in self._slots]
         idle = any(slot.ready and slot.job is None for slot in self._slots)
@@ -260,7 +257,6 @@ class Runner:
             self._retry(slot.job, TrialLost(slot.job.work.key, RetryRow(cause, text)))
 
     def _check_deadlines(self) -> None:
-        """Kill workers that are late."""
         now = time.monotonic()
         self._extend_deadlines(now - self._checked)
         self._checked = now
@@ -298,7 +294,6 @@ class Runner:
         slot.worker.send(Proceed())
 
     def _complete(self, slot: Slot, record: TrialRecord) -> None:
-        """The trial of `slot` has its record."""
         job, slot.job, target = slot.job, None, slot.target
         if job is not None:
             now = time.monotonic()
@@ -317,7 +312,6 @@ class Runner:
             self._scale_up(target)
 
     def _check_errors(self, record: TrialRecord, target: str) -> None:
-        """Stop the run if trials keep ending in the same policy error."""
         verdict = self._errors.add(record, target)
         if verdict is None:
             return
@@ -349,7 +343,6 @@ class Runner:
         return True
 
     def _retry(self, job: TrialJob, lost: TrialLost) -> None:
-        """Queue another attempt at the trial of `job`, or record it as missing."""
         work, text, now = job.work, lost.row.message, time.monotonic()
         unfit = lost.fault == "incompatible"
         server = self._scheduler.servers[job.target]
@@ -391,7 +384,6 @@ class Runner:
     # --- status -----------------------------------------------------------------------------------
 
     def _report_status(self) -> None:
-        """Report the state of the run a few times a second and at its end."""
         now = time.monotonic()
         if now - self._reported >= STATUS_SECONDS or not self._queue.unsettled:
             self._reported = now

@@ -90,7 +90,6 @@ class Scheduler:
         return TrialJob(work, server.target)
 
     def _taken(self, server: ServerStats) -> bool:
-        """Whether `server` does one trial at a time and has one, under whatever URL."""
         address = self._one_trial.get(server.target)
         return address is not None and any(
             s.running for s in self.servers.values() if self._one_trial.get(s.target) == address
@@ -107,14 +106,12 @@ class Scheduler:
         return work / ((server.running + 1) * self._wait(server, now))
 
     def _wait(self, server: ServerStats, now: float) -> float:
-        """What one worker adds to the wait there; that of an average server where unknown."""
         if (known := server.wait(now)) is not None:
             return max(known, 1e-3)
         others = [max(w, 1e-3) for s in self.servers.values() if (w := s.wait(now)) is not None]
         return sum(others) / len(others) if others else 1.0
 
     def _task(self, server: ServerStats, due: Mapping[str, float]) -> str:
-        """The base task that `server` goes on with or turns to."""
         if server.task in due:
             return server.task
         mine = [task for task in due if task in server.tasks]

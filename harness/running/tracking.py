@@ -140,7 +140,6 @@ def open_tracker(log: str, folder: Path, settings: Mapping[str, Any]) -> RunTrac
 
 
 def _identity(folder: Path) -> str:
-    """The id of the run in `folder`, made when it is first asked for."""
     file = folder / ID_FILE
     try:
         return file.read_text().strip()

@@ -269,7 +269,6 @@ def describe(error: BaseException) -> str:
 
 
 def _attempt(worker: Worker, command: RunTrial) -> Message:
-    """How this attempt went. Errors are sorted here, once."""
     from robospa.harness.running.status import connection_fault, retry_cause
     from robospa.harness.world import SceneUnstable
     from robospa.registry import UnknownName

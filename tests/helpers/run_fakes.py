@@ -21,6 +21,9 @@ from numpy.typing import NDArray
 from robospa.geometry import Pose
 from robospa.harness.action_decoder import ActionDecoder
 from robospa.harness.robots import embodiment
+from robospa.harness.running.evaluate import Request
+from robospa.harness.running.request import make_request
+from robospa.harness.settings import EvaluationSettings, updated
 from robospa.harness.trial import TrialSetup, trial_id
 from robospa.harness.world import Poll, SceneUnstable, StepResult
 from robospa.observation import CameraSpec
@@ -267,3 +270,11 @@ def picky() -> FakePolicy:
 class Broken:
     def __init__(self) -> None:
         raise RuntimeError("no Vulkan device")
+
+
+def request(url: str | list[str], out: Path, trials: int = 2, resume: bool = False) -> Request:
+    """An evaluation in the fake world."""
+    given = {"policy": url, "out": out, "trials": trials, "workers": 1, "patience": 1}
+    given |= {"tasks": "Pick_Blocks_Size", "levels": "1", "seeds": "100000-100009", "backoff": 0.01}
+    given |= {"world": "run_fakes:FakeWorld", "parts": "run_fakes:parts"}
+    return make_request(updated(EvaluationSettings(), given), resume=resume)

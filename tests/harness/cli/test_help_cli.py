@@ -75,17 +75,6 @@ def test_the_shell_completes(
     assert output(capsys).split() == expected.split()
 
 
-def test_tasks_fit_into_80_columns_with_their_categories(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("COLUMNS", "80")
-    text = output(capsys, "tasks")
-    rows = {line.split()[0]: line for line in text.splitlines() if line.split()}
-    assert "…" not in text
-    assert all(f" {task.category} " in rows[name] for name, task in tasks().items())
-    assert "procedural: RPF OFE OCE CAC MIP" in text
-
-
 def test_tasks_as_json(capsys: pytest.CaptureFixture[str]) -> None:
     listed = json.loads(output(capsys, "tasks", "--json"))
     assert [row["name"] for row in listed] == list(tasks())
@@ -94,13 +83,6 @@ def test_tasks_as_json(capsys: pytest.CaptureFixture[str]) -> None:
     assert scene["digest"] == build_scene("Pick_Blocks_Size", 2, 100000).digest
     assert set(scene["instructions"]) == {"train", "heldout", "indirect"}
     assert scene["plan"][0]["skill"] == "Pick"
-
-
-def test_lint_as_json(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit):
-        main(["report", "paper", "--lint", "--json"])
-    found = json.loads(capsys.readouterr().out)
-    assert found["errors"] == sum(f["severity"] == "error" for f in found["findings"]) > 0
 
 
 def test_a_server_s_checks_as_json(

@@ -26,20 +26,6 @@ SILENT = {
 }
 """Commands that report nothing to a program, and why."""
 HERE = {
-    "check": "test_help_cli",
-    "eval": "test_eval_cli",
-    "seeds": "test_seeds_cli",
-    "collect": "test_collect_cli",
-    "official assets": "test_assets_cli",
-    "official checkout": "test_checkout_cli",
-    "submit pack": "test_submit_cli",
-    "submit verify": "test_submit_cli",
-    "submit block": "test_submit_cli",
-    "submit reproduce": "test_submit_cli",
-    "leaderboard add": "test_submit_cli",
-}
-"""Commands that need more than a run on disk, and the file of the test that parses their JSON."""
-HERE = {
     "report": "report {run}",
     "compare": "compare {run} {other}",
     "paper": "paper --out {tmp}/paper --table basic",

@@ -15,16 +15,20 @@ from robospa.protocol.server import ServerThread
 EVAL = ("--tasks", "Pick_Blocks_Size", "--levels", "1", "--trials", "1", "--out")
 
 
-def test_a_server_without_its_scheme(tmp_path: Path) -> None:
-    done = robospa("eval", "localhost:8000", *EVAL, tmp_path / "run")
-    assert (done.code, done.out) == (1, "")
-    assert "no module:function; of a server write ws://localhost:8000" in done.err
-
-
-def test_a_web_address_in_place_of_a_server(tmp_path: Path) -> None:
-    done = robospa("eval", "http://localhost:8000", *EVAL, tmp_path / "run")
-    assert "no address of a policy server; they begin with" in done.err
-    assert done.err.endswith("(ws:// for one of robospa serve)\n")
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("eval", "localhost:8000", *EVAL), "of a server write ws://localhost:8000"),
+        (("eval", "http://localhost:8000", *EVAL), "no address of a policy server"),
+        (("submit", "verify"), "is a folder: a bundle is a .zip"),
+        (("official", "checkout"), "has no folder envs"),
+    ],
+)
+def test_what_is_no_server_bundle_or_checkout(
+    tmp_path: Path, words: tuple[str, ...], said: str
+) -> None:
+    done = robospa(*words, tmp_path)
+    assert (done.code, done.out) == (1, "") and said in done.err
 
 
 def test_a_forgotten_token(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -42,14 +46,6 @@ def test_a_port_that_is_taken() -> None:
     assert done.code == 1 and done.err.startswith(said)
 
 
-def test_a_folder_in_place_of_a_bundle(tmp_path: Path) -> None:
-    done = robospa("submit", "verify", tmp_path)
-    assert (
-        done.err
-        == f"robospa: {tmp_path} is a folder: a bundle is a .zip of `robospa submit pack`\n"
-    )
-
-
 def test_a_collection_names_its_extra_before_it_makes_anything(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -61,8 +57,3 @@ def test_a_collection_names_its_extra_before_it_makes_anything(
     done = robospa("collect", "--tasks", "Pick_Blocks_Size", "--episodes", "1", "--out", out)
     assert done.code == 1 and "pyarrow is not installed; install it with" in done.err
     assert done.err.endswith("[demos]'\n") and not out.exists()
-
-
-def test_a_folder_in_place_of_a_checkout(tmp_path: Path) -> None:
-    done = robospa("official", "checkout", tmp_path)
-    assert f"the checkout cannot be used: {tmp_path} has no folder envs" in done.err

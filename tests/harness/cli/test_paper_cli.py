@@ -32,14 +32,6 @@ def test_all_tables_are_written_and_the_errata_told(
     assert {"tables.md", "tables.tex", "tables.html", "tables.csv", "main.tex"} <= names
 
 
-def test_one_table_in_one_format(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    words = ("--out", str(tmp_path / "p"), "--table", "basic", "--format", "md")
-    code, out, _ = run(capsys, *words)
-    assert code == 0
-    assert "Color-Based Grounding" in out
-    assert [path.name for path in (tmp_path / "p").iterdir()] == ["tables.md"]
-
-
 def test_what_is_printed_as_json(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     words = ("--out", str(tmp_path / "p"), "--table", "basic", "--format", "md", "--json")
     code, out, _ = run(capsys, *words)

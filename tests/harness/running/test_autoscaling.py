@@ -18,18 +18,16 @@ def run_round(scaler: Autoscaler, waiting: float, trials: int | None = None) -> 
         scaler.add(record)
 
 
-def test_workers_that_never_wait_fill_the_cores() -> None:
+@pytest.mark.parametrize(
+    ("waiting", "saturated", "more"),
+    [(0.05, False, 0), (0.4, False, 1), (0.07, False, 0), (0.95, True, 0)],
+)
+def test_workers_that_wait_for_a_server_with_room_leave_room_for_others(
+    waiting: float, saturated: bool, more: int
+) -> None:
     scaler = Autoscaler(2, 16, cores=2)
-    run_round(scaler, 0.05)
-    assert scaler.scale_up(saturated=False) == 0
-
-
-def test_workers_that_wait_leave_room_for_others() -> None:
-    scaler = Autoscaler(2, 16, cores=2)
-    run_round(scaler, 0.4)
-    assert scaler.scale_up(saturated=False) == 1  # 2 workers fill 1.2 cores: 3 fill 2
-    run_round(scaler, 0.38)
-    assert scaler.scale_up(saturated=False) == 0  # 1.86 of 2 is full
+    run_round(scaler, waiting)
+    assert scaler.scale_up(saturated) == more
 
 
 def test_they_come_in_steps_up_to_the_most() -> None:
@@ -40,12 +38,6 @@ def test_they_come_in_steps_up_to_the_most() -> None:
         scaler.scale_up(saturated=False)
         grown.append(scaler.target)
     assert grown == [4, 8, 10, 10, 10]
-
-
-def test_a_full_server_ends_it() -> None:
-    scaler = Autoscaler(2, 16, cores=2)
-    run_round(scaler, 0.95)
-    assert scaler.scale_up(saturated=True) == 0
 
 
 def test_a_review_takes_a_whole_round() -> None:

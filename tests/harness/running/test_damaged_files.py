@@ -46,18 +46,7 @@ TOKENS += ["", "x", "../../x", "a/b", "\x00", "\ud800", "é", "A" * 5000, [], {}
 TOKENS += [{"a": {}}, {"1": [1]}, "success", "infrastructure", [None], "NaN", float("nan")]
 TOKENS += [float("inf"), "100000", {"kind": "success"}, [{"kind": 3}], {"seeds": 1}]
 RAW = [b"[" * 3000, b"{" * 300, b'"', b"\\ud800", b"1e999", b"-", b"9" * 5000, b"NaN", b"\n"]
-RAW += [
-    b"\x00",
-    b"\xff\xfe",
-    b"null",
-    b"true",
-    b'{"a":',
-    b",",
-    b"]",
-    b"}",
-    b"\xff" * 4,
-    b"PK\x01\x02",
-]
+RAW += b'\x00 \xff\xfe null true {"a": , ] } \xff\xff\xff\xff PK\x01\x02'.split()
 EXAMPLES = {"bundle": 12, "run": 30}
 """Of these kinds; of the others a hundred."""
 

@@ -12,7 +12,6 @@ from msgspec import structs
 
 from robospa.harness.running.manifest import (
     about_machine,
-    changed_settings,
     check_folder,
     open_run,
     write_manifest,
@@ -140,10 +139,6 @@ def test_a_driver_killed_before_its_first_file_leaves_a_folder_to_start_in(tmp_p
     (tmp_path / ".lock").touch()
     (tmp_path / ".run.json.123.part").touch()
     check_folder(tmp_path, resume=False)
-
-
-def test_settings_that_appear_count_as_changed() -> None:
-    assert changed_settings({}, {"a": 1}) == ["a: 'unset' -> 1"]
 
 
 def test_the_machine_is_described() -> None:

@@ -10,14 +10,12 @@ from typing import Any
 
 import msgpack
 import pytest
-from run_fakes import SPEC, FakePolicy
+from run_fakes import SPEC, FakePolicy, request
 from standins import OpenPi
 
 from robospa.harness.running import policy_probe
-from robospa.harness.running.evaluate import Request, evaluate
+from robospa.harness.running.evaluate import evaluate
 from robospa.harness.running.executor import RunAborted
-from robospa.harness.running.request import make_request
-from robospa.harness.settings import EvaluationSettings, updated
 from robospa.protocol.server import ServerThread
 from robospa.results.lint import lint_run
 from robospa.results.records.manifest import RunError
@@ -34,23 +32,6 @@ def served(checkpoint: str, port: int = 0) -> Iterator[ServerThread]:
     spec = replace(SPEC, checkpoint=checkpoint)
     with ServerThread(policy_factory=lambda: FakePolicy(spec), port=port) as server:
         yield server
-
-
-def request(url: str | list[str], out: Path, trials: int = 2, resume: bool = False) -> Request:
-    given = {
-        "policy": url,
-        "out": out,
-        "tasks": "Pick_Blocks_Size",
-        "levels": "1",
-        "trials": trials,
-        "seeds": "100000-100009",
-        "workers": 1,
-        "backoff": 0.01,
-        "patience": 1,
-        "world": "run_fakes:FakeWorld",
-        "parts": "run_fakes:parts",
-    }
-    return make_request(updated(EvaluationSettings(), given), resume=resume)
 
 
 def test_resuming_with_another_checkpoint_is_refused_and_with_the_same_goes_on(

@@ -60,11 +60,6 @@ def test_maps_that_cannot_be(tmp_path: Path, value: Any, reason: str) -> None:
         read_map(write(tmp_path, value), ["Pick_A", "Pick_B", "Pick_C", "Pick_D"], KNOWN)
 
 
-def test_a_map_that_is_not_there(tmp_path: Path) -> None:
-    with pytest.raises(RunError, match="cannot be read"):
-        read_map(tmp_path / "none.json", [], KNOWN)
-
-
 def test_every_server_is_asked_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[str] = []
 
@@ -189,22 +184,6 @@ def test_a_checkpoint_for_every_task(tmp_path: Path) -> None:
     settings, about = run.manifest.settings, run.manifest.about
     assert settings.policies["Pick_Blocks_Height"].stated.name == "lazy"
     assert about.policies["Pick_Blocks_Size"].target == first.url
-
-
-def test_a_task_without_policy_stops_before_the_run(tmp_path: Path) -> None:
-    path = write(tmp_path, {"Pick_Blocks_Size": "ws://127.0.0.1:1"})
-    words = ["--policy-map", str(path), "--tasks", "Pick_Blocks_Size,Pick_Blocks_Height"]
-    code, err = evaluate(tmp_path / "run", *words)
-    assert code != 0
-    assert "has no policy for Pick_Blocks_Height" in err
-    assert not (tmp_path / "run").exists()
-
-
-def test_a_policy_and_a_map_are_too_much(tmp_path: Path) -> None:
-    for words in (["ws://127.0.0.1:1", "--policy-map", "x.json"], []):
-        code, err = evaluate(tmp_path / "run", *words)
-        assert code != 0
-        assert "or else --policy-map" in err
 
 
 def test_warnings_and_options_are_printed_and_kept(tmp_path: Path) -> None:

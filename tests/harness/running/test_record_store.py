@@ -38,10 +38,6 @@ def write(folder: Path, *records: TrialRecord) -> Path:
     return writer.path
 
 
-def test_a_record_survives_its_line() -> None:
-    assert from_line(to_line(RECORD)) == RECORD
-
-
 def test_every_prefix_of_a_file_reads_as_its_whole_lines(tmp_path: Path) -> None:
     path = write(tmp_path, RECORD, other(1))
     data = path.read_bytes()
@@ -110,20 +106,13 @@ WITHDRAWN = (
 )
 
 
-@pytest.mark.parametrize("order", list(permutations(range(3))))
+@pytest.mark.parametrize("order", [(0, 1), (1, 0), *permutations(range(3))])
 def test_a_policy_error_that_was_withdrawn_is_no_result(
     tmp_path: Path, order: tuple[int, ...]
 ) -> None:
     for place in order:
         write(tmp_path, WITHDRAWN[place])
-    assert read_records(tmp_path)[KEY] == WITHDRAWN[2]
-
-
-@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
-def test_until_it_is_run_again_it_is_missing(tmp_path: Path, order: tuple[int, ...]) -> None:
-    for place in order:
-        write(tmp_path, WITHDRAWN[place])
-    assert read_records(tmp_path)[KEY] == WITHDRAWN[1]
+    assert read_records(tmp_path)[KEY] == WITHDRAWN[max(order)]
 
 
 def test_the_loss_with_most_attempts_is_the_last(tmp_path: Path) -> None:

@@ -49,10 +49,7 @@ def test_the_saved_settings_name_the_folder_that_was_chosen() -> None:
     request = make_request(settings("hold", tasks="Pick_Blocks_Size", trials=1))
     assert request.settings is not None
     assert request.settings.out == request.config.folder
-
-
-def test_settings_that_do_not_describe_the_trials_are_not_saved() -> None:
-    assert make_request(settings("hold"), keys=KEYS).settings is None
+    assert make_request(settings("hold"), keys=KEYS).settings is None, "they say not which trials"
 
 
 def test_client_options_from_a_file(tmp_path: Path) -> None:

@@ -76,12 +76,6 @@ def test_beside_the_run_few_processes_of_low_priority_film_and_after_it_more(
     assert filmers.started == [19, 19] and sorted(filmers.asked) == KEYS and not filmers.alive
 
 
-def test_nothing_is_started_without_a_film(films: Films, filmers: Filmers) -> None:
-    films.finish()
-    films.close()
-    assert filmers.started == []
-
-
 def raising(error: Exception, key: object = None) -> Callable[..., FilmDone]:
     """A film of `key`, or any, that ends so."""
 
@@ -147,14 +141,6 @@ def test_ctrl_c_leaves_what_is_not_made_for_later(
     assert not filmers.alive
 
 
-def test_films_that_could_not_be_made_are_one_sentence(films: Films) -> None:
-    films.made, films.failed, films.troubles = 7, 2, ["a ends in another state", "b too"]
-    made, failed = module.film_lines(films, 4.2)
-    assert made == "7 films made; waited 4 s for them"
-    assert failed == "warning: 2 films could not be made: a ends in another state"
-    films.close()
-
-
 # --- one film -------------------------------------------------------------------------------------
 
 
@@ -190,11 +176,6 @@ def test_a_trial_whose_first_action_was_refused_has_a_film_too(tmp_path: Path) -
     record = recorded(tmp_path, KEY, NanPolicy())
     assert (record.end, record.steps) == ("policy_error", 0)
     assert len(made(tmp_path, FilmMaker(config(tmp_path)).make(record))) == 6
-
-
-def test_cameras_stand_side_by_side(tmp_path: Path) -> None:
-    maker = FilmMaker(config(tmp_path, cameras=("head", "third")))
-    assert made(tmp_path, maker.make(recorded(tmp_path, KEY)))[0].shape == (240, 640, 3)
 
 
 @pytest.mark.parametrize(

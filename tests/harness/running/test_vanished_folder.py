@@ -5,19 +5,16 @@ from __future__ import annotations
 import shutil
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from fake_runs import KEY, RECORD, other, outcomes, write
-from run_fakes import FakePolicy
+from run_fakes import FakePolicy, request
 
 from robospa.harness.running.atomic_file import StorageError, run_lock
-from robospa.harness.running.evaluate import Request, evaluate
+from robospa.harness.running.evaluate import evaluate
 from robospa.harness.running.executor import RunAborted
 from robospa.harness.running.record_store import RecordWriter, write_actions
-from robospa.harness.running.request import make_request
-from robospa.harness.settings import EvaluationSettings, updated
 from robospa.protocol.policy import TrialInfo
 from robospa.protocol.server import ServerThread
 from robospa.results.lint import lint_actions
@@ -89,21 +86,6 @@ class Vanishing(FakePolicy):
         super().reset(trial)
 
 
-def request(url: str, out: Path, resume: bool = False) -> Request:
-    given: dict[str, Any] = {
-        "policy": url,
-        "out": out,
-        "tasks": "Pick_Blocks_Size",
-        "levels": "1",
-        "trials": 6,
-        "seeds": "100000-100009",
-        "workers": 1,
-        "world": "run_fakes:FakeWorld",
-        "parts": "run_fakes:parts",
-    }
-    return make_request(updated(EvaluationSettings(), given), resume=resume)
-
-
 @pytest.mark.parametrize("vanish", [delete, move])
 def test_a_run_stops_and_its_moved_folder_goes_on(
     tmp_path: Path, vanish: Callable[[Path], None]
@@ -112,12 +94,12 @@ def test_a_run_stops_and_its_moved_folder_goes_on(
     Vanishing.trials, Vanishing.act = 0, staticmethod(lambda: vanish(folder))  # type: ignore[assignment]
     with ServerThread(policy_factory=Vanishing) as server:
         with pytest.raises(RunAborted, match=f"folder {folder} was moved, deleted or replaced"):
-            evaluate(request(server.url, folder))
+            evaluate(request(server.url, folder, 6))
         assert not folder.exists()
         if vanish is move:
             moved = tmp_path / "moved"
             assert len(read_run(moved).missing) == 4
-            evaluate(request(server.url, moved, resume=True))
+            evaluate(request(server.url, moved, 6, resume=True))
             assert not read_run(moved).missing and lint_errors(moved) == set()
 
 
@@ -130,12 +112,12 @@ def test_lost_actions_are_an_error_of_lint_and_named_on_resuming(
 ) -> None:
     folder = tmp_path / "run"
     with ServerThread(policy_factory=FakePolicy) as server:
-        evaluate(request(server.url, folder))
+        evaluate(request(server.url, folder, 6))
         for file in sorted((folder / "actions").iterdir())[:4]:
             file.unlink()
         assert lint_errors(folder) == {"lost-actions"}
         capsys.readouterr()
-        evaluate(request(server.url, folder, resume=True))
+        evaluate(request(server.url, folder, 6, resume=True))
     said = capsys.readouterr().err
     assert "warning: 4 of 6 finished trials have lost the file of their actions: Pick_" in said
     assert "and 1 more; copy them back" in said
