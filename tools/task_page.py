@@ -35,12 +35,11 @@ COUNT = "trials"
 
 HEAD = """# Tasks
 
-Written by `python tools/task_page.py`: do not edit. {bases} base tasks and
-{basics} basic ones for reference, with five levels; pictures show levels {first} and {last}. *n* is
-the number of objects that a guesser could pick or of kinds of things to handle, *T* of subtasks
-(spatial and basic tasks: 1), *limit* of actions (there: 150): one value, each level's, or a range
-in equal steps. `robospa tasks NAME --level 3 --seed 100007` shows a scene.
-[Departures](fidelity.md) from the official tasks.
+Written by `python tools/task_page.py`: do not edit. {bases} base tasks and {basics} basic ones,
+with five levels (pictures: {first} and {last}). *n* counts the objects that a guesser could pick,
+or kinds of things to handle, *T* subtasks (spatial and basic tasks: 1), *limit* actions (there:
+150): one value, each level's, or a range in equal steps.
+`robospa tasks NAME --level 3 --seed 100007` shows a scene.
 
 Percentages are SR/SR@1, of procedures SR/SR@1/PS, of [policies that read no
 sentence](policies.md#floors) at levels 1, 3 and 5, and of [a learned one](learned.md), heat-maps
@@ -56,7 +55,7 @@ def page(root: Path = Path()) -> str:
     found = list(tasks().values())
     basics = sum(task.dimension == "basic" for task in found)
     rates, trials = floors(root / FLOORS)
-    extents = ", ".join(f"{name} {count} trials a task" for name, count in trials.items())
+    extents = ", ".join(f"{name} {count} trials" for name, count in trials.items())
     poor = [name for name, by in rates.items() if set(by.get(EXPERT, "100").split("/")) != {"100"}]
     head = HEAD.format(
         bases=len(found) - basics, basics=basics, first=SHOWN[0], last=SHOWN[-1],
