@@ -21,6 +21,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -153,12 +154,13 @@ def write_trials(folder: Path) -> None:
         trials = () if "--trials" in options else ("--trials", "1")
         words = ("eval", policy, *options, *trials, *scale, "--run-seed", "0", "--workers", "2")
         _robospa(*words, "--out", str(out), codes=(0, 1))  # 1: some trials could not be run
-        lines = [_stripped(line) for path in out.rglob("*.jsonl") for line in path.open()]
-        (folder / f"trials-{name}.txt").write_text("".join(sorted(lines)))
+        records = [json.loads(line) for path in out.rglob("*.jsonl") for line in path.open()]
+        have = {str(r["key"]) for r in records if r["end"] != "infrastructure"}
+        kept = [r for r in records if r["end"] != "infrastructure" or str(r["key"]) not in have]
+        (folder / f"trials-{name}.txt").write_text("".join(sorted(map(_stripped, kept))))
 
 
-def _stripped(line: str) -> str:
-    record = json.loads(line)
+def _stripped(record: dict[str, Any]) -> str:
     record["diagnostics"].pop("final", None)  # the digest of the state says it exactly
     return json.dumps({k: v for k, v in record.items() if k not in TIMES}, sort_keys=True) + "\n"
 
