@@ -164,5 +164,6 @@ def test_killing_the_driver_loses_and_doubles_nothing_and_counts_as_an_attempt(
     true = {int(mark.name): mark.stat().st_size for mark in begun.iterdir()}
     counted = {key.seed: r.attempts for key, r in records.items()}
     print(f"{len(codes) - 2} drivers killed, {sum(true.values())} attempts")
-    assert counted == true and sum(true.values()) >= 4 * KILLS
+    assert counted == true
+    assert all(count > 1 for seed, count in true.items() if seed % 6 == 0)
     assert {x.cause for r in records.values() for x in r.retries} == {"interrupted"}
