@@ -35,7 +35,7 @@ def test_a_packed_run_is_valid(whole: Path) -> None:
     files = unzip(whole / "b.zip")
     assert b"secret" not in b"".join(files.values()), "addresses and command lines stay at home"
     assert "arguments" not in json.loads(files["run.json"])["about"]
-    assert len([name for name in files if name.startswith("videos/")]) == 1
+    assert sum(name.startswith("videos/") for name in files) == 1
 
 
 def test_the_same_run_gives_the_same_bytes(whole: Path, tmp_path: Path) -> None:
