@@ -35,7 +35,7 @@ from robospa.results.scoring.repeats import (
     fault_rates,
 )
 from robospa.results.statistics.samples import onta_of_percent
-from robospa.text import some
+from robospa.text import counted, some
 from robospa.trial import PROCEDURAL
 
 FASTEST_STEP = 4e-6
@@ -260,7 +260,7 @@ def _lint_limits(run: Run, name: str) -> Iterator[Finding]:
         yield Finding("unknown-checkpoint", "note", name, text)
     if (drivers := run.manifest.about.drivers) > 1:
         cut = sum(x.cause == INTERRUPTED for r in run.records.values() for x in r.retries)
-        text = f"{drivers} drivers ran it one after the other, whose ends cut off {cut} attempts"
+        text = f"{drivers} drivers ran it one after the other, whose ends cut off {counted(cut, 'attempt')}"
         yield Finding("drivers", "note", name, text)
 
 

@@ -163,7 +163,7 @@ def test_an_attempt_under_way_is_waited_for_until_its_driver_is_gone(tmp_path: P
     assert found.missing and [f.rule for f in lint_run(found)] == ["missing"]
     more = structs.replace(found.manifest, about=RunAbout(drivers=2))
     (drivers,) = [f for f in lint_run(replace(found, manifest=more)) if f.rule == "drivers"]
-    assert "2 drivers" in drivers.text and "cut off 1 attempts" in drivers.text
+    assert "2 drivers" in drivers.text and "cut off 1 attempt" in drivers.text
 
 
 def test_a_server_that_is_away_costs_no_attempt_for_ever(tmp_path: Path) -> None:
