@@ -260,7 +260,7 @@ def _lint_limits(run: Run, name: str) -> Iterator[Finding]:
         yield Finding("unknown-checkpoint", "note", name, text)
     if (drivers := run.manifest.about.drivers) > 1:
         cut = sum(x.cause == INTERRUPTED for r in run.records.values() for x in r.retries)
-        text = f"{drivers} drivers ran it one after the other, whose ends cut off {counted(cut, 'attempt')}"
+        text = f"{drivers} drivers ran it in turn, whose ends cut off {counted(cut, 'attempt')}"
         yield Finding("drivers", "note", name, text)
 
 
