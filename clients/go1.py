@@ -25,19 +25,10 @@ from typing import Any
 
 import numpy as np
 
+from robospa.clients import model_policy
 from robospa.clients.chunks import ChunkOptions, Frequency
 from robospa.clients.dialect import ConnectionParams, Dialect, Probe
 from robospa.clients.http import HttpSession, chunk_of, dumps
-from robospa.clients.model_policy import (
-    Chunk,
-    ModelPolicy,
-    Query,
-    describe_checkpoint,
-    existing,
-    import_code,
-    import_torch,
-    seeded_rows,
-)
 from robospa.observation import Observation
 from robospa.protocol.options import option
 
@@ -147,25 +138,25 @@ class Go1ServerOptions(Go1Conventions):
             raise ValueError("option checkpoint is needed: the folder of the fine-tuned model")
 
 
-class Go1(ModelPolicy):
+class Go1(model_policy.ModelPolicy):
     """The official class, one observation at a time."""
 
     def __init__(self, model: Any, options: Go1ServerOptions) -> None:
         super().__init__()
         self.model, self.options = model, options
-        checkpoint = describe_checkpoint(options.checkpoint)
+        checkpoint = model_policy.describe_checkpoint(options.checkpoint)
         self.spec = options.spec_of("go1", seeded=True, checkpoint=checkpoint)
 
-    def predict(self, queries: Sequence[Query]) -> list[Chunk]:
+    def predict(self, queries: Sequence[model_policy.Query]) -> list[model_policy.Chunk]:
         """One chunk (T, 14) of absolute joint targets per query."""
         chunks = []
         for query in queries:
-            with seeded_rows([query.seed]):
+            with model_policy.seeded_rows([query.seed]):
                 answer = self.model.inference(self._payload(query))
             chunks.append(np.array(answer, np.float32)[: self.options.horizon])
         return chunks
 
-    def _payload(self, query: Query) -> dict[str, Any]:
+    def _payload(self, query: model_policy.Query) -> dict[str, Any]:
         """What its server would have read from the wire, in arrays of its own."""
         inputs = self.options.inputs(query.observation)
         return {k: np.array(v) if isinstance(v, np.ndarray) else v for k, v in inputs.items()}
@@ -173,7 +164,9 @@ class Go1(ModelPolicy):
 
 def create(options: Go1ServerOptions) -> Go1:
     """Load the model. Raises ModelMissing."""
-    import_torch()
-    source = import_code("evaluate.deploy", options.code, "a checkout of AgiBot-World")
-    stats = None if options.stats is None else existing(options.stats, "stats")
-    return Go1(source.GO1Infer(existing(options.checkpoint, "checkpoint"), stats), options)
+    model_policy.import_torch()
+    source = model_policy.import_code("evaluate.deploy", options.code, "a checkout of AgiBot-World")
+    stats = None if options.stats is None else model_policy.existing(options.stats, "stats")
+    return Go1(
+        source.GO1Infer(model_policy.existing(options.checkpoint, "checkpoint"), stats), options
+    )

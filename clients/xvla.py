@@ -30,20 +30,10 @@ from msgspec import Meta
 from numpy.typing import NDArray
 
 from robospa.action_space import ActionSpace
+from robospa.clients import model_policy
 from robospa.clients.chunks import ChunkOptions, Count, invert_grippers, refuse_unread
 from robospa.clients.dialect import ConnectionParams, Dialect, Probe
 from robospa.clients.http import HttpSession, chunk_of, dumps
-from robospa.clients.model_policy import (
-    Chunk,
-    ModelMissing,
-    ModelPolicy,
-    Query,
-    describe_checkpoint,
-    import_code,
-    import_torch,
-    pillow_image,
-    seeded_rows,
-)
 from robospa.clients.state_encoding import (
     ARM,
     LAYOUTS,
@@ -270,7 +260,7 @@ class XvlaServerOptions(XvlaConventions):
             raise ValueError("option checkpoint is needed: a folder or a hub name")
 
 
-class Xvla(ModelPolicy):
+class Xvla(model_policy.ModelPolicy):
     """The official model and its processor."""
 
     def __init__(self, model: Any, processor: Any, options: XvlaServerOptions) -> None:
@@ -288,12 +278,12 @@ class Xvla(ModelPolicy):
             options.spec_of_model(options.text_budget),
             batch=options.batch,
             seeded=True,
-            checkpoint=describe_checkpoint(options.checkpoint),
+            checkpoint=model_policy.describe_checkpoint(options.checkpoint),
         )
 
-    def predict(self, queries: Sequence[Query]) -> list[Chunk]:
+    def predict(self, queries: Sequence[model_policy.Query]) -> list[model_policy.Chunk]:
         """One chunk per query: `ee` actions (T, 16), or joint targets (T, 14)."""
-        torch = import_torch()
+        torch = model_policy.import_torch()
         shown = [self._shown(query) for query in queries]
         inputs = {name: torch.cat([one[name] for one in shown]) for name in shown[0]}
         inputs["proprio"] = torch.from_numpy(
@@ -307,32 +297,34 @@ class Xvla(ModelPolicy):
             else value.to(weight.device)
             for name, value in inputs.items()
         }
-        with torch.inference_mode(), seeded_rows([query.seed for query in queries]):
+        with torch.inference_mode(), model_policy.seeded_rows([query.seed for query in queries]):
             answer = self.model.generate_actions(**inputs, steps=self.options.steps)
         chunks = answer.float().cpu().numpy()[:, : self.options.horizon]
         return [self.encoding.actions(query, c) for query, c in zip(queries, chunks, strict=True)]
 
-    def _shown(self, query: Query) -> dict[str, Any]:
+    def _shown(self, query: model_policy.Query) -> dict[str, Any]:
         """What the processor makes of images and text: tensors whose first axis is 1."""
         images = [query.observation["images"][name] for name in self.options.views]
         if self.options.colors == "bgr":
             images = [np.ascontiguousarray(image[..., ::-1]) for image in images]
-        views = [pillow_image().fromarray(image) for image in images]
+        views = [model_policy.pillow_image().fromarray(image) for image in images]
         inputs = self.processor(views, query.observation["instruction"])
         lacking = {"input_ids", "image_input", "image_mask"} - set(inputs)
         if lacking:
-            raise ModelMissing(f"the checkpoint's processor gives no {', '.join(sorted(lacking))}")
+            raise model_policy.ModelMissing(
+                f"the checkpoint's processor gives no {', '.join(sorted(lacking))}"
+            )
         return dict(inputs)
 
 
 def create(options: XvlaServerOptions) -> Xvla:
     """Load the model. Raises ModelMissing."""
-    torch = import_torch()
-    modeling = import_code("models.modeling_xvla", options.code, CHECKOUT)
-    processing = import_code("models.processing_xvla", options.code, CHECKOUT)
+    torch = model_policy.import_torch()
+    modeling = model_policy.import_code("models.modeling_xvla", options.code, CHECKOUT)
+    processing = model_policy.import_code("models.processing_xvla", options.code, CHECKOUT)
     try:
         processor = processing.XVLAProcessor.from_pretrained(options.checkpoint)
         model = modeling.XVLA.from_pretrained(options.checkpoint, torch_dtype=torch.float32)
     except OSError as error:
-        raise ModelMissing(f"cannot load {options.checkpoint}: {error}") from error
+        raise model_policy.ModelMissing(f"cannot load {options.checkpoint}: {error}") from error
     return Xvla(model.to(options.device).to(torch.float32).eval(), processor, options)

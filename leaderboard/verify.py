@@ -20,21 +20,10 @@ from msgspec import Meta, Struct, to_builtins
 
 from robospa.harness.running.status import cores
 from robospa.leaderboard import bundle as layout
+from robospa.leaderboard import rules
 from robospa.leaderboard.bundle import BundleError
 from robospa.leaderboard.card import Card, check_checkpoints, to_card
 from robospa.leaderboard.evidence import Validity, announced
-from robospa.leaderboard.rules import (
-    ONE,
-    Done,
-    Reference,
-    check_card_fits,
-    check_categories,
-    check_scenes,
-    check_seeds,
-    check_settings,
-    manifest_of,
-    spec_of,
-)
 from robospa.leaderboard.traces import Trace, decode, most_bytes
 from robospa.leaderboard.trial_rows import check_record, check_trace, read_rows, trace_hash
 from robospa.results.comparison.compare import Difference, compare_results, over_levels
@@ -81,11 +70,11 @@ class Valid:
 
 def verify(
     path: Path,
-    reference: Reference,
+    reference: rules.Reference,
     practice: bool = False,
     limits: layout.BundleLimits | None = None,
     workers: int = 0,
-    done: Done = lambda count, trials: None,
+    done: rules.Done = lambda count, trials: None,
 ) -> Valid:
     """The bundle at `path`, if it is valid; BundleError saying in one sentence why not.
 
@@ -95,7 +84,7 @@ def verify(
     with layout.BundleArchive(path, limits) as archive:
         manifest = _manifest(archive, reference, practice)
         archive.listed = manifest.files
-        claimed = manifest_of(said := archive.read_map(layout.RUN))
+        claimed = rules.manifest_of(said := archive.read_map(layout.RUN))
         if where := compare_scores(claimed.to_json(), said):
             raise BundleError(f"{layout.RUN} says what no run says: {where}")
         keys = _keys(claimed, archive.limits)
@@ -112,7 +101,7 @@ def verify(
         _check_derived(archive, run)
         _check_videos(archive, manifest, records)
         archive.all_used()
-    check_scenes(records, reference.parts, workers or cores(), done)
+    rules.check_scenes(records, reference.parts, workers or cores(), done)
     evidence = Validity(
         bundle=manifest.bundle,
         trials=len(keys),
@@ -125,7 +114,7 @@ def verify(
     return Valid(path, manifest, card, run, traces, evidence)
 
 
-def check_run(run: Run, card: Card, reference: Reference, practice: bool) -> list[str]:
+def check_run(run: Run, card: Card, reference: rules.Reference, practice: bool) -> list[str]:
     """Warnings of our lint; BundleError unless a run may enter a leaderboard under `card`."""
     check_listed(run.manifest, run.keys, card, reference, practice)
     if missing := run.without_result:
@@ -137,23 +126,27 @@ def check_run(run: Run, card: Card, reference: Reference, practice: bool) -> lis
 
 
 def check_listed(
-    run: RunManifest, keys: Sequence[TrialKey], card: Card, reference: Reference, practice: bool
+    run: RunManifest,
+    keys: Sequence[TrialKey],
+    card: Card,
+    reference: rules.Reference,
+    practice: bool,
 ) -> None:
     """BundleError unless settings, card and the listed trials `keys` fit the benchmark and each
     other."""
-    settings = check_settings(run, reference)
-    for name in ONE:
+    settings = rules.check_settings(run, reference)
+    for name in rules.ONE:
         if strange := [k for k in keys if getattr(k, name) != getattr(settings, name)[0]]:
             raise BundleError(f"{strange[0].slug[:120]!a} is not of the run's {name}")
-    check_seeds(keys, reference, practice)
+    rules.check_seeds(keys, reference, practice)
     tasks = list(dict.fromkeys(key.task for key in keys))
     check_checkpoints(card, tasks)
-    check_categories(run, tasks, reference)
+    rules.check_categories(run, tasks, reference)
     for task in tasks:
-        check_card_fits(card, settings, task)
+        rules.check_card_fits(card, settings, task)
 
 
-def check_records(run: Run, reference: Reference) -> list[str]:
+def check_records(run: Run, reference: rules.Reference) -> list[str]:
     """Warnings of our lint; BundleError for a record that cannot be, and the lint's first error."""
     for record in run.records.values():
         check_record(record, reference, run.manifest.settings)
@@ -170,7 +163,7 @@ def check_records(run: Run, reference: Reference) -> list[str]:
 
 
 def _manifest(
-    archive: layout.BundleArchive, reference: Reference, practice: bool
+    archive: layout.BundleArchive, reference: rules.Reference, practice: bool
 ) -> layout.BundleManifest:
     """The manifest, held against the archive."""
     data = archive.read_map(layout.MANIFEST)
@@ -255,7 +248,10 @@ def _variants(records: Mapping[TrialKey, TrialRecord]) -> Iterator[list[TrialRec
 
 
 def _check_actions(
-    archive: layout.BundleArchive, run: Run, traces: Mapping[TrialKey, str], reference: Reference
+    archive: layout.BundleArchive,
+    run: Run,
+    traces: Mapping[TrialKey, str],
+    reference: rules.Reference,
 ) -> None:
     """BundleError unless every stored array has its row's and record's hash.
 
@@ -263,7 +259,7 @@ def _check_actions(
     """
 
     def check(found: Sequence[TrialRecord]) -> None:
-        space = spec_of(run.manifest.settings, found[0].key.task).action
+        space = rules.spec_of(run.manifest.settings, found[0].key.task).action
         _check_variant(archive, found, traces, reference, space)
 
     pool = ThreadPoolExecutor(THREADS)
@@ -278,7 +274,7 @@ def _check_variant(
     archive: layout.BundleArchive,
     found: Sequence[TrialRecord],
     traces: Mapping[TrialKey, str],
-    reference: Reference,
+    reference: rules.Reference,
     space: str,
 ) -> None:
     name = layout.actions_name(*found[0].key.variant)

@@ -25,35 +25,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.observation import Observation
+from robospa.protocol import errors, messages
 from robospa.protocol.codec import DEFAULT_LIMITS, Limits, encode_images
-from robospa.protocol.errors import (
-    CallTimeout,
-    ConnectionLost,
-    DecodeError,
-    HandshakeError,
-    PolicyAnswerError,
-    ProtocolViolation,
-    ServerError,
-    SpecMismatch,
-    TransportError,
-    printable,
-)
-from robospa.protocol.messages import (
-    BAD_ANSWER,
-    BUSY,
-    SUBPROTOCOL,
-    Actions,
-    End,
-    Ended,
-    Error,
-    Hello,
-    Infer,
-    Message,
-    Ready,
-    Reset,
-    pack,
-    unpack,
-)
 from robospa.protocol.policy import PolicySpec, TrialInfo, check_chunk, check_size
 from robospa.protocol.transport import Address, Timeouts, Transport
 
@@ -171,7 +144,7 @@ def _shown(value: object) -> str:
     return text if len(text) <= SHOWN else f"{text[: SHOWN - 3]}..."
 
 
-M = TypeVar("M", bound=Message)
+M = TypeVar("M", bound=messages.Message)
 T = TypeVar("T")
 FIRST_PAUSE, LONGEST_PAUSE = 0.02, 1.0
 """[s] between two requests to a server that is busy."""
@@ -267,11 +240,11 @@ class RemotePolicy:
         while True:
             try:
                 return request()
-            except ServerError as error:
-                if error.code != BUSY:
+            except errors.ServerError as error:
+                if error.code != messages.BUSY:
                     raise
                 if time.monotonic() + pause > give_up:
-                    raise CallTimeout(
+                    raise errors.CallTimeout(
                         f"{self.url} was busy for {timeout:g} s ({error.message}); use fewer "
                         "workers, or allow more time"
                     ) from error
@@ -294,7 +267,7 @@ class RemotePolicy:
         changes = self._expected.changes(found) if self._expected is not None else []
         if changes:
             session.close()
-            raise SpecMismatch(
+            raise errors.SpecMismatch(
                 f"the server at {self.url} is another one than before: {'; '.join(changes)}; "
                 "start the first one again, or a new run for this one"
             )
@@ -326,7 +299,7 @@ class _RobospaClient:
 
     def __init__(self, transport: Transport, timeouts: Timeouts, limits: Limits) -> None:
         self._transport, self._timeouts, self._limits = transport, timeouts, limits
-        hello = self._receive(Hello, 0, timeouts.hello)
+        hello = self._receive(messages.Hello, 0, timeouts.hello)
         self.spec = hello.spec
         check_size(hello.spec, limits, transport.url)
         self.hello: dict[str, object] = {
@@ -337,56 +310,58 @@ class _RobospaClient:
         }
 
     def reset(self, id: int, trial: TrialInfo) -> None:
-        self._call(Reset(id, trial), Ready, self._timeouts.reset)
+        self._call(messages.Reset(id, trial), messages.Ready, self._timeouts.reset)
 
     def infer(
         self, id: int, observation: Observation, timeout: float
     ) -> tuple[object, Mapping[str, float]]:
-        actions = self._call(Infer(id, observation), Actions, timeout)
+        actions = self._call(messages.Infer(id, observation), messages.Actions, timeout)
         return actions.chunk, actions.timing
 
     def end(self, id: int, outcome: Mapping[str, object]) -> None:
-        self._call(End(id, outcome), Ended, self._timeouts.end)
+        self._call(messages.End(id, outcome), messages.Ended, self._timeouts.end)
 
     def close(self) -> None:
         self._transport.close()
 
-    def _call(self, request: Message, answer: type[M], timeout: float) -> M:
-        self._transport.send(pack(request, self._limits))
+    def _call(self, request: messages.Message, answer: type[M], timeout: float) -> M:
+        self._transport.send(messages.pack(request, self._limits))
         return self._receive(answer, request.id, timeout)
 
     def _receive(self, expected: type[M], id: int, timeout: float) -> M:
         data = self._transport.receive(timeout, expected.type)
         if isinstance(data, str):
-            text = printable(data, 200)
+            text = errors.printable(data, 200)
             raise self._violation(f"a text frame came instead of {expected.type}: {text!r}")
         try:
-            message = unpack(data, self._limits)
-        except DecodeError as error:
+            message = messages.unpack(data, self._limits)
+        except errors.DecodeError as error:
             raise self._violation(f"the answer cannot be read: {error}") from error
-        if isinstance(message, Error) and message.id in (id, 0):
+        if isinstance(message, messages.Error) and message.id in (id, 0):
             if message.id == 0:
                 self.close()
-                reason = printable(message.message)
-                raise ConnectionLost(f"{self._transport.url} gave up the connection: {reason}")
-            if message.code == BAD_ANSWER:
-                raise PolicyAnswerError(printable(message.message))
+                reason = errors.printable(message.message)
+                raise errors.ConnectionLost(
+                    f"{self._transport.url} gave up the connection: {reason}"
+                )
+            if message.code == messages.BAD_ANSWER:
+                raise errors.PolicyAnswerError(errors.printable(message.message))
             url = self._transport.url
-            raise ServerError(message.code, message.message, message.retriable, url)
+            raise errors.ServerError(message.code, message.message, message.retriable, url)
         if message.id != id:
             raise self._violation(f"answer {message.id} came to request {id}")
         if not isinstance(message, expected):
             raise self._violation(f"{message.type} came where {expected.type} was expected")
         return message
 
-    def _violation(self, reason: str) -> TransportError:
+    def _violation(self, reason: str) -> errors.TransportError:
         self.close()
         return violation(self._transport.url, reason)
 
 
-def violation(url: str, reason: str) -> TransportError:
+def violation(url: str, reason: str) -> errors.TransportError:
     """The error for something that the protocol does not allow."""
-    return ProtocolViolation(
+    return errors.ProtocolViolation(
         f"{url} broke the protocol: {reason}; robospa check lists what else it gets wrong"
     )
 
@@ -419,15 +394,15 @@ def open_wire(
 
     Without `other` such a server is a HandshakeError.
     """
-    transport = Transport(address, timeouts, limits, SUBPROTOCOL)
+    transport = Transport(address, timeouts, limits, messages.SUBPROTOCOL)
     try:
         if transport.subprotocol is not None:
             return _RobospaClient(transport, timeouts, limits)
         if other is not None:
             return other(transport)
-        raise HandshakeError(
-            f"{address.url} does not speak {SUBPROTOCOL}: if it is the server of another project, "
-            "connect with robospa.connect and the scheme of its dialect"
+        raise errors.HandshakeError(
+            f"{address.url} does not speak {messages.SUBPROTOCOL}: if it is the server of another "
+            "project, connect with robospa.connect and the scheme of its dialect"
         )
     except BaseException:
         transport.close()

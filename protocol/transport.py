@@ -34,17 +34,8 @@ from websockets.sync.client import ClientConnection
 from websockets.sync.client import connect as websocket_connect
 from websockets.typing import Subprotocol
 
+from robospa.protocol import errors
 from robospa.protocol.codec import DEFAULT_LIMITS, Limits
-from robospa.protocol.errors import (
-    CallTimeout,
-    ConnectFailed,
-    ConnectionLost,
-    HandshakeError,
-    TransportError,
-    Unauthorized,
-    printable,
-    without_secrets,
-)
 from robospa.protocol.messages import SUBPROTOCOL
 
 T = TypeVar("T")
@@ -147,7 +138,7 @@ class Transport:
             return self._socket.recv(timeout)
         except TimeoutError as error:
             self.close()
-            raise CallTimeout(
+            raise errors.CallTimeout(
                 f"{self.url} did not send {what} within {timeout:g} s; "
                 "look at the server's log, or allow more time"
             ) from error
@@ -166,9 +157,9 @@ class Transport:
         """Close; harmless when closed already."""
         self._socket.close()
 
-    def _lost(self, when: str, error: Exception) -> TransportError:
+    def _lost(self, when: str, error: Exception) -> errors.TransportError:
         self.close()
-        return ConnectionLost(
+        return errors.ConnectionLost(
             f"the connection to {self.url} ended {when}: {why_closed(error, self._limit)}"
         )
 
@@ -184,10 +175,10 @@ def why_closed(error: Exception, limit: int) -> str:
                 "is it a policy server?"
             )
         if error.sent.code in (CloseCode.PROTOCOL_ERROR, CloseCode.INVALID_DATA):
-            reason = printable(error.sent.reason)
+            reason = errors.printable(error.sent.reason)
             return f"the server broke the rules of WebSocket ({reason}); is it a policy server?"
     if error.rcvd is not None:
-        reason = f"{error.rcvd.code:d}: {printable(error.rcvd.reason) or 'no reason given'}"
+        reason = f"{error.rcvd.code:d}: {errors.printable(error.rcvd.reason) or 'no reason given'}"
         return f"the server closed it ({reason}); look at its log"
     return "it was closed without a reason; look at the server's log"
 
@@ -210,14 +201,14 @@ def connect_until(url: str, wait: float, connect: Callable[[], T]) -> T:
         try:
             return connect()
         except ConnectionRefusedError as error:
-            failure: Exception = ConnectFailed(
+            failure: Exception = errors.ConnectFailed(
                 f"cannot connect to {url}: nothing listens there; start the policy server first"
             )
             cause: BaseException | None = error
         except NotYet as error:
             failure, cause = error.error, error.__cause__
         except OSError as error:
-            raise ConnectFailed(f"cannot connect to {url}: {error}") from error
+            raise errors.ConnectFailed(f"cannot connect to {url}: {error}") from error
         if time.monotonic() >= give_up:
             raise failure from cause
         time.sleep(0.05)
@@ -237,7 +228,7 @@ def _open(
             return connect_until(here.url, timeouts.wait, attempt), here.url
         except _Redirected as error:
             address = _moved(here, error.location)
-    raise HandshakeError(f"{here.url} redirects for ever")
+    raise errors.HandshakeError(f"{here.url} redirects for ever")
 
 
 def _attempt(
@@ -254,15 +245,15 @@ def _attempt(
             raise NotYet(refused) from error
         raise refused from error
     except TimeoutError as error:
-        raise ConnectFailed(
+        raise errors.ConnectFailed(
             f"{address.url} did not finish the handshake within {timeouts.connect:g} s; "
             "look at the server's log"
         ) from error
     except (OSError, ValueError, EOFError, WebSocketException) as error:
         if not _hung_up(error):
-            raise ConnectFailed(f"cannot connect to {address.url}: {error}") from error
+            raise errors.ConnectFailed(f"cannot connect to {address.url}: {error}") from error
         raise NotYet(
-            ConnectFailed(
+            errors.ConnectFailed(
                 f"cannot connect to {address.url}: it hung up during the handshake ({error}); "
                 "start the policy server behind it"
             )
@@ -277,8 +268,8 @@ def _moved(address: Address, location: str) -> Address:
     there = urlsplit(url)
     safe = there.scheme == "wss" or (there.scheme == "ws" and here.scheme == "ws")
     if not location or not safe or there.hostname != here.hostname or "@" in there.netloc:
-        target = printable(without_secrets(location), 200) or "nowhere"
-        raise HandshakeError(
+        target = errors.printable(errors.without_secrets(location), 200) or "nowhere"
+        raise errors.HandshakeError(
             f"{address.url} redirects to {target}, which is not "
             "followed to another host: give the address of the policy server itself"
         )
@@ -302,7 +293,7 @@ def _open_once(
     parts = urlsplit(address.url)
     if parts.scheme not in ("ws", "wss") or not parts.hostname or "@" in parts.netloc:
         raise BadAddress(
-            f"{without_secrets(address.url)!r} is not of the form ws://host:port or wss://host:port"
+            f"{errors.without_secrets(address.url)!r} is not of the form ws://host:port or wss://host:port"
         )
     sock = None
     if is_loopback(parts.hostname):
@@ -333,12 +324,14 @@ def _open_once(
 
 def _refused(address: Address, error: InvalidStatus) -> Exception:
     status = error.response.status_code
-    body = printable(bytes(error.response.body or b"").decode("utf-8", "replace"))
+    body = errors.printable(bytes(error.response.body or b"").decode("utf-8", "replace"))
     if status == HTTPStatus.UNAUTHORIZED:
-        return Unauthorized(f"{address.url} refused the token: {body or status}")
+        return errors.Unauthorized(f"{address.url} refused the token: {body or status}")
     if status in (HTTPStatus.BAD_REQUEST, HTTPStatus.FORBIDDEN, HTTPStatus.UPGRADE_REQUIRED):
-        return HandshakeError(f"{address.url} refused the connection: {body or status}")
-    return ConnectFailed(f"{address.url} answered HTTP {status}: {body or 'no reason given'}")
+        return errors.HandshakeError(f"{address.url} refused the connection: {body or status}")
+    return errors.ConnectFailed(
+        f"{address.url} answered HTTP {status}: {body or 'no reason given'}"
+    )
 
 
 SOCKET_BUFFER = 4 * 2**20

@@ -25,20 +25,8 @@ from typing import TYPE_CHECKING, Any
 from robospa.harness.clock.policy_clock import PolicyClock
 from robospa.harness.factory import is_url, load_function, open_policy
 from robospa.harness.pool import Child
+from robospa.harness.running import executor
 from robospa.harness.running.atomic_file import LOGS, StorageError, log_to
-from robospa.harness.running.executor import (
-    Command,
-    Executor,
-    Fatal,
-    Message,
-    RunTrial,
-    Stop,
-    TrialBegins,
-    TrialDone,
-    TrialLost,
-    WorkerHandle,
-    WorkerReady,
-)
 from robospa.harness.running.heartbeat import ComputeLock, HeartbeatSender, MonitoredPolicy
 from robospa.harness.running.manifest import this_processor
 from robospa.harness.running.policy_probe import over_budget
@@ -268,7 +256,7 @@ def describe(error: BaseException) -> str:
     return text if text and module.startswith("robospa.") else f"{type(error).__name__}: {text}"
 
 
-def _attempt(worker: Worker, command: RunTrial) -> Message:
+def _attempt(worker: Worker, command: executor.RunTrial) -> executor.Message:
     from robospa.harness.running.status import connection_fault, retry_cause
     from robospa.harness.world import SceneUnstable
     from robospa.registry import UnknownName
@@ -276,28 +264,30 @@ def _attempt(worker: Worker, command: RunTrial) -> Message:
 
     key = command.key
     try:
-        return TrialDone(worker.run(key, command.target, command.retries))
+        return executor.TrialDone(worker.run(key, command.target, command.retries))
     except (SceneUnstable, PackError) as error:
         if isinstance(error, PackError):  # the world may hold a part of the scene
             worker.recover()
-        return TrialLost(key, RetryRow("harness_error", describe(error), 0), retry=False)
+        return executor.TrialLost(key, RetryRow("harness_error", describe(error), 0), retry=False)
     except (UnknownName, StorageError) as error:
-        return Fatal(describe(error))
+        return executor.Fatal(describe(error))
     except Exception as error:  # the driver decides: retry, then report as missing
         with contextlib.suppress(OSError):  # the log's disk may be full
             traceback.print_exc()
         row = RetryRow(retry_cause(error, worker.in_trial), describe(error), worker.steps)
         fault = connection_fault(error, worker.in_trial)
         worker.recover()
-        return TrialLost(key, row, fault=fault)
+        return executor.TrialLost(key, row, fault=fault)
 
 
 def _serve(
-    commands: Connection[Any, RunTrial | Stop], send: Callable[[Message], None], worker: Worker
+    commands: Connection[Any, executor.RunTrial | executor.Stop],
+    send: Callable[[executor.Message], None],
+    worker: Worker,
 ) -> None:
     while True:
         command = commands.recv()
-        if isinstance(command, Stop):
+        if isinstance(command, executor.Stop):
             return
         with worker.heartbeat.computing():
             message = _attempt(worker, command)
@@ -310,18 +300,18 @@ def _hold(
     """Run the trials that come through `pipe`, one after the other, until it says Stop."""
     sending = threading.Lock()
 
-    def send(message: Message) -> None:
+    def send(message: executor.Message) -> None:
         with sending:
             pipe.send(message)
 
     def announce() -> None:
-        send(TrialBegins())
+        send(executor.TrialBegins())
         pipe.recv()  # Proceed; EOFError if the driver is gone
 
     worker = Worker(config, writer, HeartbeatSender(send, turn), announce)
     worker.heartbeat.start()
     try:
-        send(WorkerReady(writer.path, this_processor()))
+        send(executor.WorkerReady(writer.path, this_processor()))
         _serve(pipe, send, worker)
     except (EOFError, ConnectionError):
         return
@@ -347,7 +337,7 @@ def main(pipes: Sequence[Connection], argument: tuple[WorkerConfig, str]) -> Non
         log_to(config.folder / LOGS / f"{name}.log")
         writer = RecordWriter(config.folder)
     except StorageError as error:
-        pipes[0].send(Fatal(describe(error)))
+        pipes[0].send(executor.Fatal(describe(error)))
         return
     if len(pipes) > 1:
         sys.setswitchinterval(SWITCH_SECONDS)
@@ -365,7 +355,7 @@ def main(pipes: Sequence[Connection], argument: tuple[WorkerConfig, str]) -> Non
         writer.close()
 
 
-class LocalWorker(WorkerHandle):
+class LocalWorker(executor.WorkerHandle):
     """One worker process and the pipe of one trial that it may hold; `spare` are those of more."""
 
     def __init__(
@@ -379,15 +369,15 @@ class LocalWorker(WorkerHandle):
         """A place for one more trial; None if there is none."""
         return LocalWorker(self.process, self._spare.pop(), self.name) if self._spare else None
 
-    def send(self, command: Command) -> None:
+    def send(self, command: executor.Command) -> None:
         """Send it a command; nothing happens if it has ended. To stop it stops unused places."""
-        for pipe in [self.pipe, *(self._spare if isinstance(command, Stop) else ())]:
+        for pipe in [self.pipe, *(self._spare if isinstance(command, executor.Stop) else ())]:
             with contextlib.suppress(OSError):  # it has just died, which `exit_status` reports
                 pipe.send(command)
 
-    def messages(self) -> list[Message]:
+    def messages(self) -> list[executor.Message]:
         """What it has sent since the last call; also after it has ended."""
-        received: list[Message] = []
+        received: list[executor.Message] = []
         try:
             while self.pipe.poll():
                 received.append(self.pipe.recv())
@@ -412,7 +402,7 @@ class LocalWorker(WorkerHandle):
         self.process.close()
 
 
-class LocalExecutor(Executor):
+class LocalExecutor(executor.Executor):
     """At most `workers` processes on this machine, with up to `concurrent_trials` each."""
 
     def __init__(self, config: WorkerConfig, workers: int, concurrent_trials: int = 1) -> None:
@@ -429,6 +419,6 @@ class LocalExecutor(Executor):
         first, *spare = process.pipes
         return LocalWorker(process, first, name, spare)
 
-    def wait(self, workers: Sequence[WorkerHandle], seconds: float) -> None:
+    def wait(self, workers: Sequence[executor.WorkerHandle], seconds: float) -> None:
         """Return as soon as one of `workers` has sent something or ended, or after `seconds`."""
         wait([worker.pipe for worker in workers if isinstance(worker, LocalWorker)], seconds)

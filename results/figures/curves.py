@@ -9,18 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from robospa.results.comparison.latency_curve import LatencyCurve
-from robospa.results.figures.series import (
-    COLOURS,
-    DASHES,
-    MARKERS,
-    WIDTH,
-    label_of,
-    legend_below,
-    new_figure,
-    plain,
-    styled,
-    whiskers,
-)
+from robospa.results.figures import series
 from robospa.results.scoring.scores import Scores
 from robospa.results.statistics.intervals import Estimate
 from robospa.trial import METRIC_NAMES
@@ -38,13 +27,16 @@ def draw_latency_curves(curves: Sequence[LatencyCurve]) -> Figure:
     the latency at which half of the success is gone."""
     from matplotlib.lines import Line2D
 
-    figure = new_figure(2.1)
+    figure = series.new_figure(2.1)
     axis = figure.subplots()
     handles = []
     last = max(curve.points[-1].latency for curve in curves)
     for i, curve in enumerate(curves):
-        colour, marker = COLOURS[i % len(COLOURS)], MARKERS[i % len(MARKERS)]
-        dash, name = DASHES[i % len(DASHES)], _curve_name(curve)
+        colour, marker = (
+            series.COLOURS[i % len(series.COLOURS)],
+            series.MARKERS[i % len(series.MARKERS)],
+        )
+        dash, name = series.DASHES[i % len(series.DASHES)], _curve_name(curve)
         handles.append(Line2D([], [], color=colour, marker=marker, ls=dash, ms=3, label=name))
         rates = [100 * point.success.value for point in curve.points]
         spans = [(100 * p.success.low, 100 * p.success.high) for p in curve.points]
@@ -75,14 +67,14 @@ def draw_latency_curves(curves: Sequence[LatencyCurve]) -> Figure:
     axis.set_ylim(min(-4, -1 - 3.0 * len(curves)), 104)
     axis.set_xlabel("declared latency of an answer [ms]")
     axis.set_ylabel("SR [%]")
-    plain(axis)
-    legend_below(figure, handles, 1)
+    series.plain(axis)
+    series.legend_below(figure, handles, 1)
     return figure
 
 
 def _curve_name(curve: LatencyCurve) -> str:
     """The policy, how its chunks follow each other, and where half of its success is gone."""
-    name = f"{label_of(curve.policy, MOST_LETTERS)}, {curve.clock}"
+    name = f"{series.label_of(curve.policy, MOST_LETTERS)}, {curve.clock}"
     if curve.half is None or not math.isfinite(curve.half.value):
         return name
     return f"{name}: half at {curve.half.value:.0f} ms"
@@ -113,7 +105,7 @@ def draw_learning_curve(points: Sequence[CurvePoint], metric: str = "sr") -> Fig
     levels = sorted({level for point in points for level in point.scores.levels})
     if not any(value_at(point, MEAN, metric) for point in points):
         raise ValueError(f"none of the runs has the metric {metric}: choose another")
-    figure = new_figure(2.1)
+    figure = series.new_figure(2.1)
     left, right = figure.subplots(1, 2, sharey=True)
     for i, level in enumerate((*levels, MEAN)):
         found = [(p.demonstrations, value_at(p, level, metric)) for p in points]
@@ -132,7 +124,7 @@ def draw_learning_curve(points: Sequence[CurvePoint], metric: str = "sr") -> Fig
     right.set_xlabel("level")
     left.set_ylim(-4, 104)
     for axis in (left, right):
-        plain(axis)
+        series.plain(axis)
         axis.legend(loc="upper center", bbox_to_anchor=(0.5, -0.28), ncols=2, columnspacing=1.0)
     return figure
 
@@ -140,7 +132,7 @@ def draw_learning_curve(points: Sequence[CurvePoint], metric: str = "sr") -> Fig
 def _line(axis: Axes, index: int, name: str, values: Sequence[tuple[int, Estimate]]) -> None:
     if not values:
         return
-    whiskers(axis, values, index, name)
+    series.whiskers(axis, values, index, name)
 
 
 PANEL = 1.4
@@ -156,21 +148,26 @@ def draw_losses(rows: Sequence[Mapping[str, float]], path: Path) -> None:
     for name in names:
         panels.setdefault(name.rpartition("_")[2], []).append(name)
     steps = [row["step"] for row in rows]
-    with styled():
-        figure = new_figure(PANEL * len(panels) + 0.25)
-        figure.set_figwidth(2.0 * WIDTH)
+    with series.styled():
+        figure = series.new_figure(PANEL * len(panels) + 0.25)
+        figure.set_figwidth(2.0 * series.WIDTH)
         axes = figure.subplots(len(panels), 1, squeeze=False, sharex=True)[:, 0]
         for axis, (ending, members) in zip(axes, panels.items(), strict=True):
             for i, name in enumerate(members):
                 values = [row[name] for row in rows]
                 axis.plot(
-                    steps, values, color=COLOURS[i % len(COLOURS)], marker="o", ms=2.0, label=name
+                    steps,
+                    values,
+                    color=series.COLOURS[i % len(series.COLOURS)],
+                    marker="o",
+                    ms=2.0,
+                    label=name,
                 )
             if ending == "share":
                 axis.set_ylim(0.0, 1.05)
             elif min(row[name] for row in rows for name in members) > 0:
                 axis.set_yscale("log")
             axis.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0))
-            plain(axis)
+            series.plain(axis)
         axes[-1].set_xlabel("step")
         figure.savefig(path, dpi=200, metadata={"Software": None})
