@@ -96,6 +96,8 @@ class PolicyCaller:
 
     policy: Policy
     latencies: list[float] = field(default_factory=list)
+    asked: list[int] = field(default_factory=list)
+    """For every answer, how many actions had been begun when it was asked for."""
     server_timings: list[Mapping[str, float]] = field(default_factory=list)
     """For every answer, the times that the policy's server reported [ms]."""
 
@@ -108,6 +110,7 @@ class PolicyCaller:
         if committed is not None:
             observation["committed"], observation["delay"] = committed.actions, committed.delay
         answer = run.stopwatch.ask(self.policy, self.policy.infer, observation)
+        self.asked.append(observation["step"])
         self.latencies.append(1000.0 * run.stopwatch.last_call)
         self.server_timings.append(getattr(self.policy, "last_timing", {}))
         return run.checked(answer, spec)

@@ -15,7 +15,7 @@ from __future__ import annotations
 import hashlib
 import secrets
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Protocol, cast
 
@@ -34,6 +34,7 @@ from robospa.protocol.errors import PolicyAnswerError, PolicyError
 from robospa.protocol.policy import Policy, PolicySpec, TrialInfo, check_chunk
 from robospa.results.records.action_problems import KINDS, ProblemKind
 from robospa.results.records.trial_record import PROCESSOR, EventRow, TrialRecord
+from robospa.results.scoring.comparable import LEAD, query_entries
 from robospa.tasks.catalog import build_scene
 from robospa.tasks.catalog import task as find_task
 from robospa.tasks.descriptions import describe_objects
@@ -295,6 +296,9 @@ def _diagnostics(run: TrialState) -> dict[str, object]:
     found = dict(run.parts.tracker.diagnostics())
     poses = run.world.snapshot().poses
     found[FINAL] = {name: [round(x, 5) for x in pose.position] for name, pose in poses.items()}
+    task, scene = run.parts.task, run.parts.scene
+    if task.lead is not None and scene.objects:  # a checkout tells none
+        found[LEAD] = round(task.lead(scene), 5)
     if run.events:
         found["objects"] = describe_objects(run.parts.scene)
     if run.grasps is not None:
@@ -359,7 +363,7 @@ def run_trial(
     limit = step_limit(run.parts.task, key.level, step_scale)
     end, message = _play(run, answers, info, limit, real)
     run.finish()
-    record = record_of(run, key, end, message, policy_seed, len(answers.latencies))
+    record = record_of(run, key, end, message, policy_seed, answers.asked)
     timing = {
         **run.stopwatch.seconds,
         "physics": run.physics_seconds,
@@ -376,9 +380,10 @@ def run_trial(
 
 
 def record_of(
-    run: TrialState, key: TrialKey, end: str, message: str, policy_seed: int, policy_calls: int
+    run: TrialState, key: TrialKey, end: str, message: str, policy_seed: int, asked: Sequence[int]
 ) -> TrialRecord:
-    """The record of a trial that has ended, without its times."""
+    """The record of a trial that has ended, without its times. `asked`: how many actions had been
+    begun at each query of the policy."""
     setup, tracker = run.parts, run.parts.tracker
     reached = outcome(run.events, tracker.total)
     return TrialRecord(
@@ -394,14 +399,14 @@ def record_of(
         candidates=setup.task.levels[key.level].candidates,
         steps=len(run.actions),
         physics_steps=run.physics_steps,
-        policy_calls=policy_calls,
+        policy_calls=len(asked),
         digest=run.world.digest(),
         actions_digest=actions_digest(run.actions),
         wall_time=0.0,
         policy_seed=policy_seed,
         message=message,
         events=run.rows(),
-        diagnostics=_diagnostics(run),
+        diagnostics={**_diagnostics(run), **query_entries(asked, len(run.actions))},
     )
 
 

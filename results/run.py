@@ -13,7 +13,15 @@ from robospa.results.records.action_problems import KINDS, described
 from robospa.results.records.runs import Run, finished, read_run
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.report.score_table import run_html, run_table
+from robospa.results.scoring.comparable import (
+    asked_again,
+    comparable,
+    executed_chunks,
+    lead,
+    median,
+)
 from robospa.results.scoring.first_choice import first_choice, held_at_start
+from robospa.results.scoring.models import results_of_run
 from robospa.results.scoring.scores import Scores, score_run
 from robospa.results.tables import Table
 from robospa.trial import TrialKey
@@ -42,6 +50,11 @@ class LoadedRun(Run):
         """All scores with their intervals, by variant, task, category, dimension and over all:
         `run.scores().overall[0].values["sr1"]` is the mean over levels of SR@1."""
         return score_run(self, ci)
+
+    def comparable(self, ci: str = "wilson") -> Scores:
+        """The same over the trials of SDE, CVR and MIP that compare (`docs/statistics.md`); columns
+        `lead` [m] and `asked_again` of the frame say why."""
+        return comparable(results_of_run(self, ci=ci)).scores
 
     def failures(self) -> FailedTrials:
         """A list of every failed trial with the type of its failure and the evidence for it;
@@ -107,6 +120,7 @@ def _evidence(record: TrialRecord) -> str:
 FLAGS: Mapping[str, Callable[[TrialRecord], Cell]] = {
     "success": lambda record: record.success,
     "first_choice": first_choice,
+    "asked_again": asked_again,
 }
 TEXTS: Mapping[str, Callable[[TrialRecord], Cell]] = {
     "category": lambda record: record.category,
@@ -121,11 +135,14 @@ TEXTS: Mapping[str, Callable[[TrialRecord], Cell]] = {
 NUMBERS: Mapping[str, Callable[[TrialRecord], Cell]] = {
     "progress": lambda record: record.done / record.total if record.total else None,
     "idle_progress": lambda record: held_at_start(record) / record.total if record.total else None,
+    "lead": lead,
+    "chunk": lambda record: median(executed_chunks(record)),
     "wall_time": lambda record: float(record.wall_time),
     "latency_p50": lambda record: _latency(record, "p50"),
     "latency_p95": lambda record: _latency(record, "p95"),
 }
 """`progress`: the share of subtasks that hold at the end, `idle_progress`: before the first action;
+`lead` [m]: of what is asked for; `chunk`: actions executed of an answer, the median;
 `wall_time` [s]; latencies [ms]."""
 PROBLEMS = {kind.name: _problem(kind.name) for kind in KINDS}
 """How many actions were executed otherwise than they were sent, by kind."""

@@ -15,10 +15,12 @@ from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING
 
-from robospa.text import markdown_table, plain, plain_console
+from robospa.text import interval_text, markdown_table, plain, plain_console
 
 if TYPE_CHECKING:
     from rich.console import Console
+
+    from robospa.results.statistics.intervals import Estimate
 
 PRINTED_OTHERWISE = "*"
 MISSING = "†"
@@ -40,6 +42,12 @@ class TableCell:
     missing: int = 0
     bounds: tuple[float, float] | None = None
     """Between which values [percent] the `missing` trials leave it, where that is known."""
+
+
+def estimate_cell(estimate: Estimate, style: str = "z.1f") -> TableCell:
+    """A cell of an estimate in percent, with its interval."""
+    ends = (100 * estimate.value, 100 * estimate.low, 100 * estimate.high)
+    return TableCell(interval_text(*ends, style=style), *ends)
 
 
 @dataclass(frozen=True)

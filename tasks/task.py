@@ -122,6 +122,8 @@ class Task:
     slots: Callable[[Scene], Mapping[str, Phrasings]]
     summary: str
     success: str
+    lead: Callable[[Scene], float] | None = None
+    """By how much [m] what is asked for is ahead of what comes closest; None where nothing is."""
 
     @property
     def dimension(self) -> str:

@@ -95,8 +95,8 @@ def run_and_show(request: Request, *, as_json: bool = False) -> None:
     """
     from robospa.results.records.runs import by_setting, read_run
     from robospa.results.report.score_table import print_scores
+    from robospa.results.scoring.models import results_of_run
     from robospa.results.scoring.repeats import many_policy_errors
-    from robospa.results.scoring.scores import score_run
 
     folder = request.config.folder
     again = f"the same command with --out {folder} --resume goes on from here"
@@ -116,7 +116,7 @@ def run_and_show(request: Request, *, as_json: bool = False) -> None:
         print_json({"folder": folder, **run_data(run)})
     else:
         for part in by_setting(run):
-            print_scores(part, score_run(part))
+            print_scores(part, results_of_run(part))
     if run.missing:
         print(
             f"robospa: {len(run.missing)} of {len(run.keys)} trials could not be run and are "

@@ -123,7 +123,7 @@ def _report(
         print_json({"report": folder / "report.html", "runs": runs})
         return
     for one, model in zip(made.runs, made.models, strict=False):
-        print_scores(one, model.scores)
+        print_scores(one, model)
     print(f"Report: {folder / 'report.html'}")
 
 

@@ -235,7 +235,7 @@ class TaskEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         assert self._trial is not None
         self._trial.finish()
         seed, steps = policy_seed(self._key, 0), len(self._trial.actions)
-        self._record = record_of(self._trial, self._key, end, message, seed, steps)
+        self._record = record_of(self._trial, self._key, end, message, seed, range(steps))
 
     def _info(self) -> Info:
         """Progress, and the events since the last call."""

@@ -47,8 +47,8 @@ from robospa.results.statistics.significance import (
     mcnemar_mid_p,
     p_of_interval,
 )
-from robospa.results.tables import Table, TableCell, TableRow
-from robospa.text import interval_text, percent_text
+from robospa.results.tables import Table, TableCell, TableRow, estimate_cell
+from robospa.text import percent_text
 from robospa.trial import BASIC, CATEGORIES, DIMENSIONS, METRIC_NAMES
 
 
@@ -358,12 +358,6 @@ def by_axis(models: Sequence[ModelResults], metric: str = "sr") -> Table | None:
         tuple(rows),
         notes=(_axis_note(shared, paired),),
     )
-
-
-def estimate_cell(estimate: Estimate, style: str = "z.1f") -> TableCell:
-    """A cell of an estimate in percent, with its interval."""
-    ends = (100 * estimate.value, 100 * estimate.low, 100 * estimate.high)
-    return TableCell(interval_text(*ends, style=style), *ends)
 
 
 def _axis_note(shared: Sequence[Variant], paired: bool) -> str:

@@ -15,7 +15,6 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from robospa.results.comparison.compare import estimate_cell
 from robospa.results.comparison.pairs import check_comparable, common_seeds, paired_variants
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.scoring.models import IncomparableError, ModelResults
@@ -27,7 +26,7 @@ from robospa.results.statistics.intervals import (
     paired_sample_difference,
 )
 from robospa.results.statistics.significance import p_of_interval
-from robospa.results.tables import Table, TableCell, TableRow
+from robospa.results.tables import Table, TableCell, TableRow, estimate_cell
 
 ENTRY = "real_time"
 """What records keep of real time, in their diagnostics."""

@@ -26,6 +26,7 @@ from robospa.results.report.run_card import about, ends, facts
 from robospa.results.report.score_table import percent
 from robospa.results.report.tables import for_page, write_files
 from robospa.results.report.trials import failure_counts, trial_rows
+from robospa.results.scoring.comparable import comparable
 from robospa.results.scoring.scores import Scores, to_json
 from robospa.results.statistics.intervals import Estimate
 from robospa.results.tables import escape_markdown, to_markdown
@@ -267,6 +268,7 @@ def to_data(report: Report) -> dict[str, object]:
                 "name": model.name,
                 "run": about(run),
                 **to_json(model.scores),
+                "comparable": to_json(comparable(model).scores),
                 "ends": ends(run),
                 "problems": problem_data(run.records.values()),
             }

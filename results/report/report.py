@@ -28,6 +28,7 @@ from robospa.results.report.tables import (
     report_tables,
     shared_variants,
 )
+from robospa.results.scoring.comparable import comparable_table
 from robospa.results.scoring.models import IncomparableError, ModelResults, results_of_run
 from robospa.trial import TrialKey
 
@@ -96,11 +97,14 @@ def make_report(
 
 
 def _tables(own: Sequence[ModelResults], columns: Sequence[Column]) -> list[ReportTable]:
-    """The paper's tables, after those of one policy's robots, scene modes or splits."""
+    """The paper's tables, after those of one policy's robots, scene modes or splits and of the
+    trials that compare."""
     if not columns:
         return []
     axes = [table for metric in ("sr", "sr1") if (table := by_axis(own, metric))]
-    return [*(ReportTable(table, False) for table in axes), *report_tables(columns)]
+    comparable = [table] if (table := comparable_table(own)) else []
+    ours = [ReportTable(table, False) for table in (*axes, *comparable)]
+    return [*ours, *report_tables(columns)]
 
 
 def banners(models: Sequence[ModelResults]) -> list[str]:

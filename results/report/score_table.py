@@ -14,7 +14,9 @@ from robospa.results.records.action_problems import grouped, problem_lines
 from robospa.results.records.manifest import departures
 from robospa.results.records.runs import Run, by_setting, finished, setting_name
 from robospa.results.report.run_card import ends
+from robospa.results.scoring.comparable import comparable_table
 from robospa.results.scoring.first_choice import after_others
+from robospa.results.scoring.models import ModelResults
 from robospa.results.scoring.repeats import policy_error_lines, repeat_lines
 from robospa.results.scoring.scores import (
     IDLE,
@@ -162,10 +164,13 @@ def _level_cell(part: VariantScore | AverageScore | None) -> TableCell:
     return TableCell(short(part.values.get("sr")), sign=MISSING * bool(part.missing))
 
 
-def print_scores(run: Run, scores: Scores) -> None:
-    """Print the table of `run` on the terminal: how its trials ended, why some are missing, are
+def print_scores(run: Run, results: ModelResults) -> None:
+    """Print the tables of `run` on the terminal: how its trials ended, why some are missing, are
     policy errors or were repeated, which actions could not be executed as they were sent."""
-    show(score_table(run, scores))
+    scores = results.scores
+    for table in (score_table(run, scores), comparable_table([results])):
+        if table is not None:
+            show(table)
     console = plain_console(wide=130)
     console.print(_ends_line(run), style="dim", soft_wrap=True)
     lines = [*missing_lines(scores), *loss_lines(run), *policy_error_lines(run)]

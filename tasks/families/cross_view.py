@@ -257,6 +257,14 @@ def slots(scene: Scene) -> Slots:
     return TEXT.slots(f"target.{kind}", f"view.{view}", **words)
 
 
+def lead(scene: Scene) -> float:
+    """By how much [m] the asked object is more extreme than any other."""
+    facts = Facts.of(scene)
+    k = EXTREMES.index(facts.extreme)
+    along = {item.name: float(SIGNS[k] * item.pose.position[AXES[k]]) for item in scene.objects}
+    return along.pop(facts.target) - max(along.values())
+
+
 def spread_task(spread: ObjectSpread, basic: bool = False) -> Task:
     """The CVR task of `spread` or, if `basic`, the EPG one, where the robot is the viewer."""
     kind = spread.kind
@@ -273,6 +281,7 @@ def spread_task(spread: ObjectSpread, basic: bool = False) -> Task:
         summary=f"Pick the extreme one of 3 to 7 {spread.what} as seen from {seen}.",
         success="the target rose by more than 6 cm, touched by a gripper and carried by a closed "
         "one",
+        lead=lead,
     )
 
 

@@ -280,6 +280,16 @@ def draw(
     return SceneSample(objects, facts)
 
 
+def gap(scene: Scene) -> float:
+    """By how much [m] the asked object's distance differs from that of any other."""
+    facts = Facts.of(scene)
+    places = {item.name: item.pose.position[:2] for item in scene.objects}
+    reference = places.pop(facts.reference)
+    far = {name: math.dist(place, reference) for name, place in places.items()}
+    asked = far.pop(facts.target)
+    return min(abs(asked - other) for other in far.values())
+
+
 def distance_task(family: ObjectSet, name: str, what: str) -> Task:
     """The task that asks for the k-th farthest of `what` from a reference."""
 
@@ -302,6 +312,7 @@ def distance_task(family: ObjectSet, name: str, what: str) -> Task:
         slots=slots,
         summary=f"Pick the k-th farthest of {what} from a named one.",
         success="the target's origin is higher than 0.82 m while a gripper carries it",
+        lead=gap,
     )
 
 

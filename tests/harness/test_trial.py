@@ -23,14 +23,14 @@ def play(policy: FakePolicy, key: TrialKey = KEY, world: FakeWorld | None = None
     return run_trial(world or FakeWorld(), policy, key, policy_seed=7, parts=parts)
 
 
+def queries(record: TrialRecord) -> tuple[object, object]:
+    return record.diagnostics["chunks"], record.diagnostics["last_query"]
+
+
 def test_success_ends_the_trial_inside_a_chunk() -> None:
     record = play(FakePolicy(length=4))
-    assert (record.end, record.success, record.steps, record.policy_calls) == (
-        "success",
-        True,
-        5,
-        2,
-    )
+    assert (record.end, record.success, record.steps) == ("success", True, 5)
+    assert record.policy_calls == 2 and queries(record) == ({"1": 1, "4": 1}, 4)
     assert (record.done, record.best, record.total) == (2, 2, 2)
     assert record.physics_steps == 25
 
@@ -46,12 +46,8 @@ def test_the_step_limit_cuts_the_last_chunk() -> None:
             return np.zeros((3, 14), np.float32)
 
     record = play(Idle())
-    assert (record.end, record.success, record.steps, record.policy_calls) == (
-        "step_limit",
-        False,
-        LIMIT,
-        7,
-    )
+    assert (record.end, record.success, record.steps) == ("step_limit", False, LIMIT)
+    assert record.policy_calls == 7 and queries(record) == ({"2": 1, "3": 6}, 18)
 
 
 def test_execute_leaves_the_rest_of_the_chunk_unused() -> None:

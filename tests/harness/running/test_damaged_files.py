@@ -37,7 +37,7 @@ from robospa.leaderboard.verify import verify
 from robospa.results.records.manifest import RunError, read_manifest, seed_hash
 from robospa.results.records.runs import finished, from_line, merge, read_file, read_run, to_line
 from robospa.results.report.score_table import print_scores
-from robospa.results.scoring.scores import score_run
+from robospa.results.scoring.models import results_of_run
 from robospa.trial import TrialKey
 
 ALLOWED = (RunError, BundleError, SettingsError)
@@ -207,7 +207,7 @@ class Readers:
         (run / "trials" / "0000.jsonl").write_bytes(b"\n".join(lines) + b"\n")
         with contextlib.redirect_stdout(io.StringIO()):
             found = read_run(run)
-            print_scores(found, score_run(found))
+            print_scores(found, results_of_run(found))
 
 
 KINDS = "line,records,run.json,policy map,client options,seeds,actions,traces,archive,bundle,run"

@@ -18,7 +18,7 @@ from robospa.results.report import score_table as tables
 from robospa.results.report.page import write_report
 from robospa.results.report.report import make_report
 from robospa.results.report.trials import event_row
-from robospa.results.scoring.scores import score_run
+from robospa.results.scoring.models import results_of_run
 from robospa.results.statistics.intervals import Estimate, wilson
 
 pytestmark = pytest.mark.usefixtures("same_figures_once")
@@ -233,7 +233,7 @@ def test_a_run_without_any_record_still_makes_a_report(tmp_path: Path) -> None:
 
 def test_the_terminal_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     run = make_run(tmp_path / "run", RECORDS, lost=1)
-    tables.print_scores(run, score_run(run))
+    tables.print_scores(run, results_of_run(run))
     text = capsys.readouterr().out
     assert "GAC Pick It" in text
     assert "75.0" in text

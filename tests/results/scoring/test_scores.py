@@ -197,7 +197,7 @@ def test_json_has_counts_and_bounds_of_every_metric(run: Run) -> None:
 def test_the_terminal_marks_incomplete_variants_and_says_why(
     run: Run, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    print_scores(run, score_run(run))
+    print_scores(run, results_of_run(run))
     text = capsys.readouterr().out
     assert "83.3†" in text and "50.0†" in text
     assert "16 trials: 8 success, 4 step limit, 2 missing, 2 not run († lacks trials)" in text
@@ -211,7 +211,7 @@ def test_what_a_server_said_is_no_markup(
 ) -> None:
     bad = lost(PICK, 1, 1, "the server reported [/x]: [red]")
     run = write(tmp_path / "run", [record(PICK, 1, 0, 1), bad])
-    print_scores(run, score_run(run))
+    print_scores(run, results_of_run(run))
     assert "missing 1: the server reported [/x]: [red]" in capsys.readouterr().out
 
 

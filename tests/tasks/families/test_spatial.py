@@ -178,7 +178,8 @@ def test_distance_ranks_are_uniform_clear_and_spaced(name: str, level: int) -> N
         p, reference, target = places(scene), index_of(scene, "reference"), index_of(scene)
         far = [math.dist(q, p[reference]) for q in p]
         others = [d for i, d in enumerate(far) if i not in (reference, target)]
-        assert min(abs(d - far[target]) for d in others) >= gap - 1e-9
+        found_gap = min(abs(d - far[target]) for d in others)
+        assert found_gap >= gap - 1e-9 and task(name).lead(scene) == pytest.approx(found_gap)
         assert apart(p.tolist()) >= rules.apart[level - 1] - 1e-9
         assert (np.ptp(p, axis=0) >= rules.extent[level - 1]).all()
         if name in ("Pick_Mugs_Distance", "Pick_Pill_Bottles_Distance"):
@@ -318,6 +319,8 @@ def test_every_side_is_led_by_as_much_as_the_level_says(name: str) -> None:
             first, leads = cross_view.leaders(places(scene))
             assert len(set(first.tolist())) == min(len(scene.objects), 4), scene.seed
             assert leads.min() >= cross_view.LEADS[level] - 1e-9, scene.seed
+            extreme = cross_view.EXTREMES.index(scene.facts["extreme"])
+            assert task(name).lead(scene) == pytest.approx(leads[extreme])
 
 
 @each_level

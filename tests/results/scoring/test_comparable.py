@@ -1,0 +1,141 @@
+"""Scores over the trials that compare: by lead, by gap, asked again after the cue was hidden."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fake_runs import make_run, record
+
+from robospa.results.records.trial_record import TrialRecord
+from robospa.results.report.page import write_report
+from robospa.results.report.report import make_report
+from robospa.results.scoring.comparable import (
+    comparable_table,
+    executed_chunks,
+    median,
+    query_entries,
+)
+from robospa.results.scoring.models import results_of_run
+
+CVR, SDE, MIP = "Pick_Seals_Multi_View", "Pick_Mugs_Distance", "Remember_Color_Cover"
+
+
+def led(task: str, level: int, seed: int, success: int, lead: object) -> TrialRecord:
+    category = "CVR" if task == CVR else "SDE"
+    return record(task, level, seed, success, category=category, diagnostics={"lead": lead})
+
+
+def remembered(seed: int, success: int, asked: list[int], hidden: int | None) -> TrialRecord:
+    """A memory trial of 40 actions, whose policy was asked at these and whose cue was hidden."""
+    events = [{"time": 0.0, "kind": "cue_hidden", "object": "", "index": -1, "step": hidden}]
+    return record(
+        *(MIP, 3, seed, success),
+        category="MIP",
+        steps=40,
+        events=events if hidden is not None else (),
+        diagnostics=query_entries(asked, 40),
+    )
+
+
+RECORDS = [
+    *(led(CVR, 1, n, 1, 0.0601) for n in range(3)),
+    led(CVR, 1, 3, 0, 0.06),  # not more than officially
+    *(led(CVR, 5, n, int(n < 1), 0.02 if n else 0.2) for n in range(4)),
+    led(CVR, 5, 4, 0, None),  # not known
+    *(led(SDE, 2, n, n, 0.05 + 0.02 * n) for n in range(2)),
+    remembered(0, 1, [0], 10),  # all of it from what it saw at reset
+    remembered(1, 1, [0, 16, 32], 10),
+    remembered(2, 0, [0, 10, 26], 10),
+    remembered(3, 0, [0, 16], None),  # moved before
+]
+"""CVR L1: 3 of 4, led 3 of 3; L5: 1 of 5, led 1 of 1; SDE L2: 1 of 2, apart 1 of 1; MIP L3: 2 of 4,
+asked again 1 of 2."""
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Any:
+    return make_run(tmp_path / "run", RECORDS)
+
+
+def test_rates_over_the_trials_that_compare_stand_beside_those_over_all(run: Any) -> None:
+    table = comparable_table([results_of_run(run, "mine")])
+    assert table is not None
+    found = {}
+    for row in table.rows:
+        if row.kind == "section":
+            category = row.label[:3]
+        else:
+            found[category, row.label] = row.cells
+    values = {place: tuple(cell.value for cell in cells[:4]) for place, cells in found.items()}
+    assert values == {
+        ("SDE", "L2"): (50, 100, 100, 1),
+        ("SDE", "mean"): (50, 100, 100, 1),
+        ("CVR", "L1"): (75, 100, 100, 3),
+        ("CVR", "L5"): (20, 100, 100, 1),
+        ("CVR", "mean"): (47.5, 100, 100, 4),
+        ("MIP", "L3"): (50, 50, 50, 2),
+        ("MIP", "mean"): (50, 50, 50, 2),
+    }
+    assert found["CVR", "L5"][3].text == "1 of 5"
+    assert found["MIP", "L3"][4].text == "16 [10, 40]"
+    assert found["CVR", "L1"][1].low == pytest.approx(43.85, abs=0.01)  # Wilson, 3 of 3
+
+
+def test_variants_without_such_trials_are_in_neither_rate(tmp_path: Path) -> None:
+    other = [led("Pick_Breads_Multi_View", 1, n, 0, 0.01) for n in range(4)]
+    other = [TrialRecord(**{**vars(one), "category": "CVR"}) for one in other]
+    table = comparable_table([results_of_run(make_run(tmp_path / "run", [*RECORDS, *other]))])
+    assert table is not None
+    line = next(row for row in table.rows if row.label == "L1")
+    assert [cell.text for cell in line.cells][3] == "3 of 4"
+
+
+def test_the_table_is_in_all_that_a_report_writes(run: Any, tmp_path: Path) -> None:
+    folder = write_report(make_report(run), tmp_path / "report")
+    for name in ("report.html", "report.md", "tables/tables.csv", "tables/comparable.tex"):
+        text = (folder / name).read_text()
+        assert "leads by more than 6 cm" in text and "16 [10, 40]" in text.replace("\\", ""), name
+    assert run.comparable().cells[CVR, 5].values["sr"].value == 1.0
+    frame = run.to_pandas()
+    assert frame.lead.max() == 0.2 and frame.asked_again.sum() == 2
+
+
+def test_a_run_without_such_trials_has_no_table(tmp_path: Path) -> None:
+    few = [r for r in RECORDS if r.category == "CVR" and r.diagnostics["lead"] != 0.0601][:2]
+    table = comparable_table([results_of_run(make_run(tmp_path / "run", few[:1]))])
+    assert table is None
+
+
+@pytest.mark.parametrize(
+    ("asked", "steps", "lengths"),
+    [
+        ((), 0, {}),
+        ((0,), 12, {12: 1}),  # cut off, but the only one
+        ((0, 16, 32), 40, {16: 2}),
+        ((0, 16, 32), 48, {16: 2}),
+        (range(100), 100, {1: 99}),
+        ((0, 4, 12, 16), 17, {4: 2, 8: 1}),
+    ],
+)
+def test_chunks_are_what_was_executed_between_two_queries(
+    asked: Any, steps: int, lengths: dict[int, int]
+) -> None:
+    entries = query_entries(asked, steps)
+    made = record(MIP, 1, 0, 0, steps=steps, diagnostics=entries)
+    assert executed_chunks(made) == lengths
+
+
+@pytest.mark.parametrize("entry", [None, 7, "16", {"x": 1}, {"16": "many"}, {"16": math.nan}])
+def test_what_is_no_count_of_chunks_counts_nothing(entry: object) -> None:
+    made = record(MIP, 1, 0, 0, diagnostics={"chunks": entry, "last_query": 0, "lead": entry})
+    assert not executed_chunks(made)
+
+
+def test_the_median_is_the_lower_one() -> None:
+    assert [median(Counter(x)) for x in ((), (3,), (1, 2), (1, 1, 9), (1, 9, 9))] == [
+        *(None, 3, 1, 1, 9)
+    ]
