@@ -22,7 +22,7 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=10)
     parser.add_argument("--envs", type=int, default=1)
     words = parser.parse_args()
-    name = f"RoboSPA/{words.task}-v2"  # 2 is the suite's version
+    name = f"RoboSPA/{words.task}-v3"  # 3 is the suite's version
     if words.envs == 1:
         env = gymnasium.make(name, level=words.level)
         _, info = env.reset(seed=words.seed)

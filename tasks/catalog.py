@@ -10,7 +10,7 @@ import numpy as np
 
 from robospa.tasks.modes import canonical
 from robospa.tasks.modes import mode as scene_mode
-from robospa.tasks.scene import SUITE, Scene
+from robospa.tasks.scene import SCENES, Scene
 from robospa.tasks.task import Task
 from robospa.trial import REFERENCE
 from robospa.workcell import WORKCELL
@@ -154,7 +154,7 @@ def build_scene(
         scene = robospa.build_scene("Pick_Blocks_Size", level=1, seed=100000)
         [(item.name, item.pose.position) for item in scene.objects]
 
-    The task's objects are drawn by one generator seeded by (suite, task, level, seed), for one
+    The task's objects are drawn by one generator seeded by (stream, task, level, seed), for one
     workcell: every robot and every mode gets the same ones. What the
     mode varies has generators of its own, seeded by the part's name too. A salt enters all of
     these seeds and stands nowhere in the scene: who does not have it cannot draw the scene.
@@ -176,7 +176,7 @@ def build_scene(
     if level not in found.levels:
         raise ValueError(f"{found.name} has levels {sorted(found.levels)}, not {level}")
     vary = scene_mode(mode)
-    identity = "/".join([SUITE, *([salt] if salt else []), found.name, str(level), str(seed)])
+    identity = "/".join([SCENES, *([salt] if salt else []), found.name, str(level), str(seed)])
     draft = found.draw(level, generator(identity), WORKCELL)
     scene = Scene(
         task=found.name,

@@ -19,9 +19,11 @@ from robospa.schema import convert
 from robospa.tasks.shapes import Color, Params
 from robospa.workcell import TABLE_TOP
 
-SUITE = "robospa-2"
-"""Version of scenes, robot and rules: a change to any of them needs a new one. It is part of what
-seeds the random streams of scenes, so two suites share no scene."""
+SUITE = "robospa-3"
+"""Version of scenes, pictures, sentences, robot and rules: a change to any needs a new one."""
+SCENES = "robospa-2"
+"""What seeds the random streams of scenes, with task, level and seed: the suite that drew them
+all anew last. Later ones keep every scene whose task they do not change, and so its seed lists."""
 
 
 SEEN, UNSEEN = "seen", "unseen"

@@ -52,5 +52,5 @@ def fake_episode(
         replay_digest="cd" * 32,
         failure="" if kind in ("expert", "noise", "midstate") else "target_grounding",
         pictures=pictures,
-        about={"suite": "robospa-2", "version": "0.1"},
+        about={"suite": "robospa-3", "version": "0.1"},
     )

@@ -155,7 +155,7 @@ def test_another_suite_cannot_be_replayed(tmp_path: Path, monkeypatch: pytest.Mo
     tiny_dataset(tmp_path, count=2)
     monkeypatch.setattr(verification, "SUITE", "robospa-9")
     (problem,) = verify(tmp_path).problems
-    assert "of the suite robospa-2, and those of this version of robospa-9" in problem
+    assert "of the suite robospa-3, and those of this version of robospa-9" in problem
 
 
 def test_the_default_sample_finds_a_twentieth_of_bad_episodes() -> None:

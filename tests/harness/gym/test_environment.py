@@ -41,7 +41,7 @@ def fake(level: int = 1, **more: Any) -> Any:
 
 def test_every_task_has_one_id() -> None:
     ids = [name for name in gymnasium.registry if name.startswith("RoboSPA/")]
-    assert ids == [f"RoboSPA/{name}-v2" for name in tasks()]
+    assert ids == [f"RoboSPA/{name}-v3" for name in tasks()]
 
 
 @pytest.mark.filterwarnings("ignore:.*recommend using a symmetric and normalized space")

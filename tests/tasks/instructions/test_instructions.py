@@ -163,7 +163,7 @@ def test_instruction_is_one_of_the_sentences_and_ignores_the_robot(split: str) -
 
 def test_instruction_is_pinned() -> None:
     scene = scene_of("press_stapler_repeat", 2)
-    said = "Knock on the paper stapler a total of 2 times with one of the arms."
+    said = "Reach down and strike the stapling machine exactly 2 times."
     assert instruction(scene) == said
 
 
