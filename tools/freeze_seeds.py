@@ -6,8 +6,8 @@
     python tools/freeze_seeds.py --confirm 1          # after a change of code that changes no trial
 
 A suite ships a hundred seeds of each of: all variants, basic ones too, with the default robot in
-clean scenes; the 280 of the benchmark in randomized ones; the paper's ten multi-embodiment tasks
-with every other robot in clean scenes. Flags choose among them; robots, modes and tasks that are
+clean scenes; the 280 of the benchmark with it in randomized ones and with every other robot in
+clean ones; the paper's ten multi-embodiment tasks with every other robot in randomized ones. Flags choose among them; robots, modes and tasks that are
 named in full need not be shipped ones.
 
 Each list is written as it is finished, so what is there may be committed at any time. Each finished
@@ -54,8 +54,9 @@ def shipped() -> list[ListKey]:
     """Every list of the suite, in the order in which they are made."""
     ten = list(load().embodiments.tasks.values())
     settings = [(REFERENCE, "clean", parse_tasks("all,basic"))]
-    settings += [(robot, "clean", ten) for robot in embodiments() if robot != REFERENCE]
     settings += [(REFERENCE, "randomized", parse_tasks("all"))]
+    for robot in (name for name in embodiments() if name != REFERENCE):
+        settings += [(robot, "clean", parse_tasks("all")), (robot, "randomized", ten)]
     return [ListKey(t, n, r, m) for r, m, tasks in settings for t in tasks for n in LEVELS]
 
 

@@ -25,7 +25,7 @@ from robospa.registry import ROBOTS, SCENE_MODES, module_of
 from robospa.tasks.catalog import home_of
 from robospa.tasks.modes import tangible
 from robospa.tasks.scene import SUITE
-from robospa.tasks.seeds import ListKey, NoSeedList, accepted
+from robospa.tasks.seeds import ListKey, NoSeedList, accepted, read_lists, shown
 
 SHIPPED, LOCAL = "shipped", "local"
 
@@ -67,8 +67,7 @@ def find_list(key: ListKey) -> SeedList:
 def read_levels(path: Path) -> dict[int, tuple[int, ...]]:
     """The lists in a file, by level; empty if there is none that can be read."""
     try:
-        data = json.loads(path.read_text())
-        return {int(n): tuple(map(int, row)) for n, row in data.items() if n.isdecimal()}
+        return read_lists(path.read_text())
     except (OSError, ValueError, TypeError, AttributeError):
         return {}
 
@@ -78,10 +77,9 @@ def save(path: Path, level: int, seeds: Sequence[int]) -> None:
     file begins with the kind of processor that made what is in it last."""
     lists = {**read_levels(path), level: list(seeds)}
     made: dict[object, object] = {"processor": str(this_processor())}
-    made |= {level: list(lists[level]) for level in sorted(lists)}
-    rows = ",\n".join(f'"{k}": {json.dumps(row)}' for k, row in made.items() if row)
+    made |= {level: shown(lists[level]) for level in sorted(lists) if lists[level]}
     path.parent.mkdir(parents=True, exist_ok=True)
-    replace_file(path, ("{\n" + rows + "\n}\n").encode())
+    replace_file(path, (json.dumps(made, indent=0) + "\n").encode())
 
 
 FAMILIES = "robospa.tasks.families."

@@ -1,8 +1,9 @@
 """The accepted seeds that are shipped: scenes that settle and that the expert solves.
 
-There is a folder for each robot and, in it, one for each scene mode, with a file for each task, in
-which levels have lists of seeds (`ListKey.file`). `robospa seeds` makes lists of what is not
-shipped, which `robospa.harness.seeds.lists` finds. A run on shipped lists needs no expert.
+There is a folder for each robot and, in it, one for each scene mode, with a file for each task
+(`ListKey.file`), in which each level has its seeds as a range and what it leaves out (`shown`).
+`robospa seeds` makes lists of what is not shipped, which `robospa.harness.seeds.lists` finds. A run
+on shipped lists needs no expert.
 """
 
 from __future__ import annotations
@@ -66,8 +67,26 @@ def _lists(file: str) -> dict[int, tuple[int, ...]]:
     path = files("robospa.tasks.seeds").joinpath(file)
     if not path.is_file():
         return {}
-    data = json.loads(path.read_text())
-    return {int(level): tuple(seeds) for level, seeds in data.items() if level.isdecimal()}
+    return read_lists(path.read_text())
+
+
+def read_lists(text: str) -> dict[int, tuple[int, ...]]:
+    """The seeds of each level in the text of a file; ValueError if it is not one."""
+    data = json.loads(text)
+    return {int(level): _seeds(row) for level, row in data.items() if level.isdecimal()}
+
+
+def shown(seeds: Sequence[int]) -> str:
+    """Ascending seeds as a range and what it leaves out: "100000-100100 but 100007 100031"."""
+    out = sorted(set(range(seeds[0], seeds[-1] + 1)).difference(seeds))
+    return f"{seeds[0]}-{seeds[-1]}" + " but ".join(["", " ".join(map(str, out))] if out else [])
+
+
+def _seeds(text: str) -> tuple[int, ...]:
+    span, _, out = text.partition(" but ")
+    first, last = map(int, span.split("-"))
+    left_out = set(map(int, out.split()))
+    return tuple(seed for seed in range(first, last + 1) if seed not in left_out)
 
 
 def accepted(

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import json
+
 import pytest
 
+from robospa.tasks import seeds as lists
 from robospa.tasks.catalog import LEVELS, tasks
 from robospa.tasks.seeds import FIRST_SEED, PER_VARIANT, ListKey, NoSeedList, accepted, list_hash
 
@@ -22,6 +25,12 @@ def test_the_expert_solves_nearly_every_seed() -> None:
     # the list holds the first accepted seeds: its span shows how many were refused
     refused = {v: accepted(*v)[-1] - FIRST_SEED for v in VARIANTS}
     assert [v for v, span in refused.items() if span >= PER_VARIANT / 0.98] == []
+
+
+@pytest.mark.parametrize("seeds", [(5,), (5, 6, 9), tuple(range(100, 300, 3))])
+def test_a_list_is_a_range_and_what_it_leaves_out(seeds: tuple[int, ...]) -> None:
+    text = json.dumps({"processor": "some kind", "3": lists.shown(seeds)})
+    assert lists.read_lists(text) == {3: seeds}
 
 
 def test_a_variant_without_a_list_says_how_to_make_it() -> None:
