@@ -7,8 +7,8 @@
 
 A suite ships a hundred seeds of each of: all variants, basic ones too, with the default robot in
 clean scenes; the 280 of the benchmark with it in randomized ones and with every other robot in
-clean ones; the paper's ten multi-embodiment tasks with every other robot in randomized ones. Flags choose among them; robots, modes and tasks that are
-named in full need not be shipped ones.
+clean ones; the paper's ten multi-embodiment tasks with every other robot in randomized ones. Flags
+choose among them; robots, modes and tasks that are named in full need not be shipped ones.
 
 Each list is written as it is finished, so what is there may be committed at any time. Each finished
 trial is kept in build/seeds: stopped anywhere, the same command goes on there. A list whose inputs
