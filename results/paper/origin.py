@@ -10,6 +10,8 @@ from robospa.results.scoring.models import ModelResults, in_official_world, suit
 from robospa.text import listed
 
 CHECKOUT = "official-checkout"
+SPLITS = {"train": "comparable", "heldout": "stricter", "indirect": "stricter"}
+"""How sentences of a split compare with the paper's, whose unseen ones largely repeat seen ones."""
 RULES = "tasks, rules, thresholds, step limits"
 
 
@@ -29,15 +31,13 @@ def pieces_of(results: ModelResults) -> Pieces:
 def pieces(suite: str, settings: RunSettings) -> Pieces:
     """The pieces of a run of `suite` with the `settings` of its manifest; of what the manifest does
     not say, nothing is official."""
-    said = _hash(settings.instructions)
-    sentences = f"sentences{said}" if said else ""
     if suite == CHECKOUT:
         return _of_checkout(settings.world.arguments)
     if suite.startswith(OFFICIAL):
-        return _of_world(settings.layout or LayoutSettings(), settings.world.arguments, sentences)
+        return _of_world(settings.layout or LayoutSettings(), settings)
     official, other = [RULES, "layouts", "the robot"], ["other object meshes", "another renderer"]
     other += ["other seeds"]
-    (official if sentences else other).append(sentences or "other sentences")
+    (official if settings.instructions else other).append(_sentences(settings))
     return Pieces(tuple(official), tuple(other))
 
 
@@ -56,7 +56,7 @@ def _of_checkout(world: Facts) -> Pieces:
     )
 
 
-def _of_world(layout: LayoutSettings, world: Facts, sentences: str) -> Pieces:
+def _of_world(layout: LayoutSettings, settings: RunSettings) -> Pieces:
     official, other = [RULES, "the robot's joints and cameras"], []
     if layout.assets == "official":
         official.append(f"objects{_hash(layout.digest, 'archive')}")
@@ -65,7 +65,8 @@ def _of_world(layout: LayoutSettings, world: Facts, sentences: str) -> Pieces:
         other.append("other object meshes")
     if names := layout.switches:
         official.append(f"quirks of scenes ({', '.join(names)})")
-    (official if sentences else other).append(sentences or "other sentences")
+    (official if settings.instructions else other).append(_sentences(settings))
+    world = settings.world.arguments
     meshes = str(world.get("robot_assets", "builtin"))
     full = {"official": " (thinned)"}.get(meshes, "")
     if meshes.startswith("official"):
@@ -78,6 +79,14 @@ def _of_world(layout: LayoutSettings, world: Facts, sentences: str) -> Pieces:
         other.append("another start (when nothing moves)")
     other += ["other draws of layouts", "other seeds", "motions without the official planner"]
     return Pieces(tuple(official), (*other, "another renderer"))
+
+
+def _sentences(settings: RunSettings) -> str:
+    """The official sentences, or how those made here compare with the paper's."""
+    if settings.instructions:
+        return f"sentences{_hash(settings.instructions)}"
+    known = [f"`{split}`: {SPLITS[split]}" for split in settings.split if split in SPLITS]
+    return "other sentences" + f" ({'; '.join(known)})" * bool(known)
 
 
 def told(results: ModelResults) -> str:
@@ -100,7 +109,8 @@ ORIGIN = (
     "Tasks, rules, thresholds, layouts, step limits and the robot are those of the official "
     "benchmark; the object meshes, the renderer, the seeds and the sentences are this project's "
     "own. So numbers of other suites, the paper's among them, stand beside ours and are never "
-    "ranked among them."
+    "ranked among them. The paper's unseen sentences largely repeat seen ones: `train` or official "
+    "sentences compare with it, `heldout` and `indirect` are stricter."
 )
 RANKED = (
     "Marks and ranks count the paper's values and these alike; they say which policy is better "

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from msgspec import to_builtins
 
+from robospa.results.paper.origin import SPLITS
 from robospa.results.records.action_problems import problem_lines
 from robospa.results.records.manifest import RunAbout, departures
 from robospa.results.records.runs import Run, setting_name
@@ -127,6 +128,8 @@ def facts(run: Run) -> list[tuple[str, str]]:
         ("not executed as sent", "; ".join(problem_lines(run.records.values()))),
         ("setting", _words(" ".join(x) for x in
                            (settings.embodiment, settings.mode, settings.split) if x)),
+        ("beside the paper", _words(f"sentences of {split} are {SPLITS[split]}"
+                                    for split in settings.split if split in SPLITS)),
         ("suite", manifest.suite),
         ("departures", "; ".join(map(str, departures(manifest)))),
         ("list of trials", f"hash {manifest.seed_hash}" if manifest.seed_hash else ""),

@@ -46,7 +46,7 @@ WORLDS = {
     "plain": ("official-1", {**ARCHIVE, "instructions": "", "world": {}}),
     "builtin": ("official-1-builtin", BUILTIN),
     "checkout": ("official-checkout", CHECKOUT),
-    "ours": (OURS, {}),
+    "ours": (OURS, {"split": ["heldout", "train"]}),
     "ours, their sentences": (OURS, {"instructions": "fedcba9876543210"}),
 }
 SAID = {
@@ -61,7 +61,10 @@ SAID = {
     ),
     "builtin": ([], ["other object meshes", "other sentences", "other robot meshes"]),
     "checkout": (["simulator, planner and renderer", "configuration: demo_clean"], ["other seeds"]),
-    "ours": (["layouts"], ["other object meshes", "other sentences", "another renderer"]),
+    "ours": (
+        ["layouts"],
+        ["other object meshes", "other sentences (`heldout`: stricter; `train`: comparable)"],
+    ),
     "ours, their sentences": (["sentences (hash fedcba987654)"], ["other object meshes"]),
 }  # fmt: skip
 
