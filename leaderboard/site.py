@@ -35,9 +35,8 @@ from robospa.leaderboard.entries import (
 from robospa.leaderboard.submission import left_out, read_submissions
 from robospa.leaderboard.verify import paired, results_of
 from robospa.results.failures.labels import KINDS, NAMES, SIMULATED_PER_FILM
-from robospa.results.figures.charts import draw_failures
 from robospa.results.figures.draw import draw
-from robospa.results.figures.series import DrawnFigure, Series, save, styled
+from robospa.results.figures.series import DrawnFigure, Series
 from robospa.results.paper.origin import DIFFERENCES, ORIGIN
 from robospa.results.paper.published import load
 from robospa.results.report.page import FIGURES, card, figure, own_version, render
@@ -251,13 +250,8 @@ def _figures(entry: Entry, folder: Path) -> list[DrawnFigure]:
         known = json.loads(kept.read_text(encoding="utf-8"))
         if known["state"] == state:
             return [DrawnFigure(**one) for one in known["drawings"]]
-    made = draw([Series(entry.name, entry.column.scores)], folder, FORMATS)
-    counts = {t: entry.failures[t] for t in load().tasks if any(entry.failures.get(t, {}).values())}
-    if counts:
-        with styled():
-            save(draw_failures(counts, KINDS, NAMES), folder, "failures", FORMATS)
-        text = "Share of every failure type among a task's failed trials, and their number."
-        made.append(DrawnFigure("failures", "Failure types", text))
+    series = Series(entry.name, entry.column.scores, failures=entry.failures)
+    made = draw([series], folder, FORMATS)
     found = {"state": state, "drawings": [asdict(drawing) for drawing in made]}
     replace_file(kept, json.dumps(found).encode())
     return made

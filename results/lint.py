@@ -1,6 +1,6 @@
 """Checks of a run or a table of results for values that cannot be right, without running anything.
 
-Numbers that cannot be (progress below success, a share of subtasks that no count gives), numbers
+Numbers that cannot be (progress below success), numbers
 that are too alike to be true (one row under two tasks, one sequence of actions for two seeds), and
 what a reader must know before averaging (trials missing, listed twice, from mixed settings or
 versions). An error makes numbers wrong, a warning asks for a look, a note says what nobody checked.
@@ -12,7 +12,6 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TypeVar
 
 from robospa.results.paper.published import load
 from robospa.results.paper.rounding import rounded
@@ -34,121 +33,60 @@ from robospa.results.scoring.repeats import (
     FaultRate,
     fault_rates,
 )
-from robospa.results.statistics.samples import onta_of_percent
 from robospa.text import counted, some
 from robospa.trial import PROCEDURAL
 
 FASTEST_STEP = 4e-6
 """Wall time of a physics step [s] that no machine known to us beats: 1000 times real time. Arms
 that stand still among sleeping objects take 16 us on two cores of 2026."""
-T = TypeVar("T")
 LINTED = {LIMITS: "warning", REAL_TIME: "note"}
 """Departures that a finding names, with its severity."""
 INFORMATIVE = 3
 """Rows with fewer different numbers above zero may well agree by chance."""
 
 
-@dataclass(frozen=True)
-class ResultRow:
-    """One model's results of one task, in percent by level, None where there is none.
-
-    `candidates` and `subtasks` are the n of ONTA and the T of PS by level, empty if unknown;
-    `trials` per level. `printed`: values are rounded to one decimal.
-    """
-
-    model: str
-    task: str
-    levels: tuple[int, ...]
-    sr: tuple[float | None, ...]
-    onta: tuple[float | None, ...] = ()
-    ps: tuple[float | None, ...] = ()
-    candidates: tuple[int, ...] = ()
-    subtasks: tuple[int, ...] = ()
-    trials: tuple[int, ...] = ()
-    printed: bool = False
-
-
 def lint_published() -> list[Finding]:
-    """Everything that is odd about the paper's per-task tables."""
-    return lint_table(published_rows())
-
-
-def published_rows() -> list[ResultRow]:
-    """The paper's per-task tables."""
-    data, rows = load(), []
+    """What is odd about the paper's per-task tables; `paper.check` says what does not follow."""
+    data, found = load(), []
     for model in data.models:
-        for task, values in data.per_task[model, "sr"].rows.items():
-            spatial = task in data.per_task[model, "onta"].rows
-            other = data.per_task[model, "onta" if spatial else "ps"].rows[task]
-            counts = data.tasks[task].counts
-            row = ResultRow(
-                model,
-                task,
-                (1, 2, 3, 4, 5),
-                tuple(values),
-                onta=tuple(other) if spatial else (),
-                ps=() if spatial else tuple(other),
-                candidates=counts if spatial else (),
-                subtasks=() if spatial else counts,
-                trials=(data.trials,) * 5,
-                printed=True,
-            )
-            rows.append(row)
-    return rows
-
-
-def lint_table(rows: Sequence[ResultRow]) -> list[Finding]:
-    """Findings in rows of results; each cell on its own, then rows that repeat each other."""
-    found = [finding for row in rows for finding in _lint_row(row)]
-    same: dict[tuple[object, ...], list[str]] = defaultdict(list)
-    for row in rows:
-        numbers = (*row.sr, *row.ps, *row.onta)
-        if len({x for x in numbers if x is not None and x > 0}) >= INFORMATIVE:
-            same[row.model, row.levels, row.trials, *numbers].append(row.task)
-    for (model, *_), tasks in same.items():
-        if len(tasks) > 1:
-            text = f"{' and '.join(tasks)} have the same results at every level"
-            found.append(Finding("identical-rows", "error", str(model), text))
+        rows: dict[str, Row] = {}
+        for task, rates in data.per_task[model, "sr"].rows.items():
+            progress = data.per_task[model, "ps"].rows.get(task, [])
+            other = progress or data.per_task[model, "onta"].rows[task]
+            rows[task] = (), (*rates, *other)
+            counts = zip(progress, data.tasks[task].counts, strict=False)
+            for level, (ps, total) in enumerate(counts, 1):
+                if not _possible(ps, data.trials * total):
+                    text = f"PS {ps:g} is no multiple of 1/{total} over {data.trials} trials"
+                    where = f"{model}, {task} L{level}"
+                    found.append(Finding("ps-not-a-share", "error", where, text))
+        found += lint_rows(model, rows)
     return found
 
 
-def _lint_row(row: ResultRow) -> Iterator[Finding]:
-    for place, level in enumerate(row.levels):
-        where = f"{row.model}, {row.task} L{level}"
-        sr, ps, corrected = (_at(x, place) for x in (row.sr, row.ps, row.onta))
-        trials, total = _at(row.trials, place), _at(row.subtasks, place)
-        if sr is not None and not 0 <= sr <= 100:
-            yield Finding("range", "error", where, f"SR {sr:g} is no percentage")
-        if sr is not None and trials and not _possible(sr, trials, row.printed):
-            text = f"SR {sr:g} is no whole number of {trials} trials"
-            yield Finding("sr-not-a-count", "error", where, text)
-        if ps is not None and sr is not None and ps < sr - 1e-9:
-            text = f"PS {ps:g} is below SR {sr:g}, though every success is full progress"
-            yield Finding("ps-below-sr", "error", where, text)
-        if ps is not None and sr is not None and total == 1 and abs(ps - sr) > 0.05:
-            text = f"PS {ps:g} is not SR {sr:g}, though there is a single subtask"
-            yield Finding("ps-is-sr", "error", where, text)
-        if ps is not None and trials and total and not _possible(ps, trials * total, row.printed):
-            text = f"PS {ps:g} is no multiple of 1/{total} over {trials} trials"
-            yield Finding("ps-not-a-share", "error", where, text)
-        n = _at(row.candidates, place)
-        if corrected is not None and sr is not None and n:
-            follows = onta_of_percent(sr, n)
-            if abs((rounded(follows) if row.printed else follows) - corrected) > 0.05:
-                text = f"ONTA {corrected:g} does not follow from SR {sr:g} and n = {n}"
-                yield Finding("onta-from-sr", "error", where, f"{text}: {rounded(follows):g} does")
+Row = tuple[tuple[int, ...], tuple[float, ...]]
+"""A task's levels with their numbers of trials, and its results there."""
 
 
-def _at(values: Sequence[T], place: int) -> T | None:
-    return values[place] if place < len(values) else None
+def lint_rows(name: str, rows: Mapping[str, Row]) -> list[Finding]:
+    """Findings in the results of `name` by task: rows that repeat each other."""
+    same: dict[Row, list[str]] = defaultdict(list)
+    for task, row in rows.items():
+        if len({x for x in row[1] if x > 0}) >= INFORMATIVE:
+            same[row].append(task)
+    return [
+        Finding(
+            *("identical-rows", "error", name),
+            f"{' and '.join(tasks)} have the same results at every level",
+        )
+        for tasks in same.values()
+        if len(tasks) > 1
+    ]
 
 
-def _possible(percent: float, parts: int, printed: bool) -> bool:
+def _possible(percent: float, parts: int) -> bool:
     near = round(percent * parts / 100)
-    values = (100 * n / parts for n in (near - 1, near, near + 1))
-    if not printed:
-        return any(abs(v - percent) < 1e-6 for v in values)
-    return any(abs(rounded(v) - percent) < 1e-6 for v in values)
+    return any(abs(rounded(100 * n / parts) - percent) < 1e-6 for n in range(near - 1, near + 2))
 
 
 def lint_run(run: Run, variants: Collection[tuple[str, int]] | None = None) -> list[Finding]:
@@ -165,7 +103,7 @@ def lint_run(run: Run, variants: Collection[tuple[str, int]] | None = None) -> l
         groups[record.key.variant].append(record)
     for (task, level), records in groups.items():
         found += _lint_variant(f"{name}, {task} L{level}", records)
-    found += lint_table(run_rows(run, name, groups))
+    found += lint_rows(name, run_rows(groups))
     return found + list(_repeats(name, groups, run.manifest.settings.privileged))
 
 
@@ -197,24 +135,15 @@ def lint_runs(runs: Sequence[Run]) -> list[Finding]:
     return found
 
 
-def run_rows(
-    run: Run, name: str, groups: dict[tuple[str, int], list[TrialRecord]] | None = None
-) -> list[ResultRow]:
-    """A run's results by task, in percent."""
-    if groups is None:
-        groups = defaultdict(list)
-        for record in run.records.values():
-            if finished(record):
-                groups[record.key.variant].append(record)
-    rows = []
-    for task in dict.fromkeys(task for task, _ in groups):
-        levels = tuple(sorted(level for t, level in groups if t == task))
-        cells = [groups[task, level] for level in levels]
-        ps: tuple[float, ...] = ()
-        if all(r.category in PROCEDURAL and r.total for cell in cells for r in cell):
-            ps = tuple(100 * sum(r.done / r.total for r in cell) / len(cell) for cell in cells)
-        sr = tuple(100 * sum(r.success for r in cell) / len(cell) for cell in cells)
-        rows.append(ResultRow(name, task, levels, sr, ps=ps, trials=tuple(map(len, cells))))
+def run_rows(groups: Mapping[tuple[str, int], Sequence[TrialRecord]]) -> dict[str, Row]:
+    """The success rates and, of procedures, the progress of every task."""
+    rows: dict[str, Row] = {}
+    for (task, level), records in sorted(groups.items()):
+        sizes, numbers = rows.get(task, ((), ()))
+        rates = [sum(r.success for r in records) / len(records)]
+        if all(r.category in PROCEDURAL and r.total for r in records):
+            rates.append(sum(r.done / r.total for r in records) / len(records))
+        rows[task] = (*sizes, level, len(records)), (*numbers, *rates)
     return rows
 
 

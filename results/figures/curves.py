@@ -32,38 +32,14 @@ def draw_latency_curves(curves: Sequence[LatencyCurve]) -> Figure:
     handles = []
     last = max(curve.points[-1].latency for curve in curves)
     for i, curve in enumerate(curves):
-        colour, marker = (
-            series.COLOURS[i % len(series.COLOURS)],
-            series.MARKERS[i % len(series.MARKERS)],
-        )
-        dash, name = series.DASHES[i % len(series.DASHES)], _curve_name(curve)
-        handles.append(Line2D([], [], color=colour, marker=marker, ls=dash, ms=3, label=name))
-        rates = [100 * point.success.value for point in curve.points]
-        spans = [(100 * p.success.low, 100 * p.success.high) for p in curve.points]
-        axis.errorbar(
-            [point.latency for point in curve.points],
-            rates,
-            yerr=[
-                [max(0.0, rate - low) for rate, (low, _) in zip(rates, spans, strict=True)],
-                [max(0.0, high - rate) for rate, (_, high) in zip(rates, spans, strict=True)],
-            ],
-            color=colour,
-            marker=marker,
-            ls=dash,
-            ms=3,
-            elinewidth=0.7,
-            capsize=1.6,
-        )
+        style = series.look(i)
+        handles.append(Line2D([], [], ms=3, label=_curve_name(curve), **style))
+        series.whiskers(axis, [(point.latency, point.success) for point in curve.points], i)
         if curve.half is not None and math.isfinite(curve.half.value):
-            low, high = curve.half.low, min(curve.half.high, last)
-            axis.plot([low, high], [2.0 - 3.0 * i] * 2, color=colour, lw=1.6, alpha=0.5)
-            axis.plot(
-                [curve.half.value] * 2,
-                [0, rates[0] / 2],
-                color=colour,
-                lw=0.8,
-                ls=":",
-            )
+            colour, middle = style["color"], 50 * curve.points[0].success.value
+            span = [curve.half.low, min(curve.half.high, last)]
+            axis.plot(span, [2.0 - 3.0 * i] * 2, color=colour, lw=1.6, alpha=0.5)
+            axis.plot([curve.half.value] * 2, [0, middle], color=colour, lw=0.8, ls=":")
     axis.set_ylim(min(-4, -1 - 3.0 * len(curves)), 104)
     axis.set_xlabel("declared latency of an answer [ms]")
     axis.set_ylabel("SR [%]")

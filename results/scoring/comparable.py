@@ -11,14 +11,17 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import accumulate, pairwise
+from itertools import accumulate, chain, pairwise
 
+from robospa.results.failures.attribution import MEMORY
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.scoring.models import ModelResults, restricted, results_of_records
 from robospa.results.scoring.scores import level_name
 from robospa.results.tables import Table, TableCell, TableRow, estimate_cell
 from robospa.trial import CATEGORY_NAMES
 
+LEVELS = (1, 2, 3, 4, 5, 0)
+"""All levels, and their mean."""
 LEAD = "lead"
 """The diagnostic that says by how much [m] what is asked for is ahead of what comes closest."""
 CHUNKS, LAST_QUERY = "chunks", "last_query"
@@ -81,9 +84,9 @@ class Condition:
 
 
 CONDITIONS = {
-    "SDE": Condition("the asked distance differs from any other by more than 6 cm", _leads),
-    "CVR": Condition("the asked object leads by more than 6 cm, as officially", _leads),
-    "MIP": Condition("asked again after the cue was hidden", lambda r: bool(asked_again(r))),
+    "SDE": Condition("asked distance off any other by more than 6 cm", _leads),
+    "CVR": Condition("asked object leads by more than 6 cm, as officially", _leads),
+    MEMORY: Condition("asked again after the cue was hidden", lambda r: bool(asked_again(r))),
 }
 
 
@@ -99,56 +102,69 @@ def comparable(results: ModelResults) -> ModelResults:
     return results_of_records(results.name, list(records), records, results.manifest, ci)
 
 
-HEADS = ("SR of all", "SR of these", "SR@1 of these", "these", "actions a query")
-NOTE = (
-    "SR in percent with 95 % intervals, over variants with such trials. Actions a query: median "
-    "[least, most] of an answer that were executed in all trials, but for a trial's last answer."
+RATES = ("SR of all", "SR@1 of all", "SR of these", "SR@1 of these")
+CHUNK = "actions a query"
+NOTE = "In percent with 95 % intervals, over the variants that have such trials."
+CHUNK_NOTE = (
+    f"{CHUNK}: how many of an answer were executed, median [least, most] over all trials, without "
+    "a trial's last answer where it had several."
 )
 
 
 def comparable_table(models: Sequence[ModelResults]) -> Table | None:
     """The categories of CONDITIONS over all trials and over those that compare, by level; None if
     no model has any of these. Published models, whose trials nobody knows, have no column."""
-    pairs = [(model, comparable(model)) for model in models if not model.published]
-    sides = [(restricted(model, few.trials), few) for model, few in pairs]
+    sides = [(model, comparable(model)) for model in models if not model.published]
+    known = {
+        (r.category, level)
+        for model, _ in sides
+        for r in _records(model)
+        for level in (r.key.level, 0)
+    }
+    heads = (*RATES, "these", *[CHUNK] * ((MEMORY, 0) in known))
     rows: list[TableRow] = []
     for category, condition in CONDITIONS.items():
-        known = {n for _, few in sides for c, n in few.scores.categories if c == category}
-        if known:
+        if (category, 0) in known:
             name = f"{category} {CATEGORY_NAMES[category]}: {condition.words}"
             rows.append(TableRow(name, kind="section"))
-        for level in sorted(known, key=lambda n: n or 9):
-            cells = [cell for side in sides for cell in _cells(*side, category, level)]
-            rows.append(TableRow(level_name(level), tuple(cells), "row" if level else "average"))
+        for level in (level for level in LEVELS if (category, level) in known):
+            cells = [_cells(*side, category, level)[: len(heads)] for side in sides]
+            kind = "row" if level else "average"
+            rows.append(TableRow(level_name(level), tuple(chain(*cells)), kind))
     if not rows:
         return None
-    groups = tuple((model.name, len(HEADS)) for model, _ in sides)
-    heads = HEADS * len(sides)
+    groups = tuple((model.name, len(heads)) for model, _ in sides)
     title = "Success rate (SR) where trials compare"
-    return Table("comparable", title, "", heads, tuple(rows), groups, (NOTE,))
+    notes = (NOTE, *[CHUNK_NOTE] * (CHUNK in heads))
+    return Table("comparable", title, "", heads * len(sides), tuple(rows), groups, notes)
 
 
-def _cells(whole: ModelResults, few: ModelResults, category: str, level: int) -> list[TableCell]:
-    records, these = _records(whole, category, level), _records(few, category, level)
-    if not these:
-        return [TableCell("–")] * len(HEADS)
-    rates = [
-        estimate_cell(found)
-        for model, metric in ((whole, "sr"), (few, "sr"), (few, "sr1"))
-        if (found := model.scores.categories[category, level].values[metric]) is not None
-    ]
-    count = TableCell(f"{len(these)} of {len(records)}", len(these))
-    return [*rates, count, TableCell(chunks_text(records) if category == "MIP" else "")]
-
-
-def _records(model: ModelResults, category: str, level: int) -> list[TrialRecord]:
-    """The results of a category at a level; 0: at all."""
+def _records(model: ModelResults) -> list[TrialRecord]:
+    """The results of CONDITIONS' categories that say whether they compare."""
     return [
         record
-        for (_, n), trials in model.trials.items()
+        for trials in model.trials.values()
         for record in trials.values()
-        if record.category == category and level in (0, n)
+        if record.category in CONDITIONS and {LEAD, CHUNKS} & record.diagnostics.keys()
     ]
+
+
+def _cells(model: ModelResults, few: ModelResults, category: str, level: int) -> list[TableCell]:
+    records, these = (
+        [r for r in _records(x) if r.category == category and level in (0, r.key.level)]
+        for x in (model, few)
+    )
+    averages = [
+        scores.categories.get((category, level))
+        for scores in (restricted(model, few.trials).scores, few.scores)
+    ]
+    rates = [
+        estimate_cell(found) if average and (found := average.values[metric]) else TableCell("–")
+        for average in averages
+        for metric in ("sr", "sr1")
+    ]
+    count = TableCell(f"{len(these)} of {len(records)}", len(these))
+    return [*rates, count, TableCell(chunks_text(records) if category == MEMORY else "")]
 
 
 def chunks_text(records: Iterable[TrialRecord]) -> str:

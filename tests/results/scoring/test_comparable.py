@@ -70,19 +70,19 @@ def test_rates_over_the_trials_that_compare_stand_beside_those_over_all(run: Any
             category = row.label[:3]
         else:
             found[category, row.label] = row.cells
-    values = {place: tuple(cell.value for cell in cells[:4]) for place, cells in found.items()}
+    values = {place: tuple(cell.value for cell in cells[:5]) for place, cells in found.items()}
     assert values == {
-        ("SDE", "L2"): (50, 100, 100, 1),
-        ("SDE", "mean"): (50, 100, 100, 1),
-        ("CVR", "L1"): (75, 100, 100, 3),
-        ("CVR", "L5"): (20, 100, 100, 1),
-        ("CVR", "mean"): (47.5, 100, 100, 4),
-        ("MIP", "L3"): (50, 50, 50, 2),
-        ("MIP", "mean"): (50, 50, 50, 2),
+        ("SDE", "L2"): (50, 50, 100, 100, 1),
+        ("SDE", "mean"): (50, 50, 100, 100, 1),
+        ("CVR", "L1"): (75, 75, 100, 100, 3),
+        ("CVR", "L5"): (20, 20, 100, 100, 1),
+        ("CVR", "mean"): (47.5, 47.5, 100, 100, 4),
+        ("MIP", "L3"): (50, 50, 50, 50, 2),
+        ("MIP", "mean"): (50, 50, 50, 50, 2),
     }
-    assert found["CVR", "L5"][3].text == "1 of 5"
-    assert found["MIP", "L3"][4].text == "16 [10, 40]"
-    assert found["CVR", "L1"][1].low == pytest.approx(43.85, abs=0.01)  # Wilson, 3 of 3
+    assert found["CVR", "L5"][4].text == "1 of 5"
+    assert found["MIP", "L3"][5].text == "16 [10, 40]"
+    assert found["CVR", "L1"][2].low == pytest.approx(43.85, abs=0.01)  # Wilson, 3 of 3
 
 
 def test_variants_without_such_trials_are_in_neither_rate(tmp_path: Path) -> None:
@@ -91,7 +91,8 @@ def test_variants_without_such_trials_are_in_neither_rate(tmp_path: Path) -> Non
     table = comparable_table([results_of_run(make_run(tmp_path / "run", [*RECORDS, *other]))])
     assert table is not None
     line = next(row for row in table.rows if row.label == "L1")
-    assert [cell.text for cell in line.cells][3] == "3 of 4"
+    assert [cell.text for cell in line.cells][4] == "3 of 8"
+    assert line.cells[0].value == 75
 
 
 def test_the_table_is_in_all_that_a_report_writes(run: Any, tmp_path: Path) -> None:
@@ -104,10 +105,16 @@ def test_the_table_is_in_all_that_a_report_writes(run: Any, tmp_path: Path) -> N
     assert frame.lead.max() == 0.2 and frame.asked_again.sum() == 2
 
 
-def test_a_run_without_such_trials_has_no_table(tmp_path: Path) -> None:
-    few = [r for r in RECORDS if r.category == "CVR" and r.diagnostics["lead"] != 0.0601][:2]
-    table = comparable_table([results_of_run(make_run(tmp_path / "run", few[:1]))])
-    assert table is None
+def test_where_no_trial_compares_the_chunks_are_told_all_the_same(tmp_path: Path) -> None:
+    run = make_run(tmp_path / "run", [remembered(n, 1, [0], 10) for n in range(2)])
+    table = comparable_table([results_of_run(run)])
+    assert table is not None
+    assert [c.text for c in table.rows[1].cells] == [*["–"] * 4, "0 of 2", "40 [40, 40]"]
+
+
+def test_other_categories_and_older_records_have_no_table(tmp_path: Path) -> None:
+    records = [record("Pick_Blocks_Size", 1, 0, 1), record(SDE, 1, 0, 1)]
+    assert comparable_table([results_of_run(make_run(tmp_path / "run", records))]) is None
 
 
 @pytest.mark.parametrize(
