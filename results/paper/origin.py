@@ -85,7 +85,7 @@ def _sentences(settings: RunSettings) -> str:
     """The official sentences, or how those made here compare with the paper's."""
     if settings.instructions:
         return f"sentences{_hash(settings.instructions)}"
-    known = [f"`{split}`: {SPLITS[split]}" for split in settings.split if split in SPLITS]
+    known = [f"{split}: {SPLITS[split]}" for split in settings.split if split in SPLITS]
     return "other sentences" + f" ({'; '.join(known)})" * bool(known)
 
 
@@ -109,8 +109,8 @@ ORIGIN = (
     "Tasks, rules, thresholds, layouts, step limits and the robot are those of the official "
     "benchmark; the object meshes, the renderer, the seeds and the sentences are this project's "
     "own. So numbers of other suites, the paper's among them, stand beside ours and are never "
-    "ranked among them. The paper's unseen sentences largely repeat seen ones: `train` or official "
-    "sentences compare with it, `heldout` and `indirect` are stricter."
+    "ranked among them. The paper's unseen sentences largely repeat seen ones: the split train and "
+    "official sentences compare with it, heldout and indirect are stricter."
 )
 RANKED = (
     "Marks and ranks count the paper's values and these alike; they say which policy is better "

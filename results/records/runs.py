@@ -350,12 +350,14 @@ def _part(run: Run, setting: tuple[str, str, str]) -> Run:
 def setting_name(run: Run) -> str:
     """Robots, scene modes and splits of `run` in a few words, with its suite and clock where they
     are not the benchmark's; the usual mode and split go without saying."""
-    robots = dict.fromkeys(key.embodiment for key in run.keys)
-    modes = dict.fromkeys(key.mode for key in run.keys if key.mode != "clean")
-    splits = dict.fromkeys(key.split for key in run.keys if key.split != "heldout")
-    official = [run.manifest.suite] if run.manifest.suite.startswith(OFFICIAL) else []
-    clock = [run.manifest.clock] if run.manifest.clock else []
-    return ", ".join((*official, *robots, *modes, *splits, *clock))
+    return ", ".join(part for part in setting_parts(run) if part not in ("", "clean", "heldout"))
+
+
+def setting_parts(run: Run) -> tuple[str, ...]:
+    """The suite if it is no own one, robots, scene modes, splits and clock of `run`."""
+    official = run.manifest.suite if run.manifest.suite.startswith(OFFICIAL) else ""
+    values = [dict.fromkeys(getattr(key, part) for key in run.keys) for part in PARTS]
+    return (official, *map(", ".join, values), run.manifest.clock)
 
 
 def read_part(name: str) -> Run:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import compress
 
 from msgspec import to_builtins
 
 from robospa.results.paper.origin import SPLITS
 from robospa.results.records.action_problems import problem_lines
 from robospa.results.records.manifest import RunAbout, departures
-from robospa.results.records.runs import Run, setting_name
+from robospa.results.records.runs import Run, setting_parts
 from robospa.results.records.trial_record import PROCESSOR
 from robospa.results.scoring.repeats import error_rates_text, policy_errors, repeats_text
 
@@ -27,11 +28,13 @@ ACTIONS = {"action": "", "horizon": "chunks of at most ", "execute": "executed o
 
 
 def names_of(runs: Sequence[Run]) -> list[str]:
-    """A name for every run: its policy's, where two would be equal with its robot and scene mode
-    if these differ, and then with its folder."""
+    """A name for every run: its policy's, where two would be equal with what they differ in of
+    their settings, and then with their folder."""
     names = [run.manifest.policy.name or "unknown" for run in runs]
-    for more in (setting_name, lambda run: run.folder.name):
-        extra = [more(run) for run in runs]
+    settings = [setting_parts(run) for run in runs]
+    differ = [len(set(values)) > 1 for values in zip(*settings, strict=True)]
+    told = [", ".join(filter(None, compress(parts, differ))) for parts in settings]
+    for extra in (told, [run.folder.name for run in runs]):
         names = [
             f"{name} ({text})" if _differ(names, extra, name) else name
             for name, text in zip(names, extra, strict=True)

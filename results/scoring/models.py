@@ -196,7 +196,7 @@ def check_alike(models: Sequence[ModelResults], parts: Sequence[str]) -> None:
     suite, because each is of another suite than those anyway.
     """
     runs = [m for m in models if not m.published]
-    shared = [part for part in parts if not (one_policy(models) and part in FREE)]
+    shared = [part for part in parts if not (one_policy(runs) and part in FREE)]
     if len(runs) < len(models) and all(map(in_official_world, runs)):
         shared = [part for part in shared if part != "suite"]
     check_same([(m.name, m.setting) for m in runs], shared)

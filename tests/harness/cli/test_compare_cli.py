@@ -101,4 +101,4 @@ def test_mistakes_are_one_sentence(
 def test_lint_of_the_paper_fails_with_its_findings(capsys: pytest.CaptureFixture[str]) -> None:
     code, text, _ = run(capsys, "report", "paper", "--lint")
     assert code == 1
-    assert "10 errors, 0 warnings" in text
+    assert "8 errors, 0 warnings" in text

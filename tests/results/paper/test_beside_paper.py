@@ -63,7 +63,7 @@ SAID = {
     "checkout": (["simulator, planner and renderer", "configuration: demo_clean"], ["other seeds"]),
     "ours": (
         ["layouts"],
-        ["other object meshes", "other sentences (`heldout`: stricter; `train`: comparable)"],
+        ["other object meshes", "other sentences (heldout: stricter; train: comparable)"],
     ),
     "ours, their sentences": (["sentences (hash fedcba987654)"], ["other object meshes"]),
 }  # fmt: skip

@@ -263,3 +263,12 @@ def test_runs_at_both_ends_are_marked_under_the_bootstrap_too(tmp_path: Path) ->
     report = make_report([good, bad], ci="bootstrap")
     cells = [line.cells for shown in report.tables for line in shown.table.rows if line.cells]
     assert cells and all([e.best for e in row] == [True, False] for row in cells)
+
+
+def test_both_splits_of_a_run_have_a_column_beside_the_paper(tmp_path: Path) -> None:
+    records = [replace(r, key=replace(r.key, split=s)) for s in ("train", "heldout") for r in KNOWN]
+    report = make_report(make_run(tmp_path / "run", records), ["RDT"])
+    table = next(t.table for t in report.tables if t.table.name == "sr-tasks")
+    names = [name.rpartition("(")[2] for name, _ in table.groups]
+    assert names == ["train)", "heldout)", "paper)"]
+    assert "(train: comparable)" in report.banner[0] and "(heldout: stricter)" in report.banner[0]
