@@ -51,7 +51,7 @@ def lint_published() -> list[Finding]:
     for model in data.models:
         rows: dict[str, Row] = {}
         for task, rates in data.per_task[model, "sr"].rows.items():
-            progress = data.per_task[model, "ps"].rows.get(task, [])
+            progress = data.per_task[model, "ps"].rows.get(task, ())
             other = progress or data.per_task[model, "onta"].rows[task]
             rows[task] = (), (*rates, *other)
             counts = zip(progress, data.tasks[task].counts, strict=False)
