@@ -20,7 +20,7 @@ import numpy as np
 from robospa.tasks.families import table
 from robospa.tasks.goals.lifting import Lift
 from robospa.tasks.instructions import Slots, TaskText, ordinal
-from robospa.tasks.sampling.grid import GapGrid, Grid, GridLayout
+from robospa.tasks.sampling.grid import GapGrid, Grid
 from robospa.tasks.sampling.places import NoRoom, retry
 from robospa.tasks.sampling.turns import Turnable, between
 from robospa.tasks.scene import Scene
@@ -77,7 +77,7 @@ class Line:
     kind: str
     noun: str
     things: Things
-    layouts: Mapping[int, GridLayout]
+    layouts: Mapping[int, Grid | GapGrid]
     steady: float
     what: str
     sideways: tuple[str, ...] = ()
@@ -275,6 +275,4 @@ LINES = (
 )
 
 TASKS = tuple(line_task(line) for line in LINES)
-
-
 BASIC = tuple(line_task(line, basic=True) for line in LINES)

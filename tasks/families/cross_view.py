@@ -37,9 +37,9 @@ OBJECTS = {1: 3, 2: 4, 3: 5, 4: 6, 5: 7}
 PIXELS = 60.0
 """Least distance of two different objects' centres in the head image [px]."""
 MARGIN = (0.05, 0.05)
-LEADS = {1: 0.04, 2: 0.03, 3: 0.025, 4: 0.025, 5: 0.02}
-"""Every extreme object leads the next one by at least this [m], whichever is asked for: if only
-the asked one had to lead (officially, by 0.06), its place alone would tell the answer."""
+LEAD = 0.061
+"""Every extreme object leads the next one by this [m] in x and in y, where there is room, whichever
+is asked for: if only the asked one led (officially, by 0.06), its place alone would tell it."""
 LAYOUTS = 100
 """Layouts that are drawn until the objects lie free of each other in one."""
 SHIFT = 0.02
@@ -47,24 +47,37 @@ SHIFT = 0.02
 CHAINS = 256
 """Random walks that the layouts of a level come from."""
 STARTS = (
-    ((-0.1816, -0.1308), (0.1759, -0.0708), (0.1112, 0.0423), (0.0899, -0.1705),
-     (-0.0155, -0.022), (-0.1462, -0.0043), (-0.0536, -0.1493)),
-    ((-0.1846, -0.0574), (0.1858, 0.003), (-0.0787, 0.0425), (-0.1259, -0.1729),
-     (0.0488, 0.0074), (0.0254, -0.1362), (0.1546, -0.1412)),
-    ((-0.1874, 0.0087), (0.1801, -0.0598), (0.0922, 0.0419), (0.1056, -0.1729),
-     (-0.0213, -0.1311), (-0.1558, -0.1418), (-0.049, 0.0167)),
-    ((-0.1856, -0.0736), (0.165, -0.1157), (-0.1157, 0.042), (-0.0948, -0.1723),
-     (0.0319, -0.1432), (0.0127, 0.0098), (0.1423, 0.0179)),
-    ((-0.2361, -0.0030), (0.1751, 0.0296), (0.0690, 0.0824), (-0.1863, -0.1632),
-     (-0.1364, 0.0354), (-0.0353, -0.0164), (0.0602, -0.1206)),
-    ((-0.2277, -0.0087), (0.1669, -0.0173), (-0.1219, 0.0778), (-0.1732, -0.1835),
-     (-0.0655, -0.1009), (0.0537, -0.1395), (0.0535, 0.0330)),
-    ((-0.2356, 0.0374), (0.1675, -0.0141), (0.0384, 0.0880), (-0.0861, -0.1836),
-     (-0.1157, 0.0388), (0.0201, -0.1340), (-0.1908, -0.1347)),
-    ((-0.2379, -0.0038), (0.1961, 0.0408), (-0.0979, 0.0936), (-0.1877, -0.1772),
-     (-0.0697, -0.1000), (0.1512, -0.1294), (0.0623, -0.0033)),
-)  # fmt: skip
-"""Layouts of seven, the four of EXTREMES first, where the pools start; found by annealing."""
+    ((-239, -8), (196, 28), (-166, 92), (-158, -178), (-67, -82), (19, 24), (94, -81)),
+    ((-232, -86), (186, -10), (113, 92), (106, -171), (15, -2), (-164, 18), (-69, -104)),
+    ((-233, 10), (188, -6), (117, 90), (-166, -174), (-119, 2), (2, -8), (84, -109)),
+    ((-232, -4), (198, 28), (-160, 90), (133, -178), (-126, -98), (-42, 12), (82, 14)),
+    ((-233, -90), (166, -104), (-40, 81), (-111, -168), (-154, 8), (2, -98), (96, 18)),
+    ((-187, -46), (184, -23), (55, 42), (-124, -168), (57, -104), (-64, -59)),
+    ((-186, -109), (184, -33), (-115, 34), (118, -172), (-58, -108), (62, -65)),
+    ((-187, -40), (185, -35), (-18, 40), (119, -172), (-58, -99), (65, -73)),
+    ((-186, -86), (182, -40), (-91, 40), (58, -171), (54, -24), (-66, -105)),
+    ((-187, -88), (184, -39), (-43, 42), (96, -170), (-58, -107), (61, -52)),
+    ((-187, -58), (167, -113), (-94, 42), (-119, -168), (14, -115), (104, -10)),
+    ((-177, -116), (185, -15), (56, 42), (116, -171), (-26, -117), (-106, -10)),
+    ((-187, -13), (175, -69), (107, 40), (-111, -170), (42, -115), (-57, -14)),
+    ((-187, -113), (177, -26), (-124, 42), (80, -169), (-55, -116), (46, -10)),
+    ((-187, -117), (187, -18), (18, 40), (-42, -169), (-116, -13), (89, -118)),
+    ((-181, -11), (165, -115), (-49, 41), (35, -169), (-94, -117), (99, -12)),
+    ((-195, -117), (180, -67), (115, 49), (104, -179), (-9, 2), (-132, 0), (-62, -125)),
+    ((-194, -55), (186, -2), (-113, 49), (-126, -177), (123, -131), (63, -4), (-1, -129)),
+    ((-195, -6), (194, -6), (-75, 50), (126, -176), (3, -118), (70, 4), (-120, -128)),
+    ((-196, -134), (194, -7), (72, 51), (-69, -181), (122, -134), (-130, -25), (-3, -77)),
+    ((-195, -6), (184, -51), (70, 43), (120, -180), (-130, -129), (-2, -127), (-60, -4)),
+    ((-191, 0), (189, -1), (52, 51), (-9, -179), (115, -129), (-128, -129), (-68, 5)),
+    ((-187, -139), (176, -64), (102, 40), (100, -170), (-154, 0), (-27, 8), (-49, -136)),
+    ((-187, -66), (187, 4), (-105, 36), (-116, -172), (27, -137), (154, -141), (50, 2)),
+    ((-187, 9), (177, -59), (94, 42), (107, -172), (-44, 6), (-152, -139), (-24, -136)),
+    ((-187, -60), (184, 0), (-74, 41), (-113, -171), (16, -139), (55, 9), (145, -139)),
+    ((-187, -136), (173, -70), (104, 38), (71, -172), (-57, -136), (-156, 1), (-27, 1)),
+    ((-186, -65), (186, 6), (-110, 42), (-115, -171), (28, 10), (13, -134), (144, -133)),
+    ((-187, 6), (178, -60), (75, 41), (109, -172), (-153, -137), (-58, 5), (-19, -127)),
+)
+"""Layouts [mm] where the pools start, the four of EXTREMES first; found by annealing."""
 
 EXTREMES = ("leftmost", "rightmost", "frontmost", "backmost")
 """In the robot's frame: least x, largest x, largest y (far), least y (near)."""
@@ -83,10 +96,9 @@ class ObjectSpread:
     """The data of one task: equal objects if there is one asset, else different ones.
 
     `radius` and `tall` bound the objects [m] in view, where their turns do not. Two of them are
-    apart by `spacing`: in x or in y,
-    and in any case. `inset` keeps the origins that far inside the region. In the head image
-    centres of different objects are 60 px apart; equal ones, taken to be of radius `seen`, do
-    not overlap.
+    apart by `spacing`: in x or in y, and in any case. `inset` keeps the origins that far inside the
+    region. In the head image centres of different objects are 60 px apart; equal ones, taken to be
+    of radius `seen`, do not overlap. `leads` are the levels' least leads in x and y.
     """
 
     kind: str
@@ -97,6 +109,7 @@ class ObjectSpread:
     spacing: tuple[float, float, float]
     inset: float = 0.0
     seen: float = 0.0
+    leads: tuple[tuple[float, float], ...] = ((LEAD, LEAD),) * 5
 
     @property
     def alike(self) -> bool:
@@ -119,10 +132,9 @@ class ObjectSpread:
         if self.alike:
             free &= self._separate(workcell, points, moved_to)
         else:
-            u, v = workcell.head.pixel(points[..., 0], points[..., 1], TABLE_TOP + self.tall / 2)
-            wu, wv = workcell.head.pixel(
-                moved_to[:, :1], moved_to[:, 1:], TABLE_TOP + self.tall / 2
-            )
+            middle = TABLE_TOP + self.tall / 2
+            u, v = workcell.head.pixel(points[..., 0], points[..., 1], middle)
+            wu, wv = workcell.head.pixel(moved_to[:, :1], moved_to[:, 1:], middle)
             free &= (u - wu) ** 2 + (v - wv) ** 2 >= PIXELS**2
         free[:, i] = True
         return np.asarray(free.all(axis=1))
@@ -156,6 +168,7 @@ def fits(workcell: Workcell, spread: ObjectSpread, level: int, roles: NDArray[np
     It must be so in the head image as well, where perspective could put another object outermost.
     """
     middle = TABLE_TOP + spread.tall / 2
+    least = np.array(spread.leads[level - 1])[AXES]
 
     def rule(points: Array, moved_to: Array, i: int) -> Mask:
         moved = points.copy()
@@ -163,7 +176,7 @@ def fits(workcell: Workcell, spread: ObjectSpread, level: int, roles: NDArray[np
         place, lead = leaders(moved)
         u, v = workcell.head.pixel(moved[..., 0], moved[..., 1], middle)
         seen = leaders(np.stack([u, -v], axis=-1))[0]
-        clear = ((place == roles) & (seen == roles) & (lead >= LEADS[level])).all(axis=1)
+        clear = ((place == roles) & (seen == roles) & (lead >= least)).all(axis=1)
         allowed = spread.allowed(workcell, moved_to[:, 0], moved_to[:, 1])
         return np.asarray(clear & allowed & spread.apart(workcell, points, moved_to, i))
 
@@ -177,7 +190,7 @@ def _starts(workcell: Workcell, spread: ObjectSpread, level: int) -> list[Array]
     """
     count = OBJECTS[level]
     good = []
-    for layout in np.array(STARTS):
+    for layout in (np.array(places) / 1000 for places in STARTS if len(places) >= count):
         parts = [layout[:count]] if count > 3 else [np.delete(layout[:4], k, 0) for k in range(4)]
         for part in parts:
             roles = leaders(part)[0]
@@ -315,6 +328,7 @@ SPREADS = (
         0.08,
         (0.126, 0.098, 0.118),
         inset=0.052,
+        leads=(*((LEAD, LEAD),) * 3, (LEAD, 0.045), (0.025, 0.025)),
     ),
     ObjectSpread(
         "Mixed_Objects_B",
@@ -324,10 +338,9 @@ SPREADS = (
         0.099,
         (0.118, 0.092, 0.104),
         inset=0.0435,
+        leads=(*((LEAD, LEAD),) * 4, (LEAD, 0.04)),
     ),
 )
 
 TASKS = tuple(spread_task(spread) for spread in SPREADS)
-
-
 BASIC = tuple(spread_task(spread, basic=True) for spread in SPREADS)

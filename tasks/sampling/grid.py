@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Protocol
 
 import numpy as np
 
@@ -15,22 +14,6 @@ from robospa.workcell import Workcell
 
 Cell = tuple[int, int]
 """Column (to the right) and row (away from the robot), counted from 0."""
-
-
-class GridLayout(Protocol):
-    """Where the objects of a level stand."""
-
-    @property
-    def rows(self) -> int: ...
-
-    @property
-    def columns(self) -> int: ...
-
-    def places(
-        self, rng: np.random.Generator, workcell: Workcell
-    ) -> Callable[[int, int], tuple[float, float]]:
-        """A drawn grid: place [m] of object `k` on cell `cell` (row by row from the robot)."""
-        ...
 
 
 @dataclass(frozen=True)
