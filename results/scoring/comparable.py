@@ -1,7 +1,7 @@
 """Scores over the trials that compare best with the official benchmark or with other policies.
 
 Officially the object that a Multi View task asks for leads the others by more than 6 cm; here all
-four extremes lead by less, so that the scene does not tell which one is asked for. A gap of the
+four extremes do, and mixed objects at levels 4 and 5, where there is no room, by less. A gap of the
 same size makes the levels of the Distance tasks comparable with each other. And a policy that
 executes long chunks may do a whole memory trial from what it saw before the cue was hidden.
 """
