@@ -112,6 +112,12 @@ def collision(geometry: Geometry, at: Vec3 = (0.0, 0.0, 0.0), rotation: Quat = U
     return Shape(geometry, Pose(at, rotation), visual=False)
 
 
+def outline(geometry: Geometry, at: Vec3 = (0.0, 0.0, 0.0), rotation: Quat = UPRIGHT) -> Shape:
+    """A shape that is neither drawn nor felt, but measured: sizes and samplers take the object to
+    reach as far, so that a scene outlives a new drawing."""
+    return Shape(geometry, Pose(at, rotation), visual=False, collision=False)
+
+
 def solid(
     geometry: Geometry,
     color: Color,

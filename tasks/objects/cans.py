@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from robospa.geometry import yaw_rotation
 from robospa.tasks.objects import build
 from robospa.tasks.objects import meshes as m
 from robospa.tasks.objects.build import collision, colour, srgb, visual
@@ -192,29 +193,48 @@ PILLS = (
 """Colours of bottle and cap, colour word and radius [m]."""
 PILL_HEIGHT, PILL_GRIP = 0.155, 0.125
 """Height of a pill bottle, and how high it is grasped from above [m] (official)."""
+PILL_TURNS = (0.6 + math.pi, 0.6)
+"""How the halves of the capsule on its cap are turned [rad]."""
 
 
 def pill_bottle(look: int, params: Params) -> ObjectModel:
-    """A medicine bottle with a wide ribbed cap and a white label."""
+    """A medicine bottle with a neck, a capsule on its wide ribbed cap, and a cross on its label."""
     shell, cap, word, r = PILLS[look]
     h = PILL_HEIGHT
-    body = [(r - 0.002, 0.0), (r, 0.002), (r, 0.106), (r * 0.86, 0.116)]
+    body = [(0.0, 0.0), (r - 0.002, 0.0), (r, 0.002), (r, 0.088), (r * 0.68, 0.108)]
+    body += [(r * 0.68, 0.124)]
     label = srgb("#cfe0f4") if word == "white" else build.PAPER
-    cross = m.rectangle(0.0042, 0.0140), m.rectangle(0.0140, 0.0042)
-    print_color = srgb("#c8202a") if word != "orange" else srgb("#1f55c4")
+    cross = m.rectangle(0.0052, 0.0170), m.rectangle(0.0134, 0.0052)
+    cross_before = m.rectangle(0.0042, 0.0140), m.rectangle(0.0140, 0.0042)
+    red = srgb("#c8202a")
+    top = h - 0.0010
     parts = [
         collision(Cylinder(r, h / 2), (0.0, 0.0, h / 2)),
-        visual(m.lathe(body, 16), srgb(shell), roughness=0.2),
-        visual(m.lathe([(r + 0.0004, 0.022), (r + 0.0004, 0.072)], 16, False), label),
-        visual(m.merge(*(around(c, r + 0.0012, 0.047) for c in cross)), print_color),
-        visual(_ribbed(r - 0.0015, 0.114, h), colour(cap), roughness=0.5),
-    ]
+        visual(m.lathe(body, 16, False), srgb(shell), roughness=0.2),
+        visual(m.lathe([(r + 0.0004, 0.016), (r + 0.0004, 0.080)], 16, False), label),
+        visual(m.merge(*(around(c, r + 0.0009, 0.048) for c in cross)),
+               red if word != "orange" else srgb("#1f55c4")),
+        visual(_ribbed(r - 0.0015, 0.122, top), colour(cap), roughness=0.5),
+        visual(m.merge(*(_half_pill(0.78 * r, top + 0.0003, t) for t in PILL_TURNS)), build.DARK),
+        visual(_half_pill(0.66 * r, top + 0.0006, PILL_TURNS[0]), build.PAPER),
+        visual(_half_pill(0.66 * r, top + 0.0006, PILL_TURNS[1]), red),
+        build.outline(m.lathe([(r + 0.0004, 0.022), (r + 0.0004, h)], 16)),
+        build.outline(m.merge(*(around(c, r + 0.0012, 0.047) for c in cross_before))),
+    ]  # fmt: skip
     phrases = build.fill_phrases(
         word, "{} pill bottle", "{} medicine bottle", "{} bottle of pills", "pill bottle in {}",
         "{} plastic medicine bottle", "{} pill container", f"{word} pill bottle with a {cap} cap",
     )  # fmt: skip
     grasps = build.round_grasps(2 * r, PILL_GRIP, 1.0)
     return build.model("pill_bottle", parts, "pill bottle", phrases, grasps, support=(0.0, 0.0, h))
+
+
+def _half_pill(long: float, z: float, turn: float) -> Mesh:
+    """Half a capsule lying at `z`, `long` [m] from the capsule's middle to its end."""
+    wide = 0.46 * long
+    arc = [(long - wide + wide * math.cos(t), wide * math.sin(t)) for t in (-1.57, -0.8, 0.8, 1.57)]
+    end = m.flat([(0.0, -wide), *arc, (0.0, wide)], z)
+    return m.moved(end, rotation=yaw_rotation(turn))
 
 
 def _ribbed(radius: float, low: float, high: float) -> Mesh:
@@ -259,15 +279,18 @@ def glue(look: int, params: Params) -> ObjectModel:
 
 def _glue_stick(base: str, cap: str, r: float) -> list[Shape]:
     h = 0.155
-    profile = [(r, 0.0), (r, 0.013), (r - 0.002, 0.014), (r - 0.002, 0.100)]
-    label = around(m.rectangle(0.6 * r, 0.027), r - 0.001, 0.055)
-    drop = around(_drop(0.014), r - 0.0001, 0.055)
+    body, stick = r - 0.0025, r - 0.0045
+    dial = [(0.0, 0.0), (r, 0.0), (r, 0.020), (body, 0.020)]
+    tube = [(body, 0.020), (body, 0.096), (stick, 0.096)]
+    lid = [(r, 0.108), (r, h - 0.008), (r - 0.004, h - 0.001), (0.0, h - 0.001)]
     return [
         collision(Cylinder(r, h / 2), (0.0, 0.0, h / 2)),
-        visual(m.lathe(profile, 14), colour(base)),
-        visual(_cap(r, 0.099, h), colour(cap)),
-        visual(label, build.PAPER),
-        visual(drop, srgb("#c8202a") if base != "red" else srgb("#1f55c4")),
+        visual(m.lathe(tube, 14, False), colour(base)),
+        *(visual(m.lathe(end, 14, False), colour(cap)) for end in (dial, lid)),
+        visual(m.lathe([(stick, 0.096), (stick, 0.110)], 14, False), build.PAPER),
+        visual(m.lathe([(body + 0.0003, 0.034), (body + 0.0003, 0.080)], 14, False), build.PAPER),
+        visual(around(_drop(0.020), r - 0.0012, 0.056), srgb("#c8202a")),
+        *(build.outline(m.lathe([(r, 0.0), (r, h)], n)) for n in (12, 14)),
     ]
 
 

@@ -89,28 +89,31 @@ SEAL_SIZES = (
 
 
 def seal(look: int, params: Params) -> ObjectModel:
-    """A hand stamp: a foot with a coloured edge, a thin neck and a round knob."""
+    """A hand stamp: a foot on coloured rubber, a thin neck and a grip with its print on top."""
     wood, edge, word, form, ink = SEALS[look]
     r, h = 0.0235, 0.064
-    handle = [(0.0165, 0.015), (0.0095, 0.021), (0.0085, 0.030), (0.0125, 0.037), (0.0152, 0.046)]
-    handle += [(0.0138, 0.056), (0.0085, 0.0625), (0.0, h)]
+    handle = [(0.0130, 0.0145), (0.0080, 0.020), (0.0080, 0.030), (0.0130, 0.039), (0.0150, 0.047)]
+    handle += [(0.0150, 0.059), (0.0135, h - 0.0008), (0.0, h - 0.0008)]
     if form == "round":
-        foot = m.lathe([(r, 0.0), (r, 0.006)], 18)
-        block = m.lathe([(r - 0.001, 0.006), (r - 0.001, 0.0135), (r - 0.004, 0.0155)], 18)
+        foot = m.lathe([(r, 0.0), (r, 0.008)], 18)
+        block = m.lathe([(r - 0.002, 0.008), (r - 0.002, 0.0155)], 18)
         under: Shape = collision(Cylinder(r, 0.0077), (0.0, 0.0, 0.0077))
     else:
-        foot = m.slab(r - 0.002, r - 0.002, 0.006, 0.002, 0.0, 2)
-        block = m.moved(m.slab(r - 0.003, r - 0.003, 0.0095, 0.003, 0.002, 2), (0.0, 0.0, 0.006))
+        foot = m.slab(r - 0.002, r - 0.002, 0.008, 0.002, 0.0, 2)
+        block = m.moved(m.slab(r - 0.004, r - 0.004, 0.0075, 0.003, 0.0, 2), (0.0, 0.0, 0.008))
         under = collision(Box((r - 0.002, r - 0.002, 0.0077)), (0.0, 0.0, 0.0077))
-    band = m.lathe([(0.0098, 0.0295), (0.0098, 0.033)], 12, False)
+    band = m.lathe([(0.0100, 0.0270), (0.0100, 0.032)], 10, False)
+    sign = srgb(edge) if ink != "white" else srgb(wood)
     parts = [
         under,
         collision(Cylinder(0.0085, 0.011), (0.0, 0.0, 0.026)),
         collision(m.lathe([(0.0125, 0.037), (0.0150, 0.043), (0.0150, 0.049), (0.0085, h)], 12)),
         visual(foot, srgb(edge), roughness=0.9),
         visual(block, srgb(wood), roughness=0.4),
-        visual(m.lathe(handle, 14), srgb(wood), roughness=0.3),
+        visual(m.lathe(handle, 12, False), srgb(wood), roughness=0.3),
         visual(band, colour("gold"), roughness=0.3, metallic=0.4),
+        visual(m.flat(m.ellipse(0.0128, 0.0128, 12), h - 0.0004), build.PAPER, roughness=0.8),
+        visual(m.flat(m.star(0.0108, 0.0046), h), sign, roughness=0.8),
     ]
     phrases = build.fill_phrases(
         word, "{} stamp", "{} hand stamp", "{} seal", "stamp with a {} handle", "{} stamper",
@@ -245,21 +248,19 @@ FAN_SIZES = (
 
 
 def fan(look: int, params: Params) -> ObjectModel:
-    """A desk fan blowing towards -y: round foot, stem, ringed blades before a pale back."""
+    """A desk fan blowing towards -y: blades in a cage, whose nose and motor show from the side."""
     frame, blade = FANS[look]
     r, z, deep = 0.0540, 0.1010, 0.0140
-    foot = [(0.042, 0.0), (0.042, 0.006), (0.036, 0.012), (0.016, 0.017)]
-    ring = [(r - 0.0060, -deep), (r, -deep + 0.003), (r, deep - 0.003), (r - 0.0060, deep)]
-    hoop = m.lathe([*ring, ring[0]], 24, False)
-    back = m.lathe([(r - 0.005, -0.009), (r - 0.005, -0.007)], 24)
-    spokes = [
-        m.box_mesh(
-            (0.0220, 0.0008, 0.0008),
-            (0.027 * math.cos(a), 0.027 * math.sin(a), deep - 0.001),
-            axis_rotation((0.0, 0.0, 1.0), a),
-        )
-        for a in (math.pi / 4 + math.pi / 2 * i for i in range(4))
-    ]
+    foot = [(0.042, 0.0), (0.042, 0.006), (0.014, 0.015)]
+    ring = [(r - 0.0050, 0.0), (r, -0.006), (r, 0.006)]
+    nose = [(0.013, -0.006), (0.013, 0.013), (0.008, 0.022), (0.0, 0.023)]
+    motor = [(0.0, -0.038), (0.011, -0.036), (0.017, -0.028), (0.017, -0.008)]
+    cage = []
+    for end in (-0.022, 0.019):
+        wires = [((0.052 * c, 0.052 * s, 0.2 * end), (0.012 * c, 0.012 * s, end))
+                 for c, s in m.ellipse(1.0, 1.0, 8, 0.2)]  # fmt: skip
+        cage.append(m.merge(*(m.tube(wire, 0.0012, 3) for wire in wires)))
+    frames = ([*ring, ring[0]], 20), (nose, 10), (motor, 10)
     at = (0.0, 0.0, z)
     pale = srgb("#8fa0ad") if frame == "white" else srgb("#eef1f4")
     parts = [
@@ -267,19 +268,14 @@ def fan(look: int, params: Params) -> ObjectModel:
         collision(Cylinder(0.011, 0.018), (0.0, 0.0, 0.033)),
         collision(Cylinder(r, deep), at, build.ALONG_Y),
         visual(m.lathe(foot, 22), colour(frame), roughness=0.4),
-        visual(m.lathe([(0.011, 0.015), (0.009, 0.050)], 10), colour(frame), roughness=0.4),
-        visual(hoop, colour(frame), at, build.ALONG_Y, 0.4),
-        visual(back, pale, at, build.ALONG_Y, 0.8),
+        visual(m.lathe([(0.009, 0.010), (0.007, 0.050)], 8, False), colour(frame), roughness=0.4),
+        visual(m.merge(*(m.lathe(profile, n, False) for profile, n in frames)), colour(frame), at,
+               build.ALONG_Y, 0.4),
+        visual(cage[0], pale, at, build.ALONG_Y, 0.4),
         visual(_blades(), colour(blade), at, build.ALONG_Y, 0.5),
-        visual(m.merge(*spokes), pale, at, build.ALONG_Y, 0.4),
-        visual(
-            m.lathe([(0.0110, 0.0), (0.0110, deep), (0.006, deep + 0.001)], 14),
-            colour(frame),
-            at,
-            build.ALONG_Y,
-        ),
-        visual(m.lathe([(0.006, 0.0), (0.006, 0.003)], 10), colour("red"), (0.0, -0.029, 0.0135)),
-    ]
+        visual(cage[1], pale, at, build.ALONG_Y, 0.4),
+        visual(m.lathe([(0.006, 0.0), (0.006, 0.003)], 8), colour("red"), (0.0, -0.029, 0.0090)),
+    ]  # fmt: skip
     phrases = build.fill_phrases(
         frame, "{} fan", "small {} fan", "{} desk fan", "fan with a {} frame", "{} electric fan",
         "{} table fan", f"{frame} fan with {blade} blades",
@@ -293,10 +289,7 @@ def fan(look: int, params: Params) -> ObjectModel:
 
 def _blades() -> Mesh:
     parts = []
-    petal = [
-        (0.006, -0.010), (0.030, -0.030), (0.043, -0.017), (0.0465, 0.004), (0.040, 0.020),
-        (0.020, 0.018), (0.006, 0.008),
-    ]  # fmt: skip
+    petal = [(0.006, -0.010), (0.032, -0.031), (0.045, 0.000), (0.038, 0.022), (0.006, 0.008)]
     for i in range(3):
         turn = axis_rotation((0.0, 0.0, 1.0), 2 * math.pi / 3 * i + 0.5)
         twist = m.moved(m.prism(petal, 0.0, 0.0016), rotation=axis_rotation((1.0, 0.0, 0.0), 0.2))

@@ -160,69 +160,86 @@ def alarm_clock(look: int, params: Params) -> ObjectModel:
 
 
 def _digital(body: str, metal: str) -> tuple[list[Shape], float]:
-    """A rounded block with a dark screen, 10:10 in bright bars, and a long button on top."""
+    """A block with a dark screen on both broad sides, 10:10 in bright bars, and a long button."""
     hx, hy, h, top = 0.097, 0.036, 0.110, 0.1228
-    outline = m.moved(m.slab(hx, h / 2, 2 * hy, 0.022, 0.004, 4), rotation=build.ALONG_Y)
-    block = m.moved(outline, (0.0, hy, h / 2))
-    screen = m.upright(m.rounded_rectangle(0.082, 0.040, 0.010), (0.0, -hy - 0.0006, h / 2))
+    outline = m.moved(m.slab(hx, h / 2, 2 * hy - 0.0016, 0.022, 0.004, 3), rotation=build.ALONG_Y)
+    block = m.moved(outline, (0.0, hy - 0.0008, h / 2))
+    screen = m.rounded_rectangle(0.088, 0.046, 0.012)
     digits = [
-        *(m.rectangle(0.0045, 0.026, x) for x in (-0.048, 0.022)),
-        *(m.rectangle(w, 0.0035, x, z) for x in (-0.017, 0.053) for z, w in
-          ((0.0225, 0.014), (-0.0225, 0.014))),
-        *(m.rectangle(0.0035, 0.026, x + u) for x in (-0.017, 0.053) for u in (-0.0105, 0.0105)),
-        *(m.rectangle(0.0035, 0.0035, 0.003, z) for z in (-0.010, 0.010)),
-    ]  # fmt: skip
-    lit = m.merge(*(m.upright(d, (0.0, -hy - 0.0011, h / 2)) for d in digits))
-    button = m.moved(m.slab(0.048, 0.016, top - h + 0.002, 0.008, 0.002), (0.0, 0.0, h - 0.002))
+        *(m.rectangle(0.0065, 0.034, x) for x in (-0.066, 0.022)),
+        *(m.rectangle(0.019, 0.0055, x, z) for x in (-0.030, 0.058) for z in (-0.0285, 0.0285)),
+        *(m.rectangle(0.0055, 0.034, x + u) for x in (-0.030, 0.058) for u in (-0.0135, 0.0135)),
+        *(m.rectangle(0.0050, 0.0050, -0.003, z) for z in (-0.013, 0.013)),
+    ]
+    button = m.moved(m.slab(0.048, 0.016, top - h + 0.002, 0.012, 0.003), (0.0, 0.0, h - 0.0024))
+    half = [(0.008, 0.005), (0.008, 0.009), (-0.008, 0.009), (-0.008, 0.005), (0.002, 0.005)]
+    letter = [*half, *((-x, -y) for x, y in half)]
+    sides = ((-1, -math.pi / 2), (1, math.pi / 2))
     parts = [
         collision(Box((hx, hy, h / 2)), (0.0, 0.0, h / 2)),
         collision(Box((0.048, 0.016, (top - h) / 2)), (0.0, 0.0, (top + h) / 2)),
         visual(block, colour(body), roughness=0.4),
-        visual(screen, srgb("#10151a"), roughness=0.2),
-        visual(lit, srgb("#ff8a3c") if body != "red" else srgb("#7dff9a")),
+        visual(m.merge(*(m.upright(screen, (0.0, s * (hy - 0.0004), h / 2), a) for s, a in sides)),
+               srgb("#10151a"), roughness=0.2),
+        visual(m.merge(*(m.upright(d, (0.0, s * hy, h / 2), a) for s, a in sides for d in digits)),
+               srgb("#ff8a3c") if body != "red" else srgb("#7dff9a")),
         visual(button, colour(metal), roughness=0.4),
-    ]
+        visual(m.merge(*(m.flat(letter, top, (x, 0.0)) for x in (-0.027, 0.0, 0.027))), build.DARK),
+        build.outline(m.mesh([(-0.082, -0.0366, h / 2), (0.082, -0.0366, h / 2),
+                              (-0.0525, -0.0371, h / 2), (0.067, -0.0371, h / 2)], ())),
+    ]  # fmt: skip
     return parts, top
 
 
 def _two_bells(body: str, metal: str) -> tuple[list[Shape], float]:
+    """A drum whose dials, one to either side, slope so that the hours show from its edge, too."""
     r, z, deep = 0.0310, 0.0385, 0.0150
     at = (0.0, 0.0, z)
-    drum = [(r - 0.002, -deep), (r, -deep + 0.002), (r, deep - 0.0005), (r - 0.0025, deep)]
-    dial = m.lathe([(r - 0.0035, deep - 0.0002), (r - 0.0035, deep + 0.0003)], 20)
+    edge, low, flat, high = r - 0.002, 0.0052, 0.0150, deep - 0.0012
+    drum = [(edge, -low), (r, -0.004), (r, 0.004), (edge, low)]
+    dial = m.lathe([(edge, low), (flat, high), (0.0, high)], 20, False)
+    slope = (high - low) / (edge - flat)
     ticks = []
     for i in range(12):
-        a = math.pi / 6 * i
-        long = 0.0035 if i % 3 == 0 else 0.0020
-        bar = m.rectangle(long, 0.0013 if i % 3 == 0 else 0.0009, r - 0.0095 + 0.0035 - long)
-        turned = [
-            (u * math.cos(a) - v * math.sin(a), u * math.sin(a) + v * math.cos(a)) for u, v in bar
-        ]
-        ticks.append(m.flat(turned, deep + 0.0006))
-    hands = [_hand(0.0115, 0.0020, math.radians(150)), _hand(0.0175, 0.0014, math.radians(30))]
+        c, s = math.cos(math.pi / 6 * i), math.sin(math.pi / 6 * i)
+        half, inner = (0.0022, 0.0185) if i % 3 == 0 else (0.0012, 0.0215)
+        bar = m.rectangle((r - 0.0035 - inner) / 2, half, (r - 0.0035 + inner) / 2)
+        turned = [(u * c - v * s, u * s + v * c, low + slope * (edge - u) + 0.0006) for u, v in bar]
+        ticks.append(m.mesh(turned, ((0, 1, 2), (0, 2, 3))))
+    shown, before = (
+        [_hand(length, half, math.radians(turn), up) for length, half, turn in hands]
+        for up, hands in (
+            (0.0143, ((0.0120, 0.0036, 150), (0.0185, 0.0028, 30))),
+            (0.0159, ((0.0115, 0.0020, 150), (0.0175, 0.0014, 30))),
+        )
+    )
+    marks = m.merge(*ticks, *shown)
+    over = axis_rotation((0.0, 1.0, 0.0), math.pi)
     domes = []
     for s in (-1, 1):
-        cap = m.lathe([(0.0125, 0.0), (0.0112, 0.0055), (0.0060, 0.0095), (0.0, 0.0105)], 12)
-        tip = axis_rotation((0.0, 1.0, 0.0), s * 0.55)
-        domes.append(m.moved(cap, (s * 0.0180, 0.0, z + r - 0.0045), tip))
-    legs = [
-        m.tube([(s * 0.016, y, z - r + 0.010), (s * 0.0225, y, 0.0008)], 0.0030, 6)
-        for s in (-1, 1)
-        for y in (-0.008, 0.008)
-    ]
+        cap = m.lathe([(0.0105, 0.0), (0.0090, 0.0050), (0.0, 0.0085)], 10)
+        tip = axis_rotation((0.0, 1.0, 0.0), s * 0.65)
+        domes.append(m.moved(cap, (s * 0.0190, 0.0, z + r - 0.0055), tip))
+    legs = [m.tube([(s * 0.016, 0.0, z - r + 0.010), (s * 0.0225, 0.0, 0.0008)], 0.0036, 5)
+            for s in (-1, 1)]  # fmt: skip
     arch = ((-0.007, -0.001), (-0.0045, 0.011), (0.0045, 0.011), (0.007, -0.001))
     handle = m.tube([(x, 0.0, z + r + up) for x, up in arch], 0.0016, 5)
     trim = colour(metal)
     shine = 0.4 if metal != "black" else 0.0
+    reach = [(0.031, 0.0145), (0.0275, 0.0153), (0.025, 0.0156)]
+    corners = m.mesh([(s * x, 0.0, y) for x, y in reach for s in (-1, 1)], ())
     parts = [
         collision(Cylinder(r, deep), at, build.ALONG_Y),
         collision(Box((0.025, 0.012, 0.011)), (0.0, 0.0, 0.011)),
         collision(Box((0.024, 0.010, 0.007)), (0.0, 0.0, z + r)),
-        visual(m.lathe(drum, 22), colour(body), at, build.ALONG_Y, 0.35),
+        visual(m.lathe(drum, 22, False), colour(body), at, build.ALONG_Y, 0.35),
         visual(dial, build.PAPER, at, build.ALONG_Y),
-        visual(m.merge(*ticks, *hands), build.DARK, at, build.ALONG_Y),
+        visual(m.moved(dial, rotation=over), build.PAPER, at, build.ALONG_Y),
+        visual(marks, build.DARK, at, build.ALONG_Y),
+        visual(m.moved(marks, rotation=over), build.DARK, at, build.ALONG_Y),
         visual(m.merge(*domes, handle), trim, roughness=0.3, metallic=shine),
         visual(_grounded(m.merge(*legs)), trim, roughness=0.4),
+        build.outline(m.merge(corners, *before), at, build.ALONG_Y),
     ]
     return parts, z + r + 0.007
 
@@ -232,10 +249,10 @@ def _grounded(part: Mesh) -> Mesh:
     return m.mesh([(x, y, max(0.0, z)) for x, y, z in part.vertices], part.faces)
 
 
-def _hand(length: float, half: float, angle: float) -> Mesh:
+def _hand(length: float, half: float, angle: float, z: float) -> Mesh:
     bar = [(-0.003, -half / 2), (length, -half / 3), (length, half / 3), (-0.003, half / 2)]
     c, s = math.cos(angle), math.sin(angle)
-    return m.flat([(u * c - v * s, u * s + v * c) for u, v in bar], 0.0150 + 0.0009)
+    return m.flat([(u * c - v * s, u * s + v * c) for u, v in bar], z)
 
 
 CARS = (

@@ -9,7 +9,7 @@ from robospa.tasks.objects import build
 from robospa.tasks.objects import meshes as m
 from robospa.tasks.objects.boxes import SIDES, on_side
 from robospa.tasks.objects.build import collision, colour, solid, srgb, visual
-from robospa.tasks.shapes import Box, Cylinder, Mesh, ObjectModel, Params, Shape
+from robospa.tasks.shapes import Box, Cylinder, Mesh, ObjectModel, Params
 
 CUPS = (
     ("red", "white", "dots", 0.0425, 0.0895), ("blue", "yellow", "bands", 0.0380, 0.0916),
@@ -115,20 +115,28 @@ PERFUME_CAP, PERFUME_HEIGHT, PERFUME_GRIP = 0.0165, 0.155, 0.132
 
 
 def perfume(look: int, params: Params) -> ObjectModel:
-    """A flat perfume flask of thick glass, square or round, a collar and a tall cap."""
+    """A flat flask of thick clear glass, square or round, with a spray bulb and a stopper."""
     glass, cap, word, form = PERFUMES[look]
     pale = "#f6efe6" if word != "black" else "#d6a52c"
     hx, hy, h = PERFUME
     half = (hx, hy, h / 2)
     faces = (SIDES[0], SIDES[2])
     if form == "square":
-        body: Shape = visual(m.slab(hx, hy, h, 0.006, 0.004), srgb(glass), roughness=0.1)
+        body = m.moved(m.slab(hx - 0.003, hy - 0.0006, 0.076, 0.004, 0.0, 2), (0.0, 0.0, 0.008))
+        flank = m.rounded_rectangle(hx, hy, 0.006, 2)
+        glass_parts = [
+            m.prism(flank, 0.0, 0.010),
+            m.prism(flank, 0.084, 0.094),
+            m.moved(m.prism(flank, 0.0, h - 0.094, 0.55), (0.0, 0.0, 0.094)),
+        ]
         felt = collision(Box(half), (0.0, 0.0, h / 2))
         label = m.merge(*(on_side(m.rectangle(0.030, 0.024), half, s) for s in faces))
     else:
         rim = [(x, max(h / 2 * (1 + z), 0.0)) for x, z in m.ellipse(hx, 1.07, 22, 0.07)]
         disc = m.front_prism([(x, min(z, h)) for x, z in rim], hy, -hy)
-        body = visual(disc, srgb(glass), roughness=0.1)
+        body = m.front_prism([(0.98 * x, z) for x, z in rim if z < 0.088], hy - 0.0006, 0.0006 - hy)
+        rest = [(x, min(z, h)) for x, z in rim if z > 0.083]
+        glass_parts = [m.front_prism(rest, hy, -hy)]
         felt = collision(disc)
         label = m.merge(*(on_side(m.ellipse(0.030, 0.028, 16), half, s) for s in faces))
     line = m.merge(
@@ -139,16 +147,22 @@ def perfume(look: int, params: Params) -> ObjectModel:
     body_grip = build.top_grasp((0.0, 0.0, 0.085), 2 * hy, math.pi / 2)
     grasps = (*build.round_grasps(2 * r, PERFUME_GRIP, 0.7), body_grip)
     collar = [(0.012, h - 0.001), (0.012, h + 0.006)]
-    lid = [(r, h + 0.005), (r, top - 0.003), (r - 0.002, top), (0.0, top)]
+    lid = [(0.006, h + 0.006), (0.006, h + 0.012), (r, h + 0.017), (r, top - 0.012), (0.010, top)]
+    x, z = 0.037, h + 0.010
+    hose = m.tube([(0.0, 0.0, h + 0.009), (0.018, 0.0, h + 0.013), (x, 0.0, z)], 0.0028, 5)
+    ball = m.lathe([(0.0, -0.009), (0.011, -0.004), (0.011, 0.004), (0.0, 0.009)], 10, False)
+    bulb = m.moved(ball, (x, 0.0, z), build.ALONG_X)
+    thin = tuple(0.5 * c + (0.4 if word != "black" else 0.06) for c in srgb(glass))
     shine = 0.4 if cap != "black" else 0.0
     parts = [
         felt,
         collision(Cylinder(r, (top - h) / 2), (0.0, 0.0, (top + h) / 2)),
-        body,
+        visual(body, srgb(glass), roughness=0.1),
         visual(label, srgb(pale), roughness=0.5),
         visual(line, colour("brown") if word != "black" else srgb("#2a2b31")),
         visual(m.lathe(collar, 12), build.STEEL, roughness=0.25, metallic=0.4),
-        visual(m.lathe(lid, 14), colour(cap), roughness=0.25, metallic=shine),
+        visual(m.merge(m.lathe(lid, 8), hose, bulb), colour(cap), roughness=0.25, metallic=shine),
+        *(visual(part, (thin[0], thin[1], thin[2]), roughness=0.1) for part in glass_parts),
     ]
     phrases = build.fill_phrases(
         word, "{} perfume", "{} perfume bottle", "bottle of {} perfume", "{} fragrance bottle",

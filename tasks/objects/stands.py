@@ -32,7 +32,7 @@ PHONE_SLOPE = 1.097
 
 
 def phone_stand(look: int, params: Params) -> ObjectModel:
-    """A desk stand: a foot, a bent stem and a steep back with a lip, on which a phone leans.
+    """A desk stand: a foot, a stem and a steep back with a lip, on which a phone leans to charge.
 
     Frame "support": where the body frame of a phone goes, its screen up the slope. Frame "end":
     where its lower end comes to rest.
@@ -53,10 +53,17 @@ def phone_stand(look: int, params: Params) -> ObjectModel:
     plate = m.side_prism(board(-0.0060, long, 0.0, -2 * thick), wide)
     lip = m.side_prism(board(-0.0060, 0.0, 0.0150, -2 * thick), wide)
     hooks = [
-        m.moved(m.side_prism(board(-0.0060, 0.0075, 0.0190, 0.0150), 0.0060), (x, 0.0, 0.0))
-        for x in (-0.019, 0.019)
+        m.moved(m.side_prism(board(-0.0060, 0.0130, 0.0190, 0.0130), 0.0085), (x, 0.0, 0.0))
+        for x in (0.0085 - wide, wide - 0.0085)
     ]
-    cushion = m.side_prism(board(0.010, long - 0.012, 0.0006, -0.001), wide - 0.007)
+
+    def shown(polygon: m.Polygon, out: float) -> Mesh:
+        """`polygon` (to the right, up the slope) on the back, `out` [m] in front of it."""
+        faces = m.triangulate(polygon)
+        return m.mesh([(u, *on_back(0.049 + v, out)) for u, v in polygon], faces)
+
+    bolt = [(0.003, 0.021), (-0.010, -0.004), (-0.001, -0.004), (-0.004, -0.021), (0.010, 0.005),
+            (0.001, 0.005), (0.010, 0.021)]  # fmt: skip
     (knee_y, knee_z), (top_y, top_z) = (0.030, 0.010), on_back(0.035, -2 * thick)
     stem = m.tube(
         [(0.0, knee_y, knee_z), (0.0, knee_y + 0.004, 0.085), (0.0, top_y + 0.002, top_z)], 0.009, 8
@@ -65,11 +72,11 @@ def phone_stand(look: int, params: Params) -> ObjectModel:
         collision(Box((0.0383, 0.069, 0.006)), (0.0, 0.0, 0.006)),
         *(collision(part) for part in (plate, lip)),
         collision(Box((0.008, 0.009, 0.045)), (0.0, knee_y + 0.002, 0.055)),
-        visual(m.slab(0.0383, 0.069, 0.012, 0.020, 0.003, 5), colour(body), roughness=0.4),
-        visual(m.merge(plate, lip, *hooks), colour(body), roughness=0.4),
+        visual(m.slab(0.0383, 0.069, 0.012, 0.034, 0.003, 5), colour(body), roughness=0.4),
+        visual(m.merge(plate, lip), colour(body), roughness=0.4),
         visual(stem, build.STEEL if body != "silver" else build.DARK, roughness=0.3),
-        visual(cushion, colour(pad), roughness=0.9),
-        visual(m.flat(m.rounded_rectangle(0.028, 0.050, 0.014), 0.0124), colour(pad)),
+        visual(m.merge(*hooks, shown(m.ellipse(0.0255, 0.034, 14), 0.0006)), colour(pad)),
+        visual(shown(bolt, 0.0012), build.PAPER),
     ]
     made = build.fitted(parts, PHONE_STAND_SIZES[look])
     _, fy, fz = made.factors
@@ -232,6 +239,12 @@ def mug_rack(look: int, params: Params) -> ObjectModel:
     head = [(0.0065, tall - 0.010), (0.0095, tall - 0.003), (0.0065, tall + 0.004)]
     head += [(0.0, tall + 0.006)]
     knobs = [m.moved(m.lathe(knob, 10), p) for p in (tip, back[1])]
+    arms = [
+        m.tube([(0.0, post_y, at), (s * 0.0315, post_y + 0.014, at + 0.008),
+                (s * 0.044, post_y + 0.021, at + 0.024)], 0.0045, 6)
+        for at in (0.085, 0.150)
+        for s in (-1, 1)
+    ]  # fmt: skip
     parts = [
         collision(Box((0.052, 0.052, 0.007)), (0.0, 0.0, 0.007)),
         collision(Box((0.0065, 0.0065, (tall - 0.014) / 2)), (0.0, post_y, (tall + 0.014) / 2)),
@@ -241,7 +254,7 @@ def mug_rack(look: int, params: Params) -> ObjectModel:
         visual(m.moved(m.lathe([(0.0095, 0.013), (0.0065, 0.022), (0.0065, tall - 0.010)], 12),
                       (0.0, post_y, 0.0)), wood, roughness=0.6),
         visual(m.moved(m.lathe(head, 12), (0.0, post_y, 0.0)), colour(trim), roughness=0.5),
-        visual(pegs, wood, roughness=0.6),
+        visual(m.merge(pegs, *arms), wood, roughness=0.6),
         visual(m.merge(*knobs), colour(trim), roughness=0.5),
     ]  # fmt: skip
     phrases = build.fill_phrases(

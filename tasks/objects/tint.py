@@ -35,7 +35,7 @@ TINTS: Mapping[str, Tint] = {
     "sauce_can": Tint((2,), (4, 5)),
     "bowl": Tint((0, 2), (1, 3, 4)),
     "toycar": Tint((2, 4), (5, 7)),
-    "fan": Tint((3, 4, 5, 9), (7, 10)),
+    "fan": Tint((3, 4, 5), (7, 9)),
     "tissue_box": Tint((0,), (1,)),
     "french_fries": Tint((2,), (3,)),
 }

@@ -24,10 +24,17 @@ HAMMER_HANDLE = 0.0514
 """How high [m] the handle is above the striking face (official points)."""
 
 
+CLAW = (
+    (0.0000, 0.0150, -0.020, 0.022, 0.068), (0.0010, 0.0140, -0.013, 0.014, 0.092),
+    (0.0040, 0.0135, -0.017, 0.004, 0.116), (0.0070, 0.0128, -0.024, -0.018, 0.1365),
+)  # fmt: skip
+"""Sections of half a hammer's claw: from x to x, from y to y, and height [m]."""
+
+
 def hammer(look: int, params: Params) -> ObjectModel:
     """A hammer standing on its striking face, its handle level and towards -y.
 
-    Its head is a thick end to strike with and a thinner one, up. Frame "head": the middle of the
+    Its head is a thick end to strike with and a claw, up. Frame "head": the middle of the
     face that strikes, where the hammer stands (z up).
     """
     head, shaft, word = HAMMERS[look]
@@ -36,27 +43,32 @@ def hammer(look: int, params: Params) -> ObjectModel:
     bar, near, far = 0.0068, y - hy, -0.086
     ring = m.rounded_rectangle(hx, hy, 0.006, 3)
     cap = m.rounded_rectangle(hx - 0.0006, hy - 0.0008, 0.0055, 3)
-    peen = m.rounded_rectangle(hx - 0.003, thin, 0.004, 3)
+    waist = m.rounded_rectangle(0.7 * hx, 0.7 * hy, 0.004, 2)
 
     def layer(outline: m.Polygon, low: float, high: float, top: float = 1.0) -> Mesh:
         return m.moved(m.prism(outline, low, high, top), (0.0, y, 0.0))
 
+    claw = [
+        m.loft([[(s * a, y + far, at), (s * b, y + far, at), (s * b, y + near, at),
+                 (s * a, y + near, at)][::s] for a, b, near, far, at in CLAW])
+        for s in (1, -1)
+    ]  # fmt: skip
+
     handle = m.rounded_rectangle(bar, (near - far) / 2 + 0.002, 0.003, 2)
-    sleeve = m.rounded_rectangle(bar + 0.0004, 0.026, 0.003, 2)
-    dark = srgb("#3b3f45") if head == "black" else build.DARK
+    grip = m.prism(m.rounded_rectangle(bar + 0.0004, 0.026, 0.003, 2), -bar - 0.0004, bar + 0.0004)
+    steel = build.STEEL if head != "silver" else build.DARK
     metallic = 0.5 if head == "silver" else 0.0
     middle, up = (near + far) / 2, (h - neck) / 2
     parts = [
         collision(Box((hx, hy, neck / 2)), (0.0, y, neck / 2)),
         collision(Box((hx - 0.003, thin, up)), (0.0, y, neck + up)),
         collision(Box((bar, (near - far) / 2, bar)), (0.0, middle, z)),
-        visual(layer(ring, 0.010, neck), colour(head), roughness=0.4, metallic=metallic),
-        visual(layer(peen, neck, h - 0.002), colour(head), roughness=0.4, metallic=metallic),
-        visual(m.merge(layer(cap, 0.0, 0.010), layer(peen, h - 0.002, h, 0.8)), dark,
-               roughness=0.7),
+        visual(m.merge(layer(ring, 0.036, neck - 0.006), layer(waist, 0.014, 0.036),
+                       m.moved(grip, (0.0, far + 0.026, z))),
+               colour(head), roughness=0.4, metallic=metallic),
+        visual(layer(cap, 0.0, 0.014), steel, roughness=0.4, metallic=0.4),
+        visual(m.merge(*claw), steel, roughness=0.4, metallic=0.4),
         visual(m.moved(m.prism(handle, -bar, bar), (0.0, middle, z)), colour(shaft), roughness=0.6),
-        visual(m.moved(m.prism(sleeve, -bar - 0.0004, bar + 0.0004), (0.0, far + 0.026, z)),
-              colour(head) if head != "silver" else build.STEEL, roughness=0.6),
     ]  # fmt: skip
     phrases = build.fill_phrases(
         word, "{} hammer", "{} mallet", "{} hammer with a handle", "hammer with a {} head",
