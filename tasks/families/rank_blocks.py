@@ -158,7 +158,6 @@ def _color_order(colors: list[str]) -> Phrasings:
     return TEXT.phrasings(
         "order.colors",
         colors=listed(colors),
-        steps=(", then " if len(colors) > 2 else " and then ").join(colors),
         first=colors[0],
         rest=listed(colors[1:]),
     )

@@ -196,7 +196,7 @@ class Scale:
 
 
 SIZES = Scale(
-    ("larger", "smaller"), ("largest", "smallest"), ("bigger", "smaller"), ("biggest", "tiniest")
+    ("larger", "smaller"), ("largest", "smallest"), ("bigger", "smaller"), ("biggest", "smallest")
 )
 LENGTHS = Scale(
     ("longer", "shorter"), ("longest", "shortest"), ("longer", "shorter"), ("longest", "shortest")

@@ -224,23 +224,23 @@ CHAINS: tuple[Chain, ...] = (
 
 
 def _when_done(steps: Sequence[str]) -> str:
-    words = ("when done", "next up", "from there", "lastly")
-    rest = [f"; {word}, {step}" for word, step in zip(words, steps[1:], strict=False)]
-    return "first of all " + steps[0] + "".join(rest) + "."
+    words = ("once done,", "next,", "after that,", "lastly,")
+    rest = [f" {word} {step}." for word, step in zip(words, steps[1:], strict=False)]
+    return "first of all, " + steps[0] + "." + "".join(rest)
 
 
 def _as_soon(steps: Sequence[str]) -> str:
-    words = ("when finished,", "following that,", "thereafter", "to end with,")
+    words = ("after that,", "now", "following that,", "to finish,")
     rest = [f" {word} {step}." for word, step in zip(words, steps[1:], strict=False)]
-    return "to begin, " + steps[0] + "." + "".join(rest)
+    return "to start with, " + steps[0] + "." + "".join(rest)
 
 
 HELDOUT_CHAINS: tuple[Chain, ...] = (
     _when_done,
-    lambda steps: "carry out these jobs one by one: " + listed(steps) + ".",
-    lambda steps: "work in this sequence: " + "; ".join(steps) + ".",
+    lambda steps: "carry out these steps in order: " + listed(steps) + ".",
+    lambda steps: "here is what to do, step by step: " + "; ".join(steps) + ".",
     _as_soon,
-    lambda steps: "get this done without changing the order: " + listed(steps) + ".",
+    lambda steps: "go ahead and " + listed(steps) + ", one after the other.",
 )
 """Five other ways."""
 
@@ -369,16 +369,18 @@ def acting_arm(side: str) -> Slots:
 def color_orders(colors: Sequence[str]) -> Phrasings:
     """Phrasings for the order of two or more colours, from the first to the last."""
     steps = (", then " if len(colors) > 2 else " and then ").join(colors)
-    places = (*("first", "second", "third", "fourth")[: len(colors) - 1], "last")
-    placed = ", ".join(f"{c} {p}" for c, p in zip(colors, places, strict=True))
-    return (
-        (listed(colors, ", then "), steps),
-        (placed, " followed by ".join(colors), " before ".join(colors)),
-    )
+    return (listed(colors, ", then "), steps), _in_turn(colors)
+
+
+def _in_turn(names: Sequence[str]) -> tuple[str, ...]:
+    """Three held-out ways to give the order of two or more things."""
+    places = (*("first", "second", "third", "fourth")[: len(names) - 1], "last")
+    placed = ", ".join(f"{name} {place}" for name, place in zip(names, places, strict=True))
+    start = f"first {', next '.join(names[:-1])} and last {names[-1]}"
+    return placed, f"{names[0]} first, followed by {listed(names[1:])}", start
 
 
 _TRAIN_LINKS = (", then ", ", and then ")
-_HELDOUT_LINKS = (" followed by ", ", next ", ", after that ")
 
 
 def one_after_another(nouns: Sequence[Phrasings]) -> Phrasings:
@@ -386,7 +388,5 @@ def one_after_another(nouns: Sequence[Phrasings]) -> Phrasings:
     train = tuple(
         link.join(noun[0][k] for noun in nouns) for k in range(2) for link in _TRAIN_LINKS
     )
-    held = tuple(
-        link.join(noun[1][k] for noun in nouns) for k in range(4) for link in _HELDOUT_LINKS
-    )
-    return train, held
+    held = [_in_turn([noun[1][k] for noun in nouns]) for k in range(4)]
+    return train, tuple(text for ways in held for text in ways)

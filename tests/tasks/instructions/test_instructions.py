@@ -163,7 +163,7 @@ def test_instruction_is_one_of_the_sentences_and_ignores_the_robot(split: str) -
 
 def test_instruction_is_pinned() -> None:
     scene = scene_of("press_stapler_repeat", 2)
-    said = "Reach down and strike the stapling machine exactly 2 times."
+    said = "Just keep pushing the small stapler down until you have made two presses in total."
     assert instruction(scene) == said
 
 
