@@ -161,7 +161,7 @@ def bread_basket(look: int, params: Params) -> ObjectModel:
     for i in range(24):
         ends = ((math.cos(a), math.sin(a)) for a in (math.pi * i / 12, math.pi * (i + 1) / 12))
         path = [(middle * x, middle * y, h) for x, y in ends]
-        weave[dark if i % 2 else pale].append(m.tube(path, edge, 4))
+        weave[dark if i % 2 else pale].append(m.tube(path, edge, 4, caps=False))
     parts = [
         visual(m.merge(*weave[dark]), srgb(dark), roughness=0.9),
         visual(m.merge(*weave[pale]), srgb(pale), roughness=0.9),

@@ -259,7 +259,7 @@ def fan(look: int, params: Params) -> ObjectModel:
     for end in (-0.022, 0.019):
         wires = [((0.052 * c, 0.052 * s, 0.2 * end), (0.012 * c, 0.012 * s, end))
                  for c, s in m.ellipse(1.0, 1.0, 8, 0.2)]  # fmt: skip
-        cage.append(m.merge(*(m.tube(wire, 0.0012, 3) for wire in wires)))
+        cage.append(m.merge(*(m.tube(wire, 0.0012, 3, caps=False) for wire in wires)))
     frames = ([*ring, ring[0]], 20), (nose, 10), (motor, 10)
     at = (0.0, 0.0, z)
     pale = srgb("#8fa0ad") if frame == "white" else srgb("#eef1f4")

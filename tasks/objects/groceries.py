@@ -235,7 +235,7 @@ SIGNS = (
 
 
 def payment_sign(look: int, params: Params) -> ObjectModel:
-    """A standing plate for paying by phone: a coloured head and a square code, on a foot."""
+    """A tent on a foot, to pay by phone: a square code in front, radio waves on all sides."""
     word, hx, foot, z1 = SIGNS[look]
     hy, z0 = 0.0060, 0.006
     middle = (z0 + z1) / 2
@@ -253,17 +253,33 @@ def payment_sign(look: int, params: Params) -> ObjectModel:
     field = [(x, y + low + 5 * cell) for x, y in m.rounded_rectangle(paper, paper, cell)]
     room = (middle + low + 5 * cell + paper, z1)  # between the code and the upper edge
     size = min(hx / 0.027, (room[1] - room[0]) / 0.024)
-    at = sum(room) / 2 - middle
+    lean = (0.85 * foot - hy) / (z1 - z0)
+
+    def tent(part: Mesh) -> Mesh:
+        """What is drawn on an upright plate, on two that lean on each other."""
+        return m.mesh(
+            [(x, y + math.copysign(lean * (z1 - z), y), z) for x, y, z in part.vertices], part.faces
+        )
+
+    wide = hx - 0.0008
+    large, narrow = min(hx / 0.010, z1 / 0.032), (hy + lean * (z1 - 0.036)) / 0.0085
+    waves = (
+        tent(_waves(half, front, size, sum(room) / 2 - middle)),
+        tent(_waves(half, back, large, 0.0)),
+        *(
+            _waves((wide, hy, middle), side, narrow, 0.030 - middle)
+            for side in (SIDES[1], SIDES[3])
+        ),
+    )
     parts = [
         collision(Box((hx, foot, z0 / 2)), (0.0, 0.0, z0 / 2)),
         collision(Box((hx, hy, (z1 - z0) / 2)), (0.0, 0.0, middle)),
         visual(m.slab(hx, foot, z0, 0.004, 0.0015), srgb("#d9dde2"), roughness=0.3),
-        visual(m.moved(m.slab(hx, hy, z1 - z0, 0.002, 0.001, 2), (0.0, 0.0, z0)), colour(word),
-              roughness=0.3),
-        visual(on_side(field, half, front, 0.0006), build.PAPER),
-        visual(m.merge(*dots), srgb("#16171a")),
-        visual(_waves(half, front, size, at), colour("white")),
-        visual(_waves(half, back, size, at), colour("white")),
+        visual(tent(m.moved(m.prism(m.rectangle(wide, hy), 0.0, z1 - z0), (0.0, 0.0, z0))),
+               colour(word), roughness=0.3),
+        visual(tent(on_side(field, half, front, 0.0006)), build.PAPER),
+        visual(tent(m.merge(*dots)), srgb("#16171a")),
+        visual(m.merge(*waves), colour("white")),
     ]  # fmt: skip
     phrases = build.fill_phrases(
         word, "{} payment sign", "{} sign for paying by phone", "{} payment stand",
@@ -292,7 +308,7 @@ def _waves(half: tuple[float, float, float], side: float, size: float, at: float
     """Three arcs of radio waves of relative `size`, `at` [m] above the middle of the sign."""
     arcs = []
     for r in (0.004 * size, 0.008 * size, 0.012 * size):
-        angles = [math.radians(-42 + 84 * i / 4) for i in range(5)]
+        angles = [math.radians(-42 + 84 * i / 3) for i in range(4)]
         outer = [(r * math.cos(a), r * math.sin(a)) for a in angles]
         thin = r - 0.0018 * size
         inner = [(thin * math.cos(a), thin * math.sin(a)) for a in reversed(angles)]

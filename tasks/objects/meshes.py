@@ -178,8 +178,10 @@ def pillow(sections: Sequence[tuple[float, float, float]], n: int = 14, power: f
     return loft([[(x * rx, y * ry, z) for x, y in unit] for rx, ry, z in sections])
 
 
-def tube(path: Sequence[Vec3], radius: float, n: int = 6, closed: bool = False) -> Mesh:
-    """Round bar of `radius` along `path`; `closed` joins its ends."""
+def tube(
+    path: Sequence[Vec3], radius: float, n: int = 6, closed: bool = False, caps: bool = True
+) -> Mesh:
+    """Round bar of `radius` along `path`; `closed` joins its ends, `caps` are at open ones."""
     points = np.asarray(path, dtype=float)
     count = len(points)
     rings: list[list[Vec3]] = []
@@ -203,7 +205,7 @@ def tube(path: Sequence[Vec3], radius: float, n: int = 6, closed: bool = False) 
             j, m = k * n + i, k * n + (i + 1) % n
             c, d = (j + n) % (n * count), (m + n) % (n * count)
             faces += [(j, m, d), (j, d, c)]
-    if not closed:
+    if caps and not closed:
         last = (count - 1) * n
         faces += [(0, i + 1, i) for i in range(1, n - 1)]
         faces += [(last, last + i, last + i + 1) for i in range(1, n - 1)]
@@ -220,9 +222,10 @@ def decal(polygon: Polygon, radius: float, height: float, angle: float) -> Mesh:
     flat += [(u * 0.5, v * 0.5) for u, v in polygon] + list(polygon)
     n = len(polygon)
     faces: list[Face] = []
+    small = max(abs(u) for u, _ in polygon) ** 2 < 0.0048 * radius  # sinks by less than 0.6 mm
     for i in range(n):
         j, k = 1 + i, 1 + (i + 1) % n
-        faces += [(0, j, k), (j, j + n, k + n), (j, k + n, k)]
+        faces += [(0, j + n, k + n)] if small else [(0, j, k), (j, j + n, k + n), (j, k + n, k)]
     vertices = []
     for u, v in flat:
         a = angle + u / radius
