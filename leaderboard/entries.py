@@ -22,7 +22,6 @@ from robospa.results.paper.columns import Column, published_column
 from robospa.results.paper.origin import DIFFERENCES
 from robospa.results.paper.published import LEVELS, load
 from robospa.results.scoring.scores import to_json
-from robospa.results.statistics.intervals import Estimate
 from robospa.trial import CATEGORIES, DIMENSIONS, METRICS
 
 
@@ -299,19 +298,11 @@ def _shown(column: Column, metric: str, row: str, level: int) -> list[float] | i
         estimate = column.estimate(metric, row, level)
     else:
         full = all(column.estimate(metric, row, n) is not None for n in LEVELS)
-        estimate = _over_levels(column, metric, row) if full else None
+        part = column.part(row, 0) if full else None
+        estimate = part.values.get(metric) if part else None
     if estimate is None:
         return 0
     return [round(100 * x, 2) for x in (estimate.value, estimate.low, estimate.high)]
-
-
-def _over_levels(column: Column, metric: str, row: str) -> Estimate | None:
-    scores = column.scores
-    if row == rounding.OVERALL:
-        return scores.overall[0].values.get(metric)
-    part = scores.tasks.get(row) or scores.categories.get((row, 0))
-    part = part or scores.dimensions.get((row, 0))
-    return None if part is None else part.values.get(metric)
 
 
 def all_entries(submissions: Sequence[Submission]) -> list[Entry]:

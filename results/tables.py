@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING
 
+from robospa.results.paper.rounding import rounded
 from robospa.text import interval_text, markdown_table, plain, plain_console
 
 if TYPE_CHECKING:
@@ -44,10 +45,15 @@ class TableCell:
     """Between which values [percent] the `missing` trials leave it, where that is known."""
 
 
-def estimate_cell(estimate: Estimate, style: str = "z.1f") -> TableCell:
-    """A cell of an estimate in percent, with its interval."""
+def estimate_cell(estimate: Estimate | None, style: str = "z.1f", sign: str = "") -> TableCell:
+    """`12.0 [5.6, 23.8]`, an estimate in percent, rounded as everywhere; a dash for none."""
+    if estimate is None:
+        return DASH
     ends = (100 * estimate.value, 100 * estimate.low, 100 * estimate.high)
-    return TableCell(interval_text(*ends, style=style), *ends)
+    return TableCell(interval_text(*map(rounded, ends), style=style), *ends, sign=sign)
+
+
+DASH = TableCell("–")
 
 
 @dataclass(frozen=True)
@@ -395,17 +401,14 @@ def to_csv(tables: Sequence[Table]) -> str:
                 section = row.label
                 continue
             for group, head, entry in zip(table.group_of, table.heads, row.cells, strict=True):
-                numbers = ("" if x is None else f"{x:.10g}" for x in _numbers(entry))
+                found = (entry.value, entry.low, entry.high)
+                numbers = ("" if x is None else f"{x:.10g}" for x in found)
                 words = (table.name, section, row.label, group, head, entry.text)
                 best = "best" if entry.best else ""
                 lacks = (entry.missing or "", *(f"{x:.10g}" for x in entry.bounds or ()))
                 texts = (*map(_no_formula, words), *numbers, best, entry.sign, *lacks)
                 writer.writerow((*texts, *[""] * (len(CSV_FIELDS) + len(CSV_LACKS) - len(texts))))
     return out.getvalue()
-
-
-def _numbers(entry: TableCell) -> tuple[float | None, float | None, float | None]:
-    return entry.value, entry.low, entry.high
 
 
 def _no_formula(text: str) -> str:

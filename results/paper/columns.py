@@ -146,10 +146,7 @@ class Column:
 
     def part(self, row: str, level: int) -> VariantScore | AverageScore | None:
         """The score of a row; averages are over the variants that were run."""
-        if row == rounding.OVERALL:
-            return self.scores.overall.get(level)
-        found = self.scores.cells.get((row, level)) or self.scores.categories.get((row, level))
-        return found or self.scores.dimensions.get((row, level))
+        return self.scores.part(row, level)
 
     def estimate(self, metric: str, row: str, level: int) -> Estimate | None:
         """The value with its interval, as fractions; None where the value is missing."""

@@ -18,7 +18,7 @@ from robospa.results.paper.origin import table_note
 from robospa.results.paper.published import LEVELS, load, row_title, title
 from robospa.results.scoring.models import in_official_world
 from robospa.results.statistics.significance import supported_best
-from robospa.results.tables import MISSING, PRINTED_OTHERWISE, Table, TableCell, TableRow
+from robospa.results.tables import DASH, MISSING, PRINTED_OTHERWISE, Table, TableCell, TableRow
 from robospa.trial import CATEGORY_NAMES, DIMENSIONS, METRIC_CATEGORIES, METRIC_NAMES
 
 MARKS = ("tied", "highest", "none")
@@ -41,7 +41,6 @@ FIRST = (
     "nothing can reach 100 % of the spatial tasks. SR@1 and ONTA@1 count successes with nothing "
     "else taken, pressed, done early or once more."
 )
-DASH = TableCell("–")
 Marked = Mapping[tuple[str, int], set[str]]
 """Titles of the columns to mark, by row and level."""
 CellMaker = Callable[[Column, str, str, Marked], TableCell]
@@ -68,7 +67,7 @@ def summary_table(
             entry = _number(rounding.drop(*(column.value(metric, row, level) for level in levels)))
         else:
             level = int(head[1])
-            entry = _value(column, metric, row, level, column.title in best[row, level])
+            entry = value_cell(column, metric, row, level, column.title in best[row, level])
         return _signed(entry, PRINTED_OTHERWISE * ((row, column.published, head) in wrong))
 
     title = f"{_long_name(metric)} in percent by category"
@@ -104,7 +103,7 @@ def task_table(
         key = (data.tasks[row].printed, column.published, head)
         if key in wrong and metric == "ps":  # it is given there, not derived
             return _signed(_number(wrong[key].printed), PRINTED_OTHERWISE)
-        entry = _value(column, metric, row, level, column.title in best[row, level])
+        entry = value_cell(column, metric, row, level, column.title in best[row, level])
         return _signed(entry, PRINTED_OTHERWISE * (key in wrong))
 
     heads = tuple(f"L{level}" for level in LEVELS)
@@ -244,7 +243,8 @@ def _highest(
     return made
 
 
-def _value(column: Column, metric: str, row: str, level: int, best: bool) -> TableCell:
+def value_cell(column: Column, metric: str, row: str, level: int, best: bool = False) -> TableCell:
+    """A value of `column` with its interval and what is missing; a dash where there is none."""
     value = column.value(metric, row, level)
     if value is None:
         return DASH

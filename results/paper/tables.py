@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from robospa.results.paper import rounding
@@ -11,25 +12,26 @@ from robospa.results.paper.columns import Column, check_columns, check_worlds
 from robospa.results.paper.origin import printed_note, table_note
 from robospa.results.paper.published import load, row_title, title
 from robospa.results.paper.result_tables import (
-    DASH,
     DIMENSION_NAMES,
     not_run_note,
     summary_table,
     task_table,
+    value_cell,
 )
-from robospa.results.statistics.intervals import interval_of
+from robospa.results.statistics.intervals import Estimate, interval_of
 from robospa.results.tables import (
+    DASH,
     MISSING,
     Table,
     TableCell,
     TableRow,
+    estimate_cell,
     html_page,
     latex_document,
     to_csv,
     to_latex,
     to_markdown,
 )
-from robospa.text import interval_text
 from robospa.trial import BASIC, CATEGORY_NAMES, DIMENSIONS, METRIC_NAMES
 
 INTERVAL_METHODS = (("bootstrap", "Stratified bootstrap"), ("wilson", "MOVER on Wilson limits"))
@@ -48,10 +50,7 @@ def interval_table(columns: Sequence[Column]) -> Table:
         lines.append(TableRow(column.title, tuple(entries)))
         printed = data.intervals.rows.get(column.published)
         if printed:
-            given = [
-                _with_ends(value / 100, low / 100, high / 100)
-                for value, low, high in (printed[row] for row in rows)
-            ]
+            given = [estimate_cell(Estimate(*(end / 100 for end in printed[row]))) for row in rows]
             blank = [TableCell()] * len(rows)
             lines.append(TableRow(f"{column.title}, as printed", (*given, *blank)))
     heads = ("Fine-grained", "Long-horizon", "Overall") * len(INTERVAL_METHODS)
@@ -88,13 +87,8 @@ def _interval(column: Column, row: str, level: int, method: str) -> TableCell:
         return DASH
     found = interval_of(samples, shares, method)
     value = column.value("sr", row, level) or 0.0
-    entry = _with_ends(value / 100, found.low, found.high)
+    entry = estimate_cell(replace(found, value=value / 100))
     return column.with_missing(entry, "sr", row, level)
-
-
-def _with_ends(value: float, low: float, high: float, sign: str = "") -> TableCell:
-    ends = (100 * value, 100 * low, 100 * high)
-    return TableCell(interval_text(*map(rounding.rounded, ends)), *ends, sign=sign)
 
 
 def embodiment_table(dimension: str, columns: Sequence[Column] = ()) -> Table:
@@ -111,7 +105,9 @@ def embodiment_table(dimension: str, columns: Sequence[Column] = ()) -> Table:
             lines.append(TableRow(f"{table.model}, {name}", tuple(printed)))
         for column in runs:
             if column.embodiment == robot:
-                entries = [_variant(column, table.tasks[s], n) for s in shorts for n in levels]
+                entries = [
+                    value_cell(column, "sr", table.tasks[s], n) for s in shorts for n in levels
+                ]
                 lines.append(TableRow(f"{column.title}, {name}", tuple(entries)))
     groups = tuple((short, len(levels)) for short in shorts)
     names = "; ".join(f"{s} {data.tasks[table.tasks[s]].title}" for s in shorts)
@@ -130,17 +126,6 @@ def embodiment_table(dimension: str, columns: Sequence[Column] = ()) -> Table:
         groups,
         notes,
     )
-
-
-def _variant(column: Column, task: str, level: int) -> TableCell:
-    value = column.value("sr", task, level)
-    if value is None:
-        return DASH
-    found = column.estimate("sr", task, level)
-    assert found is not None, "a value has an interval"
-    text = rounding.text(value, 0 if value == round(value) else 1)
-    entry = TableCell(text, value, 100 * found.low, 100 * found.high)
-    return column.with_missing(entry, "sr", task, level)
 
 
 def _words(*texts: object) -> tuple[TableCell, ...]:
@@ -189,7 +174,7 @@ def _grounding(run: Column, metric: str, category: str, level: int, sets: int) -
     cells = run.scores.cells.items()
     if sum(cell.category == category and n == level for (_, n), cell in cells) < sets:
         return DASH
-    return _with_ends(found.value, found.low, found.high, MISSING if part.missing else "")
+    return estimate_cell(found, sign=MISSING * bool(part.missing))
 
 
 def models_table() -> Table:

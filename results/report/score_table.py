@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from html import escape
 from itertools import compress
 
 from robospa.results.failures.labels import NAMES, failures_of
-from robospa.results.paper.rounding import rounded, text
+from robospa.results.paper.rounding import OVERALL
 from robospa.results.records.action_problems import grouped, problem_lines
 from robospa.results.records.manifest import departures
 from robospa.results.records.runs import Run, by_setting, finished, setting_name
@@ -27,8 +26,16 @@ from robospa.results.scoring.scores import (
     score_run,
 )
 from robospa.results.statistics.intervals import Estimate
-from robospa.results.tables import MISSING, Table, TableCell, TableRow, html_fragment, show
-from robospa.text import counted, interval_text, plain_console
+from robospa.results.tables import (
+    MISSING,
+    Table,
+    TableCell,
+    TableRow,
+    estimate_cell,
+    html_fragment,
+    show,
+)
+from robospa.text import counted, plain_console
 from robospa.trial import BASIC, CATEGORIES, CATEGORY_NAMES, DIMENSIONS, REFERENCE
 
 
@@ -53,68 +60,30 @@ def loss_lines(run: Run, most: int = 5) -> list[str]:
     return [f"missing {count}: {reason}" for count, reason in grouped(reasons, most)]
 
 
-@dataclass(frozen=True)
-class ScoreRow:
-    """One line of a table: `cells` holds (level, cell or average), level 0 the mean of levels."""
-
-    label: str
-    kind: str
-    parts: tuple[tuple[int, VariantScore | AverageScore | None], ...]
-    category: str = ""
-
-
 def percent(estimate: Estimate | None) -> str:
-    """`12.0 [5.6, 23.8]`, or a dash; rounded as everywhere (`paper.rounding`)."""
-    if estimate is None:
-        return "–"
-    return interval_text(*(rounded(100 * x) for x in (estimate.value, estimate.low, estimate.high)))
+    """`12.0 [5.6, 23.8]`, or a dash."""
+    return estimate_cell(estimate).text
 
 
 def short(estimate: Estimate | None) -> str:
     """The value alone."""
-    return "–" if estimate is None else text(100 * estimate.value)
+    return percent(estimate).partition(" ")[0]
 
 
-def rows(scores: Scores) -> list[ScoreRow]:
-    """Tasks grouped by category, then categories, dimensions and the overall value; basic grounding
-    tasks come last among tasks, their categories after all else, because they enter no average."""
-    levels = (*scores.levels, 0)
-    made: list[ScoreRow] = []
-    for task in scores.tasks_by_category:
-        cells = [(n, scores.cells.get((task, n))) for n in scores.levels]
-        parts = (*cells, (0, scores.tasks[task]))
-        made.append(ScoreRow(task.replace("_", " "), "task", parts, scores.category_of[task]))
-    made += _category_rows(scores, CATEGORIES, levels)
-    for dimension in DIMENSIONS:
-        if (dimension, 0) in scores.dimensions:
-            parts = _averages(scores.dimensions, dimension, levels)
-            made.append(ScoreRow(f"{dimension} categories", "dimension", parts))
-    if scores.overall:
-        made.append(
-            ScoreRow("overall", "overall", tuple((n, scores.overall.get(n)) for n in levels))
-        )
-    return made + _category_rows(scores, BASIC, levels)
+def rows(scores: Scores) -> list[tuple[str, str]]:
+    """(row, label) of tasks by category, then categories, dimensions and the overall value; basic
+    grounding comes last among tasks, and its categories after all else: they enter no average.
 
-
-def _category_rows(
-    scores: Scores, categories: Iterable[str], levels: tuple[int, ...]
-) -> list[ScoreRow]:
-    return [
-        ScoreRow(f"{c} {CATEGORY_NAMES[c]}", "category", _averages(scores.categories, c, levels), c)
-        for c in categories
-        if (c, 0) in scores.categories
-    ]
-
-
-def _averages(
-    found: Mapping[tuple[str, int], AverageScore], name: str, levels: tuple[int, ...]
-) -> tuple[tuple[int, VariantScore | AverageScore | None], ...]:
-    return tuple((level, found.get((name, level))) for level in levels)
-
-
-def category_size(scores: Scores, row: ScoreRow) -> int:
-    """Number of tasks below a category's row; 0 for other rows."""
-    return [*scores.category_of.values()].count(row.category) if row.kind == "category" else 0
+    Without categories if each would repeat its task.
+    """
+    category = scores.category_of
+    made = [(t, f"{category[t]} {t.replace('_', ' ')}") for t in scores.tasks_by_category]
+    several = len(made) > len(set(category.values()))
+    categories = [(c, f"{c} {CATEGORY_NAMES[c]}") for c in CATEGORIES + BASIC if several]
+    made += [row for row in categories if row[0] in CATEGORIES]
+    made += [*((d, f"{d} categories") for d in DIMENSIONS), (OVERALL, OVERALL)]
+    made += [row for row in categories if row[0] in BASIC]
+    return [row for row in made if scores.part(row[0], 0)]
 
 
 TAIL = ("SR [95 %]", "SR@1 [95 %]", "ONTA", "ONTA@1", "PS", "idle PS", "trials")
@@ -123,15 +92,10 @@ TAIL = ("SR [95 %]", "SR@1 [95 %]", "ONTA", "ONTA@1", "PS", "idle PS", "trials")
 
 def score_table(run: Run, scores: Scores) -> Table:
     """The success rates of `run` by level, with the metrics of the mean over levels that it has."""
-    table_rows = rows(scores)
-    if all(category_size(scores, row) < 2 for row in table_rows):
-        table_rows = [
-            row for row in table_rows if row.kind != "category"
-        ]  # they would repeat their task
     departs = "".join(f" ({one})" for one in departures(run.manifest))
     title = f"{run.manifest.policy.name or 'policy'}{departs}{_where(run)}"
     heads = (*map(level_name, scores.levels), *TAIL)
-    lines = [_table_row(row) for row in table_rows]
+    lines = [_table_row(scores, *row) for row in rows(scores)]
     filled = [any(line.cells[i].text for line in lines) for i in range(len(heads))]
     lines = [replace(line, cells=tuple(compress(line.cells, filled))) for line in lines]
     return Table("scores", title, "", tuple(compress(heads, filled)), tuple(lines))
@@ -143,19 +107,16 @@ def _where(run: Run) -> str:
     return "" if name == REFERENCE else f", {name}"
 
 
-def _table_row(row: ScoreRow) -> TableRow:
-    cells = [_level_cell(part) for level, part in row.parts if level]
-    mean = dict(row.parts)[0]
-    tail = [""] * len(TAIL)
-    if mean is not None:
-        lost = f" -{mean.missing}" if mean.missing else ""
-        rates = [percent(mean.values.get(metric)) for metric in ("sr", "sr1")]
-        others = ("onta", "onta1", "ps", IDLE)
-        shorts = [short(mean.values[m]) if m in mean.values else "" for m in others]
-        tail = [*rates, *shorts, f"{mean.trials}{lost}"]
-    label = f"{row.category} {row.label}" if row.kind == "task" else row.label
-    kind = "row" if row.kind == "task" else "average"
-    return TableRow(label, (*cells, *map(TableCell, tail)), kind)
+def _table_row(scores: Scores, row: str, label: str) -> TableRow:
+    cells = [_level_cell(scores.part(row, level)) for level in scores.levels]
+    mean = scores.part(row, 0)
+    assert mean is not None, "rows have a mean"
+    lost = f" -{mean.missing}" if mean.missing else ""
+    tail = [percent(mean.values.get(metric)) for metric in ("sr", "sr1")]
+    others = ("onta", "onta1", "ps", IDLE)
+    tail += [short(mean.values[m]) if m in mean.values else "" for m in others]
+    kind = "row" if row in scores.category_of else "average"
+    return TableRow(label, (*cells, *map(TableCell, (*tail, f"{mean.trials}{lost}"))), kind)
 
 
 def _level_cell(part: VariantScore | AverageScore | None) -> TableCell:

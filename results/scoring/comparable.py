@@ -154,13 +154,10 @@ def _cells(model: ModelResults, few: ModelResults, category: str, level: int) ->
         [r for r in _records(x) if r.category == category and level in (0, r.key.level)]
         for x in (model, few)
     )
-    averages = [
-        scores.categories.get((category, level))
-        for scores in (restricted(model, few.trials).scores, few.scores)
-    ]
+    parts = [x.scores.part(category, level) for x in (restricted(model, few.trials), few)]
     rates = [
-        estimate_cell(found) if average and (found := average.values[metric]) else TableCell("–")
-        for average in averages
+        estimate_cell(part.values[metric] if part else None)
+        for part in parts
         for metric in ("sr", "sr1")
     ]
     count = TableCell(f"{len(these)} of {len(records)}", len(these))

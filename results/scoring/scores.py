@@ -17,6 +17,7 @@ from typing import TypedDict
 
 import numpy as np
 
+from robospa.results.paper.rounding import OVERALL
 from robospa.results.records.runs import Run, finished
 from robospa.results.records.trial_record import TrialRecord
 from robospa.results.scoring.first_choice import first_choice, held_at_start
@@ -184,6 +185,14 @@ class Scores:
         """The mean of all categories, by level."""
         found = self._by_level({"": CATEGORIES}, lambda c, n: self.categories.get((c, n)))
         return {level: average for (_, level), average in found.items()}
+
+    def part(self, row: str, level: int) -> VariantScore | AverageScore | None:
+        """The score of a task, a category, a dimension or OVERALL at a level; None if none is."""
+        if row in self.category_of:
+            return self.cells.get((row, level)) if level else self.tasks[row]
+        if row == OVERALL:
+            return self.overall.get(level)
+        return self.categories.get((row, level)) or self.dimensions.get((row, level))
 
     def _by_level(
         self,

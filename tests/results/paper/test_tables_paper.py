@@ -296,15 +296,15 @@ def test_no_average_includes_them(mixed: Run) -> None:
 
 
 def test_their_rows_come_last(mixed: Run) -> None:
-    labels = [row.label for row in rows(score_run(mixed))]
-    assert labels[:2] == ["Pick Blocks Size", "Ground 0"]
+    labels = [label for _, label in rows(score_run(mixed))]
+    assert labels[:2] == ["GAC Pick Blocks Size", "CBG Ground 0"]
     assert labels[-2:] == ["overall", "CBG Color-Based Grounding"]
 
 
 def test_a_run_of_them_alone_has_no_overall_value(tmp_path: Path) -> None:
     scores = score_run(run_of(tmp_path / "run", grounding()))
     assert to_json(scores)["overall"] == {}
-    assert [r.label for r in rows(scores)][-1] == "CBG Color-Based Grounding"
+    assert [label for _, label in rows(scores)][-1] == "CBG Color-Based Grounding"
 
 
 def test_the_table_sets_own_runs_beside_the_printed_values(mixed: Run) -> None:
