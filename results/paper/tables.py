@@ -50,7 +50,10 @@ def interval_table(columns: Sequence[Column]) -> Table:
         lines.append(TableRow(column.title, tuple(entries)))
         printed = data.intervals.rows.get(column.published)
         if printed:
-            given = [estimate_cell(Estimate(*(end / 100 for end in printed[row]))) for row in rows]
+            given = [
+                estimate_cell(Estimate(value / 100, low / 100, high / 100))
+                for value, low, high in (printed[row] for row in rows)
+            ]
             blank = [TableCell()] * len(rows)
             lines.append(TableRow(f"{column.title}, as printed", (*given, *blank)))
     heads = ("Fine-grained", "Long-horizon", "Overall") * len(INTERVAL_METHODS)

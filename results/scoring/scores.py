@@ -24,10 +24,8 @@ from robospa.results.scoring.first_choice import first_choice, held_at_start
 from robospa.results.statistics.intervals import (
     METHODS,
     Estimate,
-    chance_corrected,
     interval_of,
     mean,
-    wilson,
 )
 from robospa.results.statistics.samples import Sample, onta_of_bound, progress, rate
 from robospa.trial import (
@@ -220,24 +218,14 @@ def score_cell(
     """The cell of one variant from its results (`records` without lost ones)."""
     spatial, procedural = category in SPATIAL, category in PROCEDURAL
     metrics = ["sr", "sr1"] + ["onta", "onta1"] * spatial + ["ps", IDLE] * procedural
-    won = {"sr": sum(r.success for r in records), "sr1": sum(map(first_choice, records))}
+    samples = {m: found for m in metrics if (found := sample_of(records, m)) is not None}
     values: dict[str, Estimate | None] = dict.fromkeys(metrics)
-    samples: dict[str, Sample] = {}
+    values |= {m: interval_of([s], seed=_seed(task, level)) for m, s in samples.items()}
+    won, first = (samples[m].total if records else 0 for m in ("sr", "sr1"))
     candidates = candidates_of(records) if spatial else 0
-    for metric in metrics if records else ():
-        if metric in RATES:
-            found = wilson(won[RATES[metric]], len(records))
-            if metric == RATES[metric]:
-                values[metric], samples[metric] = found, rate(won[metric], len(records))
-            elif candidates > 1:
-                values[metric] = chance_corrected(found, candidates)
-                samples[metric] = rate(won[RATES[metric]], len(records), candidates)
-        elif (sample := sample_of(records, metric)) is not None:
-            samples[metric] = sample
-            values[metric] = interval_of([sample], seed=_seed(task, level))
     return VariantScore(
-        *(task, level, category, listed, len(records), won["sr"], values, candidates, samples),
-        firsts=won["sr1"],
+        *(task, level, category, listed, len(records), won, values, candidates, samples),
+        firsts=first,
     )
 
 
