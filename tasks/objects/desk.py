@@ -220,8 +220,8 @@ def bell(look: int, params: Params) -> ObjectModel:
         collision(m.lathe([(body, 0.0100), *shell[1:]], 20)),
         collision(Cylinder(0.0095, 0.0085), (0.0, 0.0, h - 0.0085)),
         visual(m.lathe([(r, 0.0), (r, 0.0060), (0.0420, 0.0115)], 24), srgb(foot), roughness=0.5),
-        visual(m.lathe(shell, 24), srgb(dome), roughness=0.25, metallic=metallic),
-        visual(m.lathe([(0.0055, 0.0530), (0.0055, 0.0600)], 8), build.STEEL, roughness=0.3),
+        visual(m.lathe(shell, 24, False), srgb(dome), roughness=0.25, metallic=metallic),
+        visual(m.lathe([(0.0055, 0.0530), (0.0055, 0.0600)], 8, False), build.STEEL, roughness=0.3),
         visual(m.lathe([(0.0095, 0.0575), (0.0100, 0.0640), (0.0060, h), (0.0, h)], 14),
                srgb(foot)),
     ]  # fmt: skip

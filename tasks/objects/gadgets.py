@@ -93,7 +93,7 @@ def remote_control(look: int, params: Params) -> ObjectModel:
         for column in range(3):
             buttons.append(_key(key, h, (0.0084 * (column - 1), -0.031 + 0.0068 * row)))
     ring_out, ring_in = m.ellipse(0.0105, 0.0105, 16), m.ellipse(0.0042, 0.0042, 10)
-    pad = m.moved(m.prism(ring_out, 0.0, 0.0010), (0.0, 0.0085, h - 0.0002))
+    pad = m.moved(m.prism(ring_out, 0.0, 0.0010, under=False), (0.0, 0.0085, h - 0.0002))
     bars = [_key(m.rectangle(0.0016, 0.0042), h, (s * 0.009, 0.0255)) for s in (-1, 1)]
     shade = srgb("#3a3d44") if body == "black" else build.DARK
     parts = [
@@ -119,7 +119,7 @@ def remote_control(look: int, params: Params) -> ObjectModel:
 
 
 def _key(outline: m.Polygon, h: float, at: m.Point) -> Mesh:
-    return m.moved(m.prism(outline, -0.0002, 0.0011, 0.9), (at[0], at[1], h))
+    return m.moved(m.prism(outline, -0.0002, 0.0011, 0.9, under=False), (at[0], at[1], h))
 
 
 CLOCKS = (

@@ -103,8 +103,11 @@ def _inside(p: Point, a: Point, b: Point, c: Point) -> bool:
     return min(_cross(a, b, p), _cross(b, c, p), _cross(c, a, p)) >= -1e-15
 
 
-def loft(rings: Sequence[Sequence[Vec3]], caps: bool = True) -> Mesh:
-    """Skin over `rings` of equally many points, counter-clockwise from above, bottom ring first."""
+def loft(rings: Sequence[Sequence[Vec3]], caps: bool = True, under: bool = True) -> Mesh:
+    """Skin over `rings` of equally many points, counter-clockwise from above, bottom ring first.
+
+    Its ends are closed if they are `caps`, the lower one only if it is seen from `under` it.
+    """
     n = len(rings[0])
     vertices = [p for ring in rings for p in ring]
     faces: list[Face] = []
@@ -117,7 +120,7 @@ def loft(rings: Sequence[Sequence[Vec3]], caps: bool = True) -> Mesh:
         top = triangulate([(p[0], p[1]) for p in rings[-1]]) if _area(rings[-1]) > 1e-10 else []
         low = triangulate([(p[0], p[1]) for p in rings[0]]) if _area(rings[0]) > 1e-10 else []
         faces += [(a + last, b + last, c + last) for a, b, c in top]
-        faces += [(a, c, b) for a, b, c in low]
+        faces += [(a, c, b) for a, b, c in low if under]
     return mesh(vertices, faces)
 
 
@@ -137,9 +140,10 @@ def lathe(profile: Polygon, n: int = 14, caps: bool = True, turn: float = 0.0) -
     return loft(rings, caps)
 
 
-def prism(polygon: Polygon, low: float, high: float, top: float = 1.0) -> Mesh:
+def prism(polygon: Polygon, low: float, high: float, top: float = 1.0, under: bool = True) -> Mesh:
     """`polygon` (x, y) extruded from z = `low` to `high`, its upper face scaled by `top`."""
-    return loft([[(x, y, low) for x, y in polygon], [(x * top, y * top, high) for x, y in polygon]])
+    ends = [(x, y, low) for x, y in polygon], [(x * top, y * top, high) for x, y in polygon]
+    return loft(ends, under=under)
 
 
 def side_prism(polygon: Polygon, half: float) -> Mesh:
