@@ -12,13 +12,16 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
+from threading import get_ident
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robospa.geometry import Pose, rotate
+from robospa.harness.sim.antialiasing import Smoother
 from robospa.harness.sim.bodies import to_sapien
 from robospa.observation import CameraSpec
 
@@ -46,28 +49,30 @@ def new_camera(
 
 
 def pixels(
-    camera: sapien.render.RenderCameraComponent, sky: NDArray[np.uint8]
-) -> NDArray[np.uint8]:
-    """The picture taken last, RGB (height, width, 3); `sky` (3,) where nothing was drawn."""
-    return row_of_pixels(camera, sky, 1)[0]
-
-
-def row_of_pixels(
-    camera: sapien.render.RenderCameraComponent, sky: NDArray[np.uint8], count: int
+    camera: sapien.render.RenderCameraComponent, sky: NDArray[np.uint8], count: int = 1
 ) -> list[NDArray[np.uint8]]:
-    """The same of a picture that is `count` pictures of equal width beside each other."""
+    """The picture taken last, as `count` of equal width, RGB (height, width, 3).
+
+    `sky` (3,) is where nothing was drawn; edges are smoothed.
+    """
     row = camera.get_picture("Color")
-    nothing = row[..., 3] == 0 if row[..., 3].min() == 0 else None
-    height, width = row.shape[0], row.shape[1] // count
+    colors = row.view(np.uint32)
+    if colors.min() == 0:
+        colors[colors == 0] = np.array([*sky, 255], dtype=np.uint8).view(np.uint32)
+    height, width = row.shape[:2]
+    row = _smoother(get_ident(), height, width, count)(row)
     images = []
-    for left in range(0, count * width, width):
-        image = np.empty((height, width, 3), dtype=np.uint8)
-        for channel in range(3):  # numpy copies pixels of three bytes five times slower
-            image[..., channel] = row[:, left : left + width, channel]
-        if nothing is not None:
-            image[nothing[:, left : left + width]] = sky
+    for picture in np.split(row, count, axis=1):
+        image = np.empty((height, width // count, 3), dtype=np.uint8)
+        for channel in range(3):  # a third of the time of one copy
+            image[..., channel] = picture[..., channel]
         images.append(image)
     return images
+
+
+@lru_cache(maxsize=8)
+def _smoother(thread: int, height: int, width: int, count: int) -> Smoother:
+    return Smoother(height, width, count)
 
 
 MOST = 3
@@ -124,7 +129,7 @@ class TiledRenderer:
         self._scene.update_render()
         camera = self._camera(len(views), width, height)
         camera.take_picture()
-        return row_of_pixels(camera, sky, len(views))
+        return pixels(camera, sky, len(views))
 
     def _camera(self, count: int, width: int, height: int) -> sapien.render.RenderCameraComponent:
         """The camera of rows of `count` pictures, made on first use."""

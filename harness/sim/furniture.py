@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 LEGS: Color = (0.86, 0.86, 0.85)
 WALL: Color = (1.0, 0.9, 0.9)
-FLOOR: Color = (0.42, 0.42, 0.44)
+FLOOR: Color = (0.15, 0.18, 0.21)
 
 LEG = 0.05
 """Side of the square legs, and how far they stand in from the edge [m]."""

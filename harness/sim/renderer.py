@@ -220,7 +220,7 @@ class Renderer:
             self._scene.update_render()
         for camera in alone.values():  # the device draws one while the next is handed over
             camera.take_picture()
-        taken.update({index: pictures.pixels(camera, sky) for index, camera in alone.items()})
+        taken.update({index: pictures.pixels(camera, sky)[0] for index, camera in alone.items()})
         return [taken[index] for index in range(len(cameras))]
 
     def _leave_out(

@@ -41,6 +41,11 @@ const float TINY = 1e-6;
 // and wall throw back or hide: fitted to ray-traced pictures of the same scenes.
 const float UPRIGHT = 0.9, SLOPE = 0.25;
 
+// Of ambient light up to MOST is hidden by what is nearer than 12 cm in the way to a light, TOUCHING for
+// each of them; a mm of distance is ignored, within which a surface would hide itself. Both are in
+// parts of the depth of the maps of sun and lamps.
+const float TOUCHING = 0.35, MOST = 0.6, BY_SUN = 50, BY_LAMP = 36, RISE = 2500;
+
 struct Surface {
   vec3 normal;
   vec3 toCamera;
@@ -73,18 +78,21 @@ vec3 reflected(Surface s, vec3 way, vec3 color, float strength) {
   return (s.diffuse + (s.fresnel + (1 - s.fresnel) * grazing(vh)) * share) * (color * (strength * nl));
 }
 
-// Share of a light that reaches `at` (column, row, depth in its shadow map): a mean over the four
+// Of a light at `at` (column, row, depth in its shadow map): the share that reaches it, and how near
+// what hides it is, 1 where it touches and 0 beyond a depth of 1 / `nearness`. A mean over the four
 // texels around it, weighted by how near they are.
-float reaching(sampler2D map, vec3 at) {
-  vec4 open = step(at.z, textureGather(map, at.xy));
-  vec2 share = fract(at.xy * textureSize(map, 0).x + 0.5);
-  return mix(mix(open.w, open.z, share.x), mix(open.x, open.y, share.x), share.y);
+vec2 reaching(sampler2D map, vec3 at, float nearness) {
+  vec4 gap = at.z - textureGather(map, at.xy);
+  vec2 share = fract(at.xy * textureSize(map, 0).x + 0.5), rest = 1 - share;
+  vec4 weight = vec4(rest.x, share.x, share.x, rest.x) * vec4(share.yy, rest.yy);
+  vec4 near = max(min(RISE * gap - 0.6, 1 - nearness * gap), 0);
+  return vec2(dot(step(gap, vec4(0)), weight), dot(near, weight));
 }
 
-float lamplit(sampler2D map, vec4 seen) {
+vec2 lamplit(sampler2D map, vec4 seen) {
   float scale = 1 / seen.w;
   vec3 at = vec3(seen.xy * (0.5 * scale) + 0.5, seen.z * scale);
-  return seen.w > 0 ? reaching(map, at) : 1;
+  return seen.w > 0 ? reaching(map, at, BY_LAMP) : vec2(1, 0);
 }
 
 vec3 lamp(Surface s, int i, float strength) {
@@ -131,11 +139,14 @@ void main() {
   vec3 scattered = albedo * (1 - metallic) * (UPRIGHT + SLOPE * s.normal.z);
   vec3 mirrored = s.fresnel * (1 - 0.75 * roughness * (1 - metallic)) +
                   (1 - s.fresnel) * grazing(nv) * (1 - roughness);
-  vec3 color = lights.ambientLight.rgb * (scattered + mirrored);
-  color += lamp(s, 0, lamplit(samplerSpotLightDepths[0], byLeft));
-  color += lamp(s, 1, lamplit(samplerSpotLightDepths[1], byRight));
+  vec2 sun = reaching(samplerDirectionalLightDepths[0], bySun, BY_SUN);
+  vec2 left = lamplit(samplerSpotLightDepths[0], byLeft);
+  vec2 right = lamplit(samplerSpotLightDepths[1], byRight);
+  float hidden = max(s.normal.z, 0) * (sun.y + left.y + right.y) * TOUCHING;
+  vec3 color = lights.ambientLight.rgb * (scattered + mirrored) * (1 - min(hidden, MOST));
+  color += lamp(s, 0, left.x);
+  color += lamp(s, 1, right.x);
   color += reflected(s, -lights.directionalLights[0].direction.xyz,
-                     lights.directionalLights[0].emission.rgb,
-                     reaching(samplerDirectionalLightDepths[0], bySun));
+                     lights.directionalLights[0].emission.rgb, sun.x);
   outColor = vec4(shown(color), 1);
 }

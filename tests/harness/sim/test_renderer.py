@@ -201,7 +201,7 @@ def test_pictures_are_bytes_with_sky_outside_the_room_and_shadows_of_sun_and_lam
         camera.entity.pose = to_sapien(pose)
         scene.update_render()
         camera.take_picture()
-        return pixels(camera, room.sky())
+        return pixels(camera, room.sky())[0]
 
     sky = taken(Pose((0.0, 0.0, 2.0), look_rotation((0.0, -1.0, 1.0), (1.0, 0.0, 0.0))))
     assert sky.dtype == np.uint8 and sky.shape == (24, 32, 3)
