@@ -49,7 +49,15 @@ class Smoother:
         self._after[:] = flat
         colors, after = flat.view(np.uint32), self._after.reshape(-1, 4)
         _blend(colors, after, _runs(self._below, 1), self._below, self._right, 1, width)
-        _blend(colors, after, self._columns(_runs(self._right, width)), self._right, self._below, width, 1)
+        _blend(
+            colors,
+            after,
+            self._columns(_runs(self._right, width)),
+            self._right,
+            self._below,
+            width,
+            1,
+        )
         return self._after.reshape(picture.shape)
 
     def _find(self, flat: Bytes, step: int, edges: Edges) -> None:
