@@ -142,7 +142,7 @@ def check_picture() -> str:
     camera = new_camera(scene, 32, 24)
     scene.update_render()
     camera.take_picture()
-    red, green, blue = pixels(camera, np.zeros(3, np.uint8))[12, 16].tolist()
+    red, green, blue = pixels(camera, np.zeros(3, np.uint8))[0][12, 16].tolist()
     took = time.perf_counter() - began
     if not (red > 127 and green < 51 and blue < 51):
         raise RuntimeError(f"a red cube has colour ({red}, {green}, {blue})")

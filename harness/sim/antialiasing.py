@@ -105,7 +105,8 @@ def _blend(
     begins, ends = step(first - along, first - along), step(last, last + along)
     length = (last - first) // along + 1
     wanted = np.flatnonzero((begins | ends) & ~((length == 1) & (begins == ends)))
-    begins, ends, first, length = (of[wanted] for of in (begins, ends, first, length))
+    begins, ends = begins[wanted], ends[wanted]
+    first, length = first[wanted], length[wanted]
     run = np.repeat(np.arange(len(length)), length)
     whole, index = length[run], np.arange(len(run)) - (np.cumsum(length) - length)[run]
     here = first[run] + index * along
