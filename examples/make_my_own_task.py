@@ -14,7 +14,7 @@ import sys
 from pathlib import Path
 
 from robospa.harness.factory import policy_factory
-from robospa.harness.pictures.gallery import first_frame, save_png
+from robospa.harness.pictures.gallery import first_frame, save
 from robospa.harness.seeds.attempt import ORACLE, attempt
 from robospa.harness.sim.sapien_world import SapienWorld
 from robospa.registry import load
@@ -49,7 +49,7 @@ def main() -> None:
     print(f"{task.name} level {words.level}: the expert solves {solved} of {words.seeds} seeds")
     if words.out:
         scene = build_scene(task.name, words.level, words.first)
-        save_png(first_frame(world, scene, size=(640, 480)), Path(words.out))
+        save(first_frame(world, scene, size=(640, 480)), Path(words.out))
         print(words.out)
     world.close()
 

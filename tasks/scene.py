@@ -26,9 +26,9 @@ SCENES = "robospa-2"
 all anew last. Later ones keep every scene whose task they do not change, and so its seed lists."""
 
 
-SEEN, UNSEEN = "seen", "unseen"
-"""Splits of textures: those of training scenes, and those of evaluation."""
-TEXTURES = {SEEN: 10_000, UNSEEN: 1_000}
+SEEN, UNSEEN, WHITE = "seen", "unseen", "white"
+"""Splits of textures: those of training scenes, those of evaluation, and plain white."""
+TEXTURES = {SEEN: 10_000, UNSEEN: 1_000, WHITE: 1}
 """How many textures each split has; officially files that are called by their numbers."""
 
 

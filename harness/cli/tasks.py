@@ -263,7 +263,7 @@ def _draw(console: Console, scene: Scene, camera: str, size: tuple[int, int], pa
     world = SapienWorld()
     try:
         image = gallery.first_frame(world, scene, camera, size)
-        gallery.save_png(image, path)
+        gallery.save(image, path)
     except (RenderUnavailable, SceneUnstable, OSError) as error:
         console.print(Text.assemble(("no picture:", "red"), f" {error}"))
         raise typer.Exit(1) from None
@@ -322,13 +322,13 @@ def _gallery(
         ]
         count = sum(len(row.cells) for row in rows)
         page = gallery.sheet(rows, f"RoboSPA · {len(rows)} tasks, {count} variants, seed {seed}")
-        size = gallery.save_jpeg(page, path, max(gallery.LEAST, gallery.SHARE * len(rows)))
+        gallery.save(page, path)
     except (RenderUnavailable, SceneUnstable, OSError, ValueError) as error:
         console.print(Text.assemble(("no gallery:", "red"), f" {error}"))
         raise typer.Exit(1) from None
     finally:
         simulator.close()
-    console.print(f"{count} variants in {path} ({size / 1000:.0f} kB)", soft_wrap=True)
+    console.print(f"{count} variants in {path}", soft_wrap=True)
 
 
 # -- JSON ---------------------------------------------------------------------------------------

@@ -226,9 +226,7 @@ def draw_sheet(path: Path, pictures: Sequence[tuple[NDArray[np.uint8], str]]) ->
         top = GAP + (i // columns) * (height + CAPTION)
         small = Image.fromarray(image).resize((WIDTH, height), Image.Resampling.LANCZOS)
         page.paste(small, (left, top))
-        text = wrapped(caption, WIDTH, lambda line: draw.textlength(line, font))
-        for k, line in enumerate(text):
-            draw.text((left, top + height + 3 + 14 * k), line, TEXT, font=font)
+        draw.text((left, top + height + 3), wrapped(caption, WIDTH), TEXT, font=font)
     page.save(path, "JPEG", quality=85)
 
 

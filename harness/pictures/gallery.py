@@ -6,9 +6,9 @@ of that very scene. Text is drawn by Pillow with its built-in font, so no system
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+import textwrap
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -25,12 +25,10 @@ if TYPE_CHECKING:
     from PIL import Image, ImageFont
 
 CELL = (320, 240)
-"""Size of a picture on the sheet [px]; it is rendered at twice that and averaged."""
+"""Size of a picture on the sheet [px]."""
 GAP, MARGIN, HEADER, TITLE, CAPTION = 10, 24, 34, 64, 66  # [px]
-TEXT, CAPTION_SIZE, LINES = "#20262e", 12, 4
+TEXT, CAPTION_SIZE, LINES, LETTER = "#20262e", 12, 4, 6.2
 PAPER, QUIET = "#ffffff", "#68727f"
-LEAST, SHARE = 1_000_000, 75_000
-"""Most bytes of a sheet: so many, or so many for each task; a README's picture stays below 1 MB."""
 Build = Callable[[str, int, int], Scene]
 """Makes the scene of a task, level and seed."""
 TRIES = 20
@@ -38,21 +36,12 @@ TRIES = 20
 
 
 @dataclass(frozen=True)
-class Cell:
-    """One variant: its level, its instruction and its picture (uint8 RGB)."""
-
-    level: int
-    instruction: str
-    image: NDArray[np.uint8]
-
-
-@dataclass(frozen=True)
 class GalleryRow:
-    """One task and its levels."""
+    """One task, and the caption and picture (uint8 RGB) of each level."""
 
     title: str
     note: str
-    cells: tuple[Cell, ...]
+    cells: tuple[tuple[str, NDArray[np.uint8]], ...]
 
 
 def first_frame(
@@ -90,8 +79,8 @@ def task_row(
     cells = []
     for level in sorted(task.levels):
         scene = settled_scene(world, task.name, level, seed, build)
-        image = world.render(CameraSpec("head", 2 * CELL[0], 2 * CELL[1]))
-        cells.append(Cell(level, sentence(scene), image))
+        image = world.render(CameraSpec("head", *CELL))
+        cells.append((f"L{level}  {sentence(scene)}", image))
     return GalleryRow(
         task.name.replace("_", " "), f"{task.category} · {task.summary}", tuple(cells)
     )
@@ -113,38 +102,17 @@ def sheet(rows: Sequence[GalleryRow], title: str) -> Image.Image:
         draw.text((MARGIN, base), row.title, TEXT, font=_font(19), anchor="ls")
         left = MARGIN + draw.textlength(row.title, _font(19)) + 12
         draw.text((left, base), row.note, QUIET, font=_font(14), anchor="ls")
-        for j, cell in enumerate(row.cells):
-            _paste(page, cell, MARGIN + j * (CELL[0] + GAP), top + HEADER)
+        for j, (caption, image) in enumerate(row.cells):
+            left = MARGIN + j * (CELL[0] + GAP)
+            page.paste(Image.fromarray(image), (left, top + HEADER))
+            below = (left, top + HEADER + CELL[1] + 4)
+            draw.text(below, wrapped(caption, CELL[0]), TEXT, font=_font(CAPTION_SIZE))
     return page
 
 
-def _paste(page: Image.Image, cell: Cell, left: int, top: int) -> None:
-    from PIL import Image, ImageDraw
-
-    page.paste(Image.fromarray(cell.image).resize(CELL, Image.Resampling.BOX), (left, top))
-    draw = ImageDraw.Draw(page)
-    font = _font(CAPTION_SIZE)
-    text = f"L{cell.level}  {cell.instruction}"
-    lines = wrapped(text, CELL[0], lambda line: draw.textlength(line, font))
-    for k, line in enumerate(lines):
-        draw.text((left, top + CELL[1] + 4 + 15 * k), line, TEXT, font=font)
-
-
-def wrapped(text: str, width: float, measure: Callable[[str], float]) -> list[str]:
-    """`text` in at most LINES lines no wider than `width`; what is cut off becomes an ellipsis."""
-    lines = [""]
-    for word in text.split(" "):
-        longer = f"{lines[-1]} {word}" if lines[-1] else word
-        if lines[-1] and measure(longer) > width:
-            lines.append(word)
-        else:
-            lines[-1] = longer
-    if len(lines) <= LINES:
-        return lines
-    last = lines[LINES - 1]
-    while " " in last and measure(last + " …") > width:
-        last = last.rpartition(" ")[0]
-    return [*lines[: LINES - 1], last + " …"]
+def wrapped(text: str, width: float) -> str:
+    """`text` in at most LINES lines of `width` [px]; what is cut off becomes an ellipsis."""
+    return textwrap.fill(text, int(width / LETTER), max_lines=LINES, placeholder=" …")
 
 
 def _font(size: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
@@ -153,29 +121,10 @@ def _font(size: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
     return ImageFont.load_default(size)
 
 
-def save_png(image: NDArray[np.uint8], path: Path) -> None:
-    """Write one RGB image; folders are made."""
+def save(image: Image.Image | NDArray[np.uint8], path: Path) -> None:
+    """Write an image as its file's ending says; folders are made."""
     from PIL import Image
 
     path.parent.mkdir(parents=True, exist_ok=True)
-    Image.fromarray(image).save(path, format="PNG", optimize=True)
-
-
-def save_jpeg(
-    page: Image.Image,
-    path: Path,
-    limit: int = LEAST,
-    qualities: Iterable[int] = (90, 85, 80, 75, 70, 60, 50),
-) -> int:
-    """Write `page` at the best quality that stays below `limit` bytes; returns the size [bytes].
-    ValueError, with nothing written, if even the lowest quality is larger."""
-    data = b""
-    for quality in qualities:
-        buffer = BytesIO()
-        page.save(buffer, format="JPEG", quality=quality, optimize=True, progressive=True)
-        data = buffer.getvalue()
-        if len(data) < limit:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(data)
-            return len(data)
-    raise ValueError(f"{path} would take {len(data)} bytes, more than {limit}; show fewer tasks")
+    page = Image.fromarray(image) if isinstance(image, np.ndarray) else image
+    page.save(path, optimize=True, quality=85)

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from robospa.geometry import Pose, look_rotation
 from robospa.harness import textures
 from robospa.harness.sim.cameras import add_copies
+from robospa.harness.textures.field import SIZE
 from robospa.tasks.colors import TABLE_COLOR
-from robospa.tasks.scene import Lights, Surroundings, Texture
+from robospa.tasks.scene import WHITE, Lights, Surroundings, Texture
 from robospa.tasks.shapes import Box, Color, Shape
 from robospa.workcell import WORKCELL, TableGeometry
 
@@ -199,4 +200,6 @@ class DrawnFurniture:
             lamp.color = color
 
     def _image(self, texture: Texture | None) -> NDArray[np.uint8] | None:
-        return None if texture is None else self.textures.image(texture)
+        if texture is None or texture.split != WHITE:
+            return None if texture is None else self.textures.image(texture)
+        return np.full((SIZE, SIZE, 3), 255, dtype=np.uint8)

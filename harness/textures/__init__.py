@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from robospa.harness.textures import materials, prints
 from robospa.harness.textures.field import SIZE, Draw, Picture
 from robospa.tasks.packs import PackError
-from robospa.tasks.scene import SEEN, TEXTURES, UNSEEN, Texture
+from robospa.tasks.scene import SEEN, UNSEEN, Texture
 
 VARIABLE = "ROBOSPA_TEXTURES"
 """Environment variable that names a folder of the user's own textures."""
@@ -149,7 +149,7 @@ class TextureFolder:
                 f"there is no folder of textures {str(path)!r}; make it or unset ROBOSPA_TEXTURES"
             )
         self._path = path
-        self._files = {split: _numbered(path / split) for split in TEXTURES}
+        self._files = {split: _numbered(path / split) for split in (SEEN, UNSEEN)}
         if not any(self._files.values()):
             raise PackError(
                 f"the folder of textures {str(path)!r} has no image such as seen/0.png or "

@@ -320,6 +320,8 @@ def departures(manifest: RunManifest) -> tuple[Departure, ...]:
         found.append(Departure("shuffled sentences", words))
     if manifest.clock:
         found.append(Departure(REAL_TIME, f"{manifest.clock}, a suite of its own"))
+    if parts := [mode for mode in settings.mode if ":" in mode]:
+        found.append(Departure("scenes", f"{', '.join(parts)}, which nobody else has"))
     if settings.step_scale != 1:
         found.append(Departure(LIMITS, f"{settings.step_scale:g} times the official ones", True))
     if settings.salt_sha256:

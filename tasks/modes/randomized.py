@@ -7,6 +7,7 @@
 | light | colours of the lights; in 2 % of the scenes they change from picture to picture | 1 |
 | clutter | things on the table, of which none has to do with the task: at most | 10 |
 | camera | the head camera off its place by 0 to (off unless it is named, as officially) | 0.02 m |
+| white-table | the table's top white, as officially in clean scenes (off unless it is named) | 1 |
 
 Every part draws from a generator of its own: leaving one out, or changing its strength, leaves the
 others as they were. Evaluation takes unseen textures, training scenes (mode `randomized-seen`) seen
@@ -25,7 +26,7 @@ import numpy as np
 from robospa.registry import did_you_mean
 from robospa.tasks.modes import Part, with_table_raised
 from robospa.tasks.modes.clutter import clutter
-from robospa.tasks.scene import SEEN, TEXTURES, UNSEEN, Lights, Scene, Texture
+from robospa.tasks.scene import SEEN, TEXTURES, UNSEEN, WHITE, Lights, Scene, Texture
 from robospa.tasks.shapes import Color
 
 FLICKERING = 0.02
@@ -95,6 +96,10 @@ def _camera(scene: Scene, part: Part, strength: float, textures: str) -> Scene:
     return replace(scene, surroundings=replace(scene.surroundings, camera_shift=(x, y, z)))
 
 
+def _white_table(scene: Scene, part: Part, strength: float, textures: str) -> Scene:
+    return replace(scene, surroundings=replace(scene.surroundings, table=Texture(WHITE, 0)))
+
+
 VARIATIONS = {
     v.name: v
     for v in (
@@ -103,6 +108,7 @@ VARIATIONS = {
         Variation("light", 1.0, 1.0, _light),
         Variation("clutter", 10.0, 20.0, _clutter, whole=True, tangible=True),
         Variation("camera", 0.02, 0.1, _camera, official=False),
+        Variation("white-table", 1.0, 1.0, _white_table, whole=True, official=False),
     )
 }
 """By name, in the order in which they are applied: clutter stands on the table as it is then."""
