@@ -47,17 +47,8 @@ class Smoother:
             right[:, left + self._single - 1] = False
             below[:, [left, left + self._single - 1]] = False
         self._after[:] = flat
-        colors, after = flat.view(np.uint32), self._after.reshape(-1, 4)
-        _blend(colors, after, _runs(self._below, 1), self._below, self._right, 1, width)
-        _blend(
-            colors,
-            after,
-            self._columns(_runs(self._right, width)),
-            self._right,
-            self._below,
-            width,
-            1,
-        )
+        self._blend(flat.view(np.uint32), self._below, self._right, 1, width)
+        self._blend(flat.view(np.uint32), self._right, self._below, width, 1)
         return self._after.reshape(picture.shape)
 
     def _find(self, flat: Bytes, step: int, edges: Edges) -> None:
@@ -72,49 +63,44 @@ class Smoother:
         self._far[len(here) :] = False
         np.not_equal(self._far.view(np.uint32), 0, out=edges[: len(flat) // 4])
 
-    def _columns(self, runs: list[Places]) -> list[Places]:
-        """First and last pixels in the order of columns, in which they belong together."""
-        by_column = (np.sort(at % self._width * self._height + at // self._width) for at in runs)
-        return [at % self._height * self._width + at // self._height for at in by_column]
+    def _blend(
+        self, colors: NDArray[np.uint32], edges: Edges, steps: Edges, along: int, over: int
+    ) -> None:
+        """Draw the lines of runs of edges, whose pixels are `along` apart, to those `over`."""
+        first = np.flatnonzero(edges[along:] > edges[:-along]) + along
+        last = np.flatnonzero(edges[:-along] > edges[along:])
+        if along > 1:
+            first, last = self._by_column(first), self._by_column(last)
 
+        def step(at: Places, outside: Places) -> NDArray[np.int8]:
+            """1 if the edge goes on a pixel further on this side, -1 if beyond, else 0."""
+            near = steps[at] & ~steps[at - over] & edges[outside - over]
+            beyond = steps[at + over] & ~steps[at + 2 * over] & edges[outside + over]
+            return near.view(np.int8) - beyond.view(np.int8)
 
-def _runs(edges: Edges, along: int) -> list[Places]:
-    """First and last pixels of runs of edges, whose pixels are `along` apart."""
-    before, after = edges[:-along], edges[along:]
-    return [np.flatnonzero(after > before) + along, np.flatnonzero(before > after)]
+        after = self._after.reshape(-1, 4)
+        begins, ends = step(first - along, first - along), step(last, last + along)
+        length = (last - first) // along + 1
+        wanted = np.flatnonzero((begins | ends) & ~((length == 1) & (begins == ends)))
+        begins, ends = begins[wanted], ends[wanted]
+        first, length = first[wanted], length[wanted]
+        run = np.repeat(np.arange(len(length)), length)
+        whole, index = length[run], np.arange(len(run)) - (np.cumsum(length) - length)[run]
+        here = first[run] + index * along
+        rest = whole - 1 - 2 * index  # twice as far as the middle of the run
+        side = np.where(rest > 0, begins[run], ends[run])
+        share = np.where(whole == 1, ALONE, np.abs(rest) * (WHOLE // 2) // whole)
+        for way, to, of in ((1, here, here + over), (-1, here + over, here)):
+            taken = np.flatnonzero(
+                ((side == way) | (whole == 1) & (begins[run] == way)) & (share > 0)
+            )
+            to, of = to[taken], of[taken]
+            old, new = (
+                colors[at].view(np.uint8).reshape(-1, 4).astype(np.int32) for at in (to, of)
+            )
+            after[to] += ((new - old) * share[taken, None] // WHOLE).astype(np.uint8)
 
-
-def _blend(
-    colors: NDArray[np.uint32],
-    after: Bytes,
-    runs: list[Places],
-    edges: Edges,
-    steps: Edges,
-    along: int,
-    over: int,
-) -> None:
-    """Draw the lines of runs of edges between pixels `over` apart."""
-    first, last = runs
-
-    def step(at: Places, outside: Places) -> NDArray[np.int8]:
-        """1 if the edge goes on a pixel further on this side, -1 if beyond, else 0."""
-        near = steps[at] & ~steps[at - over] & edges[outside - over]
-        beyond = steps[at + over] & ~steps[at + 2 * over] & edges[outside + over]
-        return near.view(np.int8) - beyond.view(np.int8)
-
-    begins, ends = step(first - along, first - along), step(last, last + along)
-    length = (last - first) // along + 1
-    wanted = np.flatnonzero((begins | ends) & ~((length == 1) & (begins == ends)))
-    begins, ends = begins[wanted], ends[wanted]
-    first, length = first[wanted], length[wanted]
-    run = np.repeat(np.arange(len(length)), length)
-    whole, index = length[run], np.arange(len(run)) - (np.cumsum(length) - length)[run]
-    here = first[run] + index * along
-    rest = whole - 1 - 2 * index  # twice as far as the middle of the run
-    side = np.where(rest > 0, begins[run], ends[run])
-    share = np.where(whole == 1, ALONE, np.abs(rest) * (WHOLE // 2) // whole)
-    for way, to, of in ((1, here, here + over), (-1, here + over, here)):
-        taken = np.flatnonzero(((side == way) | (whole == 1) & (begins[run] == way)) & (share > 0))
-        to, of = to[taken], of[taken]
-        old, new = (colors[at].view(np.uint8).reshape(-1, 4).astype(np.int32) for at in (to, of))
-        after[to] += ((new - old) * share[taken, None] // WHOLE).astype(np.uint8)
+    def _by_column(self, at: Places) -> Places:
+        """Ends of runs in the order of columns, in which first and last belong together."""
+        order = np.sort(at % self._width * self._height + at // self._width)
+        return order % self._height * self._width + order // self._height

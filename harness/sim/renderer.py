@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
@@ -37,36 +37,24 @@ SHADOW = 1.6
 """How far shadows fall beside a thing on the table, by its height: the further lamp's slope."""
 
 
-@dataclass(frozen=True)
-class Frustum:
-    """A camera's pose (x forward, y left), and tangents of half its view across and upright."""
-
-    pose: Pose
-    across: float
-    upright: float
-
-    @staticmethod
-    def of(pose: Pose, fov: float, width: int, height: int) -> Frustum:
-        """The view of a camera with this vertical field of view [rad] and picture size [px]."""
-        upright = math.tan(fov / 2)
-        return Frustum(pose, upright * width / height, upright)
-
-    def may_show(self, point: Vec3, radius: float) -> bool:
-        """Whether a ball around `point` [m, world] reaches into the picture; never wrongly no."""
-        ahead, left, up = self.pose.inverse().apply(point)
-        return (
-            ahead > -radius
-            and abs(left) - self.across * ahead <= radius * math.hypot(1.0, self.across)
-            and abs(up) - self.upright * ahead <= radius * math.hypot(1.0, self.upright)
-        )
+def may_show(view: CameraView, aspect: float, point: Vec3, radius: float) -> bool:
+    """Whether a ball around `point` [m, world] reaches into the picture; never wrongly no."""
+    upright = math.tan(view.fov / 2)
+    across = upright * aspect
+    ahead, left, up = view.pose.inverse().apply(point)
+    return (
+        ahead > -radius
+        and abs(left) - across * ahead <= radius * math.hypot(1.0, across)
+        and abs(up) - upright * ahead <= radius * math.hypot(1.0, upright)
+    )
 
 
-def in_frame(views: Sequence[Frustum], model: ObjectModel, pose: Pose) -> bool:
-    """Whether one of the views may show the model at `pose`, or its shadow."""
+def in_frame(views: Sequence[tuple[CameraView, float]], model: ObjectModel, pose: Pose) -> bool:
+    """Whether one of the views, with its aspect, may show the model at `pose`, or its shadow."""
     height = model.size[2]
     reach = math.hypot(model.radius, height) + SHADOW * height
     middle = pose.apply((0.0, 0.0, model.bottom))
-    return any(view.may_show(middle, reach) for view in views)
+    return any(may_show(*view, middle, reach) for view in views)
 
 
 Links = Sequence[Mapping[str, Pose]]
@@ -233,10 +221,8 @@ class Renderer:
         clutter = self._loaded.clutter if self._loaded is not None else ()
         if not clutter:
             return
-        seen = [
-            Frustum.of(view.pose, view.fov, camera.width, camera.height)
-            for view, camera in zip(views, cameras, strict=True)
-        ]
+        aspects = [camera.width / camera.height for camera in cameras]
+        seen = list(zip(views, aspects, strict=True))
         for item in clutter:
             drawn, pose = self._objects.get(item.name), poses.get(item.name)
             if drawn is not None and pose is not None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import ctypes
 import ctypes.util
 import re
+import struct
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -47,50 +48,9 @@ class Device:
         return (int(found[1]), int(found[2])) < OLDEST_MESA
 
 
-class _Instance(ctypes.Structure):
-    _fields_ = (
-        ("sType", ctypes.c_uint32),
-        ("pNext", ctypes.c_void_p),
-        ("flags", ctypes.c_uint32),
-        ("application", ctypes.c_void_p),
-        ("layerCount", ctypes.c_uint32),
-        ("layers", ctypes.c_void_p),
-        ("extensionCount", ctypes.c_uint32),
-        ("extensions", ctypes.c_void_p),
-    )
-
-
-class _Application(ctypes.Structure):
-    _fields_ = (
-        ("sType", ctypes.c_uint32),
-        ("pNext", ctypes.c_void_p),
-        ("name", ctypes.c_char_p),
-        ("version", ctypes.c_uint32),
-        ("engine", ctypes.c_char_p),
-        ("engineVersion", ctypes.c_uint32),
-        ("api", ctypes.c_uint32),
-    )
-
-
-class _Driver(ctypes.Structure):
-    _fields_ = (
-        ("sType", ctypes.c_uint32),
-        ("pNext", ctypes.c_void_p),
-        ("id", ctypes.c_uint32),
-        ("name", ctypes.c_char * 256),
-        ("info", ctypes.c_char * 256),
-        ("conformance", ctypes.c_uint8 * 4),
-    )
-
-
-class _Properties(ctypes.Structure):
-    _fields_ = (
-        ("sType", ctypes.c_uint32),
-        ("pNext", ctypes.c_void_p),
-        ("numbers", ctypes.c_uint32 * 5),
-        ("name", ctypes.c_char * 256),
-        ("rest", ctypes.c_uint8 * 1024),  # limits and more, 540 bytes; room to spare
-    )
+_APPLICATION, _INSTANCE = struct.Struct("@iPPIPII"), struct.Struct("@iPIPIPIP")
+_PROPERTIES, _DRIVER = struct.Struct("@iP5I256s1024x"), struct.Struct("@iPI256s256s4x")
+"""The C structures, as native alignment lays them out; of the properties' limits only the room."""
 
 
 def _loader() -> ctypes.CDLL:
@@ -114,10 +74,14 @@ def _loader() -> ctypes.CDLL:
 def devices() -> tuple[Device, ...]:
     """All Vulkan devices in the loader's order; VulkanError if it has no driver at all."""
     vulkan = _loader()
-    application = _Application(0, None, b"robospa", 1, b"", 0, _API_1_2)
-    wanted = _Instance(_CREATE_INSTANCE, None, 0, ctypes.addressof(application), 0, None, 0, None)
+    name = ctypes.create_string_buffer(b"robospa")
+    application = ctypes.create_string_buffer(
+        _APPLICATION.pack(0, 0, ctypes.addressof(name), 1, 0, 0, _API_1_2)
+    )
+    at = ctypes.addressof(application)
+    wanted = ctypes.create_string_buffer(_INSTANCE.pack(_CREATE_INSTANCE, 0, 0, at, 0, 0, 0, 0))
     instance = ctypes.c_void_p()
-    code = vulkan.vkCreateInstance(ctypes.byref(wanted), None, ctypes.byref(instance))
+    code = vulkan.vkCreateInstance(wanted, None, ctypes.byref(instance))
     if code != 0:
         raise VulkanError(f"there is no Vulkan driver (vkCreateInstance answers {code})")
     try:
@@ -131,11 +95,9 @@ def devices() -> tuple[Device, ...]:
 
 
 def _describe(vulkan: ctypes.CDLL, handle: ctypes.c_void_p) -> Device:
-    driver = _Driver(_DRIVER_PROPERTIES, None)
-    properties = _Properties(_PROPERTIES_2, ctypes.addressof(driver))
-    vulkan.vkGetPhysicalDeviceProperties2(handle, ctypes.byref(properties))
-    return Device(
-        name=properties.name.decode(errors="replace"),
-        driver=driver.name.decode(errors="replace"),
-        version=driver.info.decode(errors="replace"),
-    )
+    driver = ctypes.create_string_buffer(_DRIVER.pack(_DRIVER_PROPERTIES, 0, 0, b"", b""))
+    asked = _PROPERTIES.pack(_PROPERTIES_2, ctypes.addressof(driver), *[0] * 5, b"")
+    properties = ctypes.create_string_buffer(asked)
+    vulkan.vkGetPhysicalDeviceProperties2(handle, properties)
+    texts = _PROPERTIES.unpack_from(properties)[-1], *_DRIVER.unpack_from(driver)[-2:]
+    return Device(*(text.partition(b"\0")[0].decode(errors="replace") for text in texts))

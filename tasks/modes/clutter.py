@@ -18,7 +18,7 @@ import itertools
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -226,35 +226,26 @@ class KeepOut:
         return np.asarray(((beyond**2).sum(axis=2) >= reach**2).all(axis=1))
 
 
-@dataclass
-class _Rectangles:
-    """Rectangles as they are found."""
+Rectangle = tuple[tuple[float, float], Array, tuple[float, float]]
+"""Centre, axes and half sizes."""
 
-    centres: list[tuple[float, float]] = field(default_factory=list)
-    axes: list[Array] = field(default_factory=list)
-    halves: list[tuple[float, float]] = field(default_factory=list)
 
-    def add(self, x: float, y: float, axes: Array, half: tuple[float, float]) -> None:
-        self.centres.append((x, y))
-        self.axes.append(axes)
-        self.halves.append(half)
-
-    def add_circle(self, x: float, y: float, radius: float) -> None:
-        self.add(x, y, np.eye(2), (radius, radius))
+def _circle(x: float, y: float, radius: float) -> Rectangle:
+    return (x, y), np.eye(2), (radius, radius)
 
 
 def keep_out(scene: Scene) -> KeepOut:
     """Where no clutter of `scene` may lie; nothing of it depends on which object is asked for,
     beyond the places to which the plan carries things."""
-    found = _Rectangles()
+    found: list[Rectangle] = []
     boxes, nearest = [], []
     for item in scene.objects:
         model = object_model(item.asset, item.params)
         turn = to_matrix(item.pose.rotation)
         half = footprint(model)
         x, y, _ = item.pose.position
-        found.add(x, y, turn[:2, :2].T, half)
-        _add_swing(found, item.pose, model)
+        found.append(((x, y), turn[:2, :2].T, half))
+        found += _swing(item.pose, model)
         corners = _corners(item, model, half)
         column, row = WORKCELL.head.pixel(*corners.T)
         boxes.append((column.min(), column.max(), row.min(), row.max()))
@@ -265,11 +256,9 @@ def keep_out(scene: Scene) -> KeepOut:
             if skill.on is not None:
                 x, y, _ = scene.object(skill.on).pose.position
             moved = scene.object(skill.object)
-            found.add_circle(x, y, object_model(moved.asset, moved.params).radius)
-    return KeepOut(
-        np.array(found.centres), np.array(found.axes), np.array(found.halves),
-        np.array(boxes), np.array(nearest),
-    )  # fmt: skip
+            found.append(_circle(x, y, object_model(moved.asset, moved.params).radius))
+    centres, axes, halves = map(np.array, zip(*found, strict=True))
+    return KeepOut(centres, axes, halves, np.array(boxes), np.array(nearest))
 
 
 def footprint(model: ObjectModel) -> tuple[float, float]:
@@ -280,12 +269,12 @@ def footprint(model: ObjectModel) -> tuple[float, float]:
     return x / 2, y / 2
 
 
-def _add_swing(found: _Rectangles, pose: Pose, model: ObjectModel) -> None:
-    if model.hinge is not None:
-        points = np.concatenate([points_of(shape) for shape in model.hinge.shapes])
-        x, y, _ = pose.apply(model.hinge.point)
-        reach = np.hypot(*(points - model.hinge.point)[:, :2].T).max()
-        found.add_circle(x, y, float(reach))
+def _swing(pose: Pose, model: ObjectModel) -> list[Rectangle]:
+    if model.hinge is None:
+        return []
+    points = np.concatenate([points_of(shape) for shape in model.hinge.shapes])
+    x, y, _ = pose.apply(model.hinge.point)
+    return [_circle(x, y, float(np.hypot(*(points - model.hinge.point)[:, :2].T).max()))]
 
 
 def _corners(item: SceneObject, model: ObjectModel, half: tuple[float, float]) -> Array:

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.geometry import Pose, yaw_rotation
-from robospa.harness.sim.cameras import pixels
-from robospa.harness.sim.renderer import Frustum, in_frame
+from robospa.harness.sim.cameras import CameraView, pixels
+from robospa.harness.sim.renderer import in_frame, may_show
 from robospa.tasks.objects import object_model
 from robospa.workcell import HEIGHT, WIDTH, WORKCELL
 
-HEAD = Frustum.of(WORKCELL.head.pose, WORKCELL.head.fov, WIDTH, HEIGHT)
+HEAD = CameraView(WORKCELL.head.pose, WORKCELL.head.fov, 0.1), WIDTH / HEIGHT
 
 
 def test_nothing_that_the_head_camera_sees_is_left_out() -> None:
@@ -24,7 +24,7 @@ def test_nothing_that_the_head_camera_sees_is_left_out() -> None:
     column, row = WORKCELL.head.pixel(x, y, z)
     inside = (column > 0) & (column < WIDTH) & (row > 0) & (row < HEIGHT)
     far = (np.abs(column - WIDTH / 2) > WIDTH) | (np.abs(row - HEIGHT / 2) > HEIGHT)
-    told = np.array([HEAD.may_show(p, 0.02) for p in np.stack([x, y, z], 1).tolist()])
+    told = np.array([may_show(*HEAD, p, 0.02) for p in np.stack([x, y, z], 1).tolist()])
     assert told[inside].all() and inside.sum() > 300
     assert not told[far].any() and far.sum() > 100
 
@@ -34,7 +34,7 @@ def test_a_thing_behind_the_camera_is_not_drawn_and_one_before_it_is() -> None:
     x, y, z = WORKCELL.head.position
     assert in_frame([HEAD], model, Pose((0.0, 0.0, 0.74)))
     assert not in_frame([HEAD], model, Pose((x, y - 1.0, z)))
-    turned = Frustum.of(Pose((0.0, 0.0, 1.0), yaw_rotation(math.pi / 2)), 0.6, 320, 240)
+    turned = CameraView(Pose((0.0, 0.0, 1.0), yaw_rotation(math.pi / 2)), 0.6, 0.1), 4 / 3
     assert in_frame([turned], model, Pose((0.0, 2.0, 1.0)))
     assert not in_frame([turned], model, Pose((2.0, 0.0, 1.0)))
     assert in_frame([HEAD, turned], model, Pose((0.0, 2.0, 1.0)))
