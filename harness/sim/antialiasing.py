@@ -102,5 +102,6 @@ class Smoother:
 
     def _by_column(self, at: Places) -> Places:
         """Ends of runs in the order of columns, in which first and last belong together."""
-        order = np.sort(at % self._width * self._height + at // self._width)
-        return order % self._height * self._width + order // self._height
+        order: Places = np.sort(at % self._width * self._height + at // self._width)
+        rows: Places = order % self._height
+        return rows * self._width + order // self._height
