@@ -98,7 +98,7 @@ class Facts(PickFacts):
     color: str
 
 
-def color_task(family: distance.ObjectSet, colored: Colored, what: str) -> Task:
+def color_task(family: distance.ObjectSet, colored: Colored) -> Task:
     """The task that names the target of `family` by its colour."""
     rules = family.rules
 
@@ -127,15 +127,15 @@ def color_task(family: distance.ObjectSet, colored: Colored, what: str) -> Task:
         plan=pick_target,
         templates=TEXT.templates,
         slots=slots,
-        summary=f"Pick the one of the named colour among {what}.",
+        summary=f"Pick the one of the named colour among {family.what}.",
         success="the target's origin is higher than 0.82 m while a gripper carries it",
     )
 
 
 TASKS = (
-    color_task(distance.BLOCKS, blocks, "3 to 10 blocks"),
-    color_task(distance.MUGS, alike("mug"), "3 to 7 mugs"),
-    color_task(distance.PILL_BOTTLES, alike("pill_bottle"), "3 to 7 pill bottles"),
-    color_task(distance.MIXED_A, mixed(SET_A), "3 to 7 different objects"),
-    color_task(distance.MIXED_B, mixed(SET_B), "3 to 7 different objects"),
+    color_task(distance.BLOCKS, blocks),
+    color_task(distance.MUGS, alike("mug")),
+    color_task(distance.PILL_BOTTLES, alike("pill_bottle")),
+    color_task(distance.MIXED_A, mixed(SET_A)),
+    color_task(distance.MIXED_B, mixed(SET_B)),
 )

@@ -90,6 +90,12 @@ class ObjectSet:
     noun: str
     yaw: float = math.pi / 2
 
+    @property
+    def what(self) -> str:
+        """How many of what lie in its scenes."""
+        noun = "different object" if self.noun == "object" else self.noun
+        return f"{self.rules.counts[0]} to {self.rules.counts[-1]} {noun}s"
+
 
 def allowed(workcell: Workcell, rules: Rules, x: Array, y: Array) -> Mask:
     """Whether origins are in the region, with the footprint and the object's axis in view."""
@@ -290,8 +296,8 @@ def gap(scene: Scene) -> float:
     return min(abs(asked - other) for other in far.values())
 
 
-def distance_task(family: ObjectSet, name: str, what: str) -> Task:
-    """The task that asks for the k-th farthest of `what` from a reference."""
+def distance_task(family: ObjectSet) -> Task:
+    """The task that asks for the k-th farthest from a reference."""
 
     def slots(scene: Scene) -> Slots:
         names = family.reference(scene.object(Facts.of(scene).reference))
@@ -302,7 +308,7 @@ def distance_task(family: ObjectSet, name: str, what: str) -> Task:
         return {**phrases, "reference": names}
 
     return Task(
-        name=name,
+        name=table.pick_name(family.name, "Distance"),
         category="SDE",
         levels=family.rules.levels,
         draw=lambda level, rng, workcell: draw(level, rng, workcell, family),
@@ -310,7 +316,7 @@ def distance_task(family: ObjectSet, name: str, what: str) -> Task:
         plan=table.pick_target,
         templates=TEXT.templates,
         slots=slots,
-        summary=f"Pick the k-th farthest of {what} from a named one.",
+        summary=f"Pick the k-th farthest of {family.what} from a named one.",
         success="the target's origin is higher than 0.82 m while a gripper carries it",
         lead=gap,
     )
@@ -476,12 +482,4 @@ MIXED_B = ObjectSet(
 FAMILIES = (BLOCKS, MUGS, PILL_BOTTLES, MIXED_A, MIXED_B)
 
 
-WHAT = {
-    "Blocks": "3 to 10 blocks",
-    "Mugs": "3 to 7 mugs",
-    "Pill_Bottles": "3 to 7 pill bottles",
-    "Mixed_Objects_A": "3 to 7 different objects",
-    "Mixed_Objects_B": "3 to 7 different objects",
-}
-
-TASKS = tuple(distance_task(f, table.pick_name(f.name, "Distance"), WHAT[f.name]) for f in FAMILIES)
+TASKS = tuple(distance_task(family) for family in FAMILIES)

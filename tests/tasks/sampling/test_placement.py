@@ -49,10 +49,6 @@ def test_scatter_gives_up_in_bounded_work() -> None:
     assert len(calls) == 7
 
 
-def test_spread_is_the_range() -> None:
-    assert places.spread([0.3, -0.1, 0.2]) == pytest.approx(0.4)
-
-
 def fits_square(points: np.ndarray, wanted: np.ndarray, i: int) -> np.ndarray:
     inside = (wanted >= 0).all(axis=1) & (wanted <= 0.2).all(axis=1)
     return inside & places.keeps_apart(points, wanted, i, 0.15)
