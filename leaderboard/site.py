@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import shutil
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
@@ -41,6 +40,7 @@ from robospa.results.paper.origin import DIFFERENCES, ORIGIN
 from robospa.results.paper.published import load
 from robospa.results.report.page import FIGURES, card, figure, own_version, render
 from robospa.results.report.tables import ReportTable, for_page, method_notes, report_tables
+from robospa.results.report.trials import put
 from robospa.results.scoring.models import ModelResults
 from robospa.trial import CATEGORIES, CATEGORY_NAMES, DIMENSIONS, METRIC_NAMES
 
@@ -182,7 +182,8 @@ def write_model(entry: Entry, folder: Path) -> None:
         names = [str(film["video"]) for film in films] + [IN_REPOSITORY] * (
             address == IN_REPOSITORY
         )
-        _copy(entry.submission.folder, names, folder)
+        for name in names:
+            put(entry.submission.folder / name, folder / name)
     drawings = _figures(entry, folder / FIGURES)
     failures = failure_rows(entry.failures)
     sections = ["summary", "evidence", "tables", "figures"]
@@ -255,17 +256,6 @@ def _figures(entry: Entry, folder: Path) -> list[DrawnFigure]:
     found = {"state": state, "drawings": [asdict(drawing) for drawing in made]}
     replace_file(kept, json.dumps(found).encode())
     return made
-
-
-def _copy(source: Path, names: Sequence[str], folder: Path) -> None:
-    for name in names:
-        target = folder / name
-        target.parent.mkdir(parents=True, exist_ok=True)
-        target.unlink(missing_ok=True)
-        try:
-            os.link(source / name, target)
-        except OSError:
-            shutil.copyfile(source / name, target)
 
 
 FOLDER = "pairs"

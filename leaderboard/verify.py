@@ -13,6 +13,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import groupby
 from pathlib import Path
 from typing import Annotated
 
@@ -241,10 +242,8 @@ def _records(
 
 
 def _variants(records: Mapping[TrialKey, TrialRecord]) -> Iterator[list[TrialRecord]]:
-    groups: dict[tuple[str, int], list[TrialRecord]] = {}
-    for key, record in records.items():
-        groups.setdefault(key.variant, []).append(record)
-    yield from groups.values()
+    """The records of each variant, which follow each other."""
+    return (list(own) for _, own in groupby(records.values(), key=lambda r: r.key.variant))
 
 
 def _check_actions(

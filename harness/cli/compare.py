@@ -23,22 +23,9 @@ TRIALS = (2, 10, 100)
 """Trials of every variant there."""
 
 
-class Metric(StrEnum):
-    """What is compared."""
-
-    sr = "sr"
-    sr1 = "sr1"
-    onta = "onta"
-    onta1 = "onta1"
-    ps = "ps"
-
-
-class Method(StrEnum):
-    """How intervals are made."""
-
-    wilson = "wilson"
-    exact = "exact"
-    bootstrap = "bootstrap"
+Metric = StrEnum("Metric", ["sr", "sr1", "onta", "onta1", "ps"])
+Method = StrEnum("Method", ["wilson", "exact", "bootstrap"])
+"""How intervals are made."""
 
 
 def compare(

@@ -45,7 +45,6 @@ def trials_for(variance: float, half: float) -> int:
 
 
 POWER = 0.8
-ALPHA = 0.05
 
 
 @dataclass(frozen=True)
@@ -58,22 +57,19 @@ class SampleSize:
     paired: dict[float, int]
 
 
-def trials_unpaired(base: float, other: float, power: float = POWER, alpha: float = ALPHA) -> int:
-    """Trials a side, each on seeds of its own, to tell the rates apart with probability `power`."""
+def trials_unpaired(base: float, other: float) -> int:
+    """Trials a side, each on seeds of its own, to tell the rates apart with probability POWER."""
     _check_rates(base, other)
     gap = 2 * math.asin(math.sqrt(other)) - 2 * math.asin(math.sqrt(base))
-    return math.ceil(2 * (_z(power, alpha) / gap) ** 2)
+    return math.ceil(2 * ((Z95 + NormalDist().inv_cdf(POWER)) / gap) ** 2)
 
 
-def trials_paired(
-    base: float, other: float, correlation: float, power: float = POWER, alpha: float = ALPHA
-) -> int:
+def trials_paired(base: float, other: float, correlation: float) -> int:
     """Common seeds needed if outcomes on one seed have this (phi) `correlation`."""
     _check_rates(base, other)
-    normal, gap = NormalDist(), other - base
-    apart = discordant(base, other, correlation)
+    gap, apart = other - base, discordant(base, other, correlation)
     spread = math.sqrt(max(0.0, apart - gap * gap))
-    reach = normal.inv_cdf(1 - alpha / 2) * math.sqrt(apart) + normal.inv_cdf(power) * spread
+    reach = Z95 * math.sqrt(apart) + NormalDist().inv_cdf(POWER) * spread
     return math.ceil((reach / gap) ** 2)
 
 
@@ -85,23 +81,16 @@ def discordant(base: float, other: float, correlation: float) -> float:
     return base + other - 2 * together
 
 
-def sample_size(
-    base: float, gap: float, correlations: Sequence[float] = (0.25, 0.5), power: float = POWER
-) -> SampleSize:
+def sample_size(base: float, gap: float, correlations: Sequence[float] = (0.25, 0.5)) -> SampleSize:
     """Trials needed to tell `base` from `base + gap`; impossible correlations are left out."""
     other = base + gap
     paired = {}
     for correlation in correlations:
         try:
-            paired[correlation] = trials_paired(base, other, correlation, power)
+            paired[correlation] = trials_paired(base, other, correlation)
         except ValueError:
             continue
-    return SampleSize(base, other, trials_unpaired(base, other, power), paired)
-
-
-def _z(power: float, alpha: float) -> float:
-    normal = NormalDist()
-    return normal.inv_cdf(1 - alpha / 2) + normal.inv_cdf(power)
+    return SampleSize(base, other, trials_unpaired(base, other), paired)
 
 
 def _check_rates(base: float, other: float) -> None:

@@ -9,7 +9,6 @@ A trial lost to infrastructure is no failure of the policy and gets no type.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, fields, replace
 from typing import SupportsIndex, overload
@@ -170,11 +169,8 @@ SHOWN = 100
 """Failures that are printed before the others are only counted."""
 
 
-def counts_table(records: Iterable[TrialRecord], by: str, as_json: bool) -> str:
-    """Occurrences of each type, as JSON or a table in Markdown."""
-    rows = distribution(records, by)
-    if as_json:
-        return json.dumps(rows, indent=1)
+def counts_table(rows: Mapping[str, Mapping[str, int]], by: str) -> str:
+    """A `distribution` as a table in Markdown."""
     kinds = [k for k in KINDS if any(k in row for row in rows.values())]
     head = [by, "failed", *(NAMES[k] + " *" * (k in OURS) for k in kinds)]
     body = [
@@ -274,13 +270,13 @@ UNLISTED = ("embodiment", "mode", "split")
 """Fields that the listing has no column for."""
 
 
-def trials_table(records: Iterable[TrialRecord], as_json: bool) -> str:
-    """Every failed trial: type, evidence, when; as JSON or a table in Markdown."""
-    rows = [asdict(trial) for trial in failed_trials(records)]
+def trials_table(failed: FailedTrials) -> str:
+    """Every failed trial, its type, evidence and when, in Markdown."""
     head = [field.name for field in fields(FailedTrial) if field.name not in UNLISTED]
-    if as_json:
-        return json.dumps([{name: row[name] for name in head} for row in rows], indent=1)
-    body = [["" if row[name] is None else str(row[name]) for name in head] for row in rows]
+    body = [
+        ["" if (value := getattr(trial, name)) is None else str(value) for name in head]
+        for trial in failed
+    ]
     return _laid_out(head, body)
 
 

@@ -128,13 +128,17 @@ def film(run: Run, record: TrialRecord, place: Path) -> Path | None:
     source = (run.folder / record.video).resolve()
     if not source.is_relative_to(run.folder.resolve()) or not source.is_file():
         return None
-    target = place / source.name
-    place.mkdir(parents=True, exist_ok=True)
+    put(source, target := place / source.name)
+    return target
+
+
+def put(source: Path, target: Path) -> None:
+    """Make `target` the file `source`, or a copy of it, in place of what an earlier report put."""
+    target.parent.mkdir(parents=True, exist_ok=True)
     if target.exists() and target.samefile(source):
-        return target
-    target.unlink(missing_ok=True)  # of an earlier report, before the trial was run again
+        return
+    target.unlink(missing_ok=True)
     try:
         os.link(source, target)
     except OSError:
         shutil.copyfile(source, target)
-    return target
