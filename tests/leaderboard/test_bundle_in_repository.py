@@ -206,20 +206,6 @@ def test_what_is_handed_in_wrongly_is_refused_before_it_is_opened(
         check(folder, tmp_path / "e.json", clone=clone)
 
 
-def test_no_recipe_of_the_pull_request_itself_counts(folder: Path, tmp_path: Path) -> None:
-    (folder.parents[1] / "scripts").mkdir()
-    (folder.parents[1] / "scripts" / "learn_fake.sh").write_text("")
-    (tmp_path / "target").mkdir()
-    with pytest.raises(BundleError, match="which this repository does not have"):
-        check(folder, tmp_path / "e.json", clone=tmp_path / "target")
-
-
-def test_a_card_of_https_weights_may_still_name_a_recipe_that_exists(clone: Path) -> None:
-    in_repository.check_recipes(to_card(data(link=RECIPE)), clone)
-    with pytest.raises(BundleError, match=r"learn_none\.sh, which this"):
-        in_repository.check_recipes(to_card(data(link="recipe:scripts/learn_none.sh")), clone)
-
-
 def test_a_merged_bundle_stays_the_one_that_was_verified(valid: Valid, folder: Path) -> None:
     add(valid, [whole(valid)], folder.parent, NAME)
     other = folder / "other.zip"

@@ -140,44 +140,26 @@ def test_every_file_of_the_bundle_is_held_against_its_hash(folder: Path) -> None
 @pytest.mark.parametrize(
     ("name", "edit", "refusal"),
     [
-        ("evidence.json", lambda d: d["valid"].update(bundle="0" * 64), "this very bundle"),
-        ("evidence.json", lambda d: d["replayed"].update(different=1), "other outcomes"),
-        (
-            "evidence.json",
-            lambda d: d["replayed"].update(sampled="all"),
-            "a whole number, not 'all'",
+        *(
+            ("evidence.json", edit, refusal)
+            for edit, refusal in (
+                (lambda d: d["valid"].update(bundle="0" * 64), "this very bundle"),
+                (lambda d: d["replayed"].update(different=1), "other outcomes"),
+                (lambda d: d["replayed"].update(sampled="all"), "a whole number, not 'all'"),
+                (lambda d: d["replayed"].update(sampled=19, identical=19), "20 is the least"),
+                (lambda d: d["replayed"].update(trials=21), "not those of the bundle"),
+                (lambda d: d["replayed"].update(challenge="1"), "fewer than 8"),
+                (lambda d: d["replayed"].update(bundle="0" * 64), "replay is of another bundle"),
+                (lambda d: d["reproduced"].update(trials=1, power={"0.05": 0.0}), "needs 95 %"),
+                (lambda d: d["reproduced"].pop("bundle"), "lacks the field 'bundle'"),
+                (lambda d: d["reproduced"].update(bundle="0" * 64), "is of another bundle"),
+                (
+                    lambda d: d["reproduced"]["counts"]["sr"].update({"Pick_Blocks_Size/1": LIED}),
+                    "contradict what the bundle claims: sr of Pick_Blocks_Size/1",
+                ),
+                (lambda d: d.update(address="javascript:alert(1)"), "markup|address"),
+            )
         ),
-        (
-            "evidence.json",
-            lambda d: d["replayed"].update(sampled=19, identical=19),
-            "19 of 20 trials were replayed; 20 is the least",
-        ),
-        ("evidence.json", lambda d: d["replayed"].update(trials=21), "not those of the bundle"),
-        ("evidence.json", lambda d: d["replayed"].update(identical=19), "not those of the bundle"),
-        ("evidence.json", lambda d: d["replayed"].update(challenge="1"), "fewer than 8"),
-        (
-            "evidence.json",
-            lambda d: d["reproduced"]["counts"]["sr"].update({"Pick_Blocks_Size/1": LIED}),
-            "contradict what the bundle claims: sr of Pick_Blocks_Size/1",
-        ),
-        (
-            "evidence.json",
-            lambda d: d["reproduced"].update(trials=1, power={"0.05": 0.0}),
-            "1 trials on hidden scenes notice a lie of 5 points with 0 %; a badge needs 95 %",
-        ),
-        ("evidence.json", lambda d: d["reproduced"].update(power={}), "with 0 %"),
-        ("evidence.json", lambda d: d["reproduced"].pop("bundle"), "lacks the field 'bundle'"),
-        (
-            "evidence.json",
-            lambda d: d["reproduced"].update(bundle="0" * 64),
-            "the reproduction is of another bundle",
-        ),
-        (
-            "evidence.json",
-            lambda d: d["replayed"].update(bundle="0" * 64),
-            "the replay is of another bundle",
-        ),
-        ("evidence.json", lambda d: d.update(address="javascript:alert(1)"), "markup|address"),
         ("trials.json", lambda d: d["films"][0].update(video="../../x.mp4"), "the name of a video"),
         (
             "trials.json",
@@ -236,21 +218,17 @@ def test_what_was_handed_in_has_to_fit_the_bundle(tmp_path: Path) -> None:
         (folder / "bundle.txt").write_text(text.replace(" ", "\n"))
         with pytest.raises(BundleError, match=refusal):
             add(valid, [], home, "mine")
+    (folder / "model.toml").write_text(CARD_TEXT.replace("Nobody", "Else"))
+    with pytest.raises(BundleError, match="not the bundle's model card"):
+        add(valid, [], home, "mine")
+    with pytest.raises(BundleError, match="small letters"):
+        add(valid, [], home, "../mine")
+    (folder / "model.toml").write_text(CARD_TEXT)
     (folder / "bundle.txt").write_text(f"https://a.org/b.zip\n{size}\n{valid.manifest.bundle}\n")
     assert list(left_out(home)) == ["mine"] and read_submissions(home) == []
     assert add(valid, [], home, "mine") == folder
     assert read_submissions(home)[0].evidence.address == "https://a.org/b.zip"
     assert left_out(home) == {}
-
-
-def test_another_card_than_the_bundles_is_refused(tmp_path: Path) -> None:
-    valid = make_valid(tmp_path)
-    (tmp_path / "home" / "mine").mkdir(parents=True)
-    (tmp_path / "home" / "mine" / "model.toml").write_text(CARD_TEXT.replace("Nobody", "Else"))
-    with pytest.raises(BundleError, match="not the bundle's model card"):
-        add(valid, [], tmp_path / "home", "mine")
-    with pytest.raises(BundleError, match="small letters"):
-        add(valid, [], tmp_path / "home", "../mine")
 
 
 def test_a_bundle_for_practice_is_no_submission(tmp_path: Path) -> None:

@@ -42,7 +42,6 @@ from robospa.results.tables import (
     to_latex,
     to_markdown,
 )
-from robospa.text import plain_console
 
 EVIL = "=a|b_c & 100% <script>alert(1)</script> \\input{x} $#~^{} “é” 模型"
 SMALL = Table(
@@ -316,8 +315,6 @@ def test_all_formats_of_a_table_hold_the_name(
     assert not re.search(r"(?<!\\)%", made.replace("{%\n", "")) or "%" not in name
     assert "evil.org" not in name or r"\textless" not in made
     capsys.readouterr()
-    from robospa.results.tables import show
-
     show(table)
     assert capsys.readouterr().out.count(name) >= 6
 
@@ -349,8 +346,3 @@ def test_a_console_is_made_in_one_place_alone() -> None:
         and re.search(r"\bConsole\(|rich\.markup|markup=True", path.read_text())
     ]
     assert places == ["robospa/text.py"]
-
-
-def test_a_console_takes_nothing_for_markup(capsys: pytest.CaptureFixture[str], name: str) -> None:
-    plain_console().print(name)
-    assert capsys.readouterr().out.strip() == name

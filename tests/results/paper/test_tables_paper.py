@@ -113,15 +113,6 @@ def test_a_task_that_was_not_run_leaves_all_averages_above_it_open() -> None:
     assert entry(intervals, "mine", 1).text != "–"
 
 
-def test_a_variant_that_lost_everything_is_no_zero() -> None:
-    records = [
-        replace(r, end="infrastructure") if r.key.variant == ("Pick_Seals_Multi_View", 1) else r
-        for r in full_run("RDT", trials=2)
-    ]
-    table = task_table([run_column(make_run(records))], "sr-tasks", "sr")
-    assert entry(table, "Pick Seals Multi View", 0).text == "–"
-
-
 def test_the_best_are_better_than_another_model_and_worse_than_none() -> None:
     columns = [published_column(model) for model in DATA.models]
     tied = summary_table(columns, "main", "sr", ("L1", "L5", "Drop"), "tied")
@@ -157,11 +148,6 @@ def test_beside_runs_published_models_are_not_marked(mark: str) -> None:
         assert both.notes[0].startswith("(paper): another suite, with other")
     one = task_table([runs[0], *published[:1]], "sr-tasks", "sr", mark)
     assert not any(e.best for line in one.rows for e in line.cells), "one of each suite"
-
-
-def test_one_model_alone_is_not_marked_as_best() -> None:
-    (table,) = make_tables([published_column("RDT")], ["main"])
-    assert not any(e.best for line in table.rows for e in line.cells)
 
 
 def test_a_run_on_another_robot_is_a_row_of_the_embodiment_tables_only() -> None:
@@ -322,11 +308,6 @@ def test_a_mean_over_some_of_the_sets_stays_open(tmp_path: Path) -> None:
     column = run_column(run_of(tmp_path / "run", grounding(sets=4)))
     (table,) = make_tables([column], ["basic"])
     assert {e.text for e in table.rows[0].cells[5:]} == {"–"}
-
-
-def test_without_such_runs_the_table_is_the_printed_one() -> None:
-    (table,) = make_tables([published_column("pi0.5")], ["basic"])
-    assert table.groups == () and len(table.heads) == 5
 
 
 def test_runs_of_them_alone_are_in_no_table_of_the_benchmark(tmp_path: Path) -> None:
