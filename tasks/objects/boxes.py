@@ -185,12 +185,15 @@ def soap(look: int, params: Params) -> ObjectModel:
     dark: Color = (color[0] * 0.72, color[1] * 0.72, color[2] * 0.72)
     pale: Color = (min(1, color[0] * 1.12), min(1, color[1] * 1.12), min(1, color[2] * 1.12))
     top = 2 * half[2]
+    letters = [
+        m.flat(m.rectangle(0.0022, 0.0026, 0.006 * i - 0.009), top + 0.0009) for i in range(4)
+    ]
     parts = [
         collision(Box((half[0], half[1] - 0.0005, half[2])), (0.0, 0.0, half[2])),
         visual(m.slab(half[0], half[1], top, 0.008, 0.004, 4), color, roughness=0.35),
         visual(m.flat(m.ellipse(0.019, 0.0088, 18), top + 0.0003), dark),
         visual(m.flat(m.ellipse(0.0172, 0.0073, 18), top + 0.0006), pale),
-        visual(m.merge(*_letters(top + 0.0009)), dark),
+        visual(m.merge(*letters), dark),
     ]
     phrases = build.fill_phrases(
         word, "{} soap bar", "{} bar of soap", "bar of {} soap", "{} soap", "soap bar in {}",
@@ -199,11 +202,6 @@ def soap(look: int, params: Params) -> ObjectModel:
     made = build.fitted(parts, SOAP_SIZES[look])
     x, y, z = made.at(half[0], half[1] - 0.0005, 0.011)
     return build.model("soap", made.shapes, "soap", phrases, build.box_grasps(x, y, z, 0.6)[::-1])
-
-
-def _letters(z: float) -> list[Mesh]:
-    strokes = ((-0.009, 0.0022), (-0.003, 0.0022), (0.003, 0.0022), (0.009, 0.0022))
-    return [m.flat(m.rectangle(w, 0.0026, x), z) for x, w in strokes]
 
 
 BLOCK_COLORS = (

@@ -153,6 +153,7 @@ def bottle(look: int, params: Params) -> ObjectModel:
     body = [(r - 0.004, 0.0), (r, 0.004), (r, wall), (r * 0.82, 0.69 * h), (neck + 0.001, shoulder)]
     body += [(neck, 0.92 * h)]
     middle = 0.36 * h
+    emblem = {"white": colour("red"), "yellow": colour("green")}.get(label, build.PAPER)
     parts = [
         collision(Cylinder(r, wall / 2), (0.0, 0.0, wall / 2)),
         collision(m.lathe([(r * 0.97, wall), (screw, shoulder)], 10)),
@@ -162,7 +163,7 @@ def bottle(look: int, params: Params) -> ObjectModel:
             m.lathe([(r + 0.0004, middle - 0.15 * h), (r + 0.0004, middle + 0.15 * h)], 16, False),
             colour(label),
         ),
-        visual(around(m.ellipse(0.0145, 0.021, 10), r + 0.0011, middle), _emblem(label)),
+        visual(around(m.ellipse(0.0145, 0.021, 10), r + 0.0011, middle), emblem),
         visual(_cap(screw, 0.88 * h, h), colour(cap), roughness=0.4),
     ]
     phrases = build.fill_phrases(
@@ -172,12 +173,6 @@ def bottle(look: int, params: Params) -> ObjectModel:
     grasps = build.side_grasps(2 * r, grip)
     top = (0.0, 0.0, h)
     return build.model("bottle", parts, "bottle", phrases, grasps, support=top)
-
-
-def _emblem(label: str) -> tuple[float, float, float]:
-    return (
-        colour("red") if label == "white" else build.PAPER if label != "yellow" else colour("green")
-    )
 
 
 def _cap(radius: float, low: float, high: float) -> Mesh:

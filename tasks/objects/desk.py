@@ -189,10 +189,7 @@ def _seams(levels: Sequence[tuple[float, float, float]]) -> list[Mesh]:
         for x, y in line:
             z = height(x, y) + 0.0006
             points += [(x - dx, y + dy, z), (x + dx, y - dy, z)]
-        faces = []
-        for i in range(0, len(points) - 2, 2):
-            faces += [(i, i + 1, i + 3), (i, i + 3, i + 2)]
-        strips.append(m.mesh(points, faces))
+        strips.append(m.strip(points))
     return strips
 
 

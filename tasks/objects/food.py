@@ -201,15 +201,6 @@ def _crest(rx: float, ry: float, h: float, x: float, y: float) -> float:
     return levels[-1][1]
 
 
-def _draped(points: m.Polygon, rx: float, ry: float, h: float, gap: float = 0.0007) -> Mesh:
-    """A strip given as left and right points alternately, laid on the `_dome` surface."""
-    vertices = [(x, y, _crest(rx, ry, h, x, y) + gap) for x, y in points]
-    faces: list[tuple[int, int, int]] = []
-    for i in range(0, len(points) - 2, 2):
-        faces += [(i, i + 1, i + 3), (i, i + 3, i + 2)]
-    return m.mesh(vertices, faces)
-
-
 def _slash(
     rx: float, ry: float, h: float, x: float, y: float, length: float, width: float, turn: float
 ) -> Mesh:
@@ -219,7 +210,7 @@ def _slash(
         t = (k / 6 - 0.5) * length
         w = width / 2 * math.sqrt(max(0.02, 1 - (2 * t / length) ** 2))
         points += [(x + t * c - w * s, y + t * s + w * c), (x + t * c + w * s, y + t * s - w * c)]
-    return _draped(points, rx, ry, h)
+    return m.strip([(x, y, _crest(rx, ry, h, x, y) + 0.0007) for x, y in points])
 
 
 def _bun(

@@ -220,8 +220,8 @@ def _two_bells(body: str, metal: str) -> tuple[list[Shape], float]:
         cap = m.lathe([(0.0105, 0.0), (0.0090, 0.0050), (0.0, 0.0085)], 10)
         tip = axis_rotation((0.0, 1.0, 0.0), s * 0.65)
         domes.append(m.moved(cap, (s * 0.0190, 0.0, z + r - 0.0055), tip))
-    legs = [m.tube([(s * 0.016, 0.0, z - r + 0.010), (s * 0.0225, 0.0, 0.0008)], 0.0036, 5)
-            for s in (-1, 1)]  # fmt: skip
+    legs = m.merge(*(m.tube([(s * 0.016, 0.0, z - r + 0.010), (s * 0.0225, 0.0, 0.0008)], 0.0036, 5)
+                     for s in (-1, 1)))  # fmt: skip
     arch = ((-0.007, -0.001), (-0.0045, 0.011), (0.0045, 0.011), (0.007, -0.001))
     handle = m.tube([(x, 0.0, z + r + up) for x, up in arch], 0.0016, 5)
     trim = colour(metal)
@@ -238,15 +238,14 @@ def _two_bells(body: str, metal: str) -> tuple[list[Shape], float]:
         visual(marks, build.DARK, at, build.ALONG_Y),
         visual(m.moved(marks, rotation=over), build.DARK, at, build.ALONG_Y),
         visual(m.merge(*domes, handle), trim, roughness=0.3, metallic=shine),
-        visual(_grounded(m.merge(*legs)), trim, roughness=0.4),
+        visual(
+            m.mesh([(x, y, max(0.0, up)) for x, y, up in legs.vertices], legs.faces),
+            trim,
+            roughness=0.4,
+        ),
         build.outline(m.merge(corners, *before), at, build.ALONG_Y),
     ]
     return parts, z + r + 0.007
-
-
-def _grounded(part: Mesh) -> Mesh:
-    """`part` cut off at z = 0."""
-    return m.mesh([(x, y, max(0.0, z)) for x, y, z in part.vertices], part.faces)
 
 
 def _hand(length: float, half: float, angle: float, z: float) -> Mesh:

@@ -248,6 +248,14 @@ def band(radius: float, low: float, high: float, angle: float, span: float, n: i
     return mesh(lower + upper, faces)
 
 
+def strip(points: Sequence[Vec3]) -> Mesh:
+    """A ribbon, given as left and right points alternately."""
+    faces: list[Face] = []
+    for i in range(0, len(points) - 2, 2):
+        faces += [(i, i + 1, i + 3), (i, i + 3, i + 2)]
+    return mesh(points, faces)
+
+
 def flat(polygon: Polygon, z: float, at: Point = (0.0, 0.0)) -> Mesh:
     """Horizontal patch of `polygon` (x, y), seen from above only."""
     points = [(x + at[0], y + at[1]) for x, y in polygon]
