@@ -19,6 +19,7 @@ from statistics import NormalDist
 import numpy as np
 from numpy.typing import NDArray
 
+from robospa.results.statistics.significance import log_choose
 from robospa.trial import CATEGORIES, DIMENSIONS
 
 Array = NDArray[np.float64]
@@ -70,19 +71,13 @@ def _fisher(counts: Counts) -> Array:
 
 @cache
 def _hypergeometric(successes: int, claimed: int, fresh: int) -> Array:
-    total = _log_choose(claimed + fresh, successes)
+    total = log_choose(claimed + fresh, successes)
     return np.array(
         [
-            math.exp(_log_choose(fresh, k) + _log_choose(claimed, successes - k) - total)
+            math.exp(log_choose(fresh, k) + log_choose(claimed, successes - k) - total)
             for k in range(fresh + 1)
         ]
     )
-
-
-def _log_choose(n: int, k: int) -> float:
-    if not 0 <= k <= n:
-        return -math.inf
-    return math.lgamma(n + 1) - math.lgamma(k + 1) - math.lgamma(n - k + 1)
 
 
 def holm(chances: Sequence[float]) -> list[float]:

@@ -298,7 +298,7 @@ def _shown(column: Column, metric: str, row: str, level: int) -> list[float] | i
         estimate = column.estimate(metric, row, level)
     else:
         full = all(column.estimate(metric, row, n) is not None for n in LEVELS)
-        part = column.part(row, 0) if full else None
+        part = column.scores.part(row, 0) if full else None
         estimate = part.values.get(metric) if part else None
     if estimate is None:
         return 0

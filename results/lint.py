@@ -265,26 +265,19 @@ def _repeats(
     """
     ends = _shared(groups, lambda r: r.digest)
     if ends:
-        text = f"{ends.count} trials end in the state of another scene, {ends.example}"
+        text = f"{ends[0]} trials end in the state of another scene, {ends[1]}"
         yield Finding("same-end-state", "warning", name, f"{text}: were records copied?")
     elif not privileged and (
         acts := _shared(groups, lambda r: r.actions_digest if r.steps else "")
     ):
-        text = f"{acts.count} trials have the actions of another scene, {acts.example}"
+        text = f"{acts[0]} trials have the actions of another scene, {acts[1]}"
         yield Finding("same-actions", "warning", name, f"{text}: does the policy use its images?")
-
-
-@dataclass(frozen=True)
-class _Shared:
-    """How many trials have something in common with another of their variant, and two of them."""
-
-    count: int
-    example: str
 
 
 def _shared(
     groups: Mapping[tuple[str, int], Sequence[TrialRecord]], value: Callable[[TrialRecord], str]
-) -> _Shared | None:
+) -> tuple[int, str] | None:
+    """How many trials have a value in common with another of their variant, and two of them."""
     count, example = 0, ""
     for (task, level), records in groups.items():
         seeds: dict[str, set[int]] = defaultdict(set)
@@ -296,7 +289,7 @@ def _shared(
                 count += len(alike)
                 first, second = sorted(alike)[:2]
                 example = example or f"such as {task} L{level} seeds {first} and {second}"
-    return _Shared(count, example) if count else None
+    return (count, example) if count else None
 
 
 SEVERITIES = ("error", "warning", "note")

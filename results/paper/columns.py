@@ -144,13 +144,9 @@ class Column:
         """Percent, unrounded."""
         return self.values[metric].get((row, level))
 
-    def part(self, row: str, level: int) -> VariantScore | AverageScore | None:
-        """The score of a row; averages are over the variants that were run."""
-        return self.scores.part(row, level)
-
     def estimate(self, metric: str, row: str, level: int) -> Estimate | None:
         """The value with its interval, as fractions; None where the value is missing."""
-        part = self.part(row, level)
+        part = self.scores.part(row, level)
         if part is None or self.value(metric, row, level) is None:
             return None
         if row == rounding.OVERALL and METRIC_CATEGORIES[metric] != CATEGORIES:
@@ -160,7 +156,7 @@ class Column:
     def sample(self, metric: str, row: str, level: int) -> Sample | Estimate | None:
         """The input of a test: counts of a variant's success rate, else value and interval, which
         is not the bootstrap's: that can be a point."""
-        part = self.part(row, level)
+        part = self.scores.part(row, level)
         if metric in ("sr", "sr1") and isinstance(part, VariantScore):
             return part.samples.get(metric)
         found = self.estimate(metric, row, level)
@@ -177,7 +173,7 @@ class Column:
 
         Empty where the column has no value of the row.
         """
-        part = self.part(row, level)
+        part = self.scores.part(row, level)
         if not isinstance(part, AverageScore) or self.value("sr", row, level) is None:
             return [], []
         below = part.samples.get("sr", ())
@@ -185,7 +181,7 @@ class Column:
 
     def with_missing(self, entry: TableCell, metric: str, row: str, level: int) -> TableCell:
         """`entry` with what it has to say of missing trials."""
-        part = self.part(row, level)
+        part = self.scores.part(row, level)
         if part is None or not part.missing:
             return entry
         ends = part.bounds(metric)

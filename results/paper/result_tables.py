@@ -323,7 +323,7 @@ def not_run_note(column: Column, levels: Sequence[int]) -> list[str]:
 
 
 def _lost(column: Column, metric: str, row: str, level: int) -> str:
-    part = column.part(row, level)
+    part = column.scores.part(row, level)
     if part is None or not part.missing or not (metric in part.values or not part.trials):
         return ""
     name = load().tasks[row].title if row in load().tasks else row

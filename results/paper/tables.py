@@ -74,7 +74,7 @@ def _open_notes(columns: Sequence[Column], level: int) -> list[str]:
     notes: list[str] = []
     for column in columns:
         notes += not_run_note(column, [level])
-        part = column.part(rounding.OVERALL, level)
+        part = column.scores.part(rounding.OVERALL, level)
         if part is not None and part.missing:
             low, high = (100 * end for end in part.bounds("sr") or (0.0, 1.0))
             notes.append(

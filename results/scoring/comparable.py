@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import accumulate, chain, pairwise
 
 from robospa.results.failures.attribution import MEMORY
@@ -75,19 +74,12 @@ def _leads(record: TrialRecord) -> bool:
     return found is not None and found > CLEAR
 
 
-@dataclass(frozen=True)
-class Condition:
-    """Which trials of a category compare, in `words` and as a rule."""
-
-    words: str
-    holds: Callable[[TrialRecord], bool]
-
-
-CONDITIONS = {
-    "SDE": Condition("asked distance off any other by more than 6 cm", _leads),
-    "CVR": Condition("asked object leads by more than 6 cm, as officially", _leads),
-    MEMORY: Condition("asked again after the cue was hidden", lambda r: bool(asked_again(r))),
+CONDITIONS: Mapping[str, tuple[str, Callable[[TrialRecord], bool | None]]] = {
+    "SDE": ("asked distance off any other by more than 6 cm", _leads),
+    "CVR": ("asked object leads by more than 6 cm, as officially", _leads),
+    MEMORY: ("asked again after the cue was hidden", asked_again),
 }
+"""Which trials of a category compare, in words and as a rule."""
 
 
 def comparable(results: ModelResults) -> ModelResults:
@@ -96,7 +88,7 @@ def comparable(results: ModelResults) -> ModelResults:
         record.key: record
         for trials in results.trials.values()
         for record in trials.values()
-        if record.category in CONDITIONS and CONDITIONS[record.category].holds(record)
+        if record.category in CONDITIONS and CONDITIONS[record.category][1](record)
     }
     ci = results.scores.ci
     return results_of_records(results.name, list(records), records, results.manifest, ci)
@@ -123,9 +115,9 @@ def comparable_table(models: Sequence[ModelResults]) -> Table | None:
     }
     heads = (*RATES, "these", *[CHUNK] * ((MEMORY, 0) in known))
     rows: list[TableRow] = []
-    for category, condition in CONDITIONS.items():
+    for category, (words, _) in CONDITIONS.items():
         if (category, 0) in known:
-            name = f"{category} {CATEGORY_NAMES[category]}: {condition.words}"
+            name = f"{category} {CATEGORY_NAMES[category]}: {words}"
             rows.append(TableRow(name, kind="section"))
         for level in (level for level in LEVELS if (category, level) in known):
             cells = [_cells(*side, category, level)[: len(heads)] for side in sides]

@@ -32,7 +32,7 @@ def mcnemar_mid_p(only_first: int, only_second: int) -> float:
         raise ValueError(f"{only_first} and {only_second} are no counts")
     if only_first == only_second:
         return 1.0
-    chances = [math.exp(_log_choose(count, k) - count * math.log(2)) for k in range(fewer + 1)]
+    chances = [math.exp(log_choose(count, k) - count * math.log(2)) for k in range(fewer + 1)]
     return min(1.0, 2 * sum(chances) - chances[-1])
 
 
@@ -131,7 +131,10 @@ def at_least(count: int, trials: Mapping[float, int]) -> float:
     return float(min(1.0, whole[count:].sum()))
 
 
-def _log_choose(n: int, k: int) -> float:
+def log_choose(n: int, k: int) -> float:
+    """The logarithm of the number of ways to choose `k` of `n`."""
+    if not 0 <= k <= n:
+        return -math.inf
     return math.lgamma(n + 1) - math.lgamma(k + 1) - math.lgamma(n - k + 1)
 
 
@@ -156,12 +159,12 @@ def _boschloo_less(a: int, n: int, b: int, m: int) -> float:
 @lru_cache(maxsize=64)
 def _fisher_less(n: int, m: int) -> NDArray[np.float64]:
     """Fisher's one-sided p for all counts of `n` and `m` trials, shape [n + 1, m + 1]."""
-    first = np.array([_log_choose(n, k) for k in range(n + 1)])
-    second = np.array([_log_choose(m, k) for k in range(m + 1)])
+    first = np.array([log_choose(n, k) for k in range(n + 1)])
+    second = np.array([log_choose(m, k) for k in range(m + 1)])
     table = np.zeros((n + 1, m + 1))
     for total in range(n + m + 1):
         a = np.arange(max(0, total - m), min(n, total) + 1)
-        weights = np.exp(first[a] + second[total - a] - _log_choose(n + m, total))
+        weights = np.exp(first[a] + second[total - a] - log_choose(n + m, total))
         table[a, total - a] = np.minimum(1.0, np.cumsum(weights))
     return table
 
@@ -176,7 +179,7 @@ def _tables(
     """
     rates = np.linspace(low, high, steps)[:, None]
     counts = np.arange(n + 1)
-    ways = np.array([_log_choose(n, k) for k in range(n + 1)])
+    ways = np.array([log_choose(n, k) for k in range(n + 1)])
     with np.errstate(divide="ignore", invalid="ignore"):
         ups = np.where(counts == 0, 0.0, counts * np.log(rates))
         downs = np.where(counts == n, 0.0, (n - counts) * np.log1p(-rates))

@@ -154,12 +154,6 @@ def test_rates_are_of_results_and_bounds_of_all_that_is_listed(run: Run) -> None
     assert overall.bounds("sr") == pytest.approx(((5 / 8 + 3 / 8) / 2, (7 / 8 + 5 / 8) / 2))
 
 
-def test_a_policy_error_is_a_failure_and_a_loss_is_none(tmp_path: Path) -> None:
-    records = [record(PICK, 1, 0, 1), replace(record(PICK, 1, 1, 0), end="policy_error")]
-    cell = score_run(write(tmp_path / "run", [*records, lost(PICK, 1, 2)])).cells[PICK, 1]
-    assert (cell.trials, cell.successes, cell.missing) == (2, 1, 1)
-
-
 def test_json_has_counts_and_bounds_of_every_metric(run: Run) -> None:
     found = to_json(score_run(run))["variants"]
     assert found[PICK]["L1"]["missing"] == 2
