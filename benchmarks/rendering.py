@@ -143,7 +143,7 @@ def measure(rounds: int = 15) -> Result:
     three = "observation of three 320x240 cameras"
     figures = [
         Figure("observation of a randomised scene beside its clean twin, CPU time",
-            round(mode["randomized"] / mode["clean"], 3), "x", at_most=1.15,
+            round(mode["randomized"] / mode["clean"], 3), "x", at_most=1.25,
             note=f"{mode['randomized']:.1f} ms and {mode['clean']:.1f} ms"),
         Figure(f"{three} beside bare SAPIEN capture, CPU time",
             round(cpu["ours"] / cpu["bare"], 3), "x", at_most=1.1),
@@ -161,9 +161,10 @@ def measure(rounds: int = 15) -> Result:
 Only the cameras that a policy asks for are rendered, and only when it is asked for actions. Bare
 capture takes pictures of the same scene with SAPIEN's calls and default shader. Ours is one pass
 without what these scenes have none of, with three shadow maps that leave wall and floor out, and
-bytes instead of floats; on a CPU SAPIEN draws all cameras side by side as one. Half of what is left
-are pixels, the other half small triangles: the ten more things of a randomised scene have 3,500 to
-4,200, drawn three times and three times into shadow maps, for 5.7 ms.""",
+bytes instead of floats; on a CPU SAPIEN draws all cameras side by side as one. Edges are smoothed
+from the pixels for 0.9 ms (35 to 44 dB of a 16-fold supersampled picture before, 37 to 47 after);
+four samples a pixel added 12.8 ms, as much again. Small triangles that are seen are dear: those
+of a randomised scene's ten more things take 4.6 ms, the things themselves 1.4, its textures 1.3.""",
         circumstances=f"medians of {rounds} rounds; sides take turns; drawn by {renderer['name']}, "
         f"{renderer['version']}",
     )

@@ -8,7 +8,6 @@ Mesa's software one included. A camera that nobody asks for costs nothing.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
@@ -18,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robospa.action_space import ARMS
-from robospa.geometry import Pose, Vec3
+from robospa.geometry import Pose
 from robospa.harness.robots.embodiment import Embodiment
 from robospa.harness.sim import cameras as pictures
 from robospa.harness.sim.cameras import CameraView
@@ -32,30 +31,6 @@ if TYPE_CHECKING:
     import sapien
 
     from robospa.harness.packs.visuals import RobotSkins
-
-SHADOW = 1.6
-"""How far shadows fall beside a thing on the table, by its height: the further lamp's slope."""
-
-
-def may_show(view: CameraView, aspect: float, point: Vec3, radius: float) -> bool:
-    """Whether a ball around `point` [m, world] reaches into the picture; never wrongly no."""
-    upright = math.tan(view.fov / 2)
-    across = upright * aspect
-    ahead, left, up = view.pose.inverse().apply(point)
-    return (
-        ahead > -radius
-        and abs(left) - across * ahead <= radius * math.hypot(1.0, across)
-        and abs(up) - upright * ahead <= radius * math.hypot(1.0, upright)
-    )
-
-
-def in_frame(views: Sequence[tuple[CameraView, float]], model: ObjectModel, pose: Pose) -> bool:
-    """Whether one of the views, with its aspect, may show the model at `pose`, or its shadow."""
-    height = model.size[2]
-    reach = math.hypot(model.radius, height) + SHADOW * height
-    middle = pose.apply((0.0, 0.0, model.bottom))
-    return any(may_show(*view, middle, reach) for view in views)
-
 
 Links = Sequence[Mapping[str, Pose]]
 """World pose of every link of the left and of the right arm."""
@@ -189,7 +164,6 @@ class Renderer:
         if self._loaded is not None:
             self._room.light(self._loaded.surroundings.lights, step)
         views = [self._view(spec, links) for spec in cameras]
-        self._leave_out(views, cameras, poses)
         return self._take(views, cameras)
 
     def _take(
@@ -210,27 +184,6 @@ class Renderer:
             camera.take_picture()
         taken.update({index: pictures.pixels(camera, sky)[0] for index, camera in alone.items()})
         return [taken[index] for index in range(len(cameras))]
-
-    def _leave_out(
-        self,
-        views: Sequence[CameraView],
-        cameras: Sequence[CameraSpec],
-        poses: Mapping[str, Pose],
-    ) -> None:
-        """Draw no clutter that none of these pictures shows: a third of it, on average."""
-        clutter = self._loaded.clutter if self._loaded is not None else ()
-        if not clutter:
-            return
-        aspects = [camera.width / camera.height for camera in cameras]
-        seen = list(zip(views, aspects, strict=True))
-        for item in clutter:
-            drawn, pose = self._objects.get(item.name), poses.get(item.name)
-            if drawn is not None and pose is not None:
-                model = self._model(item.asset, item.params)
-                visible = in_frame(seen, model, pose)
-                if bool(drawn.components[0].visibility) != visible:  # a change costs SAPIEN 1 ms
-                    for picture, copy in enumerate(drawn.components):
-                        copy.visibility = pictures.visibility(picture) if visible else 0.0
 
     def _remove(self, name: str) -> None:
         for entity in (self._objects.pop(name), self._parts.pop(name, (None,))[0]):

@@ -1,14 +1,16 @@
-"""Smoothed edges, beside pictures drawn larger and averaged. Needs no device."""
+"""What becomes of a picture that was taken: its parts, sky and smoothed edges. Needs no device."""
 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from robospa.harness.sim.antialiasing import CONTRAST, Smoother
+from robospa.harness.sim.cameras import pixels
 
 Bytes = NDArray[np.uint8]
 FINER = 16
@@ -70,3 +72,40 @@ def test_pictures_of_any_size_and_colours_are_between_what_was_there(
         levels = np.random.default_rng(seed).choice([10, 240], (*shape, 1)).astype(np.uint8)
         after = smoother(np.repeat(levels, 4, axis=2))
         assert after.min() >= 10 and after.max() <= 240
+
+
+SKY = np.array([101, 112, 103], dtype=np.uint8)
+
+
+class Camera:
+    """Has taken `picture`, RGBA (height, width, 4)."""
+
+    def __init__(self, picture: Bytes) -> None:
+        self.picture = picture
+
+    def get_picture(self, name: str) -> Bytes:
+        assert name == "Color"
+        return self.picture
+
+
+def random_picture(width: int) -> Bytes:
+    return np.random.default_rng(0).integers(100, 120, (6, width, 4), dtype=np.uint8)
+
+
+def test_a_row_is_cut_into_its_pictures() -> None:
+    row = random_picture(12)
+    camera: Any = Camera(row)
+    images = pixels(camera, SKY, 3)
+    for image, part in zip(images, np.split(row, 3, axis=1), strict=True):
+        assert image.flags.c_contiguous and image.flags.owndata
+        np.testing.assert_array_equal(image, part[..., :3])
+
+
+def test_the_sky_is_where_nothing_was_drawn_and_nowhere_else() -> None:
+    row = random_picture(8)
+    row[2, 1] = row[4, 7] = 0
+    camera: Any = Camera(row)
+    drawn = row[..., :3].copy()
+    left, right = pixels(camera, SKY, 2)
+    assert left[2, 1].tolist() == right[4, 3].tolist() == SKY.tolist()
+    assert (np.hstack([left, right]) != drawn).any(axis=2).sum() == 2
