@@ -163,8 +163,8 @@ capture takes pictures of the same scene with SAPIEN's calls and default shader.
 without what these scenes have none of, with three shadow maps that leave wall and floor out, and
 bytes instead of floats; on a CPU SAPIEN draws all cameras side by side as one. Edges are smoothed
 from the pixels for 0.9 ms (35 to 44 dB of a 16-fold supersampled picture before, 37 to 47 after);
-four samples a pixel added 12.8 ms, as much again. Small triangles that are seen are dear: those
-of a randomised scene's ten more things take 4.6 ms, the things themselves 1.4, its textures 1.3.""",
+four samples a pixel added 12.8 ms, as much again. Small triangles that are seen are dear: those of
+a randomised scene's ten more things take 4.6 ms, the things themselves 1.4, its textures 1.3.""",
         circumstances=f"medians of {rounds} rounds; sides take turns; drawn by {renderer['name']}, "
         f"{renderer['version']}",
     )
