@@ -5,8 +5,8 @@
 pure functions; the pick depends on suite, task, level, seed, split and the secret salt of a hidden
 scene only, so that every robot gets the same sentence.
 
-Sentences of the splits `train` and `heldout` are orders; held-out ones have other verbs, clauses
-and word orders. Those of `indirect` ask, wish, state a goal or a condition. The phrasings that fill
+Sentences of the splits `train` and `heldout` are orders; held-out ones have other clauses and word
+orders. Those of `indirect` ask, wish, state a goal or a condition. The phrasings that fill
 them are split too: those of training are in no other split. A scene has the same sentences in
 every mode; with clutter, some of them end in a clause that names the kinds of the objects
 (`robospa.tasks.sentences`).

@@ -2,7 +2,7 @@
 
 Draw: k blocks scattered in front of the robot, never in the right order already. Success: each
 block lies farther right than the one before it, hardly nearer or farther away, let go of; for sizes
-both grippers are open, too. Level 1 has one block, to be brought to the middle of the near edge.
+both grippers are open, too. Level 1 has one block, to be brought to the middle of its near half.
 """
 
 from __future__ import annotations

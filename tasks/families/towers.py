@@ -3,7 +3,7 @@
 Blocks, stacked in a given order; k scattered in front: equal cubes coloured red, green,
 blue, yellow, purple (the first k); cubes of one random colour and fixed sizes, the largest at the
 bottom; bars of one colour and one cross-section, their lengths clearly different, the longest at
-the bottom. Level 1 has a single block, which is brought to the middle of the near edge (official).
+the bottom. Level 1 has a single block, which is brought to the middle of the near half (official).
 
 Bowls: one fixed plate left or right of the middle, k equal bowls farther away, all to be stacked on
 the plate in any order.

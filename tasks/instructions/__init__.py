@@ -3,7 +3,7 @@
     [[templates]]                       # of some levels
     levels = [1, 2]
     train = ["pick up {block}.", ...]   # 50 sentences with slots in braces
-    heldout = ["hoist {block} clear of {table}.", ...]                 # 10 other orders
+    heldout = ["using {arm}, hold up {block}.", ...]                   # 10 other orders
     indirect = ["could {block} be raised off {table}?", ...]           # 10 that are no orders
 
     [phrasings.block]                   # what may fill the slot {block}
@@ -48,7 +48,7 @@ SENTENCES = 100
 """Sentences per scene and split (official count)."""
 
 SPLITS = ("train", "heldout", "indirect")
-"""Instruction splits: orders to train on, orders with other verbs and structures, and the same
+"""Instruction splits: orders to train on, orders of other structures, and the same
 asked for in other ways than by an order."""
 
 Phrasings = tuple[tuple[str, ...], tuple[str, ...]]
