@@ -1,0 +1,283 @@
+"""Plans as steps: what is done next with which object, and where everything is then.
+
+A step is what a policy decides at one look. `labelled` reads a scene's plan as steps and moves the
+objects to where each step leaves them: all states of a plan, without physics. `after` says the same
+of objects that were seen, so that acting knows what to expect.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+
+from robospa.geometry import Pose, Vec3, rotate, yaw_rotation
+from robospa.tasks import plan as calls
+from robospa.tasks.catalog import task
+from robospa.tasks.environment_state import main_color
+from robospa.tasks.objects import model_of, object_model, variant_count
+from robospa.tasks.scene import Scene, SceneObject
+from robospa.tasks.shapes import Color, ObjectModel
+from robospa.workcell import TABLE_TOP
+
+TYPES = (
+    *("pick", "move", "back", "turn", "drop", "press", "stamp", "dock"),
+    *("hang", "hit", "pour", "open", "lift", "wait", "done"),
+)
+"""move: onto `destination` or to `place`; back: to where it stood at first; turn: as `destination`
+lay at first. Press, stamp, hit and lift are once a step."""
+KINDS = (
+    *("alarm_clock", "apple", "bell", "block", "bottle", "bowl", "bread", "bread_basket", "can"),
+    *("coaster", "coffee_box", "cover", "cup", "display_stand", "dustbin", "electronic_scale"),
+    *("fan", "french_fries", "garbage", "glue", "hamburger", "hammer", "kitchen_pot", "microwave"),
+    *("mouse", "mug", "mug_rack", "pad", "payment_sign", "perfume", "phone", "phone_stand"),
+    *("pill_bottle", "plate", "playing_cards", "remote_control", "rubikscube", "sauce_can"),
+    *("seal", "soap", "stapler", "t_block", "table_trash_bin", "tea_box", "tissue_box"),
+    *("toycar", "tray", "wooden_block"),
+)
+"""The assets of the 56 tasks."""
+HELD, OPENED, SAME_PLACE = 0.12, 0.7, 0.012
+"""How high [m] a picked object is held; how far a door is opened, as a share; a thing that comes as
+near [m] as that to where it stood at first is brought back."""
+
+
+@dataclass(frozen=True)
+class Seen:
+    """An object as it is seen. `place`: x and y of its origin and z of its underside [m, world];
+    `half` sizes [m] and `turn` [rad], of its own axes; `color` linear RGB; `hinge` [rad]."""
+
+    kind: str
+    place: Vec3
+    half: Vec3
+    turn: float
+    color: Color
+    hinge: float = 0.0
+
+
+@dataclass(frozen=True)
+class Tracked:
+    """An object over a trial: as it is `now` and as it was `first` seen; `acts` and `goals` count
+    the steps in which it was object and destination. `visible`: it can be seen at present;
+    `at_start`: it could be in the first picture."""
+
+    now: Seen
+    first: Seen
+    acts: int = 0
+    goals: int = 0
+    visible: bool = True
+    at_start: bool = True
+
+
+@dataclass(frozen=True)
+class Step:
+    """What is done next. `object` and `destination` count in the state's objects, `place` is x and
+    y [m]."""
+
+    type: str
+    object: int | None = None
+    destination: int | None = None
+    place: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class State:
+    """All objects that were ever seen, and the steps done."""
+
+    objects: tuple[Tracked, ...]
+    done: tuple[Step, ...] = ()
+
+
+def model(seen: Seen) -> ObjectModel:
+    """The library's model that looks most like it."""
+    return object_model(seen.kind, params_of(seen))
+
+
+def params_of(seen: Seen) -> Mapping[str, object]:
+    """Parameters of that model: a block has the sizes seen, of all else there are a few looks."""
+    if seen.kind == "block":
+        return {"half": list(seen.half), "color": list(seen.color)}
+    return min(_looks(seen.kind), key=lambda look: _unlike(seen, look[1], look[2]))[0]
+
+
+@cache
+def _looks(kind: str) -> tuple[tuple[Mapping[str, object], Vec3, Color], ...]:
+    kinds: tuple[Mapping[str, int], ...] = (
+        ({"kind": 0}, {"kind": 1}) if kind == "t_block" else ({},)
+    )
+    every = [{"look": look, **more} for look in range(variant_count(kind)) for more in kinds]
+    made = [(params, object_model(kind, params)) for params in every]
+    return tuple((p, m.size, main_color(m)) for p, m in made)
+
+
+def _unlike(seen: Seen, size: Vec3, color: Color) -> float:
+    return math.dist([2 * h for h in seen.half], size) + 0.003 * math.dist(seen.color, color)
+
+
+def pose_of(seen: Seen) -> Pose:
+    """Pose [m, world] of the body frame of its model."""
+    x, y, z = seen.place
+    return Pose((x, y, z - model(seen).bottom), yaw_rotation(seen.turn))
+
+
+def seen_at(kind: str, made: ObjectModel, pose: Pose, hinge: float = 0.0) -> Seen:
+    """A model at a pose, as it is seen by who sees it perfectly."""
+    x, y, z = pose.position
+    ahead = rotate(pose.rotation, (1.0, 0.0, 0.0))
+    half = (made.size[0] / 2, made.size[1] / 2, made.size[2] / 2)
+    turn = math.atan2(ahead[1], ahead[0])
+    return Seen(kind, (x, y, z + made.bottom), half, turn, main_color(made), hinge)
+
+
+def labelled(scene: Scene) -> list[tuple[State, Step]]:
+    """All states of the scene's plan, each with its next step; the last one is done."""
+    items = [o for o in scene.objects if o.appears_at is None]
+    items += [o for o in scene.objects if o.appears_at is not None]
+    names = {item.name: i for i, item in enumerate(items)}
+    state = State(tuple(_tracked(o) for o in items if o.appears_at is None))
+    later = tuple(_tracked(o) for o in items[len(state.objects) :])
+    found = []
+    for step in steps_of(scene, names):
+        found.append((state, step))
+        state = after(state, step)
+        if step.type == "wait":
+            state = hidden(replace(state, objects=state.objects + later))
+    return [*found, (state, Step("done"))]
+
+
+def _tracked(item: SceneObject) -> Tracked:
+    seen = seen_at(item.asset, model_of(item), item.pose)
+    return Tracked(seen, seen, at_start=item.appears_at is None)
+
+
+def steps_of(scene: Scene, names: Mapping[str, int]) -> Iterator[Step]:
+    """The steps of the scene's plan; `names` says which number an object has."""
+    plan: list[object] = [c for c in task(scene.task).plan(scene) if not isinstance(c, calls.Home)]
+    starts = {o.name: o.pose.position for o in scene.objects}
+    partners = dict(zip(scene.facts.get("near", ()), scene.facts.get("far", ()), strict=True))
+    while plan:
+        call = plan.pop(0)
+        match call:
+            case calls.Pick(object=name):
+                goal = (
+                    plan.pop(0) if plan and isinstance(plan[0], calls.Place | calls.Drop) else None
+                )
+                if _goes_on(plan, name, goal):
+                    continue
+                yield _moved(names, name, goal, starts[name], partners)
+            case calls.Press(object=name) | calls.Open(object=name):
+                yield Step(type(call).__name__.lower(), names[name])
+            case calls.Stamp():
+                yield from [Step("stamp", names[call.object], names[call.on])] * call.times
+            case calls.Dock() | calls.Hang():
+                yield Step(type(call).__name__.lower(), names[call.object], names[call.on])
+            case calls.Hit():
+                yield from (Step("hit", names[call.tool], names[t]) for t in call.targets)
+            case calls.Pour():
+                yield Step("pour", names[call.object], names[call.into])
+            case calls.RaiseLower():
+                yield from [Step("lift", names[call.object])] * call.times
+            case calls.Wait():
+                yield Step("wait")
+
+
+def _goes_on(plan: Sequence[object], name: str, goal: object) -> bool:
+    """Whether the object is put down only to be taken anew: handed over, or turned by halves."""
+    if not plan or not isinstance(plan[0], calls.Pick) or plan[0].object != name:
+        return False
+    return isinstance(goal, calls.Place) and goal.on is None
+
+
+def _moved(
+    names: Mapping[str, int], name: str, goal: object, start: Vec3, partners: Mapping[str, str]
+) -> Step:
+    if isinstance(goal, calls.Drop):
+        return Step("drop", names[name], names[goal.into])
+    if not isinstance(goal, calls.Place):
+        return Step("pick", names[name])
+    if goal.on is not None:
+        return Step("move", names[name], names[goal.on])
+    if goal.yaw is not None:
+        return Step("turn", names[name], names[partners[name]])
+    if math.dist(goal.position, start) < SAME_PLACE:
+        return Step("back", names[name])
+    return Step("move", names[name], None, goal.position[:2])
+
+
+def after(state: State, step: Step) -> State:
+    """Where everything is after a step that went well."""
+    items = list(state.objects)
+    if step.object is not None:
+        item = items[step.object]
+        goal = None if step.destination is None else items[step.destination]
+        now, visible = _brought(items, step, item, goal), step.type != "drop"
+        items[step.object] = replace(item, now=now, acts=item.acts + 1, visible=visible)
+        if goal is not None and step.destination is not None:
+            items[step.destination] = replace(goal, goals=goal.goals + 1)
+    return hidden(State(tuple(items), (*state.done, step)))
+
+
+def _brought(items: Sequence[Tracked], step: Step, item: Tracked, goal: Tracked | None) -> Seen:
+    now, (x, y, z) = item.now, item.now.place
+    if step.type == "pick":
+        return replace(now, place=(x, y, z + HELD))
+    if step.type == "open":
+        hinge = model(now).hinge
+        return replace(now, hinge=OPENED * hinge.upper) if hinge else now
+    if step.type == "back":
+        return replace(now, place=item.first.place)
+    if step.type == "move" and step.place is not None:
+        return replace(now, place=(*step.place, support_height(items, step.place, now)))
+    if goal is None:
+        return now
+    if step.type == "turn":
+        return replace(now, turn=goal.first.turn)
+    return _at(step.type, now, goal.now)
+
+
+def _at(kind: str, now: Seen, goal: Seen) -> Seen:
+    """`now`, brought to the object `goal` by a step of some kind."""
+    if kind in ("dock", "hang"):
+        frame = pose_of(goal) * model(goal).frames["support" if kind == "dock" else "hang"]
+        if kind == "hang":
+            frame = frame * model(now).frames["handle"].inverse()
+        return replace(seen_at(now.kind, model(now), frame), color=now.color, half=now.half)
+    x, y, top = (pose_of(goal) * model(goal).frames["support"]).position
+    if kind in ("hit", "pour"):
+        return replace(now, place=(x, y, top + HELD))
+    return replace(now, place=(x, y, goal.place[2] if kind == "drop" else top))
+
+
+def support_height(items: Sequence[Tracked], place: tuple[float, float], but: Seen) -> float:
+    """Height [m] of what lies at x and y: the table, or where a wide thing carries others."""
+    tops = [
+        (pose_of(o.now) * model(o.now).frames["support"]).position[2]
+        for o in items
+        if o.now is not but and min(o.now.half[:2]) > 0.04 and _covers(o.now, place)
+    ]
+    return max([z for z in tops if z < TABLE_TOP + 0.1], default=TABLE_TOP)
+
+
+def _covers(seen: Seen, place: Sequence[float]) -> bool:
+    dx, dy = place[0] - seen.place[0], place[1] - seen.place[1]
+    c, s = math.cos(seen.turn), math.sin(seen.turn)
+    return abs(c * dx + s * dy) < seen.half[0] and abs(c * dy - s * dx) < seen.half[1]
+
+
+def is_wall(seen: Seen) -> bool:
+    """Whether it is the wall that hides what is behind it."""
+    return seen.kind == "block" and seen.half[2] > 0.15 and seen.half[1] < 0.015
+
+
+def hidden(state: State) -> State:
+    """The state with what nobody can see: behind a wall, under a cover."""
+    walls = [o.now for o in state.objects if is_wall(o.now)]
+    covers = [o.now for o in state.objects if o.now.kind == "cover"]
+
+    def seen(item: Tracked) -> bool:
+        now = item.now
+        behind = any(now.place[1] > w.place[1] + w.half[1] for w in walls)
+        under = any(now is not c and math.dist(now.place, c.place) < 0.03 for c in covers)
+        return not behind and not under and not (item.acts and now.place[2] < TABLE_TOP - 0.1)
+
+    return replace(state, objects=tuple(replace(o, visible=seen(o)) for o in state.objects))
