@@ -1,0 +1,358 @@
+"""Acting: a step of a plan, performed on an imagined scene.
+
+What was seen (`Seen`) is imagined as the library's models, and the expert's skills plan on these.
+They are told of no true pose: what a gripper closes around comes along, what it lets go of stays,
+and the next look, once empty arms are out of the way, puts right where everything is. A gripper
+that closed on nothing is seen by how far it closed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robospa.action_space import ARMS
+from robospa.baselines.learned.steps import (
+    HELD,
+    KINDS,
+    Seen,
+    State,
+    Step,
+    Tracked,
+    hidden,
+    model,
+    params_of,
+    pose_of,
+    support_height,
+)
+from robospa.geometry import Pose, rotate
+from robospa.harness.robots.embodiment import Embodiment
+from robospa.harness.robots.kinematics import chain_of, end_effector
+from robospa.harness.skills.pick import world_grasps
+from robospa.observation import FEATURES, SLOTS, Observation
+from robospa.tasks import plan as calls
+from robospa.tasks.environment_state import kind_code
+from robospa.tasks.families.dustbin import EXCHANGE
+from robospa.tasks.scene import Scene, SceneObject
+from robospa.tasks.snapshot import Snapshot
+from robospa.workcell import TABLE_TOP, grasp_points
+
+Rows = NDArray[np.float32]
+NEAR_HOME = 0.2
+"""An arm whose joints are all so close [rad] to home hides nothing."""
+AROUND = 0.02
+"""A gripper that closes so far [m] beside an object's box takes it."""
+EMPTY = 0.4
+"""One that holds something is open by more than this share of its width."""
+SAME = 0.15
+"""What is seen within this [m], colours' distance counted a tenth, is what was there before."""
+WAIT = 2.6
+"""Seconds until what hides the cue is there [s]; official: 2."""
+TURN_AT_ONCE = 0.2
+"""Only so far [m] from the middle or more can an arm make half a turn at once."""
+LIFTS = {"kitchen_pot": 0.11}
+LIFT, RISE = 0.08, 0.10
+"""How high [m] things are lifted: to be set down again, and to go elsewhere."""
+
+
+def objects_of(row: Rows) -> list[Seen]:
+    """The objects in an environment state (E,): what a perfect eye would see."""
+    codes = {tuple(kind_code(kind)): kind for kind in KINDS}
+    found = []
+    for numbers in row.reshape(SLOTS, len(FEATURES)).astype(float).tolist():
+        of = dict(zip(FEATURES, numbers, strict=True))
+        if of["present"]:
+            kind = codes[tuple(numbers[-12:])]
+            half = (of["half_x"], of["half_y"], of["half_z"])
+            low = of["z"] - (half[2] if kind == "block" else 0.0)
+            turn = math.atan2(of["sin_yaw"], of["cos_yaw"])
+            color = (of["red"], of["green"], of["blue"])
+            found.append(Seen(kind, (of["x"], of["y"], low), half, turn, color, of["hinge"]))
+    return found
+
+
+def calls_of(steps: Sequence[Step], state: State) -> list[object]:
+    """The skill calls that do equal `steps`, one after the other, on objects named by number."""
+    step, count = steps[0], len(steps)
+    if step.type == "wait":
+        return [calls.Wait(WAIT)]
+    if step.object is None:
+        return []
+    name, item = str(step.object), state.objects[step.object]
+    on = "" if step.destination is None else str(step.destination)
+    side = ARMS[int(item.now.place[0] > 0)]
+    match step.type:
+        case "pick":
+            return [calls.Pick(name, HELD)]
+        case "press":
+            return [
+                calls.Press(str(s.object), arm=ARMS[int(state.objects[s.object].now.place[0] > 0)])
+                for s in steps
+                if s.object is not None
+            ]
+        case "stamp":
+            return [calls.Stamp(name, on, count)]
+        case "dock":
+            return [calls.Dock(name, on)]
+        case "hang":
+            return [calls.Hang(name, on)]
+        case "hit":
+            targets = tuple(str(s.destination) for s in steps)
+            return [calls.Hit(name, targets)]
+        case "pour":
+            return [calls.Pour(name, on)]
+        case "open":
+            return [calls.Open(name)]
+        case "lift":
+            both = item.now.kind == "kitchen_pot"
+            rise = LIFTS.get(item.now.kind, LIFT)
+            return [calls.RaiseLower(name, rise, count, ARMS if both else (side,))]
+        case "drop":
+            drop = [calls.Pick(name, arm="left"), calls.Drop(name, on, arm="left")]
+            if item.now.place[0] <= 0:
+                return list(drop)
+            over = calls.Place(name, (*_exchange(state, step.object), TABLE_TOP), arm="right")
+            return [calls.Pick(name, arm="right"), over, *drop]
+        case "turn" | "back" | "move":
+            return _moved(step, state)
+    return []
+
+
+def _moved(step: Step, state: State) -> list[object]:
+    assert step.object is not None
+    name, item = str(step.object), state.objects[step.object]
+    low = -model(item.now).bottom
+    if step.type == "back":
+        x, y, z = item.first.place
+        return [calls.Pick(name, RISE), calls.Place(name, (x, y, z + low))]
+    if step.type == "turn" and step.destination is not None:
+        x, y, z = item.first.place
+        goal = _quarter(state.objects[step.destination].first.turn)
+        half = math.cos(goal - item.now.turn) < -0.7 and abs(x) < TURN_AT_ONCE
+        ways = [goal - math.pi / 2, goal] if half else [goal]
+        return [
+            call
+            for yaw in ways
+            for call in (calls.Pick(name, LIFT), calls.Place(name, (x, y, z + low), yaw=yaw))
+        ]
+    if step.destination is not None:
+        goal_now = state.objects[step.destination].now
+        frames, top = model(goal_now).frames, goal_now.place[2] + 2 * goal_now.half[2] - TABLE_TOP
+        up = 0.0
+        if item.now.kind == "bowl" == goal_now.kind:
+            up = frames["nest"].position[2] - frames["support"].position[2]
+        drop = 0.02 if goal_now.kind == "bread_basket" else 0.003
+        on = calls.Place(name, (0.0, 0.0, up), on=str(step.destination), drop=drop)
+        return [calls.Pick(name, max(LIFT, min(0.16, top + 0.06))), on]
+    assert step.place is not None
+    z = support_height(state.objects, step.place, item.now)
+    return [calls.Pick(name, LIFT), calls.Place(name, (*step.place, z + low))]
+
+
+def _quarter(turn: float) -> float:
+    """The nearest quarter turn [rad]."""
+    return round(turn / (math.pi / 2)) * math.pi / 2
+
+
+def _exchange(state: State, but: int) -> tuple[float, float]:
+    """Where one arm puts down what the other takes: the free place that is nearest to the usual."""
+    others = [o.now.place for i, o in enumerate(state.objects) if i != but and o.visible]
+
+    def cost(point: tuple[float, float]) -> float:
+        near = min((math.dist(point, other[:2]) for other in others), default=1.0)
+        return max(0.0, 0.105 - near) * 10 + math.dist(point, EXCHANGE)
+
+    steps = range(-6, 7)
+    return min(
+        ((EXCHANGE[0] + 0.0125 * i, EXCHANGE[1] + 0.0125 * j) for i in steps for j in steps),
+        key=cost,
+    )
+
+
+@dataclass
+class Hold:
+    """What an arm holds, how it lies in the hand, its width between the fingers [m], and where it
+    was before."""
+
+    number: int
+    offset: Pose
+    width: float
+    before: Pose
+
+
+class Belief:
+    """Where all objects of a trial are, by what was seen and by what the arms did since."""
+
+    def __init__(self, robot: Embodiment, seen: Sequence[Seen]) -> None:
+        self.robot = robot
+        self.chains = [chain_of(arm) for arm in robot.arms]
+        self.columns = robot.action_space("joint").arms
+        self.state = State(tuple(Tracked(one, one) for one in seen))
+        self.poses = [pose_of(one) for one in seen]
+        self.held: list[Hold | None] = [None, None]
+        self.last: Rows | None = None
+        """What was commanded last (D,)."""
+
+    def scene(self) -> Scene:
+        """The imagined scene; objects are called by their numbers."""
+        items = tuple(
+            SceneObject(str(i), o.now.kind, self.poses[i], params_of(o.first))
+            for i, o in enumerate(self.state.objects)
+            if o.visible or o.now.place[2] > TABLE_TOP - 0.1
+        )
+        return Scene("imagined", 1, 0, self.robot.name, "clean", items, {})
+
+    def snapshot(self, observation: Observation, scene: Scene) -> Snapshot:
+        """This instant, as imagined."""
+        ends = tuple(_pose(row) for row in observation["ee"].astype(float).tolist())
+        measured = observation["state"].astype(float)
+        last = measured if self.last is None else self.last.astype(float)
+        names = {item.name for item in scene.objects}
+        left, right = (
+            [tuple(row[c.body].tolist()) for c in self.columns] for row in (last, measured)
+        )
+        hinges = {str(i): o.now.hinge for i, o in enumerate(self.state.objects)}
+        pair = (ends[0], ends[1])
+        return Snapshot(
+            time=0.0,
+            poses={str(i): pose for i, pose in enumerate(self.poses) if str(i) in names},
+            gripper=(float(last[self.columns[0].gripper]), float(last[self.columns[1].gripper])),
+            end_effector=pair,
+            grasp_points=grasp_points(self.robot.grippers, pair),
+            joints=(left[0], left[1]),
+            measured=(right[0], right[1]),
+            hinges={name: angle for name, angle in hinges.items() if name in names},
+        )
+
+    def out_of_the_way(self) -> bool:
+        """Whether no empty arm is over the table."""
+        if self.last is None:
+            return True
+        return all(
+            hold is not None or np.abs(self.last[c.body] - np.array(arm.home)).max() < NEAR_HOME
+            for hold, c, arm in zip(self.held, self.columns, self.robot.arms, strict=True)
+        )
+
+    # -- by what the arms do -------------------------------------------------------------------
+
+    def advance(self, rows: Rows, target: int | None, observation: Observation) -> None:
+        """Take over what commanded `rows` (T, D) did with object number `target`."""
+        before = observation["state"] if self.last is None else self.last
+        for row in rows:
+            for arm, c in enumerate(self.columns):
+                old, new = float(before[c.gripper]), float(row[c.gripper])
+                if self.held[arm] is None and new < old - 0.02 and target is not None:
+                    self._close(arm, row, target)
+                elif self.held[arm] is not None and new > old + 0.02:
+                    self._carry(arm, row)
+                    self.held[arm] = None
+            before = row
+        self.last = before
+        for arm, hold in enumerate(self.held):
+            if hold is None:
+                continue
+            share = float(observation["state"][self.columns[arm].gripper])
+            if share < EMPTY * self.robot.arms[arm].gripper_value(hold.width):
+                self._put(hold.number, hold.before)
+                self.held[arm] = None
+            else:
+                self._put(
+                    hold.number, _pose(observation["ee"][arm].astype(float).tolist()) * hold.offset
+                )
+
+    def _end(self, arm: int, row: Rows) -> Pose:
+        return end_effector(self.chains[arm], row[self.columns[arm].body].astype(float).tolist())
+
+    def _carry(self, arm: int, row: Rows) -> None:
+        hold = self.held[arm]
+        if hold is not None:
+            self._put(hold.number, self._end(arm, row) * hold.offset)
+
+    def _close(self, arm: int, row: Rows, target: int) -> None:
+        """Hold the object if the fingers are about it, in their middle."""
+        hand, end, pose = self.robot.arms[arm].gripper, self._end(arm, row), self.poses[target]
+        point = np.array(end.apply((hand.grip, 0.0, 0.0)))
+        made = model(self.state.objects[target].first)
+        x, y, z = pose.inverse().apply(tuple(point.tolist()))
+        z -= made.bottom + made.size[2] / 2
+        if any(abs(v) > s / 2 + AROUND for v, s in zip((x, y, z), made.size, strict=True)):
+            return
+        across = np.array(rotate(end.rotation, (0.0, 1.0, 0.0)))
+        options = [
+            (math.dist(g.point, point) - 0.1 * abs(float(np.dot(g.closing, across))), g)
+            for g in world_grasps(made, pose, hand)
+        ]
+        if not options:
+            return
+        best = min(options, key=lambda option: option[0])[1]
+        shift = across * float(np.dot(point - np.array(best.point), across))
+        px, py, pz = (np.array(pose.position) + shift).tolist()
+        offset = end.inverse() * Pose((px, py, pz), pose.rotation)
+        self.held[arm] = Hold(target, offset, best.width, pose)
+
+    def _put(self, number: int, pose: Pose) -> None:
+        self.poses[number] = pose
+        items = list(self.state.objects)
+        item = items[number]
+        x, y, z = pose.position
+        ahead = rotate(pose.rotation, (1.0, 0.0, 0.0))
+        now = replace(
+            item.now,
+            place=(x, y, z + model(item.first).bottom),
+            turn=math.atan2(ahead[1], ahead[0]),
+        )
+        items[number] = replace(item, now=now)
+        self.state = replace(self.state, objects=tuple(items))
+
+    # -- by what is seen -----------------------------------------------------------------------
+
+    def look(self, seen: Sequence[Seen]) -> None:
+        """Put right where everything is; what was never seen before is new."""
+        items = list(self.state.objects)
+        inside = {hold.number for hold in self.held if hold is not None}
+        pairs = sorted(
+            (cost, i, k)
+            for i, item in enumerate(items)
+            for k, one in enumerate(seen)
+            if i not in inside and (cost := _unlike(item, one)) < math.inf
+        )
+        old: set[int] = set(inside)
+        new: set[int] = set()
+        for _, i, k in pairs:
+            if i in old or k in new:
+                continue
+            old.add(i)
+            new.add(k)
+            items[i] = replace(items[i], now=seen[k], visible=True)
+            self.poses[i] = pose_of(seen[k])
+        for i in set(range(len(items))) - old:
+            items[i] = replace(items[i], visible=False)
+        for k in set(range(len(seen))) - new:
+            if not any(self._is_held(one, seen[k]) for one in inside):
+                items.append(Tracked(seen[k], seen[k], at_start=False))
+                self.poses.append(pose_of(seen[k]))
+        state = replace(self.state, objects=tuple(items))
+        pairs_seen = zip(items, hidden(state).objects, strict=True)
+        objects = tuple(replace(o, visible=o.visible and h.visible) for o, h in pairs_seen)
+        self.state = replace(state, objects=objects)
+
+    def _is_held(self, number: int, one: Seen) -> bool:
+        return one.kind == self.state.objects[number].now.kind
+
+
+def _unlike(item: Tracked, one: Seen) -> float:
+    """How little `one` is like the object; infinite for another one."""
+    if item.now.kind != one.kind:
+        return math.inf
+    near = math.dist(item.now.place, one.place)
+    look = 0.1 * math.dist(item.first.color, one.color) + math.dist(item.first.half, one.half)
+    return near + look if near < SAME or look < 0.03 else math.inf
+
+
+def _pose(row: Sequence[float]) -> Pose:
+    x, y, z, qw, qx, qy, qz = row[:7]
+    return Pose((x, y, z), (qw, qx, qy, qz))

@@ -1,1 +1,0 @@
-"""A policy that does not see: ACT on the objects as numbers, keyframe by keyframe."""

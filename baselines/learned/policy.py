@@ -1,0 +1,164 @@
+"""The learned policy: looks when its arms are out of the way, decides a step, performs it.
+
+Memory is two things: all objects that were ever seen, as they were at first, and the steps done. A
+step that did not do what it should is done again.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from robospa.baselines.learned.act import Belief, Rows, calls_of
+from robospa.baselines.learned.steps import Seen, State, Step, Tracked, after
+from robospa.harness.robots import embodiment
+from robospa.harness.robots.embodiment import Embodiment
+from robospa.harness.skills.expert import Expert
+from robospa.observation import Observation
+from robospa.protocol.policy import PolicySpec, TrialInfo
+
+Look = Callable[[Observation], list[Seen]]
+"""What is seen in an observation."""
+Decide = Callable[[State, str], Step]
+"""The next step, from all that is known and the sentence."""
+REPEATED = ("press", "lift", "stamp", "hit")
+"""Steps of which several are done in one go: between them nothing is to be seen."""
+AT_ONCE, TRIES = 30, 3
+ARRIVED = {"move": 0.025, "back": 0.025, "dock": 0.05, "hang": 0.06}
+"""How far [m] from its place something may be after a step of a type."""
+TURNED = 0.25
+
+
+class Learned:
+    """A policy from what it sees and the sentence; one per connection."""
+
+    def __init__(self, spec: PolicySpec, look: Look, decide: Decide) -> None:
+        self.spec, self._look, self._decide = spec, look, decide
+        self._robot: Embodiment | None = None
+
+    def reset(self, trial: TrialInfo) -> None:
+        """Forget the trial before."""
+        self._robot = embodiment(trial.embodiment)
+        self._sentence = trial.instruction
+        self.belief: Belief | None = None
+        self._expert: Expert | None = None
+        self._steps: list[Step] = []
+        self._rows: Rows | None = None
+        self._tries = 0
+        self.log: list[tuple[Step, str]] = []
+        """Every step that was tried, and what came of it."""
+
+    def infer(self, observation: Observation) -> Rows:
+        """The next actions, float32 (T, D)."""
+        if self._robot is None:
+            raise RuntimeError("the policy was asked for actions before a reset")
+        if self.belief is None:
+            self.belief = Belief(self._robot, self._look(observation))
+        elif self._rows is not None:
+            target = self._steps[0].object if self._steps else None
+            self.belief.advance(self._rows, target, observation)
+            if self.belief.out_of_the_way():
+                self.belief.look(self._look(observation))
+        self._rows = self._next_rows(self.belief, observation)
+        return self._rows
+
+    def _next_rows(self, belief: Belief, observation: Observation) -> Rows:
+        while True:
+            if self._expert is None:
+                self._begin(belief, observation)
+            if self._expert is None:
+                break
+            rows = self._expert.next(belief.snapshot(observation, self._scene))
+            if not self._expert.finished:
+                return rows
+            self._end(belief)
+        last = observation["state"] if belief.last is None else belief.last
+        return np.asarray(last, np.float32)[None]
+
+    def _begin(self, belief: Belief, observation: Observation) -> None:
+        """Decide what is next; nothing if all is done."""
+        if self._tries == 0:
+            self._steps = self._chain(belief.state)
+        calls = calls_of(self._steps, belief.state)
+        if not calls:
+            return
+        self._scene = belief.scene()
+        snapshot = belief.snapshot(observation, self._scene)
+        self._expert = Expert(self._scene, snapshot, calls)
+        held = [None if hold is None else str(hold.number) for hold in belief.held]
+        self._expert.workspace.held = held
+
+    def _chain(self, state: State) -> list[Step]:
+        steps = [self._decide(state, self._sentence)]
+        while steps[0].type in REPEATED and len(steps) < AT_ONCE:
+            state = after(state, steps[-1])
+            more = self._decide(state, self._sentence)
+            if more.type != steps[0].type or not _alike(more, steps[0]):
+                break
+            steps.append(more)
+        return steps
+
+    def _end(self, belief: Belief) -> None:
+        """Note what came of the steps; try again what failed."""
+        assert self._expert is not None
+        failed = self._missed(belief, self._steps[0]) or "; ".join(self._expert.failures)
+        self.log += [(step, failed) for step in self._steps]
+        self._expert = None
+        self._tries += 1
+        if failed and self._tries < TRIES:
+            return
+        self._tries = 0
+        items = list(belief.state.objects)
+        for step in self._steps:
+            if step.object is not None:
+                items[step.object] = _counted(items[step.object], 1, 0)
+            if step.destination is not None:
+                items[step.destination] = _counted(items[step.destination], 0, 1)
+        belief.state = State(tuple(items), (*belief.state.done, *self._steps))
+
+    def _missed(self, belief: Belief, step: Step) -> str:
+        """What of the step did not come out; "" if all of it did."""
+        if step.object is None:
+            return ""
+        item, want = (
+            belief.state.objects[step.object],
+            after(belief.state, step).objects[step.object],
+        )
+        held = any(hold is not None and hold.number == step.object for hold in belief.held)
+        if step.type == "pick":
+            return "" if held else "not held"
+        if step.type in ARRIVED and item.visible:
+            off = math.dist(item.now.place, want.now.place)
+            return "" if off < ARRIVED[step.type] else f"{off:.3f} m off"
+        if step.type == "turn" and item.visible:
+            off = abs(math.remainder(item.now.turn - want.now.turn, 2 * math.pi))
+            return "" if off < TURNED else f"{off:.2f} rad off"
+        if step.type == "drop" and step.destination is not None:
+            away = math.dist(item.now.place[:2], want.now.place[:2])
+            return "still outside" if item.visible and away > 0.3 else ""
+        return ""
+
+
+def _alike(one: Step, other: Step) -> bool:
+    """Whether both steps are done in one go."""
+    if one.type == "press":
+        return True
+    return one.object == other.object and (
+        one.type != "stamp" or one.destination == other.destination
+    )
+
+
+def _counted(item: Tracked, acts: int, goals: int) -> Tracked:
+    return replace(item, acts=item.acts + acts, goals=item.goals + goals)
+
+
+def given(steps: Sequence[Step]) -> Decide:
+    """Decides what `steps` say, in their order."""
+
+    def decide(state: State, sentence: str) -> Step:
+        return steps[len(state.done)] if len(state.done) < len(steps) else Step("done")
+
+    return decide
