@@ -7,7 +7,7 @@ SPREAD := -n auto --maxprocesses 4 --dist loadfile
 UV_COMPILE := $(BIN)/uv pip compile pyproject.toml --universal --fork-strategy fewest \
 	--python-version 3.11 --no-header --generate-hashes -q
 
-.PHONY: help demo learn-demo test test-models test-maniskill install install-dev lint types fast sim docs format lock clean
+.PHONY: help demo learn test test-models test-maniskill install install-dev lint types fast sim docs format lock clean
 
 help: ## What can be made
 	@grep -E '^[a-z-]+:.*##' Makefile | sed -E 's/:.*## /\t/' | expand -t 14
@@ -37,8 +37,9 @@ fast: ## Tests without simulator
 sim: ## Tests that run the simulator
 	$(BIN)/pytest -m sim $(SPREAD)
 
-learn-demo: install ## Demonstrations, training, evaluation and report of a small policy (LeRobot, Python 3.12)
-	@bash scripts/learn_demo.sh demo
+learn: install ## Train the learned reference anew, from nothing, in runs/learned (needs torch; a night of two cores)
+	$(BIN)/pip install -q torch --index-url https://download.pytorch.org/whl/cpu
+	$(BIN)/robospa learn runs/learned
 
 test-models: install-dev ## LeRobot: tiny policies served, data sets loaded; in .venv-models (Python 3.12)
 	@[ -n "$$ROBOSPA_MODELS_PYTHON" ] || bash scripts/models.sh

@@ -19,8 +19,6 @@ from robospa.extras import EXTRAS, remedy
 
 POLICIES = "robospa.policies"
 """Functions that make a policy, called with the options of `robospa serve --arg`."""
-LEARNERS = "robospa.learners"
-"""Objects of `robospa.baselines.learned.learner.Learner`: what `robospa learn` trains."""
 ROBOTS = "robospa.robots"
 """Objects of `robospa.harness.robots.embodiment.Embodiment`."""
 WORLDS = "robospa.worlds"

@@ -2,22 +2,30 @@
 
 Memory is two things: all objects that were ever seen, as they were at first, and the steps done. A
 step that did not do what it should is done again.
+
+    robospa serve learned
+    robospa serve learned --option eyes=no
+
+Without eyes it is told of the objects as numbers, and privileged: the same networks but for those
+that see. So both rows side by side tell what cannot be seen from what cannot be learned.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
-from robospa.baselines.learned.act import Belief, Rows, calls_of
+from robospa.baselines.learned.act import Belief, Rows, calls_of, objects_of
 from robospa.baselines.learned.steps import Seen, State, Step, Tracked, after
 from robospa.harness.robots import embodiment
 from robospa.harness.robots.embodiment import Embodiment
 from robospa.harness.skills.expert import Expert
-from robospa.observation import Observation
+from robospa.observation import CameraSpec, Observation
+from robospa.protocol.options import option
 from robospa.protocol.policy import PolicySpec, TrialInfo
 
 Look = Callable[[Observation], list[Seen]]
@@ -155,10 +163,52 @@ def _counted(item: Tracked, acts: int, goals: int) -> Tracked:
     return replace(item, acts=item.acts + acts, goals=item.goals + goals)
 
 
-def given(steps: Sequence[Step]) -> Decide:
-    """Decides what `steps` say, in their order."""
+WEIGHTS = Path(__file__).parent / "weights"
+"""What is served where no other folder is named."""
 
-    def decide(state: State, sentence: str) -> Step:
-        return steps[len(state.done)] if len(state.done) < len(steps) else Step("done")
 
-    return decide
+@dataclass(frozen=True)
+class LearnedOptions:
+    """What is served, and whether it sees."""
+
+    path: str = option("", "folder of weights of robospa learn; empty for those that are shipped")
+    eyes: bool = option(True, "no: told of the objects as numbers (privileged)")
+
+
+class Learners:
+    """Makes a policy for each connection; all share the networks."""
+
+    def __init__(self, options: LearnedOptions) -> None:
+        from robospa.baselines.learned import perceive, point
+
+        folder = Path(options.path).expanduser() if options.path else WEIGHTS
+        pointer = point.load(folder)
+        self._decide: Decide = pointer.next_step
+        self._look: Look = told
+        names = [pointer.checkpoint]
+        if options.eyes:
+            eyes = perceive.load(folder)
+            self._look = lambda observation: eyes.look(observation["images"]["head"])
+            names.append(eyes.checkpoint)
+        self.spec = PolicySpec(
+            "learned" if options.eyes else "learned:eyes-off",
+            cameras=(CameraSpec("head"),) if options.eyes else (),
+            state="measured",
+            seeded=True,
+            environment_state=not options.eyes,
+            checkpoint=" ".join(names),
+        )
+
+    def __call__(self) -> Learned:
+        """A policy for one connection."""
+        return Learned(self.spec, self._look, self._decide)
+
+
+def told(observation: Observation) -> list[Seen]:
+    """What a policy without eyes is told."""
+    return objects_of(observation["environment_state"])
+
+
+def create(options: LearnedOptions) -> Learners:
+    """The learned reference. Raises FileNotFoundError for a folder without weights."""
+    return Learners(options)

@@ -34,7 +34,7 @@ SECTIONS = {
     },
     "Train": {
         "collect": "Collect demonstrations to train with; record one; verify a data set.",
-        "learn": "Train a policy of our own on such a data set.",
+        "learn": "Train the learned reference, a policy of our own, anew.",
     },
     "The benchmark": {
         "tasks": "List the tasks; show, draw or collect their scenes.",

@@ -40,7 +40,7 @@ def serve(
         ),
     ],
     checkpoint: Annotated[
-        Path | None, typer.Argument(help="a checkpoint of robospa learn: the path of `learned`")
+        Path | None, typer.Argument(help="weights of robospa learn: the path of `learned`")
     ] = None,
     host: Annotated[str, typer.Option(help="address to listen on")] = "127.0.0.1",
     port: Annotated[int, typer.Option(callback=PORT, help="port; 0 for any free one")] = 8000,

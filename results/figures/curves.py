@@ -1,21 +1,15 @@
-"""Curves: success against latency and against demonstrations, and the losses of a training."""
+"""Curves: success against latency."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from pathlib import Path
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from robospa.results.comparison.latency_curve import LatencyCurve
 from robospa.results.figures import series
-from robospa.results.scoring.scores import Scores
-from robospa.results.statistics.intervals import Estimate
-from robospa.trial import METRIC_NAMES
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 MOST_LETTERS = 28
@@ -54,96 +48,3 @@ def _curve_name(curve: LatencyCurve) -> str:
     if curve.half is None or not math.isfinite(curve.half.value):
         return name
     return f"{name}: half at {curve.half.value:.0f} ms"
-
-
-NAMES = {metric: f"{name} [%]" for metric, name in METRIC_NAMES.items()}
-MEAN = 0
-"""The level that is the mean over levels, as in `Scores`."""
-
-
-@dataclass(frozen=True)
-class CurvePoint:
-    """What a policy that was trained with so many demonstrations a variant came to."""
-
-    demonstrations: int
-    scores: Scores
-
-
-def value_at(point: CurvePoint, level: int, metric: str) -> Estimate | None:
-    """The mean over all tasks of a level, MEAN for all; None where there is none."""
-    average = point.scores.overall.get(level)
-    return None if average is None else average.values.get(metric)
-
-
-def draw_learning_curve(points: Sequence[CurvePoint], metric: str = "sr") -> Figure:
-    """The figure. Raises ValueError for a metric that none of the points has."""
-    points = sorted(points, key=lambda point: point.demonstrations)
-    levels = sorted({level for point in points for level in point.scores.levels})
-    if not any(value_at(point, MEAN, metric) for point in points):
-        raise ValueError(f"none of the runs has the metric {metric}: choose another")
-    figure = series.new_figure(2.1)
-    left, right = figure.subplots(1, 2, sharey=True)
-    for i, level in enumerate((*levels, MEAN)):
-        found = [(p.demonstrations, value_at(p, level, metric)) for p in points]
-        name = "mean" if level == MEAN else f"L{level}"
-        _line(left, i, name, [(x, e) for x, e in found if e])
-    for i, point in enumerate(points):
-        found = [(level, value_at(point, level, metric)) for level in levels]
-        _line(right, i, f"{point.demonstrations:,}", [(x, e) for x, e in found if e])
-    counts = [point.demonstrations for point in points]
-    left.set_xscale("log")
-    left.set_xticks(counts, [f"{count:,}" for count in counts])
-    left.minorticks_off()
-    left.set_xlabel("demonstrations a variant")
-    left.set_ylabel(NAMES.get(metric, metric))
-    right.set_xticks(levels, [f"L{level}" for level in levels])
-    right.set_xlabel("level")
-    left.set_ylim(-4, 104)
-    for axis in (left, right):
-        series.plain(axis)
-        axis.legend(loc="upper center", bbox_to_anchor=(0.5, -0.28), ncols=2, columnspacing=1.0)
-    return figure
-
-
-def _line(axis: Axes, index: int, name: str, values: Sequence[tuple[int, Estimate]]) -> None:
-    if not values:
-        return
-    series.whiskers(axis, values, index, name)
-
-
-PANEL = 1.4
-"""Height of a panel [inch]."""
-
-
-def draw_losses(rows: Sequence[Mapping[str, float]], path: Path) -> None:
-    """Write the picture of `rows`, of which each has a `step` and the same other numbers, as a
-    PNG. Those whose names end alike (loss, held_out_loss) share a panel; shares are
-    drawn from 0 to 1, all else on a logarithmic scale where it can be."""
-    names = [name for name in rows[0] if name != "step"]
-    panels: dict[str, list[str]] = {}
-    for name in names:
-        panels.setdefault(name.rpartition("_")[2], []).append(name)
-    steps = [row["step"] for row in rows]
-    with series.styled():
-        figure = series.new_figure(PANEL * len(panels) + 0.25)
-        figure.set_figwidth(2.0 * series.WIDTH)
-        axes = figure.subplots(len(panels), 1, squeeze=False, sharex=True)[:, 0]
-        for axis, (ending, members) in zip(axes, panels.items(), strict=True):
-            for i, name in enumerate(members):
-                values = [row[name] for row in rows]
-                axis.plot(
-                    steps,
-                    values,
-                    color=series.COLOURS[i % len(series.COLOURS)],
-                    marker="o",
-                    ms=2.0,
-                    label=name,
-                )
-            if ending == "share":
-                axis.set_ylim(0.0, 1.05)
-            elif min(row[name] for row in rows for name in members) > 0:
-                axis.set_yscale("log")
-            axis.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0))
-            series.plain(axis)
-        axes[-1].set_xlabel("step")
-        figure.savefig(path, dpi=200, metadata={"Software": None})

@@ -20,8 +20,7 @@ SILENT = {
     "demo": "shows how the others look",
     "serve": "runs until it is stopped",
     "view": "opens a browser",
-    "learn train": "prints the folder",
-    "learn curve": "prints the figure",
+    "learn": "prints the folder",
     "submit template": "prints a TOML file",
 }
 """Commands that report nothing to a program, and why."""
